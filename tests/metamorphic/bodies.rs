@@ -24,7 +24,7 @@ pub const KINDS: [&str; 8] = [
     "plane frame",
 ];
 
-/// A random body of one of the [`KINDS`].
+/// Returns a random body of one of the [`KINDS`].
 pub fn body(kind: usize, random: &mut Random) -> RawModel {
     let raw = match kind {
         0 => graded_block(random, MassRule::Consistent),
@@ -40,19 +40,20 @@ pub fn body(kind: usize, random: &mut Random) -> RawModel {
     RawModel { damping: damping(random), ..raw }
 }
 
-/// Damping of the model in a third of the cases.
+/// Returns damping of the model in a third of the draws.
 fn damping(random: &mut Random) -> Option<Damping<flexbody_model::RawMatrix>> {
     match pick(random, 6) {
         0 => Some(Damping::Ratio(0.02)),
-        // Named by ratios of the lowest frequencies, which all bodies but the plane frame have near one.
+        // The coefficients are chosen for lowest frequencies near one, which all bodies except the plane
+        // frame have.
         1 => Some(Damping::Rayleigh { alpha: 0.02, beta: 0.0 }),
         _ => None,
     }
 }
 
-/// A block of bricks, askew, whose stiffness and density change along it.
+/// Returns a skewed block of bricks with stiffness and density that vary along it.
 fn graded_block(random: &mut Random, rule: MassRule) -> RawModel {
-    // The points of a reduced rule must not lie on one line.
+    // The integration points of a reduced rule must not lie on one line.
     let across = if rule == MassRule::Reduced { 2 } else { 1 + pick(random, 2) as i32 };
     let cells = [3, across, 1];
     let size = [between(random, 0.3, 0.7), between(random, 0.2, 0.5), between(random, 0.1, 0.4)];
@@ -73,8 +74,8 @@ fn graded_block(random: &mut Random, rule: MassRule) -> RawModel {
     RawModel { geometric_stiffness, ..raw }
 }
 
-/// The model with interfaces `root` and `tip` of its nodes of least and largest x; `by_node`: the root is its last
-/// node. Three of the nodes may lie on one line, four do not.
+/// Returns the model with interfaces `root` and `tip` of its nodes with smallest and largest x; if `by_node`
+/// is true, the root is its last node. Three of the nodes may lie on one line, four do not.
 fn with_ends(raw: RawModel, by_node: bool) -> RawModel {
     const AT_ROOT: usize = 3;
     const AT_TIP: usize = 4;
@@ -97,7 +98,7 @@ fn with_ends(raw: RawModel, by_node: bool) -> RawModel {
     RawModel { interfaces, ..raw }
 }
 
-/// True if a node has rotations.
+/// Returns true if a node has rotations.
 pub fn turns(raw: &RawModel, id: i64) -> bool {
     raw.dofs.iter().flatten().any(|label| label.node == id && label.direction > 3)
 }

@@ -3,22 +3,22 @@
 use crate::outputs::{Along, Output, Values};
 use nalgebra::{Matrix3, Vector3};
 
-/// The map from outputs of the original to those of the transformed subject.
+/// Map from the outputs of the original to those of the transformed subject.
 #[derive(Debug, Clone)]
 pub struct Correspondence {
-    /// Turn or mirror image of the world.
+    /// Rotation or reflection of the world.
     pub world: Matrix3<f64>,
-    /// Turn or mirror image of the model.
+    /// Rotation or reflection of the model.
     pub model: Matrix3<f64>,
-    /// Place at time zero, velocity and acceleration of the old origin of the world.
+    /// Position at time zero, velocity and acceleration of the old origin of the world.
     pub shift: [Vector3<f64>; 3],
-    /// The numbers of a length, a mass and a time over those of the original.
+    /// Ratios of the new to the original numbers of a length, a mass and a time.
     pub units: [f64; 3],
-    /// Instants of the original that come before the first of the transformed subject.
+    /// Number of output times of the original before the first of the transformed subject.
     pub skipped: usize,
-    /// Instants of the transformed subject that come before the first of the original.
+    /// Number of output times of the transformed subject before the first of the original.
     pub delayed: usize,
-    /// Instants of the transformed subject for one of the original.
+    /// Number of output times of the transformed subject per one of the original.
     pub finer: usize,
     /// True if the largest values of the whole motion correspond.
     pub whole: bool,
@@ -26,7 +26,7 @@ pub struct Correspondence {
     pub allowed: f64,
 }
 
-/// Largest difference of motions that are integrated along other steps, or of models with rounded matrices.
+/// Largest relative difference of motions integrated with other steps, or of models with rounded matrices.
 pub const INTEGRATED: f64 = 2e-7;
 
 impl Default for Correspondence {
@@ -46,18 +46,18 @@ impl Default for Correspondence {
 }
 
 impl Correspondence {
-    /// The factor of a quantity with these exponents of length, mass and time.
+    /// Returns the factor of a quantity with these exponents of length, mass and time.
     fn factor(&self, unit: [i32; 3]) -> f64 {
         self.units.iter().zip(unit).map(|(factor, exponent)| factor.powi(exponent)).product()
     }
 
-    /// The matrix of vectors along these axes.
+    /// Returns the matrix for vectors along these axes.
     fn turn(&self, along: Along, axial: bool) -> Matrix3<f64> {
         let matrix = if along == Along::World { self.world } else { self.model };
         if axial { matrix * matrix.determinant() } else { matrix }
     }
 
-    /// The values that the transformed subject must have, given those of the original at its times.
+    /// Returns the values that the transformed subject must have, from those of the original at its times.
     pub fn expected(&self, output: &Output, times: &[f64]) -> Values {
         let factor = self.factor(output.unit);
         let [place, velocity, acceleration] = self.shift;
@@ -84,7 +84,7 @@ impl Correspondence {
         }
     }
 
-    /// The number below which differences of this output do not count.
+    /// Returns the number below which differences of this output do not count.
     pub fn least(&self, output: &Output) -> f64 {
         output.least * self.factor(output.unit)
     }

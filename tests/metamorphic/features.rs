@@ -1,10 +1,10 @@
-//! Features of a scene, each of which can be told and taken away.
+//! Features of a scene, each of which can be detected and removed.
 
 use crate::subject::Subject;
 use flexbody_motion::scene::{Attachment, Drive, History, Load, Point, VectorHistory};
 use nalgebra::Vector3;
 
-/// Names of the features of a subject, ascending.
+/// Returns the names of the features of a subject, ascending.
 pub fn features(subject: &Subject) -> Vec<&'static str> {
     let scene = &subject.scene;
     let initial = &scene.initial;
@@ -61,12 +61,12 @@ pub fn features(subject: &Subject) -> Vec<&'static str> {
     found.into_iter().map(|(name, _)| name).collect()
 }
 
-/// True of kinds of bodies with a singular mass matrix.
+/// Returns true for bodies with a singular mass matrix.
 pub fn has_singular_mass(subject: &Subject) -> bool {
     subject.kind.contains("singular") || subject.kind.contains("massless")
 }
 
-/// The factor of a vector along one direction.
+/// Returns the factor of a vector along one direction.
 fn factor(history: &VectorHistory) -> Option<&History> {
     match history {
         VectorHistory::Along { factor, .. } => Some(factor),

@@ -1,7 +1,7 @@
-//! The metamorphic matrix: scene features crossed with transformations that must not change the physics, crossed with
+//! Metamorphic matrix: scene features crossed with transformations that must not change the physics, and with
 //! the commands that judge a motion.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod bodies;
 mod commands;
@@ -18,10 +18,10 @@ mod subject;
 mod text;
 mod transformations;
 
-/// Crossings of the plain test: about half a minute on two cores.
+/// Number of crossings of the plain test: about half a minute on two cores.
 const FEW: u64 = 30;
 
-/// Crossings of the slow test: within three minutes on two cores.
+/// Number of crossings of the slow test: within three minutes on two cores.
 const MANY: u64 = 200;
 
 #[test]

@@ -1,4 +1,4 @@
-//! The runner of the crossings.
+//! Runner of the crossings.
 
 use crate::commands::{self, Command};
 use crate::draws::{one_in, pick, stream};
@@ -16,18 +16,18 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// The value of an environment variable, or `usual`.
+/// Returns the value of an environment variable, or `usual`.
 fn asked(name: &str, usual: u64) -> u64 {
     std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(usual)
 }
 
-/// Longest search for the smallest scene of a violation.
+/// Time limit of the search for the smallest scene of a violation.
 const LONGEST: Duration = Duration::from_secs(40);
 
-/// Crossings that take longer are named.
+/// Crossings that take longer are listed by name.
 const SLOW: Duration = Duration::from_secs(5);
 
-/// One scene, one transformation, one command.
+/// A crossing of one scene, one transformation and one command.
 #[derive(Debug, Clone, Copy)]
 struct Crossing {
     seed: u64,
@@ -41,19 +41,20 @@ enum Outcome {
     Apart,
     /// Both subjects are refused for the same reason.
     Refused(String),
-    /// The outputs correspond, with this part of the allowed difference; an output that is open may not.
+    /// The outputs correspond, up to this fraction of the allowed difference; the violation of an open output
+    /// is allowed.
     Same(f64, Option<Violation>),
-    /// They do not.
+    /// The outputs do not correspond.
     Violated(Violation),
 }
 
-/// True of an output that is known to depend on axes.
+/// Returns true for an output that is known to depend on axes.
 fn is_open(name: &str) -> bool {
     commands::OPEN.iter().any(|open| name.contains(open))
 }
 
-/// Outcome of a refusal. Random scenes are sound, but for a torque where nothing follows a rotation (FB212) and bodies
-/// that `trade --reference nodal` is not for (FB801).
+/// Returns the outcome of an error. Random scenes are valid except for a torque at a point without rotation
+/// (FB212), and bodies that `trade --reference nodal` does not support (FB801).
 fn refused(error: &Error) -> Outcome {
     match code(error) {
         code if ["FB212", "FB801"].contains(&&*code) => Outcome::Refused(code),
@@ -61,19 +62,19 @@ fn refused(error: &Error) -> Outcome {
     }
 }
 
-/// A violation by the outcome itself.
+/// Returns a violation without numbers.
 fn violated(detail: String) -> Outcome {
     Outcome::Violated(Violation { output: "outcome".to_owned(), size: f64::INFINITY, detail })
 }
 
-/// Codes of an error.
+/// Returns the codes of an error.
 fn code(error: &Error) -> String {
     commands::codes(error.diagnostics())
 }
 
 impl Crossing {
-    /// The crossing of a number: transformations take turns, and half of all is `simulate`, whose outputs say most; with
-    /// `FLEXBODY_SIMULATED_CROSSINGS` all of them.
+    /// Returns the crossing of a number. Transformations alternate, and half of all crossings run `simulate`,
+    /// which has the most outputs; with `FLEXBODY_SIMULATED_CROSSINGS` all of them.
     fn of(number: u64) -> Self {
         let random = &mut stream(number, 7);
         let transformation = number as usize % transformations::ALL.len();
@@ -88,7 +89,7 @@ impl Crossing {
         (transformations::ALL[self.transformation].name, commands::ALL[self.command].name)
     }
 
-    /// The pair of the scene, with the second case transformed alike.
+    /// Returns the pair of the scene, with the second case transformed in the same way.
     fn pair(&self, subject: &Subject) -> Result<Option<Pair>> {
         let of = |subject: &Subject| {
             (transformations::ALL[self.transformation].apply)(subject, &mut stream(self.seed, 3))
@@ -101,7 +102,7 @@ impl Crossing {
         Ok(Some(pair))
     }
 
-    /// True of an output that the transformation must not change.
+    /// Returns true for an output that the transformation must not change.
     fn counts(&self, name: &str) -> bool {
         let changed = |(output, by): &(&str, &str)| name.contains(output) && *by == self.names().0;
         !is_open(name) && !commands::CHANGED.iter().any(changed)
@@ -128,7 +129,7 @@ impl Crossing {
         }
     }
 
-    /// A violation with the smallest scene that shows it.
+    /// Returns a violation with the smallest scene that shows it.
     fn told(&self, subject: &Subject, found: &Violation) -> String {
         let started = Instant::now();
         let fails = |subject: &Subject| {
@@ -165,7 +166,7 @@ impl Crossing {
 struct Run {
     /// Features of the scene.
     features: Vec<&'static str>,
-    /// The outcome; of a violation with the smallest scene in its detail.
+    /// Outcome; for a violation the detail contains the smallest scene.
     outcome: Outcome,
 }
 
@@ -190,16 +191,17 @@ impl Run {
 /// Counts and violations of many crossings.
 #[derive(Default)]
 struct Matrix {
-    /// Crossings of feature and transformation.
+    /// Number of crossings of feature and transformation.
     counts: BTreeMap<(&'static str, &'static str), usize>,
-    /// Crossings of transformation and command.
+    /// Number of crossings of transformation and command.
     commands: BTreeMap<(&'static str, &'static str), usize>,
     /// Largest differences by transformation.
     largest: BTreeMap<&'static str, f64>,
     refused: BTreeMap<String, usize>,
     apart: usize,
     scenes: usize,
-    /// Differences of open outputs by output and transformation: their number, and the first with its crossing.
+    /// Differences of open outputs by output and transformation: number, and first difference with its
+    /// crossing.
     open: BTreeMap<(String, &'static str), (usize, u64, String)>,
     violations: Vec<String>,
 }
@@ -226,7 +228,7 @@ impl Matrix {
         }
     }
 
-    /// The counts as a table.
+    /// Returns the counts as a table.
     fn table(&self) -> String {
         let mut table = String::new();
         let crossings: usize = self.counts.values().sum();
@@ -270,10 +272,11 @@ impl Matrix {
     }
 }
 
-/// Runs `few` crossings from number `first` on, or those that `FLEXBODY_CROSSINGS` and `FLEXBODY_FIRST_CROSSING` ask for.
+/// Runs `few` crossings from number `first` on, or those requested by `FLEXBODY_CROSSINGS` and
+/// `FLEXBODY_FIRST_CROSSING`.
 ///
 /// # Panics
-/// With the smallest scene of every violation.
+/// Panics with the smallest scene of every violation.
 pub fn hold(first: u64, few: u64) {
     let (first, crossings) = (asked("FLEXBODY_FIRST_CROSSING", first), asked("FLEXBODY_CROSSINGS", few));
     let started = Instant::now();

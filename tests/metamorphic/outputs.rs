@@ -1,9 +1,9 @@
-//! Outputs of a command in a form that transformations act on.
+//! Outputs of a command in a form to which transformations apply.
 
 use crate::correspondence::Correspondence;
 use nalgebra::{Matrix3, Vector3};
 
-/// Axes that a vector is along.
+/// Axes of a vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Along {
     /// Axes that are fixed in space.
@@ -12,21 +12,21 @@ pub enum Along {
     Model,
 }
 
-/// Values of an output, at the instants of a motion or once.
+/// Values of an output, at each output time or once.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
-    /// Vectors; an axial one turns over in a mirror.
+    /// Vectors; axial vectors change sign under reflection.
     Vectors {
-        /// Axes.
+        /// Axes of the components.
         along: Along,
-        /// True of angular velocities and torques.
+        /// True for angular velocities and torques.
         axial: bool,
-        /// The vectors.
+        /// Vector at each output time.
         rates: Vec<Vector3<f64>>,
     },
-    /// Rotations from axes of the model to those of the world.
+    /// Rotations from model axes to world axes.
     Attitudes(Vec<Matrix3<f64>>),
-    /// Numbers.
+    /// Numbers without direction.
     Numbers(Vec<f64>),
     /// Decisions, counts and codes of findings, in words.
     Facts(String),
@@ -35,17 +35,17 @@ pub enum Values {
 /// An output of a command.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
-    /// Name.
+    /// Name of the output.
     pub name: String,
     /// Exponents of length, mass and time.
     pub unit: [i32; 3],
-    /// The values.
+    /// Values of the output.
     pub values: Values,
-    /// Number of time derivatives of a place of the world; `None` of what does not move with the world.
+    /// Number of time derivatives of a world position; `None` for quantities that do not move with the world.
     pub derivative: Option<u8>,
-    /// Size from which differences are measured where the values are smaller.
+    /// Smallest scale for relative differences.
     pub least: f64,
-    /// True if there is a value for each instant.
+    /// True if there is a value for each output time.
     pub by_instant: bool,
     /// Factor of the allowed difference.
     pub slack: f64,
@@ -54,9 +54,9 @@ pub struct Output {
 /// All outputs of a command.
 #[derive(Debug, Clone, Default)]
 pub struct Outputs {
-    /// Instants.
+    /// Output times.
     pub times: Vec<f64>,
-    /// Outputs.
+    /// Outputs of the command.
     pub all: Vec<Output>,
 }
 
@@ -65,14 +65,14 @@ pub struct Outputs {
 pub struct Violation {
     /// Name of the output.
     pub output: String,
-    /// Difference over the allowed one.
+    /// Difference divided by the allowed difference.
     pub size: f64,
     /// The two values, in words.
     pub detail: String,
 }
 
 impl Values {
-    /// Values from `first`, one in `every`, at the most `count`.
+    /// Returns one of every `every` values from `first` on, at most `count`.
     fn picked(&self, first: usize, every: usize, count: usize) -> Self {
         fn some<T: Clone>(all: &[T], first: usize, every: usize, count: usize) -> Vec<T> {
             all.iter().skip(first).step_by(every).take(count).cloned().collect()
@@ -87,7 +87,7 @@ impl Values {
         }
     }
 
-    /// Number of values.
+    /// Returns the number of values.
     fn len(&self) -> usize {
         match self {
             Self::Vectors { rates, .. } => rates.len(),
@@ -97,7 +97,7 @@ impl Values {
         }
     }
 
-    /// Size of the largest value.
+    /// Returns the size of the largest value.
     fn size(&self) -> f64 {
         let sizes: Vec<f64> = match self {
             Self::Vectors { rates, .. } => rates.iter().map(|x| x.norm()).collect(),
@@ -107,7 +107,7 @@ impl Values {
         sizes.into_iter().fold(0.0, f64::max)
     }
 
-    /// Distances from other values.
+    /// Returns the distances to other values.
     fn distances(&self, other: &Self) -> Vec<f64> {
         match (self, other) {
             (Self::Vectors { rates: a, .. }, Self::Vectors { rates: b, .. }) => {
@@ -122,7 +122,7 @@ impl Values {
         }
     }
 
-    /// One value in words.
+    /// Returns one value in words.
     fn word(&self, at: usize) -> String {
         match self {
             Self::Vectors { rates, .. } => format!("{:?}", rates[at].as_slice()),
@@ -134,8 +134,8 @@ impl Values {
 }
 
 impl Outputs {
-    /// The worst violation of `map` by the outputs `found` of a transformed subject, among those whose name `counts`,
-    /// and the largest difference over the allowed one.
+    /// Returns the worst violation of `map` by the outputs `found` of a transformed subject, among outputs
+    /// for which `counts` returns true, and the largest difference over the allowed one.
     pub fn compare(
         &self,
         found: &Self,
@@ -149,7 +149,7 @@ impl Outputs {
             }
             let violation = match found.all.iter().find(|other| other.name == own.name) {
                 Some(other) => self.compare_output(own, other, map),
-                // What is said of an enriched body has a longer name: whether one is enriched is open.
+                // Outputs of an enriched body have a longer name; enrichment itself may differ.
                 None if found.all.iter().any(|other| other.name.starts_with(&own.name)) => continue,
                 None => {
                     Violation { output: own.name.clone(), size: f64::INFINITY, detail: "missing".to_owned() }

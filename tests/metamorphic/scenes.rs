@@ -1,4 +1,4 @@
-//! Random scenes: every feature that a scene has, each on or off.
+//! Random scenes: every feature of a scene is randomly present or absent.
 
 use crate::bodies::{self, KINDS, turns};
 use crate::draws::{axis, between, direction, one_in, pick, stream};
@@ -18,13 +18,13 @@ use oracle::random::Random;
 use oracle::scenes::nothing_happens;
 use std::f64::consts::TAU;
 
-/// Largest deflection by the loads, relative to the extent of the body.
+/// Largest deflection under the loads, relative to the extent of the body.
 const DEFLECTION: f64 = 2e-3;
 
-/// Tolerance of an integration.
+/// Relative tolerance of the time integration.
 const TOLERANCE: f64 = 1e-12;
 
-/// Modes of a body.
+/// Number of modes of a body.
 const MODES: usize = 8;
 
 /// Generator of a scene: a source of random numbers and the scales of the body.
@@ -42,10 +42,10 @@ struct Scales<'r> {
     dimension: usize,
 }
 
-/// The subject of a seed.
+/// Returns the subject of a seed.
 ///
 /// # Errors
-/// Errors of the conversion and of the motion that loads are scaled by.
+/// The errors of the conversion and of the motion that scales the loads.
 pub fn subject(seed: u64) -> Result<Subject> {
     let random = &mut stream(seed, 1);
     let kind = pick(random, KINDS.len());
@@ -101,7 +101,7 @@ impl Scales<'_> {
         Ok(scene)
     }
 
-    /// The start, and what prescribes the motion of the frame.
+    /// Sets the initial state and the prescribed motion of the frame.
     fn moving(&mut self, scene: &mut Scene, raw: &RawModel) {
         let speed = between(self.random, 0.005, 0.05) * self.rate;
         if one_in(self.random, 2) {
@@ -135,7 +135,7 @@ impl Scales<'_> {
         }
     }
 
-    /// The attitude at the start that `attitude_from` has, for columns along axes of the model.
+    /// Returns the initial attitude that `attitude_from` needs, for columns along axes of the model.
     fn attitude(
         &mut self,
         velocity: &VectorHistory,
@@ -149,7 +149,7 @@ impl Scales<'_> {
         Some(RotationVector(axis(self.random, self.dimension) * between(self.random, 0.1, 2.5)))
     }
 
-    /// An angular velocity of about this size over time, and its axes.
+    /// Returns an angular velocity of about this size over time, and its axes.
     fn turning(&mut self, speed: f64) -> (VectorHistory, Axes) {
         let world = one_in(self.random, 2);
         let axes = if world { Axes::World } else { Axes::Model };
@@ -167,7 +167,7 @@ impl Scales<'_> {
         (velocity, axes)
     }
 
-    /// Three columns of a smooth vector of about this size; of a rotation in the plane about z.
+    /// Returns three columns of a smooth vector of about this size; a plane rotation is about z.
     fn columns(&mut self, size: f64, turns: bool) -> VectorHistory {
         const ROWS: usize = 9;
         let mut value = || match (self.dimension, turns) {
@@ -197,7 +197,7 @@ impl Scales<'_> {
         Carried { by, spin, translation }
     }
 
-    /// A motion of what carries the body that deflects it by about [`DEFLECTION`].
+    /// Returns a motion of the carrier that deflects the body by about [`DEFLECTION`].
     fn drive(&mut self) -> Drive {
         let acceleration = DEFLECTION * self.extent * self.rate * self.rate;
         let frequency = between(self.random, 0.1, 1.5) * self.rate / TAU;
@@ -215,7 +215,7 @@ impl Scales<'_> {
         }
     }
 
-    /// A load of about unit size.
+    /// Returns a load of about unit size.
     fn load(&mut self, raw: &RawModel) -> Load {
         let node = raw.nodes.ids[pick(self.random, raw.nodes.len())];
         let at = match one_in(self.random, 3) {
@@ -241,7 +241,7 @@ impl Scales<'_> {
         Load { at, force, torque, axes: [Axes::World, Axes::Model][pick(self.random, 2)] }
     }
 
-    /// A history of about unit size.
+    /// Returns a history of about unit size.
     fn history(&mut self) -> History {
         let frequency = between(self.random, 0.1, 2.0) * self.rate / TAU;
         let part = between(self.random, 0.3, 1.0);
@@ -261,13 +261,14 @@ impl Scales<'_> {
         }
     }
 
-    /// Damping of the scene, and tolerances.
+    /// Sets damping and tolerances of the scene.
     fn demands(&mut self, scene: &mut Scene) {
         scene.requirements.damping = one_in(self.random, 3).then_some(0.02.into());
-        // The models may have a damping of their own.
+        // The models may have damping of their own.
         scene.requirements.replaces_damping = true;
         if one_in(self.random, 4) {
-            // Above the rates of all scenes; a body that is held has no stiffness left at far higher ones.
+            // The limit exceeds the rates of all scenes; far higher rates would leave a held body without
+            // stiffness.
             let spin = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
             let carried = spin.map(|spin| 1.3 * spin.velocity.largest_until(f64::INFINITY).0);
             let allowed = carried.unwrap_or(0.15 * self.rate);
@@ -286,7 +287,7 @@ impl Scales<'_> {
     }
 }
 
-/// Makes the loads so large that they deflect the free body by [`DEFLECTION`].
+/// Scales the loads so that they deflect the free body by [`DEFLECTION`].
 fn scale_loads(scene: &mut Scene, probe: &FlexBody) -> Result<()> {
     if scene.loads.is_empty() {
         return Ok(());
@@ -302,7 +303,7 @@ fn scale_loads(scene: &mut Scene, probe: &FlexBody) -> Result<()> {
     Ok(())
 }
 
-/// A load times a factor.
+/// Returns a load times a factor.
 pub fn scaled(load: &Load, factor: f64) -> Load {
     Load { force: load.force.scaled(factor), torque: load.torque.scaled(factor), ..load.clone() }
 }

@@ -1,10 +1,10 @@
-//! The smallest scene that still shows a violation.
+//! Search for the smallest scene that still shows a violation.
 
 use crate::subject::{Basis, Subject};
 use flexbody_motion::scene::{Attachment, Axes, History, MotionRange, Scene, VectorHistory};
 use nalgebra::Vector3;
 
-/// Drops features as long as `fails` holds; gives the last subject for which it does.
+/// Drops features as long as `fails` returns true; returns the last subject that fails.
 pub fn smallest(subject: &Subject, fails: impl Fn(&Subject) -> bool) -> Subject {
     let mut smallest = subject.clone();
     loop {
@@ -16,7 +16,7 @@ pub fn smallest(subject: &Subject, fails: impl Fn(&Subject) -> bool) -> Subject 
     }
 }
 
-/// The subject with one thing less, for each thing.
+/// Returns the subject with one feature less, for each feature.
 fn simplifications(subject: &Subject) -> Vec<Subject> {
     let mut all = Vec::new();
     let mut model = |change: &dyn Fn(&mut Subject)| {
@@ -41,7 +41,7 @@ fn simplifications(subject: &Subject) -> Vec<Subject> {
     all
 }
 
-/// Scenes with one thing less.
+/// Returns scenes with one feature less.
 fn simpler_scenes(scene: &Scene) -> Vec<Scene> {
     let mut all: Vec<Scene> = Vec::new();
     let mut with = |change: &dyn Fn(&mut Scene)| {
@@ -93,7 +93,7 @@ fn for_histories(scene: &mut Scene, change: fn(&VectorHistory) -> VectorHistory)
     });
 }
 
-/// A constant of about the same size.
+/// Returns a constant of about the same size.
 fn constant(history: &VectorHistory) -> VectorHistory {
     match history {
         VectorHistory::Along { direction, factor } => VectorHistory::Along {

@@ -7,7 +7,7 @@ use oracle::elements::Material;
 use oracle::mesh::{Mesh, entries};
 use oracle::reference::dense;
 
-/// Eigenvalues of K below this part of the largest are those of rigid motion.
+/// Eigenvalues of K below this part of the largest belong to rigid motions.
 const RIGID: f64 = 1e-10;
 
 fn matrix(a: &CscMatrix) -> DMatrix<f64> {
@@ -15,8 +15,8 @@ fn matrix(a: &CscMatrix) -> DMatrix<f64> {
     DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
 }
 
-/// K_geo of a unit of every product of two components of an angular velocity about the centre of mass, of a model of
-/// these parts.
+/// Returns K_geo for a unit of every product of two components of an angular velocity about the centre of
+/// mass, for a model of these parts.
 pub fn of_spin(raw: &RawModel, parts: &[(Mesh, Material)]) -> Vec<GeometricStiffness<RawMatrix>> {
     let (stiffness, mass) = (matrix(&raw.stiffness.matrix), matrix(&raw.mass.matrix));
     let n = raw.nodes.len();
@@ -27,7 +27,7 @@ pub fn of_spin(raw: &RawModel, parts: &[(Mesh, Material)]) -> Vec<GeometricStiff
     let centre = Vector3::from_fn(|k, _| unit(k).dot(&(&mass * &field)) / total);
     let arm = |i: usize| place(i) - centre;
 
-    // Rigid motions about the centre of mass, to balance the forces with.
+    // Rigid motions about the centre of mass, used to balance the forces.
     let mut rigid = DMatrix::zeros(3 * n, 6);
     for i in 0..n {
         rigid.view_mut((3 * i, 0), (3, 3)).fill_with_identity();
@@ -47,7 +47,7 @@ pub fn of_spin(raw: &RawModel, parts: &[(Mesh, Material)]) -> Vec<GeometricStiff
     };
     let of_load = |component: usize| {
         let (k, l) = LoadKind::SPIN[component];
-        // w x (w x x) for the coefficient of w_k w_l.
+        // Coefficient of w_k w_l in w x (w x x).
         let centripetal = |x: Vector3<f64>| match k == l {
             true => Vector3::ith(k, x[k]) - x,
             false => Vector3::ith(k, x[l]) + Vector3::ith(l, x[k]),

@@ -1,4 +1,4 @@
-//! A model with the scene that it is put into.
+//! A model with its scene.
 
 use crate::text;
 use flexbody_base::error::Result;
@@ -14,7 +14,7 @@ use flexbody_motion::scene::{LoadCases, Scene};
 /// Modes of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Basis {
-    /// The lowest free modes.
+    /// Number of lowest free modes.
     Lowest(usize),
     /// All free modes: a complete basis.
     All,
@@ -27,17 +27,17 @@ pub enum Basis {
 pub struct Subject {
     /// Name of the kind of body.
     pub kind: &'static str,
-    /// The model.
+    /// Model before its checks.
     pub raw: RawModel,
     /// Modes of the conversion.
     pub basis: Basis,
     /// Frame of the conversion.
     pub frame: BodyFrame,
-    /// The scene.
+    /// Scene of the first load case.
     pub scene: Scene,
-    /// Number of load cases that are the scene.
+    /// Number of load cases that repeat the scene.
     pub cases: usize,
-    /// Another load case.
+    /// A different load case.
     pub second: Option<Scene>,
     /// True if the body is written and read before use.
     pub stored: bool,
@@ -46,15 +46,15 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// The checked model.
+    /// Returns the checked model.
     ///
     /// # Errors
-    /// Errors of [`FeModel::from_raw`].
+    /// The errors of [`FeModel::from_raw`].
     pub fn model(&self) -> Result<FeModel> {
         Ok(FeModel::from_raw(self.raw.clone())?.model)
     }
 
-    /// Settings of the conversion.
+    /// Returns the settings of the conversion.
     pub fn settings(&self) -> ConvertSettings {
         let wanted = match self.basis {
             Basis::Lowest(count) => count,
@@ -73,10 +73,10 @@ impl Subject {
         }
     }
 
-    /// The body.
+    /// Returns the converted body.
     ///
     /// # Errors
-    /// Errors of the conversion, and of the file.
+    /// The errors of the conversion and of the file.
     pub fn body(&self) -> Result<FlexBody> {
         let body = convert(&self.model()?, &self.settings(), &Context::QUIET)?.body;
         if !self.stored {
@@ -88,10 +88,10 @@ impl Subject {
         flexbody_file::read(&path)
     }
 
-    /// The load cases.
+    /// Returns the load cases.
     ///
     /// # Errors
-    /// Errors of the scene file.
+    /// The errors of the scene file.
     pub fn scenes(&self) -> Result<Vec<Scene>> {
         if !self.written {
             return Ok(self.with_second(vec![self.scene.clone(); self.cases]));
@@ -105,7 +105,7 @@ impl Subject {
         scenes
     }
 
-    /// Number of dimensions of the model.
+    /// Returns the number of dimensions of the model.
     pub fn dimension(&self) -> usize {
         usize::from(self.raw.dimension)
     }

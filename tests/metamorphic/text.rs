@@ -1,4 +1,4 @@
-//! A scene as the files that a user would write.
+//! Scenes written as files like those of a user.
 
 use flexbody_motion::scene::{
     Attachment, Axes, Drive, History, Load, Point, Range, Samples, Scene, Scheme, VectorHistory,
@@ -8,7 +8,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The scene file, and the tables beside it by name.
+/// The scene file, and its tables by name.
 #[derive(Debug, Default)]
 pub struct Text {
     /// The scene file.
@@ -17,7 +17,7 @@ pub struct Text {
     pub tables: Vec<(String, String)>,
 }
 
-/// Writes a scene into a folder; gives the place of the scene file.
+/// Writes a scene into a folder; returns the path of the scene file.
 pub fn write(scene: &Scene, folder: &Path) -> PathBuf {
     let text = Text::of(scene);
     for (name, table) in &text.tables {
@@ -43,7 +43,7 @@ fn list(values: impl Iterator<Item = f64>) -> String {
     format!("[{}]", values.map(|x| format!("{x:?}")).collect::<Vec<_>>().join(", "))
 }
 
-/// A history times a factor.
+/// Returns a history times a factor as text.
 fn history(history: &History, factor: f64) -> String {
     match history.scaled(factor) {
         History::Constant(value) => format!("{value:?}"),
@@ -65,7 +65,7 @@ fn history(history: &History, factor: f64) -> String {
 }
 
 impl Text {
-    /// The text of a scene.
+    /// Returns the text of a scene.
     pub fn of(scene: &Scene) -> Self {
         let mut text = Self::default();
         text.head(scene);
@@ -102,7 +102,7 @@ impl Text {
         }
         let demands = &scene.requirements;
         if let Some(ratios) = &demands.damping {
-            // One ratio: no scene is drawn with bands.
+            // Damping is a single ratio: random scenes have no bands.
             self.line(&format!("[damping]\nratio = {ratios}\nreplace = {}", demands.replaces_damping));
         }
         if let Some(Range::Any(length)) = demands.motion.angular_velocity {
@@ -154,7 +154,7 @@ impl Text {
         }
     }
 
-    /// A rotation: axis and rate, or columns.
+    /// Writes a rotation: axis and rate, or columns.
     fn turning(&mut self, velocity: &VectorHistory, axes: Axes) {
         match velocity {
             VectorHistory::Along { direction, factor } => {
@@ -203,7 +203,7 @@ impl Text {
         }
     }
 
-    /// Force and torque, each a load of its own.
+    /// Writes force and torque as separate loads.
     fn load(&mut self, load: &Load) {
         for (name, vector_history) in [("force", &load.force), ("torque", &load.torque)] {
             if vector_history.is_nothing() {
@@ -223,7 +223,7 @@ impl Text {
         }
     }
 
-    /// Writes columns into a table; gives the reference to it.
+    /// Writes columns into a table; returns the reference to it.
     fn columns(&mut self, columns: &Samples<3>) -> String {
         let name = format!("columns{}.csv", self.tables.len() + 1);
         let mut table = String::from("t,x,y,z\n");

@@ -1,6 +1,6 @@
-//! Every broken input of `fixtures/cases/` gives exactly the report that stands in it and the exit code of the table, and
-//! leaves nothing behind. `fixtures/cases/README.md` describes the form of a case; a new one needs no code.
-//! `FLEXBODY_BLESS=1 cargo test --test program bad_input` writes the reports; read the difference.
+//! Every broken input of `fixtures/cases/` gives exactly its recorded report and the exit code of the table,
+//! and leaves no files. `fixtures/cases/README.md` describes the form of a case; a new one needs no code.
+//! `FLEXBODY_BLESS=1 cargo test --test program bad_input` writes the reports; review the difference.
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
@@ -16,7 +16,7 @@ fn subfolders(folder: &Path) -> Vec<PathBuf> {
     paths.filter(|path| path.is_dir()).collect()
 }
 
-/// Bodies of four modes, each made when it is first asked for.
+/// Bodies of four modes, made on first use.
 struct Bodies(TempDir);
 
 impl Bodies {
@@ -33,18 +33,18 @@ impl Bodies {
     }
 }
 
-/// What the program did with a case.
+/// Result of the program for a case.
 struct Run {
     report: String,
     exit: Option<i32>,
-    /// Names of what it wrote to the place of its result.
+    /// Names of files at the place of the result.
     results: Vec<String>,
-    /// Whether a command writes its result to a file.
+    /// True if the command writes its result to a file.
     writes: bool,
     changed_inputs: bool,
 }
 
-/// The option for the result of a command and the name of its file; an audit tells its result.
+/// Returns the option for the result of a command and the name of its file; an audit prints its result.
 fn result_option(command: &str) -> Option<(&'static str, &'static str)> {
     match command {
         "convert" | "assemble" | "simulate" | "view" | "export" => Some(("--output", "body.flex.h5")),
@@ -85,7 +85,7 @@ fn run(case: &Case, bodies: &Bodies) -> Run {
     }
 }
 
-/// The exit code of the first error; a report without one is a success with warnings.
+/// Returns the exit code of the first error; a report without errors is a success with warnings.
 fn promised_exit(report: &str) -> i32 {
     let first = report.lines().find_map(|line| line.strip_prefix("error[")).map(|rest| &rest[..5]);
     first.map_or(0, |id| {
@@ -94,7 +94,7 @@ fn promised_exit(report: &str) -> i32 {
     })
 }
 
-/// What is wrong with one run, empty when nothing is.
+/// Returns the defects of a run; empty if there are none.
 fn problems(run: &Run, id: &str, expected: &str) -> Vec<String> {
     let Run { report, exit, results, .. } = run;
     let mut wrong = Vec::new();
@@ -134,7 +134,7 @@ fn every_broken_input_gives_the_report_that_stands_in_it() {
     assert!(wrong.is_empty(), "{} problems:\n\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// Codes that no files and no command line reach, with the test that does.
+/// Codes that no file and no command line triggers, with the test that does.
 const ELSEWHERE: &[(&str, &str)] = &[
     ("FB104", "crates/file/tests/file/store_output.rs"),
     ("FB105", "tests/program/command_line.rs"),
@@ -197,7 +197,7 @@ fn no_case_repeats_a_file() {
             assert!(same.is_none(), "{place} is a copy of {}", same.unwrap_or_default());
         }
     }
-    // What belongs to no case is left over from one.
+    // A folder without a case is a leftover.
     for folder in subfolders(&fixtures().join("cases/files")) {
         let name = folder.file_name().expect("a name").to_string_lossy().into_owned();
         assert!(fixtures().join("cases").join(format!("{name}.toml")).exists(), "{name} belongs to no case");

@@ -1,6 +1,6 @@
-//! Modes that a cluster finds: what `prepare` writes, and what `assemble` makes of a result or refuses. The
-//! results are written here as the driver writes them, from modes of the built-in solver; `tests/peers` runs
-//! the driver itself.
+//! Modes computed on a cluster: the files of `prepare`, and the bodies that `assemble` makes or refuses. The
+//! tests write results in the form of the driver, from modes of the built-in solver; `tests/peers` runs the
+//! driver itself.
 
 use crate::program::flexbody;
 use faer::Mat;
@@ -32,7 +32,7 @@ fn manifest(model: &str) -> PathBuf {
     fixtures().join("models").join(model).join("model.toml")
 }
 
-/// The two lines of a file of the cluster.
+/// Returns the two lines of a file of the cluster: head with checksum, and body.
 fn sealed(format: &str, content: &Value) -> String {
     let body = content.to_string();
     let head = json!({ "format": format, "version": 1, "sha256": sha256_hex(body.as_bytes()) });
@@ -44,7 +44,7 @@ fn content(path: &Path) -> Value {
     serde_json::from_str(text.lines().nth(1).expect("two lines")).expect("JSON")
 }
 
-/// X' M X of X = [rigid modes, e_b x modes for each axis b, modes] of a solid.
+/// Returns X' M X of X = [rigid modes, e_b x modes for each axis b, modes] of a solid.
 fn condensed(model: &FeModel, modes: &Mat<f64>) -> Mat<f64> {
     let rigid = rigid_modes(model, &model.pencil()).expect("rigid modes");
     let (n, count, first) = (modes.nrows(), modes.ncols(), rigid.ncols());
@@ -62,7 +62,7 @@ fn condensed(model: &FeModel, modes: &Mat<f64>) -> Mat<f64> {
     x.transpose() * model.pencil().apply_mass(x.as_ref())
 }
 
-/// Columns as PETSc writes vectors.
+/// Returns columns in the vector format of PETSc.
 fn petsc(columns: &Mat<f64>) -> Vec<u8> {
     let mut bytes = Vec::new();
     for j in 0..columns.ncols() {
@@ -74,7 +74,7 @@ fn petsc(columns: &Mat<f64>) -> Vec<u8> {
 }
 
 impl Job {
-    /// `job` is prepared of a model of solids, whose rows are written in the order of the model.
+    /// Prepares `job` from a model of solids, whose rows are written in the order of the model.
     fn new(model: &str) -> Self {
         let place = tempfile::tempdir().expect("a folder");
         let path = manifest(model).display().to_string();
@@ -100,7 +100,7 @@ impl Job {
         self.place.path().join("job").join(name)
     }
 
-    /// Writes the result as it stands.
+    /// Writes the result with matching checksums.
     fn write(&mut self) {
         let bytes = petsc(&self.vectors);
         self.result["modes_sha256"] = sha256_hex(&bytes).into();
@@ -116,7 +116,7 @@ impl Job {
         fs::write(self.path("result.jsonl"), sealed("flexbody-result", &self.result)).expect("written");
     }
 
-    /// Runs `assemble` with more words; exit code and what was said.
+    /// Runs `assemble` with further words; returns exit code and messages.
     fn assemble(&self, more: &[&str]) -> (i32, String) {
         let words = [&["assemble", "job", "-o", "body.flex.h5"], more].concat();
         let run = flexbody(self.place.path(), &words);
@@ -124,7 +124,7 @@ impl Job {
         (run.status.code().expect("a code"), said.into_owned())
     }
 
-    /// The result is refused with this code and exit code, with these words, and nothing is written.
+    /// Asserts that the result is refused with this code, exit code and message, and that nothing is written.
     fn refused(&self, more: &[&str], code: &str, exit: i32, words: &str) {
         let before = members(self.place.path());
         let (found, said) = self.assemble(more);
@@ -230,7 +230,7 @@ fn products_of_condensation_are_held_to_the_mass_matrix() {
     bytes[100] ^= 1;
     fs::write(job.path("condensed.petsc"), &bytes).expect("written");
     job.refused(&[], "FB761", 1, "the products of condensation are not those");
-    // Drivers of earlier programs did not make them.
+    // Drivers of earlier versions did not compute these products.
     job.result.as_object_mut().expect("a table").remove("condensed_sha256");
     fs::write(job.path("result.jsonl"), sealed("flexbody-result", &job.result)).expect("written");
     assert_eq!(job.assemble(&[]).0, 0);
@@ -305,11 +305,11 @@ fn where_mpi_or_python_are_not_there_it_is_said() {
         assert!(run.status.code() == Some(exit) && said.contains(code) && said.contains(words), "{said}");
         assert!(!place.path().join("body.flex.h5").exists());
     }
-    // What a later run goes on from stays, where there was something to run.
+    // Files for a later resumption remain if the cluster run was started.
     assert_eq!(members(place.path()), ["body.flex.h5.cluster"]);
 }
 
-/// A list of two bodies, the second with these words.
+/// Writes a list of two bodies; `more` is added to the second.
 fn list(place: &Path, more: &str) {
     let model = |name: &str| manifest(name).display().to_string();
     let (one, two) = (model("cube_hex8"), model("bracket_hex20"));
@@ -347,7 +347,7 @@ fn a_batch_makes_what_is_not_there_and_tells_of_all() {
     assert_eq!(fs::metadata(place.join("one.flex.h5")).expect("a body").modified().expect("a time"), first);
     assert_eq!(told["results"]["bodies"][1]["modes"], 4);
     assert!(fs::read_to_string(place.join("all.html")).expect("a page").contains("two.flex.h5"));
-    // A body that was changed is made again.
+    // A changed body is converted again.
     fs::write(place.join("two.flex.h5"), "no body").expect("written");
     let (exit, told) = batch(place);
     assert_eq!((exit, states(&told)), (0, vec!["unchanged", "done"]), "{told:#}");
@@ -355,7 +355,7 @@ fn a_batch_makes_what_is_not_there_and_tells_of_all() {
     assert_eq!((exit, states(&told)), (0, vec!["unchanged", "unchanged"]), "{told:#}");
 }
 
-/// A note that comes before the error is not the cause of a failure.
+/// A note before the error is not reported as the cause of a failure.
 #[test]
 fn a_batch_tells_the_first_error_of_what_fails() {
     let place = tempfile::tempdir().expect("a folder");
@@ -364,7 +364,7 @@ fn a_batch_tells_the_first_error_of_what_fails() {
     for file in members(&brick) {
         fs::copy(brick.join(&file), place.join(&file)).expect("copied");
     }
-    // Node 9 has no rows, which is noted; node 8 lies elsewhere, so that rigid motion strains the body.
+    // Node 9 has no rows, which gives a note; node 8 is displaced, so that rigid motion strains the body.
     let nodes = fs::read_to_string(place.join("nodes.csv")).expect("nodes");
     let moved: String = nodes
         .lines()

@@ -1,7 +1,6 @@
-//! The program as scripts and people meet it: exit codes, what goes to stdout and stderr, what is left on
-//! disk.
+//! The program on the command line: exit codes, output on stdout and stderr, files left on disk.
 
-#[allow(dead_code)] // its `main`
+#[allow(dead_code)] // `main` of the example is unused
 #[path = "../../examples/from_memory.rs"]
 mod from_memory;
 
@@ -15,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
 
-/// What a run of the program gave.
+/// Exit code and output of a run of the program.
 struct Run {
     code: i32,
     out: String,
@@ -27,7 +26,7 @@ impl Run {
         serde_json::from_str(&self.out).unwrap_or_else(|e| panic!("{e}: {}", self.out))
     }
 
-    /// What the command found.
+    /// Returns the results in the JSON output of the command.
     fn results(&self) -> Value {
         self.json()["results"].take()
     }
@@ -47,7 +46,7 @@ fn flexbody(folder: &Path, line: &str) -> Run {
     }
 }
 
-/// As [`flexbody`], for runs that must succeed.
+/// Runs `flexbody`, asserts that it succeeds, and returns the run.
 fn done(folder: &Path, line: &str) -> Run {
     let run = flexbody(folder, line);
     assert_eq!(run.code, 0, "{line}: {}{}", run.out, run.err);
@@ -63,7 +62,7 @@ fn block() -> Assembly {
         .assemble(&Material::STEEL, MassRule::Consistent)
 }
 
-/// A folder with a small steel block: `model.toml`, `K.mtx`, `M.mtx`, `nodes.csv`.
+/// Creates a folder with a small steel block: `model.toml`, `K.mtx`, `M.mtx`, `nodes.csv`.
 fn model() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     write_model(folder.path(), &block().raw_model(), Triangle::Lower);
@@ -143,7 +142,7 @@ fn outputs_that_cannot_be_written_are_refused_before_the_work() {
         ("-o b.h5 --report taken/no/r.json", 2, "error[FB105]: cannot write taken/no/r.json"),
         ("-o b.h5 --report taken/", 2, "error[FB801]: report taken/ has no known extension"),
     ] {
-        // The matrix that does not exist would be reported if anything were read first.
+        // The missing matrix would be reported if the program read files before it checked the options.
         fs::rename(folder.path().join("K.mtx"), folder.path().join("K.away")).unwrap();
         let run = flexbody(folder.path(), &format!("convert model.toml {line}"));
         fs::rename(folder.path().join("K.away"), folder.path().join("K.mtx")).unwrap();
@@ -221,7 +220,7 @@ fn json_is_all_that_is_printed_and_holds_the_facts() {
     let exact = 7850.0 * 0.4 * 0.15 * 0.1;
     assert!((json["body"]["mass"].as_f64().unwrap() / exact - 1.0).abs() < 1e-12, "{}", json["body"]);
     assert_eq!(json["completeness"]["proved"], true);
-    // The report says the same but for what writing it costs.
+    // The report agrees with the JSON output except for the cost of writing it.
     let report: Value = serde_json::from_slice(&fs::read(folder.path().join("r.json")).unwrap()).unwrap();
     for key in ["model", "body", "modes", "completeness", "lumped", "diagnostics"] {
         assert_eq!(report[key], json[key], "{key}");
@@ -270,7 +269,7 @@ fn json_tells_usage_errors_too() {
         assert_eq!(diagnostic["code"], "FB801", "{line}");
         assert!(diagnostic["message"].as_str().unwrap().starts_with(said), "{line}: {diagnostic}");
     }
-    // Help stays text; what stands behind `--` is no option.
+    // Help is printed as text even with `--json`; words after `--` are no options.
     assert!(done(folder.path(), "convert --json --help").out.starts_with("Make a flexible body"));
     let run = flexbody(folder.path(), "inspect -- a --json");
     assert!(run.code == 2 && run.out.is_empty() && run.err.starts_with("error: unexpected"), "{}", run.err);
@@ -311,8 +310,8 @@ fn modes_up_to_a_frequency_are_those_below_it() {
 
 #[test]
 fn compare_agrees_on_a_model_in_another_order_and_differs_beyond_tolerance() {
-    // A cube: repeated eigenvalues, and nodes of equal displacement, so that order decides about signs and
-    // bases.
+    // A cube has repeated eigenvalues and nodes of equal displacement, so that signs and bases depend on the
+    // order of nodes.
     let cube = |material: &Material| {
         Mesh::block(ElementKind::Hex8, [5; 3], [0.2; 3]).assemble(material, MassRule::Consistent).raw_model()
     };
@@ -341,10 +340,11 @@ fn compare_agrees_on_a_model_in_another_order_and_differs_beyond_tolerance() {
     assert!(!mass.contains("DIFFERS"), "{mass}");
     let json = flexbody(folder, &format!("compare {a} {c} --json"));
     assert_eq!((json.code, &json.json()["passed"]), (1, &false.into()));
-    // Frequencies are allowed to differ by as much; the modal stiffness is an invariant.
+    // The tolerance of frequencies is raised; the modal stiffness is an invariant and needs its own
+    // tolerance.
     assert_eq!(flexbody(folder, &format!("compare {a} {c} --frequency 1e-6")).code, 1);
     done(folder, &format!("compare {a} {c} --frequency 1e-6 --invariants 2e-6"));
-    // Nothing can be compared when units differ.
+    // Bodies with different units cannot be compared.
     let manifest = fs::read_to_string(folders[2].path().join("model.toml")).unwrap();
     let units = "[model.units]\nlength = \"m\"\nmass = \"kg\"\ntime = \"ms\"\n[files]";
     fs::write(folders[2].path().join("model.toml"), manifest.replace("[files]", units)).unwrap();
@@ -363,7 +363,7 @@ fn check_passes_on_what_convert_wrote_and_recomputes_it_from_the_matrices() {
         let own = done(folder.path(), "check b.h5");
         assert!(own.out.contains("all 23 identities hold"), "{name}: {}", own.out);
         let against = done(folder.path(), &format!("check b.h5 --against {manifest}"));
-        // Interfaces have two: what they are, and where their reference points lie.
+        // Interfaces add two identities: their definition, and their reference points.
         let has_interfaces = fs::read_to_string(&manifest).unwrap().contains("[[interface]]");
         let count = if has_interfaces { 31 } else { 29 };
         assert!(against.out.contains(&format!("all {count} identities hold")), "{name}: {}", against.out);
@@ -373,8 +373,7 @@ fn check_passes_on_what_convert_wrote_and_recomputes_it_from_the_matrices() {
 
 #[test]
 fn check_allows_for_what_rounding_takes_from_a_slender_body() {
-    // The stiffest element is 1e9 times as stiff as the first bending mode: so many digits of psi' K psi are
-    // lost.
+    // The stiffest element is 1e9 times as stiff as the first bending mode: psi' K psi loses nine digits.
     let folder = tempfile::tempdir().unwrap();
     let beam = Mesh::block(ElementKind::Hex20, [40, 1, 1], [4.0, 0.03, 0.02]);
     let raw = beam.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
@@ -487,12 +486,12 @@ fn exports_tell_what_they_lose_in_a_scene() {
         let (_, rest) = told.split_once("at most ").expect("a share");
         rest.split_once(" %").expect("a percentage").0.parse::<f64>().unwrap()
     };
-    // It grows with the square of the spin.
+    // The share grows with the square of the spin.
     let (slow, fast) = (share(2e3), share(4e3));
     assert!(slow > 0.1 && (fast / slow - 4.0).abs() < 0.2, "{slow} {fast}");
 }
 
-/// Error norms of one scheme of a report.
+/// Returns the error norms of one scheme of a report.
 fn norms<'a>(json: &'a Value, scheme: &str) -> &'a Value {
     let lumped = json["lumped"].as_array().unwrap();
     &lumped.iter().find(|l| l["scheme"] == scheme).unwrap_or_else(|| panic!("no {scheme}"))["error_norms"]
@@ -501,7 +500,7 @@ fn norms<'a>(json: &'a Value, scheme: &str) -> &'a Value {
 #[test]
 fn nodal_masses_of_the_user_are_compared_like_any_other_scheme() {
     let folder = model();
-    // Row sums as a user would write them, in another order of the nodes.
+    // Row sums written by a user, with the nodes in another order.
     let mut sums = vec![0.0; block().nodes.len()];
     oracle::mesh::entries(&block().scalar_mass).for_each(|(row, _, value)| sums[row as usize] += value);
     let mut rows: Vec<_> = sums.iter().enumerate().map(|(i, m)| format!("{},{m:e}\n", i + 1)).collect();
@@ -533,7 +532,7 @@ fn nodal_masses_of_the_user_are_compared_like_any_other_scheme() {
 
 #[test]
 fn lumped_modes_never_have_higher_frequencies_than_the_consistent_ones() {
-    // Row sums of a mass matrix without negative entries: M_lumped - M is positive semidefinite.
+    // M_lumped - M is positive semidefinite for row sums of a mass matrix without negative entries.
     let folder = model();
     let run =
         done(folder.path(), "convert model.toml -o b.h5 --modes 8 --lumped row-sum --lumped-modes --json");
@@ -570,7 +569,7 @@ fn fast_accuracy_says_not_proved_everywhere() {
     assert_eq!(json["completeness"]["proved_modes"], Value::Null);
     assert_eq!(json["completeness"]["negative_pivots"], Value::Null);
     assert!(fs::read_to_string(folder.path().join("r.html")).unwrap().contains("Not proved complete."));
-    // The file alone says so too.
+    // The file alone reports the missing proof too.
     assert!(done(folder.path(), "inspect b.h5").out.contains("NOT PROVED"));
     assert_eq!(done(folder.path(), "inspect b.h5 --json").results()["completeness"]["proved"], false);
     let proved = done(folder.path(), "convert model.toml -o c.h5");

@@ -1,6 +1,5 @@
-//! Generated documents are what the code generates.
-//! `FLEXBODY_BLESS=1 cargo test --test program docs_generated` writes them. Written ones lead to files and
-//! codes that exist.
+//! Generated documents agree with the code. `FLEXBODY_BLESS=1 cargo test --test program docs_generated`
+//! writes them. Handwritten documents refer to existing files and codes.
 
 use flexbody_base::diagnostic;
 use flexbody_base::diagnostic::{Code, Severity};
@@ -35,7 +34,7 @@ fn diagnostic_codes() {
     assert_generated("docs/codes.md", &diagnostic::codes_markdown());
 }
 
-/// What `flexbody recipe` prints stands in the page on FE programs, each piece in a block of its own.
+/// The output of `flexbody recipe` is in the page on FE programs, each piece in a block of its own.
 #[test]
 fn recipes_are_those_of_the_page() {
     let page = oracle::root().join("docs/fe_programs.md");
@@ -48,7 +47,8 @@ fn recipes_are_those_of_the_page() {
     }
 }
 
-/// README, ARCHITECTURE, CHANGELOG and all of `docs/`, `fixtures/` and `benches/` with their text.
+/// Returns README, ARCHITECTURE, CHANGELOG and all documents of `docs/`, `fixtures/` and `benches/` with
+/// their text.
 fn documents() -> Vec<(PathBuf, String)> {
     let root = oracle::root();
     let mut found = Vec::new();

@@ -1,6 +1,6 @@
-//! However a run ends, no unfinished file is left, and its exit code says whether its outputs are in their places.
+//! Every end of a run leaves no unfinished file, and the exit code shows if the outputs are in place.
 //!
-//! `FLEXBODY` names another program that these tests run: scripts/release.sh holds the one that is handed out to them.
+//! `FLEXBODY` names another program to test; scripts/release.sh passes the released one.
 #![cfg(unix)]
 
 use flexbody_base::error::ExitCode;
@@ -15,7 +15,7 @@ use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// The program in `folder`, without dumps of memory.
+/// Returns a command for the program in `folder`, without core dumps.
 fn program(folder: &Path) -> Command {
     let mut command = Command::new("sh");
     command.args(["-c", "ulimit -c 0; exec \"$@\"", "sh"]).current_dir(folder);
@@ -30,7 +30,7 @@ fn send(signal: &str, child: &Child) {
     assert!(sent.expect("a shell").success(), "{signal}");
 }
 
-/// Waits for `done`, which must come before the program ends.
+/// Waits for `done`, and asserts that the program still runs.
 fn wait_for(child: &mut Child, what: &str, done: impl Fn() -> bool) {
     let began = Instant::now();
     while !done() {
@@ -40,12 +40,12 @@ fn wait_for(child: &mut Child, what: &str, done: impl Fn() -> bool) {
     }
 }
 
-/// Number of temporary files in a folder.
+/// Returns the number of temporary files in a folder.
 fn unfinished(folder: &Path) -> usize {
     members(folder).iter().filter(|name| name.starts_with(".flexbody-")).count()
 }
 
-/// A model whose hundred modes take seconds.
+/// Writes a model whose hundred modes take seconds.
 fn long_model(folder: &Path) -> PathBuf {
     let place = folder.join("model");
     std::fs::create_dir(&place).expect("a folder");
@@ -54,7 +54,7 @@ fn long_model(folder: &Path) -> PathBuf {
     write_model(&place, &block.raw_model(), Triangle::Lower)
 }
 
-/// A small body, a scene for it, and files of the names of outputs.
+/// Creates a folder with a small body, a scene for it, and old files with the names of outputs.
 fn folder_with_outputs(outputs: &[&str]) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let made = program(folder.path()).arg("convert").arg(cube()).args(["-o", "body.flex.h5"]).output();
@@ -75,13 +75,13 @@ fn is_old(path: &Path) -> bool {
     std::fs::read(path).expect("an output") == b"old"
 }
 
-/// Numbers of the signals of Linux with these names.
+/// Names and Linux numbers of signals of crashes.
 const CRASHES: [(&str, i32); 7] =
     [("SEGV", 11), ("BUS", 7), ("ILL", 4), ("FPE", 8), ("ABRT", 6), ("TRAP", 5), ("SYS", 31)];
 
 const INTERRUPTIONS: [&str; 3] = ["HUP", "INT", "TERM"];
 
-/// Signals of limits, timers, queues and users, with their numbers on Linux.
+/// Names and Linux numbers of signals of limits, timers, queues and users.
 const OTHERS: [(&str, i32); 12] = [
     ("QUIT", 3),
     ("USR1", 10),
@@ -133,7 +133,7 @@ fn every_signal_that_ends_a_run_leaves_the_folder_as_it_was() {
     }
 }
 
-/// Signals that a program is started to ignore are ignored by the programs that it starts, too.
+/// A signal that is ignored from the start is ignored by the child programs too.
 #[test]
 fn other_signals_that_are_ignored_from_the_start_stay_ignored() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -151,7 +151,7 @@ fn other_signals_that_are_ignored_from_the_start_stay_ignored() {
     assert_eq!(members(folder.path()), ["body.flex.h5"]);
 }
 
-/// A batch that makes two bodies at the same time; the folder has their temporary files.
+/// Starts a batch that makes two bodies in parallel; the folder has their temporary files.
 fn batch_in_work() -> (TempDir, Child) {
     let folder = tempfile::tempdir().expect("a folder");
     long_model(folder.path());
@@ -165,19 +165,20 @@ fn batch_in_work() -> (TempDir, Child) {
     let mut command = program(folder.path());
     command.args(["batch", "list.toml", "--report", "all.json", "--memory-limit", "4G"]);
     let mut child = command.spawn().expect("the program");
-    // The report of the batch is one of three.
+    // One of the three temporary files is the report of the batch.
     wait_for(&mut child, "the files of its programs", || unfinished(folder.path()) == 3);
     (folder, child)
 }
 
-/// The batch says that no unfinished file is left when that is so, and starts no body any more.
+/// An interrupted batch reports that no unfinished file is left when that is true, and starts no further
+/// body.
 #[test]
 fn a_batch_that_is_interrupted_has_ended_its_programs() {
     for (signal, code) in [("TERM", Some(130)), ("INT", Some(130)), ("USR1", None)] {
         let (folder, child) = batch_in_work();
         send(signal, &child);
         let ended = child.wait_with_output().expect("a child");
-        // At once, not after a while.
+        // The files are gone immediately, not after a delay.
         assert_eq!(members(folder.path()), ["list.toml", "model"], "SIG{signal}");
         assert_eq!(ended.status.code(), code, "SIG{signal}");
         let said = String::from_utf8_lossy(&ended.stderr);
@@ -192,7 +193,7 @@ fn programs_of_a_batch_that_is_killed_end_and_leave_nothing() {
     child.kill().expect("killed");
     child.wait().expect("a child");
     let began = Instant::now();
-    // The batch itself was killed: its own temporary file stays, those of its programs go.
+    // The batch itself was killed: its own temporary file remains, those of its child programs disappear.
     while unfinished(folder.path()) > 1 {
         assert!(began.elapsed() < Duration::from_secs(20), "the programs go on");
         std::thread::sleep(Duration::from_millis(2));
@@ -201,7 +202,7 @@ fn programs_of_a_batch_that_is_killed_end_and_leave_nothing() {
     assert!(!members(folder.path()).iter().any(|name| name.ends_with(".h5")), "a body was made");
 }
 
-/// Commands with outputs that exist before, for the body and the scene of [`folder_with_outputs`].
+/// Returns commands whose outputs exist already, for the body and the scene of [`folder_with_outputs`].
 fn commands() -> Vec<(String, Vec<&'static str>)> {
     let cube = cube().display().to_string();
     vec![
@@ -217,7 +218,7 @@ fn commands() -> Vec<(String, Vec<&'static str>)> {
     ]
 }
 
-/// Exit code 4 means that no output was put in its place, also where only the results on stdout cannot be printed.
+/// Exit code 4 means that no output is in place, even if only the results on stdout cannot be printed.
 #[cfg(target_os = "linux")]
 #[test]
 fn results_that_cannot_be_printed_leave_the_outputs_as_they_were() {
@@ -229,7 +230,7 @@ fn results_that_cannot_be_printed_leave_the_outputs_as_they_were() {
             let mut command = program(folder.path());
             let ended = command.args(line.split(' ')).args(json).stdout(full).output().expect("the program");
             let said = String::from_utf8_lossy(&ended.stderr);
-            // `select` and `trade` may say that a check failed.
+            // `select` and `trade` may report a failed check.
             let code = ended.status.code().expect("no signal");
             assert!(
                 matches!(code, 1 | 4) && said.contains("the results cannot be printed"),
@@ -244,7 +245,8 @@ fn results_that_cannot_be_printed_leave_the_outputs_as_they_were() {
     }
 }
 
-/// A run whose results nobody reads has its outputs in their places and waits: told to end, it takes them back.
+/// A run whose stdout is not read has its outputs in place and waits; a signal makes it restore the old
+/// outputs.
 #[test]
 fn a_signal_while_the_results_are_printed_takes_the_outputs_back() {
     for signal in ["INT", "QUIT"] {
@@ -252,7 +254,7 @@ fn a_signal_while_the_results_are_printed_takes_the_outputs_back() {
         let before = members(folder.path());
         let (reader, mut writer) = std::io::pipe().expect("a pipe");
         let own = writer.try_clone().expect("a pipe");
-        // Fills the pipe, and ends when nobody can read it any more.
+        // Fills the pipe, and ends when its reader closes.
         let filler = std::thread::spawn(move || while writer.write_all(&[b'x'; 4096]).is_ok() {});
         std::thread::sleep(Duration::from_millis(100));
         let mut command = program(folder.path());
@@ -284,7 +286,7 @@ fn a_signal_while_the_results_are_printed_takes_the_outputs_back() {
     }
 }
 
-/// A contradiction of the program's own, here one that is asked for: the phase begins that the variable names.
+/// A deliberate panic at the beginning of the phase that the variable names.
 #[test]
 fn a_panic_ends_with_exit_code_70_and_leaves_nothing() {
     for (phase, json) in [("checks", false), ("writing", false), ("writing", true)] {
@@ -308,8 +310,8 @@ fn a_panic_ends_with_exit_code_70_and_leaves_nothing() {
     }
 }
 
-/// Kills runs at times spread over their length: 130 and other signals mean that the old outputs are there, 0 that the
-/// new ones are. `FLEXBODY_KILLS` is the number of times for each signal.
+/// Kills runs at times spread over their length: 130 and other signals mean that the old outputs are in
+/// place, 0 that the new ones are. `FLEXBODY_KILLS` is the number of runs for each signal.
 #[test]
 #[ignore = "slow"]
 fn whenever_a_signal_comes_the_exit_code_tells_which_outputs_are_there() {
@@ -333,7 +335,7 @@ fn whenever_a_signal_comes_the_exit_code_tells_which_outputs_are_there() {
             let mut child = start();
             let part = 1.05 - 0.5 * (f64::from(kill) / f64::from(kills)).powi(2);
             std::thread::sleep(whole.mul_f64(part));
-            // The run may have ended by itself.
+            // The run may already have ended.
             let _ = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).output();
             let status: ExitStatus = child.wait().expect("a child");
             let mut said = String::new();

@@ -1,4 +1,5 @@
-//! The library as a program that uses it sees it: listeners, interfaces, reports, motions, trade studies, jobs.
+//! Public API of the library as a user program calls it: progress callbacks, interfaces, reports, motions,
+//! trade studies, jobs.
 
 use flexbody::{
     Basis, Code, ConvertOptions, Coupling, ExitCode, FlexBody, Model, Progress, ReferenceChoice,
@@ -17,7 +18,7 @@ fn body() -> FlexBody {
     bracket().convert(&ConvertOptions::default().modes(6)).expect("a body").body
 }
 
-/// A short spin with tolerances, and its folder.
+/// Returns a short spin with tolerances, and its folder.
 fn spin() -> (tempfile::TempDir, Scene) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("spin.toml");
@@ -101,7 +102,7 @@ fn interfaces_have_their_nodes_and_what_the_modes_do_there() {
 #[test]
 fn what_a_builder_states_is_checked_and_kept() {
     let name = |folder: &str| fixtures().join("models").join(folder).join("model.toml");
-    // A plane model is one of matrices in memory too.
+    // A plane model from matrices in memory.
     let square =
         |triplets: &[(usize, usize, f64)]| SparseMatrix::from_triplets(4, triplets).expect("a matrix");
     let stiffness = square(&[(0, 0, 1.0), (2, 2, 1.0), (0, 2, -1.0), (2, 0, -1.0)]);
@@ -115,7 +116,7 @@ fn what_a_builder_states_is_checked_and_kept() {
         .expect("a bar in the plane");
     let body = plane.convert(&ConvertOptions::default().modes(1)).expect("a body").body;
     assert_eq!((body.dimension(), body.equations_of_motion().n_rigid(), body.n_dofs()), (2, 3, 4));
-    // K = [1 -1; -1 1], m = 1: lambda = 2, and D = alpha M.
+    // K = [1 -1; -1 1] and m = 1 give lambda = 2, and D = alpha M.
     assert!((body.eigenvalues()[0] - 2.0).abs() < 1e-12 && (body.damping()[(0, 0)] - 0.1).abs() < 1e-12);
     assert_eq!(body.interfaces()[0].coupling, Some(Coupling::Free));
     let refused = Model::builder("bar", stiffness, mass)
@@ -151,7 +152,7 @@ fn motions_selections_and_studies_tell_their_numbers() {
     assert_eq!((last, motion.modal_velocities(last).len()), (20, 6));
     let length: f64 = motion.attitude(last).iter().map(|p| p * p).sum();
     assert!((length - 1.0).abs() < 1e-12 && motion.reaction(last).is_none());
-    // Nothing acts on the body.
+    // No load acts on the body.
     assert!(motion.drift().iter().all(|drift| *drift < 1e-6) && motion.work(last).abs() < 1e-12);
     let path = &motion.paths()[0];
     assert_eq!((path.name.as_str(), path.place.len()), ("interface bolt_wall", 21));

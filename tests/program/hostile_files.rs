@@ -1,4 +1,5 @@
-//! Files that do harm: they change while they are read, load code, send commands to the terminal, lead elsewhere.
+//! Hostile files: changed while they are read, loading code, sending commands to the terminal, referring to
+//! other files.
 
 use crate::program::flexbody;
 use oracle::{fixtures, members};
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
 
-/// A tetrahedron with its manifest in a folder of its own.
+/// Creates a folder with a tetrahedron and its manifest.
 fn tet4() -> TempDir {
     copied("small/tet4")
 }
@@ -24,14 +25,14 @@ fn told(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Replaces a text of a file that is there once.
+/// Replaces a text that occurs once in a file.
 fn edit(path: &Path, from: &str, to: &str) {
     let text = fs::read_to_string(path).expect("a text");
     assert_eq!(text.matches(from).count(), 1, "{from}");
     fs::write(path, text.replace(from, to)).expect("written");
 }
 
-/// The connecting rod with matrices that are not compressed.
+/// Creates a folder with the connecting rod and uncompressed matrices.
 fn unpacked_rod() -> TempDir {
     let folder = copied("models/connecting_rod");
     for name in ["K", "M"] {
@@ -48,7 +49,7 @@ fn unpacked_rod() -> TempDir {
     folder
 }
 
-/// An FE program starts again while its matrices are read: their files are cut off, and written again.
+/// An FE program restarts while its matrices are read: the files are truncated and written again.
 #[cfg(unix)]
 #[test]
 #[ignore = "slow"]
@@ -77,7 +78,7 @@ fn matrices_that_are_cut_off_while_they_are_read_end_no_run() {
         assert!(left.iter().all(|name| !name.starts_with(".flexbody")), "run {run}: {left:?}");
         match output.status.code() {
             Some(0) => {}
-            // Before it was opened it has no bytes, or those that were written by then.
+            // Before the matrix was opened it was empty, or partially written.
             Some(2) if said.contains("FB132") => refused += 1,
             code => assert!(code == Some(2), "run {run}: {code:?} {said}"),
         }
@@ -85,7 +86,7 @@ fn matrices_that_are_cut_off_while_they_are_read_end_no_run() {
     assert!(refused > 0, "no run met the change");
 }
 
-/// A library that tells when it is loaded, by a file beside it; `None` without a C compiler.
+/// Builds a library that writes a file beside it when it is loaded; `None` without a C compiler.
 #[cfg(target_os = "linux")]
 fn telling_library(folder: &Path) -> Option<PathBuf> {
     let mark = folder.join("loaded");
@@ -102,7 +103,7 @@ fn telling_library(folder: &Path) -> Option<PathBuf> {
     built.is_ok_and(|status| status.success()).then_some(mark)
 }
 
-/// The number of a filter that HDF5 does not have makes it look for a plugin: it loads every library of the folder.
+/// The number of an unknown filter makes HDF5 search for a plugin, which loads every library of the folder.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_file_makes_hdf5_load_libraries() {
@@ -121,7 +122,7 @@ fn no_file_makes_hdf5_load_libraries() {
     assert!(!mark.exists(), "a library was loaded");
 }
 
-/// Python files beside the model, or beside the driver, are data.
+/// Python files beside the model or the driver are data and are not executed.
 #[cfg(unix)]
 #[test]
 fn python_packages_are_not_taken_from_folders_of_data() {
@@ -142,7 +143,7 @@ fn python_packages_are_not_taken_from_folders_of_data() {
         let name = format!("{package}.py");
         fs::copy(folder.path().join(&name), folder.path().join("job").join(&name)).expect("copied");
     }
-    // Whatever the driver finds of packages.
+    // The driver may fail for missing packages.
     let _ = Command::new("python3").args(["job/driver.py", "--probe"]).current_dir(folder.path()).output();
     assert!(!mark.exists(), "a file beside the driver was run");
 }
@@ -170,7 +171,7 @@ fn a_list_of_bodies_starts_no_program_that_the_command_line_does_not_allow() {
     assert!(String::from_utf8_lossy(&says.stdout).contains("--allow-programs"));
 }
 
-/// Names of groups of a file reach the terminal in messages, names of interfaces in summaries.
+/// Names of groups in a file appear in messages, names of interfaces in summaries.
 #[test]
 fn no_text_of_a_file_is_a_command_to_the_terminal() {
     let folder = tet4();
@@ -207,7 +208,7 @@ fn files_outside_of_the_folder_of_a_manifest_are_not_quoted() {
         let said = told(&run);
         assert!(run.status.code() == Some(2) && said.contains("...`"), "{key}: {said}");
         assert!(!said.contains("root") && !said.contains("salt"), "{key}: {said}");
-        // The same text beside the manifest is quoted: it helps.
+        // The text of a file beside the manifest is quoted, because that helps the user.
         fs::write(folder.path().join(name), secret).expect("written");
         edit(&manifest, &format!("{:?}", outside.path().display().to_string()), &format!("{name:?}"));
         let run = flexbody(folder.path(), &["convert", "model.toml", "-o", "b.h5"]);
@@ -233,7 +234,7 @@ fn names_that_are_not_utf_8_are_written_and_read() {
     let word = OsStr::new;
     run(&[word("convert"), word("model.toml"), word("--modes"), word("2"), word("-o"), body.as_os_str()]);
     run(&[word("inspect"), body.as_os_str()]);
-    // The same under a name of UTF-8 has the same bytes.
+    // A UTF-8 name gives equal bytes.
     run(&[word("convert"), word("model.toml"), word("--modes"), word("2"), word("-o"), word("b.flex.h5")]);
     assert!(fs::read(&body).expect("a body") == fs::read(folder.path().join("b.flex.h5")).expect("a body"));
 }
@@ -255,7 +256,8 @@ fn a_deck_includes_no_more_than_a_thousand_files() {
     assert!(run.status.code() == Some(2) && said.contains("FB110") && said.contains("1000 times"), "{said}");
 }
 
-/// Mistakes that a manifest has many times are listed a few times, and no more interfaces are read than a body can have.
+/// Repeated mistakes in a manifest are listed a few times, and no more interfaces are read than a body can
+/// have.
 #[test]
 fn a_manifest_with_very_many_interfaces_is_refused_in_short() {
     let folder = tet4();
@@ -271,7 +273,7 @@ fn a_manifest_with_very_many_interfaces_is_refused_in_short() {
     }
 }
 
-/// Under a limit of address space, where the program knows what is left.
+/// The address space is limited, so that the program knows the available memory.
 #[cfg(target_os = "linux")]
 #[test]
 fn what_a_head_announces_is_held_to_the_memory_that_is_left() {

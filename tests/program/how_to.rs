@@ -1,9 +1,9 @@
-//! The pages of docs/how_to do what they say: every command runs, and prints the lines that the page shows.
+//! Pages of docs/how_to: every command runs and prints the lines of the page.
 
 use std::path::Path;
 use std::process::Command;
 
-/// Blocks of a page: the language, and the text.
+/// Returns the blocks of a page: language and text.
 fn blocks(page: &str) -> Vec<(&str, &str)> {
     let mut parts = page.split("```");
     parts.next();
@@ -14,7 +14,7 @@ fn blocks(page: &str) -> Vec<(&str, &str)> {
     found
 }
 
-/// What the commands print, both streams together.
+/// Runs the commands and returns their output, both streams together.
 fn run(commands: &str, folder: &Path) -> String {
     let program = Path::new(env!("CARGO_BIN_EXE_flexbody")).parent().expect("a folder");
     let path = std::env::var("PATH").unwrap_or_default();

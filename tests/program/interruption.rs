@@ -1,4 +1,4 @@
-//! An interrupted program ends at once, says so, and leaves nothing but what was there before.
+//! An interrupted program ends at once, reports it, and leaves the folder unchanged.
 #![cfg(unix)]
 
 use flexbody_base::error::ExitCode;
@@ -12,7 +12,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Waits until so many outputs have been reserved: the handler stands since before that.
+/// Waits until `count` outputs are reserved; the signal handler is installed before that.
 fn wait_for_temporary_files(folder: &Path, count: usize, child: &mut Child) {
     let began = Instant::now();
     while members(folder).iter().filter(|name| name.starts_with(".flexbody-")).count() < count {
@@ -63,8 +63,8 @@ fn a_signal_during_convert_leaves_the_folder_as_it_was() {
     }
 }
 
-/// `nohup` and the shell's jobs in the background start programs that ignore signals: a run of hours outlives its
-/// terminal.
+/// `nohup` and background jobs of the shell start programs that ignore signals, so that a long run survives
+/// its terminal.
 #[test]
 fn signals_that_are_ignored_from_the_start_stay_ignored() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -94,7 +94,7 @@ fn signals_that_are_ignored_from_the_start_stay_ignored() {
     }
 }
 
-/// A queue ends the program that it has started, not those that this one has started.
+/// A queue ends the program that it started, not the children of that program.
 #[test]
 fn programs_that_it_waits_for_end_with_it() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -113,7 +113,7 @@ fn programs_that_it_waits_for_end_with_it() {
     let sent = Command::new("kill").arg("-TERM").arg(batch.id().to_string()).status();
     assert!(sent.expect("kill").success());
     assert_eq!(batch.wait().expect("a child").code(), Some(ExitCode::Interrupted as i32));
-    // The conversion removes what it has begun when it is told to end; left alone it would make the body.
+    // An interrupted conversion removes its temporary file; an uninterrupted one would make the body.
     let began = Instant::now();
     while members(place).iter().any(|name| name.starts_with(".flexbody-")) {
         assert!(began.elapsed() < Duration::from_secs(180), "the conversion went on");
@@ -122,8 +122,8 @@ fn programs_that_it_waits_for_end_with_it() {
     assert_eq!(members(place), ["list.toml", "model"]);
 }
 
-/// The program that converts the cube of the fixtures to `new.flex.h5` with a report, over older files of
-/// these names.
+/// Returns the command that converts the cube of the fixtures to `new.flex.h5` with a report, over older
+/// files of these names.
 fn small_convert(out: &Path) -> Command {
     let model = oracle::fixtures().join("models/cube_hex8/model.toml");
     let mut command = Command::new(env!("CARGO_BIN_EXE_flexbody"));
@@ -132,7 +132,7 @@ fn small_convert(out: &Path) -> Command {
     command
 }
 
-/// Kills runs at times spread over their length; `FLEXBODY_KILLS` is the number of times for each signal.
+/// Kills runs at times spread over their length; `FLEXBODY_KILLS` is the number of runs for each signal.
 #[test]
 #[ignore = "slow"]
 fn whenever_it_is_killed_outputs_are_whole_and_the_next_run_leaves_nothing_else() {
@@ -149,10 +149,10 @@ fn whenever_it_is_killed_outputs_are_whole_and_the_next_run_leaves_nothing_else(
             std::fs::write(&body, "old").expect("a file");
             std::fs::write(&report, "old").expect("a file");
             let mut child = small_convert(out).spawn().expect("the program");
-            // Most of what is delicate happens at the end.
+            // Kill times are concentrated near the end, where files are replaced.
             let part = 1.0 - 0.7 * (f64::from(kill) / f64::from(kills)).powi(2);
             std::thread::sleep(whole.mul_f64(part));
-            // It may have ended by itself.
+            // The run may already have ended.
             let _ = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).output();
             let status = child.wait().expect("a child");
             if !is_old(&body) {
@@ -163,7 +163,7 @@ fn whenever_it_is_killed_outputs_are_whole_and_the_next_run_leaves_nothing_else(
                 serde_json::from_str::<serde_json::Value>(&text).expect("a whole report");
             }
             if signal != "KILL" {
-                // Before the handler stands the system ends the program, which has made nothing yet.
+                // Before the handler is installed the system ends the program, which has written nothing yet.
                 let handled = matches!(status.code(), Some(0 | 130));
                 assert!(handled || (status.signal().is_some() && is_old(&body)), "SIG{signal}: {status:?}");
                 assert_eq!(is_old(&body), is_old(&report), "SIG{signal}: one of two outputs");

@@ -1,6 +1,6 @@
-//! The bodies and joints of `examples/joints`, integrated with error control.
+//! Bodies and joints of `examples/joints`, integrated with error control.
 
-#[allow(dead_code, unused_imports)] // the steps of the examples
+#[allow(dead_code, unused_imports)] // some steps of the examples are unused
 #[path = "../../examples/joints/mod.rs"]
 mod joints;
 
@@ -8,20 +8,20 @@ use flexbody_motion::integration::{Explicit, Failure, System};
 #[allow(unused_imports)] // not every test binary joins bodies
 pub use joints::{Assembly, End, Joint, Start};
 
-/// Sizes that errors are measured against.
+/// Reference scales of the errors.
 pub struct Scales {
     pub length: f64,
     pub rate: f64,
 }
 
-/// An assembly, and what its errors are measured against.
+/// An assembly with the reference scales of its errors.
 pub struct Jointed<'a> {
     pub assembly: Assembly<'a>,
     pub scales: Scales,
 }
 
 impl<'a> Jointed<'a> {
-    /// From 0 to the last of the `instants`, with a look at the state at each.
+    /// Integrates from 0 to the last of the `instants` and calls the observer with the state at each.
     pub fn run(
         &mut self,
         y: &mut [f64],
@@ -67,7 +67,7 @@ impl System for Jointed<'_> {
         }
     }
 
-    /// Back to the constraints.
+    /// Projects the state onto the constraints.
     fn settle(&self, y: &mut [f64]) {
         self.assembly.settle(y).expect("independent joints");
     }

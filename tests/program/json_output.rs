@@ -1,5 +1,5 @@
-//! With `--json` every command prints one object, as `schemas/output.schema.json` says, whatever became of
-//! the run; warnings end a run where they are denied.
+//! With `--json` every command prints one object according to `schemas/output.schema.json`, for every
+//! outcome; denied warnings end a run.
 
 use crate::program::flexbody;
 use flexbody::program::Arguments;
@@ -18,7 +18,7 @@ const SCENE: &str = "[run]\nduration = 0.001\noutputs = 20\n[initial]\nangular_v
 const LIST: &str =
     "[[body]]\nmodel = \"model.toml\"\noutput = \"listed.h5\"\noptions = [\"--modes\", \"4\"]\n";
 
-/// The schemas beside the one that refers to them.
+/// Retriever of schemas in the folder of the referring schema.
 struct Folder;
 
 impl Retrieve for Folder {
@@ -35,7 +35,7 @@ fn schema() -> jsonschema::Validator {
     options.with_retriever(Folder).build(&schema).expect("a schema")
 }
 
-/// A block with a lumped mass, which is worth a warning, its body and a scene.
+/// Creates a folder with a block with a lumped mass, which causes a warning, its body and a scene.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let mesh = Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.4, 0.15, 0.1]);
@@ -48,7 +48,8 @@ fn folder() -> TempDir {
     folder
 }
 
-/// What a run prints: one object that the schema accepts, with its exit code, and nothing beside it.
+/// Returns the output of a run: one object that the schema accepts, with its exit code, and nothing on
+/// stderr.
 fn told(place: &Path, line: &str) -> Value {
     let words: Vec<&str> = line.split_whitespace().collect();
     let run = flexbody(place, &words);
@@ -121,7 +122,7 @@ fn every_command_prints_an_object_of_the_schema() {
         );
         commands.push(command);
     }
-    // A new command needs a line here.
+    // A new command needs a line in this test.
     for command in <Arguments as clap::CommandFactory>::command().get_subcommands() {
         assert!(command.get_name() == "help" || commands.contains(&command.get_name()), "{command}");
     }

@@ -1,4 +1,4 @@
-//! Matrices that are kept in files instead of in memory: the same as others, and the same files for a cluster.
+//! Matrices kept in files instead of memory: equal bodies, and equal files for a cluster.
 
 use crate::program::flexbody;
 use flexbody_body::convert::{ConvertSettings, convert};
@@ -11,7 +11,7 @@ use oracle::{fixtures, members};
 use std::fs;
 use std::path::Path;
 
-/// How a matrix is stored.
+/// Storage of a matrix.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Layout {
     Plain,
@@ -33,7 +33,7 @@ const LAYOUTS: [Layout; 7] = [
     Layout::OneTriangle,
 ];
 
-/// Writes compressed columns as h5py does.
+/// Writes compressed columns in the layout of h5py.
 fn write_group(file: &hdf5::File, name: &str, matrix: &CscMatrix, layout: Layout) {
     let (mut pointers, mut rows, mut values) = (vec![0_i64], Vec::new(), Vec::new());
     for j in 0..matrix.n_cols() {
@@ -43,7 +43,7 @@ fn write_group(file: &hdf5::File, name: &str, matrix: &CscMatrix, layout: Layout
         match layout {
             Layout::OneTriangle => column.retain(|(row, _)| *row as usize >= j),
             Layout::Unsorted => column.reverse(),
-            // A row that the column does not couple.
+            // Adds an explicit zero in a row that the column does not couple.
             Layout::WithZero if j == 0 => {
                 let free = (0..).find(|row| column.iter().all(|(own, _)| own != row)).expect("a free row");
                 column.push((free, 0.0));
@@ -81,15 +81,15 @@ fn write_group(file: &hdf5::File, name: &str, matrix: &CscMatrix, layout: Layout
     }
 }
 
-/// Puts a copy, which nobody has locked, in the place of a file that was written here: a program that another
-/// test starts has the open files of this one, and their locks, until it runs.
+/// Replaces a written file by an unlocked copy: child programs of other tests inherit open files of this one
+/// with their locks until they run.
 fn unlock(path: &Path) {
     let copied = path.with_extension("copy");
     fs::copy(path, &copied).expect("a copy");
     fs::rename(&copied, path).expect("renamed");
 }
 
-/// The cube in a folder, its matrices in HDF5.
+/// Writes the cube into a folder, with matrices in HDF5.
 fn model_in(folder: &Path, layout: Layout) {
     let own = fixtures().join("models/cube_hex8");
     let read = read_model(&read_manifest(own.join("model.toml")).expect("a manifest")).expect("a model");
@@ -113,8 +113,8 @@ fn read(folder: &Path, keep: bool) -> RawModel {
     read_model(&files).expect("a model")
 }
 
-/// However a matrix is stored it is the same; it is kept in files where its columns are sorted and complete. No
-/// file is left.
+/// Every storage gives the same matrix; it is kept in files if its columns are sorted and complete. No file
+/// remains.
 #[test]
 fn matrices_are_kept_in_files_where_columns_are_sorted() {
     for layout in LAYOUTS {
@@ -135,7 +135,7 @@ fn matrices_are_kept_in_files_where_columns_are_sorted() {
     }
 }
 
-/// Damaged files are refused in the same words.
+/// Damaged files are refused with equal messages.
 #[test]
 fn damage_is_told_alike() {
     for (dataset, at, wrong) in [("indices", 5, 1e6), ("data", 7, f64::NAN), ("indptr", 3, 1e6)] {
@@ -159,7 +159,7 @@ fn damage_is_told_alike() {
     }
 }
 
-/// `prepare` takes the matrices where they lie, and writes for a cluster what it writes from text.
+/// `prepare` reads the matrices in place, and writes the same files for a cluster as from text.
 #[test]
 fn a_cluster_gets_the_same_files() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -176,7 +176,7 @@ fn a_cluster_gets_the_same_files() {
     }
 }
 
-/// `assemble` and `convert --engine slepc` make bodies of matrices that are kept.
+/// `assemble` and `convert --engine slepc` make bodies from matrices kept in files.
 #[test]
 fn a_body_of_kept_matrices_is_that_of_others() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,11 +1,11 @@
-//! Every dependency that ends up in the program or in the Python package has a permissive licence.
+//! Every dependency in the program or in the Python package has a permissive licence.
 
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
 
-/// Licences that ask for no more than attribution. `WITH` binds an exception to its licence.
+/// Licences that require attribution at most. `WITH` binds an exception to its licence.
 const PERMISSIVE: &[&str] = &[
     "0BSD",
     "Apache-2.0",
@@ -23,13 +23,12 @@ const PERMISSIVE: &[&str] = &[
     "Zlib",
 ];
 
-/// Packages that give a file instead of an expression: what must stand in that file.
+/// Packages with a licence file instead of an expression, and a sentence that the file must contain.
 const BY_FILE: &[(&str, &str)] = &[("hdf5-metno-src", "covered by the 3-clause BSD License")];
 
-/// Whether an SPDX expression can be met by permissive licences alone: one of the sides of `OR`, both of
-/// `AND`.
+/// Returns true if permissive licences alone satisfy an SPDX expression: one side of `OR`, both of `AND`.
 ///
-/// `/` is the old way to write `OR`. `None` for what is no expression.
+/// `/` is the old form of `OR`. Returns `None` for an invalid expression.
 fn is_permissive(expression: &str) -> Option<bool> {
     let spaced = expression.replace('(', " ( ").replace(')', " ) ").replace('/', " OR ");
     let words: Vec<&str> = spaced.split_whitespace().collect();
@@ -79,7 +78,7 @@ fn output_of(program: &str, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
-/// The packages that package `root` is linked with: normal dependencies, and theirs.
+/// Returns the packages linked into package `root`: its normal dependencies, recursively.
 fn linked<'a>(metadata: &'a Value, root: &'a str) -> BTreeSet<&'a str> {
     let nodes = metadata["resolve"]["nodes"].as_array().expect("a resolved graph");
     let by_id: BTreeMap<&str, &Value> =
@@ -98,7 +97,7 @@ fn linked<'a>(metadata: &'a Value, root: &'a str) -> BTreeSet<&'a str> {
     found
 }
 
-/// Whether a package's licence file is one that was read and found permissive.
+/// Returns true if the licence file of a package is known and permissive.
 fn has_known_file(package: &Value) -> bool {
     let name = package["name"].as_str().expect("a name");
     let Some((_, sentence)) = BY_FILE.iter().find(|(known, _)| *known == name) else { return false };
@@ -107,7 +106,7 @@ fn has_known_file(package: &Value) -> bool {
     std::fs::read_to_string(file).is_ok_and(|text| text.contains(sentence))
 }
 
-/// Packages that the package of `manifest` is linked with on this machine, and that are not permissive.
+/// Returns the packages linked into the package of `manifest` on this machine that are not permissive.
 fn offenders(manifest: &str) -> Vec<String> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned());

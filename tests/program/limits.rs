@@ -1,5 +1,5 @@
-//! Little memory, small files, few open files: the program does its work or ends with exit code 4 and a
-//! message, and leaves nothing behind. Never a signal, never a panic.
+//! Little memory, small files, few open files: the program succeeds or ends with exit code 4 and a message,
+//! and leaves no files. It never ends by a signal or a panic.
 #![cfg(target_os = "linux")]
 
 use flexbody_base::error::ExitCode;
@@ -24,7 +24,7 @@ fn run(folder: &Path, limit: &str, arguments: &[&str]) -> Output {
         .expect("a shell")
 }
 
-/// A folder with a body and a scene.
+/// Creates a folder with a body and a scene.
 fn folder_with_body() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let model = fixture("cube_hex8");
@@ -60,7 +60,7 @@ fn a_limit_of_address_space_gives_a_result_or_exit_code_4() {
             let left = members(folder.path());
             assert!(!left.iter().any(|name| name.starts_with(".flexbody-")), "{arguments:?}: {left:?}");
             let enough = kilobytes >= 1_000_000;
-            // `select` and `trade` may say that the body is not accurate enough.
+            // `select` and `trade` may report an inaccurate body.
             if code == Some(ExitCode::Resources as i32) && !enough {
                 assert!(said.contains("error[FB601]"), "{arguments:?}, {kilobytes}: {said}");
             } else {
@@ -111,7 +111,7 @@ fn a_limit_of_file_size_is_a_short_disk_and_leaves_nothing() {
 fn few_open_files_give_a_message() {
     let folder = folder_with_body();
     let before = members(folder.path());
-    // With three the system cannot load the program.
+    // With three open files the system cannot load the program.
     for files in [4, 5, 6, 8] {
         let output = run(
             folder.path(),
@@ -158,7 +158,7 @@ fn so_many_modes_that_it_takes_hours_are_refused_before_the_search() {
     assert!(said.contains("error[FB604]: 6918 modes of a model with 6924 degrees"), "{said}");
     assert!(said.contains("--allow-long"), "{said}");
     assert!(members(folder.path()).is_empty());
-    // What memory does not hold is refused whatever is allowed.
+    // Requests beyond the memory are refused even with `--allow-long`.
     let output = run(
         folder.path(),
         "true",
@@ -167,7 +167,7 @@ fn so_many_modes_that_it_takes_hours_are_refused_before_the_search() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(ExitCode::Resources as i32), "{said}");
     assert!(said.contains("error[FB601]"), "{said}");
-    // A small model has few modes, and they are soon found.
+    // A small model has few modes, which are found quickly.
     let output = run(
         folder.path(),
         "true",

@@ -1,7 +1,6 @@
-//! The program as people and scripts meet it: command line, messages, reports, limits; documents and the
-//! structure of the sources.
+//! Tests of the program: command line, messages, reports, limits, documents and the structure of the sources.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod bad_input;
 mod bodies;

@@ -1,5 +1,5 @@
-//! Pipes, devices and folders in the places of files, names that are too long, permissions of what is replaced: the
-//! program says so before the work, waits for nothing, and keeps what a file had.
+//! Pipes, devices and folders in place of files, names that are too long, and permissions of replaced files:
+//! the program reports them before the work, never waits, and keeps the permissions.
 #![cfg(unix)]
 
 use crate::program::program;
@@ -11,7 +11,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// Longest run of this file: none computes more than a brick or a cube.
+/// Time limit of a run; the models are a brick and a cube.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Runs `flexbody` with these words in `folder`, with 2 GiB of address space.
@@ -40,7 +40,7 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A folder with the brick as `model.toml`, a body of it, a scene, a list of a batch, and a pipe.
+/// Creates a folder with the brick as `model.toml`, its body, a scene, a list for a batch, and a pipe.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let (path, brick) = (folder.path(), fixtures().join("small/brick"));
@@ -56,7 +56,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// Each command line has the file in question as `@`.
+/// Command lines with `@` in place of the file under test.
 const INPUTS: &[&str] = &[
     "convert @ -o new.h5",
     "convert @ --units m,kg,s --format abaqus -o new.h5",
@@ -85,7 +85,7 @@ const INPUTS: &[&str] = &[
     "batch @",
 ];
 
-/// A pipe would wait for its writer, a device may never end.
+/// Pipes would wait for a writer, and devices may never end.
 #[test]
 fn pipes_devices_and_folders_are_no_inputs() {
     let folder = folder();
@@ -102,7 +102,7 @@ fn pipes_devices_and_folders_are_no_inputs() {
     );
 }
 
-/// Files that other files name.
+/// Pipes and devices referred to by other files are refused too.
 #[test]
 fn pipes_and_devices_that_files_name_are_no_inputs() {
     let folder = folder();
@@ -137,7 +137,7 @@ fn pipes_and_devices_that_files_name_are_no_inputs() {
             let ended = run(path, words);
             assert_eq!(ended.status.code(), Some(2), "{words} with {file}: {}", said(&ended));
         }
-        // A body of the list fails, and the list is worked off.
+        // A body of the list fails, and the batch continues.
         let list = format!("[[body]]\nmodel = \"{file}\"\noutput = \"new.h5\"\n");
         fs::write(path.join("l.toml"), list).expect("written");
         let ended = run(path, "batch l.toml");
@@ -146,7 +146,7 @@ fn pipes_and_devices_that_files_name_are_no_inputs() {
     assert!(!members(path).iter().any(|name| name.starts_with("new") || name.starts_with(".flexbody")));
 }
 
-/// The files that a batch and a prepared folder keep for themselves may be something else, too.
+/// The files that a batch and a prepared folder keep for themselves may be pipes, too.
 #[test]
 fn pipes_in_the_places_of_files_that_the_program_keeps_are_refused() {
     let folder = folder();
@@ -165,8 +165,8 @@ fn pipes_in_the_places_of_files_that_the_program_keeps_are_refused() {
     }
 }
 
-/// The temporary file has a short name: that of the output is looked at before the work. The model cannot be read, which
-/// nobody sees.
+/// The temporary file has a short name, so that the name of the output is checked before the work. The model
+/// is invalid, but the error of the name comes first.
 #[test]
 fn names_that_are_too_long_are_refused_before_the_work() {
     let folder = folder();
@@ -203,7 +203,7 @@ fn names_that_are_too_long_are_refused_before_the_work() {
     assert!(!members(path).iter().any(|name| name.starts_with(".flexbody")));
 }
 
-/// An output that may not be written ends a run with the exit code of a full disk.
+/// An output without write permission ends a run with the exit code of a full disk.
 #[test]
 fn outputs_that_may_not_be_written_are_refused_before_the_work() {
     let folder = folder();
@@ -216,7 +216,7 @@ fn outputs_that_may_not_be_written_are_refused_before_the_work() {
         assert!(said(&ended).contains(&format!("error[{code}")), "{output}: {}", said(&ended));
         assert!(code != "FB121" || ended.status.code() == Some(4), "{output}");
     }
-    // A stream that is a file without a name.
+    // A stream that is a deleted file.
     let words = "exec \"$0\" convert model.toml -o /dev/stdout > gone; ";
     let ended = Command::new("sh")
         .args(["-c", &format!("exec 3> gone; rm gone; {}", words.replace("> gone", ">&3"))])
@@ -244,7 +244,7 @@ fn an_output_keeps_the_mode_of_the_file_that_it_replaces() {
             assert!(meta.len() > 3, "{name}");
         }
     }
-    // A file that is made has the mode that the umask leaves.
+    // A new file has the mode given by the umask.
     let made = Command::new("sh")
         .args(["-c", "umask 027; exec \"$0\" inspect body.h5 --report made.html"])
         .arg(program())
@@ -255,7 +255,7 @@ fn an_output_keeps_the_mode_of_the_file_that_it_replaces() {
     assert_eq!(fs::metadata(path.join("made.html")).expect("an output").mode() & 0o7777, 0o640);
 }
 
-/// An owner can be given away by root alone; a test that runs as another user sees its own.
+/// Only root can give a file away; a test as another user checks the own user only.
 #[test]
 fn an_output_keeps_the_owner_of_the_file_that_it_replaces() {
     let folder = folder();
@@ -269,7 +269,7 @@ fn an_output_keeps_the_owner_of_the_file_that_it_replaces() {
     assert_eq!((after.uid(), after.gid(), after.mode()), (before.uid(), before.gid(), before.mode()));
 }
 
-/// A run is asked for so many threads that these would leave no memory to go on with.
+/// A run with an unreasonable number of threads succeeds without exhausting the memory.
 #[test]
 fn so_many_threads_that_no_machine_has_them_are_no_fault() {
     let folder = folder();

@@ -1,9 +1,9 @@
-//! The program as a user runs it, and the files that it is shipped with.
+//! The built program and the files that it is shipped with.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// The program: that of this build, or the one that `FLEXBODY` names.
+/// Returns the path of the program: of this build, or named by `FLEXBODY`.
 pub fn program() -> PathBuf {
     std::env::var_os("FLEXBODY").map_or_else(|| env!("CARGO_BIN_EXE_flexbody").into(), PathBuf::from)
 }

@@ -1,5 +1,5 @@
-//! No output replaces a file that a command reads, also one that no argument names: what a deck includes or assigns, a
-//! history of a scene, a file under the name of a link.
+//! No output replaces a file that a command reads, even if no argument names it: included or assigned files
+//! of a deck, a history of a scene, a file under the name of a link.
 
 use crate::program::flexbody;
 use oracle::{fixtures, members};
@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// The small job `name` in a folder of its own.
+/// Copies the small job `name` into a folder of its own.
 fn job(name: &str) -> TempDir {
     let (folder, from) = (tempfile::tempdir().expect("a folder"), fixtures().join("small").join(name));
     for file in members(&from) {
@@ -16,7 +16,7 @@ fn job(name: &str) -> TempDir {
     folder
 }
 
-/// Every file below a folder, and what it holds.
+/// Returns every file below a folder with its contents.
 fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let mut all = Vec::new();
     for name in members(folder) {
@@ -30,7 +30,7 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     all
 }
 
-/// The command is refused for its output and leaves every file as it was.
+/// Asserts that the command is refused for its output and leaves every file unchanged.
 fn refuses(folder: &Path, line: &str) {
     let before = contents(folder);
     let words: Vec<&str> = line.split_whitespace().collect();
@@ -41,8 +41,7 @@ fn refuses(folder: &Path, line: &str) {
     assert!(contents(folder) == before, "{line}");
 }
 
-/// Every file of these jobs is one that the job consists of; some of them are included or assigned under names that tell
-/// nothing.
+/// All files of these jobs are inputs; some are included or assigned under unrelated names.
 #[test]
 fn files_of_a_job_are_not_replaced_whatever_they_are_called() {
     for (name, deck) in [
@@ -91,12 +90,12 @@ fn links_to_included_files_and_other_spellings_are_inputs_for_every_command() {
     ] {
         refuses(path, &line);
     }
-    // What prepare writes has names of its own.
+    // The output files of `prepare` have fixed names.
     fs::hard_link(path.join("nodes.inp"), path.join("sub/driver.py")).expect("a link");
     refuses(path, "prepare job.inp --units m,kg,s -o sub");
 }
 
-/// A body of the list must not be written over what another one is made of, and a report not over any of them.
+/// An output of the list must not replace an input of another body, and a report must not replace any input.
 #[test]
 fn a_batch_replaces_no_input_of_any_body() {
     let folder = job("calculix");
@@ -116,7 +115,7 @@ fn a_batch_replaces_no_input_of_any_body() {
     }
 }
 
-/// A history of a load case that is not asked for belongs to the scene all the same.
+/// The history of an unselected load case belongs to the scene too.
 #[test]
 fn histories_of_every_case_are_inputs() {
     let folder = job("brick");

@@ -1,10 +1,10 @@
-//! The page about the structure of the sources says what the sources do (`ARCHITECTURE.md`).
+//! `ARCHITECTURE.md` agrees with the sources.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Lines of the longest file that is still one noun.
+/// Largest number of lines of a file. A longer file should be split by topic.
 const LONGEST_FILE: usize = 700;
 
 fn read(path: impl AsRef<Path>) -> String {
@@ -12,12 +12,12 @@ fn read(path: impl AsRef<Path>) -> String {
         .unwrap_or_else(|e| panic!("{}: {e}", path.as_ref().display()))
 }
 
-/// The words of a text that stand between backquotes.
+/// Returns the words of a text between backquotes.
 fn quoted(text: &str) -> BTreeSet<String> {
     text.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
-/// All Rust files below a folder of the workspace, by their paths from its root.
+/// Returns all Rust files below a folder of the workspace, with paths from the root.
 fn rust_files(folder: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut left = vec![PathBuf::from(folder)];
@@ -35,7 +35,7 @@ fn rust_files(folder: &str) -> Vec<PathBuf> {
     found
 }
 
-/// What each crate uses, from its manifest: the crates of the workspace among its dependencies.
+/// Returns for each crate the crates of the workspace among the dependencies of its manifest.
 fn manifests() -> BTreeMap<String, BTreeSet<String>> {
     oracle::members(&oracle::root().join("crates"))
         .into_iter()
@@ -79,7 +79,7 @@ fn every_exception_to_the_ban_of_unsafe_code_is_named() {
     assert_eq!(quoted(paragraph), found);
 }
 
-/// Takes away files that use no file that is left, until nothing is left, or files in a circle.
+/// Repeatedly removes files that use no remaining file, until none remain or the rest form a circle.
 #[test]
 fn the_extension_module_has_no_circle_of_files() {
     let mut uses: BTreeMap<String, String> = rust_files("python/src")

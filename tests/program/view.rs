@@ -1,4 +1,4 @@
-//! The page of `flexbody view`: what it holds, and that a browser draws it.
+//! Page of `flexbody view`: its contents, and its display in a browser.
 
 use crate::program::flexbody;
 use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
 
-/// Runs `flexbody`, which must succeed, and gives what it prints.
+/// Runs `flexbody`, asserts that it succeeds, and returns its output.
 fn done(folder: &Path, line: &str) -> String {
     let run = flexbody(folder, &line.split_whitespace().collect::<Vec<_>>());
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
@@ -20,7 +20,7 @@ fn done(folder: &Path, line: &str) -> String {
     text(&run.stdout)
 }
 
-/// A folder with the body of the block of `fixtures/small/abaqus_labels`, as `body.flex.h5`.
+/// Creates a folder with the body of the block of `fixtures/small/abaqus_labels` as `body.flex.h5`.
 fn block(options: &str) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let job = fixtures().join("small/abaqus_labels/job.inp");
@@ -33,10 +33,10 @@ fn block(options: &str) -> TempDir {
     folder
 }
 
-/// Static responses to loads at the interface, in the basis beside the free modes.
+/// Option for residual vectors of loads at the interface, in addition to the free modes.
 const WITH_RESIDUAL_VECTORS: &str = "--residual-vectors interfaces";
 
-/// The element of a page with this identity.
+/// Returns the element of a page with this id.
 fn element(page: &str, id: &str) -> String {
     let (_, after) = page.split_once(&format!("id=\"{id}\">")).unwrap_or_else(|| panic!("no {id}"));
     after.split_once("</script>").expect("an end").0.to_owned()
@@ -51,7 +51,7 @@ fn the_page_has_everything_in_it() {
     assert_eq!((facts["drawn"].as_str(), facts["triangles"].as_u64()), (Some("surface"), Some(20)));
     let page = fs::read_to_string(folder.path().join("view.html")).expect("a page");
     assert_eq!(facts["bytes"].as_u64(), Some(page.len() as u64));
-    // Nothing is loaded from elsewhere.
+    // The page loads nothing from elsewhere.
     for mark in ["http:", "https:", "src=", "@import", "url(", "{{"] {
         assert!(!page.contains(mark), "{mark}");
     }
@@ -63,15 +63,16 @@ fn the_page_has_everything_in_it() {
     assert!(statics.count() > 0, "residual vectors are named as such");
     assert_eq!(data["interfaces"][0]["name"], "left");
     assert_eq!(data["interfaces"][0]["nodes"].as_array().map(Vec::len), Some(4));
-    // Four letters of base64 for three bytes: six for each node and place, and for each node and mode.
+    // Base64 writes three bytes as four letters: a position has six bytes per node, a shape six bytes per
+    // node and mode.
     let nodes = facts["drawn_nodes"].as_u64().expect("a count") as usize;
     assert_eq!(element(&page, "data-positions").len(), (6 * nodes).div_ceil(3) * 4);
     assert_eq!(element(&page, "data-shapes").len(), (6 * nodes * modes.len()).div_ceil(3) * 4);
     assert_eq!(element(&page, "data-triangles").len(), 20 * 6 / 3 * 4);
 }
 
-/// The same body without a surface is drawn as points; fewer triangles can be asked for; the same command
-/// writes the same page.
+/// A body without a surface is drawn as points; the number of triangles can be reduced; equal commands write
+/// equal pages.
 #[test]
 fn pages_draw_what_there_is() {
     let points = block("--no-mesh");
@@ -87,7 +88,7 @@ fn pages_draw_what_there_is() {
     assert!(a == b);
 }
 
-/// A simulation is played by its own body only.
+/// A simulation is played only with its own body.
 #[test]
 fn simulations_are_played_by_their_body() {
     let folder = block("");
@@ -98,7 +99,7 @@ fn simulations_are_played_by_their_body() {
     assert!(said.contains("a simulation of 21 instants"), "{said}");
     let page = fs::read_to_string(folder.path().join("spin.html")).expect("a page");
     assert_eq!(element(&page, "data-times").len(), (4 * 21usize).div_ceil(3) * 4);
-    // Colours go up to the largest deflection, which may lie between the instants.
+    // The colour scale reaches the largest deflection, which may lie between the output times.
     let body = flexbody_file::read(folder.path().join("body.flex.h5")).expect("a body");
     let motion = flexbody_file::read_simulation(folder.path().join("spin.h5")).expect("a motion");
     let shape = &body.modes().shape;
@@ -125,7 +126,7 @@ fn simulations_are_played_by_their_body() {
     }
 }
 
-/// Whatever is wrong with a file of a simulation, it is refused or read.
+/// A damaged file of a simulation is refused or read and never causes a panic.
 #[test]
 fn damaged_simulations_are_no_panic() {
     let folder = block("");
@@ -135,7 +136,7 @@ fn damaged_simulations_are_no_panic() {
     let path = folder.path().join("damaged.h5");
     for k in 0..300usize {
         let mut bytes = whole.clone();
-        // A fixed sequence of places, spread over the file.
+        // The damaged positions are a fixed sequence, spread over the file.
         let at = k * 7919 % whole.len();
         match k % 3 {
             0 => bytes.truncate(at),
@@ -143,12 +144,12 @@ fn damaged_simulations_are_no_panic() {
             _ => bytes[at..(at + 8).min(whole.len())].fill(0xff),
         }
         fs::write(&path, bytes).expect("written");
-        // Either is well.
+        // Reading may succeed or fail.
         let _ = read_simulation(&path);
     }
 }
 
-/// A body that hangs from an interface is drawn as it is carried.
+/// A body carried at an interface is drawn in its carried form.
 #[test]
 fn carried_bodies_are_drawn_as_they_are_carried() {
     let folder = block("");
@@ -159,7 +160,7 @@ fn carried_bodies_are_drawn_as_they_are_carried() {
     done(folder.path(), "view body.flex.h5 --simulation hang.h5 -o hang.html");
     let page = fs::read_to_string(folder.path().join("hang.html")).expect("a page");
     let data: Value = serde_json::from_str(&element(&page, "data")).expect("JSON");
-    // The interface rests in the frame of the scene.
+    // The interface is at rest in the frame of the scene.
     let motion = data["interfaces"][0]["motion"].as_array().expect("numbers");
     let largest =
         data["modes"].as_array().expect("modes").iter().map(|m| m["largest"].as_f64().expect("a number"));
@@ -167,7 +168,7 @@ fn carried_bodies_are_drawn_as_they_are_carried() {
     assert!(motion.iter().all(|x| x.as_f64().expect("a number").abs() < 1e-9 * largest), "{motion:?}");
 }
 
-/// A plate of 100,000 nodes with 20 modes.
+/// Returns a plate with 100,000 nodes and 20 modes.
 fn plate() -> FlexBody {
     let (rows, columns) = (250usize, 400usize);
     let mut parts = parts(Random::new(3), rows * columns, 20, 0, 0);
@@ -184,7 +185,7 @@ fn plate() -> FlexBody {
     FlexBody::new(parts).expect("a body")
 }
 
-/// A large surface is thinned to what a page has room for.
+/// A large surface is thinned to the size limit of a page.
 #[test]
 fn a_hundred_thousand_nodes_fit_into_a_page() {
     let body = plate();
@@ -194,7 +195,7 @@ fn a_hundred_thousand_nodes_fit_into_a_page() {
     assert!((1_500_000..4_000_000).contains(&report), "{report}");
 }
 
-/// A browser of this machine.
+/// Returns a browser of this machine, if there is one.
 fn browser() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     let names = ["chromium", "chromium-browser", "google-chrome", "chrome"];
@@ -203,7 +204,8 @@ fn browser() -> Option<PathBuf> {
         .find(|file| file.is_file())
 }
 
-/// What the browser makes of a page: its document and what it says, or with a file of a picture that.
+/// Returns the document and the messages of the browser for a page; with an option for a screenshot it writes
+/// that instead.
 fn browse(browser: &Path, page: &Path, asked: &str, options: &[&str]) -> (String, String) {
     let own = tempfile::tempdir().expect("a folder");
     let usual = "--headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic \
@@ -220,7 +222,7 @@ fn browse(browser: &Path, page: &Path, asked: &str, options: &[&str]) -> (String
     (text(run.stdout), text(run.stderr))
 }
 
-/// A report draws its body without complaint, whether the run or the file wrote it.
+/// A browser draws the body of a report without errors, written by the run or from the file.
 #[test]
 fn a_browser_draws_the_body_of_a_report() {
     let Some(browser) = browser() else {
@@ -238,7 +240,7 @@ fn a_browser_draws_the_body_of_a_report() {
         }
         assert!(!document.contains("data-failed="), "{document}");
     }
-    // What is drawn of the file is what is drawn of the run.
+    // The pictures of the run and of the file are equal.
     let [run, file] =
         ["run.html", "file.html"].map(|name| fs::read_to_string(folder.path().join(name)).expect("a report"));
     for id in ["data", "data-positions", "data-shapes", "data-triangles"] {
@@ -246,7 +248,7 @@ fn a_browser_draws_the_body_of_a_report() {
     }
 }
 
-/// A page says how long its frames take, however large the body is.
+/// A page reports the time of its frames for a body of any size.
 #[test]
 #[ignore = "slow"]
 fn a_browser_turns_a_hundred_thousand_nodes() {
@@ -265,7 +267,7 @@ fn a_browser_turns_a_hundred_thousand_nodes() {
     assert!(time.parse::<f64>().is_ok_and(|time| time > 0.0), "{time}");
 }
 
-/// The page draws without complaint, and two instants of a mode look different; one looks the same twice.
+/// The page draws without errors; two phases of a mode look different, and one phase drawn twice looks equal.
 #[test]
 #[ignore = "slow"]
 fn a_browser_draws_the_page() {

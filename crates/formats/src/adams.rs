@@ -1,5 +1,5 @@
-//! The nine inertia invariants with the numbering and the signs of Adams/Flex, for comparison with what an
-//! MNF translator prints.
+//! The nine inertia invariants with the numbering and signs of Adams/Flex, for comparison with the output of
+//! an MNF translator.
 
 use super::export::Holding::{Held, NotApplicable};
 use super::export::arrays::Nested;
@@ -11,7 +11,7 @@ use flexbody_body::flex_body::FlexBody;
 use serde_json::json;
 use std::fmt::Write;
 
-/// The format.
+/// Export format of the invariants.
 pub(crate) struct AdamsInvariants;
 
 const TEXT: &str = "text";
@@ -76,18 +76,18 @@ const CONVENTIONS: &[&str] = &[
     "MNF files are proprietary to Adams: this is no MNF, and Adams does not read it.",
 ];
 
-/// One invariant, or what belongs beside them.
+/// An invariant or an accompanying quantity.
 struct Quantity {
     name: &'static str,
     title: &'static str,
     formula: &'static str,
     units: &'static str,
     shape: Vec<usize>,
-    /// Row-major; `None` where the body does not hold it.
+    /// Values in row-major order; `None` if the body does not hold the quantity.
     values: Option<Vec<f64>>,
 }
 
-/// I1 to I9, then stiffness and damping of the modes.
+/// Returns I1 to I9, then stiffness and damping of the modes.
 fn quantities(body: &FlexBody) -> Vec<Quantity> {
     let nf = body.n_modes();
     let told = body.invariants().numbered();
@@ -217,7 +217,7 @@ fn text(body: &FlexBody, quantities: &[Quantity], frames: &[ExportFrame]) -> Str
     out
 }
 
-/// Rows of numbers that read back bit by bit.
+/// Writes rows of numbers that round-trip exactly.
 fn lines(out: &mut String, values: &[f64], columns: usize) {
     for row in values.chunks(columns) {
         let row: Vec<String> = row.iter().map(|v| format!("{v:e}")).collect();

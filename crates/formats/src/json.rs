@@ -10,7 +10,7 @@ use serde_json::Serializer;
 use serde_json::ser::Formatter;
 use std::io::{self, Write};
 
-/// The format.
+/// Export format of JSON.
 pub(crate) struct Json;
 
 impl ExportFormat for Json {
@@ -37,7 +37,7 @@ impl ExportFormat for Json {
     }
 }
 
-/// Every key on a line of its own, every array on a single one.
+/// Formatter with one key per line and each array on a single line.
 struct KeyPerLine;
 
 impl Formatter for KeyPerLine {

@@ -1,6 +1,5 @@
-//! Files of flexible bodies: our own, and one folder or file for every format of another program. What all
-//! formats share that are written stands in `export`, what all share that are read in `import`; `registry`
-//! lists them.
+//! Files of flexible bodies for other programs, one folder or file per format. `export` holds the code shared
+//! by export formats, `import` that shared by import formats; `registry` lists the formats.
 
 #![deny(
     clippy::exit,

@@ -12,7 +12,7 @@ use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
-/// The format.
+/// Export format of NumPy.
 pub(crate) struct Npz;
 
 impl ExportFormat for Npz {
@@ -45,11 +45,12 @@ impl ExportFormat for Npz {
     }
 }
 
-/// Members as they are: shapes shrink by no more than 5 to 20 % (`store`), and NumPy maps what is stored.
+/// Returns an archive of uncompressed members: compression reduces shapes by 5 to 20 % only (`store`), and
+/// NumPy maps uncompressed members into memory.
 fn archive(members: Vec<(&str, Vec<u8>)>) -> zip::result::ZipResult<Vec<u8>> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, bytes) in members {
-        // No clock and no platform: equal bodies are equal bytes.
+        // Neither clock nor platform is recorded, so that equal bodies give equal bytes.
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Stored)
             .last_modified_time(DateTime::default())
@@ -61,11 +62,11 @@ fn archive(members: Vec<(&str, Vec<u8>)>) -> zip::result::ZipResult<Vec<u8>> {
     Ok(archive.finish()?.into_inner())
 }
 
-/// One array in row-major order.
+/// Returns an array in row-major order as a member.
 fn npy<const N: usize>(kind: &str, shape: &[usize], values: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
     let extents: String = shape.iter().map(|extent| format!("{extent}, ")).collect();
     let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({extents}), }}");
-    // A line, after which the numbers begin at a multiple of 64.
+    // The header is padded so that the numbers begin at a multiple of 64.
     let width = (PREFIX + header.len() + 1).next_multiple_of(64) - PREFIX - 1;
     let header = format!("{header:<width$}\n");
     let length = u16::try_from(header.len()).expect("a few extents");
@@ -76,10 +77,10 @@ fn npy<const N: usize>(kind: &str, shape: &[usize], values: impl Iterator<Item =
     member
 }
 
-/// Magic, version and length in front of the header.
+/// Length of magic, version and header length in bytes.
 const PREFIX: usize = 10;
 
-/// A text as an array without extents: four bytes for each character.
+/// Returns a text as an array without extents: four bytes for each character.
 fn text(text: &str) -> Vec<u8> {
     let characters: Vec<char> = text.chars().collect();
     npy(&format!("<U{}", characters.len()), &[], characters.iter().map(|c| u32::from(*c).to_le_bytes()))

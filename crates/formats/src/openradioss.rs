@@ -1,16 +1,16 @@
-//! OpenRadioss: the data file of `/FXBODY`, as the starter reads it (`hm_read_fxb.F`) and makes it from a
-//! DMIG file (`ini_fxbody.F`).
+//! OpenRadioss: data file of `/FXBODY`, as the starter reads it (`hm_read_fxb.F`) and derives it from a DMIG
+//! file (`ini_fxbody.F`).
 //!
-//! Twelve rigid modes move a node at x (body axes) by the velocities of four points in space: the ends of the
-//! body axes, p_I, and their origin p_0. Rigid mode 3 (I - 1) + J: x_I e_J, rigid mode 9 + J:
-//! (1 - x_1 - x_2 - x_3) e_J. The columns of the rotation matrix are p_I - p_0. Where nodes have
-//! rotations, three more turn all nodes about the axes in space. Local modes turn with the body.
+//! Twelve rigid modes move a node at x (body axes) by the velocities of four points in space: the ends p_I of
+//! the body axes and their origin p_0. Rigid mode 3 (I - 1) + J is x_I e_J, rigid mode 9 + J is (1 - x_1 -
+//! x_2 - x_3) e_J. The columns of the rotation matrix are p_I - p_0. If nodes have rotations, three more
+//! modes rotate all nodes about the axes in space. Local modes rotate with the body.
 //!
-//! With s_I = x_I, s_0 = 1 - sum x_I and E_ab = e_a e_b', the products are those of J, c, m, Ibar and C1:
-//! s_I' Ms s_K = J_IK, s_0' Ms s_I = c_I - sum_K J_IK, s_I' Ms Psi_k = `Ibar_Ik`, s_0' Ms Psi_k = C1_k -
-//! sum_I Ibar_Ik. They give the kinetic energy of the undeformed body exactly, for any mass: J, Ibar and C1
-//! stand for its I0, C2 and W1. The rows of the three rotations are zero: their inertia is in the other
-//! twelve, which the program ties to them.
+//! With s_I = x_I, s_0 = 1 - sum x_I and E_ab = e_a e_b', the products follow from J, c, m, Ibar and C1: s_I'
+//! Ms s_K = J_IK, s_0' Ms s_I = c_I - sum_K J_IK, s_I' Ms Psi_k = `Ibar_Ik`, s_0' Ms Psi_k = C1_k - sum_I
+//! Ibar_Ik. They give the exact kinetic energy of the undeformed body for any mass: J, Ibar and C1 represent
+//! its I0, C2 and W1. The rows of the three rotations are zero: their inertia is contained in the other
+//! twelve modes, to which the program ties them.
 
 use super::export::Holding::{self, Held, NotApplicable};
 use super::export::frames::{ExportFrame, frames};
@@ -21,7 +21,7 @@ use flexbody_body::flex_body::FlexBody;
 use nalgebra::Vector3;
 use std::fmt::Write;
 
-/// The format.
+/// Export format of OpenRadioss.
 pub(crate) struct OpenRadioss;
 
 impl ExportFormat for OpenRadioss {
@@ -43,14 +43,14 @@ impl ExportFormat for OpenRadioss {
         ExportChecklist {
             rigid_coupling: Held,
             plane: losses::plane(body),
-            // Its velocities lack what the rotation makes of the deformation (`fxbodvp.F`).
+            // The velocities of the program omit the rotation of the deformation (`fxbodvp.F`).
             deformed_inertia: losses::changing_inertia(
                 body,
                 "W1 but for its centrifugal load",
                 "OpenRadioss takes the inertia of the undeformed body",
             ),
             general_w0: losses::general_w0(body),
-            // Those of W2 and W3 are lost with the inertia of the deformed body.
+            // Terms of W2 and W3 are lost together with the inertia of the deformed body.
             coriolis_force: NotApplicable,
             general_w3: NotApplicable,
             separate_w2: NotApplicable,
@@ -86,16 +86,17 @@ impl ExportFormat for OpenRadioss {
     }
 }
 
-/// Largest integer in eight columns.
+/// Largest integer that fits into eight columns.
 const LARGEST: i64 = 99_999_999;
 
-/// Columns of a number.
+/// Width of a number in columns.
 const WIDTH: usize = 16;
 
-/// alpha and beta of D = alpha I + beta diag(lambda), where the damping of the modes is that.
+/// Returns alpha and beta of D = alpha I + beta diag(lambda) if the modal damping has this form.
 fn rayleigh(body: &FlexBody) -> Option<[f64; 2]> {
-    /// Of what rounding leaves of a projected matrix.
+    /// Rounding error of a projected matrix, relative.
     const ROUNDING: f64 = 1e-9;
+    // alpha and beta from the first and the last diagonal entry; all entries must then agree.
     let (d, lambda) = (body.damping(), &body.modes().eigenvalue);
     let last = lambda.len() - 1;
     let slope = (d[(last, last)] - d[(0, 0)]) / (lambda[last] - lambda[0]);
@@ -107,10 +108,10 @@ fn rayleigh(body: &FlexBody) -> Option<[f64; 2]> {
     (0..=last).all(|i| (0..=last).all(|j| is_told(i, j))).then_some([alpha, beta])
 }
 
-/// The file as it grows.
+/// Text of the file under construction.
 struct Deck {
     text: String,
-    /// Whether products of the body's numbers stay in the range of double precision.
+    /// True if all products of numbers of the body are in the range of double precision.
     finite: bool,
 }
 
@@ -120,6 +121,7 @@ impl Deck {
         let turning = frames.iter().any(|frame| frame.rotation.is_some());
         let damping = losses::is_damped(body).then(|| rayleigh(body)).flatten();
         let mut deck = Self { text: String::new(), finite: true };
+        // Sizes, nodes and the positions where the deck needs them.
         deck.remark("flexible body of /FXBODY, written by flexbody");
         deck.remark("  NMOD    NMST    NBNO    IROT   IDAMP    IBLO   IFILE");
         deck.integers(&[nf, 0, frames.len(), turning.into(), damping.is_some().into(), 0, 0], 7);
@@ -133,6 +135,7 @@ impl Deck {
         }
         let ids: Vec<i64> = frames.iter().map(|frame| frame.id).collect();
         deck.integers(&ids, 10);
+        // Orientation of the body axes, and the highest natural frequency sqrt(lambda) / (2 pi).
         deck.remark("rotation matrix, row by row, and the highest frequency");
         let highest = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
         let mut rotation: Vec<f64> = body.frame().axes.transpose().iter().copied().collect();
@@ -142,6 +145,7 @@ impl Deck {
             deck.remark("damping alpha M + beta K");
             deck.numbers(damping);
         }
+        // Rigid modes: the four points with their weights s, then the rotations.
         let sets = if turning { 5 } else { 4 };
         for (set, axis) in (0..sets).flat_map(|set| [0, 1, 2].map(|axis| (set, axis))) {
             deck.remark(&format!("rigid mode {}", 3 * set + axis + 1));
@@ -155,6 +159,7 @@ impl Deck {
                 deck.numbers(moved);
             }
         }
+        // Local modes, node by node: displacement and rotation.
         for j in 0..nf {
             deck.remark(&format!("local mode {}", j + 1));
             for frame in frames {
@@ -163,6 +168,7 @@ impl Deck {
                 deck.numbers((0..6).map(moved));
             }
         }
+        // Diagonal mass and stiffness of the local modes, then the coupling products.
         let diagonal = |a: &faer::Mat<f64>| (0..nf).map(|j| a[(j, j)]).collect::<Vec<f64>>();
         deck.remark("mass of the local modes");
         deck.numbers(diagonal(&invariants.modal_mass()));
@@ -172,7 +178,8 @@ impl Deck {
         deck
     }
 
-    /// Products of the rigid modes with the mass, and of both kinds of modes with mass and stiffness.
+    /// Writes the products of the rigid modes with the mass, and of rigid and local modes with mass and
+    /// stiffness.
     fn products(&mut self, body: &FlexBody, rigid: usize) {
         let (nf, invariants) = (body.n_modes(), body.invariants());
         let (mass, c, moment) = (invariants.mass(), invariants.first_moment(), invariants.second_moment());
@@ -190,14 +197,14 @@ impl Deck {
             3 => invariants.c1()[(axis, j)] - (0..3).map(|k| ibar_told[k][axis][j]).sum::<f64>(),
             _ => ibar_told[set][axis][j],
         };
-        // Rigid mode l along e_a with E_ab psi_j: component b of the mode.
+        // Product of rigid mode l along e_a with E_ab psi_j: component b of the mode.
         for (a, b) in (0..3).flat_map(|a| [0, 1, 2].map(|b| (a, b))) {
             self.remark(&format!("mass that couples rigid and local modes, E{}{}", a + 1, b + 1));
             let entry = |l: usize, j: usize| if l % 3 == a && l < 12 { ibar(l / 3, b, j) } else { 0.0 };
             self.numbers((0..rigid).flat_map(|l| (0..nf).map(move |j| (l, j))).map(|(l, j)| entry(l, j)));
         }
-        // K psi_j = lambda_j M psi_j. Rigid motion strains nothing: what is antisymmetric is rounding, and so
-        // is C1.
+        // By K psi_j = lambda_j M psi_j. A rigid motion causes no strain, so that the antisymmetric part and
+        // C1 are rounding.
         let strained = |set: usize, axis: usize, j: usize| {
             let symmetric_along = |k: usize| 0.5 * (ibar_told[k][axis][j] + ibar_told[axis][k][j]);
             let symmetric =
@@ -211,12 +218,12 @@ impl Deck {
         }
     }
 
-    /// Lines that begin with # are passed over.
+    /// Writes a comment line; the reader skips lines that begin with #.
     fn remark(&mut self, text: &str) {
         writeln!(self.text, "# {text}").expect("writing to a String cannot fail");
     }
 
-    /// Where the deck must have a node.
+    /// Writes a comment with the position in the model where the deck needs a node.
     fn place(&mut self, body: &FlexBody, which: &str, position: &[f64; 3]) {
         let frame = body.frame();
         let [x, y, z] = (frame.origin + frame.axes * Vector3::from(*position)).into();
@@ -231,7 +238,7 @@ impl Deck {
         }
     }
 
-    /// Five numbers on a line.
+    /// Writes five numbers per line.
     fn numbers(&mut self, values: impl IntoIterator<Item = f64>) {
         let mut on_line = 0;
         for value in values {
@@ -250,13 +257,13 @@ impl Deck {
     }
 }
 
-/// s_1, s_2, s_3, s_0 of a node.
+/// Returns s_1, s_2, s_3, s_0 of a node.
 fn weights(x: &[f64; 3]) -> [f64; 4] {
     [x[0], x[1], x[2], 1.0 - x[0] - x[1] - x[2]]
 }
 
-/// The most digits that the columns take: 15 of numbers from 0.1, 11 to 13 of others, one less of negative
-/// ones. Fortran reads exponents without a letter.
+/// Returns a number with as many digits as its columns hold: 15 for numbers from 0.1, 11 to 13 for others,
+/// one less for negative numbers. Fortran reads exponents without a letter.
 fn number(value: f64) -> String {
     let fits = |text: &String| text.len() <= WIDTH;
     for digits in (1..=15).rev() {
@@ -273,7 +280,7 @@ fn number(value: f64) -> String {
     unreachable!("one digit with sign, point and exponent takes seven columns")
 }
 
-/// With a decimal point, without zeros that say nothing.
+/// Returns a number with a decimal point and without redundant zeros.
 fn trimmed(text: &str) -> String {
     let mut text =
         if text.contains('.') { text.trim_end_matches('0').to_owned() } else { format!("{text}.") };

@@ -1,4 +1,4 @@
-//! Every format of other programs: those that are written, and those that are read.
+//! Registry of the formats of other programs, for export and import.
 
 use super::export::{ExportFormat, ExportOptions, Exported, Points};
 use super::gltf::Gltf;
@@ -13,7 +13,7 @@ use flexbody_base::text::InputFile;
 use flexbody_body::flex_body::FlexBody;
 use std::borrow::Cow;
 
-/// Every format, in the order of the documentation.
+/// All export formats in the order of the documentation.
 pub const FORMATS: &[&dyn ExportFormat] = &[
     #[cfg(feature = "hdf5")]
     &exudyn::write::Exudyn,
@@ -33,10 +33,10 @@ pub const FORMATS: &[&dyn ExportFormat] = &[
     &Gltf,
 ];
 
-/// The format of that name.
+/// Returns the export format with this name.
 ///
 /// # Errors
-/// [`Usage`](Code::Usage), with the names that there are.
+/// [`Usage`](Code::Usage) for an unknown name, with the known names.
 pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
     FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
         let names: Vec<&str> = FORMATS.iter().map(|format| format.name()).collect();
@@ -45,12 +45,12 @@ pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
     })
 }
 
-/// Writes `body` in a format, with a warning for everything that the format cannot hold, and a note for every
-/// setting that its program needs and for what a picture leaves out.
+/// Writes `body` in a format. Warns of every property that the format cannot hold; notes state every setting
+/// that the reading program needs, and the properties that a picture leaves out.
 ///
 /// # Errors
 /// [`Usage`](Code::Usage) for options that the format does not have, or nodes that the body does not have;
-/// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss`; those of
+/// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss` is true; the errors of
 /// [`RecordedMotion::staged`](flexbody_file::RecordedMotion::staged) and of [`ExportFormat::write`].
 pub fn export(
     body: &FlexBody,
@@ -59,11 +59,13 @@ pub fn export(
     allow_loss: bool,
 ) -> Result<(Exported, Vec<Diagnostic>)> {
     check_options(body, format, options)?;
+    // A picture of a motion shows the body in the frame of the motion.
     let body = match &options.motion {
         Some(motion) => Cow::Owned(motion.staged(body)?),
         None => Cow::Borrowed(body),
     };
     let body = body.as_ref();
+    // Losses are warnings if they are allowed, otherwise errors.
     let code = if allow_loss { Code::ExportLost } else { Code::ExportLoses };
     let losses: Vec<Diagnostic> = format
         .checklist(body, options)
@@ -113,7 +115,7 @@ fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOpt
     Ok(())
 }
 
-/// Every format, in the order in which files are recognised.
+/// All import formats in the order in which files are recognised.
 pub const IMPORT_FORMATS: &[&dyn ImportFormat] = &[
     &sid::import::SidFile,
     &mbdyn::import::Mbdyn,
@@ -123,10 +125,10 @@ pub const IMPORT_FORMATS: &[&dyn ImportFormat] = &[
     &exudyn::read::Exudyn,
 ];
 
-/// The format of that name.
+/// Returns the import format with this name.
 ///
 /// # Errors
-/// [`Usage`](Code::Usage), with the names that there are.
+/// [`Usage`](Code::Usage) for an unknown name, with the known names.
 pub fn find_import_format(name: &str) -> Result<&'static dyn ImportFormat> {
     IMPORT_FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
         let names: Vec<&str> = IMPORT_FORMATS.iter().map(|format| format.name()).collect();
@@ -135,10 +137,10 @@ pub fn find_import_format(name: &str) -> Result<&'static dyn ImportFormat> {
     })
 }
 
-/// The format of a file.
+/// Returns the format of a file.
 ///
 /// # Errors
-/// [`ForeignUnreadable`](Code::ForeignUnreadable) when it is none of them.
+/// [`ForeignUnreadable`](Code::ForeignUnreadable) if no format recognises the file.
 pub fn recognise(file: &InputFile) -> Result<&'static dyn ImportFormat> {
     IMPORT_FORMATS.iter().copied().find(|format| format.recognises(file)).ok_or_else(|| {
         let names: Vec<&str> = IMPORT_FORMATS.iter().map(|format| format.name()).collect();

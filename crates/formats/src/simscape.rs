@@ -1,5 +1,5 @@
-//! Simscape Multibody: what the block Reduced Order Flexible Solid takes, with the names of the example of
-//! its documentation ("Model an Excavator Dipper Arm as a Flexible Body"): `arm = load('body.mat')` gives
+//! Simscape Multibody: input of the block Reduced Order Flexible Solid, with the names of the example in its
+//! documentation ("Model an Excavator Dipper Arm as a Flexible Body"): `arm = load('body.mat')` gives
 //! `arm.P0`, `arm.K`, `arm.M`, `arm.C`.
 
 use super::export::hdf5_contents::{Hdf5Contents, hdf5_bytes};
@@ -11,7 +11,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 
-/// The format.
+/// Export format of Simscape Multibody.
 pub(crate) struct Simscape;
 
 const HDF5: &str = "hdf5";
@@ -67,7 +67,7 @@ impl ExportFormat for Simscape {
     }
 }
 
-/// JSON in ASCII, which Octave reads: other characters by their numbers.
+/// Returns JSON in ASCII, which Octave reads; other characters are written as escape sequences.
 fn ascii(json: &str) -> String {
     let mut out = String::with_capacity(json.len());
     for c in json.chars() {

@@ -1,4 +1,4 @@
-//! Evaluations of the equations of motion and steps of the integrators take no memory from the heap.
+//! Evaluations of the equations of motion and steps of the integrators allocate no heap memory.
 
 use flexbody_body::flex_body::Frame;
 use flexbody_body::invariants::BodyFrame;
@@ -15,14 +15,14 @@ use oracle::general::raw_fixture;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-/// The system's allocator, counting per thread: other threads of the test harness do not matter.
+/// System allocator that counts per thread, so that other threads of the test harness do not matter.
 struct Counting;
 
 thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
 }
 
-#[allow(unsafe_code)] // an allocator cannot be written without
+#[allow(unsafe_code)] // an allocator needs unsafe code
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.with(|count| count.set(count.get() + 1));
@@ -82,7 +82,7 @@ fn evaluations_allocate_nothing() {
             let axes = vector.axes();
             assert_eq!(COUNT.get(), before, "{name} {terms:?}");
             assert!(energy > 0.0 && axes.determinant() > 0.0);
-            // The counter counts.
+            // Checks the counter itself.
             let one = std::hint::black_box(Box::new(energy));
             assert_eq!(COUNT.get(), before + 1);
             drop(one);
@@ -90,7 +90,7 @@ fn evaluations_allocate_nothing() {
     }
 }
 
-/// The nodal equations of a solid, of massless rows and of other null vectors of the mass.
+/// Nodal equations of a solid, with massless rows, and with other null vectors of the mass.
 #[test]
 fn nodal_evaluations_allocate_nothing() {
     for name in ["bracket_hex20", "frame_lumped", "shell_folded", "plane_frame"] {

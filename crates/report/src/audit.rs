@@ -1,4 +1,4 @@
-//! An audit as text and as JSON.
+//! Audit of a file of another program as text and as JSON.
 
 use super::document::Block;
 use super::identities::{check_row, check_table};
@@ -8,13 +8,13 @@ use flexbody_base::provenance::generator;
 use flexbody_formats::import::{Audit, AuditCheck};
 use serde_json::{Value, json};
 
-/// Version of the JSON: a newer major breaks readers, a newer minor only adds keys.
+/// Version of the JSON: a newer major version breaks readers, a newer minor version only adds keys.
 const VERSION: (u32, u32) = (1, 0);
 
-/// Frequencies that are printed.
+/// Number of frequencies that are printed.
 const FREQUENCIES: usize = 6;
 
-/// Writes a summary of the file, every check, and the findings in plain words.
+/// Renders a summary of the file, every check, and the findings in words.
 pub fn audit_text(file: &str, audit: &Audit) -> String {
     let Audit { format, dialect, name, mass, n_modes, n_frames, .. } = audit;
     let dialect = if dialect.is_empty() { String::new() } else { format!(", dialect {dialect}") };
@@ -43,7 +43,7 @@ pub fn audit_text(file: &str, audit: &Audit) -> String {
     text::render(&blocks, Screen::default())
 }
 
-/// The contract `schemas/audit.schema.json`.
+/// Returns the audit as JSON that follows the schema `schemas/audit.schema.json`.
 pub fn audit_json(file: &str, audit: &Audit) -> Value {
     let check = |c: &AuditCheck| {
         json!({

@@ -1,4 +1,4 @@
-//! All bodies of a batch in one report: text, JSON and HTML.
+//! Report on all bodies of a batch: text, JSON and HTML.
 
 use super::document::{Block, Document, Inline, Table, cells, heading};
 use super::numbers::significant;
@@ -10,34 +10,34 @@ use serde_json::Value;
 /// One body of a batch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BatchRow {
-    /// File that was written, or was to be.
+    /// Output file of the conversion, written or not.
     pub output: String,
-    /// `done`, `unchanged` (made by an earlier run) or `failed`.
+    /// State of the body: `done`, `unchanged` (made by an earlier run) or `failed`.
     pub state: &'static str,
-    /// Exit code of its conversion.
+    /// Exit code of the conversion.
     pub exit_code: i32,
-    /// First error, where there is one.
+    /// First error of the conversion; `None` without errors.
     pub error: Option<String>,
     /// Number of warnings.
     pub warnings: u64,
-    /// Bytes that were set aside for it.
+    /// Memory reserved for the conversion. Unit: bytes.
     pub memory_estimate_bytes: u64,
-    /// Largest resident memory of its conversion.
+    /// Largest resident memory of the conversion. Unit: bytes.
     pub peak_memory_bytes: Option<u64>,
-    /// Seconds of its conversion.
+    /// Wall time of the conversion. Unit: s.
     pub seconds: f64,
-    /// Degrees of freedom.
+    /// Number of degrees of freedom.
     pub n_dofs: Option<u64>,
     /// Number of modes.
     pub modes: Option<u64>,
     /// First and last frequency in hertz.
     pub frequencies_hz: Option<[f64; 2]>,
-    /// The sentence about completeness.
+    /// Sentence about the completeness of the modes.
     pub complete: Option<String>,
 }
 
 impl BatchRow {
-    /// Takes the row from the JSON that a conversion printed.
+    /// Fills the row from the JSON output of a conversion.
     pub fn read(&mut self, told: &Value) {
         let results = &told["results"];
         let frequencies: Vec<f64> = results["modes"]["frequency_hz"]
@@ -61,7 +61,7 @@ impl BatchRow {
     }
 }
 
-/// A batch.
+/// Facts of a batch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BatchFacts {
     format: &'static str,
@@ -76,7 +76,7 @@ pub struct BatchFacts {
 }
 
 impl BatchFacts {
-    /// Facts of the bodies of a list, in its order.
+    /// Collects the facts of the bodies of a list, in the order of the list.
     pub fn new(list: String, memory_bytes: u64, parallel: usize, bodies: Vec<BatchRow>) -> Self {
         let failed = bodies.iter().filter(|row| row.state == "failed").count();
         let (format, generator) = ("flexbody-batch", generator());
@@ -93,7 +93,7 @@ impl BatchFacts {
         }
     }
 
-    /// Number of bodies that failed.
+    /// Returns the number of bodies that failed.
     pub fn failed(&self) -> usize {
         self.failed
     }

@@ -1,4 +1,4 @@
-//! Lumped masses in the report of a body: their errors in plain words, as bars, and in all norms.
+//! Lumped masses in the report of a body: their errors in words, as bars, and in all norms.
 
 use super::chart::{Axis, Bar, Bars};
 use super::document::{Block, Inline, Span, Table, cells, heading, listed};
@@ -10,12 +10,13 @@ use super::numbers::{percent, significant};
 use super::text::KEEP;
 use flexbody_body::invariants::{ERROR_NORMS, LumpedScheme};
 
-/// Error at the left end of the bars: smaller ones are of no consequence.
+/// Error at the left end of the bars; smaller errors are negligible. A smaller value adds decades to the
+/// axis.
 const LOWEST_BAR: f64 = 1e-6;
-/// Longest name of a scheme beside which texts are aligned.
+/// Longest name of a scheme that is aligned with the others in a text.
 const LONGEST_SCHEME: usize = 20;
 
-/// The sections about lumped masses.
+/// Returns the sections about lumped masses.
 pub(super) fn lumped<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     let (lumped, own_modes) = (&facts.lumped, &facts.lumped_modes);
     let mut blocks = Vec::new();
@@ -44,7 +45,7 @@ pub(super) fn lumped<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     blocks
 }
 
-/// `Nodal masses from row sums: 410 NEGATIVE masses, ...`.
+/// Returns the effect of a scheme in words: `Nodal masses from row sums: 410 NEGATIVE masses, ...`.
 fn in_words(lumped: &LumpedFacts) -> Inline {
     let words = scheme_in_words(&lumped.scheme);
     let whose = match LumpedScheme::from_name(&lumped.scheme) {
@@ -63,7 +64,7 @@ fn in_words(lumped: &LumpedFacts) -> Inline {
     head.then(rest + ".")
 }
 
-/// The worst norm of every invariant that differs, and the negative masses.
+/// Returns the worst norm of every invariant that differs, and the number of negative masses.
 fn in_text(lumped: &LumpedFacts) -> String {
     let negative = match lumped.negative_masses {
         0 => String::new(),
@@ -77,14 +78,14 @@ fn errors(errors: &Errors) -> String {
     if errors.worst.is_none() {
         return "not compared".to_owned();
     }
-    // NaN, an error that is not known, is told too.
+    // NaN, an unknown error, is listed too.
     let told = errors.worst_by_invariant.iter().filter(|n| n.value.is_nan() || n.value > NEGLIGIBLE);
     let text = |n: &ErrorNorm| format!("{} {}", n.invariant.replace('_', " "), percent(n.value));
     let told: Vec<String> = told.map(|n| text(n).replace(' ', KEEP)).collect();
     if told.is_empty() { "no error above 1e-9".to_owned() } else { format!("errors {}", told.join(", ")) }
 }
 
-/// The worst norm of each invariant for each scheme; `None` without errors to draw.
+/// Returns bars with the worst norm of each invariant for each scheme; `None` if there are no errors to draw.
 fn bars(lumped: &[LumpedFacts]) -> Option<Bars> {
     let norms = || lumped.iter().flat_map(|own| &own.errors.worst_by_invariant);
     let invariants = distinct(norms().map(|norm| norm.invariant.as_str()));
@@ -93,7 +94,7 @@ fn bars(lumped: &[LumpedFacts]) -> Option<Bars> {
         Axis::decades("", values.filter(|value| *value >= LOWEST_BAR), f64::INFINITY)?.with_labels(percent);
     let group = |invariant: &&str| {
         let bar = |(style, own): (usize, &LumpedFacts)| {
-            // The last of a name counts, as in a table by names.
+            // The last of several norms of one name counts, as in a table by names.
             let norm =
                 own.errors.worst_by_invariant.iter().rev().find(|norm| norm.invariant == *invariant)?;
             Some(Bar { style, value: norm.value, label: percent(norm.value), name: own.scheme.clone() })
@@ -108,14 +109,14 @@ fn bars(lumped: &[LumpedFacts]) -> Option<Bars> {
     })
 }
 
-/// The worst norm of a scheme and whose it is.
+/// Returns the worst norm of a scheme, and its invariant and kind.
 fn worst(errors: &Errors, unknown: &str) -> [String; 2] {
     let worst = errors.worst.as_ref();
     let value = worst.map_or_else(|| unknown.to_owned(), |norm| percent(norm.value));
     [value, worst.map_or_else(String::new, |norm| format!("{}, {}", norm.invariant, norm.kind()))]
 }
 
-/// Worst error and negative masses of every scheme.
+/// Returns the table of worst errors and negative masses of every scheme.
 fn schemes(lumped: &[LumpedFacts]) -> Table {
     let row = |own: &LumpedFacts| {
         let count = own.negative_masses.to_string();
@@ -127,7 +128,7 @@ fn schemes(lumped: &[LumpedFacts]) -> Table {
     Table::new("Schemes", heads, &[0, 3], lumped.iter().map(row).collect())
 }
 
-/// Every norm of every scheme.
+/// Returns the table of every norm of every scheme.
 fn all_norms(lumped: &[LumpedFacts]) -> Table {
     let norms = lumped.iter().flat_map(|own| &own.errors.error_norms.0);
     let names = distinct(norms.map(|(name, _)| name.as_str()));
@@ -147,7 +148,7 @@ fn all_norms(lumped: &[LumpedFacts]) -> Table {
     Table::new("All error norms", heads, &[0, last], rows)
 }
 
-/// Modes from the lumped masses.
+/// Returns the table of the modes computed from the lumped masses.
 fn lumped_modes(lumped: &[LumpedModesFacts]) -> Table {
     let row = |own: &LumpedModesFacts| {
         let none = String::new;

@@ -1,4 +1,4 @@
-//! The modes in the report of a body: their frequencies, their completeness, what they lack.
+//! Modes in the report of a body: frequencies, completeness, truncation errors.
 
 use super::completeness::Completeness;
 use super::craig_bampton::CraigBamptonFacts;
@@ -11,10 +11,10 @@ use super::numbers::{counted, percent, significant};
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::Truncation;
 
-/// Frequencies shown before the last.
+/// Number of frequencies shown before the last.
 const FIRST_FREQUENCIES: usize = 6;
 
-/// Everything about the modes.
+/// Returns the section about the modes.
 pub(super) fn modes<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     let modes = &facts.modes;
     let mut blocks =
@@ -41,7 +41,7 @@ pub(super) fn modes<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     blocks
 }
 
-/// `812.5 812.5 1204 1890.2 2411 3020 ... 4412.5 Hz`.
+/// Returns the first frequencies and the last: `812.5 812.5 1204 1890.2 2411 3020 ... 4412.5 Hz`.
 pub(super) fn first_and_last(hz: &[f64]) -> String {
     let shown: Vec<String> = hz.iter().take(FIRST_FREQUENCIES).map(|f| significant(*f, 5)).collect();
     let last = hz.last().filter(|_| hz.len() > FIRST_FREQUENCIES);
@@ -50,7 +50,7 @@ pub(super) fn first_and_last(hz: &[f64]) -> String {
     format!("{}{last} Hz", shown.join(" "))
 }
 
-/// The modes in a text.
+/// Returns the terms about the modes in a text.
 fn in_short(facts: &Facts<'_>) -> Vec<Term> {
     let modes = &facts.modes;
     let accuracy = facts.run.as_ref().map(|run| run.accuracy.as_str()).filter(|name| !name.is_empty());
@@ -67,7 +67,7 @@ fn in_short(facts: &Facts<'_>) -> Vec<Term> {
     }
     let held = reduced.and_then(CraigBamptonFacts::held_hz);
     items.extend(held.map(|hz| Term::text("held", first_and_last(hz) + " (fixed-interface modes)")));
-    // The modes of a Craig-Bampton body are mixtures.
+    // The modes of a Craig-Bampton body are combinations of several kinds of shapes.
     let share = if reduced.is_some() { " with the largest share of a " } else { ": " };
     items.extend(listed("origin", &modes.origins(), |(origin, count)| {
         format!("{}{share}{origin}", counted(*count, "mode"))
@@ -75,7 +75,7 @@ fn in_short(facts: &Facts<'_>) -> Vec<Term> {
     items
 }
 
-/// The table of the modes.
+/// Returns the table of the modes.
 fn frequencies(facts: &Facts<'_>) -> Table {
     let modes = &facts.modes;
     let caption = match modes.craig_bampton {
@@ -84,7 +84,7 @@ fn frequencies(facts: &Facts<'_>) -> Table {
         }
         None => "Flexible modes, ascending",
     };
-    // Without damping a column of zeros would say nothing.
+    // Without damping the column would hold zeros only.
     let is_damped = modes.damping_ratio.iter().any(|&ratio| ratio != 0.0);
     let has_origins = !modes.origins().is_empty();
     let mut heads: Vec<Inline> = vec!["Mode".into(), "Frequency (Hz)".into()];
@@ -115,7 +115,8 @@ fn frequencies(facts: &Facts<'_>) -> Table {
     Table::new(caption, heads, words, (0..modes.count).map(row).collect())
 }
 
-/// The residual of a mode or, of a Craig-Bampton body, its error beside the free body.
+/// Returns the cells of the residual of a mode or, for a Craig-Bampton body, of its frequency error relative
+/// to the free body.
 fn accuracy_of_mode(modes: &ModeFacts, j: usize) -> Vec<Inline> {
     match &modes.craig_bampton {
         Some(own) => cells([
@@ -136,7 +137,7 @@ fn bounds(guarantee: &GuaranteeFacts, j: usize) -> Vec<Inline> {
     ])
 }
 
-/// Origin of a mode; a kind of shape that the glossary has with its explanation.
+/// Returns the origin of a mode; a kind of shape in the glossary carries its explanation.
 fn origin(provenance: &str) -> Inline {
     match provenance.split_once(':') {
         Some((kind, rest)) => Inline::from(word(kind)).then(format!(":{rest}")),
@@ -144,19 +145,19 @@ fn origin(provenance: &str) -> Inline {
     }
 }
 
-/// The table of the fixed-interface modes of a Craig-Bampton body.
+/// Returns the table of the fixed-interface modes of a Craig-Bampton body.
 fn held_frequencies<'a>(hz: &[f64]) -> Block<'a> {
     let rows = (1..).zip(hz).map(|(j, hz)| cells([format!("{j}"), significant(*hz, 8)])).collect();
     let caption = "Fixed-interface modes that the basis has: natural frequencies with all interfaces held";
     Block::Table(Table::new(caption, ["Fixed-interface mode", "Frequency (Hz)"], &[], rows))
 }
 
-/// Errors of the static responses of the modes.
+/// Returns the truncation errors of the static responses of the modes.
 fn truncation<'a>(loads: &[Truncation]) -> Vec<Block<'a>> {
     if loads.is_empty() {
         return Vec::new();
     }
-    // A load of an interface without residual vectors.
+    // Equal errors before and after belong to a load of an interface without residual vectors.
     let has_none = |t: &Truncation| t.before == t.after;
     let after = |t: &Truncation| if has_none(t) { "-".to_owned() } else { significant(t.after, 3) };
     let rows = loads.iter().map(|t| cells([t.load.clone(), significant(t.before, 3), after(t)])).collect();
@@ -171,7 +172,7 @@ fn truncation<'a>(loads: &[Truncation]) -> Vec<Block<'a>> {
     vec![Block::Table(Table::new(caption, heads, &[0], rows)), Block::Terms(listed)]
 }
 
-/// Properties of the modes as a whole.
+/// Returns the properties of the modes as a whole.
 fn completeness(facts: &Facts<'_>) -> Vec<Term> {
     let (modes, completeness) = (&facts.modes, &facts.completeness);
     let mut items = proof(facts);
@@ -211,7 +212,7 @@ fn completeness(facts: &Facts<'_>) -> Vec<Term> {
     items
 }
 
-/// The remark of the certificate; a text without a count has it in its sentence.
+/// Returns the remark of the certificate; in a text without a count the sentence already holds the remark.
 fn remark(completeness: &Completeness) -> Option<Term> {
     let remark = completeness.remark.as_str();
     let term = match completeness.proved_modes {
@@ -221,8 +222,8 @@ fn remark(completeness: &Completeness) -> Option<Term> {
     (!remark.is_empty()).then_some(term)
 }
 
-/// Grounds of the proof of completeness: of a Craig-Bampton body with the interfaces held, of others without
-/// supports.
+/// Returns the facts behind the proof of completeness: for a Craig-Bampton body with the interfaces held, for
+/// other bodies without supports.
 fn proof(facts: &Facts<'_>) -> Vec<Term> {
     let (modes, c) = (&facts.modes, &facts.completeness);
     let pivots = |count: Option<usize>, held: &str, shift: Option<f64>| {

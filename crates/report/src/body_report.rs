@@ -1,4 +1,4 @@
-//! The report of a body.
+//! Report of a body.
 
 use super::body_lumped::lumped;
 use super::body_modes::modes;
@@ -11,9 +11,9 @@ use super::run_data::{Phase, SearchAttempt};
 use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::{FlexBody, MassStructure};
 
-/// Builds the report.
+/// Builds the report of a body.
 pub(super) fn document<'f>(facts: &'f Facts<'_>) -> Document<'f> {
-    // Errors and warnings stand before the results they affect.
+    // Errors and warnings are shown before the results they affect.
     let is_urgent = facts.diagnostics.iter().any(|found| found.severity() != Severity::Note);
     let diagnostics = |is_here: bool| is_here.then_some(Block::Diagnostics(&facts.diagnostics));
     let mut blocks = vec![verdict(facts)];
@@ -54,7 +54,7 @@ fn verdict<'a>(facts: &Facts<'_>) -> Block<'a> {
     Block::Verdict { state, head: completeness.head.to_owned(), rest }
 }
 
-/// Properties of the undeformed body.
+/// Returns the properties of the undeformed body.
 fn properties(facts: &Facts<'_>) -> Vec<Term> {
     let (model, body) = (&facts.model, &facts.body);
     let units = &model.units;
@@ -100,7 +100,7 @@ fn properties(facts: &Facts<'_>) -> Vec<Term> {
     items
 }
 
-/// Sides of the box around the nodes.
+/// Returns the lengths of the sides of the box around the nodes, along the model axes. Unit: length.
 fn extent(body: &FlexBody) -> Option<[f64; 3]> {
     let places = body.nodes().positions.iter().map(|x| body.frame().to_model(*x));
     let (low, high) = places.fold(None, |own: Option<([f64; 3], [f64; 3])>, x| {
@@ -110,7 +110,7 @@ fn extent(body: &FlexBody) -> Option<[f64; 3]> {
     Some([0, 1, 2].map(|k| high[k] - low[k]))
 }
 
-/// Approximations in the model, the storage and the units.
+/// Returns a caution for each approximation in the model, the storage and the units.
 fn cautions<'a>(model: &ModelFacts) -> Vec<Block<'a>> {
     let is_lumped = model.mass_structure == MassStructure::Diagonal.name();
     let lumped = "The mass matrix is diagonal: it was lumped before it came here, and all numbers are exact for that mass only.";
@@ -147,7 +147,7 @@ fn interfaces<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     ]
 }
 
-/// Time and memory of the run.
+/// Returns the time and memory of the run.
 fn run<'a>(run: &RunFacts) -> Vec<Block<'a>> {
     let times = times(run.wall_seconds, run.cpu_seconds);
     let known = |size: Option<u64>| size.map_or_else(|| "not known".to_owned(), bytes);
@@ -210,7 +210,7 @@ fn attempts(attempts: &[SearchAttempt]) -> Vec<[String; 3]> {
     attempts.iter().enumerate().map(row).collect()
 }
 
-/// Inputs and settings of the run.
+/// Returns the inputs and settings of the run.
 fn origin<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     let model = &facts.model;
     let files = counted(model.files.len(), "input file");

@@ -1,18 +1,20 @@
-//! Modes whose basis two computations cannot share.
+//! Clusters of modes whose basis is not reproducible between two computations.
 
 use std::ops::Range;
 
-/// Neighbours closer than this (relative) are compared as one space. Rounding p of the eigenproblem turns two
-/// modes at the relative gap g by p/g: with p = 1e-13, modes further apart than this agree to 1e-8; nearer
-/// ones would show rounding as a difference.
+/// Relative gap of eigenvalues below which neighbours are compared as one space. Rounding p of the
+/// eigenproblem rotates two modes with the relative gap g by p/g: with p = 1e-13, modes further apart than
+/// this agree to 1e-8. A smaller value would show rounding of closer modes as a difference.
 const GAP: f64 = 1e-5;
 
-/// Returns true if the eigenvalue `i` (from 1) of `values` (ascending) is in one space with the one before it.
+/// Returns true if the eigenvalue `i` (from 1) of `values` (ascending) belongs to the same cluster as its
+/// predecessor.
 pub(super) fn close(values: &[f64], i: usize) -> bool {
     values[i] - values[i - 1] <= GAP * values[i]
 }
 
-/// Ranges of modes that are close to each other in `a` or in `b` (both ascending, the same number).
+/// Returns the ranges of modes that are close to each other in `a` or in `b` (both ascending, of equal
+/// length).
 pub(super) fn clusters(a: &[f64], b: &[f64]) -> Vec<Range<usize>> {
     let mut ranges = Vec::new();
     let mut start = 0;

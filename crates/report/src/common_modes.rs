@@ -1,4 +1,4 @@
-//! The modes that two bodies have in common, where one has fewer than the other.
+//! Modes that two bodies have in common if one has fewer modes than the other.
 
 use super::clusters::close;
 use super::errors_in_words::runs;
@@ -7,8 +7,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 
-/// Modes of two bodies that are compared with each other (indices from 0, ascending, the same number of
-/// both), and the modes that are left out.
+/// Paired modes of two bodies (indices from 0, ascending, the same number for both).
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CommonModes {
     pub a: Vec<usize>,
@@ -18,10 +17,10 @@ pub(super) struct CommonModes {
 }
 
 impl CommonModes {
-    /// Every mode of the body that has fewer gets a partner of the other, in ascending order, so that the
-    /// ratios of frequencies deviate as little as possible. A mode that differs is compared with its
-    /// neighbour and not taken for one that the other body lacks. Of a repeated eigenvalue all modes are
-    /// compared or none: those of a part of it are not determined.
+    /// Pairs every mode of the body with fewer modes with a mode of the other body, in ascending order, so
+    /// that the ratios of the frequencies deviate least. A mode that differs is thus compared with its
+    /// neighbour and not reported as missing. For a repeated eigenvalue all modes are compared or none,
+    /// because a part of its eigenspace is not determined.
     ///
     /// # Errors
     /// [`BodyIncomparable`](Code::BodyIncomparable) when no mode is left.
@@ -29,6 +28,7 @@ impl CommonModes {
         let (of_a, of_b) = (&a.modes().eigenvalue, &b.modes().eigenvalue);
         let (fewer, more) = if of_a.len() <= of_b.len() { (of_a, of_b) } else { (of_b, of_a) };
         let partners = partners(fewer, more);
+        // Modes whose cluster in the larger body is complete among the partners.
         let (kept, split): (Vec<usize>, Vec<usize>) =
             (0..fewer.len()).partition(|&i| is_whole(more, &partners, partners[i]));
         if kept.is_empty() {
@@ -39,6 +39,7 @@ impl CommonModes {
         }
         let of_more: Vec<usize> = kept.iter().map(|&i| partners[i]).collect();
         let (a_modes, b_modes) = if of_a.len() <= of_b.len() { (kept, of_more) } else { (of_more, kept) };
+        // Notes on compared, omitted and undetermined modes.
         let mut notes = vec![format!(
             "{} in common {} compared: {} of the first body with {} of the second",
             counted(a_modes.len(), "mode"),
@@ -58,13 +59,12 @@ impl CommonModes {
     }
 }
 
-/// For each of `fewer` eigenvalues the index of its partner among `more` (both ascending): the ascending
-/// choice with the smallest sum of
-/// |ln(lambda_i / lambda_j)|, by dynamic programming.
+/// Returns for each of the `fewer` eigenvalues the index of its partner among `more` (both ascending): the
+/// ascending choice with the smallest sum of |ln(lambda_i / lambda_j)|, found by dynamic programming.
 fn partners(fewer: &[f64], more: &[f64]) -> Vec<usize> {
     let (n, m) = (fewer.len(), more.len());
     let distance = |i: usize, j: usize| (fewer[i] / more[j]).ln().abs();
-    // Smallest sums of the first i partners among the first j.
+    // sums[i][j] is the smallest sum of the first i eigenvalues with partners among the first j.
     let mut sums = vec![vec![f64::INFINITY; m + 1]; n + 1];
     sums[0].fill(0.0);
     for i in 1..=n {
@@ -72,6 +72,7 @@ fn partners(fewer: &[f64], more: &[f64]) -> Vec<usize> {
             sums[i][j] = sums[i][j - 1].min(sums[i - 1][j - 1] + distance(i - 1, j - 1));
         }
     }
+    // Trace the choice back from the last eigenvalue.
     let (mut found, mut j) = (vec![0; n], m);
     for i in (1..=n).rev() {
         while j > i && sums[i][j] == sums[i][j - 1] {
@@ -83,14 +84,14 @@ fn partners(fewer: &[f64], more: &[f64]) -> Vec<usize> {
     found
 }
 
-/// Returns true if every mode of the cluster that the mode `of` belongs to is among the `partners`.
+/// Returns true if every mode of the cluster that contains the mode `of` is among the `partners`.
 fn is_whole(more: &[f64], partners: &[usize], of: usize) -> bool {
     let below = (1..=of).rev().take_while(|&j| close(more, j)).count();
     let above = (of + 1..more.len()).take_while(|&j| close(more, j)).count();
     (of - below..=of + above).all(|j| partners.binary_search(&j).is_ok())
 }
 
-/// `all`, `modes 1 to 12`, `modes 1, 2, 5 to 7`, numbered from 1.
+/// Returns mode numbers from 1 in words: `all 12`, `modes 1 to 12`, `modes 1, 2, 5 to 7`.
 fn some_of(modes: &[usize], of: usize) -> String {
     if modes.len() == of {
         return format!("all {of}");

@@ -1,5 +1,5 @@
-//! Two bodies side by side, insensitive to the signs of modes, to the basis inside repeated eigenvalues, to
-//! the order of the nodes and to the body frame.
+//! Comparison of two bodies that does not depend on the signs of modes, the basis inside repeated
+//! eigenvalues, the order of the nodes or the body frame.
 
 use super::clusters::clusters;
 use super::common_modes::CommonModes;
@@ -22,26 +22,27 @@ mod modal_matrices;
 mod nodal_rows;
 mod not_compared;
 
-/// Largest differences that pass, all relative.
+/// Largest relative differences that pass.
 ///
-/// The defaults are those of two computations of the same model on different machines. Bodies from matrices
-/// that were written with few digits, or from another mesh, need larger ones.
+/// The defaults suit two computations of one model on different machines. Bodies from matrices that were
+/// written with few digits, or from another mesh, need larger tolerances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerances {
-    /// Of each frequency. Default 1e-9: a residual of 1e-10 bounds eigenvalues far below that.
+    /// Tolerance of each frequency, relative. Default 1e-9: a residual of 1e-10 bounds eigenvalues far below
+    /// 1e-9.
     pub frequency: f64,
-    /// Of the mass. Default 1e-9: three orders above rounding; catches a single missing element of a large
-    /// model.
+    /// Tolerance of the mass, relative. Default 1e-9: three orders above rounding; detects a single missing
+    /// element of a large model.
     pub mass: f64,
-    /// Of the inertia about the centre of mass, each entry relative to sqrt(I_kk I_ll). Default 1e-9, as the
-    /// mass.
+    /// Tolerance of the inertia about the centre of mass, each entry relative to sqrt(I_kk I_ll). Default
+    /// 1e-9.
     pub inertia: f64,
-    /// Of invariants and shapes, relative to the Cauchy-Schwarz bounds, and of damping and of the stiffness of unit
-    /// loads, relative to their largest entries. Default 1e-8: vectors of modes are known to residual / gap, less
-    /// than eigenvalues.
+    /// Tolerance of invariants and shapes, relative to the Cauchy-Schwarz bounds, and of damping and of the
+    /// stiffness of unit loads, relative to their largest entries. Default 1e-8: the error of a mode shape is
+    /// residual / gap, larger than that of its eigenvalue.
     pub invariants: f64,
-    /// Of the centre of mass, of node positions and of the reference points of interfaces, relative to the radius
-    /// of gyration. Default 1e-9, as the mass.
+    /// Tolerance of the centre of mass, of node positions and of the reference points of interfaces, relative
+    /// to the radius of gyration. Default 1e-9.
     pub centre_of_mass: f64,
 }
 
@@ -54,15 +55,16 @@ impl Default for Tolerances {
 /// One compared quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparisonRow {
-    /// Name, stable.
+    /// Stable name of the quantity.
     pub quantity: &'static str,
-    /// Quantity that the difference is relative to.
+    /// Reference value that the difference is divided by, in words.
     pub meaning: &'static str,
     /// Largest difference, dimensionless; 0 is equal.
     pub difference: f64,
-    /// Largest difference that passes: the one asked for, and what the digits of a distant origin allow.
+    /// Largest difference that passes: the requested tolerance plus the rounding error of a shift to a
+    /// distant origin.
     pub tolerance: f64,
-    /// `difference <= tolerance`; a NaN never passes.
+    /// True if `difference <= tolerance`; a NaN never passes.
     pub passed: bool,
 }
 
@@ -80,23 +82,26 @@ pub struct BodyComparison {
 
 /// Compares `b` with `a`, in the frame of `a`.
 ///
-/// With the same node numbers in both (in any order), `b` is turned and shifted into the frame of `a`, its
-/// modes are aligned inside each cluster of close eigenvalues ([`align`](flexbody_body::invariants::align),
-/// plain product of the nodal components), and positions, shapes and every primary invariant are compared.
-/// Otherwise only what needs no common node is: mass, centre of mass, inertia, frequencies, and the norms of
-/// the invariants over clusters of modes, which no choice of signs or basis changes. Damping, geometric stiffness,
-/// stiffness of inertia and interfaces are compared in both cases. [`BodyComparison::not_compared`] lists the
-/// entries of the file that are not. A body that comes from a
-/// file of another program does not know where its frame is in the model; with such a one the body frames are
-/// taken as the same.
+/// If both bodies have the same node numbers (in any order), `b` is rotated and shifted into the frame of `a`
+/// and its modes are aligned inside each cluster of close eigenvalues
+/// ([`align`](flexbody_body::invariants::align), plain product of the nodal components). Positions, shapes
+/// and every primary invariant are then compared. Otherwise the comparison covers the quantities that need no
+/// common node: mass, centre of mass, inertia, frequencies, and the norms of the invariants over clusters of
+/// modes, which do not depend on signs or basis. Damping, geometric stiffness, stiffness of inertia and
+/// interfaces are compared in both cases. [`BodyComparison::not_compared`] lists the entries of the file that
+/// are not compared.
+///
+/// The place of the body frame in the model is unknown for a body imported from another program. If one body
+/// is such an import, the two body frames are assumed to coincide.
 ///
 /// # Errors
-/// [`BodyIncomparable`](Code::BodyIncomparable) when units, dimensions or numbers of modes differ; [`compare_common`]
-/// compares bodies with different numbers of modes.
+/// [`BodyIncomparable`](Code::BodyIncomparable) when units, dimensions or numbers of modes differ;
+/// [`compare_common`] compares bodies with different numbers of modes.
 pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
     comparable(a, b)?;
     let placed = is_placed(a) && is_placed(b);
     let (in_own_a, in_own_b);
+    // A body without a known place in the model is compared in its own frame.
     let (a, b) = if placed {
         (a, b)
     } else {
@@ -112,11 +117,14 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
         notes: Vec::new(),
         not_compared: Vec::new(),
     };
+    // Quantities that need no common basis or node.
     comparison.rigid(a, b, tolerances);
+    // Invariants of b in the frame of a.
     let change = FrameChange::new(a, b);
     let in_a = b.invariants().shifted(change.shift).rotated(&change.axes);
     let groups = clusters(&a.modes().eigenvalue, &b.modes().eigenvalue);
     let pair = Pair { a, b, change, in_a, groups };
+    // Mode by mode with common nodes, otherwise by norms over clusters of modes.
     let order = common_nodes(&a.nodes().ids, &b.nodes().ids);
     comparison.not_compared = not_compared::entries(a, b, order.is_some());
     let basis = match order {
@@ -128,6 +136,7 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     };
     comparison.modal_matrices(&pair, basis.as_ref(), tolerances.invariants);
     comparison.interfaces(&pair, tolerances.centre_of_mass);
+    // Notes on the limits of the comparison.
     if !placed {
         let note = "a body comes from a file of another program, which does not tell where its frame is in the model: the body frames are taken as the same";
         comparison.notes.push(note.to_owned());
@@ -145,12 +154,13 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     Ok(comparison)
 }
 
-/// Compares two bodies one of which may have fewer modes: each of its modes is compared with that of the
-/// other whose frequency is nearest, in ascending order. The notes say which modes were compared and which
-/// were not.
+/// Compares two bodies of which one may have fewer modes. Each mode of the smaller body is paired with a mode
+/// of the larger one, in ascending order, so that the frequencies deviate least. The notes list the modes
+/// that were compared and the modes that were left out.
 ///
 /// # Errors
-/// [`BodyIncomparable`](Code::BodyIncomparable) when units differ, or no mode is in common.
+/// [`BodyIncomparable`](Code::BodyIncomparable) when units or dimensions differ, or when the bodies have no
+/// mode in common.
 pub fn compare_common(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
     if a.n_modes() == b.n_modes() {
         return compare(a, b, tolerances);
@@ -167,7 +177,7 @@ fn is_placed(body: &FlexBody) -> bool {
     body.source().n_dofs > 0
 }
 
-/// The body with its frame as that of the model.
+/// Returns the body with its frame declared as the frame of the model.
 fn in_own_frame(body: &FlexBody) -> Result<FlexBody> {
     let mut parts = body.parts().clone();
     parts.frame = Frame { origin: Vector3::zeros(), axes: Matrix3::identity() };
@@ -209,7 +219,8 @@ fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
     if problems.is_empty() { Ok(()) } else { Err(Error::new(problems)) }
 }
 
-/// True if reference conditions may be the same: a file of another program does not state its own.
+/// Returns true if two reference conditions may be the same; a file of another program does not state its
+/// conditions.
 fn have_the_same_modes(a: &ReferenceConditions, b: &ReferenceConditions) -> bool {
     use ReferenceConditions::{MeanAxes, Unstated};
     match (a, b) {
@@ -219,18 +230,18 @@ fn have_the_same_modes(a: &ReferenceConditions, b: &ReferenceConditions) -> bool
     }
 }
 
-/// Two bodies brought together.
+/// Two bodies brought into one frame.
 struct Pair<'a> {
     a: &'a FlexBody,
     b: &'a FlexBody,
     change: FrameChange,
-    /// Invariants of b in the frame of a, in the basis of b.
+    /// Invariants of `b` in the frame of `a`, in the modal basis of `b`.
     in_a: Invariants,
     /// Clusters of close eigenvalues.
     groups: Vec<Range<usize>>,
 }
 
-/// From the frame of b to that of a: x_a = axes' (x_b - shift).
+/// Transformation from the frame of `b` to that of `a`: x_a = axes' (x_b - shift).
 struct FrameChange {
     shift: Vector3<f64>,
     axes: Matrix3<f64>,
@@ -239,7 +250,7 @@ struct FrameChange {
 impl FrameChange {
     fn new(a: &FlexBody, b: &FlexBody) -> Self {
         let (a, b) = (a.frame(), b.frame());
-        // Equal frames change nothing, not even the last bit.
+        // Equal frames must change nothing, not even the last bit.
         let axes = if a.axes == b.axes { Matrix3::identity() } else { b.axes.transpose() * a.axes };
         Self { shift: b.axes.transpose() * (a.origin - b.origin), axes }
     }
@@ -249,19 +260,19 @@ impl FrameChange {
     }
 }
 
-/// Index into b of each node of a; `None` when the node numbers are not the same.
+/// Returns the index into `b` of each node of `a`; `None` if the node numbers differ.
 fn common_nodes(a: &[i64], b: &[i64]) -> Option<Vec<usize>> {
     let places: HashMap<i64, usize> = b.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     (a.len() == b.len()).then(|| a.iter().map(|id| places.get(id).copied()).collect()).flatten()
 }
 
-/// |difference| / scale; 0 when nothing differs, whatever the scale.
+/// Returns |difference| / scale; 0 if the difference is zero, even if the scale is zero.
 fn relative(difference: f64, scale: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference.abs() / scale }
 }
 
-/// Rounding error of a shift of J by `distance`, relative to its smallest entry: about a distant frame J is m d^2, with
-/// the body's own moments in its last digits.
+/// Returns the rounding error of a shift of J by `distance`, relative to the smallest diagonal entry of J.
+/// About a distant origin J is dominated by m d^2, and the moments of the body itself are in its last digits.
 fn lost_by_shift(mass: f64, distance: f64, smallest: f64) -> f64 {
     8.0 * f64::EPSILON * relative(mass * distance * distance, smallest)
 }
@@ -272,28 +283,29 @@ impl BodyComparison {
         self.passed
     }
 
-    /// The compared quantities.
+    /// Returns the compared quantities.
     pub fn rows(&self) -> &[ComparisonRow] {
         &self.rows
     }
 
-    /// Returns true if shapes and invariants were compared mode by mode: both bodies have the same node numbers.
+    /// Returns true if shapes and invariants were compared mode by mode, which requires the same node numbers
+    /// in both bodies.
     pub fn same_nodes(&self) -> bool {
         self.same_nodes
     }
 
-    /// Notes on what limits the comparison.
+    /// Returns the notes on the limits of the comparison.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// Entries of the flex-body file that were not compared, each with its paths: `lumped comparators (/lumped,
-    /// /comparison)`.
+    /// Returns the entries of the flex-body file that were not compared, each with its paths: `lumped
+    /// comparators (/lumped, /comparison)`.
     pub fn not_compared(&self) -> &[String] {
         &self.not_compared
     }
 
-    /// Notes, and a sentence for every entry that was not compared.
+    /// Returns the notes, and a sentence for every entry that was not compared.
     pub(super) fn remarks(&self) -> Vec<String> {
         let left_out = self.not_compared.iter().map(|entry| format!("not compared: {entry}"));
         self.notes.iter().cloned().chain(left_out).collect()
@@ -309,8 +321,9 @@ impl BodyComparison {
         ComparisonReport { comparison: self, a: &self.a, b: &self.b }.render(ComparisonFormat::Text)
     }
 
-    /// True if one of the bodies comes from a file of another program, which may have no place for what `has` finds,
-    /// and has none; `name (paths)` is then listed as not compared, if the other has some.
+    /// Returns true if a quantity cannot be compared because a body imported from another program does not
+    /// have it: the format may not hold the data that `has` looks for. If the other body has such data, `name
+    /// (paths)` is added to the entries that were not compared.
     fn leave_out(
         &mut self,
         pair: &Pair<'_>,
@@ -337,7 +350,8 @@ impl BodyComparison {
         });
     }
 
-    /// A group of the kinetic energy that one body lacks is not compared, and not taken for zero.
+    /// Lists each group of the kinetic energy that one body dropped as not compared; a dropped group is not
+    /// taken as zero.
     fn say_what_is_dropped(&mut self, a: &FlexBody, b: &FlexBody) {
         for group in TermGroup::ALL {
             let whose = match (a.groups().has(group), b.groups().has(group)) {
@@ -350,7 +364,7 @@ impl BodyComparison {
         }
     }
 
-    /// Mass, centre of mass, inertia about it, frequencies.
+    /// Compares mass, centre of mass, inertia about it and frequencies.
     fn rigid(&mut self, a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) {
         let (ia, ib) = (a.invariants(), b.invariants());
         self.row("mass", "relative", relative(ib.mass() - ia.mass(), ia.mass()), tolerances.mass);
@@ -381,8 +395,8 @@ impl BodyComparison {
         self.row("frequency", "relative, largest of all modes", largest, tolerances.frequency);
     }
 
-    /// Compares positions, shapes and invariants; `order` gives the node of b for each of a. Returns the basis change
-    /// that carries the modes of b to those of a.
+    /// Compares positions, shapes and invariants. `order` gives the node of `b` for each node of `a`. Returns
+    /// the basis change from the modes of `b` to those of `a`.
     fn mode_by_mode(&mut self, pair: &Pair<'_>, order: &[usize], tolerances: &Tolerances) -> Mat<f64> {
         let Pair { a, b, change, in_a, groups } = pair;
         self.same_nodes = true;
@@ -415,14 +429,14 @@ impl BodyComparison {
                     .to_owned(),
             );
         }
-        // J of a mass with inertia of its own may have no positive diagonal.
+        // J of a mass with rotary inertia of its nodes may have a diagonal entry that is not positive.
         let smallest = match a.invariants().general() {
             Some(_) => a.invariants().inertia().diagonal().min(),
             None => a.invariants().second_moment().diagonal().min(),
         };
         let lost = lost_by_shift(a.invariants().mass(), change.shift.norm(), smallest);
         for (name, difference) in differences {
-            // Mass has a row of its own.
+            // The mass has a row of its own.
             if let Some((_, quantity, meaning)) = PRIMARY.iter().find(|(known, ..)| *known == name) {
                 let lost = if name == "second_moment" { lost } else { 0.0 };
                 self.row(quantity, meaning, difference, tolerances.invariants + lost);
@@ -432,7 +446,8 @@ impl BodyComparison {
         alignment.basis
     }
 
-    /// Norms of the invariants over groups of modes, which no orthogonal change inside the groups alters.
+    /// Compares norms of the invariants over groups of modes. No orthogonal change of basis inside a group
+    /// alters these norms.
     fn norms_only(&mut self, pair: &Pair<'_>, tolerance: f64) {
         let Pair { a, b, in_a, groups, .. } = pair;
         let (na, nb) = (a.n_nodes(), b.n_nodes());
@@ -453,7 +468,7 @@ impl BodyComparison {
                     let x = |body: &Invariants| {
                         body.ibar().map_or(0.0, |ibar| norm(&mut g.clone().map(|p| ibar[k][l][p])))
                     };
-                    // ibar() is sqrt(J_kk) |psi_p|.
+                    // ibar(k, p) is sqrt(J_kk) |psi_p|.
                     let scale = norm(&mut g.clone().map(|p| bound.ibar(k, p)));
                     ibar = larger(ibar, relative(x(in_a) - x(exact), scale));
                     for h in groups {
@@ -479,7 +494,7 @@ impl BodyComparison {
     }
 }
 
-/// Names of `primary_differences`, of the rows, and what each is relative to.
+/// Names in `primary_differences`, names of the rows, and reference values in words.
 const PRIMARY: [(&str, &str, &str); 10] = [
     ("first_moment", "first moment", "about the frame origin of the first body / sqrt(m J_kk)"),
     ("second_moment", "second moment", "about the frame origin of the first body / sqrt(J_kk J_ll)"),
@@ -493,14 +508,14 @@ const PRIMARY: [(&str, &str, &str); 10] = [
     ("modal_mass", "modal mass", "largest entry / |psi_p| |psi_q|"),
 ];
 
-/// A B on one thread: the same bits at any number of threads.
+/// Returns A B, computed on one thread so that the bits do not depend on the number of threads.
 fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut c = Mat::zeros(a.nrows(), b.ncols());
     matmul(&mut c, Accum::Replace, a, b, 1.0, Par::Seq);
     c
 }
 
-/// Shapes (3n x nf) with their nodes in the given order and their components along other axes.
+/// Returns shapes (3n x nf) with the nodes in the given order and components along the given axes.
 fn turned(shapes: MatRef<'_, f64>, axes: &Matrix3<f64>, order: &[usize]) -> Mat<f64> {
     Mat::from_fn(3 * order.len(), shapes.ncols(), |row, p| {
         let (node, k) = (order[row / 3], row % 3);
@@ -508,7 +523,7 @@ fn turned(shapes: MatRef<'_, f64>, axes: &Matrix3<f64>, order: &[usize]) -> Mat<
     })
 }
 
-/// |A - B|_F / |A|_F of a group of columns.
+/// Returns |A - B|_F / |A|_F of a group of columns.
 fn shape_difference(a: MatRef<'_, f64>, b: MatRef<'_, f64>, group: &Range<usize>) -> f64 {
     let square = |value: &dyn Fn(usize, usize) -> f64| {
         group.clone().map(|p| (0..a.nrows()).map(|i| value(i, p).powi(2)).sum::<f64>()).sum::<f64>()

@@ -1,4 +1,4 @@
-//! The comparison of two bodies as a report: for people, for programs, and for what runs checks unattended.
+//! Report on the comparison of two bodies, for people, programs and automated checks.
 
 use super::comparison::{BodyComparison, ComparisonRow};
 use super::document::{Block, Document, Span, State, Table, Term, cells, heading};
@@ -13,20 +13,21 @@ use std::path::Path;
 /// Formats of the report of a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ComparisonFormat {
-    /// For a terminal.
+    /// Text for a terminal.
     Text,
-    /// For programs: what `--json` has as its results.
+    /// JSON for programs, identical to the results of `--json`.
     Json,
-    /// For people and archives: one file, no scripts, nothing loaded from elsewhere.
+    /// One HTML file for people and archives, without scripts or external resources.
     Html,
-    /// Test cases as JUnit has them in XML, a test case for each quantity.
+    /// JUnit XML with a test case for each quantity.
     JUnit,
-    /// A table in Markdown, for comments and summaries.
+    /// Markdown table for comments and summaries.
     Markdown,
 }
 
 impl ComparisonFormat {
-    /// The format that a file name asks for: `.txt`, `.json`, `.html`, `.xml` or `.md`, in any case.
+    /// Returns the format for a file name that ends in `.txt`, `.json`, `.html`, `.xml` or `.md`, in any
+    /// case.
     pub fn from_path(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "txt" => Some(Self::Text),
@@ -39,10 +40,10 @@ impl ComparisonFormat {
     }
 }
 
-/// The comparison of files, which have these names.
+/// A comparison with the names of the two files.
 #[derive(Debug, Clone, Copy)]
 pub struct ComparisonReport<'a> {
-    /// The comparison.
+    /// Result of the comparison.
     pub comparison: &'a BodyComparison,
     /// File of the reference.
     pub a: &'a str,
@@ -51,7 +52,7 @@ pub struct ComparisonReport<'a> {
 }
 
 impl ComparisonReport<'_> {
-    /// Writes the report, ending with a line break.
+    /// Renders the report in a format, ending with a line break.
     pub fn render(&self, format: ComparisonFormat) -> String {
         match format {
             ComparisonFormat::Text => text::render(&self.blocks(), Screen::default()),
@@ -71,7 +72,7 @@ impl ComparisonReport<'_> {
         format!("{} beside {}", plain(self.b), plain(self.a))
     }
 
-    /// Result of the comparison in a sentence.
+    /// Returns the result of the comparison as a sentence.
     fn verdict(&self) -> String {
         match self.failures() {
             0 => "The bodies agree.".to_owned(),

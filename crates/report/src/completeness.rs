@@ -1,29 +1,28 @@
-//! Completeness of the modes in one sentence that claims no more than the certificate proves.
+//! Completeness of the modes in a sentence that claims no more than the certificate proves.
 
 use super::craig_bampton;
 use super::numbers::{counted, plain, significant};
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::{FlexBody, is_static};
 
-/// The certificate of a body, judged.
+/// Judged certificate of a body.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub(super) struct Completeness {
-    /// The certificate proves that none is missing of the modes that the basis is made of: modes of the free
-    /// body or, of Craig-Bampton, those with the interfaces held. Static shapes beside them have no
-    /// completeness.
+    /// True if the certificate proves that no mode of the basis is missing: modes of the free body or, for
+    /// Craig-Bampton, fixed-interface modes. Static shapes have no completeness.
     pub proved: bool,
-    /// `proved`; `given`: shapes that claim to be no modes, of which nothing is to be proved; `open`.
+    /// Verdict: `proved`; `given` (shapes that are not claimed to be modes); `open`.
     pub verdict: &'static str,
     #[serde(skip)]
     pub head: &'static str,
     pub sentence: String,
-    /// Flexible modes below the shift, as counted.
+    /// Counted number of flexible modes below the shift.
     pub proved_modes: Option<usize>,
     pub rigid_modes: usize,
     pub negative_pivots: Option<usize>,
-    /// sigma. Unit: 1/time^2.
+    /// Shift sigma. Unit: 1/time^2.
     pub shift: f64,
-    /// sqrt(sigma) / (2 pi) in hertz; `None` for a negative shift.
+    /// Frequency sqrt(sigma) / (2 pi) of the shift; `None` for a negative shift. Unit: Hz.
     pub shift_hz: Option<f64>,
     pub remark: String,
     pub rigid_noise: f64,
@@ -54,15 +53,15 @@ impl Completeness {
     }
 }
 
-/// Number of modes of the body that are static shapes.
+/// Returns the number of modes of the body that are static shapes.
 fn static_shapes(body: &FlexBody) -> usize {
     body.modes().provenance.iter().filter(|origin| is_static(origin)).count()
 }
 
-/// Verdict about shapes of which nothing is to be proved.
+/// Verdict for shapes that are not claimed to be complete.
 const GIVEN: &str = "given";
 
-/// Returns true if another engine has counted as many modes as the body has.
+/// Returns true if another program counted as many modes as the body has.
 fn counted_elsewhere(body: &FlexBody) -> bool {
     let c = body.certificate();
     let below = body.modes().eigenvalue.iter().filter(|&&l| l < c.shift).count();
@@ -73,7 +72,7 @@ fn counted_elsewhere(body: &FlexBody) -> bool {
         && flexible.is_some_and(|flexible| flexible >= below)
 }
 
-/// The verdict in one word, and in a few.
+/// Returns the verdict in one word and in a short sentence.
 fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
     match (&body.certificate().fixed_interface, proved) {
         (Some(fixed), true) if fixed.modes == 0 => ("proved", "Static condensation."),
@@ -81,9 +80,9 @@ fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
         (Some(_), false) => ("open", "Fixed-interface modes not proved complete."),
         (None, true) if static_shapes(body) > 0 => ("proved", "No free mode is missing."),
         (None, true) => ("proved", "No mode is missing."),
-        // Files of earlier versions tell what was proved in the remark only.
+        // Files of earlier versions state the proof in the remark only.
         (None, false) if body.basis() == Some(BasisKind::CraigBampton) => (GIVEN, "Craig-Bampton basis."),
-        // Without a count nothing spoke against them either.
+        // Without a count there is no evidence against completeness either.
         (None, false)
             if body.basis() == Some(BasisKind::Imported) && body.certificate().negative_pivots.is_none() =>
         {
@@ -96,7 +95,8 @@ fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
     }
 }
 
-/// A certificate is proof only when its numbers agree with each other and with the modes of the body.
+/// Judges the certificate of a body. It is a proof only if its numbers agree with each other and with the
+/// modes of the body.
 fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
     let (c, nf) = (body.certificate(), body.n_modes());
     if let Some(fixed) = &c.fixed_interface {
@@ -112,6 +112,7 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
         return (false, format!("{verdict}: {why}"));
     };
     let shift = significant(shift_hz.unwrap_or(f64::NAN), 5);
+    // The count must agree with the claim, and the body must hold the claimed modes.
     let below = body.modes().eigenvalue.iter().filter(|&&l| l < c.shift).count();
     let count = c.negative_pivots.map_or("missing".to_owned(), |n| n.to_string());
     if c.negative_pivots != flexible.checked_add(c.rigid_modes) {
@@ -126,6 +127,7 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
         "{flexible} flexible + {} below {shift} Hz (inertia count {count})",
         counted(c.rigid_modes, "rigid mode")
     );
+    // Modes above the count must be static shapes for a complete proof.
     let statics = static_shapes(body);
     match flexible.cmp(&nf) {
         std::cmp::Ordering::Less if nf - flexible == statics => (

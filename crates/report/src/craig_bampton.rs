@@ -1,43 +1,45 @@
-//! A Craig-Bampton body in its own terms: what its coordinates are, what is proved of them, and up to which
-//! frequency it stands for the free body.
+//! Facts of a Craig-Bampton body: its coordinates, their proof of completeness, and the frequency up to which
+//! it represents the free body.
 
 use super::numbers::{counted, percent, significant};
 use flexbody_body::flex_body::{FixedInterface, FlexBody};
 use serde::Serialize;
 
-/// Part by which a frequency may be too high to be called right.
+/// Largest relative error of a frequency that counts as accurate.
 const RIGHT: f64 = 0.01;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct CraigBamptonFacts {
     pub fixed_interface_modes: usize,
-    /// Number of fixed-interface modes that was asked for; `None`: not known, or all below a frequency.
+    /// Requested number of fixed-interface modes; `None` if unknown, or if all below a frequency were
+    /// requested.
     pub fixed_interface_asked: Option<usize>,
-    /// Frequency below which all fixed-interface modes were asked for.
+    /// Frequency below which all fixed-interface modes were requested. Unit: Hz.
     pub fixed_interface_asked_below_hz: Option<f64>,
-    /// Frequencies of the fixed-interface modes; `None`: the body keeps a part of the modes only, or an older file.
+    /// Frequencies of the fixed-interface modes; `None` if the body keeps only some of its modes, or comes
+    /// from an older file.
     pub fixed_interface_hz: Option<Vec<f64>>,
     pub interface_motions: usize,
     pub rigid_modes: usize,
-    /// Fixed-interface modes below `shift_hz` by the inertia count; `None`: not counted.
+    /// Number of fixed-interface modes below `shift_hz` by the inertia count; `None` if not counted.
     pub counted: Option<usize>,
-    /// `None`: a negative shift.
+    /// Shift of the count; `None` for a negative shift. Unit: Hz.
     pub shift_hz: Option<f64>,
-    /// First fixed-interface mode that is left out; `None`: not computed.
+    /// Frequency of the first fixed-interface mode that was left out; `None` if not computed. Unit: Hz.
     pub next_hz: Option<f64>,
     /// Worst residual of the fixed-interface modes.
     pub worst_residual: f64,
-    /// Frequencies of the free body as estimated (nf): upper bounds.
+    /// Estimated frequencies of the free body (nf); upper bounds. Unit: Hz.
     pub free_hz: Vec<f64>,
-    /// Lower bounds; `None`: none.
+    /// Lower bounds of the frequencies of the free body; `None` without a bound. Unit: Hz.
     pub free_lower_hz: Vec<Option<f64>>,
-    /// Parts by which the frequencies of the reduced body are too high, as estimated.
+    /// Estimated relative excess of the frequencies of the reduced body.
     pub too_high: Vec<f64>,
-    /// Upper bounds of these parts; `None`: no bound is known.
+    /// Upper bounds of the relative excess; `None` without a bound.
     pub too_high_at_most: Vec<Option<f64>>,
-    /// Number of the lowest frequencies that are at most 1 % too high.
+    /// Number of lowest frequencies that are at most 1 % too high.
     pub within_one_percent: usize,
-    /// True if that free body keeps some interfaces rigid, like the basis.
+    /// True if the free body of the comparison keeps some interfaces rigid, like the basis.
     pub rigid_interfaces: bool,
 }
 
@@ -68,12 +70,13 @@ impl CraigBamptonFacts {
         })
     }
 
-    /// Returns the frequencies of the fixed-interface modes, where there are some and they are known.
+    /// Returns the frequencies of the fixed-interface modes; `None` if there are none or they are unknown.
     pub(crate) fn held_hz(&self) -> Option<&[f64]> {
         self.fixed_interface_hz.as_deref().filter(|hz| !hz.is_empty())
     }
 
-    /// `10 fixed-interface modes (10 asked for) + 12 interface motions - 6 rigid-body motions`.
+    /// Returns the composition of the basis: `10 fixed-interface modes (10 asked for) + 12 interface motions
+    /// - 6 rigid-body motions`.
     pub(crate) fn made_of(&self) -> String {
         let asked = match (self.fixed_interface_asked, self.fixed_interface_asked_below_hz) {
             (Some(count), _) => format!(" ({count} asked for)"),
@@ -88,8 +91,8 @@ impl CraigBamptonFacts {
         )
     }
 
-    /// Up to which frequency the reduced body stands for the free one, and what the first does that is
-    /// beyond; `hertz` are its own frequencies.
+    /// Returns in words up to which frequency the reduced body represents the free body, and the error of the
+    /// first frequency beyond. `hertz` are the frequencies of the reduced body.
     pub(crate) fn holds(&self, hertz: &[f64]) -> String {
         let good = self.within_one_percent;
         let kept = if self.rigid_interfaces { " (with the same rigid interfaces)" } else { "" };
@@ -113,14 +116,15 @@ impl CraigBamptonFacts {
     }
 }
 
-/// Returns the eigenvalues of the fixed-interface modes, which stand in the stiffness matrix of the interface coordinates.
+/// Returns the eigenvalues of the fixed-interface modes, the last diagonal entries of the stiffness matrix of
+/// the interface coordinates.
 fn fixed_interface_eigenvalues(body: &FlexBody) -> Option<Vec<f64>> {
     let coordinates = body.coordinates()?;
     let first = body.certificate().fixed_interface.as_ref()?.interface_motions;
     Some((first..coordinates.names.len()).map(|i| coordinates.stiffness[(i, i)]).collect())
 }
 
-/// Proof of the fixed-interface modes of a body.
+/// Judges the proof of completeness of the fixed-interface modes of a body.
 pub(super) fn judge(fixed: &FixedInterface, body: &FlexBody) -> (bool, String) {
     let hertz = |lambda: f64| significant(body.units().frequency_of(lambda.max(0.0)), 5);
     let modes = counted(fixed.modes, "fixed-interface mode");

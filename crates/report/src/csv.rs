@@ -1,17 +1,17 @@
-//! Tables of comma-separated values; numbers round-trip.
+//! Comma-separated values; numbers round-trip.
 
-/// Adds a row.
+/// Adds a row to the table.
 pub(super) fn push_row(table: &mut String, cells: impl IntoIterator<Item = String>) {
     table.push_str(&cells.into_iter().collect::<Vec<_>>().join(","));
     table.push('\n');
 }
 
-/// The cell of a number; empty without one.
+/// Returns the cell of a number; empty for `None`.
 pub(super) fn number(value: impl Into<Option<f64>>) -> String {
     value.into().map_or_else(String::new, |value| format!("{value:e}"))
 }
 
-/// The cell of a text, quoted if it holds what separates.
+/// Returns the cell of a text, quoted if it contains a separator.
 pub(super) fn text(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))

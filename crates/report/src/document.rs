@@ -1,4 +1,4 @@
-//! The tree of a report: built once from the facts, rendered as a text or as a page.
+//! Tree of a report, built once from the facts and rendered as a text or as a page.
 
 use super::chart::{Bars, Cells, Chart};
 use super::render::{Format, json};
@@ -7,14 +7,14 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_body::flex_body::FlexBody;
 use serde::Serialize;
 
-/// Lines of a text that a term takes at most.
+/// Default maximum of lines of a term in a text.
 const LINES: usize = 4;
-/// Entries of a list that a text shows.
+/// Number of list entries that a text shows.
 const LISTED: usize = 6;
 
 /// A report.
 pub(crate) struct Document<'a> {
-    /// Name of the body or scene, and kind of the report: the head of a page.
+    /// Name of the body or scene; with the kind of the report it is the head of a page.
     pub name: &'a str,
     pub kind: &'static str,
     pub generator: &'a str,
@@ -36,7 +36,7 @@ impl<'a> Document<'a> {
 pub(crate) enum Block<'a> {
     /// Heading of a section of a page.
     Heading(Inline),
-    /// The verdict of a page, its first words emphasised. A text has the verdict among its terms.
+    /// The verdict of a page, with its first words emphasised. A text has the verdict among its terms.
     Verdict {
         state: State,
         head: String,
@@ -53,21 +53,22 @@ pub(crate) enum Block<'a> {
     Gap,
     /// A paragraph of a page.
     Paragraph(String),
-    /// A paragraph of a page in the colour of what matters less.
+    /// A paragraph of a page in the colour of secondary text.
     Quiet(String),
-    /// A limit of the use of a body, on a page.
+    /// A limitation of a body, on a page.
     Caution(String),
     /// A list of a page.
     List(Vec<Inline>),
     Chart(Chart),
     Bars(Bars),
-    /// Maps of a page beside each other, below the scale of their colours; a map without cells has its words only.
+    /// Maps side by side on a page, below the scale of their colours; a map without cells shows its text
+    /// only.
     Maps(Vec<(Inline, Option<Cells>)>),
-    /// Blocks of a page that are shown when their summary is clicked, and printed.
+    /// Blocks of a page that are shown when the reader clicks their summary, and in print.
     Fold(&'static str, Vec<Block<'a>>),
     /// Text of a page with its own line breaks.
     Preformatted(String),
-    /// The picture of a body on a page, if it has one, with other blocks beside it.
+    /// The picture of a body on a page, if the body has one, with other blocks beside it.
     Picture(&'a FlexBody, Vec<Block<'a>>),
 }
 
@@ -75,17 +76,17 @@ pub(crate) enum Block<'a> {
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum State {
     Good,
-    /// Nothing was to be proved.
+    /// The verdict makes no claim that could be proved (shapes as given).
     Given,
     Open,
 }
 
-/// A heading of a page.
+/// Returns the heading of a section of a page.
 pub(crate) fn heading<'a>(title: impl Into<Inline>) -> Block<'a> {
     Block::Heading(title.into())
 }
 
-/// A text, with pieces that a page marks.
+/// A text with marked pieces.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Inline(pub Vec<Span>);
 
@@ -93,7 +94,7 @@ pub(crate) struct Inline(pub Vec<Span>);
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Span {
     Plain(String),
-    /// A number with its unit, whose exponents a page raises.
+    /// A number with its unit; a page shows exponents raised.
     Quantity(String),
     Strong(String),
     Error(String),
@@ -104,7 +105,7 @@ pub(crate) enum Span {
 }
 
 impl Span {
-    /// The text of the piece.
+    /// Returns the text of the piece.
     pub(crate) fn text(&self) -> &str {
         match self {
             Self::Plain(text) | Self::Quantity(text) | Self::Strong(text) => text,
@@ -120,7 +121,7 @@ impl Inline {
         self
     }
 
-    /// The text without marks.
+    /// Returns the text without marks.
     pub(crate) fn text(&self) -> String {
         self.0.iter().map(Span::text).collect()
     }
@@ -144,7 +145,7 @@ impl From<&str> for Inline {
     }
 }
 
-/// A number with its unit.
+/// Returns a number with its unit as marked text.
 pub(crate) fn quantity(text: impl Into<String>) -> Inline {
     Span::Quantity(text.into()).into()
 }
@@ -154,14 +155,14 @@ pub(crate) struct Term {
     pub label: Inline,
     pub value: Inline,
     pub is_in_page: bool,
-    /// Label and value in a text; `None`: the term is not in a text.
+    /// Label and value in a text; `None` if the term is in pages only.
     pub text: Option<(String, String)>,
     pub tone: Tone,
-    /// Lines of a text that the term takes at most.
+    /// Largest number of lines of the term in a text.
     pub lines: usize,
 }
 
-/// Meaning of a term, which a terminal shows by its colour.
+/// Meaning of a term, shown by colour on a terminal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Tone {
     Title,
@@ -172,19 +173,19 @@ pub(crate) enum Tone {
 }
 
 impl Term {
-    /// A term of texts and pages.
+    /// Returns a term for texts and pages.
     pub(crate) fn new(label: impl Into<Inline>, value: impl Into<Inline>) -> Self {
         let (label, value) = (label.into(), value.into());
         let text = Some((label.text(), value.text()));
         Self { label, value, is_in_page: true, text, tone: Tone::Plain, lines: LINES }
     }
 
-    /// A term of pages only.
+    /// Returns a term for pages only.
     pub(crate) fn page(label: impl Into<Inline>, value: impl Into<Inline>) -> Self {
         Self { text: None, ..Self::new(label, value) }
     }
 
-    /// A term of texts only.
+    /// Returns a term for texts only.
     pub(crate) fn text(label: &str, value: impl Into<String>) -> Self {
         Self { is_in_page: false, ..Self::new(label, value.into()) }
     }
@@ -200,40 +201,40 @@ impl Term {
         Self { text: Some((label.to_owned(), value.into())), ..self }
     }
 
-    /// Returns the term with a meaning and a limit of its lines.
+    /// Returns the term with a tone and a maximum number of lines.
     pub(crate) fn shown(self, tone: Tone, lines: usize) -> Self {
         Self { tone, lines, ..self }
     }
 }
 
-/// The first values of a list as terms of a text, with the number of the others.
+/// Returns the first values of a list as terms of a text, and the number of the others.
 pub(crate) fn listed<T>(label: &str, items: &[T], value: impl Fn(&T) -> String) -> Vec<Term> {
     listed_to(LISTED, label, items, |item| Term::text(label, value(item)))
 }
 
-/// The first `most` terms of a list, with the number of the others.
+/// Returns the first `most` terms of a list, and the number of the others.
 pub(crate) fn listed_to<T>(most: usize, label: &str, items: &[T], term: impl Fn(&T) -> Term) -> Vec<Term> {
     let mut terms: Vec<Term> = items.iter().take(most).map(term).collect();
     terms.extend((items.len() > most).then(|| Term::text(label, format!("and {} more", items.len() - most))));
     terms
 }
 
-/// A table, in which the first cell of a row is its head.
+/// A table; the first cell of a row is its head.
 #[derive(Default)]
 pub(crate) struct Table {
     pub caption: Inline,
     pub heads: Vec<Inline>,
-    /// Columns that are left-aligned.
+    /// Indices of the left-aligned columns.
     pub left: Vec<usize>,
     pub rows: Vec<Vec<Inline>>,
-    /// Columns that a text shows; empty for a table of pages only.
+    /// Indices of the columns in a text; empty for a table of pages only.
     pub in_text: Vec<usize>,
-    /// Column whose cells a text shows below their rows.
+    /// Index of the column whose cells a text shows below their rows.
     pub below: Option<usize>,
 }
 
 impl Table {
-    /// A table of pages.
+    /// Returns a table for pages only.
     pub(crate) fn new<H: Into<Inline>>(
         caption: impl Into<Inline>,
         heads: impl IntoIterator<Item = H>,
@@ -244,14 +245,14 @@ impl Table {
         Self { caption: caption.into(), heads, left: left.to_vec(), rows, ..Self::default() }
     }
 
-    /// Returns the table, in a text with the columns for whose heads `is_shown` returns true.
+    /// Returns the table with the columns for a text: those for whose heads `is_shown` returns true.
     pub(crate) fn in_text(mut self, is_shown: impl Fn(&str) -> bool) -> Self {
         self.in_text = (0..self.heads.len()).filter(|&i| is_shown(&self.heads[i].text())).collect();
         self
     }
 }
 
-/// Texts as cells of a table.
+/// Returns texts as cells of a table.
 pub(crate) fn cells<const N: usize>(texts: [String; N]) -> Vec<Inline> {
     texts.map(Inline::from).to_vec()
 }

@@ -3,7 +3,7 @@
 use super::numbers::significant;
 use flexbody_motion::scene::OutputErrors;
 
-/// Error of a quantity in words: `0.001 rad` of the attitude, `1 %` of others.
+/// Returns the error of a quantity in words: `0.001 rad` for the attitude, `1 %` for other quantities.
 pub(super) fn error_in_words(quantity: &str, error: f64, digits: usize) -> String {
     match quantity {
         "attitude" => format!("{} rad", significant(error, digits)),
@@ -11,25 +11,25 @@ pub(super) fn error_in_words(quantity: &str, error: f64, digits: usize) -> Strin
     }
 }
 
-/// `attitude 1e-4 rad, deflection 0.2 %, stress 0.4 %`.
+/// Returns errors with three digits: `attitude 1e-4 rad, deflection 0.2 %, stress 0.4 %`.
 pub(super) fn errors_in_words(errors: &OutputErrors) -> String {
     errors_to_digits(errors, 3)
 }
 
-/// Known errors in words, with the given number of significant digits.
+/// Returns the known errors in words with the given number of significant digits.
 pub(super) fn errors_to_digits(errors: &OutputErrors, digits: usize) -> String {
     let part =
         |(name, error): (&str, Option<f64>)| Some(format!("{name} {}", error_in_words(name, error?, digits)));
     errors.named().into_iter().filter_map(part).collect::<Vec<_>>().join(", ")
 }
 
-/// First and last numbers of the runs of ascending numbers.
+/// Returns the first and last number of each run of consecutive numbers.
 pub(super) fn runs(numbers: &[usize]) -> Vec<(usize, usize)> {
     let runs = numbers.chunk_by(|a, b| a + 1 == *b);
     runs.filter_map(|run| Some((*run.first()?, *run.last()?))).collect()
 }
 
-/// Ascending numbers with runs drawn together: 1-4, 7, 9-10.
+/// Returns ascending numbers with runs joined: 1-4, 7, 9-10.
 pub(super) fn ranges(numbers: &[usize]) -> String {
     let run = |(first, last): &(usize, usize)| match last - first {
         0 => first.to_string(),
@@ -38,7 +38,7 @@ pub(super) fn ranges(numbers: &[usize]) -> String {
     runs(numbers).iter().map(run).collect::<Vec<_>>().join(", ")
 }
 
-/// `60 %` of a part of what is allowed.
+/// Returns a ratio as `60 %`, or `not known`.
 pub(super) fn part_in_words(part: Option<f64>) -> String {
     part.map_or_else(|| "not known".to_owned(), |part| format!("{} %", significant(100.0 * part, 2)))
 }

@@ -1,4 +1,4 @@
-//! The facts of a body and of the run that made it, computed once; every format renders these.
+//! Facts of a body and of the run that made it, computed once and rendered in every format.
 
 use super::completeness::Completeness;
 use super::craig_bampton::CraigBamptonFacts;
@@ -17,17 +17,17 @@ use flexbody_body::flex_body::{
 };
 use serde::{Serialize, Serializer};
 
-/// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
+/// Version of the JSON report: a newer major version breaks readers, a newer minor version only adds keys.
 const MAJOR: u32 = 1;
 const MINOR: u32 = 7;
 
-/// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
+/// All facts of a report. The JSON form follows the schema `schemas/report.schema.json`.
 ///
 /// Numbers are in the units of the model, frequencies in hertz, times in seconds. A number that is not finite
 /// is `null` in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Facts<'b> {
-    /// The body itself: its picture is computed if a page needs it.
+    /// Body of the report; its picture is computed only if a page needs it.
     #[serde(skip)]
     pub(super) flex_body: &'b FlexBody,
     format: &'static str,
@@ -37,14 +37,14 @@ pub struct Facts<'b> {
     pub(super) model: ModelFacts,
     pub(super) body: MassProperties,
     pub(super) modes: ModeFacts,
-    /// For each group of the kinetic energy.
+    /// Decision about each group of the kinetic energy.
     pub(super) terms: Vec<TermFacts>,
     pub(super) completeness: Completeness,
-    /// At accuracy `certified`.
+    /// Guarantees; `None` unless the accuracy was `certified`.
     pub(super) guarantee: Option<GuaranteeFacts>,
     pub(super) lumped: Vec<LumpedFacts>,
     pub(super) lumped_modes: Vec<LumpedModesFacts>,
-    /// `None` for a body read from a file.
+    /// Facts of the run; `None` for a body read from a file.
     pub(super) run: Option<RunFacts>,
     pub(super) diagnostics: Vec<Diagnostic>,
 }
@@ -53,19 +53,19 @@ pub struct Facts<'b> {
 pub(super) struct ModelFacts {
     pub name: String,
     pub dimension: usize,
-    /// Of several bodies in the same matrices.
+    /// Number and nodes of the body if the matrices hold several bodies.
     pub body: Option<BodyFacts>,
     pub n_nodes: usize,
     pub n_dofs: usize,
     pub mass_structure: &'static str,
-    /// Precision of shapes and of the inertia of the modes: `f64` or `f32`.
+    /// Precision of stored shapes and of the inertia of the modes: `f64` or `f32`.
     pub storage: &'static str,
-    /// Part of the mass that the invariants take as approximate.
+    /// Description of the approximate part of the mass in the invariants.
     pub approximation: Option<String>,
     pub units: UnitFacts,
     pub files: Vec<SourceFile>,
     pub interfaces: Vec<InterfaceFacts>,
-    /// `None`: no surface is known.
+    /// Size of the surface; `None` if no surface is known.
     pub mesh: Option<MeshFacts>,
     pub settings: serde_json::Value,
 }
@@ -76,12 +76,12 @@ pub(super) struct BodyFacts {
     pub of: usize,
 }
 
-/// The surface that the body is drawn by.
+/// Size of the surface that the body is drawn by.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct MeshFacts {
     pub triangles: usize,
     pub edges: usize,
-    /// Nodes that it is drawn on.
+    /// Number of nodes on the surface.
     pub nodes: usize,
 }
 
@@ -95,7 +95,7 @@ impl MeshFacts {
         })
     }
 
-    /// `1200 triangles and 80 edges on 602 nodes`.
+    /// Returns the size of the surface: `1200 triangles and 80 edges on 602 nodes`.
     pub(crate) fn in_words(&self) -> String {
         let (triangles, edges) = (counted(self.triangles, "triangle"), counted(self.edges, "edge"));
         format!("{triangles} and {edges} on {}", counted(self.nodes, "node"))
@@ -114,14 +114,14 @@ pub(super) struct UnitFacts {
 pub(super) struct InterfaceFacts {
     pub name: String,
     pub n_nodes: usize,
-    /// `None`: not stated.
+    /// Name of the coupling; `None` if it was not stated.
     pub coupling: Option<&'static str>,
-    /// Body frame; `None`: no reference point.
+    /// Reference point in the body frame; `None` if there is none. Unit: length.
     pub reference: Option<[f64; 3]>,
-    /// Reference point in model axes.
+    /// Reference point in model axes. Unit: length.
     pub reference_model: Option<[f64; 3]>,
-    /// Largest deformation of the interface in a mode, relative to its largest motion in any; `None`: no
-    /// reference point.
+    /// Largest deformation of the interface in a mode, relative to its largest motion in any mode; `None`
+    /// without a reference point.
     pub deformation: Option<f64>,
 }
 
@@ -144,15 +144,16 @@ impl InterfaceFacts {
         self.coupling == Some(Coupling::Rigid.name()) && self.deformation.is_some_and(|part| part > RIGID)
     }
 
-    /// `, at 0, 0, 12.5 mm`: the reference point in model axes; empty without one. Coordinates that are rounding beside
-    /// `size` are zero.
+    /// Returns `, at 0, 0, 12.5 mm`: the reference point in model axes; empty without a reference point.
+    /// Coordinates that are rounding relative to `size` are written as zero.
     pub(crate) fn place_in_words(&self, size: f64, unit: &str) -> String {
         let place = |x: [f64; 3]| format!(", at {}", coordinates(&x, size, unit));
         self.reference_model.map_or_else(String::new, place)
     }
 
-    /// `80 nodes, rigid, at 0, 0, 12.5 mm`, `3 nodes, averaging, at 1, 0, 0 mm, deforms by up to 12 %`; `size` and `unit`
-    /// as of [`Self::place_in_words`].
+    /// Returns `80 nodes, rigid, at 0, 0, 12.5 mm` or `3 nodes, averaging, at 1, 0, 0 mm, deforms by up to 12
+    /// %`. Coordinates that are rounding relative to `size` are written as zero; `unit` is the unit of
+    /// length.
     pub(crate) fn in_words(&self, size: f64, unit: &str) -> String {
         let place = self.place_in_words(size, unit);
         let coupling = self.coupling.map_or(String::new(), |name| format!(", {name}"));
@@ -165,34 +166,36 @@ impl InterfaceFacts {
     }
 }
 
-/// Deformation of an interface up to this is rounding.
+/// Largest relative deformation of an interface that counts as rounding of a rigid motion. A smaller value
+/// reports rounding as deformation.
 const RIGID: f64 = 1e-8;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct ModeFacts {
     pub count: usize,
     pub frequency_hz: Vec<f64>,
-    /// Unit: 1/time^2.
+    /// Eigenvalue of each mode. Unit: 1/time^2.
     pub eigenvalue: Vec<f64>,
     pub residual: Vec<f64>,
-    /// Origin of each mode; empty if it is not known.
+    /// Origin of each mode; empty if unknown.
     pub provenance: Vec<String>,
-    /// Errors of the static responses of the modes, for the loads of residual vectors.
+    /// Truncation errors of the static responses to the loads of the residual vectors.
     pub truncation: Vec<Truncation>,
     pub damping_ratio: Vec<f64>,
-    /// Of the modes that are to be eigenvectors: static shapes are none; of a Craig-Bampton body that of its
-    /// fixed-interface modes.
+    /// Largest residual of the modes that should be eigenvectors; static shapes are excluded. For a
+    /// Craig-Bampton body that of its fixed-interface modes.
     pub worst_residual: f64,
-    /// Of a Craig-Bampton body: its coordinates, and its frequencies beside those of the free body.
+    /// Coordinates of a Craig-Bampton body, and its frequencies compared with the free body; `None` for other
+    /// bodies.
     pub craig_bampton: Option<CraigBamptonFacts>,
-    /// Damping of the modes, if it was given.
+    /// Damping of the modes; `None` if none was given.
     pub damping: Option<DampingFacts>,
-    /// For each unit load.
+    /// Geometric stiffness for each unit load.
     pub geometric_stiffness: Vec<GeometricStiffnessFacts>,
-    /// Of nodes whose rotations carry mass.
+    /// Stiffness of inertia; `None` unless rotations of nodes carry mass.
     pub inertia_stiffness: Option<InertiaStiffnessFacts>,
-    /// Spin about each axis of the model that takes 1 % of the stiffness of a motion, where W2 is held without
-    /// geometric stiffness for spin.
+    /// Spin about each axis of the model at which the centrifugal term takes 1 % of the stiffness of a
+    /// motion; `None` without W2 or with geometric stiffness for spin. Unit: Hz.
     pub softening_hz: Option<[Option<f64>; 3]>,
 }
 
@@ -219,7 +222,7 @@ impl DampingFacts {
         })
     }
 
-    /// `ratios from 0.01 to 0.03, modes coupled by up to 4.2 %`.
+    /// Returns the damping in words: `ratios from 0.01 to 0.03, modes coupled by up to 4.2 %`.
     pub(crate) fn in_words(&self) -> String {
         let (lowest, highest) = (significant(self.lowest_ratio, 4), significant(self.highest_ratio, 4));
         let ratios = if lowest == highest {
@@ -235,7 +238,8 @@ impl DampingFacts {
     }
 }
 
-/// Coupling of modes by damping up to this is rounding.
+/// Largest coupling of modes by damping that counts as rounding. A smaller value reports rounding as
+/// coupling.
 const UNCOUPLED: f64 = 1e-6;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -264,8 +268,8 @@ fn as_map<S: Serializer>(pairs: &[(String, u64)], serializer: S) -> Result<S::Ok
 }
 
 impl<'b> Facts<'b> {
-    /// Collects the facts of `body` and of the `run` that made it; [`RunData::default`] for a body whose run
-    /// is not known (read from a file).
+    /// Collects the facts of `body` and of the `run` that made it. Pass [`RunData::default`] for a body whose
+    /// run is unknown (read from a file).
     pub fn new(body: &'b FlexBody, run: &RunData) -> Self {
         let frequency_hz = body.frequencies_hz();
         let lumped_modes = run.lumped_modes.iter().map(|l| LumpedModesFacts::of(l, &frequency_hz)).collect();
@@ -304,7 +308,7 @@ impl<'b> Facts<'b> {
     }
 }
 
-/// Largest residual of the modes that are meant to be eigenvectors.
+/// Returns the largest residual of the modes that should be eigenvectors.
 fn worst_residual(body: &FlexBody) -> f64 {
     if let Some(fixed) = &body.certificate().fixed_interface {
         return fixed.residual;
@@ -338,13 +342,13 @@ impl ModelFacts {
         }
     }
 
-    /// Rounding of the storage; `None` for 64-bit floats.
+    /// Returns the rounding of the storage in words; `None` for 64-bit floats.
     pub(crate) fn storage_in_words(&self) -> Option<&'static str> {
         (self.storage == Storage::F32.name())
             .then_some("shapes and inertia of the modes rounded to 32-bit floats")
     }
 
-    /// `21 nodes, 63 degrees of freedom, consistent mass`.
+    /// Returns the size of the model: `21 nodes, 63 degrees of freedom, consistent mass`.
     pub(crate) fn size_in_words(&self) -> String {
         match self.n_dofs {
             0 => self.nodes_in_words(),
@@ -352,7 +356,7 @@ impl ModelFacts {
         }
     }
 
-    /// `21 nodes, 63 degrees of freedom`.
+    /// Returns the number of nodes and rows: `21 nodes, 63 degrees of freedom`.
     pub(crate) fn nodes_in_words(&self) -> String {
         match self.n_dofs {
             0 => format!("{} nodes or frames; mass as another program condensed it", self.n_nodes),
@@ -360,7 +364,7 @@ impl ModelFacts {
         }
     }
 
-    /// Structure of the mass matrix in words.
+    /// Returns the structure of the mass matrix in words.
     fn mass_in_words(&self) -> &'static str {
         match MassStructure::from_name(self.mass_structure) {
             Some(MassStructure::RotationInvariant) => "consistent mass",
@@ -371,7 +375,7 @@ impl ModelFacts {
 }
 
 impl ModeFacts {
-    /// The residual of a mode; a static shape is no eigenvector and has none.
+    /// Returns the residual of a mode, or `static shape` for a static shape, which is no eigenvector.
     pub(crate) fn residual_in_words(&self, j: usize) -> String {
         if self.provenance.get(j).is_some_and(|origin| is_static(origin)) {
             "static shape".to_owned()
@@ -380,7 +384,7 @@ impl ModeFacts {
         }
     }
 
-    /// Kind of modes that the worst residual is of; empty for all modes.
+    /// Returns the kind of modes that the worst residual refers to; empty for all modes.
     pub(crate) fn whose_residual(&self) -> &'static str {
         if self.craig_bampton.is_some() {
             " of the fixed-interface modes"
@@ -391,8 +395,8 @@ impl ModeFacts {
         }
     }
 
-    /// Kinds of shapes with the number of modes that come from them, in the order of their first modes; empty if all are
-    /// free modes.
+    /// Returns the kinds of shapes with their numbers of modes, in the order of their first modes; empty if
+    /// all modes are free modes.
     pub(crate) fn origins(&self) -> Vec<(&str, usize)> {
         let mut origins: Vec<(&str, usize)> = Vec::new();
         for origin in &self.provenance {
@@ -432,14 +436,14 @@ impl UnitFacts {
         format!("{} {}^2", self.mass(), self.length())
     }
 
-    /// All three, and whether they are a guess.
+    /// Returns the three units, with a remark if they are assumed.
     pub(crate) fn in_words(&self) -> String {
         let assumed = if self.stated { "" } else { " assumed, none stated" };
         format!("{}, {}, {}{assumed}", self.length(), self.mass(), self.time())
     }
 }
 
-/// A unit given by its size is written as that size.
+/// Returns the name of a unit; a unit given by its size in SI units is written as that size.
 fn named(unit: &str, si: &str) -> String {
     if unit.parse::<f64>().is_ok() { format!("[{unit} {si}]") } else { unit.to_owned() }
 }

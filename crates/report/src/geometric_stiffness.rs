@@ -1,4 +1,4 @@
-//! Geometric stiffness of a body, or what is without it.
+//! Geometric stiffness of a body, or the centrifugal softening without it.
 
 use super::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, LoadKind};
@@ -8,9 +8,9 @@ use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct GeometricStiffnessFacts {
-    /// `spin xx`, along body axes.
+    /// Unit load along body axes: `spin xx`.
     pub load: String,
-    /// By which part of its own a unit of the load changes the stiffness of any motion at the most.
+    /// Largest relative change of the stiffness of any motion by one unit of the load.
     pub relative_norm: f64,
     /// True if the axes of the body are not those of the model.
     #[serde(skip)]
@@ -31,8 +31,8 @@ impl GeometricStiffnessFacts {
             .collect()
     }
 
-    /// `spin xx: up to 1.2e-3 of the stiffness of a motion per unit`; of axes that are not the model's `spin xx (body
-    /// axes): ...`.
+    /// Returns the effect of the load: `spin xx: up to 1.2e-3 of the stiffness of a motion per unit`; with `
+    /// (body axes)` if the body axes differ from the model axes.
     pub(crate) fn in_words(&self) -> String {
         format!(
             "{}{}: up to {} of the stiffness of a motion per unit",
@@ -43,11 +43,11 @@ impl GeometricStiffnessFacts {
     }
 }
 
-/// Motions at which the stiffness of inertia counts.
+/// Motions of the frame at which the stiffness of inertia matters.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct InertiaStiffnessFacts {
-    /// Spin in hertz, acceleration and angular acceleration of the frame at which it has 1 % of the stiffness of a
-    /// motion, whatever their direction; null where it is zero.
+    /// Spin in hertz, acceleration and angular acceleration of the frame at which the stiffness of inertia is
+    /// 1 % of the stiffness of a motion, for any direction; null if it is zero.
     pub one_percent_spin_hz: Option<f64>,
     pub one_percent_acceleration: Option<f64>,
     pub one_percent_angular_acceleration: Option<f64>,
@@ -66,7 +66,7 @@ impl InertiaStiffnessFacts {
         })
     }
 
-    /// `of turning nodes: 1 % of a stiffness at a spin of 12.3 Hz, ...`.
+    /// Returns the motions in words: `of turning nodes: 1 % of a stiffness at a spin of 12.3 Hz, ...`.
     pub(crate) fn in_words(&self) -> String {
         match self.words.as_str() {
             "" => "of turning nodes: none".to_owned(),
@@ -75,9 +75,10 @@ impl InertiaStiffnessFacts {
     }
 }
 
-/// Spin about each axis of the model, in hertz, at which the centrifugal term takes 1 % of the stiffness of the
-/// motion that it softens most. Nothing for a body with geometric stiffness for spin, or without W2; no
-/// number where nothing moves across the axis, nor about axes that a plane body does not spin about.
+/// Returns the spin about each axis of the model at which the centrifugal term takes 1 % of the stiffness of
+/// the motion that it softens most. Unit: Hz. Returns `None` for a body with geometric stiffness for spin or
+/// without W2. An axis has no value if no mode moves perpendicular to it, or if a plane body does not spin
+/// about it.
 pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
     let given = body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
     (!given && body.groups().w2).then(|| {
@@ -89,7 +90,8 @@ pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
     })
 }
 
-/// `no geometric stiffness: 1 % softer at 12.5, 80.1, 79.9 Hz (x, y, z of the model)`.
+/// Returns the spins in words: `no geometric stiffness: 1 % softer at 12.5, 80.1, 79.9 Hz (x, y, z of the
+/// model)`.
 pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
     let axes = ["x", "y", "z"].into_iter().zip(hertz);
     let known: Vec<(&str, f64)> = axes.filter_map(|(axis, hz)| Some((axis, (*hz)?))).collect();

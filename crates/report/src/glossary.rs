@@ -1,8 +1,8 @@
-//! Words of a report that not every reader knows, explained where they stand and at the end.
+//! Technical terms of a report, explained at their place and in a list at the end.
 
 use super::document::{Block, Span, Term, heading};
 
-/// Words and what they mean.
+/// Terms and their meanings.
 const WORDS: [(&str, &str); 14] = [
     (
         "principal moments of inertia",
@@ -44,12 +44,12 @@ const WORDS: [(&str, &str); 14] = [
     ("I0", "The inertia of the undeformed body about the origin of its frame."),
 ];
 
-/// A word with its explanation; a word that has none stays as it is.
+/// Returns a word with its explanation; a word without one is returned as plain text.
 pub(super) fn word(word: &str) -> Span {
     word_as(word, word)
 }
 
-/// Another form of a known word, `W2 (n)` or a plural.
+/// Returns another form of a known word, such as `W2 (n)` or a plural, with its explanation.
 pub(super) fn word_as(known: &str, shown: &str) -> Span {
     match WORDS.iter().find(|(word, _)| *word == known) {
         Some((_, meaning)) => Span::Word(shown.to_owned(), meaning),
@@ -57,7 +57,7 @@ pub(super) fn word_as(known: &str, shown: &str) -> Span {
     }
 }
 
-/// All words at the end, for those who cannot point at one.
+/// Returns all terms as a list at the end of the page, for readers without a pointer.
 pub(super) fn glossary<'a>() -> [Block<'a>; 2] {
     let terms = WORDS.map(|(word, meaning)| Term::page(word, meaning)).into();
     [heading("Words"), Block::Fold("What the words of this report mean", vec![Block::Terms(terms)])]

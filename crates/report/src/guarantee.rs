@@ -1,18 +1,19 @@
-//! Guarantees of the accuracy `certified`, in numbers that an engineer can quote.
+//! Guarantees of the accuracy `certified` in quotable numbers.
 
 use super::numbers::{counted, significant};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::DIGITS;
 use serde::{Serialize, Serializer};
 
-/// The guarantees of a body.
+/// Guarantees of a body.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct GuaranteeFacts {
-    /// Unit: 1/time^2.
+    /// Lower bound of each eigenvalue. Unit: 1/time^2.
     pub eigenvalue_lower: Vec<f64>,
-    /// Unit: 1/time^2.
+    /// Upper bound of each eigenvalue. Unit: 1/time^2.
     pub eigenvalue_upper: Vec<f64>,
-    /// -log10 of the larger distance to a bound, relative to the eigenvalue.
+    /// Guaranteed digits of each eigenvalue: -log10 of the larger distance to a bound, relative to the
+    /// eigenvalue.
     pub eigenvalue_digits: Vec<f64>,
     pub shape_error: Vec<f64>,
     #[serde(serialize_with = "as_map")]
@@ -47,7 +48,7 @@ impl GuaranteeFacts {
         })
     }
 
-    /// Eigenvalues and the count below them.
+    /// Returns the guarantees of the eigenvalues and the inertia count below them in words.
     pub(crate) fn eigenvalues(&self) -> String {
         let (digits, mode) = least(self.eigenvalue_digits.iter().copied().zip(1..));
         let rigid = counted(self.negative_pivots_below, "rigid mode");
@@ -58,7 +59,8 @@ impl GuaranteeFacts {
         )
     }
 
-    /// Invariants, and how far the modes are from the exact ones.
+    /// Returns the guarantees of the invariants, and the distance of the modes from the exact modes, in
+    /// words.
     pub(crate) fn invariants(&self) -> String {
         let (digits, name) = least(self.invariant_digits.iter().map(|&(name, digits)| (digits, name)));
         let shape = self.shape_error.iter().copied().fold(0.0, f64::max);
@@ -69,12 +71,12 @@ impl GuaranteeFacts {
     }
 }
 
-/// Digits cut to one decimal: never more than is guaranteed.
+/// Returns a number of digits rounded down to one decimal, never more than is guaranteed.
 pub(super) fn cut(digits: f64) -> String {
     significant((10.0 * digits).floor() / 10.0, 3)
 }
 
-/// The fewest digits and whose they are.
+/// Returns the smallest number of digits and its name.
 fn least<T>(digits: impl Iterator<Item = (f64, T)>) -> (String, T) {
     let (digits, whose) =
         digits.min_by(|a, b| a.0.total_cmp(&b.0)).expect("bodies have modes and invariants");

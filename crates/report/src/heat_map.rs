@@ -8,16 +8,16 @@ use faer::Mat;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{CauchySchwarz, Invariants};
 
-/// Modes that are shown at the most.
+/// Largest number of modes in a map.
 const MODES: usize = 40;
-/// Pairs that are named.
+/// Number of pairs that are named.
 const NAMED: usize = 3;
 
-/// Moments and products of inertia: their names and places.
+/// Names and indices of the moments and products of inertia.
 const INERTIA: [(&str, usize, usize); 6] =
     [("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2)];
 
-/// The section with the maps of the groups that the body holds; nothing without modes.
+/// Returns the section with the maps of the groups that the body holds; empty without modes.
 pub(super) fn heat_maps<'a>(body: &FlexBody) -> Vec<Block<'a>> {
     let all = body.n_modes();
     if all == 0 {
@@ -34,13 +34,13 @@ pub(super) fn heat_maps<'a>(body: &FlexBody) -> Vec<Block<'a>> {
     vec![heading("How the modes act on the inertia"), Block::Paragraph(reading), Block::Maps(maps)]
 }
 
-/// One map: a value for each row and each mode.
+/// A map with a value for each row and each mode.
 struct Map {
     name: &'static str,
     reading: &'static str,
     /// True for W1, whose rows are moments and products of inertia; false if rows are modes.
     is_by_moments: bool,
-    /// `None`: the body does not hold it.
+    /// Values of the map; `None` if the body does not hold the group.
     values: Option<Vec<Vec<f64>>>,
 }
 
@@ -53,7 +53,7 @@ fn maps(invariants: &Invariants) -> [Map; 3] {
         };
         INERTIA.map(row).to_vec()
     };
-    // The largest entry of the blocks that belong to two modes.
+    // Takes the largest entry of the blocks that belong to two modes.
     let by_modes = |w: &Mat<f64>| {
         let (below, beside) = (w.nrows() / nf, w.ncols() / nf);
         let largest = |p: usize, q: usize| {
@@ -86,7 +86,7 @@ fn maps(invariants: &Invariants) -> [Map; 3] {
 }
 
 impl Map {
-    /// The map with its words.
+    /// Returns the map with its text.
     fn drawn(self) -> (Inline, Option<Cells>) {
         let name = |dot: &str| match word(self.name) {
             Span::Word(name, meaning) => Span::Word(name + dot, meaning),
@@ -107,17 +107,17 @@ impl Map {
     }
 }
 
-/// Name of a cell of W1.
+/// Returns the name of a cell of W1.
 fn moment_of_mode(i: usize, j: usize) -> String {
     format!("mode {}, I{}", j + 1, INERTIA[i].0)
 }
 
-/// Name of a cell of W2 or W3.
+/// Returns the name of a cell of W2 or W3.
 fn modes(i: usize, j: usize) -> String {
     if i == j { format!("mode {}", i + 1) } else { format!("modes {} and {}", i + 1, j + 1) }
 }
 
-/// The largest entries in words; of pairs of modes those of two different ones.
+/// Returns the largest entries in words; for maps of mode pairs only pairs of two different modes.
 fn strongest(values: &[Vec<f64>], is_by_moments: bool) -> String {
     let rows = values.iter().enumerate();
     let cells = rows.flat_map(|(i, row)| row.iter().enumerate().map(move |(j, &value)| (i, j, value)));

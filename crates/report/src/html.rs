@@ -1,4 +1,5 @@
-//! The page of a document: nothing loaded from elsewhere, readable without scripts, on a phone and on paper.
+//! HTML page of a document. The page loads nothing from elsewhere and is readable without scripts, on a phone
+//! and on paper.
 
 use super::chart::{Cells, colour_scale};
 use super::document::{Block, Document, Inline, Span, State, Table, Term};
@@ -10,10 +11,10 @@ use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 const STYLE: &str = include_str!("report.css");
 const PICTURE_STYLE: &str = include_str!("picture/embedded.css");
 
-/// Opens what is folded before a page is printed.
+/// Script that opens folded blocks before a page is printed.
 const UNFOLD: &str = "<script>addEventListener(\"beforeprint\", () => document.querySelectorAll(\"details\").forEach((fold) => (fold.open = true)));</script>\n";
 
-/// A text of the user: escaped, and without characters that turn the direction of a text.
+/// User text, escaped, without control characters that change the direction of text.
 pub(crate) struct Plain<'t>(pub &'t str);
 
 impl Render for Plain<'_> {
@@ -45,16 +46,16 @@ impl Render for Inline {
     }
 }
 
-/// A text with units as they are printed: the 2 of `t mm^2` raised.
+/// Returns a text with raised exponents: the 2 of `t mm^2`.
 pub(crate) fn raised(text: &str) -> String {
     text.replace("^2", "\u{b2}").replace("^3", "\u{b3}")
 }
 
-/// Writes the whole page.
+/// Renders the whole page.
 pub(super) fn render(document: &Document<'_>) -> String {
     let mut page = Page::default();
     let content = page.blocks(&document.blocks);
-    // A page may run what it brings, and load nothing.
+    // The content security policy allows inline scripts of the page and no external resources.
     let policy = if page.scripts.is_empty() {
         "default-src 'none'; style-src 'unsafe-inline'"
     } else {
@@ -81,7 +82,7 @@ pub(super) fn render(document: &Document<'_>) -> String {
     page.into_string() + "\n"
 }
 
-/// Style and scripts that the blocks of a page need beside their markup.
+/// Style and scripts that the blocks of a page need in addition to their markup.
 #[derive(Default)]
 struct Page {
     style: &'static str,
@@ -140,7 +141,7 @@ fn verdict(state: State, head: &str, rest: &str) -> Markup {
     html! { p class=(class) { strong { (Plain(head)) } @if !rest.is_empty() { " " (Plain(rest)) } } "\n" }
 }
 
-/// Terms, those of one label below each other.
+/// Renders terms; values of one label stand below each other.
 fn terms(items: &[Term]) -> Markup {
     let shown: Vec<&Term> = items.iter().filter(|term| term.is_in_page).collect();
     html! {
@@ -176,7 +177,7 @@ fn table(table: &Table) -> Markup {
     }
 }
 
-/// Diagnostics in the order in which they were found.
+/// Renders diagnostics in the order in which they were found.
 fn diagnostics(found: &[Diagnostic]) -> Markup {
     if found.is_empty() {
         return html! { p { "None." } };

@@ -1,4 +1,4 @@
-//! Errors of a body beside the model that it was made of.
+//! Errors of a body relative to the model that it was made from.
 
 use super::errors_in_words::errors_to_digits;
 use super::numbers::significant;
@@ -6,17 +6,18 @@ use flexbody_motion::scene::OutputErrors;
 use flexbody_study::reference::ReferenceError;
 use serde::Serialize;
 
-/// Errors of a body beside its model.
+/// Errors of a body relative to its model.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct LackFacts {
     modes: usize,
-    /// The attitude is zero where the rotation is prescribed; no reaction where no motion is prescribed.
+    /// Errors by quantity. The attitude error is zero if the rotation is prescribed; the reaction error is
+    /// `None` without prescribed motion.
     #[serde(flatten)]
     errors: OutputErrors,
-    /// Nothing where it is not known.
+    /// Largest ratio of error to tolerance; `None` if unknown.
     worst: Option<f64>,
     time: f64,
-    /// The reason why nothing is known.
+    /// Reason why the errors are unknown.
     unknown: Option<&'static str>,
 }
 
@@ -33,7 +34,8 @@ impl LackFacts {
         }
     }
 
-    /// `attitude 0.0012 rad, deflection 0.5 %, stress 8.6 %`, of a prescribed motion with `reaction 1.2 %`.
+    /// Returns the errors in words: `attitude 0.0012 rad, deflection 0.5 %, stress 8.6 %`; with prescribed
+    /// motion also `reaction 1.2 %`.
     pub(crate) fn parts(&self) -> String {
         if let Some(reason) = self.unknown {
             return format!("an unknown part ({reason})");
@@ -51,8 +53,8 @@ impl LackFacts {
     }
 }
 
-/// The reference of all measured errors: the last of `lacks`, the first of which was that before anything was
-/// enriched.
+/// Returns the error of the reference of all measured errors in words: the last of `lacks`. The first entry
+/// is the error before enrichment.
 pub(super) fn reference_in_words(lacks: &[LackFacts]) -> String {
     match lacks {
         [] => "the modes of the body; what these lack of an FE model is not known".to_owned(),

@@ -1,6 +1,6 @@
-//! Reports on bodies: facts computed once, rendered as text, JSON and HTML; comparison of two
-//! bodies; simulations; selections; trade studies; frequency responses; audits; the page that shows a body in
-//! motion.
+//! Reports: facts computed once and rendered as text, JSON and HTML. Covers bodies, the comparison of two
+//! bodies, simulations, selections, trade studies, frequency responses, audits, and the page that shows a
+//! body in motion.
 
 #![deny(
     clippy::exit,

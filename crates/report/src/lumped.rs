@@ -8,15 +8,15 @@ use flexbody_body::invariants::{ERROR_NORMS, Invariants};
 use serde::{Serialize, Serializer};
 use std::collections::{HashMap, HashSet};
 
-/// One error norm and what it measures.
+/// An error norm and its meaning.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct ErrorNorm {
-    /// `W2_spectral`, ...
+    /// Name of the norm: `W2_spectral`, ...
     pub name: String,
-    /// `W2`.
+    /// Name of the invariant: `W2`, ...
     pub invariant: String,
     pub value: f64,
-    /// Its formula; empty for a name that this version does not know.
+    /// Formula of the norm; empty for a name that this version does not know.
     pub meaning: &'static str,
 }
 
@@ -26,7 +26,7 @@ impl ErrorNorm {
         Self { name: name.clone(), invariant: invariant_of(name).to_owned(), value: *value, meaning }
     }
 
-    /// Kind of norm in a word.
+    /// Returns the kind of norm in a word.
     pub(crate) fn kind(&self) -> &'static str {
         match self.name.rsplit('_').next() {
             Some("frobenius") => "Frobenius",
@@ -37,18 +37,19 @@ impl ErrorNorm {
     }
 }
 
-/// `I0` of `I0_frobenius`; names without a kind of norm stand for themselves.
+/// Returns the name of the invariant of a norm: `I0` of `I0_frobenius`. A name without a kind of norm is
+/// returned unchanged.
 fn invariant_of(name: &str) -> &str {
     ["_frobenius", "_spectral", "_max"].iter().find_map(|kind| name.strip_suffix(kind)).unwrap_or(name)
 }
 
-/// Names in the order of their first appearance.
+/// Returns the distinct names in the order of their first appearance.
 pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut seen = HashSet::new();
     names.filter(|name| seen.insert(*name)).collect()
 }
 
-/// Errors by name: an object in JSON, in the order of the table.
+/// Errors by name: a JSON object in the order of the table.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Norms(pub Vec<(String, f64)>);
 
@@ -86,12 +87,12 @@ impl Errors {
     }
 }
 
-/// NaN is worse than any number: an error that is not known must not look small.
+/// Returns true if error `a` exceeds error `b`. NaN, an unknown error, exceeds every number.
 fn exceeds(a: f64, b: f64) -> bool {
     (a.is_nan() && !b.is_nan()) || a > b
 }
 
-/// Question (a) of theory section 9: the same modes, the invariants from lumped masses.
+/// Facts for question (a) of theory section 9: the exact modes with the invariants from lumped masses.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct LumpedFacts {
     pub scheme: String,
@@ -114,7 +115,8 @@ impl LumpedFacts {
         }
     }
 
-    /// Errors of the lumped mass in words; with `explained`, the invariants of the modes have their meaning.
+    /// Returns the errors of the lumped mass in words; if `explained`, each invariant of the modes carries
+    /// its meaning.
     pub(crate) fn in_words(&self, explained: bool) -> String {
         let norms = &self.errors.worst_by_invariant;
         let norms: Vec<(&str, f64)> = norms.iter().map(|n| (n.invariant.as_str(), n.value)).collect();
@@ -126,7 +128,7 @@ impl LumpedFacts {
     }
 }
 
-/// Question (b): the modes from the lumped masses too.
+/// Facts for question (b) of theory section 9: modes computed from the lumped masses as well.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct LumpedModesFacts {
     pub scheme: String,
@@ -134,9 +136,9 @@ pub(super) struct LumpedModesFacts {
     pub remark: String,
     pub caution: String,
     pub frequency_hz: Vec<f64>,
-    /// Relative change of the frequency that changes most, in ascending order of each; `None` without modes.
+    /// Largest relative change of a frequency, with both lists in ascending order; `None` without modes.
     pub worst_frequency_change: Option<f64>,
-    /// Mode (from 1) of that frequency.
+    /// Number (from 1) of the mode with that change.
     pub worst_frequency_mode: Option<usize>,
     pub subspace_cosine: f64,
     #[serde(flatten)]
@@ -160,7 +162,7 @@ impl LumpedModesFacts {
         }
     }
 
-    /// `frequency 4 off by -10 %, subspace cosine 0.97`.
+    /// Returns the largest change and the cosine: `frequency 4 off by -10 %, subspace cosine 0.97`.
     pub(crate) fn in_words(&self) -> String {
         if !self.done {
             return format!("not done: {}", self.remark);

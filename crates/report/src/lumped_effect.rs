@@ -1,21 +1,21 @@
-//! Effect of lumped masses on a body, in the words of its user: its moments of inertia and the worst of
-//! what its modes take part in.
+//! Effect of lumped masses on a body in the terms of an engineer: moments of inertia, and the worst error in
+//! the invariants of the modes.
 
 use super::mass_properties::{centre_of_mass, inertia_about_com, principal_moments};
 use super::numbers::significant;
 use flexbody_body::invariants::{Invariants, LumpedScheme};
 
-/// Errors up to this are rounding.
+/// Largest error that counts as rounding and is not shown.
 pub(super) const NEGLIGIBLE: f64 = 1e-9;
 
-/// Changes by the lumped masses. NaN: not known.
+/// Changes caused by the lumped masses; NaN if unknown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LumpedEffect {
-    /// Relative.
+    /// Relative change of the mass.
     pub mass: f64,
-    /// Relative, of the principal moments about the centre of mass, ascending.
+    /// Relative changes of the principal moments about the centre of mass, ascending.
     pub moments: [f64; 3],
-    /// Distance of the centres of mass, relative to the largest radius of gyration.
+    /// Distance between the centres of mass, relative to the largest radius of gyration.
     pub centre: f64,
 }
 
@@ -31,8 +31,8 @@ impl LumpedEffect {
         }
     }
 
-    /// The largest change, where it is no rounding: `smallest inertia +1.4 %`, or
-    /// `smallest principal moment of inertia 1.4 % too large`.
+    /// Returns the largest change in words if it exceeds rounding: `smallest inertia +1.4 %` or, if
+    /// `explained`, `smallest principal moment of inertia 1.4 % too large`.
     fn in_words(&self, explained: bool) -> Option<String> {
         let all = [
             ("mass", self.mass),
@@ -54,7 +54,7 @@ impl LumpedEffect {
     }
 }
 
-/// The larger of two errors; one that is not known is larger than all.
+/// Returns the larger of two errors; an unknown error counts as the largest.
 fn worse<'a>(a: (&'a str, f64), b: (&'a str, f64)) -> (&'a str, f64) {
     if !a.1.is_nan() && (b.1.is_nan() || b.1.abs() > a.1.abs()) { b } else { a }
 }
@@ -63,7 +63,7 @@ fn is_error(change: f64) -> bool {
     change.is_nan() || change.abs() > NEGLIGIBLE
 }
 
-/// `1.4 % too large`.
+/// Returns a change in words: `1.4 % too large`.
 fn off(change: f64) -> String {
     match change {
         change if change.is_nan() => "not known".to_owned(),
@@ -72,12 +72,12 @@ fn off(change: f64) -> String {
     }
 }
 
-/// A part in percent with two digits.
+/// Returns a ratio in percent with two digits.
 fn rough(part: f64) -> String {
     if part.is_nan() { "an unknown part".to_owned() } else { format!("{} %", significant(100.0 * part, 2)) }
 }
 
-/// A scheme of lumping as engineers call it.
+/// Returns the name of a lumping scheme in common usage.
 pub(super) fn scheme_in_words(scheme: &str) -> &str {
     match LumpedScheme::from_name(scheme) {
         Some(LumpedScheme::RowSum) => "row sums",
@@ -87,7 +87,7 @@ pub(super) fn scheme_in_words(scheme: &str) -> &str {
     }
 }
 
-/// Meaning of an invariant of the modes.
+/// Returns the physical meaning of an invariant of the modes.
 pub(super) fn meaning(invariant: &str) -> &'static str {
     match invariant {
         "modal_mass" => "the mass of the modes",
@@ -100,10 +100,10 @@ pub(super) fn meaning(invariant: &str) -> &'static str {
     }
 }
 
-/// All that is wrong with lumped masses, worst first where it is not physical at all: `410 NEGATIVE masses,
-/// smallest inertia +1.4 %, W2 8 % off`; with `explained`, what W2 is for.
+/// Returns all defects of lumped masses in words, unphysical ones first: `410 NEGATIVE masses, smallest
+/// inertia +1.4 %, W2 8 % off`. If `explained`, the invariant carries its meaning.
 ///
-/// `norms` are the worst ones by the name of their invariant.
+/// `norms` are the worst norm of each invariant, by the name of the invariant.
 pub(super) fn in_words(
     negative_masses: usize,
     effect: &LumpedEffect,

@@ -1,33 +1,35 @@
-//! Mass, centre of mass and principal inertia of a body, whatever its frame.
+//! Mass, centre of mass and principal inertia of a body in any frame.
 
 use super::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, ReferenceConditions};
 use flexbody_body::invariants::Invariants;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-/// Products of inertia below this part of sqrt(I_kk I_ll) are rounding of a principal frame: its diagonal
-/// then is better than any eigenvalue iteration, which loses the digits of a needle's small moment.
+/// Largest product of inertia, relative to sqrt(I_kk I_ll), that counts as rounding of a principal frame.
+/// Below it the diagonal is taken as the moments: an eigenvalue iteration would lose the digits of the small
+/// moment of a slender body.
 const DIAGONAL: f64 = 1e-12;
 
-/// Limits within which a frame counts as what it was made to be: the limits of the identities of the body.
+/// Tolerances for a frame to count as centred and as principal: the limits of the identities of the body.
 const CENTRED: f64 = 1e-9;
 const PRINCIPAL: f64 = 2e-9;
 
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub(super) struct MassProperties {
-    /// Unit: mass.
+    /// Mass of the body. Unit: mass.
     pub mass: f64,
-    /// Model coordinates. Unit: length.
+    /// Centre of mass in model coordinates. Unit: length.
     pub centre_of_mass: [f64; 3],
-    /// About the centre of mass, ascending. Unit: mass length^2.
+    /// Principal moments of inertia about the centre of mass, ascending. Unit: mass length^2.
     pub principal_inertia: [f64; 3],
-    /// sqrt(I / m) of each principal inertia; NaN (JSON null) for a negative one. Unit: length.
+    /// Radius of gyration sqrt(I / m) of each principal moment; NaN (JSON null) for a negative moment. Unit:
+    /// length.
     pub radii_of_gyration: [f64; 3],
     /// Origin of the body frame in model coordinates. Unit: length.
     pub frame_origin: [f64; 3],
     /// Rows of the matrix whose columns are the body axes in model axes.
     pub frame_axes: [[f64; 3]; 3],
-    /// Place of the frame in words.
+    /// Description of the position of the frame.
     pub frame: String,
     /// True if the frame follows the mean motion of the body.
     #[serde(skip)]
@@ -35,7 +37,8 @@ pub(super) struct MassProperties {
 }
 
 impl MassProperties {
-    /// Returns the largest radius of gyration: coordinates that are rounding beside it are shown as zero.
+    /// Returns the largest radius of gyration. Coordinates that are rounding relative to it are shown as
+    /// zero.
     pub(crate) fn size(&self) -> f64 {
         self.radii_of_gyration.iter().copied().fold(0.0, f64::max)
     }
@@ -87,34 +90,34 @@ fn describe(body: &FlexBody, inertia: &Matrix3<f64>) -> String {
     )
 }
 
-/// The angle between the body axes and those of the model, degrees.
+/// Returns the angle between the body axes and the model axes in degrees.
 fn turned_degrees(axes: &Matrix3<f64>) -> f64 {
     let skew =
         Vector3::new(axes[(2, 1)] - axes[(1, 2)], axes[(0, 2)] - axes[(2, 0)], axes[(1, 0)] - axes[(0, 1)]);
     skew.norm().atan2(axes.trace() - 1.0).to_degrees()
 }
 
-/// c / m: in the body frame. Unit: length.
+/// Returns the centre of mass c / m in the body frame. Unit: length.
 pub(super) fn centre_of_mass(body: &Invariants) -> Vector3<f64> {
     body.first_moment() / body.mass()
 }
 
-/// I0 about the centre of mass, body axes. Unit: mass length^2.
+/// Returns I0 about the centre of mass in body axes. Unit: mass length^2.
 pub(super) fn inertia_about_com(body: &Invariants) -> Matrix3<f64> {
     let com = centre_of_mass(body);
     let j = body.second_moment() - com * com.transpose() * body.mass();
-    // Sums of two diagonal entries: the trace minus the third would cancel for needles.
+    // Sums two diagonal entries; the trace minus the third would cancel for slender bodies.
     Matrix3::from_fn(|k, l| {
         if k == l { j[((k + 1) % 3, (k + 1) % 3)] + j[((k + 2) % 3, (k + 2) % 3)] } else { -j[(k, l)] }
     })
 }
 
-/// sqrt(tr J_com / m). Unit: length.
+/// Returns the radius of gyration sqrt(tr J_com / m). Unit: length.
 pub(super) fn gyration_radius(body: &Invariants) -> f64 {
     (0.5 * inertia_about_com(body).trace() / body.mass()).max(0.0).sqrt()
 }
 
-/// Largest |I_kl| / sqrt(I_kk I_ll), k != l; NaN when a moment is not positive.
+/// Returns the largest |I_kl| / sqrt(I_kk I_ll), k != l; NaN if a moment is not positive.
 fn largest_product(inertia: &Matrix3<f64>) -> f64 {
     let scaled = |(k, l): (usize, usize)| {
         let product = inertia[(k, l)].abs();
@@ -124,10 +127,10 @@ fn largest_product(inertia: &Matrix3<f64>) -> f64 {
     if products.iter().any(|p| p.is_nan()) { f64::NAN } else { products.into_iter().fold(0.0, f64::max) }
 }
 
-/// Ascending. Unit: mass length^2.
+/// Returns the principal moments of inertia, ascending. Unit: mass length^2.
 pub(super) fn principal_moments(inertia: &Matrix3<f64>) -> [f64; 3] {
     let mut moments: [f64; 3] = inertia.diagonal().into();
-    // Not finite: the iteration would not end with anything better.
+    // The eigenvalue iteration is skipped for entries that are not finite.
     let diagonal = largest_product(inertia) <= DIAGONAL;
     if !diagonal && inertia.iter().all(|v| v.is_finite()) {
         let scale = inertia.amax();

@@ -1,13 +1,13 @@
-//! Numbers and texts as people read them. JSON never uses these: its floats round-trip.
+//! Numbers and texts in readable form. JSON never uses these functions: its floats round-trip.
 
 pub(super) use flexbody_base::numbers::significant;
 
-/// A relative error in percent, three digits.
+/// Returns a relative error in percent with three digits.
 pub(super) fn percent(ratio: f64) -> String {
     format!("{} %", significant(100.0 * ratio, 3))
 }
 
-/// A duration.
+/// Returns a duration.
 pub(super) fn duration(seconds: f64) -> String {
     if seconds < 0.9995 {
         format!("{:.0} ms", 1e3 * seconds)
@@ -18,12 +18,12 @@ pub(super) fn duration(seconds: f64) -> String {
     }
 }
 
-/// Times of a run: `3.25 s wall, 6.26 s CPU`.
+/// Returns the times of a run: `3.25 s wall, 6.26 s CPU`.
 pub(super) fn times(wall_seconds: f64, cpu_seconds: f64) -> String {
     format!("{} wall, {} CPU", duration(wall_seconds), duration(cpu_seconds))
 }
 
-/// A size in memory or on disk, decimal prefixes.
+/// Returns a size in memory or on disk with a decimal prefix.
 pub(super) fn bytes(count: u64) -> String {
     let prefixes = [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
     let found = prefixes.iter().find(|(size, _)| count as f64 >= *size);
@@ -32,30 +32,30 @@ pub(super) fn bytes(count: u64) -> String {
     })
 }
 
-/// `count` things, with the plural of English nouns.
+/// Returns `count` with an English noun in singular or plural.
 pub(super) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// A fragment as a sentence begins.
+/// Returns a fragment with an upper-case first letter.
 pub(super) fn sentence(fragment: &str) -> String {
     let mut characters = fragment.chars();
     characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
 }
 
-/// Three values and their unit.
+/// Returns three values and their unit.
 pub(super) fn triple(values: &[f64; 3], unit: &str) -> String {
     let [x, y, z] = values.map(|v| significant(v, 6));
     format!("{x}, {y}, {z} {unit}")
 }
 
-/// Three coordinates; what is rounding compared with `size` is zero.
+/// Returns three coordinates; values that are rounding relative to `size` are written as zero.
 pub(super) fn coordinates(values: &[f64; 3], size: f64, unit: &str) -> String {
     triple(&values.map(|v| if v.abs() <= 1e-12 * size { 0.0 } else { v }), unit)
 }
 
-/// Text of a file for one line of a terminal or a page: what could steer a terminal or turn the direction of
-/// the text is replaced.
+/// Returns a text from a file for one line of a terminal or a page. Characters that control a terminal or
+/// change the direction of text are replaced.
 pub(super) fn plain(text: &str) -> String {
     let steers = |c: char| {
         c.is_control()

@@ -1,4 +1,4 @@
-//! The one object that every command prints with `--json` (`schemas/output.schema.json`).
+//! JSON object that every command prints with `--json` (`schemas/output.schema.json`).
 
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 use flexbody_base::error::ExitCode;
@@ -19,8 +19,8 @@ struct Output<'a> {
     diagnostics: &'a [Diagnostic],
 }
 
-/// The object of `command` (`None`: the command line names none), which ends with `code`. `results` is what
-/// it found, as JSON; `None`: it did not come to results.
+/// Returns the JSON object of `command` (`None` if the command line names none), which ends with `code`.
+/// `results` are the results as JSON; `None` if the command failed before it had results.
 ///
 /// # Panics
 /// Never: the head of the object has text keys and finite numbers.
@@ -45,8 +45,8 @@ pub fn output_json(
         diagnostics,
     };
     let head = serde_json::to_string_pretty(&head).expect("texts and numbers");
-    // Results keep the order of their keys and the digits of their numbers; no text in JSON holds a line
-    // break.
+    // Results keep the order of their keys and the digits of their numbers. Texts in JSON contain no line
+    // break, so that every line break can be indented.
     let results = results.unwrap_or("null").trim_end().replace('\n', "\n  ");
     format!("{},\n  \"results\": {results}\n}}\n", head.trim_end_matches("\n}"))
 }

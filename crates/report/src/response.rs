@@ -15,13 +15,14 @@ use flexbody_study::response::{
 };
 use serde::Serialize;
 
-/// Plots of each pair of places: the functions with the largest accelerances.
+/// Number of plots per pair of places: the functions with the largest accelerances. More plots make the page
+/// longer.
 const PLOTS: usize = 3;
 
-/// Pairs that are plotted.
+/// Number of pairs that are plotted. More pairs make the page longer.
 const PLOTTED_PAIRS: usize = 8;
 
-/// Decades that a panel shows at the most: those at its upper end.
+/// Largest number of decades on a vertical axis; values below the upper decades are cut off.
 const MOST_DECADES: f64 = 10.0;
 
 /// Facts of a frequency response.
@@ -38,11 +39,11 @@ pub struct ResponseFacts<'a> {
     band_hz: [f64; 2],
     tolerance: f64,
     verdict: String,
-    /// `None` where no error is known.
+    /// Result of the comparison with the tolerance; `None` if no error is known.
     passed: Option<bool>,
     body_modes_in_band: usize,
     solved: Option<SolvedFacts>,
-    /// `None` where no interface of the body is rigid.
+    /// Effect of the rigid interfaces; `None` if the body has no rigid interface.
     coupling: Option<CouplingFacts<'a>>,
     frequencies_hz: &'a [f64],
     pairs: Vec<PairFacts>,
@@ -54,7 +55,7 @@ pub struct ResponseFacts<'a> {
     logarithmic: bool,
 }
 
-/// The equations of all nodes.
+/// Size and cost of the solved equations of all nodes.
 #[derive(Debug, Clone, Copy, Serialize)]
 struct SolvedFacts {
     rows: usize,
@@ -63,7 +64,8 @@ struct SolvedFacts {
     modes_in_band: usize,
 }
 
-/// Rigid interfaces, which the model has in the comparison as well, and their effect on its response.
+/// Rigid interfaces, which are rigid in the compared model as well, and their effect on the response of the
+/// model.
 #[derive(Debug, Clone, Copy, Serialize)]
 struct CouplingFacts<'a> {
     interfaces: &'a [String],
@@ -101,7 +103,7 @@ struct PairFacts {
     errors: Option<ErrorFacts>,
 }
 
-/// A transfer function; real and imaginary parts.
+/// A transfer function as pairs of real and imaginary part.
 #[derive(Debug, Clone, Serialize)]
 struct FunctionFacts {
     from: &'static str,
@@ -110,7 +112,7 @@ struct FunctionFacts {
     full: Vec<Option<[f64; 2]>>,
 }
 
-/// Errors of a pair; relative.
+/// Relative errors of a pair.
 #[derive(Debug, Clone, Serialize)]
 struct ErrorFacts {
     measured: Vec<Option<f64>>,
@@ -152,7 +154,7 @@ impl PairFacts {
         format!("{} to {}", self.from, self.to)
     }
 
-    /// The functions with the largest accelerances w^2 |H|, in their order.
+    /// Returns the functions with the largest accelerances w^2 |H|, in their original order.
     fn strongest(&self, hertz: &[f64]) -> Vec<&FunctionFacts> {
         let peak = |function: &FunctionFacts| {
             let accelerances = function.reduced.iter().zip(hertz).map(|(z, f)| f * f * z[0].hypot(z[1]));
@@ -166,7 +168,8 @@ impl PairFacts {
     }
 }
 
-/// `mm/N`, `rad/N`, `mm/(N mm)`: where the units make newtons these are named.
+/// Returns the unit of a function: `mm/N`, `rad/N`, `mm/(N mm)`. A consistent force unit of one newton is
+/// written `N`.
 fn unit(function: &Function, units: &UnitSystem) -> String {
     let [length, mass, time] = [&units.length, &units.mass, &units.time];
     let newton = mass.to_si() * length.to_si() / (time.to_si() * time.to_si());
@@ -180,7 +183,7 @@ fn unit(function: &Function, units: &UnitSystem) -> String {
 }
 
 impl<'a> ResponseFacts<'a> {
-    /// Facts of `response`, made with `settings` in `run`.
+    /// Collects the facts of `response`, which was computed with `settings` in `run`.
     pub fn new(response: &'a Response, settings: &ResponseSettings, run: &'a RunData) -> Self {
         let pairs: Vec<PairFacts> =
             response.pairs.iter().map(|pair| PairFacts::new(pair, &response.units)).collect();
@@ -224,7 +227,7 @@ impl<'a> ResponseFacts<'a> {
         Document::render(self, format, || self.document())
     }
 
-    /// Label and sentence of everything that is known beside the pairs.
+    /// Returns label and sentence of all facts other than the pairs.
     fn entries(&self) -> Vec<(&'static str, String)> {
         let [low, high] = self.band_hz.map(|f| significant(f, 5));
         let mut entries = vec![
@@ -355,7 +358,8 @@ impl<'a> ResponseFacts<'a> {
     }
 }
 
-/// Error, where; level difference, where; accurate to; estimate over error.
+/// Returns the cells of a pair: largest error and its frequency; largest level difference and its frequency;
+/// frequency up to which the pair is accurate; estimated over measured error.
 fn errors_of_pair(pair: &PairFacts) -> [String; 6] {
     let none = || "-".to_owned();
     let errors = pair.errors.as_ref();
@@ -374,12 +378,13 @@ fn errors_of_pair(pair: &PairFacts) -> [String; 6] {
     ]
 }
 
-/// Values at all frequencies.
+/// Returns a series of values over frequency.
 fn curve(name: &str, mark: Mark, style: usize, hertz: &[f64], values: impl Iterator<Item = f64>) -> Series {
     Series::new(name, mark, style, hertz.iter().zip(values).map(|(&hertz, value)| [hertz, value]).collect())
 }
 
-/// The axis of the highest decades of all series; of one decade if no value is positive.
+/// Returns a logarithmic axis over the highest decades of all series, or over one decade if no value is
+/// positive.
 fn decades(unit: &str, series: &[Series]) -> Axis {
     let values = || series.iter().flat_map(|series| series.points.iter().map(|point| point[1]));
     let axis = Axis::decades(unit, values(), MOST_DECADES);
@@ -396,7 +401,7 @@ fn phase(function: &FunctionFacts, hertz: &[f64]) -> Panel {
     Panel { caption: "phase".to_owned(), y: Axis::degrees(), height: 80.0, series }
 }
 
-/// Values of a function, reduced and of all nodes.
+/// Returns the curves of a function for the reduced body and, if solved, for all nodes.
 fn curves(function: &FunctionFacts, hertz: &[f64], mark: Mark, of: fn(&[f64; 2]) -> f64) -> Vec<Series> {
     let mut curves = vec![curve("reduced", mark, 0, hertz, function.reduced.iter().map(of))];
     if function.full.iter().any(Option::is_some) {
@@ -406,7 +411,7 @@ fn curves(function: &FunctionFacts, hertz: &[f64], mark: Mark, of: fn(&[f64; 2])
     curves
 }
 
-/// Result of the response, a sentence without a full stop.
+/// Returns the result of the response as a sentence without a full stop.
 fn verdict(pairs: &[PairFacts], settings: &ResponseSettings, passed: Option<bool>) -> String {
     let tolerance = percent(settings.tolerance);
     let how = |pair: &PairFacts| match pair.errors.as_ref().map(|errors| errors.worst == errors.largest) {
@@ -443,8 +448,8 @@ fn verdict(pairs: &[PairFacts], settings: &ResponseSettings, passed: Option<bool
     }
 }
 
-/// The response as a table of comma-separated values, a row for every frequency; numbers round-trip, cells
-/// are empty where nothing was solved.
+/// Returns the response as comma-separated values with one row per frequency. Numbers round-trip; cells are
+/// empty where the equations of all nodes were not solved.
 pub fn response_csv(response: &Response) -> String {
     let mut head = vec!["frequency_hz".to_owned()];
     for pair in &response.pairs {

@@ -8,52 +8,52 @@ use serde::Serialize;
 pub struct Phase {
     /// Name: `read`, `modes`, ...
     pub name: String,
-    /// Time that passed. Unit: s.
+    /// Wall time of the phase. Unit: s.
     pub wall_seconds: f64,
     /// Processor time of all threads. Unit: s.
     pub cpu_seconds: f64,
 }
 
-/// Modes that the lumped mass gives by itself (question b of theory section 9), for one scheme.
+/// Modes computed from the lumped mass (question b of theory section 9) of one scheme.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LumpedModes {
-    /// `row-sum`, `diagonal-scaling`, `user`.
+    /// Name of the scheme: `row-sum`, `diagonal-scaling`, `user`.
     pub scheme: String,
-    /// Frequencies in hertz, ascending; empty when there are none.
+    /// Frequencies, ascending; empty if there are none. Unit: Hz.
     pub frequencies_hz: Vec<f64>,
     /// Smallest cosine between the subspaces of corresponding modes.
     pub subspace_cosine: f64,
     /// Error norms of the aligned invariants, by name.
     pub comparison: Vec<(String, f64)>,
-    /// Why it could not be done (negative masses, for example); empty when it could.
+    /// Reason why the modes could not be computed (negative masses, for example); empty otherwise.
     pub remark: String,
-    /// Why errors of the invariants and the cosine say little (the count cuts a group of equal frequencies, for
-    /// example); empty when they do not.
+    /// Reason why the errors of the invariants and the cosine have little meaning (a group of equal
+    /// frequencies is cut off, for example); empty otherwise.
     pub caution: String,
 }
 
-/// Data of one run. The default stands for a body read from a file, of whose run nothing is known.
+/// Data of a run. The default stands for the unknown run of a body read from a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunData {
     /// Phases in order.
     pub phases: Vec<Phase>,
-    /// Largest resident memory of the process, where the system tells it.
+    /// Largest resident memory of the process; `None` if the system does not report it. Unit: bytes.
     pub peak_memory_bytes: Option<u64>,
-    /// Memory that was expected before the work, if it was estimated.
+    /// Estimate of the memory before the run, if one was made. Unit: bytes.
     pub memory_estimate_bytes: Option<u64>,
     /// Number of threads.
     pub threads: usize,
-    /// Everything that was found, in order.
+    /// All diagnostics in the order in which they were found.
     pub diagnostics: Vec<Diagnostic>,
     /// Work counts by name.
     pub counters: Vec<(String, u64)>,
     /// Attempts by which the modes could be searched for, in their order; empty on the dense path.
     pub attempts: Vec<SearchAttempt>,
-    /// `fast`, `standard`, `certified`.
+    /// Accuracy: `fast`, `standard`, `certified`.
     pub accuracy: String,
     /// Name and size in bytes of the flex-body file.
     pub output: Option<(String, u64)>,
-    /// Modes from the lumped masses too, where asked for.
+    /// Modes computed from the lumped masses, if requested.
     pub lumped_modes: Vec<LumpedModes>,
 }
 
@@ -69,12 +69,12 @@ pub struct SearchAttempt {
 }
 
 impl RunData {
-    /// Time of all phases. Unit: s.
+    /// Returns the wall time of all phases. Unit: s.
     pub(super) fn wall_seconds(&self) -> f64 {
         self.phases.iter().map(|phase| phase.wall_seconds).sum()
     }
 
-    /// Processor time of all phases and threads. Unit: s.
+    /// Returns the processor time of all phases and threads. Unit: s.
     pub(super) fn cpu_seconds(&self) -> f64 {
         self.phases.iter().map(|phase| phase.cpu_seconds).sum()
     }

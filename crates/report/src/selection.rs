@@ -1,4 +1,4 @@
-//! Report on a selection: the terms and modes that a scene needs, and the grounds of the decision.
+//! Report on a selection: the terms and modes that a scene needs, and the reasons for the decision.
 
 use super::Format;
 use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
@@ -16,7 +16,7 @@ use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::selection::{CaseSelection, Ground, Participation, Selection, Trial};
 use serde::Serialize;
 
-/// Rows of modes that a summary shows.
+/// Number of modes that a summary lists.
 const MODES_SHOWN: usize = 12;
 
 /// Facts of a selection.
@@ -34,8 +34,8 @@ pub struct SelectionFacts<'a> {
     modes: ModesFacts<'a>,
     chosen: Option<TrialFacts<'a>>,
     multiplications_before: usize,
-    /// Errors of the body, and of those before it that were enriched, beside the model; nothing where only a file is
-    /// at hand.
+    /// Errors of the body, and of its versions before enrichment, relative to the model; empty if only a body
+    /// file is available.
     reference: Vec<LackFacts>,
     significance: Vec<SignificanceFacts>,
     trials: Vec<TrialFacts<'a>>,
@@ -59,9 +59,9 @@ struct TermFacts<'a> {
     tier: u8,
     bound: f64,
     limit: f64,
-    /// Part of the tolerance that `limit` is; 1 where there is none.
+    /// Ratio of `limit` to the tolerance; 1 if no error was compared with a tolerance.
     budget: f64,
-    /// limit / bound.
+    /// Ratio limit / bound.
     slack: f64,
     reason: &'a str,
 }
@@ -69,7 +69,7 @@ struct TermFacts<'a> {
 #[derive(Debug, Clone, Serialize)]
 struct ModesFacts<'a> {
     of: usize,
-    /// Numbers of the modes that are kept, from 1.
+    /// Numbers of the kept modes, from 1.
     kept: Vec<usize>,
     reason: &'a str,
     static_responses: Vec<ResponseFacts<'a>>,
@@ -79,9 +79,9 @@ struct ModesFacts<'a> {
 #[derive(Debug, Clone, Serialize)]
 struct ResponseFacts<'a> {
     load: &'a str,
-    /// Error of the selected modes beside the response of the body.
+    /// Error of the selected modes relative to the response of the body.
     selected_lack: f64,
-    /// Error of the modes of the body beside the response of the model.
+    /// Error of the modes of the body relative to the response of the model.
     body_lacks: Option<f64>,
     /// Error of the modes of the body without its residual vectors.
     without_residual_vectors: Option<f64>,
@@ -118,7 +118,7 @@ pub(super) struct TrialFacts<'a> {
     budget: f64,
     passed: bool,
     remark: &'a str,
-    /// Of several load cases the one that the errors are of.
+    /// Load case with the reported errors, if there are several cases.
     #[serde(skip_serializing_if = "Option::is_none")]
     case: Option<&'a str>,
     /// Largest error over its tolerance in each load case.
@@ -138,7 +138,7 @@ impl<'a> ResponseFacts<'a> {
 }
 
 impl<'a> TrialFacts<'a> {
-    /// Facts of `trial`, which was made in `cases`; none of a scene alone.
+    /// Collects the facts of `trial`, which was run in `cases` (empty for a scene without load cases).
     pub(super) fn new(trial: &'a Trial, cases: &'a [CaseSelection]) -> Self {
         let finite = |worst: f64| worst.is_finite().then_some(worst);
         Self {
@@ -160,14 +160,14 @@ impl<'a> TrialFacts<'a> {
         }
     }
 
-    /// The groups as text.
+    /// Returns the groups of the trial as text.
     fn groups(&self) -> String {
         if self.kept.is_empty() { "I0 only".to_owned() } else { format!("I0 {}", self.kept.join(" ")) }
     }
 }
 
 impl<'a> SelectionFacts<'a> {
-    /// Facts of `selection`, and of the run that made it.
+    /// Collects the facts of `selection` and of the run that made it.
     pub fn new(selection: &'a Selection, run: &'a RunData) -> Self {
         let term = |(decision, ground): (&'a TermDecision, &Option<Ground>)| TermFacts {
             group: decision.group.name(),
@@ -225,12 +225,12 @@ impl<'a> SelectionFacts<'a> {
         }
     }
 
-    /// The facts in a format, ending with a line break.
+    /// Renders the facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
         Document::render(self, format, || self.document())
     }
 
-    /// Decision about a term in words.
+    /// Returns the decision about a term in words.
     fn verdict(term: &TermFacts<'_>) -> String {
         let verdict = if term.kept { "keep" } else { "drop" };
         if term.limit > 0.0 {
@@ -254,12 +254,12 @@ impl<'a> SelectionFacts<'a> {
         }
     }
 
-    /// The five lines of the verdict.
+    /// Renders the five lines of the verdict.
     pub fn summary(&self) -> String {
         text::render(&[Block::Terms(self.head())], Screen::default())
     }
 
-    /// The verdict, in a page without what is to be taken: it has that at its head.
+    /// Returns the verdict. A page omits the recommendation here because its head already shows it.
     fn head(&self) -> Vec<Term> {
         let [asked, (label, taken), rest @ ..] = self.verdict.lines();
         let mut terms = vec![Term::text("Selection", format!("{}: {}", self.scene, self.body))];
@@ -406,7 +406,7 @@ impl<'a> SelectionFacts<'a> {
     }
 }
 
-/// A number with three digits; empty for what is not known.
+/// Returns a number with three digits; empty if it is unknown.
 fn known(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| significant(value, 3))
 }

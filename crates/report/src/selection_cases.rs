@@ -1,4 +1,4 @@
-//! Facts of a selection in each of several load cases.
+//! Facts of a selection for each of several load cases.
 
 use super::document::{Table, cells};
 use super::errors_in_words::{errors_in_words, part_in_words};
@@ -15,16 +15,16 @@ pub(super) struct CaseFacts<'a> {
     tolerance: PerQuantity<f64>,
     /// Errors of the selected model.
     errors: Option<OutputErrors>,
-    /// Its largest error over the tolerance.
+    /// Largest error of the selected model over its tolerance.
     worst: Option<f64>,
-    /// The output that this is of.
+    /// Output with that largest error.
     output: Option<&'static str>,
-    /// Part of the tolerances that is left.
+    /// Fraction of the tolerances left by the reference.
     budget: Option<f64>,
     passed: bool,
-    /// Parts of the selection that this case needs most of all cases: groups, and `modes`.
+    /// Parts of the selection that this case decides, because it needs them most: groups, and `modes`.
     binds: Vec<&'static str>,
-    /// Errors of the body beside the model in this case, and of those before it that were enriched.
+    /// Errors of the body, and of its versions before enrichment, relative to the model in this case.
     reference: Vec<LackFacts>,
 }
 
@@ -55,7 +55,7 @@ impl<'a> CaseFacts<'a> {
         self.reference.last().map_or_else(|| "not known".to_owned(), LackFacts::parts)
     }
 
-    /// `braking: stress 1.2 %, 60 % of what is allowed; decides W1, modes`.
+    /// Returns the case in words: `braking: stress 1.2 %, 60 % of what is allowed; decides W1, modes`.
     pub(crate) fn in_words(&self) -> String {
         let binds = if self.binds.is_empty() {
             "decides nothing".to_owned()
@@ -77,7 +77,8 @@ impl<'a> CaseFacts<'a> {
     }
 }
 
-/// The errors of the selected model in every load case, and what each decides.
+/// Returns the table of the errors of the selected model in every load case, and of the effect of each case
+/// on the selection.
 pub(super) fn cases_table(cases: &[CaseFacts<'_>]) -> Table {
     let heads =
         ["Load case", "Errors", "Of what is allowed", "Decides", "The body lacks of the model (estimated)"];

@@ -1,4 +1,4 @@
-//! A selection in five lines: what was asked, what to take, why, the error, and what it saves.
+//! Verdict of a selection in five lines: request, recommendation, reason, error, savings.
 
 use super::errors_in_words::{error_in_words, errors_in_words, ranges};
 use super::lacks::LackFacts;
@@ -8,7 +8,7 @@ use flexbody_study::reference::ReferenceError;
 use flexbody_study::selection::{Ground, Selection};
 use serde::Serialize;
 
-/// The five lines.
+/// The five lines of the verdict.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct SelectionVerdict {
     /// True if the requirements are met.
@@ -32,7 +32,7 @@ impl SelectionVerdict {
         }
     }
 
-    /// The lines with their labels.
+    /// Returns the lines with their labels.
     pub(crate) fn lines(&self) -> [(&'static str, &str); 5] {
         let take = if self.holds { "Take" } else { "Best found" };
         let lines = [&self.asked, &self.take, &self.why, &self.error, &self.saves].map(String::as_str);
@@ -41,7 +41,7 @@ impl SelectionVerdict {
     }
 }
 
-/// Meaning of a group of terms.
+/// Returns the physical meaning of a group of terms.
 fn meaning(group: TermGroup) -> &'static str {
     match group {
         TermGroup::W1 => "centrifugal load, and inertia that follows the deflection",
@@ -65,7 +65,7 @@ fn asked(selection: &Selection) -> String {
     format!("{}{}: errors of at most {}", selection.scene, cases_in_words(selection), parts.join(", "))
 }
 
-/// The load cases, and whether the tolerances that are told are the least of theirs.
+/// Returns the load cases in words, with a remark if the stated tolerances are the smallest of several.
 fn cases_in_words(selection: &Selection) -> String {
     let Some(first) = selection.cases.first() else { return String::new() };
     let names: Vec<&str> = selection.cases.iter().map(|case| case.name.as_str()).collect();
@@ -77,7 +77,7 @@ fn cases_in_words(selection: &Selection) -> String {
     format!(" in each of {} load cases ({}){least}", names.len(), names.join(", "))
 }
 
-/// ` in case ...` of what belongs to one of several load cases.
+/// Returns ` in case ...` for a fact of one of several load cases; empty for a single scene.
 fn in_case(case: Option<usize>, selection: &Selection) -> String {
     let case = case.and_then(|at| selection.cases.get(at));
     case.map_or_else(String::new, |case| format!(" in case {}", case.name))
@@ -105,7 +105,7 @@ fn held_groups(selection: &Selection) -> impl Iterator<Item = TermGroup> {
     TermGroup::ALL.into_iter().filter(|group| selection.groups.has(*group))
 }
 
-/// Groups that rest on the same error stand together.
+/// Returns the reasons of the decisions; groups with the same reason and error share a sentence.
 fn why(selection: &Selection) -> String {
     let mut reasons: Vec<(bool, Option<Ground>, Vec<TermGroup>)> = Vec::new();
     for (term, ground) in selection.terms.iter().zip(&selection.grounds) {

@@ -37,19 +37,20 @@ pub struct SimulationFacts<'a> {
     first: EnergyFacts,
     last: EnergyFacts,
     largest_spin: f64,
-    /// Axes of the model, turning with the body.
+    /// Components of the largest spin in the axes of the model, which turn with the body.
     largest_spin_components: [f64; 3],
-    /// Axes of the model at the start.
+    /// Gravity in the axes of the model at the start; `None` without gravity.
     gravity: Option<[f64; 3]>,
-    /// Carrier of the body, and the natural frequencies of the carried body.
+    /// Carrier of the body, and the natural frequencies of the carried body; `None` for a body without
+    /// carrier.
     carried: Option<CarriedFacts<'a>>,
     /// Description of the origin of the frame.
     frame_origin: String,
     largest_deflection: f64,
-    /// Force and torque that prescribed motion takes at most; none without such.
+    /// Largest reaction force and torque of the prescribed motion; `None` without prescribed motion.
     reaction: Option<ReactionFacts>,
-    /// The torque that the reference conditions carry at most at the instants written; none where the frame
-    /// is not a mean one.
+    /// Largest torque that the reference conditions carry at the output times; `None` unless the frame is a
+    /// mean-axis frame.
     largest_conditions_torque: Option<f64>,
     points: Vec<PointFacts<'a>>,
     diagnostics: &'a [Diagnostic],
@@ -91,11 +92,12 @@ struct EnergyFacts {
 struct PointFacts<'a> {
     name: &'a str,
     largest_deflection: f64,
-    /// World axes; so are the velocity and the acceleration.
+    /// Position of the point at the last output time, world axes; velocity and acceleration are in world axes
+    /// too.
     last_place: [f64; 3],
     last_velocity: [f64; 3],
     last_acceleration: [f64; 3],
-    /// At the instants written.
+    /// Largest speed at the output times.
     largest_speed: f64,
     largest_acceleration: f64,
 }
@@ -115,13 +117,13 @@ impl<'a> PointFacts<'a> {
     }
 }
 
-/// The length of the longest vector.
+/// Returns the length of the longest vector.
 fn longest(vectors: &[Vector3<f64>]) -> f64 {
     vectors.iter().fold(0.0, |most, vector| larger(most, vector.norm()))
 }
 
 impl<'a> SimulationFacts<'a> {
-    /// Facts of a recording whose numbers are in `units`, and of the run that made it.
+    /// Collects the facts of a recording whose numbers are in `units`, and of the run that made it.
     pub fn new(recording: &'a Recording, units: &UnitSystem, run: &'a RunData) -> Self {
         let Drift { energy, linear, angular } = recording.drift();
         let Work { steps, rejected, rates } = recording.work;
@@ -180,7 +182,7 @@ impl<'a> SimulationFacts<'a> {
         }
     }
 
-    /// The facts in a format, ending with a line break.
+    /// Renders the facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
         Document::render(self, format, || self.document())
     }
@@ -229,7 +231,8 @@ impl<'a> SimulationFacts<'a> {
         format!("{most}; at most {x}, {y}, {z} about the axes of the model")
     }
 
-    /// Carrier of the body, and the forces on it and on the reference conditions.
+    /// Returns the carrier of the body, and the forces on the carrier and on the reference conditions, in
+    /// words.
     fn support_in_words(&self) -> Vec<(&'static str, String)> {
         let torque = |value: f64| format!("{} {}", significant(value, 5), self.units.torque());
         let mut words = Vec::from_iter(self.carried_in_words().map(|carried| ("Carried", carried)));
@@ -352,7 +355,7 @@ impl<'a> SimulationFacts<'a> {
         charts
     }
 
-    /// The modal coordinates with the largest amplitudes.
+    /// Returns the modal coordinates with the largest amplitudes.
     fn largest_coordinates(&self) -> Vec<Line> {
         let states = &self.recording.states;
         let nf = states.first().map_or(0, |state| state.q.len());
@@ -381,7 +384,7 @@ fn components(vectors: impl Iterator<Item = Vector3<f64>> + Clone) -> Vec<Line> 
     ["x", "y", "z"].into_iter().enumerate().map(line).collect()
 }
 
-/// Lines over time; `None` if there is nothing to draw.
+/// Returns the chart of lines over time; `None` if there is nothing to draw.
 fn line_chart(title: &str, time: &[f64], time_unit: &str, lines: Vec<Line>, unit: &str) -> Option<Chart> {
     let x = Axis::between(time_unit, Scale::Linear, [*time.first()?, *time.last()?])?;
     let y = Axis::around(unit, lines.iter().flat_map(|line| line.values.iter().copied()))?;
@@ -394,7 +397,7 @@ fn line_chart(title: &str, time: &[f64], time_unit: &str, lines: Vec<Line>, unit
     Some(Chart { title: title.to_owned(), x, panels: vec![panel] })
 }
 
-/// A recording as a table of comma-separated values, a row for every instant; numbers round-trip.
+/// Returns a recording as comma-separated values with one row per output time; numbers round-trip.
 pub fn simulation_csv(recording: &Recording) -> String {
     let Recording { time, states, balances, paths, reactions, conditions, .. } = recording;
     let nf = states.first().map_or(0, |state| state.q.len());

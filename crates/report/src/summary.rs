@@ -1,5 +1,5 @@
-//! The summary of a body that an engineer reads in ten seconds: what it is, whether its modes are all there,
-//! what lumped masses would have cost, and everything that limits its use.
+//! Summary of a body on one screen: properties, completeness of the modes, errors of lumped masses, and all
+//! limitations.
 
 use super::Facts;
 use super::body_modes::first_and_last;
@@ -14,10 +14,10 @@ use super::text::{self, Screen};
 use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::MassStructure;
 
-/// Entries of a list that are shown.
+/// Number of list entries that are shown.
 const LISTED: usize = 4;
 
-/// The summary as a screen shows it.
+/// Renders the summary for a screen.
 pub fn summary(facts: &Facts<'_>, screen: Screen) -> String {
     let groups = [body, mass_properties, modes, lumped, diagnostics, output];
     let blocks: Vec<Block<'_>> =
@@ -57,7 +57,7 @@ fn body(facts: &Facts<'_>) -> Vec<Term> {
     items
 }
 
-/// `bore: 80 nodes, rigid, at 0, 0, 12.5 mm`; the point in model axes.
+/// Returns an interface in words, `bore: 80 nodes, rigid, at 0, 0, 12.5 mm`; the point is in model axes.
 fn interface(interface: &InterfaceFacts, size: f64, unit: &str) -> String {
     let coupling = interface.coupling.map_or(String::new(), |name| format!(", {name}"));
     let bends = if interface.breaks_its_word() { " but DEFORMS" } else { "" };
@@ -88,7 +88,7 @@ fn modes(facts: &Facts<'_>) -> Vec<Term> {
     let reduced = modes.craig_bampton.as_ref();
     let origins = modes.origins();
     let kinds = match reduced {
-        // Modes of the body are mixtures of fixed-interface modes and motions of the interfaces.
+        // The modes of a Craig-Bampton body are combinations of fixed-interface modes and interface motions.
         Some(own) => format!(": {}", own.made_of()),
         None if origins.is_empty() => String::new(),
         None => {
@@ -132,7 +132,7 @@ fn lumped(facts: &Facts<'_>) -> Vec<Term> {
     items
 }
 
-/// Errors and warnings; notes stand on stderr and in the report.
+/// Returns errors and warnings. Notes are shown on stderr and in the report.
 fn diagnostics(facts: &Facts<'_>) -> Vec<Term> {
     let kinds = [(Severity::Error, "errors", Tone::Bad), (Severity::Warning, "warnings", Tone::Warning)];
     let of_kind = |(severity, label, tone): (Severity, &'static str, Tone)| {

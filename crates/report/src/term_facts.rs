@@ -1,4 +1,4 @@
-//! Groups of the kinetic energy that a body holds, and the reasons.
+//! Groups of the kinetic energy in a body, with the reasons for keeping or dropping them.
 
 use super::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, TermGroup};
@@ -6,25 +6,25 @@ use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct TermFacts {
-    /// `W1`, `W2`, `W3`.
+    /// Name of the group: `W1`, `W2`, `W3`.
     pub group: &'static str,
     pub kept: bool,
-    /// Decision about the group; `None`: no selection was made.
+    /// Decision about the group; `None` if no selection was made.
     pub decision: Option<DecisionFacts>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct DecisionFacts {
     pub tier: u8,
-    /// Infinite where none is known.
+    /// Bound of the error without the group; infinite if unknown.
     pub bound: f64,
-    /// Infinite where there is none.
+    /// Limit of the error; infinite without a limit.
     pub limit: f64,
     pub reason: String,
 }
 
 impl TermFacts {
-    /// The facts of every group.
+    /// Collects the facts of every group.
     pub(crate) fn of(body: &FlexBody) -> Vec<Self> {
         let facts = |group: TermGroup| Self {
             group: group.name(),
@@ -39,7 +39,7 @@ impl TermFacts {
         TermGroup::ALL.map(facts).to_vec()
     }
 
-    /// `W1 dropped, error without it up to 0.0001 of 0.001 allowed: slow spin`.
+    /// Returns the group in words: `W1 dropped, error without it up to 0.0001 of 0.001 allowed: slow spin`.
     pub(crate) fn in_words(&self) -> String {
         let what = if self.kept { "kept" } else { "dropped" };
         let Some(decision) = &self.decision else { return format!("{} {what}", self.group) };
@@ -56,7 +56,7 @@ impl TermFacts {
     }
 }
 
-/// A note for every group that `body` lacks: nothing of it is checked.
+/// Returns a note for every group that `body` dropped, since no check covers it.
 pub fn dropped_text(body: &FlexBody) -> String {
     let note = |group: TermGroup| format!("note: {} was dropped: nothing of it is checked\n", group.name());
     body.groups().dropped().map(note).collect()

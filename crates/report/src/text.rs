@@ -1,53 +1,53 @@
-//! The text of a document, for a terminal.
+//! Text of a document for a terminal.
 
 use super::document::{Block, Table, Term, Tone, listed};
 use super::numbers::plain;
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 
-/// Columns of a terminal that every terminal has.
+/// Default width of a text: columns that every terminal has.
 const WIDTH: usize = 80;
-/// Columns of the labels.
+/// Width of the label column in characters.
 const LABEL: usize = 12;
-/// Stands for a space at which a line must not end.
+/// Character that stands for a space at which a line must not break.
 pub(super) const KEEP: &str = "\u{a0}";
 
-/// Terminal that a text is shown on.
+/// Terminal that a text is written for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Screen {
-    /// Labels are in colour.
+    /// True if labels are coloured.
     is_coloured: bool,
     columns: usize,
 }
 
 impl Screen {
-    /// Columns that a summary can be read in.
+    /// Smallest width in columns; narrower summaries are unreadable.
     const NARROWEST: usize = 40;
-    /// Lines that are longer are hard to read.
+    /// Largest width in columns; longer lines are hard to read.
     const WIDEST: usize = 100;
 
-    /// Returns the terminal with labels in colour, or without.
+    /// Returns the terminal with coloured labels if `is_coloured` is true.
     pub fn coloured(self, is_coloured: bool) -> Self {
         Self { is_coloured, ..self }
     }
 
-    /// A terminal of so many columns, which the summary fills as far as it can be read.
+    /// Returns the terminal with the given number of columns, limited to the readable range.
     pub fn with_columns(self, columns: usize) -> Self {
         Self { columns: columns.clamp(Self::NARROWEST, Self::WIDEST), ..self }
     }
 }
 
 impl Default for Screen {
-    /// A file, or a terminal that does not say what it is.
+    /// Returns the settings for a file, or for a terminal of unknown size.
     fn default() -> Self {
         Self { is_coloured: false, columns: WIDTH }
     }
 }
 
-/// Writes the blocks of a document that are in a text, ending with a line break.
+/// Writes the blocks of a document that belong to a text, ending with a line break.
 pub(super) fn render(blocks: &[Block<'_>], screen: Screen) -> String {
     let mut text = Text { text: String::new(), label: String::new(), screen };
     text.blocks(blocks);
-    // The end of a text is what a terminal shows.
+    // Diagnostics come last because a terminal shows the end of a text.
     for block in blocks {
         if let Block::Diagnostics(found) = block {
             text.diagnostics(found);
@@ -59,7 +59,7 @@ pub(super) fn render(blocks: &[Block<'_>], screen: Screen) -> String {
 
 struct Text {
     text: String,
-    /// Label of the term before.
+    /// Label of the previous term.
     label: String,
     screen: Screen,
 }
@@ -99,7 +99,8 @@ impl Text {
         }
     }
 
-    /// A text under a label, of at most so many lines where lines have the usual length.
+    /// Writes a text under a label. The maximum number of lines of the term holds for lines of the default
+    /// width.
     fn entry(&mut self, term: &Term, label: &str, value: &str) {
         let columns = self.screen.columns - LABEL;
         let most = term.lines * (WIDTH - LABEL).div_ceil(columns.min(WIDTH - LABEL));
@@ -128,7 +129,7 @@ impl Text {
         }
     }
 
-    /// The columns of a table that are in a text.
+    /// Writes the columns of a table that belong to a text.
     fn table(&mut self, table: &Table) {
         let lines: Vec<Vec<String>> = std::iter::once(&table.heads)
             .chain(&table.rows)
@@ -161,7 +162,7 @@ impl Text {
     }
 }
 
-/// Codes of a label and of its text that begin and end them (ECMA-48, SGR).
+/// Returns the ECMA-48 (SGR) colour codes of the label and of the value of a term.
 fn codes(tone: Tone) -> [&'static str; 2] {
     match tone {
         Tone::Title => ["36", "1"],
@@ -172,7 +173,7 @@ fn codes(tone: Tone) -> [&'static str; 2] {
     }
 }
 
-/// Lines of at most `width` characters; words that are longer are broken.
+/// Splits a text into lines of at most `width` characters; longer words are broken.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     let mut used = 0;

@@ -25,7 +25,8 @@ use serde::Serialize;
 const IN_TEXT: [&str; 7] =
     ["No.", "What", "Multiplications", "Evaluation", "Simulation", "File", "Error / tolerance"];
 
-/// Errors below this part of the tolerance are none on the plot.
+/// Smallest error over tolerance on the plot; smaller errors are drawn at this value. A smaller value adds
+/// decades to the axis.
 const NO_ERROR: f64 = 1e-6;
 
 /// Facts of a trade study.
@@ -38,13 +39,13 @@ pub struct TradeFacts<'a> {
     scene: &'a str,
     body: &'a str,
     reference: ReferenceKind,
-    /// Integration of the equations of all nodes, where they are the reference; of several load cases in
-    /// the first.
+    /// Integration of the equations of all nodes, if these are the reference; with several load cases that of
+    /// the first case.
     nodal: Option<NodalFacts>,
-    /// Errors of the body of row 1, and of those before it that were enriched, beside the model; nothing where only
-    /// a file is at hand. Of several load cases in that where it is most.
+    /// Errors of the body of row 1, and of its versions before enrichment, relative to the model; empty if
+    /// only a body file is available. With several load cases those of the case with the largest error.
     reference_lacks: Vec<LackFacts>,
-    /// Of several load cases the least of any.
+    /// Tolerance; with several load cases the smallest of each quantity.
     tolerance: Tolerance,
     allowed_multiplications: Option<usize>,
     /// The study in five lines.
@@ -68,20 +69,20 @@ struct VerdictLine {
     text: String,
 }
 
-/// A candidate.
+/// A candidate of the study.
 #[derive(Debug, Clone, Serialize)]
 struct RowFacts<'a> {
     number: usize,
     source: &'a str,
     kind: CandidateKind,
     modes: usize,
-    /// From 1.
+    /// Numbers of the modes, from 1.
     mode_numbers: Vec<usize>,
     last_frequency_hz: f64,
     groups: Vec<&'static str>,
-    /// Scheme by which its mass was lumped.
+    /// Scheme by which the mass of the candidate was lumped.
     lumped: Option<&'a str>,
-    /// Lumped part: the `couplings`, or the `whole` mass before the modes were computed.
+    /// Lumped quantity: the `couplings` alone, or the `whole` mass before the modes were computed.
     lumped_part: Option<&'static str>,
     storage: &'static str,
     failed: Option<&'a Diagnostic>,
@@ -90,26 +91,26 @@ struct RowFacts<'a> {
 
 #[derive(Debug, Clone, Serialize)]
 struct MeasuredFacts<'a> {
-    /// Of several load cases in that where they are largest beside the tolerances.
+    /// Errors; with several load cases those of the case with the largest error relative to its tolerance.
     errors: OutputErrors,
     /// Largest ratio of error to tolerance.
     worst: f64,
     growth: Option<f64>,
-    /// This case, and the largest ratio in each.
+    /// Name of the case that `errors` belong to.
     #[serde(skip_serializing_if = "Option::is_none")]
     case: Option<&'a str>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     by_case: Vec<f64>,
     multiplications: usize,
     file_bytes: u64,
-    /// Nothing of candidates that are not on the front.
+    /// Number of integration steps; `None` for candidates that are not on the front.
     steps: Option<u64>,
     rejected_steps: Option<u64>,
     evaluations: Option<u64>,
     seconds: Seconds,
 }
 
-/// Unit: s.
+/// Times of a candidate. Unit: s.
 #[derive(Debug, Clone, Copy, Serialize)]
 struct Seconds {
     preprocessing: Option<f64>,
@@ -144,7 +145,8 @@ impl<'a> MeasuredFacts<'a> {
 }
 
 impl MeasuredFacts<'_> {
-    /// Cells of the table of candidates; with the time of its preprocessing where there are `several` sources.
+    /// Returns the cells of the table of candidates; with `several` sources a cell with the preprocessing
+    /// time is added.
     fn cells(&self, several: bool) -> Vec<Inline> {
         let none = || "\u{2013}".to_owned();
         let number = |value: Option<f64>| value.map_or_else(none, |value| significant(value, 3));
@@ -182,7 +184,7 @@ impl<'a> RowFacts<'a> {
         }
     }
 
-    /// `6 modes, W1`: what it has, in words.
+    /// Returns the composition of the candidate: `6 modes, W1`.
     fn in_words(&self) -> String {
         let mut words = format!("{}, {}", counted(self.modes, "mode"), self.groups_in_words());
         if !self.lowest() {
@@ -208,8 +210,8 @@ impl<'a> RowFacts<'a> {
 }
 
 impl<'a> TradeFacts<'a> {
-    /// Facts of a study whose reference `lacks` something of the model in each load case, and of the run that
-    /// made it.
+    /// Collects the facts of a study and of the run that made it. `lacks` holds the errors of the reference
+    /// relative to the model for each load case.
     pub fn new(trade: &'a Trade, lacks: &[Vec<ReferenceError>], run: &'a RunData) -> Self {
         let row = |(at, row): (usize, &'a TradeRow)| RowFacts::new(at + 1, row, &trade.cases);
         let rows: Vec<RowFacts<'a>> = trade.rows.iter().enumerate().map(row).collect();
@@ -248,7 +250,7 @@ impl<'a> TradeFacts<'a> {
         self.rows.iter().map(RowFacts::in_words).collect()
     }
 
-    /// The facts in a format, ending with a line break.
+    /// Renders the facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
         Document::render(self, format, || self.document())
     }
@@ -264,10 +266,10 @@ impl<'a> TradeFacts<'a> {
         }
     }
 
-    /// Rows of the front, and the recommended one, ascending in cost.
+    /// Returns the rows of the front and the recommended row, ascending in cost.
     fn shown(&self) -> Vec<&RowFacts<'a>> {
         let mut numbers = self.front.clone();
-        // One that is as cheap and as good as a row of the front is not on it.
+        // A recommended row of equal cost and error to a row of the front is not on the front itself.
         numbers.extend(self.recommended.filter(|row| !self.front.contains(row)));
         let cost = |row: &RowFacts<'a>| row.measured.as_ref().map(|measured| measured.multiplications);
         let mut rows: Vec<_> = numbers.iter().map(|number| &self.rows[number - 1]).collect();
@@ -295,7 +297,7 @@ impl<'a> TradeFacts<'a> {
         Document { name: self.scene, kind: "Trade study", generator: &self.generator, blocks }
     }
 
-    /// The verdict, in a page without what is to be taken: it has that at its head.
+    /// Returns the verdict. A page omits the recommendation here because its head already shows it.
     fn verdict<'b>(&self) -> Vec<Block<'b>> {
         let count = counted(self.rows.len(), "candidate");
         let title = format!("{}: {}, {count} against {}", self.scene, self.body, self.against());
@@ -335,7 +337,7 @@ impl<'a> TradeFacts<'a> {
         format!("{}, {}", times(self.wall_seconds, self.cpu_seconds), counted(self.threads, "thread"))
     }
 
-    /// Failures and times at the end of a text.
+    /// Returns the number of failures and the times, at the end of a text.
     fn work(&self) -> Vec<Term> {
         let failed = self.rows.iter().filter(|row| row.failed.is_some()).count();
         let why = format!("{}: --json and --report say why", counted(failed, "candidate"));
@@ -343,7 +345,7 @@ impl<'a> TradeFacts<'a> {
         failed.into_iter().chain([Term::text("Time", self.time_in_words())]).collect()
     }
 
-    /// Error against cost; `None` if nothing was measured.
+    /// Returns the chart of error against cost; `None` if nothing was measured.
     fn chart(&self) -> Option<Chart> {
         let point = |number: usize| {
             let measured = self.rows[number - 1].measured.as_ref()?;
@@ -362,7 +364,7 @@ impl<'a> TradeFacts<'a> {
         let most = self.allowed_multiplications.map(|most| most as f64);
         let costs = measured().map(|point| point[0]).chain(most);
         let x = Axis::decades("multiplications per evaluation", costs, f64::INFINITY)?;
-        // The tolerance is always seen.
+        // The range of the axis always includes the tolerance.
         let errors = measured().map(|point| point[1]).chain([1.0]);
         let y = Axis::decades("largest error / tolerance", errors, f64::INFINITY)?;
         let front = self.front.iter().filter_map(|&number| point(number)).collect();
@@ -379,7 +381,7 @@ impl<'a> TradeFacts<'a> {
     }
 
     fn table(&self, caption: &str, rows: &[&RowFacts<'a>]) -> Table {
-        // A body alone is one source, and nobody knows how long it took to make.
+        // A body read from a file is the only source, and the time of its preprocessing is unknown.
         let several = self.rows.iter().any(|row| row.source != self.rows[0].source);
         let mut heads = vec!["No.", "What"];
         heads.extend(several.then_some("Of"));
@@ -408,15 +410,15 @@ impl<'a> TradeFacts<'a> {
     }
 }
 
-/// Errors of the reference in the load case where its last error is largest.
+/// Returns the errors of the reference in the load case with the largest last error.
 fn worst_lacks(lacks: &[Vec<ReferenceError>]) -> &[ReferenceError] {
     let last = |rounds: &&Vec<ReferenceError>| rounds.last().map_or(-1.0, |own| own.worst);
-    // The first of equals.
+    // `max_by` returns the last of equal elements, so that the reversed order selects the first.
     let worst = lacks.iter().rev().max_by(|a, b| last(a).total_cmp(&last(b)));
     worst.map_or(&[], Vec::as_slice)
 }
 
-/// A short time.
+/// Returns a short time in ns or us.
 fn short(seconds: f64) -> String {
     if seconds < 1e-6 {
         format!("{} ns", significant(1e9 * seconds, 3))
@@ -425,7 +427,7 @@ fn short(seconds: f64) -> String {
     }
 }
 
-/// The study as a table of comma-separated values, a row for every candidate; numbers round-trip.
+/// Returns the study as comma-separated values with one row per candidate; numbers round-trip.
 pub fn trade_csv(trade: &Trade) -> String {
     let mut table = "number,source,kind,modes,last_frequency_hz,groups,lumped,lumped_part,storage,multiplications,evaluation_seconds,\
                    integration_seconds,preprocessing_seconds,steps,file_bytes,attitude,deflection,stress,reaction,worst,\

@@ -1,4 +1,5 @@
-//! Load cases of a trade study: the errors of its candidates there, and the decisions.
+//! Load cases of a trade study: errors of the candidates in each case, and the effect of each case on the
+//! decision.
 
 use super::document::{Table, cells};
 use super::errors_in_words::{errors_in_words, part_in_words};
@@ -15,27 +16,28 @@ use serde::Serialize;
 pub(super) struct TradeCaseFacts<'a> {
     name: &'a str,
     tolerance: Tolerance,
-    /// Errors of the recommended candidate.
+    /// Errors of the recommended candidate in this case.
     errors: Option<OutputErrors>,
-    /// Its largest error over the tolerance.
+    /// Largest error of the recommended candidate over its tolerance.
     worst: Option<f64>,
-    /// The output that this is of.
+    /// Output with that largest error.
     output: Option<&'static str>,
-    /// Part of the tolerances that the reference leaves to candidates.
+    /// Fraction of the tolerances that the reference leaves to candidates.
     budget: f64,
-    /// Number of the row to take if there were no other case.
+    /// Number of the row to recommend if this case were the only one.
     alone: Option<usize>,
-    /// Cheaper candidates than the recommended one that are beyond the tolerances here, and those of them
-    /// that no other case rules out.
+    /// Number of candidates cheaper than the recommended one that exceed the tolerances in this case;
+    /// `ruled_out_alone` counts those that only this case rules out.
     ruled_out: usize,
     ruled_out_alone: usize,
-    /// Integration of the equations of all nodes, where they are the reference.
+    /// Integration of the equations of all nodes, if these are the reference.
     nodal: Option<NodalFacts>,
-    /// Errors of the body of row 1, and of those before it that were enriched, beside the model in this case.
+    /// Errors of the body of row 1, and of its versions before enrichment, relative to the model in this
+    /// case.
     reference_lacks: Vec<LackFacts>,
 }
 
-/// The load cases of a study; none of a scene alone.
+/// Returns the load cases of a study; empty for a single scene.
 pub(super) fn case_facts<'a>(trade: &'a Trade, lacks: &[Vec<ReferenceError>]) -> Vec<TradeCaseFacts<'a>> {
     let taken = trade.recommended.row().and_then(|row| trade.rows[row].outcome.as_ref().ok());
     let of = |(at, case): (usize, &'a flexbody_study::trade::TradeCase)| {
@@ -59,7 +61,7 @@ pub(super) fn case_facts<'a>(trade: &'a Trade, lacks: &[Vec<ReferenceError>]) ->
 }
 
 impl TradeCaseFacts<'_> {
-    /// `rules out 12 cheaper candidates, 3 of them alone`.
+    /// Returns the effect of the case on the decision: `rules out 12 cheaper candidates, 3 of them alone`.
     fn decides(&self) -> String {
         match self.ruled_out {
             0 => "rules out nothing cheaper".to_owned(),
@@ -74,7 +76,8 @@ impl TradeCaseFacts<'_> {
         self.alone.map_or_else(|| "nothing".to_owned(), |row| names[row - 1].clone())
     }
 
-    /// `braking: stress 1.2 %: 60 % of what is allowed; rules out ...; alone it takes 6 modes, W1`.
+    /// Returns the case in words: `braking: stress 1.2 %: 60 % of what is allowed; rules out ...; alone it
+    /// takes 6 modes, W1`.
     pub(crate) fn in_words(&self, names: &[String]) -> String {
         let errors = self.errors.as_ref().map_or_else(String::new, |errors| {
             format!("{}: {} of what is allowed; ", errors_in_words(errors), part_in_words(self.worst))
@@ -83,7 +86,8 @@ impl TradeCaseFacts<'_> {
     }
 }
 
-/// The errors of the recommended candidate in every load case, and what each decides.
+/// Returns the table of the errors of the recommended candidate in every load case, and of the effect of each
+/// case on the decision.
 pub(super) fn cases_table(cases: &[TradeCaseFacts<'_>], names: &[String]) -> Table {
     let heads = [
         "Load case",

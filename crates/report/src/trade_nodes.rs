@@ -1,4 +1,4 @@
-//! Integration of the equations of all nodes for a trade study.
+//! Integration of the equations of all nodes in a trade study.
 
 use super::numbers::significant;
 use flexbody_motion::scene::Scheme;
@@ -9,7 +9,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct NodalFacts {
     rows: usize,
-    /// None: of order 8 with error control.
+    /// Order of a fixed-step method; `None` for the method of order 8 with error control.
     order: Option<usize>,
     tolerance: Option<f64>,
     step: Option<f64>,

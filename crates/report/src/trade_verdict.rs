@@ -1,4 +1,4 @@
-//! A trade study in five lines: what was asked, what to take, why, the error, and what it saves.
+//! Verdict of a trade study in five lines: request, recommendation, reason, error, savings.
 
 use super::errors_in_words::errors_in_words;
 use super::lacks::LackFacts;
@@ -6,8 +6,8 @@ use super::numbers::{duration, significant};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{InCase, Measured, Recommendation, Trade, TradeRow};
 
-/// The five lines, with their labels; `names` are those of the rows, `tolerances` what the scene allows, in
-/// words; `lacking`: a reference that lacks too much of its model.
+/// Returns the five lines with their labels. `names` are the names of the rows, `tolerances` the tolerances
+/// of the scene in words, `lacking` the error of a reference that deviates too much from its model.
 pub(super) fn verdict_lines(
     trade: &Trade,
     names: &[String],
@@ -60,7 +60,7 @@ fn taken(name: &str, row: &TradeRow) -> String {
     format!("{} (to {} Hz), of: {}", name, significant(row.last_frequency_hz, 3), row.source)
 }
 
-/// The next cheaper one on the front shows what one would pay for less.
+/// Returns the reason in words; the next cheaper row of the front shows the error of a lower cost.
 fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
     let count = trade.rows.len();
     let first = match trade.recommended {
@@ -90,7 +90,7 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
     )
 }
 
-/// ` in case braking`, of several load cases.
+/// Returns ` in case braking` if there are several load cases; empty otherwise.
 fn in_case(trade: &Trade, measured: &Measured) -> String {
     let name = trade.cases[measured.case].name.as_ref();
     name.map_or_else(String::new, |name| format!(" in case {name}"))

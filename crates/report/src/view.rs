@@ -1,5 +1,5 @@
-//! The page that shows a body in motion: one file with everything in it, drawn by WebGL. What is drawn is
-//! decided and computed here; the script of the page turns it.
+//! Page that shows a body in motion by WebGL: one file with all its data. All quantities are computed here;
+//! the script of the page only rotates and animates them.
 
 mod motion;
 
@@ -19,8 +19,8 @@ use serde::Serialize;
 const PAGE: &str = include_str!("view/page.html");
 const STYLE: &str = include_str!("view/view.css");
 
-/// Room for positions, shapes and mesh in a page, in bytes: with the motion of a simulation and the script a
-/// page stays below 10 MB.
+/// Size limit of positions, shapes and mesh in a page, in bytes. With the motion of a simulation and the
+/// script a page stays below 10 MB.
 const ROOM: usize = 7_000_000;
 
 /// Facts and markup of a page.
@@ -30,12 +30,12 @@ pub struct View {
     page: String,
 }
 
-/// Contents of a page, for the terminal and for programs.
+/// Contents of a page, for terminals and programs.
 #[derive(Debug, Clone, Serialize)]
 struct ViewFacts {
     model: String,
     modes: usize,
-    /// `surface`, `lines` or `points`.
+    /// Kind of drawing: `surface`, `lines` or `points`.
     drawn: &'static str,
     nodes: usize,
     drawn_nodes: usize,
@@ -45,17 +45,17 @@ struct ViewFacts {
     position_error: f64,
     /// Half a step of the 16-bit shapes, relative to the largest component of each mode.
     shape_error: f64,
-    /// Instants of the simulation that the page has; none without one.
+    /// Number of simulated times in the page; `None` without a simulation.
     instants: Option<usize>,
     bytes: usize,
 }
 
 impl View {
-    /// The page about `body`, with at most so many `triangles`, or as many as keep it below 10 MB; with the
-    /// motion of a simulation instead of its modes, where there is one.
+    /// Builds the page of `body` with at most `triangles` triangles or, without a number, as many as keep the
+    /// page below 10 MB. With a `motion` the page plays the simulation instead of the modes.
     ///
     /// # Errors
-    /// FB735 for the motion of another body; those of [`FlexBody::carried`].
+    /// FB735 if the motion belongs to another body; the errors of [`FlexBody::carried`].
     pub fn new(body: &FlexBody, triangles: Option<usize>, motion: Option<&RecordedMotion>) -> Result<Self> {
         let staged = motion.map(|motion| motion.staged(body)).transpose()?;
         let body = staged.as_ref().unwrap_or(body);
@@ -83,7 +83,7 @@ impl View {
         Ok(Self { facts, page })
     }
 
-    /// The page.
+    /// Returns the HTML of the page.
     pub fn html(&self) -> &str {
         &self.page
     }
@@ -119,7 +119,7 @@ impl ViewFacts {
     }
 }
 
-/// Names and values beside the picture of the body.
+/// Returns names and values for the list beside the picture of the body.
 fn terms(
     body: &FlexBody,
     drawing: &Drawing<'_>,
@@ -150,7 +150,7 @@ fn terms(
     terms
 }
 
-/// The whole page.
+/// Renders the whole page.
 fn page(title: &str, data: &ShownBody<'_, ShownMotion>, arrays: &[Packed]) -> String {
     let facts = data.json();
     let title = Plain(title).render().into_string();

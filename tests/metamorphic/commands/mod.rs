@@ -1,4 +1,4 @@
-//! Commands that judge a motion, by the functions that the command line calls.
+//! Commands that judge a motion, called by the functions of the command line.
 
 mod response;
 mod simulation;
@@ -14,11 +14,11 @@ use std::collections::BTreeSet;
 
 /// A command with its name.
 pub struct Command {
-    /// Name.
+    /// Name of the command.
     pub name: &'static str,
-    /// Outputs of a subject.
+    /// Computes the outputs of a subject.
     pub run: fn(&Subject) -> Result<Outputs>,
-    /// Transformations that it is crossed with.
+    /// Returns true for transformations that the command is crossed with.
     pub meets: fn(Reach) -> bool,
 }
 
@@ -36,36 +36,36 @@ pub const ALL: [Command; 6] = [
     },
 ];
 
-/// True of what reaches commands that convert a model themselves.
+/// Returns true for transformations that apply to commands that convert a model.
 fn of_model(reach: Reach) -> bool {
     matches!(reach, Reach::All | Reach::Scene)
 }
 
-/// Tolerance of the integrations of verdicts: that of a scene file.
+/// Tolerance of the integrations of verdicts, that of a scene file.
 const TOLERANCE: f64 = 1e-9;
 
-/// Factor of the allowed difference of values that are read off at the places that an integration has looked at: other
-/// steps are other places, and a parabola through three of them finds a largest value to about 1e-4 (measured).
+/// Factor of the allowed difference of values found at the evaluated times of an integration. Other steps
+/// have other times, and a parabola through three of them gives a largest value to about 1e-4 (measured).
 pub const LOOKED_AT: f64 = 1000.0;
 
-/// Factor of the allowed difference of the largest spin, which is looked for at the ends of steps alone.
+/// Factor of the allowed difference of the largest spin, which is evaluated at the ends of steps only.
 pub const STEP_ENDS: f64 = 1e4;
 
-/// Factor of the allowed difference of errors of a motion against another: both are read off at places.
+/// Factor of the allowed difference of errors between motions, which are found at evaluated times.
 const ERRORS: f64 = 1e4;
 
-/// Outputs that are known not to correspond, by a part of their name. Their differences are counted and shown, and fail
-/// nothing; an entry goes as soon as its cause does.
+/// Outputs that are known not to correspond, by a part of their name. Their differences are counted and shown
+/// without failing; an entry is removed with its cause.
 ///
-/// * The largest deflection of any node is found among a few places that were looked at (to 0.3 %).
-/// * Enriched bodies: the responses that join a body are chosen by rounding where its basis is nearly complete, and a
-///   limit of the estimate decides whether more rounds follow. FB548 tells the estimate of a body that enrichment did not
-///   pay for.
+/// * The largest deflection of any node is found among a few evaluated times (to 0.3 %).
+/// * Enriched bodies: rounding chooses the responses that join a body if its basis is nearly complete, and a
+///   limit of the estimate decides on further rounds. FB548 states the estimate of a body that did not
+///   benefit from enrichment.
 pub const OPEN: [&str; 3] = ["largest deflection of the body", "percentages of FB548", ENRICHED];
 
-/// Outputs that a transformation changes by rights, by a part of their names.
+/// Outputs that a transformation changes by definition, by a part of their names.
 ///
-/// * What loads can do to a free body until the end of its motion is more where the motion ends later.
+/// * The possible effect of loads on a free body until the end of its motion grows if the motion ends later.
 pub const CHANGED: [(&str, &str); 4] = [
     ("significances", "start later"),
     ("FB542", "start later"),
@@ -73,26 +73,26 @@ pub const CHANGED: [(&str, &str); 4] = [
     ("findings", "start later"),
 ];
 
-/// End of the name of what depends on the modes of an enriched body.
+/// End of the name of outputs that depend on the modes of an enriched body.
 const ENRICHED: &str = "of an enriched body";
 
 /// Factor of the allowed difference of percentages in messages, which have two or three digits.
 const DIGITS: f64 = 2e5;
 
-/// The load cases of a verdict.
+/// Returns the load cases of a verdict.
 fn cases(subject: &Subject) -> Result<LoadCases> {
     let mut scenes = subject.scenes()?;
     scenes.iter_mut().for_each(|scene| scene.run.scheme = Scheme::Adaptive { tolerance: TOLERANCE });
     Ok(LoadCases::new(scenes).expect("a load case"))
 }
 
-/// Codes of findings, each once, in order.
+/// Returns the distinct codes of findings in order.
 pub fn codes(found: &[Diagnostic]) -> String {
     let codes: BTreeSet<&str> = found.iter().map(|one| one.code().id()).collect();
     codes.into_iter().collect::<Vec<_>>().join(" ")
 }
 
-/// A decision, in words.
+/// Returns a decision in words as an output.
 pub fn facts(name: &str, facts: String) -> Output {
     let values = Values::Facts(facts);
     Output {
@@ -106,13 +106,13 @@ pub fn facts(name: &str, facts: String) -> Output {
     }
 }
 
-/// A number of the whole motion.
+/// Returns a number of the whole motion as an output.
 pub fn number(name: &str, unit: [i32; 3], value: f64, least: f64) -> Output {
     let values = Values::Numbers(vec![value]);
     Output { values, unit, least, ..facts(name, String::new()) }
 }
 
-/// Codes of findings, and the percentages in their messages.
+/// Returns the codes of findings, and the percentages in their messages.
 pub fn findings(found: &[Diagnostic]) -> Vec<Output> {
     let mut outputs = vec![facts("findings", codes(found))];
     for (i, one) in found.iter().enumerate() {
@@ -129,9 +129,9 @@ pub fn findings(found: &[Diagnostic]) -> Vec<Output> {
     outputs
 }
 
-/// An error over its tolerance.
+/// Returns errors over their tolerances as an output.
 pub fn error(name: &str, errors: Vec<f64>) -> Output {
-    /// Errors below this part of the tolerance are those of the integration.
+    /// Errors below this part of the tolerance are integration errors.
     const LEAST: f64 = 1e-3;
     Output { values: Values::Numbers(errors), least: LEAST, slack: ERRORS, ..facts(name, String::new()) }
 }

@@ -1,4 +1,4 @@
-//! `response`.
+//! Command `response`.
 
 use super::{error, findings};
 use crate::outputs::{Output, Outputs, Values};
@@ -8,14 +8,14 @@ use flexbody_linalg::context::Context;
 use flexbody_motion::scene::Point;
 use flexbody_study::response::{Band, Complex, Function, Place, ResponseSettings, respond};
 
-/// Damping ratio of a body that has none: responses at resonances are finite.
+/// Damping ratio for a body without damping, which keeps responses at resonances finite.
 const RATIO: f64 = 0.02;
 
-/// Factor of the allowed difference: at a resonance of ratio 2 % a response follows 50 times the difference of the
-/// frequency.
+/// Factor of the allowed difference: at a resonance with a damping ratio of 2 % the response differs by 50
+/// times the difference of the frequency.
 const STEEP: f64 = 50.0;
 
-/// The response at the tip to forces at a node.
+/// Returns the response at the tip to forces at a node.
 pub fn response(subject: &Subject) -> Result<Outputs> {
     let (model, body) = (subject.model()?, subject.body()?);
     let hertz = body.frequencies_hz();

@@ -1,4 +1,4 @@
-//! `simulate`.
+//! Command `simulate`.
 
 use super::{LOOKED_AT, STEP_ENDS, findings, number};
 use crate::outputs::{Along, Output, Outputs, Values};
@@ -17,8 +17,8 @@ const FORCE: [i32; 3] = [1, 1, -2];
 const ENERGY: [i32; 3] = [2, 1, -2];
 const RATE: [i32; 3] = [0, 0, -1];
 
-/// Sizes that differences of a motion are measured by: a difference of the deflection by a part of the largest one
-/// is, at the highest natural frequency of the body, one of the accelerations.
+/// Scales for differences of a motion. A difference of the deflection by a part of the largest one is, at the
+/// highest natural frequency of the body, a difference of the accelerations.
 struct Sizes {
     extent: f64,
     deflection: f64,
@@ -27,7 +27,7 @@ struct Sizes {
 }
 
 impl Sizes {
-    /// Deflections below this part of the extent do not count, as in verdicts.
+    /// Deflections below this part of the extent do not count, like in verdicts.
     const LEAST: f64 = 1e-5;
 
     fn new(body: &FlexBody, recording: &Recording) -> Self {
@@ -45,13 +45,13 @@ impl Sizes {
         }
     }
 
-    /// The inertia force of the deflections.
+    /// Returns the inertia force of the deflections.
     fn force(&self) -> f64 {
         self.mass * self.deflection * self.highest * self.highest
     }
 }
 
-/// `simulate`: everything that is recorded.
+/// Runs `simulate` and returns all recorded outputs.
 pub fn simulation(subject: &Subject) -> Result<Outputs> {
     let body = subject.body()?;
     let (recording, found) = simulate(&body, &subject.scenes()?[0], &Context::QUIET)?;
@@ -69,7 +69,7 @@ fn vectors(name: String, along: Along, unit: [i32; 3], rates: Vec<Vector3<f64>>,
     Output { name, unit, values, derivative: None, least, by_instant: true, slack: 1.0 }
 }
 
-/// Marks vectors as axial: they turn over in a mirror.
+/// Marks vectors as axial: they change sign under reflection.
 fn axial(output: Output) -> Output {
     match output.values {
         Values::Vectors { along, rates, .. } => {
@@ -79,12 +79,12 @@ fn axial(output: Output) -> Output {
     }
 }
 
-/// A largest value of the motion.
+/// Returns a largest value of the motion.
 fn peak(name: &str, unit: [i32; 3], value: f64, least: f64) -> Output {
     Output { slack: LOOKED_AT, ..number(name, unit, value, least) }
 }
 
-/// Paths of the watched points.
+/// Adds the paths of the watched points.
 fn places(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
     for (i, path) in recording.paths.iter().enumerate() {
         let name = |what: &str| format!("{what} of point {i}");
@@ -102,7 +102,7 @@ fn places(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
     }
 }
 
-/// Motion of the frame, energy and reactions.
+/// Adds the motion of the frame, energy and reactions.
 fn states(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
     let states = &recording.states;
     let origins = states.iter().map(|state| state.origin).collect();
@@ -132,7 +132,7 @@ fn states(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
     }
 }
 
-/// Largest values of the whole motion.
+/// Adds the largest values of the whole motion.
 fn largest(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
     let extremes = &recording.extremes;
     let energy = sizes.mass * (sizes.deflection * sizes.highest).powi(2);

@@ -1,4 +1,4 @@
-//! `select`, `trade` and `convert --scene`.
+//! Commands `select`, `trade` and `convert --scene`.
 
 use super::{ENRICHED, cases, error, facts, findings};
 use crate::outputs::{Output, Outputs};
@@ -10,13 +10,13 @@ use flexbody_study::selection::{Selection, select};
 use flexbody_study::tailoring::{Tailoring, convert_for};
 use flexbody_study::trade::{CandidateKind, Source, TradeRow, TradeSettings, trade};
 
-/// Errors over their tolerances are compared up to this one.
+/// Errors over their tolerances are compared up to this value.
 const BEYOND: f64 = 2.0;
 
-/// Outputs of a selection among so many modes.
+/// Returns the outputs of a selection among `modes` modes.
 ///
-/// Bodies that are enriched with responses to the residual forces of one another follow ways that rounding chooses:
-/// their modes and what depends on them is open.
+/// Bodies that are enriched with responses to residual forces depend on rounding, so that their modes and
+/// dependent outputs are open.
 fn outputs(subject: &Subject, selection: &Selection, modes: usize) -> Outputs {
     let is_enriched = matches!(subject.basis, Basis::Lowest(count) if modes > count);
     let name = |name: &str| if is_enriched { format!("{name} {ENRICHED}") } else { name.to_owned() };
@@ -36,7 +36,7 @@ fn outputs(subject: &Subject, selection: &Selection, modes: usize) -> Outputs {
     Outputs { times: Vec::new(), all }
 }
 
-/// `select` of a body.
+/// Runs `select` on a body.
 pub fn select_body(subject: &Subject) -> Result<Outputs> {
     let body = subject.body()?;
     let selection = select(&body, &[], &cases(subject)?, &Context::QUIET)?;
@@ -47,7 +47,7 @@ fn tailoring(subject: &Subject) -> Tailoring {
     Tailoring { settings: subject.settings(), by_band: false, of_motion: false }
 }
 
-/// `select` of a model.
+/// Runs `select` on a model.
 pub fn select_model(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
     let enriched = tailoring(subject).convert(&model, &scenes, &Context::QUIET)?;
@@ -59,7 +59,7 @@ pub fn select_model(subject: &Subject) -> Result<Outputs> {
     Ok(outputs)
 }
 
-/// `convert --scene`.
+/// Runs `convert --scene`.
 pub fn conversion(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
     let (made, selection) = convert_for(&model, &tailoring(subject), &scenes, &Context::QUIET)?;
@@ -73,13 +73,13 @@ pub fn conversion(subject: &Subject) -> Result<Outputs> {
     Ok(outputs)
 }
 
-/// `trade` of a body beside the motion of all nodes.
+/// Runs `trade` on a body against the motion of all nodes.
 pub fn trading(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
     let settings = TradeSettings { repeat: 1, reserved: &[] };
     let source = Source::new("body", subject.body()?, None)?;
     let study = trade(&[source], &scenes, Some(&model), &settings, &Context::QUIET)?;
-    // Rounded numbers are others in a body that is turned.
+    // Candidates with rounded numbers differ for a rotated body.
     let exact = |row: &&TradeRow| row.candidate.kind() != CandidateKind::Single;
     let rows: Vec<&TradeRow> = study.rows.iter().filter(exact).collect();
     let labels: Vec<String> = rows

@@ -1,4 +1,4 @@
-//! Equations of motion in positions of all nodes: M x'' = f, with multipliers for what is prescribed.
+//! Equations of motion in positions of all nodes: M x'' = f, with multipliers for prescribed motion.
 
 use super::corotation::{Fit, Solid, Weights, node};
 use super::integration::{State, step};
@@ -7,17 +7,18 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 /// A force at a node.
 #[derive(Debug, Clone, Copy)]
 pub struct Force {
-    /// The node, from 0.
+    /// Index of the node, from 0.
     pub node: usize,
-    /// Amplitude along axes of the world, or of the frame of the body.
+    /// Amplitude along axes of the world or of the frame of the body.
     pub amplitude: Vector3<f64>,
-    /// True if the frame of the body carries it.
+    /// True if the force rotates with the frame of the body.
     pub follows: bool,
     /// Circular frequency: the force is amplitude sin(frequency t).
     pub frequency: f64,
 }
 
-/// A frame whose motion is prescribed: even rotation about an axis that is fixed in it, and an origin that swings.
+/// A frame with prescribed motion: uniform rotation about an axis fixed in the frame, and an oscillating
+/// origin.
 #[derive(Debug, Clone, Copy)]
 pub struct Driven {
     /// Attitude at time zero.
@@ -26,24 +27,24 @@ pub struct Driven {
     pub omega: Vector3<f64>,
     /// Origin of the frame in the model.
     pub origin: Vector3<f64>,
-    /// A point of the axis of rotation, in the model.
+    /// A point on the axis of rotation, in the model.
     pub through: Vector3<f64>,
-    /// Place of the model's origin at time zero.
+    /// Position of the origin of the model at time zero.
     pub place: Vector3<f64>,
     /// Amplitude of the velocity of the axis: amplitude sin(frequency t).
     pub velocity: Vector3<f64>,
-    /// Circular frequency of it.
+    /// Circular frequency of the velocity.
     pub frequency: f64,
 }
 
-/// The linear conditions G u = 0 on the displacements seen from a driven frame.
+/// Linear conditions G u = 0 on the displacements relative to a driven frame.
 #[derive(Debug, Clone)]
 pub struct Conditions {
-    /// G.
+    /// Condition matrix G.
     pub rows: DMatrix<f64>,
-    /// The frame.
+    /// Frame that the displacements refer to.
     pub frame: Driven,
-    /// True if the frame carries K, instead of the best fit.
+    /// True if the driven frame carries K; false if the best fit does.
     pub carries: bool,
 }
 
@@ -65,7 +66,7 @@ struct Frame {
     acceleration: Vector3<f64>,
 }
 
-/// The rotation by an angle about a unit vector (Rodrigues).
+/// Returns the rotation by an angle about a unit vector (Rodrigues).
 pub fn rodrigues(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
     let cross = axis.cross_matrix();
     Matrix3::identity() + cross * angle.sin() + cross * cross * (1.0 - angle.cos())
@@ -78,7 +79,7 @@ impl Driven {
             Some(axis) => self.start * rodrigues(&axis, speed * time),
             None => self.start,
         };
-        // The point of the axis swings; the origin turns about it.
+        // The point on the axis oscillates; the origin rotates about it.
         let first = self.place + self.start * self.through;
         let (sin, cos) = (self.frequency * time).sin_cos();
         let (way, rate) = match self.frequency > 0.0 {
@@ -97,31 +98,31 @@ impl Driven {
 }
 
 impl Absolute {
-    /// A free body without loads.
+    /// Returns a free body without loads.
     pub fn new(solid: Solid, weights: Weights) -> Self {
         let fit = Fit::new(&solid, weights);
         let inverse_mass = solid.mass.clone().cholesky().expect("mass");
         Self { solid, fit, inverse_mass, forces: Vec::new(), gravity: Vector3::zeros(), conditions: None }
     }
 
-    /// The body under forces and gravity.
+    /// Returns the body under forces and gravity.
     pub fn under(self, forces: &[Force], gravity: Vector3<f64>) -> Self {
         Self { forces: forces.to_vec(), gravity, ..self }
     }
 
-    /// The body with conditions.
+    /// Returns the body with conditions.
     pub fn held(self, conditions: Conditions) -> Self {
         Self { conditions: Some(conditions), ..self }
     }
 
-    /// M^-1 times forces of the nodes.
+    /// Returns M^-1 times forces of the nodes.
     fn over_mass(&self, force: &DVector<f64>) -> DVector<f64> {
         let by_node = DMatrix::from_fn(self.solid.places.len(), 3, |i, k| force[3 * i + k]);
         let solved = self.inverse_mass.solve(&by_node);
         DVector::from_fn(force.len(), |row, _| solved[(row / 3, row % 3)])
     }
 
-    /// All forces but those of the conditions.
+    /// Returns all forces except those of the conditions.
     fn force(&self, time: f64, state: &State) -> DVector<f64> {
         let frame = self.conditions.as_ref().map(|held| (held.frame.at(time).axes, held.carries));
         let (mut force, turn) = match frame {
@@ -142,7 +143,7 @@ impl Absolute {
         force
     }
 
-    /// Vectors of the nodes along the axes of a frame.
+    /// Returns vectors of the nodes along the axes of a frame.
     fn seen(&self, axes: &Matrix3<f64>, x: impl Fn(usize) -> Vector3<f64>) -> DVector<f64> {
         let mut seen = DVector::zeros(3 * self.solid.places.len());
         for i in 0..self.solid.places.len() {
@@ -151,7 +152,8 @@ impl Absolute {
         seen
     }
 
-    /// Accelerations, and the forces of the conditions at the nodes along the axes of the frame.
+    /// Returns the accelerations, and the constraint forces of the conditions at the nodes along the axes of
+    /// the frame.
     pub fn accelerations(&self, time: f64, state: &State) -> (DVector<f64>, Option<DVector<f64>>) {
         let free = self.over_mass(&self.force(time, state));
         let Some(held) = &self.conditions else { return (free, None) };
@@ -179,8 +181,9 @@ impl Absolute {
         (all, Some(reaction))
     }
 
-    /// Force and torque about the origin of the frame, along its axes, that the prescribed motion takes: what the
-    /// conditions carry, and the moment of the elastic forces, which a frame that carries K leaves; and that moment.
+    /// Returns force and torque of the prescribed motion about the origin of the frame, along its axes, and
+    /// the moment of the elastic forces alone. The torque is that of the conditions plus the moment of the
+    /// elastic forces, which does not vanish if the frame carries K.
     pub fn reaction(&self, time: f64, state: &State) -> Option<(Vector3<f64>, Vector3<f64>, Vector3<f64>)> {
         let forces = self.accelerations(time, state).1?;
         let held = self.conditions.as_ref()?;
@@ -198,8 +201,9 @@ impl Absolute {
         Some((force, torque + moment, moment))
     }
 
-    /// The undeformed body: the model at `origin` + A x, the centre of mass moving with `velocity`, all of it turning
-    /// with `omega`, along axes of the model; of a body with conditions the motion of the frame.
+    /// Returns the undeformed body: the model at `origin` + A x, with the velocity `velocity` of the centre
+    /// of mass and the angular velocity `omega` along axes of the model. With conditions the body has the
+    /// motion of the frame.
     pub fn start(
         &self,
         axes: &Matrix3<f64>,
@@ -228,7 +232,8 @@ impl Absolute {
         State { x, v }
     }
 
-    /// States at evenly spaced instants, the start first, with so many steps between two of them.
+    /// Returns states at evenly spaced times, the initial state first, with `steps` steps between two of
+    /// them.
     pub fn motion(&self, start: State, duration: f64, outputs: usize, steps: usize) -> Vec<State> {
         let h = duration / (outputs * steps) as f64;
         let acceleration = |time: f64, state: &State| self.accelerations(time, state).0;

@@ -1,8 +1,8 @@
 //! Elastic force with a corotated stiffness matrix.
 //!
-//! V(x) = u'K u / 2 with u_i = R'x_i - X_i, R(x) being the rotation that fits the nodes best: the polar factor of
-//! sum w_ij x_j X_i'. Translations drop out, since K resists none. The force is the exact gradient of V, the change of R
-//! with x included.
+//! V(x) = u'K u / 2 with u_i = R'x_i - X_i, where R(x) is the rotation that fits the nodes best: the polar
+//! factor of sum w_ij x_j X_i'. Translations cancel, since K does not resist them. The force is the exact
+//! gradient of V, including the change of R with x.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -11,50 +11,50 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 pub enum Weights {
     /// The mass matrix: R is the frame of the mean axes.
     Mass,
-    /// One for every node.
+    /// Equal weights for all nodes.
     Nodes,
 }
 
 /// A body of solid elements.
 #[derive(Debug, Clone)]
 pub struct Solid {
-    /// K (3n x 3n).
+    /// Stiffness matrix K (3n x 3n).
     pub stiffness: DMatrix<f64>,
-    /// Ms (n x n): M = Ms kron I3.
+    /// Scalar mass matrix Ms (n x n): M = Ms kron I3.
     pub mass: DMatrix<f64>,
     /// Positions of the nodes in the model.
     pub places: Vec<Vector3<f64>>,
 }
 
-/// The best fit of nodes: what of it does not change.
+/// Constant data of the best fit of nodes.
 #[derive(Debug, Clone)]
 pub struct Fit {
     weights: DMatrix<f64>,
-    /// Places about their weighted mean.
+    /// Positions relative to their weighted mean.
     arms: Vec<Vector3<f64>>,
-    /// sum_i w_ij X_i for every node j.
+    /// Weighted sums sum_i w_ij X_i for every node j.
     weighted: Vec<Vector3<f64>>,
 }
 
-/// The i-th of vectors that follow one another.
+/// Returns the i-th vector of a sequence of vectors.
 pub fn node(x: &DVector<f64>, i: usize) -> Vector3<f64> {
     x.fixed_rows::<3>(3 * i).into_owned()
 }
 
 impl Solid {
-    /// Mass of every node: the sum of its row.
+    /// Returns the mass of every node, the sum of its row.
     pub fn row_masses(&self) -> Vec<f64> {
         self.mass.row_iter().map(|row| row.sum()).collect()
     }
 
-    /// Centre of mass in the model.
+    /// Returns the centre of mass in the model.
     pub fn centre(&self) -> Vector3<f64> {
         let masses = self.row_masses();
         let moment: Vector3<f64> = self.places.iter().zip(&masses).map(|(x, m)| x * *m).sum();
         moment / masses.iter().sum::<f64>()
     }
 
-    /// Displacements R'x - X up to a translation.
+    /// Returns the displacements R'x - X up to a translation.
     pub fn displacements(&self, x: &DVector<f64>, turn: &Matrix3<f64>) -> DVector<f64> {
         let mut u = DVector::zeros(x.len());
         for (i, place) in self.places.iter().enumerate() {
@@ -63,7 +63,7 @@ impl Solid {
         u
     }
 
-    /// The force of the nodes in the world where a given rotation carries K.
+    /// Returns the force of the nodes in the world if a given rotation carries K.
     pub fn carried_force(&self, x: &DVector<f64>, turn: &Matrix3<f64>) -> DVector<f64> {
         let f = &self.stiffness * self.displacements(x, turn);
         let mut force = DVector::zeros(x.len());
@@ -73,12 +73,12 @@ impl Solid {
         -force
     }
 
-    /// The force of the nodes in the world where the best fit carries K, and that rotation.
+    /// Returns the force of the nodes in the world if the best fit carries K, and that rotation.
     pub fn fitted_force(&self, x: &DVector<f64>, fit: &Fit) -> (DVector<f64>, Matrix3<f64>) {
         let turn = fit.rotation(x);
         let f = &self.stiffness * self.displacements(x, &turn);
         let p: Vec<Vector3<f64>> = (0..self.places.len()).map(|i| turn.tr_mul(&node(x, i))).collect();
-        // A change of R by the angle d turns all p by -d: V changes by -d . sum p x f.
+        // A change of R by the angle d rotates all p by -d, so that V changes by -d . sum p x f.
         let moment: Vector3<f64> = p.iter().enumerate().map(|(i, p)| p.cross(&node(&f, i))).sum();
         let change = fit.stiffness(&p).transpose().try_inverse().expect("nodes that fix a rotation") * moment;
         let mut force = DVector::zeros(x.len());
@@ -90,7 +90,7 @@ impl Solid {
 }
 
 impl Fit {
-    /// The best fit of the nodes of a solid.
+    /// Returns the best fit of the nodes of a solid.
     pub fn new(solid: &Solid, weights: Weights) -> Self {
         let n = solid.places.len();
         let weights = match weights {
@@ -105,7 +105,7 @@ impl Fit {
         Self { weights, arms, weighted }
     }
 
-    /// R(x): the polar factor, by Newton's iteration A <- (A + A^-T) / 2.
+    /// Returns R(x), the polar factor, by the Newton iteration A <- (A + A^-T) / 2.
     pub fn rotation(&self, x: &DVector<f64>) -> Matrix3<f64> {
         let mut turn: Matrix3<f64> =
             self.weighted.iter().enumerate().map(|(j, weighted)| node(x, j) * weighted.transpose()).sum();
@@ -121,7 +121,8 @@ impl Fit {
         turn
     }
 
-    /// S with S d = sum w_ij X_i x R'dx_j for a change of R by the angle d: S = sum w_ij (X_i . p_j - p_j X_i').
+    /// Returns S with S d = sum w_ij X_i x R'dx_j for a change of R by the angle d: S = sum w_ij (X_i . p_j -
+    /// p_j X_i').
     fn stiffness(&self, p: &[Vector3<f64>]) -> Matrix3<f64> {
         let of = |j: usize| {
             let (weighted, p) = (&self.weighted[j], &p[j]);
@@ -130,7 +131,7 @@ impl Fit {
         (0..p.len()).map(of).sum()
     }
 
-    /// The rows of sum w_ij X_i x u_j = 0: what keeps the best fit at the rotation that u is seen from.
+    /// Returns the rows of sum w_ij X_i x u_j = 0, which keep the best fit at the rotation that u refers to.
     pub fn rows(&self) -> DMatrix<f64> {
         let n = self.arms.len();
         debug_assert_eq!(self.weights.nrows(), n);

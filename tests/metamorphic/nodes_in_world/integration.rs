@@ -1,17 +1,17 @@
-//! The classical Runge-Kutta method of order four with steps of one length.
+//! Classical Runge-Kutta method of order four with a fixed step.
 
 use nalgebra::DVector;
 
-/// Places and velocities.
+/// Positions and velocities.
 #[derive(Debug, Clone)]
 pub struct State {
-    /// Places of all nodes in the world.
+    /// Positions of all nodes in the world.
     pub x: DVector<f64>,
-    /// Their velocities.
+    /// Velocities of all nodes in the world.
     pub v: DVector<f64>,
 }
 
-/// Takes one step.
+/// Returns the state after one step.
 pub fn step(state: &State, time: f64, h: f64, acceleration: &impl Fn(f64, &State) -> DVector<f64>) -> State {
     let along = |slope: &State, h: f64| State { x: &state.x + &slope.x * h, v: &state.v + &slope.v * h };
     let slope = |time: f64, at: &State| State { x: at.v.clone(), v: acceleration(time, at) };

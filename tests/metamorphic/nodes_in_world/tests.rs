@@ -1,8 +1,8 @@
-//! Motions of the library beside those in absolute coordinates.
+//! Motions of the library compared with motions in absolute coordinates.
 //!
-//! With all modes and a frame that carries K as in the library the two are the same motion, to the tolerance of the
-//! integrations. Where another frame carries K, V differs in the third order of the deformation, so that motions differ
-//! in the second: by a quarter at half the loads.
+//! With all modes and a common frame for K both give one motion, to the tolerance of the integrations. With
+//! another frame for K, V differs in the third order of the deformation, so that motions differ in the second
+//! order: half the loads give a quarter of the difference.
 
 use super::absolute::{Absolute, Conditions, Driven, Force};
 use super::corotation::{Fit, Solid, Weights, node};
@@ -24,19 +24,20 @@ use oracle::reference::dense;
 use oracle::scenes::nothing_happens;
 use std::f64::consts::TAU;
 
-/// Steps of the oracle between two instants.
+/// Number of oracle steps between two output times.
 const STEPS: usize = 300;
 
-/// Instants after the first.
+/// Number of output times after the first.
 const OUTPUTS: usize = 8;
 
-/// Nodes whose places are compared.
+/// Nodes whose positions are compared.
 const WATCHED: [usize; 2] = [3, 10];
 
-/// Largest difference of places, velocities and reactions of one and the same motion, relative to the deflections.
+/// Largest difference of positions, velocities and reactions of equal motions, relative to the deflections.
 const SAME: f64 = 1e-7;
 
-/// A soft block with the interface `root` of four nodes, all of its modes, and the oracle's view of it.
+/// A soft block with the interface `root` of four nodes, all of its modes, and its representation in the
+/// oracle.
 struct Block {
     body: FlexBody,
     solid: Solid,
@@ -46,16 +47,16 @@ struct Block {
     mass: f64,
 }
 
-/// Loads, start and prescribed motion of the block, in units of its own.
+/// Loads, initial state and prescribed motion of the block, in its own scales.
 #[derive(Debug, Clone, Copy)]
 struct Happening {
     /// Size of forces, gravity and accelerations: about the deflection relative to the extent.
     size: f64,
-    /// Angular velocity over the lowest natural frequency.
+    /// Angular velocity divided by the lowest natural circular frequency.
     speed: f64,
-    /// True if a turned attitude at the start.
+    /// True if the initial attitude is rotated.
     turned: bool,
-    /// True if one of the forces turns with the body.
+    /// True if one of the forces rotates with the body.
     follows: bool,
     gravity: bool,
     held: Held,
@@ -65,11 +66,11 @@ struct Happening {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Held {
     Nothing,
-    /// The rotation of the mean axes.
+    /// Rotation of the mean axes.
     Rotation,
-    /// The rotation of the mean axes and the place of the centre of mass.
+    /// Rotation of the mean axes and position of the centre of mass.
     Frame,
-    /// The interface.
+    /// Motion of the interface.
     Interface,
 }
 
@@ -100,7 +101,7 @@ fn block() -> Block {
     Block { body, solid, root, rate, extent: 0.9, mass }
 }
 
-/// Vectors of a seed.
+/// Returns fixed random vectors.
 fn vectors() -> [Vector3<f64>; 6] {
     let random = &mut stream(5, 11);
     std::array::from_fn(|_| Vector3::from(random.vector::<3>()))
@@ -111,7 +112,7 @@ impl Block {
         0.8 * TAU / self.rate
     }
 
-    /// An acceleration that deflects the block by about this part of its extent.
+    /// Returns an acceleration that deflects the block by about this part of its extent.
     fn acceleration(&self, size: f64) -> f64 {
         size * self.extent * self.rate * self.rate
     }
@@ -147,7 +148,7 @@ impl Block {
         if what.gravity { vectors()[3] * self.acceleration(what.size) } else { Vector3::zeros() }
     }
 
-    /// Amplitude of the velocity of what carries the block.
+    /// Returns the amplitude of the velocity of the carrier.
     fn swing(&self, what: &Happening) -> Vector3<f64> {
         vectors()[4] * (self.acceleration(what.size) / self.rate)
     }
@@ -156,7 +157,7 @@ impl Block {
         self.solid.centre() + vectors()[5] * self.extent
     }
 
-    /// The scene of the library.
+    /// Returns the scene for the library.
     fn scene(&self, what: &Happening) -> Scene {
         let mut scene = nothing_happens("absolute", self.duration(), 1e-12);
         scene.run.outputs = OUTPUTS;
@@ -198,7 +199,7 @@ impl Block {
         scene
     }
 
-    /// The rows of the conditions, the origin of their frame, and a point of the axis.
+    /// Returns the rows of the conditions, the origin of their frame, and a point on the axis of rotation.
     fn conditions(&self, what: &Happening) -> Option<(DMatrix<f64>, Vector3<f64>, Vector3<f64>)> {
         let n = self.solid.places.len();
         let centre = self.solid.centre();
@@ -233,7 +234,7 @@ impl Block {
         }
     }
 
-    /// The motion of the oracle; `weights`: `None` where the driven frame carries K.
+    /// Computes the motion with the oracle. If `weights` is `None`, the driven frame carries K.
     fn absolute(&self, what: &Happening, weights: Option<Weights>) -> (Absolute, Vec<State>) {
         let scene_origin = Vector3::new(0.4, -0.2, 0.9);
         let own = weights.unwrap_or(Weights::Mass);
@@ -256,8 +257,9 @@ impl Block {
         (body, motion)
     }
 
-    /// Largest differences of places, velocities and reactions, each relative to the deflection of the library's motion
-    /// and to what it is in one radian of the lowest mode; and that deflection over the extent.
+    /// Returns the largest differences of positions, velocities and reactions, each relative to the
+    /// deflection of the motion of the library and to its scale at the lowest frequency; and that deflection
+    /// relative to the extent.
     fn apart(&self, what: &Happening, weights: Option<Weights>) -> ([f64; 3], f64) {
         let scene = self.scene(what);
         let (recording, _) = simulate(&self.body, &scene, &Context::QUIET).expect("a motion");
@@ -282,7 +284,7 @@ impl Block {
         else {
             return 0.0;
         };
-        // Mean axes carry the moment of the elastic forces; an objective V has none.
+        // Mean axes carry the moment of the elastic forces; for an objective V this moment is zero.
         let conditions = recording.conditions.as_ref().filter(|_| moment.norm() > 1e-9 * torque.norm());
         let carried = conditions.map_or(0.0, |conditions| (conditions[at] + moment).norm());
         let torques = (all[at].1 - torque).norm().max(carried) / self.extent;
@@ -293,7 +295,7 @@ impl Block {
 const CALM: Happening =
     Happening { size: 0.02, speed: 0.0, turned: false, follows: false, gravity: false, held: Held::Nothing };
 
-/// Everything at once, with this prescribed.
+/// Returns a case with all loads at once and the prescribed motion `held`.
 fn everything(held: Held) -> Happening {
     Happening { size: 0.02, speed: 0.15, turned: true, follows: true, gravity: true, held }
 }
@@ -336,7 +338,7 @@ fn driven_solids_move_as_in_absolute_coordinates() {
     }
 }
 
-/// Differences by another frame fall with the square of the loads.
+/// Differences caused by another frame of the stiffness fall with the square of the loads.
 #[test]
 fn another_frame_of_the_stiffness_differs_in_the_second_order() {
     let block = block();

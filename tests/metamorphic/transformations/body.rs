@@ -15,9 +15,9 @@ pub fn frame(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(subject, Subject { frame, ..subject.clone() }, Correspondence::default())))
 }
 
-/// Converts with another complete basis. With a singular mass matrix the static shapes of a Craig-Bampton basis keep a
-/// part that moves no mass, and do not span the finite modes (12 of 12 modes, the first at 0.453 instead of 0.246 Hz): such
-/// bodies are left out.
+/// Converts with another complete basis. Bodies with a singular mass matrix are excluded: the static shapes
+/// of a Craig-Bampton basis keep a part that moves no mass and do not span the finite modes (12 of 12 modes,
+/// the first at 0.453 instead of 0.246 Hz).
 pub fn basis(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
     if !subject.scene.initial.modes.is_empty() || has_singular_mass(subject) {
         return Ok(None);
@@ -26,13 +26,13 @@ pub fn basis(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(&with(Basis::All), with(Basis::Fixed), Correspondence::default())))
 }
 
-/// Writes the body into a file and reads it: the same bits.
+/// Writes the body to a file and reads it, which gives equal bits.
 pub fn stored(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
     let changed = Subject { stored: true, ..subject.clone() };
     Ok(Some(Pair::new(subject, changed, Correspondence { allowed: 0.0, ..Correspondence::default() })))
 }
 
-/// Writes the scene into files and reads it.
+/// Writes the scene to files and reads it.
 pub fn written(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
     let changed = Subject { written: true, ..subject.clone() };
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))

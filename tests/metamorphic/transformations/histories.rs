@@ -1,4 +1,4 @@
-//! Histories with other times and values.
+//! Transformed times and values of histories.
 
 use flexbody_motion::scene::{Drive, History, Interpolation, Samples, Scene, VectorHistory};
 use std::f64::consts::TAU;
@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 /// A change of the time t to `factor` (t + `delay`).
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
-    /// The factor.
+    /// Factor of the time.
     pub factor: f64,
-    /// The delay.
+    /// Delay before scaling.
     pub delay: f64,
 }
 
@@ -17,7 +17,7 @@ impl Clock {
         self.factor * (time + self.delay)
     }
 
-    /// The history on this clock.
+    /// Returns the history with transformed time.
     pub fn history(&self, history: &History) -> History {
         match history {
             History::Constant(value) => History::Constant(*value),
@@ -46,7 +46,7 @@ impl Clock {
         Samples::new(times.into_iter().map(|t| self.time(t)).collect(), &values, kind, true)
     }
 
-    /// The vector on this clock.
+    /// Returns the vector with transformed time.
     pub fn vector(&self, history: &VectorHistory) -> VectorHistory {
         match history {
             VectorHistory::Along { direction, factor } => {
@@ -56,7 +56,7 @@ impl Clock {
         }
     }
 
-    /// Puts all histories of a scene on this clock.
+    /// Transforms the time of all histories of a scene.
     pub fn scene(&self, scene: &mut Scene) {
         for load in &mut scene.loads {
             (load.force, load.torque) = (self.vector(&load.force), self.vector(&load.torque));
@@ -70,7 +70,7 @@ impl Clock {
 pub enum Driven {
     /// Angular velocity.
     Turned,
-    /// A way, a velocity or an acceleration, by the number of its derivative.
+    /// A displacement, a velocity or an acceleration, by the number of its derivative.
     Moved(u8),
 }
 

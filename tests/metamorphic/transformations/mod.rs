@@ -18,32 +18,33 @@ use oracle::random::Random;
 /// Two subjects whose outputs must correspond.
 #[derive(Debug, Clone)]
 pub struct Pair {
-    /// The one.
+    /// Original subject.
     pub original: Subject,
-    /// The other.
+    /// Transformed subject.
     pub changed: Subject,
     /// Relations between the outputs of the two.
     pub map: Correspondence,
 }
 
 impl Pair {
-    /// A changed subject beside the unchanged one.
+    /// Returns a changed subject with the unchanged one.
     fn new(original: &Subject, changed: Subject, map: Correspondence) -> Self {
         Self { original: original.clone(), changed, map }
     }
 }
 
-/// A transformation: for a subject and random numbers the pair, or `None` where it does not apply.
+/// A transformation. Returns the pair for a subject and random numbers, or `None` if it does not apply.
 type Apply = fn(&Subject, &mut Random) -> Result<Option<Pair>>;
 
 /// Commands that a transformation is crossed with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
-    /// `simulate` alone: a complete basis is no matter of verdicts, and a part of a motion has other largest values.
+    /// `simulate` alone: a complete basis is not a subject of verdicts, and a part of a motion has other
+    /// largest values.
     Simulation,
-    /// Commands that are given a body.
+    /// Commands that take a body.
     Body,
-    /// Commands that a scene matters to.
+    /// Commands that use a scene.
     Scene,
     /// All commands.
     All,
@@ -51,11 +52,11 @@ pub enum Reach {
 
 /// A transformation with its name and reach.
 pub struct Transformation {
-    /// Name.
+    /// Name of the transformation.
     pub name: &'static str,
-    /// Commands.
+    /// Commands that it is crossed with.
     pub reach: Reach,
-    /// The transformation.
+    /// Function that applies the transformation.
     pub apply: Apply,
 }
 

@@ -15,7 +15,7 @@ use oracle::mesh::entries;
 use oracle::random::Random;
 use std::collections::{BTreeMap, HashMap};
 
-/// Turns the model about its origin.
+/// Rotates the model about its origin.
 pub fn turn(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let model = turning(subject, random);
     let map = Correspondence { model, ..Correspondence::default() };
@@ -29,10 +29,10 @@ pub fn shift(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))
 }
 
-/// Gives the nodes other numbers.
+/// Renumbers the nodes.
 pub fn renumber(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let order = random.permutation(subject.raw.nodes.len());
-    // Labels of rows without a node stay what they are, far below.
+    // Labels of rows without a node keep their numbers, far below the new ones.
     let own: HashMap<i64, i64> =
         subject.raw.nodes.ids.iter().zip(order).map(|(&id, at)| (id, 1_000_000 + 17 * at as i64)).collect();
     let number = |id: &mut i64| *id = own.get(id).copied().unwrap_or(*id);
@@ -54,7 +54,7 @@ pub fn renumber(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> 
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))
 }
 
-/// Puts the rows of the matrices, the node table and the nodes of the interfaces into another order.
+/// Permutes the rows of the matrices, the node table and the nodes of the interfaces.
 pub fn permute(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let raw = &subject.raw;
     let labels = rows(raw);
@@ -82,7 +82,7 @@ pub fn permute(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))
 }
 
-/// Label of every row of a model.
+/// Returns the label of every row of a model.
 pub fn rows(raw: &RawModel) -> Vec<DofLabel> {
     let directions = 1..=raw.dimension;
     let all = || {
@@ -94,7 +94,7 @@ pub fn rows(raw: &RawModel) -> Vec<DofLabel> {
     raw.dofs.clone().unwrap_or_else(|| all().collect())
 }
 
-/// For every row of a model the rows of the same vector, and the coefficients that turn it.
+/// Returns for every row of a model the rows of the same vector, and the coefficients of the rotation.
 fn turned_rows(raw: &RawModel, turn: &Matrix3<f64>) -> Vec<Vec<(u32, f64)>> {
     let labels = rows(raw);
     let place: HashMap<DofLabel, u32> =
@@ -110,12 +110,12 @@ fn turned_rows(raw: &RawModel, turn: &Matrix3<f64>) -> Vec<Vec<(u32, f64)>> {
     labels.iter().map(of_row).collect()
 }
 
-/// T A T' of a matrix of the rows of a model, T turning all vectors.
+/// Returns T A T' of a matrix on the rows of a model, with the rotation T of all vectors.
 pub fn conjugated(raw: &RawModel, matrix: &CscMatrix, turn: &Matrix3<f64>) -> CscMatrix {
     combined(raw, &[(1.0, matrix)], turn)
 }
 
-/// T A T' of a sum of matrices.
+/// Returns T A T' of a weighted sum of matrices.
 fn combined(raw: &RawModel, terms: &[(f64, &CscMatrix)], turn: &Matrix3<f64>) -> CscMatrix {
     let turned = turned_rows(raw, turn);
     let mut sums: BTreeMap<(u32, u32), f64> = BTreeMap::new();
@@ -134,7 +134,7 @@ fn combined(raw: &RawModel, terms: &[(f64, &CscMatrix)], turn: &Matrix3<f64>) ->
     CscMatrix::from_triplets(turned.len(), turned.len(), &all)
 }
 
-/// Geometric stiffness of the turned unit loads.
+/// Returns the geometric stiffness of the rotated unit loads.
 pub fn geometric(raw: &RawModel, turn: &Matrix3<f64>) -> Vec<GeometricStiffness<RawMatrix>> {
     let all = &raw.geometric_stiffness;
     let own = |one: &GeometricStiffness<RawMatrix>| {
@@ -149,12 +149,12 @@ pub fn geometric(raw: &RawModel, turn: &Matrix3<f64>) -> Vec<GeometricStiffness<
     all.iter().map(own).collect()
 }
 
-/// Part of the old unit load `old` in the new one.
+/// Returns the part of the old unit load `old` in the new one.
 fn share(new: &UnitLoad, old: &UnitLoad, turn: &Matrix3<f64>) -> f64 {
     match new.kind {
         LoadKind::Spin => {
             let ((k, l), (a, b)) = (LoadKind::SPIN[new.component], LoadKind::SPIN[old.component]);
-            // The coefficient of w'_k w'_l in w_a w_b with w = T' w'.
+            // Coefficient of w'_k w'_l in w_a w_b with w = T' w'.
             let product = |k: usize, l: usize| turn[(k, a)] * turn[(l, b)];
             if k == l { product(k, k) } else { product(k, l) + product(l, k) }
         }

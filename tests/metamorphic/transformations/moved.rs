@@ -1,4 +1,4 @@
-//! A subject in a world and a model that are turned, mirrored or shifted.
+//! Rotation, reflection and shift of a subject in world and model.
 
 use super::model::{conjugated, geometric};
 use super::scene::start_axes;
@@ -8,35 +8,35 @@ use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{Axes, Drive, Scene, VectorHistory};
 use nalgebra::{Matrix3, Vector3};
 
-/// A turn or mirror image of the world, and one of the model with a shift.
+/// A rotation or reflection of the world, and one of the model with a shift.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion {
-    /// World axes.
+    /// Rotation or reflection of the world axes.
     pub world: Matrix3<f64>,
-    /// Model axes.
+    /// Rotation or reflection of the model axes.
     pub model: Matrix3<f64>,
     /// Coordinates of the old origin of the model.
     pub shift: Vector3<f64>,
 }
 
 impl Motion {
-    /// A turn of the world alone.
+    /// Returns a rotation of the world alone.
     pub fn of_world(world: Matrix3<f64>) -> Self {
         Self { world, model: Matrix3::identity(), shift: Vector3::zeros() }
     }
 
-    /// A turn and a shift of the model alone.
+    /// Returns a rotation and a shift of the model alone.
     pub fn of_model(model: Matrix3<f64>, shift: Vector3<f64>) -> Self {
         Self { world: Matrix3::identity(), model, shift }
     }
 
-    /// The matrix of vectors along these axes; an axial one turns over in a mirror.
+    /// Returns the matrix for vectors along these axes; axial vectors change sign under reflection.
     fn of(&self, axes: Axes, axial: bool) -> Matrix3<f64> {
         let matrix = if axes == Axes::World { self.world } else { self.model };
         if axial { matrix * matrix.determinant() } else { matrix }
     }
 
-    /// The subject after the motion.
+    /// Returns the subject after the motion.
     pub fn applied(&self, subject: &Subject) -> Subject {
         let mut moved = subject.clone();
         moved.scene = self.scene(&subject.scene);
@@ -109,7 +109,7 @@ impl Motion {
                 *way = way.turned(&self.world);
             }
         }
-        // Attached inertia turns with the body.
+        // The attached inertia rotates with the body.
         let inertia = &mut moved.requirements.attachment.inertia;
         *inertia = self.model * *inertia * self.model.transpose();
         moved

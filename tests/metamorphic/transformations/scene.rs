@@ -21,7 +21,7 @@ pub fn axes(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let mut changed = subject.clone();
     let scene = &mut changed.scene;
     let start = start_axes(scene);
-    // Along the axes of the model: at time zero for axes that turn with the body.
+    // Transformation to model axes: at time zero for axes that rotate with the body.
     let in_model = |axes: Axes| match axes {
         Axes::World => start.transpose(),
         Axes::Model => Matrix3::identity(),
@@ -42,7 +42,7 @@ pub fn axes(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
         }
     }
     let of_spin = |velocity: &mut VectorHistory, axes: &mut Axes, start: Option<RotationVector>| {
-        // An attitude at the start is one of the frame that `axes` name.
+        // An initial attitude refers to the frame named by `axes`.
         let keeps_axes = start.is_none()
             && (velocity.direction().is_some() || (*axes != Axes::World && to != Axes::World));
         if keeps_axes {
@@ -58,7 +58,7 @@ pub fn axes(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))
 }
 
-/// Attitude of the model at the start.
+/// Returns the initial attitude of the model.
 pub fn start_axes(scene: &Scene) -> Matrix3<f64> {
     let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
     let own = scene.spin.as_ref().and_then(|spin| spin.start).or(carried.and_then(|spin| spin.start));
@@ -75,7 +75,7 @@ pub fn split(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(applies.then(|| Pair::new(subject, changed, Correspondence::default())))
 }
 
-/// Adds points to tables of straight lines, which take the place of smooth factors of loads.
+/// Adds points to piecewise linear tables, which replace smooth factors of loads.
 pub fn refine(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     const ROWS: usize = 5;
     let part = between(random, 0.2, 0.8);
@@ -108,7 +108,7 @@ pub fn refine(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok((count > 0).then(|| Pair::new(&original, changed, Correspondence::default())))
 }
 
-/// The scene from rest: no velocity and no gravity, and everything that acts or drives rises from zero.
+/// Returns the scene starting from rest: no velocity and no gravity, and all loads and drives rise from zero.
 fn from_rest(scene: &Scene, duration: f64) -> Scene {
     let mut scene = scene.clone();
     scene.gravity = None;
@@ -128,7 +128,7 @@ fn from_rest(scene: &Scene, duration: f64) -> Scene {
     scene
 }
 
-/// Starts everything later, from rest.
+/// Starts all loads and drives later, from rest.
 pub fn later(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let Some(duration) = subject.scene.run.duration else { return Ok(None) };
     let original = Subject { scene: from_rest(&subject.scene, duration), ..subject.clone() };
@@ -142,7 +142,7 @@ pub fn later(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(&original, changed, Correspondence { delayed, ..Correspondence::default() })))
 }
 
-/// Starts from a state of the motion.
+/// Starts from an intermediate state of the motion.
 pub fn restart(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let scene = &subject.scene;
     let by_acceleration = scene
@@ -199,13 +199,13 @@ fn fix_axes(scene: &mut Scene) {
     }
 }
 
-/// Has the body serve the same case several times.
+/// Repeats the load case, so that the body serves it several times.
 pub fn repeat(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let changed = Subject { cases: 2 + pick(random, 2), ..subject.clone() };
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))
 }
 
-/// Records more instants and more places.
+/// Records more times and more points.
 pub fn outputs(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let finer = 2 + pick(random, 4);
     let mut changed = subject.clone();

@@ -1,4 +1,4 @@
-//! Other units of length, mass and time.
+//! Transformation of the units of length, mass and time.
 
 use super::Pair;
 use super::histories::{Clock, Driven, for_driving};
@@ -14,7 +14,7 @@ use flexbody_motion::scene::{Range, Scene, Scheme};
 use oracle::mesh::entries;
 use oracle::random::Random;
 
-/// Numbers of a length, a mass and a time over those in the old units.
+/// Ratios of the new to the old numbers of a length, a mass and a time.
 #[derive(Debug, Clone, Copy)]
 struct Units {
     length: f64,
@@ -22,7 +22,7 @@ struct Units {
     time: f64,
 }
 
-/// Writes everything in other units.
+/// Writes all quantities in other units.
 pub fn change(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     const FACTORS: [f64; 5] = [1e-3, 0.5, 1.0, 39.37, 1e3];
     let mut factor = || FACTORS[pick(random, FACTORS.len())];
@@ -35,7 +35,7 @@ pub fn change(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
 }
 
 impl Units {
-    /// Number of a stiffness over the old one.
+    /// Returns the ratio of the new to the old number of a stiffness.
     fn stiffness(&self) -> f64 {
         self.mass / (self.time * self.time)
     }
@@ -44,7 +44,7 @@ impl Units {
         self.stiffness() * self.length
     }
 
-    /// The matrix of a model times a factor, and a length for every rotation.
+    /// Returns the matrix of a model times a factor, and a factor of length for every rotation.
     fn matrix(&self, raw: &RawModel, own: &RawMatrix, factor: f64) -> RawMatrix {
         let labels = rows(raw);
         let length = |row: u32| if labels[row as usize].direction > 3 { self.length } else { 1.0 };
@@ -86,7 +86,7 @@ impl Units {
         changed
     }
 
-    /// The new units: smaller where numbers are larger.
+    /// Returns the new units: smaller units for larger numbers.
     fn named(&self, old: &UnitSystem) -> UnitSystem {
         let name = |si: f64, factor: f64| format!("{:e}", si / factor);
         let names = [

@@ -11,13 +11,13 @@ use flexbody_motion::scene::{Drive, History, VectorHistory};
 use nalgebra::{Matrix3, Vector3};
 use oracle::random::Random;
 
-/// A random turn, of a plane model in its plane.
+/// Returns a random rotation; for a plane model in its plane.
 pub fn turning(subject: &Subject, random: &mut Random) -> Matrix3<f64> {
     let turn = axis(random, subject.dimension()) * between(random, 0.2, 3.0);
     RotationVector(turn).axes()
 }
 
-/// Turns the world about its origin.
+/// Rotates the world about its origin.
 pub fn turn(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let world = turning(subject, random);
     let map = Correspondence { world, ..Correspondence::default() };
@@ -33,13 +33,13 @@ pub fn shift(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(subject, changed, Correspondence { shift, ..Correspondence::default() })))
 }
 
-/// Sees the motion from an observer at constant velocity.
+/// Observes the motion from a frame with constant velocity.
 pub fn boost(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let Some(duration) = subject.scene.run.duration else { return Ok(None) };
     let by = direction(random, subject.dimension()) * (extent(subject) / duration);
     let mut original = subject.clone();
     original.scene.spin.iter_mut().for_each(|spin| spin.hold = false);
-    // A velocity along a direction of its own cannot be added to another motion.
+    // A velocity along one direction cannot be added to another prescribed motion.
     original.scene.carried.iter_mut().for_each(|carried| carried.translation = None);
     let mut changed = original.clone();
     match &mut changed.scene.carried {
@@ -50,7 +50,8 @@ pub fn boost(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(&original, changed, Correspondence { shift, ..Correspondence::default() })))
 }
 
-/// Sees the motion from an observer that falls: uniform gravity and an acceleration of what carries the body are one.
+/// Observes the motion from a falling frame: uniform gravity and an acceleration of the carrier are
+/// equivalent.
 pub fn accelerate(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let Some(duration) = subject.scene.run.duration else { return Ok(None) };
     let size = 0.1 * extent(subject) / (duration * duration);
@@ -69,7 +70,7 @@ pub fn accelerate(subject: &Subject, random: &mut Random) -> Result<Option<Pair>
     Ok(Some(Pair::new(&original, changed, Correspondence { shift, ..Correspondence::default() })))
 }
 
-/// Mirrors the world and the model in planes of their own.
+/// Mirrors the world and the model in separate planes.
 pub fn mirror(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let image = |random: &mut Random| {
         let normal = direction(random, subject.dimension());
@@ -81,7 +82,7 @@ pub fn mirror(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(subject, motion.applied(subject), map)))
 }
 
-/// Largest distance of two nodes along an axis of the model.
+/// Returns the largest distance of two nodes along an axis of the model.
 pub fn extent(subject: &Subject) -> f64 {
     let along = |k: usize| subject.raw.nodes.positions.iter().map(move |x| x[k]);
     let width = |k: usize| along(k).fold(f64::MIN, f64::max) - along(k).fold(f64::MAX, f64::min);

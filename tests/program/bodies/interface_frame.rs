@@ -1,5 +1,5 @@
-//! Bodies whose frame stands on an interface: against dense solutions of the model held there, against the same body in
-//! mean axes, and through files.
+//! Bodies with a frame at an interface, compared with dense solutions of the model held there, with the body
+//! in mean axes, and after a round trip through files.
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
@@ -23,7 +23,7 @@ use oracle::random::Random;
 const SOFT: Material = Material { youngs: 1e7, poisson: 0.0, density: 1000.0 };
 const ALL: usize = 54;
 
-/// A turned bar with the interfaces `root` and `tip` at its ends.
+/// Returns a rotated bar with the interfaces `root` and `tip` at its ends.
 fn bar() -> RawModel {
     let straight = Mesh::block(ElementKind::Hex8, [4, 1, 1], [1.0, 0.2, 0.16]);
     let turned = straight.moved(&Random(7).rotation(), [3.0, -1.0, 0.5]);
@@ -73,7 +73,8 @@ fn with_all_modes_the_eigenvalues_are_those_of_the_held_model() {
     assert!(names.contains(&"frame_on_interface") && !names.contains(&"c1_zero"), "{names:?}");
 }
 
-/// Every kind of model: solids, shells, beams with rotary inertia, the plane; free modes and Craig-Bampton.
+/// Covers every kind of model: solids, shells, beams with rotary inertia, the plane; free modes and
+/// Craig-Bampton.
 #[test]
 fn every_identity_holds_for_every_kind_of_model() {
     let mut plane = rectangle(5, 2, 0.7, [1.0, 2.0]);
@@ -98,7 +99,7 @@ fn every_identity_holds_for_every_kind_of_model() {
             assert_eq!(failed(own_identities(&body)), Vec::<String>::new(), "{what}");
             assert_eq!(failed(verify(&body, &model).expect("comparable")), Vec::<String>::new(), "{what}");
             is_the_body_in_mean_axes(&body, &model, basis, &what);
-            // A file holds it bit by bit.
+            // The file stores the body bit by bit.
             let folder = tempfile::tempdir().expect("a folder");
             let path = folder.path().join("body.flex.h5");
             flexbody_file::write(&body, &path).expect("written");
@@ -107,15 +108,15 @@ fn every_identity_holds_for_every_kind_of_model() {
     }
 }
 
-/// The body in mean axes has the eigenvalues of the body that was made in mean axes.
+/// Asserts that the body transformed to mean axes has the eigenvalues of a body converted in mean axes.
 fn is_the_body_in_mean_axes(body: &FlexBody, model: &FeModel, basis: BasisChoice, what: &str) {
     let mut settings = ConvertSettings { basis, frame: BodyFrame::Com.into(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(8);
     let expected = convert(model, &settings, &Context::QUIET).expect("a body").body;
     let mean = body.in_mean_axes_at(BodyFrame::Com).expect(what);
     assert_eq!(failed(mean.identities(BodyFrame::Com)), Vec::<String>::new(), "{what}");
-    // Free modes are the lowest of their span whatever the frame was.
-    // What digits leave of rigid motion in K is in the modes of the held body.
+    // Free modes are the lowest of their span in any frame; the rounding of rigid motion in K affects the
+    // modes of the held body.
     let limit = 1e-8 + 10.0 * expected.certificate().rigid_noise;
     for (own, expected) in mean.modes().eigenvalue.iter().zip(&expected.modes().eigenvalue) {
         assert!((own / expected - 1.0).abs() < limit, "{what}: {own:e}, {expected:e}");
@@ -144,7 +145,7 @@ fn what_no_frame_can_stand_on_is_refused() {
     assert!(convert(&model, &settings, &Context::QUIET).expect_err("bounds").has(Code::Usage));
 }
 
-/// All numbers of a JSON value, in order.
+/// Collects all numbers of a JSON value in order.
 fn numbers(value: &serde_json::Value, into: &mut Vec<f64>) {
     match value {
         serde_json::Value::Number(number) => into.push(number.as_f64().expect("a float")),
@@ -157,7 +158,7 @@ fn numbers(value: &serde_json::Value, into: &mut Vec<f64>) {
     }
 }
 
-/// The command, and what other commands make of its body.
+/// The command, and the use of its body by other commands.
 #[test]
 fn the_command_makes_a_body_on_an_interface() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -174,10 +175,10 @@ fn the_command_makes_a_body_on_an_interface() {
     assert_eq!(code, Some(0), "{err}");
     assert!(out.contains("the frame stands on interface `bolt_base`"), "{out}");
     assert_eq!(convert(&["-o", "mean.flex.h5"]).0, Some(0));
-    // Against the model all invariants and modes hold.
+    // Against the model all identities of invariants and modes hold.
     let (code, out, _) = run(&["check", "held.flex.h5", "--against", model]);
     assert!(code == Some(0) && out.contains("frame_on_interface") && !out.contains("c1_zero"), "{out}");
-    // The response is that of the same body whatever its frame.
+    // The response does not depend on the frame of the body.
     let response = |body: &str| {
         let places = ["--from", "bolt_wall:x", "--to", "bolt_base:z", "--band", "100..2000", "--json"];
         let (code, out, err) = run(&[&["response", body], &places[..]].concat());
@@ -192,7 +193,7 @@ fn the_command_makes_a_body_on_an_interface() {
     for (a, b) in held.iter().zip(&mean) {
         assert!((a - b).abs() <= 1e-6 * a.abs().max(b.abs()), "{a} {b}");
     }
-    // So is a motion.
+    // The motion does not depend on the frame either.
     let scene = "[run]\nduration = 0.0005\n[initial]\nangular_velocity = [30.0, 10.0, 0.0]\n[[load]]\ninterface = \"bolt_wall\"\nforce = [5.0, 0.0, 1.0]\n[[watch]]\ninterface = \"bolt_base\"\n";
     std::fs::write(folder.path().join("scene.toml"), scene).expect("written");
     let motion = |body: &str| {
@@ -210,7 +211,7 @@ fn the_command_makes_a_body_on_an_interface() {
     for (a, b) in held.iter().zip(&mean) {
         assert!((a - b).abs() <= 1e-6 * a.abs().max(b.abs()) + 1e-12, "{held:?}, {mean:?}");
     }
-    // Selections and trades are about modes of free bodies; what cannot stand anywhere is refused.
+    // Selections and trade studies need modes of free bodies; unsupported exports are refused.
     for words in [
         &["select", "held.flex.h5", "--scene", "scene.toml"][..],
         &["trade", "held.flex.h5", "--scene", "scene.toml"],
@@ -231,7 +232,7 @@ fn the_command_makes_a_body_on_an_interface() {
         let (code, _, err) = run(words);
         assert!(code == Some(2) && err.contains("stands on interface `bolt_base`"), "{words:?}: {err}");
     }
-    // Written for another program and read again: kept, in mean axes, and on the node of the other interface.
+    // Exported and imported again: with the frame kept, in mean axes, and at the node of the other interface.
     let words = |line: &str| run(&line.split(' ').collect::<Vec<_>>());
     for line in [
         "export held.flex.h5 --to sid -o held.SID_FEM",

@@ -1,3 +1,3 @@
-//! Bodies, as the program converts them.
+//! Bodies converted by the program.
 
 mod interface_frame;

@@ -1,4 +1,4 @@
-//! `flexbody export`, `audit` and `convert --from` as a user runs them.
+//! Commands `flexbody export`, `audit` and `convert --from`.
 
 use crate::program::flexbody;
 use oracle::fixtures;
@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-/// `body.flex.h5` in the folder `place`, of a bracket with interfaces.
+/// Makes `body.flex.h5` in the folder `place`, from a bracket with interfaces.
 fn prepare(place: &Path) {
     let manifest = fixtures().join("models/bracket_hex20/model.toml");
     let manifest = manifest.to_str().expect("a path");
@@ -65,7 +65,7 @@ fn files_that_belong_beside_appear_with_it_and_replace_no_input() {
     prepare(place);
     assert_eq!(code(&run(place, "export body.flex.h5 --to embedded -o body.bin")), 0);
     assert_eq!(names(place), ["body.bin", "body.flex.h5", "body.h"]);
-    // A program that joins the interfaces, named so that Python can import it.
+    // The accompanying program has a name that Python can import.
     assert_eq!(code(&run(place, "export body.flex.h5 --to exudyn -o rod.v2.hdf5")), 0);
     assert_eq!(names(place), ["body.bin", "body.flex.h5", "body.h", "rod.v2.hdf5", "rod.v2_exudyn.py"]);
     let before = fs::read(place.join("body.flex.h5")).expect("a body");
@@ -127,7 +127,7 @@ fn a_body_goes_out_and_comes_back_in_other_units() {
     assert_eq!(code(&back), 0, "{}", errors(&back));
     assert!(fs::read_to_string(place.join("back.txt")).expect("a report").contains("nodes or frames"));
     assert_eq!(code(&run(place, "check back.flex.h5")), 0);
-    // Units of its own are no error of the body: the way back into them is the body again.
+    // Other units are no error of the body: conversion back into them gives the body again.
     assert_eq!(
         code(&run(
             place,

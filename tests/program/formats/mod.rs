@@ -1,4 +1,4 @@
-//! Files of other programs, as the program writes and reads them.
+//! Files of other programs, written and read by the program.
 
 mod exchange_command;
 mod export_pictures;

@@ -1,5 +1,5 @@
-//! Bodies whose large arrays are 32-bit floats: what is measured is what the file holds, and checks know its
-//! rounding and no more.
+//! Bodies with large arrays in 32-bit floats: measurements apply to the stored numbers, and checks allow for
+//! their rounding only.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::ModeSettings;
@@ -57,7 +57,7 @@ fn rounded_bodies_are_read_bit_for_bit_and_pass_their_checks() {
         assert_eq!((body.storage(), short.storage()), (Storage::F64, Storage::F32));
         assert_eq!(short.rounded_to_f32().expect("a body"), short, "rounded once is rounded");
         for (what, difference) in primary_differences(body.invariants(), short.invariants()) {
-            // Sums of rounded entries make m_ff and the like.
+            // Entries of m_ff and similar matrices are sums of rounded entries.
             assert!(difference <= 3.0 * UNIT, "{name}: {what} {difference:e}");
         }
         for groups in combinations() {
@@ -84,7 +84,7 @@ fn rounded_bodies_are_read_bit_for_bit_and_pass_their_checks() {
             .cloned()
             .collect();
         assert!(failed.is_empty(), "{name}: {failed:?}");
-        // A rounding that was not said fails.
+        // Undeclared rounding fails.
         let mut parts = short.into_parts();
         parts.storage = Storage::F64;
         let unsaid = FlexBody::new(parts).expect("a body");
@@ -129,7 +129,7 @@ fn what_32_bits_cannot_hold_is_refused() {
     let error = FlexBody::new(parts).expect("a body").rounded_to_f32().expect_err("too large");
     assert_eq!(error.diagnostics()[0].code(), Code::BodySchema);
     assert!(error.to_string().contains("`modes.shape` has the value inf"), "{error}");
-    // The guarantee of certified bodies is about other numbers.
+    // The guarantee of certified bodies applies to the unrounded numbers.
     let certified = oracle::file_bodies::body(1, 3, 3, 0, 1);
     assert!(certified.certificate().guarantee.is_some());
     let short = certified.rounded_to_f32().expect("moderate numbers");
@@ -163,7 +163,7 @@ fn files_must_be_stored_as_they_say() {
     says(refused(&body, |f| say(f, "f32")), "/modes/shape: expected 32-bit floats, found type float64");
     says(refused(&short, |f| say(f, "f64")), "/modes/shape: expected 64-bit floats, found type float32");
     says(refused(&short, |f| say(f, "f16")), "/@storage: expected `f64` or `f32`, found \"f16\"");
-    // Derived arrays may differ by their own rounding, and by no more.
+    // Derived arrays may differ by their own rounding only.
     let error = refused(&short, |f| {
         let w2 = f.dataset("invariants/W2").expect("a dataset");
         let mut values: Vec<f32> = w2.read_raw().expect("values");

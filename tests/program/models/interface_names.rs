@@ -1,4 +1,4 @@
-//! Names of interfaces are data: whatever they are, the file gives them back.
+//! Names of interfaces are arbitrary text that the file returns unchanged.
 
 use flexbody_base::diagnostic::Code;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 const NAMES: [&str; 7] = ["left/right", "50%", "%2F", "..", ".", "Lager außen", "a.b c"];
 
-/// A folder with a manifest of the cube of the fixtures, with an interface of each name.
+/// Creates a folder with a manifest of the cube of the fixtures, with an interface of each name.
 fn model(names: &[&str]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let cube = oracle::fixtures().join("models/cube_hex8");
@@ -19,7 +19,7 @@ fn model(names: &[&str]) -> tempfile::TempDir {
     let nodes = std::fs::read_to_string(folder.path().join("nodes.csv")).expect("nodes");
     let ids: Vec<&str> = nodes.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
     for (i, name) in names.iter().enumerate() {
-        // Far apart, not on a line.
+        // The nodes are far apart and not on a line.
         let ids: Vec<&str> = ids.iter().skip(i).step_by(ids.len() / 5).take(4).copied().collect();
         text += &format!("\n[[interface]]\nname = {name:?}\nnodes = [{}]\n", ids.join(", "));
     }
@@ -53,7 +53,7 @@ fn any_name_comes_back_from_the_file_and_from_exports() {
         let output =
             run(folder.path(), &["export", "b.flex.h5", "--to", format, "-o", &file, "--allow-loss"]);
         let said = String::from_utf8_lossy(&output.stderr);
-        // Formats in the motions of interfaces refuse a body of free modes.
+        // Formats with matrices in interface motions refuse a body of free modes.
         let refused =
             output.status.code() == Some(2) && said.contains("needs K and M in the motions of frames");
         assert!(output.status.success() || refused, "{format}: {said}");

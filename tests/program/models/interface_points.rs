@@ -1,4 +1,4 @@
-//! Where the reference point of an interface lies: on its axis, at its centre, or where it is stated.
+//! Reference points of interfaces: on the axis, at the centre, or at a stated position.
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
@@ -21,8 +21,8 @@ use std::path::Path;
 const RADIUS: f64 = 0.01;
 const CENTRE: [f64; 3] = [0.3, -0.2, 0.05];
 
-/// A plate with a hole about the axis through [`CENTRE`] along z, of tetrahedra, which are five times as fine on one
-/// side; with its surface and the nodes of the hole.
+/// Returns a plate of tetrahedra with a hole about the axis through [`CENTRE`] along z, meshed five times as
+/// fine on one side; with its surface and the nodes of the hole.
 fn plate() -> (RawModel, Vec<i64>) {
     const AROUND: i32 = 48;
     let map = |[r, t, z]: [f64; 3]| {
@@ -61,8 +61,8 @@ fn body_of(model: &FeModel, basis: BasisChoice) -> FlexBody {
         .body
 }
 
-/// The mean of the nodes is half of the radius beside the axis, the centre of the faces is on it; the coupling is about
-/// this point.
+/// The mean of the nodes is half a radius off the axis, the centre of the faces is on it; the coupling refers
+/// to the latter.
 #[test]
 fn the_centre_of_a_hole_is_that_of_its_faces() {
     let (mut raw, bore) = plate();
@@ -85,8 +85,8 @@ fn the_centre_of_a_hole_is_that_of_its_faces() {
     assert!(away(mean, CENTRE) > 0.2 * RADIUS, "{mean:?}");
 }
 
-/// The rim of the hole has edges and no faces; a stated point is taken as it is, without a warning, and a free interface
-/// has none.
+/// The rim of the hole has edges and no faces; a stated point is used without a warning, and a free interface
+/// has no point.
 #[test]
 fn rims_have_the_centre_of_their_edges_and_stated_points_stay() {
     let (mut raw, bore) = plate();
@@ -112,7 +112,7 @@ fn rims_have_the_centre_of_their_edges_and_stated_points_stay() {
     assert!(matches!(told[..], [one] if one.contains("`rim`") && one.contains("of its edges")), "{told:?}");
 }
 
-/// A folder with the cube of the fixtures and `more` in its manifest.
+/// Creates a folder with the cube of the fixtures and `more` in its manifest.
 fn cube(more: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     for entry in fs::read_dir(fixtures().join("models/cube_hex8")).expect("the fixture") {
@@ -130,7 +130,7 @@ fn cube_model(folder: &Path) -> FeModel {
     checked(read_model(&files).expect("a model")).model
 }
 
-/// Half of the nodes about an axis still have their point on it, in the middle of their extent.
+/// Half of the nodes about an axis have their point on the axis, in the middle of their extent.
 #[test]
 fn a_cylinder_has_its_point_on_its_axis() {
     let region = |coupling: &str| {
@@ -152,7 +152,7 @@ fn a_cylinder_has_its_point_on_its_axis() {
     assert_eq!(cube_model(free.path()).interfaces()[0].reference.point(), None);
 }
 
-/// A body that an earlier version made has the mean of the nodes: it is that of the same model.
+/// A body of an earlier version has its point at the mean of the nodes and is consistent with the same model.
 #[test]
 fn bodies_of_earlier_versions_keep_the_mean_of_the_nodes() {
     let (raw, bore) = plate();
@@ -174,7 +174,7 @@ fn bodies_of_earlier_versions_keep_the_mean_of_the_nodes() {
     assert!(!holds(&with(Reference::Point(CENTRE))));
 }
 
-/// The command line states a point, and terminal, `inspect` and JSON have it in model axes.
+/// The command line states a point; terminal, `inspect` and JSON show it in model axes.
 #[test]
 fn the_point_of_a_set_is_stated_and_told() {
     let folder = tempfile::tempdir().expect("a folder");

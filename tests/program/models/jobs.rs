@@ -1,4 +1,4 @@
-//! Jobs of FE programs: matrices, labels, node sets and regions from what the programs have written.
+//! Jobs of FE programs: matrices, labels, node sets and regions from the files of the programs.
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
@@ -24,8 +24,8 @@ fn assert_is_the_block(body: &FlexBody) {
     assert_has_inertia_of_the_block(body, 1e-11);
 }
 
-/// Bricks with incompatible modes, whose internal rows CalculiX numbers beyond the nodes of the deck, an
-/// included file, and a rigid body, whose rotation node stands for rotations of its reference node.
+/// Bricks with incompatible modes, whose internal rows CalculiX numbers above the nodes of the deck; an
+/// included file; and a rigid body whose rotation node represents the rotations of its reference node.
 #[test]
 fn a_job_of_calculix_is_read_with_its_internal_rows_and_rotations() {
     let raw = job(&small("calculix"), vec![set("right", "RIGHT"), set("all", "ALL")]);
@@ -45,8 +45,8 @@ fn a_job_of_calculix_is_read_with_its_internal_rows_and_rotations() {
     assert_is_the_block(&body(raw, 6));
 }
 
-/// The reference node of a distributing coupling is the weighted mean of its nodes, wherever the deck puts it: the body is
-/// that of the block without the coupling, in other coordinates.
+/// The reference node of a distributing coupling is the weighted mean of its nodes, whatever its position in
+/// the deck: the body is the block without the coupling, in other coordinates.
 #[test]
 fn a_distributing_coupling_has_its_node_at_the_mean_of_its_nodes() {
     let raw = job(&small("calculix_distributing"), Vec::new());
@@ -63,13 +63,14 @@ fn a_distributing_coupling_has_its_node_at_the_mean_of_its_nodes() {
     for (a, b) in coupled.modes().eigenvalue.iter().zip(&free.modes().eigenvalue) {
         assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
     }
-    // The first node of the coupling has no rows: an interface has three nodes, about the centre of all four.
+    // The first node of the coupling has no rows, so that the interface has three nodes, about the centre of
+    // all four.
     let end = job(&small("calculix_distributing"), vec![set("end", "left")]);
     let model = FeModel::from_raw(end).expect("a body").model;
     assert_eq!(model.interfaces()[0].nodes, [17, 14, 20]);
     let point = model.interfaces()[0].reference.point().expect("a point");
     assert!(point.iter().zip([0.0, 0.04, 0.03]).all(|(a, b)| (a - b).abs() < 1e-16), "{point:?}");
-    // What names no reference node, or no nodes, is refused with its line.
+    // A coupling without a reference node or nodes is refused with its line.
     let place = tempfile::tempdir().expect("a folder");
     copy_job("calculix_distributing", place.path());
     let deck = place.path().join("job.inp");
@@ -90,8 +91,8 @@ fn a_distributing_coupling_has_its_node_at_the_mean_of_its_nodes() {
     }
 }
 
-/// Each of two kinematic couplings gives its reference node the rotations that CalculiX labels as displacements
-/// of a node that the deck does not have, and they are those of *RIGID BODY with ROT NODE.
+/// Each of two kinematic couplings gives its reference node the rotations that CalculiX labels as
+/// displacements of a node outside the deck. They equal those of *RIGID BODY with ROT NODE.
 #[test]
 fn kinematic_couplings_have_the_rotations_of_their_reference_nodes() {
     let raw = job(&small("calculix_couplings"), Vec::new());
@@ -101,7 +102,7 @@ fn kinematic_couplings_have_the_rotations_of_their_reference_nodes() {
     for (node, directions) in [(900, 1..7), (970, 1..7), (971, 1..1), (980, 1..1), (985, 1..4)] {
         assert_eq!(of(node), directions.collect::<Vec<u8>>(), "{node}");
     }
-    // The reference nodes stand beside their faces, so that a turn moves the mass that follows them, and no
+    // The reference nodes lie beside their faces, so that a rotation moves the mass of that face and no
     // other.
     let row = |node, direction| {
         labels.iter().position(|own| (own.node, own.direction) == (node, direction)).expect("a row")
@@ -128,7 +129,7 @@ fn kinematic_couplings_have_the_rotations_of_their_reference_nodes() {
     assert_eq!(job(&deck, Vec::new()).dofs.expect("labels"), labels);
 }
 
-/// A reference node may be named by a set, and a deck whose couplings do not explain the rows is refused.
+/// A set may name the reference node, and a deck whose couplings do not explain the rows is refused.
 #[test]
 fn couplings_that_do_not_explain_the_rows_are_refused() {
     let place = tempfile::tempdir().expect("a folder");
@@ -170,9 +171,9 @@ fn couplings_that_do_not_explain_the_rows_are_refused() {
     }
 }
 
-/// Shells that CalculiX expands into solids: the nodes between the faces lie where the deck says, those on
-/// the faces half a thickness beside it. Mass and inertia are those of the plate, frequencies those of
-/// CalculiX's own table.
+/// Shells that CalculiX expands into solids: the nodes between the faces lie at the positions of the deck,
+/// those on the faces half a thickness beside them. Mass and inertia agree with the plate, frequencies with
+/// the table printed by CalculiX.
 #[test]
 fn quadratic_shells_of_calculix_are_told_apart() {
     let raw = job(&small("calculix_shells"), vec![set("left", "LEFT")]);
@@ -194,7 +195,7 @@ fn quadratic_shells_of_calculix_are_told_apart() {
     }
 }
 
-/// The same matrices without labels and with: rows and places come from the part and its instance.
+/// Matrices with and without labels give one model: rows and positions come from the part and its instance.
 #[test]
 fn both_forms_of_abaqus_are_one_model() {
     let bodies = ["abaqus", "abaqus_labels"].map(|name| {
@@ -251,7 +252,7 @@ fn manifests_and_command_lines_take_jobs() {
     ];
     let run = flexbody(place, &two);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    // The manifest names more interfaces, and no coupling; all else is the same body.
+    // The manifest names more interfaces, and no coupling; otherwise the bodies are equal.
     let compared = flexbody(place, &["compare", "one.flex.h5", "two.flex.h5"]);
     let told = String::from_utf8_lossy(&compared.stdout);
     let differing: Vec<&str> = told.lines().filter(|line| line.ends_with("DIFFERS")).collect();
@@ -265,8 +266,7 @@ fn manifests_and_command_lines_take_jobs() {
     assert_eq!(run.status.code(), Some(2));
 }
 
-/// Every command that takes a model takes a job in its place, with what a manifest would say of it as
-/// options.
+/// Every command that takes a model also takes a job, with the settings of a manifest as options.
 #[test]
 fn jobs_stand_for_manifests_in_every_command() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -316,7 +316,7 @@ fn regions_hold_their_nodes_in_the_order_of_the_model() {
     assert_eq!(region.nodes(nodes.into_iter()), [9, 2]);
 }
 
-/// Jobs of the programs themselves, where they are there; frequencies as CalculiX has printed them.
+/// Jobs of the FE programs themselves, if available, give the frequencies printed by CalculiX.
 #[test]
 fn jobs_of_the_programs_give_what_the_programs_say() {
     let samples = oracle::shared().join("samples");
@@ -331,7 +331,7 @@ fn jobs_of_the_programs_give_what_the_programs_say() {
     for (own, printed) in beam.modes().eigenvalue.iter().zip(printed) {
         assert!((own / printed - 1.0).abs() < 2e-7, "{own} {printed}");
     }
-    // Lumped masses of steel discs and aluminium blocks, as the decks describe them.
+    // The expected masses are those of steel discs and aluminium blocks described by the decks.
     let block = body(job(&samples.join("abaqus/blockC3D4.inp"), vec![set("all", "Set-1")]), 6);
     assert!((block.invariants().mass() / (2900.0 * 4.0) - 1.0).abs() < 1e-6, "{}", block.invariants().mass());
     let rotor = body(job(&samples.join("abaqus/rotorDiscTest.inp"), Vec::new()), 6);
@@ -341,7 +341,7 @@ fn jobs_of_the_programs_give_what_the_programs_say() {
 /// Main files of the jobs of the fixtures.
 const MAIN_FILES: [&str; 3] = ["job.inp", "job.bdf", "job.pch"];
 
-/// Folder and name of every file of the jobs of the fixtures; each FE program has a folder of its name.
+/// Returns folder and name of every job file of the fixtures; each FE program has a folder of its name.
 fn job_files() -> Vec<(String, String)> {
     let small = fixtures().join("small");
     for program in job_programs() {
@@ -366,7 +366,7 @@ fn job_files() -> Vec<(String, String)> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Damaged files of jobs are read or refused, nothing else.
+    /// Damaged job files are read or refused and never cause a panic.
     #[test]
     fn damaged_jobs_never_panic(
         (folder, file) in prop::sample::select(job_files()),

@@ -1,5 +1,5 @@
-//! What a manifest says beside the matrices, through the program: residual vectors and geometric stiffness;
-//! and the same on the command line.
+//! Settings of a manifest other than the matrices: residual vectors and geometric stiffness, in the manifest
+//! and on the command line.
 
 use flexbody_linalg::CscMatrix;
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 
-/// Runs `flexbody` in `folder` with the words of `line`: exit code, stdout, stderr.
+/// Runs `flexbody` in `folder` with the words of `line`; returns exit code, stdout, stderr.
 fn flexbody(folder: &Path, line: &str) -> (i32, String, String) {
     let run = Command::new(env!("CARGO_BIN_EXE_flexbody"))
         .args(line.split_whitespace())
@@ -26,12 +26,12 @@ fn json(folder: &Path, line: &str) -> Value {
     let (code, out, err) = flexbody(folder, line);
     assert_eq!(code, 0, "{line}: {out}{err}");
     let mut told: Value = serde_json::from_str(&out).expect("JSON");
-    // Of --json, what the command found.
+    // The results of the JSON output.
     told.get_mut("results").map(Value::take).unwrap_or(told)
 }
 
-/// A block with two interfaces, nodal loads `F.mtx`, a geometric stiffness `Kg.mtx`, and `more` at the end of
-/// the manifest.
+/// Creates a block with two interfaces, nodal loads `F.mtx`, a geometric stiffness `Kg.mtx`, and `more` at
+/// the end of the manifest.
 fn model(more: &str) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let mesh = Mesh::block(ElementKind::Hex8, [4, 2, 1], [0.4, 0.15, 0.1]);
@@ -94,7 +94,7 @@ fn residual_vectors_of_the_manifest_are_those_of_the_command_line_which_replaces
 
     let replaced = run(&stated, "--residual-vectors interfaces");
     assert!(loads(&replaced).iter().all(|name| name.starts_with("left") || name.starts_with("tip")));
-    // Without any the report says what free modes lack at the interfaces.
+    // Without residual vectors the report states the truncation errors of free modes at the interfaces.
     let without = run(&stated, "--residual-vectors=");
     assert_eq!(loads(&without).len(), 12);
     assert_eq!(without["model"]["settings"]["residual_vectors"], serde_json::json!([]));
@@ -153,7 +153,7 @@ fn geometric_stiffness_goes_from_the_manifest_to_the_file_and_is_recomputed() {
     assert_eq!(group["attributes"]["load_units"], "kg m s^-2");
     assert_eq!(group["datasets"]["stiffness"]["shape"], serde_json::json!([8, 8]));
 
-    // Stretched twice as much: the file no longer fits the model.
+    // Doubled geometric stiffness: the file no longer agrees with the model.
     let stretched = fs::read_to_string(path.join("Kg2.mtx")).expect("a matrix");
     let doubled = |(at, line): (usize, &str)| match (at, line.rsplit_once(' ')) {
         (2.., Some((place, value))) => format!("{place} {}\n", 2.0 * value.parse::<f64>().expect("a number")),

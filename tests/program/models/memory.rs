@@ -1,4 +1,4 @@
-//! Memory as the program tells it before the work, and what it does when there is too little.
+//! Memory estimates before the work, and the behaviour with too little memory.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::ExitCode;
@@ -21,15 +21,15 @@ fn block(cells: [i32; 3], size: [f64; 3]) -> Assembly {
     Mesh::block(ElementKind::Hex8, cells, size).assemble(&Material::STEEL, MassRule::Consistent)
 }
 
-/// A folder with a cube of 20 577 degrees of freedom, whose factor weighs more than its modes.
+/// Creates a folder with a cube of 20 577 degrees of freedom, whose factor is larger than its modes.
 fn cube() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     write_model(folder.path(), &block([18; 3], [1.0; 3]).raw_model(), Triangle::Lower);
     folder
 }
 
-/// Runs `flexbody convert model.toml -o b.h5` on one thread, where memory does not depend on who gets the
-/// processor.
+/// Runs `flexbody convert model.toml -o b.h5` on one thread, so that memory does not depend on the
+/// scheduling.
 fn convert(folder: &Path, options: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_flexbody"))
         .args(["convert", "model.toml", "-o", "b.h5", "--threads", "1"])
@@ -39,7 +39,7 @@ fn convert(folder: &Path, options: &str) -> Output {
         .expect("the program")
 }
 
-/// The report of a run that succeeds.
+/// Returns the report of a successful run.
 fn report(folder: &Path, options: &str) -> Value {
     let output = convert(folder, &format!("{options} --json"));
     assert!(output.status.success(), "{options}: {output:?}");
@@ -50,7 +50,7 @@ fn estimate(report: &Value) -> f64 {
     report["run"]["memory_estimate_bytes"].as_f64().expect("an estimate")
 }
 
-/// The peak of a run beside its estimate.
+/// Returns the peak memory of a run over its estimate.
 fn peak_over_estimate(report: &Value) -> f64 {
     report["run"]["peak_memory_bytes"].as_f64().expect("a peak") / estimate(report)
 }
@@ -68,7 +68,7 @@ fn the_peak_is_within_15_percent_of_the_estimate() {
     }
 }
 
-/// Too high an estimate refuses bodies that there is room for.
+/// Overestimates would refuse bodies that fit.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "slow"]
@@ -110,7 +110,7 @@ fn where_nothing_fits_the_numbers_are_told_before_any_work() {
     assert_eq!(*phases.lock().expect("one thread"), ["ordering"], "nothing was factored");
 }
 
-/// In the library, where nothing but the plan decides: what reading leaves behind differs from run to run of
+/// Runs in the library, where only the plan decides; the memory left over from reading varies between runs of
 /// the program.
 #[test]
 #[ignore = "slow"]
@@ -152,7 +152,7 @@ fn a_proof_that_does_not_fit_is_left_out_and_that_is_said_everywhere() {
     let model = check(block([26; 3], [1.0; 3]).raw_model()).expect("a sound model").model;
     let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
     let run = |accuracy, memory| {
-        // A search without a factor takes less than any count.
+        // A search without a factor needs less memory than any count.
         let modes = ModeSettings {
             wanted: Wanted::Lowest(2),
             accuracy,
@@ -171,7 +171,7 @@ fn a_proof_that_does_not_fit_is_left_out_and_that_is_said_everywhere() {
     assert!(limit < bytes(&all), "room for the search only: {limit} {}", bytes(&all));
     let found = run(Accuracy::Standard, Some(limit));
     assert_eq!(bytes(&found), bytes(&search));
-    // The modes keep their promise all the same.
+    // The modes keep their accuracy.
     assert_eq!(found.body.modes().eigenvalue, all.body.modes().eigenvalue);
     let why = "the count needs ";
     let warning =

@@ -1,4 +1,4 @@
-//! Models and their files, as the program reads them.
+//! Models and their files, as read by the program.
 
 mod interface_names;
 mod interface_points;

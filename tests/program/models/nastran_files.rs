@@ -29,7 +29,8 @@ fn replace(path: &Path, old: &str, new: &str) {
     fs::write(path, text.replace(old, new)).expect("written");
 }
 
-/// Files of matrices belong to the deck whose name they have; what a number or another deck tells apart does not.
+/// Matrix files belong to the deck with the same name, except those distinguished by a number or another
+/// deck.
 #[test]
 fn matrices_of_another_job_are_not_taken() {
     let (folder, path) = copied("nastran_op4");
@@ -57,7 +58,7 @@ fn matrices_of_another_job_are_not_taken() {
     assert!(read(&path).expect_err("those of the other deck").has(Code::JobIncomplete));
 }
 
-/// Text of a dense OUTPUT4 matrix.
+/// Returns the text of a dense OUTPUT4 matrix.
 fn output4(name: &str, n: usize, entry: impl Fn(usize, usize) -> f64) -> String {
     let mut text = format!("{n:8}{n:8}{:8}{:8}{name:8}1P,3E24.16\n", 6, 2);
     for j in 0..n {
@@ -70,7 +71,7 @@ fn output4(name: &str, n: usize, entry: impl Fn(usize, usize) -> f64) -> String 
     text + &format!("{:8}{:8}{:8}\n{:24.16E}\n", n + 1, 1, 1, 1.0)
 }
 
-/// Matrices of one row, empty ones and loads are no pair; of several pairs the user names one.
+/// Matrices with one row, empty matrices and loads form no pair; the user selects one of several pairs.
 #[test]
 fn of_several_pairs_one_is_named() {
     let (folder, path) = copied("nastran_op4");
@@ -129,7 +130,7 @@ fn of_several_pairs_one_is_named() {
     }
 }
 
-/// OUTPUT4 in words of eight bytes has four letters of a name in each.
+/// OUTPUT4 with eight-byte words has four letters of a name in each word.
 #[test]
 fn names_in_words_of_eight_bytes_are_whole() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -159,7 +160,7 @@ fn names_in_words_of_eight_bytes_are_whole() {
     }
 }
 
-/// The rows of a punch file that is read by itself are not those of its loads.
+/// The rows of a separately read punch file exclude those of its loads.
 #[test]
 fn loads_of_a_punch_file_are_no_rows() {
     let (folder, _) = copied("nastran");
@@ -171,7 +172,7 @@ fn loads_of_a_punch_file_are_no_rows() {
     assert_eq!(read_matrix(&location, MatrixRole::Stiffness).expect("a matrix").matrix.n_cols(), 36);
 }
 
-/// Continuations have names in any case, and stand anywhere in the file.
+/// Continuation names may have any case, and continuations may be anywhere in the file.
 #[test]
 fn continuations_are_found_by_their_names() {
     let (_folder, path) = copied("nastran_op4");
@@ -191,7 +192,7 @@ fn continuations_are_found_by_their_names() {
         let with_grid = new.contains("GRID,90");
         let found = read(&path);
         if with_grid {
-            // A grid more has no rows.
+            // The additional grid point has no rows.
             assert!(found.expect_err("79 rows").has(Code::DeckRows));
             replace(&path, "GRID,90,,0.,0.,0.", "PARAM,B,2");
         } else {
@@ -201,7 +202,7 @@ fn continuations_are_found_by_their_names() {
     }
 }
 
-/// The same GRID and CORD2R may stand twice; others of the same number may not.
+/// Equal GRID and CORD2R cards may be repeated; different cards of one number may not.
 #[test]
 fn the_same_card_may_stand_twice() {
     for (cards, is_well) in [
@@ -218,7 +219,7 @@ fn the_same_card_may_stand_twice() {
     }
 }
 
-/// Replication makes the cards that one would write.
+/// Replication gives the cards that would be written out.
 #[test]
 fn replicated_cards_are_those_that_they_stand_for() {
     let grids =

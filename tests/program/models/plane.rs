@@ -58,7 +58,7 @@ fn rigid_properties_of_a_turned_rectangle_are_exact() {
 }
 
 /// The kinetic energy of every nodal motion equals that of the condensed terms: the mass matrix of theory
-/// section 4, J0 = I0_zz, b = W1_zz / 2, C2 and W3 their z rows.
+/// section 4, J0 = I0_zz, b = W1_zz / 2, and the z rows of C2 and W3.
 #[test]
 fn kinetic_energy_equals_that_of_the_nodes() {
     for frame in BodyFrame::ALL {
@@ -79,7 +79,7 @@ fn kinetic_energy_equals_that_of_the_nodes() {
             let field = |coordinates: &[f64], row: usize| -> f64 {
                 coordinates.iter().enumerate().map(|(j, c)| c * shape[(row, j)]).sum()
             };
-            // v + theta' x r + u', all in body axes.
+            // Velocity v + theta' x r + u' in body axes.
             let velocity: Vec<[f64; 2]> = (0..x.len())
                 .map(|i| {
                     let r = [x[i][0] + field(&q, 3 * i), x[i][1] + field(&q, 3 * i + 1)];
@@ -129,18 +129,19 @@ fn identities_and_recomputation_hold() {
     }
 }
 
-/// Bending of a slender bar: Euler and Bernoulli's first frequency, to the shear and rotary inertia that they
-/// leave out.
+/// The first bending frequency of a slender bar agrees with Euler-Bernoulli theory up to shear and rotary
+/// inertia.
 #[test]
 fn first_bending_frequency_is_that_of_a_beam() {
     let body = converted(&model(rectangle(160, 12, 0.0, [0.0, 0.0])), 1, BodyFrame::Principal).body;
     let (area, second) = (HEIGHT, HEIGHT.powi(3) / 12.0);
     let slenderness = 4.730_040_744_862_704f64;
     let omega = slenderness.powi(2) * (YOUNGS * second / (DENSITY * area * LENGTH.powi(4))).sqrt();
-    // Shear and rotary inertia, which the beam leaves out, lower it by some 15 % at this slenderness.
+    // Shear and rotary inertia, which the theory neglects, lower the frequency by some 15 % at this
+    // slenderness.
     let found = body.modes().eigenvalue[0].sqrt();
     assert!(found < omega && found > 0.75 * omega, "{found}, beam {omega}");
-    // Halving the elements changes the frequency by the square of their size.
+    // Halving the elements changes the frequency with the square of their size.
     let coarse = converted(&model(rectangle(40, 3, 0.0, [0.0, 0.0])), 1, BodyFrame::Principal).body;
     let middle = converted(&model(rectangle(80, 6, 0.0, [0.0, 0.0])), 1, BodyFrame::Principal).body;
     let value = |body: &FlexBody| body.modes().eigenvalue[0].sqrt();
@@ -156,7 +157,7 @@ fn all_modes_of_a_small_plate_are_found() {
     let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
     let body = converted(&model(raw), 1000, BodyFrame::Principal).body;
     assert_eq!(body.n_modes(), n - 3);
-    // The rigid eigenvalues are zero, so the flexible ones alone make the trace of M^-1 K.
+    // Rigid eigenvalues are zero, so that the flexible ones add up to the trace of M^-1 K.
     let trace = m.partial_piv_lu().solve(&k).diagonal().column_vector().iter().sum::<f64>();
     close(body.modes().eigenvalue.iter().sum(), trace, 1e-11, "trace");
 }
@@ -184,7 +185,7 @@ fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
     let raw = RawModel { interfaces: vec![NodeSet::new("corner", vec![1])], ..raw };
     let n = 2 * raw.nodes.len();
     let last = raw.nodes.len() - 1;
-    // Strings from the first node to two others pull it along an axis with a unit force.
+    // Strings from the first node to two others apply a unit force along an axis to it.
     let ends = [last, 4];
     let line = |end: usize| [0, 1].map(|k| raw.nodes.positions[end][k] - raw.nodes.positions[0][k]);
     let ratios = |axis: usize| {
@@ -210,11 +211,11 @@ fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
     let sound = model(with(vec![given(LoadKind::Named("strings".to_owned()), 0), given(force(), 0)]));
     let body = converted(&sound, 6, BodyFrame::Principal).body;
     let (axes, shape) = (body.frame().axes, &body.modes().shape);
-    // Displacements of the first node beside those of the end of a string, in the plane of the model.
+    // Displacements of the first node relative to the end of a string, in the plane of the model.
     let stroke = |end: usize, j: usize| -> [f64; 2] {
         [0, 1].map(|k| (0..3).map(|l| axes[(k, l)] * (shape[(l, j)] - shape[(3 * end + l, j)])).sum())
     };
-    // A force along the model's x is axes' x of it along the body's.
+    // A force along x of the model has the components axes' x in the body frame.
     let expected =
         [("load_strings", 1.0), ("force_x_corner", axes[(0, 0)]), ("force_y_corner", axes[(0, 1)])];
     assert_eq!(body.geometric_stiffness().len(), expected.len());
@@ -245,7 +246,7 @@ fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
     }
 }
 
-/// A plate with two holes that scikit-fem meshed and assembled, where it lies beside the project.
+/// A plate with two holes, meshed and assembled by scikit-fem, if the file is available.
 #[test]
 fn plane_stress_plate_agrees_with_its_reference() {
     let shared = oracle::shared();
@@ -272,7 +273,7 @@ fn plane_stress_plate_agrees_with_its_reference() {
     for (found, expected) in body.modes().eigenvalue.iter().zip(lambda) {
         close(*found, expected.as_f64().expect("a number"), 1e-10, "lambda");
     }
-    // An inertia count of another program, and the row sums of the mass matrix.
+    // The reference has an inertia count of another program, and the row sums of the mass matrix.
     let sylvester = &reference["modes"]["sylvester"];
     let (shift, count) = (&sylvester["lam"], &sylvester["count"]);
     let below = body.modes().eigenvalue.iter().filter(|l| **l < shift.as_f64().expect("a shift")).count();
@@ -283,8 +284,8 @@ fn plane_stress_plate_agrees_with_its_reference() {
     assert_eq!(Some(row_sum.negative_masses as u64), reference["rowsum_negative_rows"].as_u64());
 }
 
-/// A job whose elements lie in the plane: `--dimension 2` and `dimension = 2` say so, and the refusal without them
-/// names them.
+/// A job with elements in the plane needs `--dimension 2` or `dimension = 2`; without them the error names
+/// both.
 #[test]
 fn plane_jobs_are_read_with_their_dimension() {
     let folder = tempfile::tempdir().expect("a folder");

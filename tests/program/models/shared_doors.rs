@@ -1,5 +1,5 @@
-//! The cases of `../shared/cases/doors`, where that folder is there, with their right values: the block of twelve
-//! skewed hexahedra. Tests beside this one hold the same with inputs of this package.
+//! Cases of `../shared/cases/doors`, if that folder exists, with their correct values: a block of twelve
+//! skewed hexahedra. Further tests cover the same features with inputs of this package.
 
 use crate::program::flexbody;
 use std::fs;
@@ -13,7 +13,7 @@ fn case(name: &str) -> Option<PathBuf> {
     folder.is_dir().then_some(folder)
 }
 
-/// Runs `convert` on a case; the report, or what was told where it failed.
+/// Runs `convert` on a case; returns the report, or the messages of a failure.
 fn convert(folder: &Path, words: &[&str]) -> Result<serde_json::Value, String> {
     let place = tempfile::tempdir().expect("a folder");
     let output = place.path().join("b.flex.h5");
@@ -109,7 +109,7 @@ fn other_cases_have_their_values() {
         let mass = report["body"]["mass"].as_f64().expect("a mass");
         assert!((mass / (7850.0 * 0.3 * 0.1 * 0.06) - 1.0).abs() < 1e-12, "{mass}");
     }
-    // D = beta K has ratios of omega beta / 2, along whichever axes, of all rows and of the reduced ones.
+    // D = beta K has the ratios omega beta / 2, along any axes, for all rows and for the reduced rows.
     for name in ["04a_cd_damping_geometric", "11_bgg_damping"] {
         let Some(folder) = case(name) else { continue };
         let place = tempfile::tempdir().expect("a folder");
@@ -130,7 +130,7 @@ fn other_cases_have_their_values() {
     }
 }
 
-/// Dotted names of the assembly: nodes 1 and 101.
+/// Dotted names of the assembly select nodes 1 and 101.
 #[test]
 fn sets_of_the_assembly_are_those_of_its_instances() {
     let Some(folder) = case("05b_assembly_dotted") else { return };

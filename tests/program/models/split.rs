@@ -1,5 +1,5 @@
-//! Several bodies in one pair of matrices: found, named, and on `--split` converted as each would be by
-//! itself.
+//! Several bodies in one pair of matrices: detected, named, and with `--split` converted like separate
+//! models.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::convert::{ConvertSettings, convert};
@@ -22,9 +22,10 @@ fn labels(raw: &RawModel) -> Vec<DofLabel> {
     raw.dofs.clone().unwrap_or_else(|| raw.nodes.ids.iter().flat_map(implied).collect())
 }
 
-/// The bodies in one model, rows and nodes dealt out in turn. Node i of body b of k gets the number k i + b.
+/// Returns a model of several bodies with rows and nodes interleaved. Node i of body b of k gets the number k
+/// i + b.
 fn interleaved(bodies: &[RawModel]) -> RawModel {
-    /// Place in the whole of the items of each body.
+    /// Returns the positions in the whole of the items of each body.
     fn places(sizes: &[usize]) -> Vec<Vec<usize>> {
         let mut places = vec![Vec::new(); sizes.len()];
         let mut next = 0;
@@ -72,7 +73,7 @@ fn interleaved(bodies: &[RawModel]) -> RawModel {
     }
 }
 
-/// A body of its own with the node numbers of the whole.
+/// Returns a single body with the node numbers of the whole.
 fn alone(bodies: &[RawModel], body: usize) -> RawModel {
     let number = |node: i64| node * bodies.len() as i64 + body as i64;
     let mut raw = bodies[body].clone();
@@ -85,7 +86,7 @@ fn alone(bodies: &[RawModel], body: usize) -> RawModel {
     raw
 }
 
-/// Everything but the provenance is equal, bit by bit.
+/// Asserts that the bodies are equal bit by bit, except for the provenance.
 #[track_caller]
 fn assert_same(a: &FlexBody, b: &FlexBody) {
     let (mut a, mut b) = (a.clone().into_parts(), b.clone().into_parts());
@@ -169,7 +170,7 @@ fn a_damping_matrix_is_taken_apart_too_and_must_not_couple_bodies() {
     assert!(error.to_string().contains("damping couples node 2 of body 1 with node 3 of body 2"), "{error}");
 }
 
-/// A steel block with an interface at its first nodes.
+/// Returns a steel block with an interface at its first nodes.
 fn block(cells: i32) -> RawModel {
     let mesh = Mesh::block(ElementKind::Hex8, [cells, 2, 1], [0.1 * f64::from(cells), 0.15, 0.07]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
@@ -246,7 +247,7 @@ fn every_body_gets_files_of_its_own() {
         let check = flexbody(folder.path(), &format!("check {name} --against model.toml"));
         assert_eq!(check.status.code(), Some(0), "{}", String::from_utf8_lossy(&check.stdout));
     }
-    // The body is found again only where it is.
+    // The body cannot be checked against the model of another body.
     let own = files(&alone(&bodies, 0));
     let elsewhere = own.path().join("model.toml");
     let line = format!("check pair-1.flex.h5 --against {}", elsewhere.display());
@@ -257,7 +258,7 @@ fn every_body_gets_files_of_its_own() {
 
 #[test]
 fn a_body_that_fails_leaves_no_file_of_any() {
-    // Bodies 2 and 3 hang together by an entry without size.
+    // Bodies 2 and 3 are coupled by a negligible entry.
     let bodies = [block(2), block(3), block(3)];
     let mut raw = interleaved(&bodies);
     let mut all: Vec<_> = entries(&raw.stiffness.matrix).collect();

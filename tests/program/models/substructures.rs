@@ -1,4 +1,4 @@
-//! Substructures of Abaqus: the same condensed block as the superelement of Nastran, and files that are not one.
+//! Substructures of Abaqus: the condensed block of the Nastran superelement, and invalid files.
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
@@ -21,7 +21,7 @@ fn changed(file: &str, change: impl Fn(&str) -> String) -> Result<RawModel, Erro
     read_model(&ModelFiles::from_job(folder.path().join("job.inp"), None, Vec::new(), None).expect("files"))
 }
 
-/// Replaces a text that is there once.
+/// Replaces a text that occurs once.
 fn replaced(file: &str, old: &str, new: &str) -> Result<RawModel, Error> {
     changed(file, |text| {
         assert_eq!(text.matches(old).count(), 1, "{old}");
@@ -47,10 +47,11 @@ fn a_substructure_of_abaqus_is_the_superelement_of_nastran() {
     }
 }
 
-/// The rows of a file whose nodes have different directions, from a position on.
+/// The directions of a row list hold for the following nodes until they change.
 #[test]
 fn directions_hold_until_they_change() {
-    // 24 rows in another order: two of the second node, four of the fourth, and again three of those behind it.
+    // The file has 24 rows in another order: two of the second node, four of the fourth, and three of each
+    // later node.
     let lines = "         1,          2,          3\n         2,          1,          2\n         3,          1,          2,          3\n\
                  \x20        4,          1,          2,          3,          6\n         5,          1,          2,          3\n";
     let raw = changed("ends.mtx", |text| text.replace("         1,          2,          3\n", lines));

@@ -1,5 +1,5 @@
-//! Bodies that hang from an interface, against dense solutions of the clamped model, closed forms and the way
-//! of the interface.
+//! Bodies carried at an interface, compared with dense solutions of the clamped model, closed forms and the
+//! prescribed motion of the interface.
 
 use crate::program::flexbody;
 use faer::Mat;
@@ -27,14 +27,14 @@ const LENGTH: f64 = 1.0;
 const SOFT: Material = Material { youngs: 1e7, poisson: 0.0, density: 1000.0 };
 const ALL: usize = 54;
 
-/// A bar along x from its interface `root`, of 20 nodes; its other end is `tip`.
+/// Returns a bar along x with the interface `root` at x = 0 and the interface `tip` at the other end.
 fn bar() -> (Mesh, RawModel) {
     let mesh = Mesh::block(ElementKind::Hex8, [4, 1, 1], [LENGTH, 0.2, 0.16]);
     let raw = with_ends(&mesh, mesh.assemble(&SOFT, MassRule::Consistent).raw_model());
     (mesh, raw)
 }
 
-/// The interfaces of a bar, by the places that its nodes had along x.
+/// Adds the interfaces of a bar, located by the positions of its nodes in the straight mesh.
 fn with_ends(straight: &Mesh, mut raw: RawModel) -> RawModel {
     let end = |x: f64| -> Vec<i64> {
         let kept = straight.nodes.iter().enumerate().filter(|(_, node)| (node[0] - x).abs() < 1e-9);
@@ -46,7 +46,7 @@ fn with_ends(straight: &Mesh, mut raw: RawModel) -> RawModel {
     raw
 }
 
-/// The same turned and moved, so that no axes are those of the model.
+/// Returns the bar rotated and shifted, so that no axes coincide with those of the model.
 fn turned_bar() -> RawModel {
     let (straight, _) = bar();
     let turned = straight.moved(&Random(7).rotation(), [3.0, -1.0, 0.5]);
@@ -57,7 +57,7 @@ fn root() -> Carrier {
     Carrier::Interface("root".to_owned())
 }
 
-/// Displacements under the weight of all nodes.
+/// Returns the displacements under the weight of all nodes.
 fn hanging_model(held: &HeldModel, raw: &RawModel, gravity: Vector3<f64>) -> DVector<f64> {
     let mass = dense_matrix(&raw.mass.matrix);
     let field = DVector::from_fn(mass.nrows(), |row, _| gravity[row % 3]);
@@ -65,7 +65,7 @@ fn hanging_model(held: &HeldModel, raw: &RawModel, gravity: Vector3<f64>) -> DVe
     &held.motions * held.stiffness.clone().cholesky().expect("held").solve(&load)
 }
 
-/// Static displacements of a carried body under gravity, axes of the model.
+/// Returns the static displacements of a carried body under gravity, in model axes.
 fn hanging(carried: &FlexBody, gravity: Vector3<f64>) -> DVector<f64> {
     let (invariants, shape) = (carried.invariants(), &carried.modes().shape);
     let q = |j: usize| {
@@ -90,14 +90,14 @@ fn with_all_modes_the_carried_body_is_the_clamped_model() {
     let gravity = Vector3::new(2.0, -9.81, 4.0);
     let (own, expected) = (hanging(&carried, gravity), hanging_model(&clamped, &raw, gravity));
     assert!((&own - &expected).amax() < 1e-9 * expected.amax(), "{:e}", (&own - &expected).amax());
-    // Carried again it is the same; carried by another interface and back, to rounding.
+    // Carrying a body twice by one interface changes nothing; by another interface and back, only rounding.
     assert_eq!(carried.carried(&root()).expect("an interface"), carried);
     let there = carried.carried(&Carrier::Interface("tip".to_owned())).expect("an interface");
     let back = hanging(&there.carried(&root()).expect("an interface"), gravity);
     assert!((&back - &expected).amax() < 1e-9 * expected.amax());
 }
 
-/// The invariants of the new modes are those that the mass matrix gives them.
+/// The invariants of the transformed modes agree with the mass matrix.
 #[test]
 fn carried_invariants_are_those_of_the_mass_matrix() {
     let (straight, _) = bar();
@@ -128,7 +128,7 @@ fn carried_invariants_are_those_of_the_mass_matrix() {
     }
 }
 
-/// What is linear in the modes is exact for nodal rotations as well: M in the model's own rows.
+/// Terms linear in the modes are exact for nodal rotations too: M acts on the rows of the model.
 #[test]
 fn carried_frames_of_beams_keep_what_is_linear_in_the_modes() {
     let folder = fixtures().join("models/car_frame");
@@ -174,13 +174,13 @@ fn a_cantilever_bends_under_gravity_and_its_root_carries_the_weight() {
     let weight = 9.81 * body.invariants().mass();
     let (force, torque) = recording.reactions.as_ref().expect("a reaction")[2];
     assert!((force - Vector3::new(0.0, 0.0, weight)).norm() < 1e-7 * weight, "{force}");
-    // About the reference point the weight acts at the centre of mass, deflected as it is.
+    // About the reference point the weight acts at the deflected centre of mass.
     let centre = body.frame().origin - recording.setting.origin;
     let lever = centre.cross(&Vector3::new(0.0, 0.0, weight));
     assert!((torque - lever).norm() < 2e-2 * lever.norm(), "{torque}, {lever}");
 }
 
-/// u(L) = rho w^2 / E (R L^2 / 2 + L^3 / 3), R being the radius of the root.
+/// The extension is u(L) = rho w^2 / E (R L^2 / 2 + L^3 / 3), with the radius R of the root.
 #[test]
 #[ignore = "slow"]
 fn a_spun_bar_stretches_by_the_closed_form_and_pulls_at_its_root() {
@@ -197,7 +197,7 @@ fn a_spun_bar_stretches_by_the_closed_form_and_pulls_at_its_root() {
     let load = SOFT.density * rate * rate / SOFT.youngs;
     let expected = load * (radius * LENGTH.powi(2) / 2.0 + LENGTH.powi(3) / 3.0);
     let own = recording.paths[0].deflection[2];
-    // The stretch itself adds to the load, and the bar bends under nothing.
+    // The extension increases the load, and the bar does not bend.
     assert!((own.x / expected - 1.0).abs() < 1e-5, "{own}, {expected:e}");
     assert!(own.y.abs() + own.z.abs() < 1e-6 * expected);
     let pull = body.invariants().mass() * rate * rate * (radius + 0.5 * LENGTH);
@@ -220,7 +220,7 @@ fn accelerations_of_the_interface_act_like_gravity() {
     }
     let ((a, s), (b, t)) = (held.reactions.as_ref().unwrap()[8], pushed.reactions.as_ref().unwrap()[8]);
     assert!((a - b).norm() < 1e-6 * a.norm() && (s - t).norm() < 1e-6 * s.norm());
-    // A ramp of the way ends where it should, and a sine of the velocity comes back.
+    // A ramp of the displacement ends at its value, and a sine of the velocity returns to zero.
     for (drive, end) in [
         ("displacement = { to = 0.3, duration = 0.4 }", 0.3),
         ("velocity = { amplitude = 2, frequency = 2.5 }", 0.0),
@@ -233,7 +233,7 @@ fn accelerations_of_the_interface_act_like_gravity() {
     }
 }
 
-/// The carried interface goes where it is told, whatever hangs from it.
+/// The carried interface follows its prescribed motion, whatever the body.
 #[test]
 fn the_interface_goes_its_prescribed_way() {
     let body = body_of(turned_bar(), 10, BodyFrame::Principal);
@@ -290,7 +290,7 @@ fn selections_for_a_carried_body_keep_all_groups_and_hold() {
     assert!(apart < 0.011 * largest, "{apart:e} of {largest:e}");
 }
 
-/// A folder with the bracket, its base made rigid as bolts make it.
+/// Creates a folder with the bracket, whose base is rigid like a bolted one.
 fn bolted_bracket() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let from = fixtures().join("models/bracket_hex20");
@@ -311,7 +311,8 @@ fn done(folder: &Path, words: &[&str]) -> String {
     said
 }
 
-/// The weight of all nodes, clamped where `held` says: conjugate gradients on K itself.
+/// Returns the displacements under the weight of all nodes, clamped at the nodes `held`, by conjugate
+/// gradients on K.
 fn clamped_static(folder: &Path, gravity: Vector3<f64>, held: &[i64]) -> (Vec<i64>, Vec<f64>) {
     let raw = read_model(&read_manifest(folder.join("model.toml")).expect("a manifest")).expect("a model");
     let model = FeModel::from_raw(raw).expect("a body").model;
@@ -352,7 +353,7 @@ fn clamped_static(folder: &Path, gravity: Vector3<f64>, held: &[i64]) -> (Vec<i6
     panic!("conjugate gradients do not converge");
 }
 
-/// A bracket bolted to a shaft, with gravity: what a user does, against the clamped finite element model.
+/// Compares a bracket bolted to a shaft under gravity with the clamped finite element model.
 #[test]
 #[ignore = "slow"]
 fn the_bracket_that_is_bolted_to_a_shaft_hangs_by_what_the_model_says() {
@@ -385,7 +386,7 @@ fn the_bracket_that_is_bolted_to_a_shaft_hangs_by_what_the_model_says() {
     let force = recording.reactions.as_ref().expect("a reaction")[5].0;
     assert!((force.z / weight - 1.0).abs() < 1e-6 && force.x.abs() + force.y.abs() < 1e-6 * weight);
 
-    // Held at its mean axes instead, gravity bends nothing, and that is said.
+    // In mean axes gravity bends nothing, and the program warns of that.
     let held = scene.replace("[carried]\ninterface = \"bolt_base\"\n", "[spin]\nrate = 0\nhold = true\n");
     fs::write(place.join("scene.toml"), held).expect("written");
     let said = done(place, &["simulate", "b.flex.h5", "--scene", "scene.toml"]);

@@ -1,14 +1,14 @@
-//! The examples that join bodies with Lagrange multipliers show what they say.
+//! Examples that join bodies with Lagrange multipliers give the documented results.
 
-#[allow(dead_code, clippy::duplicate_mod)] // its `main`; each example has modules of its own
+#[allow(dead_code, clippy::duplicate_mod)] // `main` of the example is unused; each example has modules of its own
 #[path = "../../../examples/pendulum.rs"]
 mod pendulum;
-#[allow(dead_code, clippy::duplicate_mod)] // its `main`; each example has modules of its own
+#[allow(dead_code, clippy::duplicate_mod)] // `main` of the example is unused; each example has modules of its own
 #[path = "../../../examples/slider_crank.rs"]
 mod slider_crank;
 
-/// Four times the stiffness leaves a quarter of what the flexible pendulum differs by from the rigid one in
-/// closed form.
+/// Four times the stiffness gives a quarter of the difference between the flexible pendulum and the closed
+/// form of the rigid one.
 #[test]
 fn the_pendulum_has_the_period_of_the_rigid_body_in_the_limit() {
     let [soft, stiff] = [1.0, 4.0].map(|factor| pendulum::swing(factor).expect("a swing"));
@@ -24,8 +24,8 @@ fn the_pendulum_has_the_period_of_the_rigid_body_in_the_limit() {
     assert!((3.5..4.5).contains(&ratio), "{:e} {:e}", difference(&soft), difference(&stiff));
 }
 
-/// So it does for the slider-crank; the constraint forces of hinge and guide are what changes the momentum
-/// besides the weight.
+/// The slider-crank converges in the same way; besides the weight, the constraint forces of hinge and guide
+/// change the momentum.
 #[test]
 fn the_slider_crank_moves_as_the_rigid_mechanism_in_the_limit() {
     let [soft, stiff] = [1.0, 4.0].map(|factor| slider_crank::run(factor, 0.06).expect("a run"));

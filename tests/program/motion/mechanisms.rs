@@ -1,5 +1,5 @@
-//! Two flexible bodies held together by joints: beside Exudyn, and in the limit of stiff bodies the rigid
-//! double pendulum.
+//! Two flexible bodies connected by joints: compared with Exudyn, and in the limit of stiff bodies with the
+//! rigid double pendulum.
 
 use crate::jointed::{Assembly, End, Joint, Jointed, Scales, Start};
 use flexbody_body::flex_body::FlexBody;
@@ -14,7 +14,7 @@ use oracle::integrate;
 use oracle::mesh::Mesh;
 use serde::Deserialize;
 
-/// tests/peers/mechanisms.py wrote this from what Exudyn computes.
+/// Results of Exudyn, written by tests/peers/mechanisms.py.
 const EXUDYN: &str = include_str!("mechanisms.json");
 
 #[derive(Deserialize)]
@@ -30,9 +30,9 @@ struct Mechanism {
     shown: Vec<Seat>,
     gravity: [f64; 3],
     duration: f64,
-    /// What the last extrapolation to step zero changed.
+    /// Change by the last extrapolation to step zero.
     error: f64,
-    /// Origins of the bodies, then the points shown, at equal intervals.
+    /// Origins of the bodies, then the recorded points, at equal intervals.
     places: Vec<Vec<[f64; 3]>>,
 }
 
@@ -58,7 +58,7 @@ enum Seat {
     Node { body: usize, node: i64 },
 }
 
-/// A body of the fixtures with joints at the means of its interfaces, where those of the record are.
+/// Returns a body of the fixtures with joints at the means of its interfaces, like those of the record.
 fn placed(one: &Placed) -> FlexBody {
     let mut raw = raw_fixture(&one.model);
     for set in &mut raw.interfaces {
@@ -90,7 +90,7 @@ impl Mechanism {
         }
     }
 
-    /// Moves as Exudyn says, and keeps its energy.
+    /// Asserts that the motion agrees with Exudyn, and that the energy is conserved.
     fn check(&self, what: &str) {
         let bodies: Vec<FlexBody> = self.bodies.iter().map(placed).collect();
         let equations: Vec<EquationsOfMotion> =
@@ -170,7 +170,7 @@ fn a_slider_crank_moves_as_in_exudyn() {
 
 const LENGTH: f64 = 1.0;
 
-/// A bar along x about the origin, held at its ends.
+/// Returns a bar along x about the origin with interfaces at its ends.
 fn bar(youngs: f64) -> FlexBody {
     let mesh = Mesh::block(ElementKind::Hex8, [6, 1, 1], [LENGTH, 0.1, 0.08]);
     let mesh = mesh.moved(&Matrix3::identity(), [-0.5 * LENGTH, -0.05, -0.04]);
@@ -189,7 +189,7 @@ const GRAVITY: f64 = 9.81;
 const ANGLES: [f64; 2] = [1.2, 2.0];
 const DURATION: f64 = 1.0;
 
-/// Tips of a flexible double pendulum in the plane after a time.
+/// Returns the tips of a flexible double pendulum in the plane after a time.
 fn tips(youngs: f64) -> Vec<Vector3<f64>> {
     let body = bar(youngs);
     let equations = [0, 1].map(|_| EquationsOfMotion::new(&body, Terms::ALL));
@@ -206,7 +206,7 @@ fn tips(youngs: f64) -> Vec<Vector3<f64>> {
     };
     let scales = Scales { length: LENGTH, rate: (GRAVITY / LENGTH).sqrt() };
     let mut system = Jointed { assembly, scales };
-    // Angles from where a pendulum hangs.
+    // Angles from the hanging position.
     let axes = ANGLES.map(|angle| {
         *Rotation3::from_axis_angle(&Vector3::z_axis(), angle - 0.5 * std::f64::consts::PI).matrix()
     });
@@ -223,7 +223,7 @@ fn tips(youngs: f64) -> Vec<Vector3<f64>> {
     tips
 }
 
-/// Tips of the rigid double pendulum, from its two equations for the angles.
+/// Returns the tips of the rigid double pendulum, from its two equations for the angles.
 fn rigid_tips() -> Vec<Vector3<f64>> {
     let body = bar(1.0);
     let (m, l, d) = (body.invariants().mass(), LENGTH, 0.5 * LENGTH);
@@ -249,7 +249,7 @@ fn rigid_tips() -> Vec<Vector3<f64>> {
     vec![along(y[0]), along(y[0]) + along(y[1])]
 }
 
-/// Sixteen times the stiffness leaves a sixteenth of the difference.
+/// Sixteen times the stiffness gives a sixteenth of the difference.
 #[test]
 fn stiff_bodies_make_the_rigid_double_pendulum() {
     let rigid = rigid_tips();

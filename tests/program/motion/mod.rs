@@ -1,4 +1,4 @@
-//! Motion of bodies, as the program simulates it and examples join it.
+//! Motion of bodies, simulated by the program and joined by examples.
 
 mod carried;
 mod joined;

@@ -1,5 +1,4 @@
-//! `flexbody simulate`, through the program: what it writes, that it is what the library computes, and that
-//! it can be repeated.
+//! Command `flexbody simulate`: its output agrees with the library and is reproducible.
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
@@ -21,7 +20,7 @@ fn done(folder: &Path, words: &[&str]) -> Output {
     run
 }
 
-/// A folder with `body.flex.h5` of a model of the fixtures.
+/// Creates a folder with `body.flex.h5` of a model of the fixtures.
 fn folder_with(model: &str, modes: usize) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let manifest = fixtures().join("models").join(model).join("model.toml");
@@ -35,7 +34,7 @@ fn scene(folder: &Path, text: &str) {
     fs::write(folder.join("scene.toml"), text).expect("written");
 }
 
-/// Head and rows of a table.
+/// Returns head and rows of a table.
 fn table(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
     let text = fs::read_to_string(path).expect("a table");
     let mut lines = text.lines();
@@ -79,7 +78,7 @@ fn scenes_of_the_fixtures_fit_their_schema_and_run() {
         let run =
             done(folder.path(), &["simulate", "body.flex.h5", "--scene", path.to_str().unwrap(), "--json"]);
         let results = serde_json::from_slice::<Value>(&run.stdout).expect("JSON")["results"].take();
-        // A scene of several load cases has facts of each.
+        // A scene with several load cases reports facts of each.
         let cases = results["cases"].as_array().map_or(std::slice::from_ref(&results), Vec::as_slice);
         for facts in cases {
             for drift in ["linear_momentum_drift", "angular_momentum_drift", "energy_drift"] {
@@ -90,8 +89,8 @@ fn scenes_of_the_fixtures_fit_their_schema_and_run() {
     }
 }
 
-/// A drive motion a cos(w1 t) and a steady spin push the sense mode by the Coriolis force alone, 2 spin W3 a
-/// w1 sin(w1 t).
+/// A drive motion a cos(w1 t) and a steady spin excite the sense mode by the Coriolis force alone, 2 spin W3
+/// a w1 sin(w1 t).
 #[test]
 fn the_gyroscope_senses_its_rate() {
     let folder = folder_with("mems_gyroscope", 6);
@@ -109,7 +108,8 @@ fn the_gyroscope_senses_its_rate() {
     let size = 2.0 * 8.7e-6 * coupling * 0.002 * w1 / (w2 * w2 - w1 * w1);
     for (t, state) in recording.time.iter().zip(&recording.states) {
         let expected = size * ((w1 * t).sin() - w1 / w2 * (w2 * t).sin());
-        // To first order of the spin: what the sense motion does to the drive is left out.
+        // The expected motion is of first order in the spin; the reaction of the sense motion on the drive is
+        // neglected.
         let error = (state.q[sense] - expected).abs() / size.abs();
         assert!(error < 1e-3, "at {t} us: {}, expected {expected}", state.q[sense]);
     }
@@ -156,7 +156,7 @@ fn files_hold_what_the_library_computes_and_are_the_same_every_time() {
     assert_eq!(array("modes/q"), flat(|s| s.q.clone()));
     assert_eq!(array("modes/qd"), flat(|s| s.qd.clone()));
     assert_eq!(file.dataset("modes/q").unwrap().shape(), [41, 5]);
-    // Scenes of one mode are matrices too.
+    // Tables of scenes with one mode are matrices too.
     let one = body.reduced(&[0], body.groups(), Vec::new()).expect("a mode");
     let mut of_one_mode = described.clone();
     of_one_mode.initial.modes.clear();
@@ -222,7 +222,8 @@ fn files_hold_what_the_library_computes_and_are_the_same_every_time() {
 
 #[test]
 fn prescribed_spin_takes_the_torque_of_a_rigid_body_and_that_of_the_load() {
-    // So slow that the body stays rigid: the torque is I alpha, and that which holds the load.
+    // The rotation is so slow that the body stays rigid: the torque is I alpha plus the torque that balances
+    // the load.
     let folder = folder_with("connecting_rod", 4);
     let body = flexbody_file::read(folder.path().join("body.flex.h5")).expect("a body");
     let inertia = body.invariants().inertia()[(2, 2)];

@@ -1,4 +1,4 @@
-//! Load cases of one scene: each is what a scene of its own would be, and one body serves all of them.
+//! Load cases of one scene: each equals a scene of its own, and one body serves all of them.
 
 use crate::program::flexbody;
 use flexbody_body::flex_body::{FlexBody, TermGroup};
@@ -11,27 +11,27 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// What all cases of the rod have.
+/// Settings of all cases of the rod.
 const COMMON: &str = "[run]\nduration = 0.002\noutputs = 50\n\
     [[watch]]\ninterface = \"small_end\"\n\
     [tolerance]\ndeflection = 0.05\nstress = 0.05\nreaction = 0.05\n";
 
-/// A load that all cases have.
+/// A load common to all cases.
 const PULL: &str = "interface = \"small_end\"\nforce = [2000, 0, 0]\naxes = \"body\"\nhistory = { to = 1, duration = 0.002 }\n";
 
-/// A slow turn, for which bounds clear all terms.
+/// A slow rotation, for which bounds rule out all terms.
 const SLOW: &str = "name = \"slow\"\nspin = { axis = [0, 0, 1], rate = { to = 5, duration = 0.02 }, hold = true }\n\
     run.duration = 0.004\ntolerance.reaction = 0.2\n";
 
-/// A turn so fast that centrifugal loads count, and a shake.
+/// A rotation so fast that centrifugal loads matter; `SHAKE` is its transverse load.
 const FAST: &str =
     "name = \"fast\"\nspin = { axis = [0, 0, 1], rate = { to = 900, duration = 0.002 }, hold = true }\n";
 const SHAKE: &str = "interface = \"small_end\"\nforce = [0, 200, 0]\naxes = \"body\"\nhistory = { amplitude = 1, frequency = 2000 }\n";
 
-/// A body that nothing moves.
+/// A case without motion.
 const IDLE: &str = "name = \"idle\"\n";
 
-/// The connecting rod with six modes, in a folder that a scene of cases joins.
+/// Creates a folder with the connecting rod with six modes, for a scene of several cases.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let model = fixtures().join("models/connecting_rod/model.toml");
@@ -41,7 +41,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// A scene of these cases, and a scene of its own for each of them.
+/// Writes a scene of these cases, and a scene of its own for each of them.
 fn written(place: &Path) {
     let load = |key: &str, load: &str| format!("[[{key}]]\n{load}");
     let pull = load("load", PULL);
@@ -70,7 +70,7 @@ fn scenes(text: &str) -> LoadCases {
     LoadCases::read(path, None).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The largest error over its tolerance of the selected body, measured by itself.
+/// Returns the largest error over its tolerance of the selected body, from a separate simulation.
 fn measured(whole: &FlexBody, selection: &Selection, scene: &Scene) -> f64 {
     let own = whole.reduced(&selection.modes, selection.groups, selection.terms.clone()).expect("a body");
     let (reference, _) = trace(whole, scene, &Context::QUIET).expect("a motion");
@@ -92,7 +92,7 @@ fn a_case_is_what_a_scene_of_its_own_is() {
         (case.case, case.source) = (None, scene.source.clone());
         assert_eq!(case, scene, "{own}");
     }
-    // All at once, one alone, and the scene of its own: the same bytes.
+    // All cases at once, one case, and the scene of its own give equal bytes.
     let run = |words: &[&str]| {
         let run = flexbody(place, &[&["simulate", "rod.flex.h5", "--quiet", "--scene"], words].concat());
         assert!(run.status.success(), "{words:?}: {}", String::from_utf8_lossy(&run.stderr));
@@ -133,12 +133,12 @@ fn one_body_serves_every_case_and_holds_what_any_of_them_needs() {
         }
         assert!(both.modes.len() >= own.modes.len(), "{:?} {:?}", both.modes, own.modes);
     }
-    // What is told of each case is its error.
+    // The error reported for each case is the measured error.
     for (told, case) in both.cases.iter().zip(cases.iter()) {
         let worst = measured(&whole, &both, case);
         let chosen = told.chosen.as_ref().expect("measured");
-        // Of half of the tolerances bounds have ruled terms out of the motion that a case is measured
-        // against.
+        // The reported error is relative to a motion from which bounds may have dropped terms within half of
+        // the tolerances, so that it may differ by as much.
         assert!(worst <= 1.0 && (chosen.worst - worst).abs() <= 0.5, "{}: {worst} {chosen:?}", told.name);
     }
     let fast = &both.cases[1];
@@ -217,7 +217,7 @@ fn reports_tell_every_case() {
     let text = fs::read_to_string(place.join("s.txt")).expect("a text");
     assert!(text.contains("Load cases  slow: "), "{text}");
     assert!(fs::read_to_string(place.join("s.html")).expect("a page").contains("Load cases"));
-    // A case by its name is a scene of its own, reports and all.
+    // A case selected by name equals a scene of its own, including reports.
     let report = |words: &[&str]| {
         let run = flexbody(place, &[&["select", "rod.flex.h5", "--scene"], words].concat());
         assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
@@ -258,7 +258,7 @@ fn a_trade_study_measures_candidates_in_every_case() {
     let table = fs::read_to_string(place.join("t.csv")).expect("a table");
     let columns = table.lines().next().expect("a head").split(',').count();
     assert!(table.lines().all(|line| line.split(',').count() == columns), "{table}");
-    // A case by its name is a scene of its own, but for the times.
+    // A case selected by name equals a scene of its own, except for times.
     let (alone, own) = (told(&["cases.toml", "--case", "fast"]), told(&["fast.toml"]));
     assert!(alone.get("cases").is_none());
     assert_eq!((&alone["recommended"], &alone["front"]), (&own["recommended"], &own["front"]));
@@ -328,7 +328,7 @@ fn keys_of_a_case_take_the_place_of_those_of_the_scene() {
     assert_eq!((other.initial.origin.y, other.initial.rotation.x), (1.0, 1.0));
     assert_eq!(other.gravity.map(|gravity| gravity.y), Some(9.81));
     assert_eq!(other.requirements.damping, Some(0.02.into()));
-    // A prescribed motion is one thing.
+    // A prescribed motion is replaced as a whole.
     assert!(!other.spin.as_ref().expect("a spin").hold && first.spin.as_ref().expect("a spin").hold);
     assert_eq!((other.loads.len(), other.watched.len()), (2, 2));
     assert_eq!(other.loads[0], first.loads[0]);

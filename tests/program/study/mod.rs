@@ -1,4 +1,4 @@
-//! What a scene needs and what accuracy costs, as the program says it.
+//! Selections, trade studies and responses by the program.
 
 mod load_cases;
 mod response;

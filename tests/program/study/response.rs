@@ -1,5 +1,5 @@
 //! Frequency responses: closed forms, identities of the receptance, the dense modal sum of all modes, and
-//! estimates held to direct solutions.
+//! estimates compared with direct solutions.
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
@@ -20,7 +20,7 @@ use oracle::turning::dense;
 use serde_json::Value;
 use std::fs;
 
-/// A block of steel with a node set at each end, and a damping ratio.
+/// Returns a steel block with a node set at each end, and a damping ratio.
 fn block(ratio: Option<f64>) -> FeModel {
     damped_block(ratio.map(Damping::Ratio))
 }
@@ -69,7 +69,7 @@ fn study(model: &FeModel, body: &FlexBody, from: &str, to: &str, settings: &Resp
     respond(Some(model), body, &ends(from), &ends(to), settings, &Context::QUIET).expect("a response")
 }
 
-/// Measured errors of the only pair.
+/// Returns the measured errors of the only pair.
 fn measured(response: &Response) -> Vec<f64> {
     let errors = response.pairs[0].errors.as_ref().expect("errors");
     errors.measured.iter().filter_map(|error| *error).collect()
@@ -82,7 +82,7 @@ fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
 #[test]
 #[ignore = "slow"]
 fn with_all_modes_the_reduced_body_answers_as_all_nodes_do() {
-    // Damped and undamped, also at turning ends; 90 rows.
+    // The block has 90 rows; the places include rotations of its ends.
     for damping in [None, Some(Damping::Ratio(0.02)), Some(Damping::Rayleigh { alpha: 300.0, beta: 2e-7 })] {
         let model = damped_block(damping.clone());
         let body = free(&model, 84);
@@ -110,7 +110,7 @@ fn receptances_are_reciprocal() {
     let functions = |response: &Response| -> Vec<_> {
         response.pairs.iter().flat_map(|pair| pair.functions.clone()).collect()
     };
-    // Places that are looked at since the estimate is largest there differ by its rounding.
+    // Frequencies that were added at the largest estimate differ by the rounding of the estimate.
     let at_both = there
         .frequencies
         .iter()
@@ -124,7 +124,8 @@ fn receptances_are_reciprocal() {
         let other =
             back.iter().find(|other| (other.from, other.to) == (one.to, one.from)).expect("the other");
         for &(i, j) in &at_both {
-            // Of the size of the functions of the same kind: some are zero but for rounding.
+            // The scale is the largest function of the same kind, because some functions are zero up to
+            // rounding.
             let alike = there.iter().filter(|f| f.kind() == one.kind());
             let scale = largest(alike.map(|f| f.reduced[i].norm()));
             let same = |a: Complex<f64>, b: Complex<f64>| (a - b).norm() < 1e-8 * scale;
@@ -139,8 +140,8 @@ fn receptances_are_reciprocal() {
     assert!(reduced > 9 * 50 && full > 9 * 8, "{reduced} {full}");
 }
 
-/// A bar of bricks without transverse strain (Poisson's ratio zero) is, under forces that are even over its
-/// ends, a chain of rod elements.
+/// A bar of bricks with zero Poisson's ratio is equivalent to a chain of rod elements under forces uniform
+/// over its ends.
 #[test]
 fn a_chain_of_rods_has_its_closed_form() {
     let cells = 12;
@@ -156,8 +157,8 @@ fn a_chain_of_rods_has_its_closed_form() {
     }
     let model = FeModel::from_raw(raw).expect("a model").model;
     let body = free(&model, 30);
-    // Linear elements of a rod with consistent mass: (k/h) (2 - 2 cos t) = w^2 (rho A h / 6) (4 + 2 cos t) on
-    // the inner nodes, u_j = cos(j t) + ...
+    // Linear rod elements with consistent mass satisfy (k/h) (2 - 2 cos t) = w^2 (rho A h / 6) (4 + 2 cos t)
+    // on the inner nodes, with u_j = cos(j t) + ...
     let h = length / f64::from(cells);
     let (k, m) = (material.youngs * area / h, material.density * area * h / 6.0);
     let first = (material.youngs / material.density).sqrt() / (2.0 * length);
@@ -167,7 +168,7 @@ fn a_chain_of_rods_has_its_closed_form() {
         let Some(full) = full else { continue };
         let square = (std::f64::consts::TAU * hertz).powi(2);
         let cosine = (k - 2.0 * square * m) / (k + square * m);
-        // u_j = cos((n - j) t) a fulfils the inner equations and the free end; the loaded one gives a.
+        // u_j = cos((n - j) t) a satisfies the inner equations and the free end; the loaded end gives a.
         let t = cosine.acos();
         let n = f64::from(cells);
         let stiffness = (k - 2.0 * square * m) * (n * t).cos() - (k + square * m) * ((n - 1.0) * t).cos();
@@ -180,8 +181,8 @@ fn a_chain_of_rods_has_its_closed_form() {
 fn damping_is_that_of_the_modes_in_both() {
     let model = block(Some(0.03));
     let body = free(&model, 10);
-    // Frequencies where the tenth mode still answers and the missing ones are static: what is missing is no
-    // matter of damping.
+    // At these frequencies the tenth mode still responds dynamically and the truncated modes respond
+    // statically, so that the truncation error does not depend on damping.
     let settings = over(0.02 * body.frequencies_hz()[0], 1.02 * body.frequencies_hz()[3], 40);
     let response = study(&model, &body, "left", "left", &settings);
     // At the first resonance the response is that of one mode, 1 / (2 i zeta lambda) psi^2.
@@ -205,8 +206,7 @@ fn more_modes_and_residual_vectors_come_closer() {
     let basis = |loads| BasisChoice::Free(FreeSurface { residual_vectors: vec![loads] });
     let with_vectors = error(&body_of(&model, 8, basis(Loads::Interfaces)));
     assert!(with_vectors < 0.05 * plain[0], "{with_vectors:e} {plain:?}");
-    // A Craig-Bampton body answers at frequencies of its own until there are enough modes with the interfaces
-    // held.
+    // A Craig-Bampton body has natural frequencies of its own until there are enough fixed-interface modes.
     let fixed =
         [6, 20, 34].map(|modes| error(&body_of(&model, modes, BasisChoice::CraigBampton(CraigBampton))));
     assert!(fixed[0] > fixed[1] && fixed[1] > fixed[2] && fixed[2] < 0.05 * fixed[0], "{fixed:?}");
@@ -214,8 +214,8 @@ fn more_modes_and_residual_vectors_come_closer() {
 
 #[test]
 fn residual_vectors_make_the_static_limit_exact() {
-    // Low down only the static response of the deformation is left, beside rigid motion: (H - H_rigid) tends
-    // to K^+.
+    // At low frequencies the response is rigid motion plus the static deformation: (H - H_rigid) tends to
+    // K^+.
     let model = block(None);
     let basis = BasisChoice::Free(FreeSurface { residual_vectors: vec![Loads::Interfaces] });
     let (vectors, plain) = (body_of(&model, 4, basis), free(&model, 4));
@@ -232,9 +232,9 @@ fn residual_vectors_make_the_static_limit_exact() {
     assert!(with < 1e-4 * without && without > 0.0, "{with:e} {without:e}");
 }
 
-/// What the estimate is worth, over bases and bands, at the solves, near resonances and antiresonances
-/// included: it is the error up to half the first frequency that the bodies lack, and on the whole; where a
-/// mode is missing next to the band it is too small.
+/// Accuracy of the estimate over bases and bands, at the solved frequencies, including resonances and
+/// antiresonances. The estimate equals the error up to half the first truncated frequency, and on average; it
+/// is too small if a mode is missing next to the band.
 #[test]
 fn the_estimate_is_near_the_error() {
     let model = block(Some(0.01));
@@ -294,7 +294,7 @@ fn models_with_rotations_and_in_the_plane_answer() {
                 |pair: &Pair| pair.errors.as_ref().and_then(|errors| errors.largest).expect("one").value;
             response.pairs.iter().map(worst).collect::<Vec<_>>()
         });
-        // At the loaded point itself every mode adds flexibility of one sign below its resonance.
+        // At the loaded point every mode adds flexibility of one sign below its resonance.
         for kind in [0, 3] {
             let [few, some, many] = errors.each_ref().map(|errors| errors[kind]);
             assert!(few > some && some > many, "{name}, kind {kind}: {few} {some} {many}");
@@ -358,11 +358,11 @@ fn the_command_writes_what_its_schema_says() {
     assert!(page.contains("Transfer functions") && page.contains("<circle") && !page.contains("NaN"));
     let text = fs::read_to_string(place.join("r.txt")).expect("a text");
     assert!(text.starts_with("Response") && text.contains("bolt_base"), "{text}");
-    // The same bits on two threads.
+    // Two threads give the same bits.
     let (_, again) = with(&["response", manifest, "--modes", "10", "--residual-vectors", "interfaces"], "2");
     assert_eq!(table, again);
 
-    // The same body from its file, beside the model and alone.
+    // The body read from its file gives the same response, with the model and alone.
     let made = [
         "convert",
         manifest,
@@ -383,7 +383,7 @@ fn the_command_writes_what_its_schema_says() {
     assert!(alone["results"]["verdict"].as_str().is_some_and(|verdict| verdict.contains("not known")));
 }
 
-/// The same block with the stated coupling of both ends.
+/// Returns the block with the stated coupling of both ends.
 fn coupled_block(coupling: Coupling) -> RawModel {
     let mesh = Mesh::block(ElementKind::Hex8, [4, 2, 1], [0.4, 0.15, 0.1]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
@@ -395,8 +395,8 @@ fn coupled_block(coupling: Coupling) -> RawModel {
     raw
 }
 
-/// G (N x m) of u = G y with the displacements of all nodes that no interface has and of the six motions of each rigid
-/// interface about its mean, written down from the positions alone.
+/// Returns G (N x m) of u = G y, with y the displacements of all nodes outside interfaces and the six motions
+/// of each rigid interface about its mean. G is written down from the positions alone.
 fn motions_under_coupling(raw: &RawModel) -> DMatrix<f64> {
     let n = 3 * raw.nodes.ids.len();
     let mut columns: Vec<DVector<f64>> = Vec::new();
@@ -431,7 +431,7 @@ fn a_body_with_rigid_interfaces_is_compared_with_the_model_under_the_same_coupli
     let model = FeModel::from_raw(raw).expect("a model").model;
     let body = body_of(&model, 6, BasisChoice::CraigBampton(CraigBampton));
     let response = study(&model, &body, "left", "right", &over(100.0, 9000.0, 30));
-    // Translations of the mean of `left` are its columns, and those of `right`.
+    // The last twelve columns of G are the motions of `left` and `right`, the translations first.
     let [from, to] = [g.ncols() - 12, g.ncols() - 6];
     let mut compared = 0;
     for (i, hertz) in response.frequencies.iter().enumerate() {
@@ -449,7 +449,8 @@ fn a_body_with_rigid_interfaces_is_compared_with_the_model_under_the_same_coupli
         }
     }
     assert!(compared > 200, "{compared}");
-    // The modes of the body are right for the coupled model where they are enough, and nowhere for one whose ends deform.
+    // With enough modes the body agrees with the coupled model; it agrees nowhere with a model whose ends
+    // deform.
     let errors = measured(&response);
     assert!(errors[0] < 1e-3, "{errors:?}");
     let coupling = response.coupling.expect("rigid ends");

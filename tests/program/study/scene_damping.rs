@@ -1,5 +1,5 @@
-//! A body has the damping of its model, a scene its own: which counts where both state one, and that a body made for a
-//! scene does not keep that of the scene.
+//! Damping of bodies and scenes: precedence if both state damping, and bodies made for a scene do not keep
+//! the damping of the scene.
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
@@ -20,8 +20,9 @@ use tempfile::TempDir;
 const SHAKEN: &str = "[run]\nduration = 0.004\noutputs = 50\n[band]\nfrequency = 9000\n[[load]]\ninterface = \"bolt_wall\"\n\
      force = [0, 20, 0]\naxes = \"body\"\nhistory = { amplitude = 1, frequency = 300 }\n[[watch]]\ninterface = \"bolt_base\"\n";
 
-/// The bracket with `damping` at the end of its manifest, a body of eight modes of it, and scenes: `plain.toml`,
-/// `own.toml` with a damping ratio and `replacing.toml` with one that takes the place of another.
+/// Creates a folder with the bracket with `damping` at the end of its manifest, its body with eight modes,
+/// and scenes: `plain.toml`, `own.toml` with a damping ratio and `replacing.toml` with a ratio that replaces
+/// another.
 fn folder(damping: &str) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let place = folder.path();
@@ -94,7 +95,7 @@ fn every_command_refuses_two_dampings_and_takes_one_that_replaces() {
                 let told = String::from_utf8_lossy(&run.stderr);
                 assert_eq!(told.contains("error[FB225]"), !is_taken, "{command} {name}: {told}");
                 match is_taken {
-                    // What is wanted of the body may not hold, but nothing is refused.
+                    // The requirements may fail, but nothing is refused.
                     true => assert!(matches!(run.status.code(), Some(0 | 1)), "{command} {name}: {told}"),
                     false => assert_eq!(run.status.code(), Some(2), "{command}: {told}"),
                 }
@@ -128,7 +129,7 @@ fn a_body_keeps_the_damping_of_its_model_alone() {
                 );
                 continue;
             }
-            // alpha M + beta K of the modes.
+            // Damping alpha M + beta K of the modes.
             for (ratio, lambda) in modes.damping_ratio.iter().zip(&modes.eigenvalue) {
                 let expected = 0.5 * (900.0 / lambda.sqrt() + 2e-7 * lambda.sqrt());
                 assert!((ratio / expected - 1.0).abs() < 1e-6, "{basis} {name}: {ratio} {expected}");
@@ -137,7 +138,7 @@ fn a_body_keeps_the_damping_of_its_model_alone() {
     }
 }
 
-/// What the body lacks of the model is judged with the damping that the scene puts in the place of that of the model.
+/// The errors of the body are estimated with the damping of the scene that replaces that of the model.
 #[test]
 fn estimates_take_the_damping_that_replaces_that_of_the_model() {
     let folder = folder("");
@@ -158,8 +159,8 @@ fn estimates_take_the_damping_that_replaces_that_of_the_model() {
     assert_eq!(lacks(Some(Damping::Ratio(0.3))), bare);
 }
 
-/// Bands of 1, 10 and 100 % and one ratio beyond the critical damping: free modes at rest fade as the closed form says, also
-/// where they creep; exports hold them.
+/// Bands of 1, 10 and 100 % and one ratio above critical damping: free modes decay like the closed form,
+/// including overdamped ones; exports hold the damping.
 #[test]
 fn bands_and_ratios_beyond_the_critical_damping_are_those_of_the_modes() {
     let folder = folder("");
@@ -192,7 +193,7 @@ fn bands_and_ratios_beyond_the_critical_damping_are_those_of_the_modes() {
             }
         }
     }
-    // In the file of the model, and beside the body.
+    // Damping in the file of the model gives the same ratios.
     let damped = self::folder(&format!("[damping]\n{bands}\n"));
     let place = damped.path();
     let own = body(place);

@@ -1,4 +1,4 @@
-//! `select` and `convert --scene` as a user runs them.
+//! Commands `select` and `convert --scene`.
 
 use crate::program::flexbody;
 use oracle::fixtures;
@@ -6,7 +6,8 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
-/// A bracket that is spun up and shaken, in the folder `place`: `whole.flex.h5` and `scene.toml`.
+/// Writes `whole.flex.h5` and `scene.toml` of a bracket that is spun up and shaken into the folder `place`;
+/// returns the manifest.
 fn prepare(place: &Path, more: &str) -> String {
     let manifest = fixtures().join("models/bracket_hex20/model.toml");
     let manifest = manifest.to_str().expect("a path").to_owned();
@@ -55,7 +56,7 @@ fn a_selection_is_what_its_schema_says_and_a_body_is_made_of_it() {
     let labels = verdict.lines().filter_map(|line| line.split("  ").next()).filter(|label| !label.is_empty());
     let expected = ["Selection", "Asked", "Take", "Why", "Error", "Saves"];
     assert_eq!(labels.collect::<Vec<_>>(), expected, "{verdict}");
-    // What is said in words is what the numbers say; tiers are details.
+    // The words agree with the numbers; tiers are shown in the details only.
     let words = |key: &str| told["verdict"][key].as_str().expect("a sentence");
     let kept = told["modes"]["kept"].as_array().expect("a list").len();
     assert!(words("take").starts_with(&format!("{kept} mode")), "{}", words("take"));
@@ -68,7 +69,7 @@ fn a_selection_is_what_its_schema_says_and_a_body_is_made_of_it() {
     let chosen = &told["chosen"];
     assert!(chosen["worst"].as_f64().expect("a number") <= 1.0, "{chosen}");
 
-    // The same from the matrices, with the modes and residual vectors that the scene asks for.
+    // The conversion from the matrices, with the modes and residual vectors requested by the scene.
     let words = ["convert", &manifest, "--scene", "scene.toml", "-o", "small.flex.h5", "--quiet"];
     assert!(flexbody(place, &words).status.success());
     assert!(flexbody(place, &["check", "small.flex.h5"]).status.success());
@@ -100,7 +101,8 @@ fn a_cost_that_nothing_meets_is_a_check_that_fails() {
     assert!(json(&run.stdout)["results"]["chosen"]["multiplications"].as_u64().expect("a number") <= 900);
 }
 
-/// `convert --scene` judges as `select` of the same does: the same exit code, and no file where it does not hold.
+/// `convert --scene` judges like `select`: the exit codes agree, and no file is written if the selection
+/// fails.
 #[test]
 fn a_body_for_a_scene_is_written_where_the_selection_holds_and_only_there() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,5 +1,5 @@
-//! `flexbody convert --scene`: the file holds what the scene needs, says why, and nothing is computed that
-//! bounds rule out before.
+//! Command `flexbody convert --scene`: the file holds the terms that the scene needs, with reasons, and terms
+//! ruled out by bounds are never computed.
 
 use flexbody_base::provenance::{SourceFile, sha256_hex};
 use flexbody_body::basis::ModeSettings;
@@ -16,14 +16,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-/// A stiff connecting rod that turns slowly, pulled smoothly.
+/// A stiff connecting rod that rotates slowly under a smooth pull.
 const MILD: &str = "[run]\nduration = 0.02\noutputs = 100\n\
     [spin]\naxis = [0, 0, 1]\nrate = { to = 5, duration = 0.02 }\nhold = true\n\
     [[load]]\ninterface = \"small_end\"\nforce = [2000, 0, 0]\naxes = \"body\"\nhistory = { to = 1, duration = 0.02 }\n\
     [[watch]]\ninterface = \"small_end\"\n\
     [tolerance]\ndeflection = 0.05\nstress = 0.05\nreaction = 0.2\n";
 
-/// The same rod, turning so fast that centrifugal loads count, and shaken.
+/// The rod in a rotation so fast that centrifugal loads matter, with a transverse shake.
 const FAST: &str = "[run]\nduration = 0.002\noutputs = 100\n\
     [spin]\naxis = [0, 0, 1]\nrate = { to = 900, duration = 0.002 }\nhold = true\n\
     [[load]]\ninterface = \"small_end\"\nforce = [0, 200, 0]\naxes = \"body\"\nhistory = { amplitude = 1, frequency = 2000 }\n\

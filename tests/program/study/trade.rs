@@ -1,5 +1,5 @@
-//! What accuracy costs: who must win does, errors are those of an independent comparison, and nothing but
-//! times depends on threads.
+//! Trade studies: the expected candidate is recommended, errors agree with an independent comparison, and
+//! only times depend on threads.
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
@@ -28,8 +28,8 @@ use std::fs;
 
 const QUICK: TradeSettings<'static> = TradeSettings { repeat: 1, reserved: &[] };
 
-/// A free tumble with so many radians per unit of time about an axis between the principal ones, over `turns`
-/// turns.
+/// Returns a free tumble with `spin` radians per unit of time about an axis between the principal axes, over
+/// `turns` turns.
 fn tumble(spin: f64, turns: f64) -> Scene {
     let axis = Vector3::new(0.2, 1.0, 0.1).normalize();
     Scene {
@@ -62,7 +62,7 @@ fn a_body_that_stays_rigid_needs_one_mode_and_no_group() {
     let body = soft_block(6);
     let scene = tumble(1e-6 * first_rate(&body), 0.5);
     let mut scene = scene;
-    // Steps that no vibration shortens: six million periods are not followed.
+    // Fixed steps longer than the vibrations: six million periods are not resolved.
     scene.run.scheme =
         Scheme::Conserving { order: 4, step: scene.run.duration.map(|duration| duration / 60.0) };
     let found = study(body, &scene);
@@ -95,7 +95,7 @@ fn the_reference_is_no_distance_from_itself_and_everything_else_is_some() {
     let worst = |row: &TradeRow| row.outcome.as_ref().expect("a motion").worst();
     assert_eq!(worst(&found.rows[0]), 0.0);
     assert!(found.rows[1..].iter().all(|row| worst(row) > 0.0));
-    // All eight sets of groups, lumped masses and single precision with all modes.
+    // The candidates with all modes cover all eight sets of groups, lumped masses and single precision.
     let whole = found.rows.iter().filter(|row| row.candidate.modes.len() == 5);
     let of_kind = |kind: CandidateKind| whole.clone().filter(|row| row.candidate.kind() == kind).count();
     assert_eq!(
@@ -106,7 +106,7 @@ fn the_reference_is_no_distance_from_itself_and_everything_else_is_some() {
     let single =
         found.rows.iter().find(|row| row.candidate.storage == Storage::F32).expect("single precision");
     assert!((1e-9..1e-2).contains(&worst(single)), "{}", worst(single));
-    // Rows of the front get better as they get dearer.
+    // Errors fall along the front as costs rise.
     let cost = |row: usize| found.rows[row].outcome.as_ref().expect("a motion").multiplications;
     for pair in found.front.windows(2) {
         assert!(cost(pair[0]) < cost(pair[1]) && worst(&found.rows[pair[0]]) > worst(&found.rows[pair[1]]));
@@ -121,12 +121,11 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
     let lumped =
         body.lumped().iter().find(|lumped| lumped.scheme == "diagonal-scaling").expect("a scheme").clone();
     let mut parts = body.clone().into_parts();
-    // The modes keep their modal mass; all that couples them with the rigid motion is summed over nodal
-    // masses.
+    // The modes keep their modal mass; all coupling with the rigid motion is summed over nodal masses.
     parts.invariants = lumped.invariants.with_modal_mass(body.invariants().modal_mass());
     parts.source.mass_structure = MassStructure::General;
     let other = FlexBody::new(parts).expect("a body");
-    // So many instants that a peak between them is no larger by much.
+    // With many output times a peak between two of them is hardly larger.
     let mut often = scene.clone();
     often.run.outputs = 6000;
     let [a, b] = [&body, &other].map(|body| simulate(body, &often, &Context::QUIET).expect("a motion").0);
@@ -207,7 +206,7 @@ fn a_cost_is_kept_by_the_most_accurate() {
 #[test]
 fn a_candidate_that_cannot_be_simulated_is_a_row_that_says_so() {
     let mut parts = soft_block(4).into_parts();
-    // The modes move the centre of mass by more than their own mass allows: no motion follows from it.
+    // The modes move the centre of mass by more than their mass allows, so that no motion can be computed.
     let c1 = &mut parts.lumped[0].invariants.primary_mut().c1;
     c1.fill(1e3);
     let body = FlexBody::new(parts).expect("a body");
@@ -220,7 +219,7 @@ fn a_candidate_that_cannot_be_simulated_is_a_row_that_says_so() {
     assert!(found.recommended.row().is_some());
 }
 
-/// A rubber-like block of few nodes, as a model.
+/// Returns a model of a rubber-like block with few nodes.
 fn model() -> FeModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([4, 2, 1]), |[x, y, z]| {
@@ -229,12 +228,12 @@ fn model() -> FeModel {
     FeModel::from_raw(mesh.assemble(&rubber, MassRule::Consistent).raw_model()).expect("a body").model
 }
 
-/// A usual study.
+/// Returns the usual settings of a study with this number of modes.
 fn wanted(modes: usize) -> WantedBodies {
     WantedBodies { modes, fine: false }
 }
 
-/// Conversions of which nothing is known that they are for.
+/// Returns conversions without information about the scene.
 fn without_scene(model: &FeModel, modes: usize) -> Conversions {
     let mut scene = tumble(1.0, 1.0);
     scene.run.duration = None;
@@ -251,7 +250,7 @@ fn a_reference_is_enriched_for_the_scene_and_tells_what_it_lacks() {
     let (first, own) = (&lacks[0], lacks.last().expect("an estimate"));
     assert_eq!(own.modes, made.sources[0].body().n_modes());
     assert!(first.modes < own.modes && own.worst < 0.7 * first.worst, "{lacks:?}");
-    // What still counts is said.
+    // Errors of the reference that matter are reported.
     assert!(made.diagnostics.iter().any(|one| one.code() == Code::ReferenceLacks), "{:?}", made.diagnostics);
 }
 
@@ -271,8 +270,8 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
         let measured = row.outcome.as_ref().expect("a motion");
         measured.deciding().errors.stress.expect("a deformed body")
     };
-    // Eight modes with residual vectors are near the truth of a spin that is there at once, one mode is not,
-    // and lacking W1 nothing is.
+    // Under a sudden spin eight modes with residual vectors are accurate, one mode is not, and no candidate
+    // without W1 is.
     let of = |source: &str, groups: TermGroups| {
         let row = found.rows.iter().find(|row| {
             row.source == source
@@ -284,15 +283,15 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
     let (whole, one) = (of(sources[0].name(), TermGroups::ALL), of("1 free mode", TermGroups::ALL));
     assert!(whole > 0.0 && whole < 0.1 && one > 0.9, "{whole} {one}");
     assert!(of(sources[0].name(), TermGroups::NONE) > 0.5);
-    // Residual vectors have what modes lack of the response to spin.
+    // Residual vectors represent the response of the truncated modes to spin.
     let (with, without) =
         (of("4 free modes, residual vectors", TermGroups::ALL), of("4 free modes", TermGroups::ALL));
     assert!(whole < with && with < without && without < one, "{whole} {with} {without} {one}");
-    // The same against the largest body: apart by no more than that is from the truth.
+    // Errors relative to the largest body differ at most by the error of that body relative to all nodes.
     let reduced = trade(&sources, &scene.clone().into(), None, &QUICK, &Context::QUIET).expect("a study");
     let mut both = 0;
     for a in &found.rows {
-        // Ladders differ: which sets of groups are hopeless is judged by either reference.
+        // The candidates differ: the reference decides which sets of groups are not worth testing.
         let Some(b) = reduced.rows.iter().find(|b| a.candidate == b.candidate) else { continue };
         assert!((stress(a) - stress(b)).abs() <= 1.1 * whole, "{a:?} {b:?}");
         both += 1;
@@ -315,7 +314,7 @@ fn a_fine_reference_stands_for_the_motion_of_all_nodes() {
     let (usual, _) = lacking(false);
     let (fine, sources) = lacking(true);
     assert!(fine <= PART_OF_FINE && usual > PART_OF_FINE, "{fine} {usual}");
-    // As all nodes tell, whom nobody asked.
+    // The estimate agrees with the error relative to all nodes, which the study did not use.
     let found =
         trade(&sources[..1], &scene.clone().into(), Some(&model), &QUICK, &Context::QUIET).expect("a study");
     let whole = found.rows[0].outcome.as_ref().expect("a motion").worst();
@@ -337,7 +336,7 @@ fn a_wholly_lumped_mass_has_modes_of_its_own() {
         for (j, eigenvalue) in pipeline.eigenvalues.iter().enumerate() {
             assert!((own.modes().eigenvalue[j] / eigenvalue - 1.0).abs() < 1e-9, "mode {j} of {pipeline:?}");
         }
-        // On a coarse mesh they are others than those of the consistent mass.
+        // On a coarse mesh the eigenvalues of the lumped mass differ from those of the consistent mass.
         let exact = sources[0].body().modes().eigenvalue[0];
         assert!((pipeline.eigenvalues[0] / exact - 1.0).abs() > 1e-3, "{pipeline:?}");
     }
@@ -367,13 +366,13 @@ fn conserving_scenes_with_damping_are_measured_against_the_nodes() {
     let full = trade(&sources, &scene.clone().into(), None, &QUICK, &Context::QUIET).expect("a study");
     assert!(full.cases[0].nodal.is_none());
     assert_eq!(full.rows[0].outcome.as_ref().expect("a motion").worst(), 0.0);
-    // Work that takes too long is refused before any.
+    // Work beyond the time limit is refused before it begins.
     let hasty = Context { longest: Some(1e-6), ..Context::QUIET };
     let error = trade(&sources, &scene.clone().into(), Some(&model), &QUICK, &hasty).expect_err("refused");
     assert_eq!(error.diagnostics()[0].code(), Code::WorkLong);
 }
 
-/// The same modes by the same search: what `trade` recommends and what `select` takes.
+/// `trade` recommends the modes that `select` selects, because both use one search.
 #[test]
 fn a_study_and_a_selection_take_the_same_modes() {
     let body = soft_block(9);
@@ -389,7 +388,7 @@ fn a_study_and_a_selection_take_the_same_modes() {
     if row.candidate.groups == taken.groups {
         assert_eq!(row.candidate.modes, taken.modes);
     }
-    // One mode fewer of the same order is not enough.
+    // One mode fewer in the same order exceeds the tolerances.
     let fewer = found.rows.iter().filter(|one| {
         one.candidate.groups == row.candidate.groups
             && one.candidate.modes.len() + 1 == row.candidate.modes.len()
@@ -400,7 +399,7 @@ fn a_study_and_a_selection_take_the_same_modes() {
     assert!(row.candidate.modes.len() == 1 || !worst.is_empty());
 }
 
-/// A body in two load cases: a slow tumble with a strict tolerance, and a fast one.
+/// Returns two load cases of a body: a slow tumble with a strict tolerance, and a fast tumble.
 fn two_cases(body: &FlexBody) -> [Scene; 2] {
     let rate = first_rate(body);
     let mut slow = tumble(0.02 * rate, 0.05);
@@ -427,7 +426,7 @@ fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
     for row in &both.rows {
         let measured = row.outcome.as_ref().expect("a motion");
         for (own, study) in measured.by_case.iter().zip(&alone) {
-            // Rungs of the ladders differ.
+            // The tested candidates differ between the studies; only common ones are compared.
             let Some(same) = study.rows.iter().find(|one| one.candidate == row.candidate) else { continue };
             let same = same.outcome.as_ref().expect("a motion");
             assert_eq!((own, measured.multiplications), (same.deciding(), same.multiplications));
@@ -439,7 +438,8 @@ fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
     }
     assert!(shared > 30, "{shared}");
 
-    // What to take is the cheapest that holds in both, and each case says what it rules out.
+    // The recommendation is the cheapest candidate that passes in both cases; each case states the candidates
+    // it rules out.
     let measured = |row: &TradeRow| row.outcome.as_ref().expect("a motion").clone();
     let taken = measured(recommended(&both));
     assert!(taken.holds());
@@ -456,7 +456,7 @@ fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
         assert!(own.by_case[at].worst <= most[at] && own.multiplications <= taken.multiplications);
     }
     assert!(both.cases.iter().all(|case| case.ruled_out_alone > 0), "{:?}", both.cases);
-    // Both runs are what it takes.
+    // The cost of two cases is the sum of both runs.
     let steps = |trade: &Trade| measured(&trade.rows[0]).timed.expect("the reference is timed").work.steps;
     assert_eq!(steps(&both), alone.iter().map(steps).sum::<u64>());
 }
@@ -512,7 +512,7 @@ fn the_program_writes_what_its_schema_says() {
     let lines = facts["verdict"].as_array().expect("lines");
     let labels: Vec<&str> = lines.iter().map(|line| line["label"].as_str().expect("a label")).collect();
     assert_eq!(labels, ["Asked", "Take", "Why", "Error", "Saves"]);
-    // The candidates that were measured are there as bodies.
+    // Every measured candidate was written as a body.
     for (at, row) in rows.iter().enumerate() {
         let path = place.join(format!("candidate_{:03}.flex.h5", at + 1));
         assert_eq!(path.exists(), !row["measured"].is_null(), "{row}");
@@ -533,7 +533,7 @@ fn the_program_writes_what_its_schema_says() {
     let bodies = rows.iter().filter(|row| !row["measured"].is_null()).count();
     assert_eq!(left.len(), 2 + 4 + bodies, "{left:?}");
 
-    // Nothing is that cheap: a tolerance that failed.
+    // No candidate is that cheap, and the command fails like for a tolerance.
     scene("[cost]\nmultiplications = 1\n");
     let run = with(&[]);
     assert_eq!(run.status.code(), Some(1));

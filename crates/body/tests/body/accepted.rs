@@ -1,5 +1,5 @@
-//! Whatever `convert` makes of a model, `check` accepts: with masses that no distribution of points has, with
-//! parts that hardly hold together, whatever the basis, the accuracy and the storage.
+//! Every body made by `convert` passes `check`: with masses that no distribution of points has, with weakly
+//! connected parts, in any basis, accuracy and storage.
 
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -32,7 +32,7 @@ fn converted(raw: RawModel, modes: usize, method: Method, accuracy: Accuracy) ->
     convert(&model, &settings, &Context::QUIET).expect("converts")
 }
 
-/// The identities of the body and, rounded to 32-bit floats, once more.
+/// Asserts the identities of the body, and of the body rounded to 32-bit floats.
 fn assert_accepted(conversion: &Conversion, about: &str) {
     let body = &conversion.body;
     let short = body.rounded_to_f32().expect("32-bit floats hold it");
@@ -44,7 +44,7 @@ fn assert_accepted(conversion: &Conversion, about: &str) {
     }
 }
 
-/// M with these entries added.
+/// Returns the model with these entries added to M.
 fn with_mass(raw: &RawModel, added: &[(u32, u32, f64)]) -> RawModel {
     let mass = &raw.mass.matrix;
     let all: Vec<_> = entries(mass).chain(added.iter().copied()).collect();
@@ -69,7 +69,7 @@ fn a_rotor_on_a_frame_is_a_body() {
     }
 }
 
-/// Two blocks end to end, their facing nodes tied to each other by springs along all axes.
+/// Returns two blocks end to end with facing nodes connected by springs along all axes.
 fn joined_pair(stiffness: f64) -> RawModel {
     let mesh = Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25]);
     let other = mesh.moved(&Matrix3::identity(), [0.75, 0.0, 0.0]);
@@ -96,8 +96,8 @@ fn joined_pair(stiffness: f64) -> RawModel {
     raw
 }
 
-/// Products with K lose in rounding what the low frequencies of a loose joint have, whatever rigid motion
-/// loses.
+/// Rounding of products with K exceeds the low frequencies of a weak joint, whatever the rounding of rigid
+/// motion.
 #[test]
 fn parts_that_are_joined_weakly_are_a_body() {
     for (method, exponent) in
@@ -113,12 +113,12 @@ fn parts_that_are_joined_weakly_are_a_body() {
             .into_iter()
             .find(|check| check.name == "modal_stiffness_diagonal")
             .expect("an identity");
-        // Without the noise of rigid motion, which may be smaller by accident.
+        // The noise of rigid motion is excluded, because it may be small by chance.
         assert!(diagonal.value <= 1e-9 + certificate.eigenvalue_rounding, "{about}: {diagonal:?}");
     }
 }
 
-/// M with inertia of the sizes `10^size` about random axes added at random nodes.
+/// Returns the model with inertia of the sizes `10^size` about random axes added to M at random nodes.
 fn with_random_inertia(raw: &RawModel, seed: u64, sizes: &[f64]) -> RawModel {
     let labels = raw.dofs.as_deref().expect("labels");
     let row = |node: i64, direction: u8| {
@@ -139,7 +139,7 @@ fn with_random_inertia(raw: &RawModel, seed: u64, sizes: &[f64]) -> RawModel {
     with_mass(raw, &added)
 }
 
-/// Every kind of basis that the program offers, for a frame with its first and last node as interfaces.
+/// Returns every kind of basis of the program, for a frame with its first and last node as interfaces.
 fn bases(model: &FeModel) -> Vec<BasisChoice> {
     let shapes = Mat::from_fn(model.rows().len(), 4, |i, j| Random((97 * i + j) as u64).signed());
     let raw = RawShapes { matrix: shapes, digits: 17, path: PathBuf::new(), source: None };
@@ -157,8 +157,7 @@ fn bases(model: &FeModel) -> Vec<BasisChoice> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, rng_seed: RngSeed::Fixed(15), ..ProptestConfig::default() })]
 
-    /// Inertia of random sizes about random axes at random nodes, up to ten thousand times and down to a ten
-    /// thousandth of that of the frame, in every basis.
+    /// Inertia about random axes at random nodes, from 1e-4 to 1e4 times that of the frame, in every basis.
     #[test]
     fn random_masses_of_nodes_are_bodies(seed in any::<u64>(), sizes in proptest::collection::vec(-4.0..4.0f64, 1..5), fast in any::<bool>()) {
         let mut raw = with_random_inertia(&raw_fixture("frame_beams"), seed, &sizes);
@@ -178,7 +177,7 @@ proptest! {
     }
 }
 
-/// What is written has passed the checks; what fails them is refused with exit code 3, and says which.
+/// Written bodies have passed the checks; a failed check ends with exit code 3 and its name.
 #[test]
 fn a_body_that_breaks_an_identity_is_refused() {
     let mesh = Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25]);

@@ -7,21 +7,21 @@ use std::f64::consts::{PI, TAU};
 
 const STEEL: Material = Material::STEEL;
 
-/// Steel without lateral contraction: rods and beams follow the one-dimensional theories exactly or nearly
-/// so.
+/// Steel with zero Poisson's ratio: rods and beams follow the one-dimensional theories exactly or nearly so.
 const NO_CONTRACTION: Material = Material { poisson: 0.0, ..STEEL };
 
 /// Roots beta L of cos(b) cosh(b) = 1: bending of a free-free beam.
 const BENDING_ROOTS: [f64; 3] = [4.730040744862704, 7.853204624095838, 10.995607838001671];
 
-/// Frequencies of Euler-Bernoulli bending, square section of side h.
+/// Returns the frequencies of Euler-Bernoulli bending for a square section of side h. Unit: Hz.
 fn euler_bernoulli(material: &Material, length: f64, h: f64) -> [f64; 3] {
     BENDING_ROOTS
         .map(|b| (b / length).powi(2) * h * (material.youngs / (12.0 * material.density)).sqrt() / TAU)
 }
 
-/// First bending frequency of a free-free Timoshenko beam, square section of side h: the root near the
-/// Euler-Bernoulli one of the frequency equation of T. C. Huang (J. Appl. Mech. 28, 1961).
+/// Returns the first bending frequency of a free-free Timoshenko beam with a square section of side h: the
+/// root near the Euler-Bernoulli frequency of the frequency equation of T. C. Huang (J. Appl. Mech. 28,
+/// 1961).
 fn timoshenko(material: &Material, length: f64, h: f64, shear_factor: f64) -> f64 {
     let (_, mu) = material.lame();
     let (area, inertia) = (h * h, h.powi(4) / 12.0);
@@ -46,7 +46,8 @@ fn timoshenko(material: &Material, length: f64, h: f64, shear_factor: f64) -> f6
     0.5 * (low + high)
 }
 
-/// Frequencies of a square beam along x, of length 1, in quadratic hexahedra half as long as its thickness.
+/// Returns the frequencies of a square beam along x of length 1, with quadratic hexahedra half as long as its
+/// thickness.
 fn beam(material: &Material, slenderness: f64, across: i32) -> Vec<f64> {
     let h = 1.0 / slenderness;
     let mesh = Mesh::block(ElementKind::Hex20, [2 * slenderness as i32, across, across], [1.0, h, h]);
@@ -58,7 +59,7 @@ fn slender_beam_converges_to_euler_bernoulli_with_the_square_of_its_thickness() 
     let deviation = |slenderness: f64| {
         let found = beam(&STEEL, slenderness, 1);
         let exact = euler_bernoulli(&STEEL, 1.0, 1.0 / slenderness);
-        // A square section bends in two planes: every frequency is there twice.
+        // A square section bends in two planes, so that every frequency is double.
         for pair in 0..3 {
             assert!((found[2 * pair] / found[2 * pair + 1] - 1.0).abs() < 1e-8, "{found:?}");
         }
@@ -87,7 +88,7 @@ fn thick_beam_follows_timoshenko() {
 #[test]
 fn rod_vibrates_along_its_axis_as_the_discrete_closed_form_says() {
     // Without lateral contraction u(x) is an exact solution in linear elements of length d: consistent mass
-    // gives lambda = 6 E / (rho d^2) (1 - cos k d) / (2 + cos k d), k = n pi / L, at any refinement.
+    // gives lambda = 6 E / (rho d^2) (1 - cos k d) / (2 + cos k d), k = n pi / L, for any refinement.
     for cells in [4, 8, 16] {
         let length = 2.0;
         let mesh = Mesh::block(ElementKind::Hex8, [cells, 1, 1], [length, 0.3, 0.2]);
@@ -128,7 +129,7 @@ fn shaft_twists_at_multiples_of_the_shear_wave_frequency() {
     }
 }
 
-/// Whether a shape is the turning of sections about z: all motion along (-y, x, 0).
+/// Returns true if a shape rotates sections about z: all motion is along (-y, x, 0).
 fn is_twist(nodes: &[[f64; 3]], shape: impl Fn(usize) -> f64) -> bool {
     let (mut along, mut all) = (0.0, 0.0);
     for (i, x) in nodes.iter().enumerate() {

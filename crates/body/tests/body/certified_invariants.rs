@@ -1,5 +1,4 @@
-//! Invariants of certified bodies against exact rational sums: every entry has the digits that it is said to
-//! have.
+//! Invariants of certified bodies compared with exact rational sums: every entry has the guaranteed digits.
 
 use faer::Mat;
 use flexbody_body::invariants::{
@@ -12,7 +11,7 @@ use num_traits::{ToPrimitive, Zero};
 use oracle::exact::exact;
 use oracle::random::Random;
 
-/// Ms, nodes, modes, K and body axes without any meaning: the sums do not ask for one.
+/// Ms, nodes, modes, K and body axes without physical meaning, which the sums do not need.
 struct Case {
     mass: Vec<Vec<f64>>,
     stiffness: Vec<Vec<f64>>,
@@ -25,7 +24,7 @@ const N: usize = 5;
 const NF: usize = 3;
 
 impl Case {
-    /// Entries of Ms and K fall over `decades`; nodes lie `far` from the origin.
+    /// Builds a case with entries of Ms and K over `decades`, and nodes `far` from the origin.
     fn new(seed: u64, decades: f64, far: f64) -> Self {
         let mut r = Random(seed);
         let mut gram = |n: usize| {
@@ -51,7 +50,7 @@ impl Case {
         condense_certified(&mass, &self.positions, self.shapes.as_ref(), &stiffness, &self.axes)
     }
 
-    /// Columns 1, x_k, psi_pk in exact numbers.
+    /// Returns the columns 1, x_k, psi_pk in exact numbers.
     fn column(&self, index: Column) -> Vec<BigRational> {
         (0..N)
             .map(|i| match index {
@@ -62,7 +61,7 @@ impl Case {
             .collect()
     }
 
-    /// a' Ms b.
+    /// Returns a' Ms b.
     fn product(&self, a: Column, b: Column) -> BigRational {
         form(&self.mass, &self.column(a), &self.column(b))
     }
@@ -106,7 +105,7 @@ fn symmetric(a: &[Vec<f64>]) -> SymmetricMatrix {
     SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries)).expect("symmetric")
 }
 
-/// Largest error of each of [`DIGITS`] relative to the Cauchy-Schwarz bound.
+/// Returns the largest error of each of [`DIGITS`] relative to the Cauchy-Schwarz bound.
 fn errors(case: &Case, body: &Invariants) -> [f64; DIGITS.len()] {
     let bound = CauchySchwarz::of(body);
     let Derived { inertia, c2, w1, w2, w3, modal_mass } = body.derived();
@@ -173,7 +172,7 @@ fn every_invariant_has_its_guaranteed_digits_and_not_many_more() {
         for ((name, digits), error) in DIGITS.iter().zip(found.digits).zip(errors) {
             let promised = 10f64.powf(-digits);
             assert!(error <= promised, "seed {seed}: {name} is off by {error:e}, promised {promised:e}");
-            // Rounding the exact number to f64 leaves 1e-16; derived entries add a few of them.
+            // Rounding the exact number to f64 costs 1e-16; derived entries add a few such errors.
             assert!(digits > 14.5, "seed {seed}: {name} has {digits} digits, its error is {error:e}");
         }
     }
@@ -182,7 +181,7 @@ fn every_invariant_has_its_guaranteed_digits_and_not_many_more() {
 #[test]
 fn plain_sums_lose_what_compensated_ones_keep() {
     // Heavy masses of either sign between the first and the last node, which move alike: the large terms of
-    // every sum cancel, with light ones between them.
+    // every sum cancel, with small terms between them.
     let mut case = Case::new(7, 0.0, 0.0);
     let last = N - 1;
     for (i, j, sign) in [(0, 0, 1.0), (last, last, 1.0), (0, last, -1.0), (last, 0, -1.0)] {
@@ -235,7 +234,7 @@ fn the_certified_condensation_equals_the_plain_one_up_to_rounding() {
     for (name, difference) in flexbody_body::invariants::primary_differences(&unturned.invariants, &plain) {
         assert!(difference < 1e-14, "{name}: {difference:e}");
     }
-    // Axes turn nothing but K_ff, which is theirs.
+    // The axes affect K_ff only.
     let turned = condense_certified(&mass, &positions, shapes.as_ref(), &stiffness, &axes).invariants;
     assert_eq!(turned.s(), unturned.invariants.s());
     assert_ne!(turned.modal_stiffness(), unturned.invariants.modal_stiffness());

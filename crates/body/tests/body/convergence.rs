@@ -1,4 +1,4 @@
-//! Orders of convergence under refinement: frequencies, and the errors that lumped masses make.
+//! Orders of convergence under refinement: frequencies, and errors of lumped masses.
 
 use faer::{Mat, MatRef};
 use flexbody_body::invariants::{
@@ -12,12 +12,13 @@ use std::f64::consts::PI;
 
 const STEEL: Material = Material::STEEL;
 
-/// log2 of the ratio of successive errors: the order of convergence when the mesh is halved each time.
+/// Returns log2 of the ratio of successive errors: the order of convergence for a mesh width that is halved
+/// each time.
 fn orders(errors: &[f64]) -> Vec<f64> {
     errors.windows(2).map(|pair| (pair[0] / pair[1]).abs().log2()).collect()
 }
 
-/// Relative error of the eigenvalue whose mode looks most like `field`.
+/// Returns the relative error of the eigenvalue whose mode is closest to `field`.
 fn error_of(body: &Assembly, field: impl Fn([f64; 3]) -> [f64; 3], exact: f64) -> f64 {
     let found = modes(body, 18);
     let field: Vec<f64> = body.nodes.iter().flat_map(|x| field(*x)).collect();
@@ -32,9 +33,9 @@ fn error_of(body: &Assembly, field: impl Fn([f64; 3]) -> [f64; 3], exact: f64) -
     found.eigenvalues()[mode] / exact - 1.0
 }
 
-/// Lame's equivoluminal mode of a square prism of side 1 and height 1/3 in cells of side 1/n: u = (cos a sin
-/// b, -sin a cos b, 0), a = pi x, b = pi y. No traction on any face and no change of volume, so lambda = 2
-/// pi^2 mu / rho exactly, at any Poisson's ratio and height.
+/// Returns the error for the Lame equivoluminal mode of a square prism of side 1 and height 1/3 with cells of
+/// side 1/n: u = (cos a sin b, -sin a cos b, 0), a = pi x, b = pi y. All faces are free of traction and the
+/// volume does not change, so that lambda = 2 pi^2 mu / rho exactly, for any Poisson's ratio and height.
 fn lame_error(kind: ElementKind, n: i32) -> f64 {
     let body = Mesh::block(kind, [n, n, n / 3], [1.0, 1.0, 1.0 / 3.0]).assemble(&STEEL, MassRule::Consistent);
     let (_, mu) = STEEL.lame();
@@ -45,8 +46,8 @@ fn lame_error(kind: ElementKind, n: i32) -> f64 {
     error_of(&body, field, 2.0 * PI * PI * mu / STEEL.density)
 }
 
-/// The first axial mode of a rod 1 x 1/8 x 1/8 without lateral contraction, in cells of side 1/n:
-/// lambda = pi^2 E / rho.
+/// Returns the error for the first axial mode of a rod 1 x 1/8 x 1/8 without lateral contraction with cells
+/// of side 1/n: lambda = pi^2 E / rho.
 fn rod_error(kind: ElementKind, n: i32) -> f64 {
     let material = Material { poisson: 0.0, ..STEEL };
     let body =
@@ -76,7 +77,7 @@ fn quadratic_hexahedra_converge_with_order_four() {
 #[ignore = "slow"]
 fn quadratic_tetrahedra_converge_with_order_four() {
     // The split of hexahedra into tetrahedra has no mirror symmetry: free faces add a term of order five, so
-    // the observed order approaches four linearly in the mesh width.
+    // that the observed order approaches four linearly in the mesh width.
     for errors in [
         [8, 16, 32].map(|n| rod_error(ElementKind::Tet10, n)),
         [3, 6, 12].map(|n| lame_error(ElementKind::Tet10, n)),
@@ -90,7 +91,8 @@ fn quadratic_tetrahedra_converge_with_order_four() {
 
 #[test]
 fn refinement_lowers_every_frequency() {
-    // Spaces of nested meshes with exact mass are nested: Rayleigh quotients can only fall.
+    // The function spaces of nested meshes with exact mass are nested, so that Rayleigh quotients can only
+    // fall.
     for kind in [ElementKind::Tet4, ElementKind::Hex8, ElementKind::Tet10] {
         let found: Vec<Vec<f64>> =
             [1, 2, 4].iter().map(|&s| modes(&block(kind, s), 12).eigenvalues().to_vec()).collect();
@@ -102,7 +104,8 @@ fn refinement_lowers_every_frequency() {
     }
 }
 
-/// Relative Frobenius errors of I0 and W2 from row sums and from the scaled diagonal, for the given shapes.
+/// Returns the relative Frobenius errors of I0 and W2 from row sums and from the scaled diagonal, for the
+/// given shapes.
 fn lumped_errors(body: &Assembly, shapes: MatRef<'_, f64>) -> [[f64; 2]; 2] {
     let mass = SymmetricMatrix::new(body.scalar_mass.clone()).expect("symmetric");
     let (frame, _) = choose_frame(&mass, &body.nodes, BodyFrame::Com).expect("a body with mass");
@@ -124,7 +127,7 @@ fn block(kind: ElementKind, s: i32) -> Assembly {
     Mesh::block(kind, [2 * s, s, s], SIZE).assemble(&STEEL, MassRule::Consistent)
 }
 
-/// Three smooth fields that know nothing of the mesh, at the nodes.
+/// Returns three smooth fields, independent of the mesh, at the nodes.
 fn smooth_shapes(nodes: &[[f64; 3]]) -> Mat<f64> {
     Mat::from_fn(3 * nodes.len(), 3, |row, j| {
         let ([x, y, z], k) = (nodes[row / 3], (row % 3) as f64);
@@ -138,7 +141,7 @@ fn smooth_shapes(nodes: &[[f64; 3]]) -> Mat<f64> {
 
 #[test]
 fn row_sums_of_linear_hexahedra_err_by_two_over_n_squared_in_every_second_moment() {
-    // The trapezoidal rule: sum of x^2 over n cells is (1 + 2 / n^2) times the integral.
+    // Trapezoidal rule: the sum of x^2 over n cells is (1 + 2 / n^2) times the integral.
     let cells = [5, 4, 3];
     let body = Mesh::block(ElementKind::Hex8, cells, SIZE).assemble(&STEEL, MassRule::Consistent);
     let mass = SymmetricMatrix::new(body.scalar_mass.clone()).expect("symmetric");
@@ -175,15 +178,15 @@ fn lumping_errors_of_linear_hexahedra_have_order_two() {
 fn row_sum_errors_of_quadratic_tetrahedra_have_order_four() {
     let bodies = [4, 8].map(|s| block(ElementKind::Tet10, s));
     let smooth = bodies.each_ref().map(|body| lumped_errors(body, smooth_shapes(&body.nodes).as_ref()));
-    // x x' is quadratic, and row sums of straight quadratic tetrahedra integrate quadratics exactly.
+    // x x' is quadratic, and row sums of straight quadratic tetrahedra integrate quadratic functions exactly.
     assert!(smooth.iter().all(|e| e[0][0] < 1e-13), "{smooth:?}");
     let order =
         |errors: &[[[f64; 2]; 2]; 2], scheme: usize, norm: usize| orders(&errors.map(|e| e[scheme][norm]))[0];
     assert!((order(&smooth, 0, 1) - 4.0).abs() < 0.05, "{}", order(&smooth, 0, 1));
-    // The scaled diagonal is less accurate though all its masses are positive.
+    // The scaled diagonal is less accurate although all its masses are positive.
     assert!((order(&smooth, 1, 0) - 2.0).abs() < 1e-9);
     assert!((order(&smooth, 1, 1) - 2.0).abs() < 0.05, "{}", order(&smooth, 1, 1));
-    // Modes of the meshes themselves carry the solver's error near free faces: observed 3.65 here.
+    // Modes of the meshes include the discretisation error near free faces; the observed order is 3.65.
     let of_modes = bodies.each_ref().map(|body| lumped_errors(body, modes(body, 5).shapes().as_ref()));
     let observed = order(&of_modes, 0, 1);
     assert!(observed > 3.5 && observed < 4.1, "{observed}");

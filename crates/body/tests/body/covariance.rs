@@ -1,4 +1,5 @@
-//! What does not change when the body is turned, moved, renumbered, reordered or measured in other units.
+//! Quantities that do not change when the body is rotated, shifted, renumbered, reordered or measured in
+//! other units.
 
 use faer::Mat;
 use flexbody_body::invariants::{BodyFrame, Invariants, compare_invariants};
@@ -15,7 +16,7 @@ use std::collections::HashMap;
 
 const METHODS: [Method; 2] = [Method::Dense, Method::Lanczos];
 
-/// A bracket with a taper and unequal arms: no symmetry, no repeated eigenvalue.
+/// Returns a bracket with a taper and unequal arms, without symmetry or repeated eigenvalues.
 fn mesh() -> Mesh {
     let cells: Vec<_> = grid([6, 3, 5]).into_iter().filter(|c| c[0] < 2 || c[2] < 2).collect();
     Mesh::from_cells(ElementKind::Hex8, &cells, |[x, y, z]| {
@@ -31,14 +32,14 @@ fn solved(raw: RawModel, method: Method) -> Body {
     proved(raw, 12, method)
 }
 
-/// Largest relative difference of eigenvalues, `scale` times those of `a` expected in `b`.
+/// Returns the largest relative difference of the eigenvalues of `b` from `scale` times those of `a`.
 fn eigenvalue_difference(a: &Body, b: &Body, scale: f64) -> f64 {
     let pairs = a.eigenvalues().iter().zip(b.eigenvalues());
     pairs.map(|(a, b)| (b / (a * scale) - 1.0).abs()).fold(0.0, f64::max)
 }
 
-/// Differences of the invariants about the centre of mass in model axes, relative to their Cauchy-Schwarz
-/// bounds, when the nodes of `b` are those of `a` at x_b = R x_a + d. Signs of modes are free.
+/// Returns the differences of the invariants about the centre of mass in model axes, relative to their
+/// Cauchy-Schwarz bounds, if the nodes of `b` are those of `a` at x_b = R x_a + d. Signs of modes may differ.
 fn moved_differences(a: &Body, b: &Body, turn: &Matrix3<f64>) -> Vec<(String, f64)> {
     let (condensed_a, condensed_b) = (a.condensed(BodyFrame::Com), b.condensed(BodyFrame::Com));
     let turned = condensed_a.invariants.rotated(&turn.transpose());
@@ -48,7 +49,8 @@ fn moved_differences(a: &Body, b: &Body, turn: &Matrix3<f64>) -> Vec<(String, f6
     differences(&turned, &condensed_b.invariants, a, &shapes_a, &condensed_b.shapes)
 }
 
-/// Differences of the invariants of two sets of the same modes but for signs; `body` gives the mass matrix.
+/// Returns the differences of the invariants of two sets of modes that are equal up to signs; `body` gives
+/// the mass matrix.
 fn differences(
     a: &Invariants,
     b: &Invariants,
@@ -89,7 +91,8 @@ fn turning_changes_nothing() {
 
 #[test]
 fn a_distant_origin_changes_nothing_where_coordinates_stay_exact() {
-    // Multiples of 2^-7 m moved by 2^20 m: every coordinate is exact, so results may differ by rounding only.
+    // Multiples of 2^-7 m shifted by 2^20 m: every coordinate is exact, so that results differ by rounding
+    // only.
     for method in METHODS {
         let mut raw = assemble(&mesh()).raw_model();
         let near = solved(raw.clone(), method);
@@ -99,7 +102,7 @@ fn a_distant_origin_changes_nothing_where_coordinates_stay_exact() {
         let far = solved(raw, method);
         assert!(eigenvalue_difference(&near, &far, 1.0) < 1e-12);
         for (name, difference) in moved_differences(&near, &far, &Matrix3::identity()) {
-            // The origin itself can be written to half the spacing of numbers at 2^20 only, 2^-33 m.
+            // The origin itself has a rounding of half the spacing of numbers at 2^20, 2^-33 m.
             let limit = if name == "first_moment" { 2e-9 } else { 1e-12 };
             assert!(difference < limit, "{name}: {difference:e}");
         }
@@ -108,7 +111,7 @@ fn a_distant_origin_changes_nothing_where_coordinates_stay_exact() {
 
 #[test]
 fn a_body_assembled_a_million_lengths_away_keeps_the_digits_of_its_coordinates() {
-    // Coordinates near 1e6 m carry 1e-10 m, and so does every element.
+    // Coordinates near 1e6 m have a rounding of 1e-10 m, and so has every element.
     let shift = [0.7e6, -0.5e6, 0.6e6];
     for method in METHODS {
         let near = solved(assemble(&mesh()).raw_model(), method);
@@ -119,7 +122,7 @@ fn a_body_assembled_a_million_lengths_away_keeps_the_digits_of_its_coordinates()
     }
 }
 
-/// The same body in units that are 1/length, 1/mass, 1/time as large.
+/// Returns the body in units of the size 1/length, 1/mass, 1/time.
 fn in_units(raw: &RawModel, length: f64, mass: f64, time: f64) -> RawModel {
     let scaled = |m: &CscMatrix, factor: f64| {
         let values: Vec<f64> = m.values().iter().map(|v| v * factor).collect();
@@ -134,7 +137,7 @@ fn in_units(raw: &RawModel, length: f64, mass: f64, time: f64) -> RawModel {
     other
 }
 
-/// The invariants of the same body in other units.
+/// Returns the invariants of the body in other units.
 fn invariants_in_units(a: &Invariants, length: f64, mass: f64, time: f64) -> Invariants {
     let root = mass.sqrt();
     let mut b = a.clone();
@@ -150,7 +153,7 @@ fn invariants_in_units(a: &Invariants, length: f64, mass: f64, time: f64) -> Inv
 #[test]
 fn units_change_nothing_but_the_numbers() {
     // mm-t-s, micrometre-kg-s and micrometre-pg-us (MEMS), km-kt-ms, ft-slug-s, a resonator of 50 micrometres
-    // in SI units, and powers of four: exact in binary, so every bit must come back.
+    // in SI units, and powers of four: exact in binary, so that every bit must agree.
     for (length, mass, time) in [
         (1e3, 1e-3, 1.0),
         (1e6, 1.0, 1.0),
@@ -166,7 +169,7 @@ fn units_change_nothing_but_the_numbers() {
             let b = solved(in_units(&raw, length, mass, time), method);
             let (ca, cb) = (a.condensed(BodyFrame::Principal), b.condensed(BodyFrame::Principal));
             let expected = invariants_in_units(&ca.invariants, length, mass, time);
-            // Shapes are mass-normalised: they scale with 1 / sqrt(mass).
+            // Mass-normalised shapes scale with 1 / sqrt(mass).
             let shapes = &ca.shapes * faer::Scale(mass.sqrt());
             let found = differences(&expected, &cb.invariants, &a, &shapes, &cb.shapes);
             let eigenvalues = eigenvalue_difference(&a, &b, time.powi(-2));
@@ -186,7 +189,7 @@ fn order_of_rows_and_node_numbers_change_nothing() {
         let place: HashMap<[u64; 3], usize> =
             raw.nodes.positions.iter().enumerate().map(|(i, x)| (x.map(f64::to_bits), i)).collect();
         for (order, numbering, limit) in [
-            // The internal order is the node table's: here the very same numbers.
+            // The internal order is that of the node table, so that the numbers are identical here.
             (DofOrder::NodeMajor, Numbering::Consecutive, 0.0),
             (DofOrder::ComponentMajor, Numbering::Consecutive, 0.0),
             (DofOrder::Shuffled(4), Numbering::Consecutive, 0.0),

@@ -1,5 +1,5 @@
-//! Craig-Bampton and Craig-Chang bases against dense solutions that use nothing of the library but its matrix
-//! type.
+//! Craig-Bampton and Craig-Chang bases compared with dense solutions that use only the matrix type of the
+//! library.
 
 mod free_body;
 mod sharing;
@@ -40,8 +40,8 @@ fn models() -> Vec<RawModel> {
     apart.chain(sharing::models()).collect()
 }
 
-/// The same from definitions, dense: K, M, D, a basis Z of what leaves the interface coordinates zero, and
-/// the weights C that take the coordinates.
+/// Dense oracle from definitions: K, M, D, a basis Z of the motions with zero interface coordinates, and the
+/// weights C that give the coordinates.
 struct Dense {
     k: Mat<f64>,
     m: Mat<f64>,
@@ -59,7 +59,8 @@ impl Dense {
         let mut motion: Vec<Vec<f64>> = Vec::new();
         let mut weights: Vec<Vec<f64>> = Vec::new();
         let mut constraints: Vec<Vec<f64>> = Vec::new();
-        // Nodes whose displacements an interface prescribes do not follow the mean of another.
+        // Nodes whose displacements an interface prescribes do not contribute to the mean of another
+        // interface.
         let prescribed: HashSet<i64> = raw
             .interfaces
             .iter()
@@ -98,7 +99,7 @@ impl Dense {
                 }
             }
             if coupling == Coupling::Averaging {
-                // Of one size: rotations are in other units.
+                // Weights are normalised because rotations have other units.
                 constraints.extend(weights[first..].iter().map(|w| {
                     let size = w.iter().map(|v| v * v).sum::<f64>().sqrt();
                     w.iter().map(|v| v / size).collect::<Vec<_>>()
@@ -117,7 +118,7 @@ impl Dense {
         Self { k, m, motion, held, weights, rigid }
     }
 
-    /// Eigenvalues of K, M within the span of `basis`, ascending, without the zero ones.
+    /// Returns the eigenvalues of K, M within the span of `basis`, ascending, without the zero ones.
     fn eigenvalues(&self, basis: MatRef<'_, f64>, zero: usize) -> Vec<f64> {
         let (k, m) = (basis.transpose() * &self.k * basis, basis.transpose() * &self.m * basis);
         let shift = 1e-4 * trace(&k) / trace(&m);
@@ -128,22 +129,22 @@ impl Dense {
         theta.iter().rev().skip(zero).map(|t| 1.0 / t - shift).collect()
     }
 
-    /// A basis of all motions that the couplings allow.
+    /// Returns a basis of all motions that the couplings allow.
     fn allowed(&self) -> Mat<f64> {
         let columns: Vec<_> = self.motion.col_iter().chain(self.held.col_iter()).collect();
         Mat::from_fn(self.k.nrows(), columns.len(), |i, j| columns[j][i])
     }
 
-    /// The unit loads on the interface coordinates, less the inertia forces of the rigid motion that they
-    /// cause.
+    /// Returns the unit loads on the interface coordinates minus the inertia forces of the rigid motion that
+    /// they cause.
     fn relieved(&self) -> Mat<f64> {
         let mass = self.rigid.transpose() * &self.m * &self.rigid;
         let resultants = self.rigid.transpose() * &self.weights;
         &self.weights - &self.m * (&self.rigid * mass.partial_piv_lu().solve(resultants))
     }
 
-    /// The deformations within the span of `basis`, M-orthogonal to rigid motion, that self-equilibrated
-    /// forces cause.
+    /// Returns the deformations within the span of `basis`, M-orthogonal to rigid motion, caused by
+    /// self-equilibrated forces.
     fn responses(&self, basis: Mat<f64>, forces: MatRef<'_, f64>) -> Mat<f64> {
         let (values, vectors) = symmetric_eigen((basis.transpose() * &self.k * &basis).as_ref());
         let largest = values[values.len() - 1];
@@ -157,13 +158,13 @@ impl Dense {
         &u - &self.rigid * along
     }
 
-    /// Loads on the coordinates without resultants: a basis of the null space of the rigid motion in them.
+    /// Returns loads on the coordinates without resultants: a basis of the null space of their rigid motion.
     fn equilibrated(&self) -> Mat<f64> {
         complement(&(self.weights.transpose() * &self.rigid))
     }
 }
 
-/// An orthonormal basis of what is orthogonal to the columns of `a`, which are independent.
+/// Returns an orthonormal basis of the complement of the independent columns of `a`.
 fn complement(a: &Mat<f64>) -> Mat<f64> {
     let q = a.qr().compute_Q();
     q.as_ref().subcols(a.ncols(), a.nrows() - a.ncols()).to_owned()
@@ -173,7 +174,7 @@ fn trace(a: &Mat<f64>) -> f64 {
     (0..a.nrows()).map(|i| a[(i, i)]).sum()
 }
 
-/// Rigid motion of points about another one.
+/// Returns the rigid motions of points about another point.
 fn rigid(x: &[[f64; 3]], d: usize, about: [f64; 3]) -> Mat<f64> {
     let turns: &[[f64; 3]] =
         if d == 2 { &[[0.0, 0.0, 1.0]] } else { &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
@@ -187,7 +188,7 @@ fn rigid(x: &[[f64; 3]], d: usize, about: [f64; 3]) -> Mat<f64> {
     })
 }
 
-/// Psi Lambda^-1 Psi' F.
+/// Returns Psi Lambda^-1 Psi' F.
 fn modal_responses(basis: &ModalBasis, forces: MatRef<'_, f64>) -> Mat<f64> {
     let (vectors, lambda) = (&basis.solution.vectors, &basis.solution.eigenvalues);
     let modal = vectors.transpose() * forces;
@@ -227,7 +228,7 @@ fn static_responses_to_interface_loads_are_exact() {
         assert_eq!(loads.ncols(), oracle.weights.ncols() - if d == 2 { 3 } else { 6 });
         let forces = &oracle.weights * &loads;
         let exact = oracle.responses(oracle.allowed(), forces.as_ref());
-        // None but the static shapes matter.
+        // Only the static shapes matter for these responses.
         let found = modal_responses(&craig_bampton(&model(raw), 1), forces.as_ref());
         for j in 0..loads.ncols() {
             let error = (found.col(j) - exact.col(j)).norm_l2() / exact.col(j).norm_l2();
@@ -264,8 +265,8 @@ fn free_frequencies_come_from_above_to_those_of_the_body() {
     }
 }
 
-/// Loads on the reference points work on the rows of the interfaces: the amplitudes are those of the nodal
-/// loads.
+/// The rows of the interfaces give the modal amplitudes of loads at the reference points: they equal those of
+/// the nodal loads.
 #[test]
 fn rows_of_the_interfaces_are_the_motion_of_the_reference_points() {
     for raw in models() {
@@ -339,7 +340,7 @@ fn interface_coordinates_hold_the_modes_and_as_many_rigid_motions() {
         let energies = symmetric_eigen(coordinates.stiffness.as_ref()).0;
         let positive = energies.iter().filter(|e| **e > 1e-13 * energies[size - 1]).count();
         assert_eq!(positive, size - zero, "{energies:?}");
-        // K x = lambda M x, through M: it is positive definite.
+        // K x = lambda M x is reduced by the Cholesky factor of M, which is positive definite.
         let l = coordinates.mass.llt(faer::Side::Lower).expect("positive definite");
         let half = |a: &Mat<f64>| l.L().partial_piv_lu().solve(a);
         let reduced = half(&half(&coordinates.stiffness).transpose().to_owned());
@@ -352,7 +353,7 @@ fn interface_coordinates_hold_the_modes_and_as_many_rigid_motions() {
     }
 }
 
-/// Checks of the interface coordinates that do not hold.
+/// Returns the names of the failed checks of the interface coordinates.
 fn broken(body: &FlexBody) -> Vec<String> {
     let checks = body.parts().interface_identities();
     assert_eq!(checks.len(), 4);
@@ -360,8 +361,8 @@ fn broken(body: &FlexBody) -> Vec<String> {
     wrong.map(|check| format!("{}: {:e} > {:e}", check.name, check.value, check.limit)).collect()
 }
 
-/// K of few digits annihilates rigid motion badly, and a slender body magnifies that: its rigid mass is exact
-/// all the same.
+/// A K with few digits annihilates rigid motion poorly, and a slender body amplifies that: the rigid mass
+/// must remain exact.
 #[test]
 fn few_digits_of_a_slender_body_do_not_reach_its_rigid_motion() {
     let mesh = Mesh::block(ElementKind::Hex8, [30, 1, 1], [3.0, 0.05, 0.04]);
@@ -390,8 +391,8 @@ fn few_digits_of_a_slender_body_do_not_reach_its_rigid_motion() {
     }
 }
 
-/// Reduced integration leaves patterns without mass, also among the motions of single nodes: they are left
-/// out and told, and what stays keeps its digits.
+/// Reduced integration leaves patterns without mass, also among motions of single nodes: they are removed and
+/// reported, and the other modes keep their digits.
 #[test]
 fn motions_without_mass_are_left_out_and_told() {
     let folder = oracle::fixtures().join("models/bar_c3d8r");
@@ -428,7 +429,7 @@ fn the_same_bits_at_any_number_of_threads() {
     assert_eq!(one, on(3));
 }
 
-/// Where the reference point lies changes the coordinates, not what they span.
+/// The position of the reference point changes the coordinates, but not their span.
 #[test]
 fn the_span_does_not_depend_on_the_reference_points() {
     for couplings in &COUPLINGS[..3] {
@@ -443,7 +444,7 @@ fn the_span_does_not_depend_on_the_reference_points() {
     }
 }
 
-/// Interfaces that state nothing are averaging ones.
+/// Interfaces without a stated coupling are averaging.
 #[test]
 fn averaging_is_the_default() {
     let stated = bracket([Coupling::Averaging, Coupling::Averaging]);
@@ -467,7 +468,7 @@ fn one_interface_gives_fixed_interface_modes_alone() {
     assert_eq!(told, [Code::ShapesRigid]);
 }
 
-/// Unit loads at the interfaces of the free body, with the inertia forces of its rigid motion.
+/// Unit loads at the interfaces of the free body are balanced by the inertia forces of its rigid motion.
 #[test]
 fn attachment_modes_carry_the_loads_of_the_interfaces() {
     for raw in models() {
@@ -541,8 +542,8 @@ fn what_cannot_be_a_craig_bampton_basis_is_refused() {
     assert!(refused(raw, &below).has(Code::ShapesNone), "nothing but rigid motion");
 }
 
-/// Two blocks that share an edge: a mechanism when one is held, and also when both are, since the interfaces
-/// move.
+/// Two blocks that share an edge are a mechanism if one interface is held, and also if both are, because the
+/// interfaces move.
 #[test]
 fn mechanisms_are_found_whether_the_interfaces_hold_them_or_not() {
     let mesh = Mesh::hinge(ElementKind::Hex8, 2);
@@ -563,7 +564,7 @@ fn mechanisms_are_found_whether_the_interfaces_hold_them_or_not() {
     }
 }
 
-/// A plane body's coordinates are two translations and a rotation for each interface.
+/// The coordinates of a plane body are two translations and a rotation for each interface.
 #[test]
 fn plane_bodies_have_three_coordinates_for_each_interface() {
     let body = body(&model(strip([Coupling::Rigid, Coupling::Averaging])), 4);

@@ -1,5 +1,5 @@
-//! Craig-Bampton bases of bodies whose nodes have rotations: single nodes are whole joints, rigid interfaces
-//! tie rotations too.
+//! Craig-Bampton bases of bodies whose nodes have rotations: a single node is a complete joint, and rigid
+//! interfaces constrain rotations too.
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef};
@@ -18,7 +18,7 @@ fn fixture(name: &str) -> RawModel {
     read_model(&read_manifest(folder.join("model.toml")).expect("a fixture")).expect("a fixture")
 }
 
-/// Nodes whose rows include all rotations.
+/// Returns the nodes whose rows include all rotations.
 fn turning(raw: &RawModel) -> Vec<i64> {
     let labels = raw.dofs.as_ref().expect("labels");
     let rotations = if raw.dimension == 2 { 1 } else { 3 };
@@ -43,7 +43,7 @@ fn body(model: &FeModel, count: usize) -> FlexBody {
         .body
 }
 
-/// Finite eigenvalues of K, M in the given rows, ascending, without the `zero` lowest.
+/// Returns the finite eigenvalues of K, M in the given rows, ascending, without the `zero` lowest.
 fn eigenvalues(model: &FeModel, kept: &dyn Fn(usize) -> bool, zero: usize) -> Vec<f64> {
     let pencil = model.pencil();
     let rows: Vec<usize> = (0..pencil.n()).filter(|&row| kept(row)).collect();
@@ -79,7 +79,7 @@ fn all_hold(body: &FlexBody, model: &FeModel, what: &str) {
     }
 }
 
-/// A node with rotations is a joint by itself, however it is coupled: six coordinates, its own rows.
+/// A node with rotations is a joint by itself with any coupling: its six rows are the coordinates.
 #[test]
 fn a_single_node_with_rotations_is_a_joint() {
     for name in ["frame_beams", "plane_frame"] {
@@ -100,7 +100,7 @@ fn a_single_node_with_rotations_is_a_joint() {
                 few.parts().interface_identities().len(),
                 if coupling == Coupling::Free { 2 } else { 4 }
             );
-            // All fixed-interface modes: the free body.
+            // With all fixed-interface modes the body has the modes of the free body.
             let free = eigenvalues(&model, &|_| true, zero);
             let all = body_of(1000);
             close(&all.modes().eigenvalue[..10], &free[..10], 1e-8, &what);
@@ -129,7 +129,7 @@ fn a_single_node_with_rotations_is_a_joint() {
 }
 
 /// The reference node of an eliminated constraint, held; and an edge of a shell, whose rotations a rigid
-/// interface ties.
+/// interface constrains.
 #[test]
 fn rigid_interfaces_tie_rotations() {
     let mpc = fixture("mpc_block");
@@ -157,7 +157,7 @@ fn rigid_interfaces_tie_rotations() {
         );
         // With one interface the modes are the fixed-interface modes without their rigid part.
         assert_eq!(body.n_modes(), 8, "{what}");
-        // The rotation of every node of the interface is that of its reference point.
+        // The rotation of every node of the interface equals that of its reference point.
         let (modes, interface) = (body.modes(), &body.interfaces()[0]);
         let rotation = modes.rotation.as_ref().expect("nodal rotations");
         let rows = interface.rows(body.nodes(), modes.shape.as_ref(), Some(rotation.as_ref()), 3);

@@ -1,5 +1,5 @@
-//! Keyword decks: names with dots and blanks, sets that cannot be resolved, files that cards name, matrices of other
-//! steps and other jobs.
+//! Keyword decks: names with dots and blanks, unresolved sets, files named by cards, matrices of other steps
+//! and other jobs.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Error;
@@ -10,7 +10,7 @@ use oracle::jobs::{body, job, set};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Copies a small job, with its deck changed.
+/// Copies a small job with a changed deck.
 fn changed(name: &str, change: impl Fn(&str) -> String) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     for entry in fs::read_dir(fixtures().join("small").join(name)).expect("a folder") {
@@ -32,7 +32,7 @@ fn nodes(path: &Path, name: &str) -> Vec<i64> {
     raw.interfaces.remove(0).nodes
 }
 
-/// A dot belongs to the name of a set where there are no instances, and a blank does not count.
+/// Without instances a dot belongs to the name of a set; blanks are ignored.
 #[test]
 fn sets_of_a_deck_without_instances_may_have_dots() {
     let sets = "*NSET, NSET=TIP.1\n5, 35\n*NSET, NSET=A.1\nTIP.1, 75\n*NSET,NSET=A B\na.1\n*MATERIAL";
@@ -42,7 +42,7 @@ fn sets_of_a_deck_without_instances_may_have_dots() {
     assert_eq!((of(0), of(1), of(2)), (vec![5, 35], vec![5, 35], vec![5, 35]), "75 has no row of its own");
 }
 
-/// A set that cannot be resolved is told where it is asked for, and so are those that are made of it.
+/// An unresolved set, or a set that contains one, is an error only if it is requested.
 #[test]
 fn sets_that_cannot_be_resolved_are_told_when_they_are_asked_for() {
     let sets = "*NSET, NSET=BROKEN\n5, NOWHERE\n*NSET, NSET=MADE\nBROKEN\n*NSET, NSET=BY, ELSET=NONE\n*ELSET, ELSET=ODD\n1, NONE\n*MATERIAL";
@@ -64,7 +64,7 @@ const ASSEMBLY: &str = "*Part, name=P\n*Node\n1, 0., 0., 0.\n2, 1., 0., 0.\n3, 0
     *Nset, nset=FACES, elset=E, instance=B\n*Nset, nset=BOTH\nDOTTED, ONE\n*Nset, nset=LOST, instance=D\n1\n*End Assembly\n";
 
 /// Sets of the assembly name nodes and sets of instances, and interfaces do so too: `A.TIP`. A name that two
-/// instances have is refused.
+/// instances share is refused.
 #[test]
 fn sets_of_instances_are_named_with_their_instance() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -136,7 +136,7 @@ fn blanks_in_keywords_do_not_count() {
     ] {
         let (centre, interface) = centre(to);
         near(centre, middle);
-        // Interfaces take the points that lie at the nodes, else those between the faces.
+        // Interfaces take the points at the nodes or, without such points, those between the faces.
         let own = if middle.abs() == 0.002 { middle } else { 0.0 };
         assert!(interface.len() >= 2);
         interface.iter().for_each(|z| near(*z, own));
@@ -150,7 +150,7 @@ fn blanks_in_keywords_do_not_count() {
     assert_eq!(labels.iter().filter(|label| label.node == 900).count(), 6);
 }
 
-/// Files that cards name are looked for in the folder of the job, then beside the file that names them.
+/// Files named by cards are searched in the folder of the job, then beside the file that names them.
 #[test]
 fn included_files_and_files_of_data_lie_where_the_job_is() {
     let (folder, path) = changed("calculix", str::to_owned);
@@ -189,7 +189,7 @@ fn included_files_and_files_of_data_lie_where_the_job_is() {
     assert!(error.has(Code::FileUnreadable) && error.to_string().contains("e.txt"), "{error}");
 }
 
-/// Stiffness and mass of two steps are a pair where no step has both; names of other jobs are none of this one.
+/// Stiffness and mass of two steps are a pair if no step has both; matrices of other jobs are ignored.
 #[test]
 fn matrices_belong_to_their_job() {
     let (folder, path) = changed("abaqus", str::to_owned);
@@ -204,7 +204,8 @@ fn matrices_belong_to_their_job() {
     assert!(read(&path, Vec::new()).expect_err("no mass").has(Code::JobUnknown));
 }
 
-/// The message about rows that do not fit names elements with internal nodes; with labels these are internal rows.
+/// The error about rows that do not fit names elements with internal nodes; with labels these are internal
+/// rows.
 #[test]
 fn internal_nodes_of_beams_are_named_and_read_with_labels() {
     let beam = "*Element, type=B33\n7, 11, 14\n*Nset";
@@ -214,7 +215,7 @@ fn internal_nodes_of_beams_are_named_and_read_with_labels() {
     let (folder, path) = changed("abaqus_labels", |text| text.replacen("*Nset", beam, 1));
     let place = folder.path().join("job_STIF1.mtx");
     let text = fs::read_to_string(&place).expect("a matrix");
-    // A row of the internal node -3 that follows the stretch from node 11 to node 23 along y.
+    // A row of the internal node -3 that follows the extension from node 11 to node 23 along y.
     let (terms, k) = ([(-3, 1, 1.0), (11, 1, -1.0), (23, 1, 1.0)], 1e9);
     let mut more = String::new();
     for (a, i, x) in terms {

@@ -1,5 +1,5 @@
-//! Rows and directions that neither K nor M holds: nodes without elements, rotations of solids, the normals of shells
-//! without drilling stiffness. The body is what it is without them.
+//! Rows and directions that are empty in both K and M: nodes without elements, rotations of solids, normals
+//! of shells without drilling stiffness. The body equals the one without them.
 
 use oracle::elements::{ElementKind, MassRule, Material};
 
@@ -32,8 +32,8 @@ fn block() -> RawModel {
         .raw_model()
 }
 
-/// The block with six rows for each node, of which the rotations are empty, and with two nodes of no element, whose
-/// rows stand in the middle.
+/// Returns the block with six rows per node, of which the rotations are empty, and with two nodes without
+/// elements, whose rows are in the middle.
 fn block_with_empty_rows() -> RawModel {
     let plain = block();
     let ids = plain.nodes.ids.clone();
@@ -94,7 +94,7 @@ fn what_is_said_of_left_out_rows_is_refused() {
     let error = FeModel::from_raw(raw).expect_err("an interface of a node that is not there");
     assert!(error.to_string().contains("names 1 nodes without stiffness and mass: 9001"), "{error}");
 
-    // Loads by the rows of the matrices: on a node of the block, on one without elements.
+    // Loads by rows of the matrices: on a node of the block, and on a node without elements.
     let model = FeModel::from_raw(block_with_empty_rows()).expect("a body").model;
     let load = |row: usize| {
         let matrix = Mat::from_fn(model.matrix_rows(), 1, |i, _| f64::from(i == row));
@@ -108,7 +108,7 @@ fn what_is_said_of_left_out_rows_is_refused() {
         "{error}"
     );
 
-    // A displacement without stiffness and mass at a node that has others is a mistake.
+    // A displacement without stiffness and mass at a node with other rows is an error.
     let mut raw = block();
     let n = raw.stiffness.matrix.n_cols();
     for matrix in [&mut raw.stiffness.matrix, &mut raw.mass.matrix] {
@@ -123,8 +123,9 @@ fn what_is_said_of_left_out_rows_is_refused() {
     assert!(FeModel::from_raw(raw).expect_err("a row of nothing").has(Code::PencilSingular));
 }
 
-/// A plate of 4 x 3 nodes in the plane x, y: bars along edges and diagonals, which bend out of the plane and twist alone.
-/// Rotations about z have neither stiffness nor mass. With the places of the nodes, K and M (six rows a node).
+/// Returns a plate of 4 x 3 nodes in the plane x, y: bars along edges and diagonals with out-of-plane bending
+/// and torsion only. Rotations about z have neither stiffness nor mass. Returns positions of the nodes, K and
+/// M (six rows per node).
 fn plate() -> (Vec<Vector3<f64>>, DMatrix<f64>, DMatrix<f64>) {
     let at = |i: usize, j: usize| 4 * j + i;
     let places: Vec<Vector3<f64>> = (0..12)
@@ -169,7 +170,7 @@ fn plate() -> (Vec<Vector3<f64>>, DMatrix<f64>, DMatrix<f64>) {
     (places, k, m)
 }
 
-/// The plate turned.
+/// Returns the rotated plate.
 fn turned(rotation: &Rotation3<f64>) -> RawModel {
     let (places, k, m) = plate();
     let n = k.nrows();
@@ -180,7 +181,7 @@ fn turned(rotation: &Rotation3<f64>) -> RawModel {
     let sparse = |matrix: &DMatrix<f64>| {
         let matrix = &all * matrix * all.transpose();
         let matrix = 0.5 * (&matrix + matrix.transpose());
-        // What rounding leaves where nothing is stays in the matrix, as FE programs write it.
+        // Rounding in empty rows remains in the matrix, like in files of FE programs.
         let entries: Vec<(u32, u32, f64)> = (0..n)
             .flat_map(|i| (0..n).map(move |j| (i, j)))
             .map(|(i, j)| (i as u32, j as u32, matrix[(i, j)]))
@@ -198,7 +199,7 @@ fn turned(rotation: &Rotation3<f64>) -> RawModel {
     RawModel { dofs, ..RawModel::in_memory("plate", sparse(&k), sparse(&m), nodes) }
 }
 
-/// Eigenvalues of the plate without its rotations about z, by dense algebra.
+/// Returns the eigenvalues of the plate without its rotations about z, by dense algebra.
 fn reference() -> Vec<f64> {
     let (_, k, m) = plate();
     let kept: Vec<usize> = (0..k.nrows()).filter(|row| row % 6 != 5).collect();
@@ -238,7 +239,7 @@ fn rotations_about_a_normal_that_is_no_axis_follow_the_nodes_around() {
     let apart = |a: &Vector3<f64>, b: &Vector3<f64>| (a - b).norm() / a.norm();
     assert!(apart(&moments[0], &moments[1]) < 1e-12 && apart(&moments[0], &moments[2]) < 1e-12);
 
-    // The rotation about the normal is that of the nodes around, in a mode that turns them in the plane.
+    // The rotation about the normal follows the neighbouring nodes, in a mode that rotates them in the plane.
     let body = converted(&tilted.model, 20, Method::Dense).body;
     let (shape, rotation) = (&body.modes().shape, body.modes().rotation.as_ref().expect("rotations"));
     let normal = body.frame().axes.transpose() * (tilt * Vector3::z());
@@ -252,7 +253,7 @@ fn rotations_about_a_normal_that_is_no_axis_follow_the_nodes_around() {
     }
 }
 
-/// A stiffness about the normal, however small, is one; a mass without stiffness is a mechanism.
+/// A stiffness about the normal counts, however small it is; a mass without stiffness is a mechanism.
 #[test]
 fn rotations_with_a_stiffness_or_a_mass_are_left_alone() {
     let tilt = Rotation3::from_euler_angles(0.4, -0.7, 1.1);
@@ -266,7 +267,7 @@ fn rotations_with_a_stiffness_or_a_mass_are_left_alone() {
                 matrix.column(j).0.iter().zip(matrix.column(j).1).map(move |(&i, &v)| (i, j as u32, v))
             })
             .collect();
-        // Between neighbours, so that rigid motion is free.
+        // Stiffness acts between neighbours, so that rigid motion is free.
         for (a, b) in [(0u32, 1u32), (4, 5)] {
             for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
                 let value = size * normal[i] * normal[j];

@@ -1,5 +1,5 @@
-//! Misprints of the literature (theory section 11), shown on a tumbling body: the correct equations keep what
-//! nature keeps, the printed ones do not.
+//! Misprints of the literature (theory section 11) on a tumbling body: the correct equations conserve energy
+//! and momentum, the printed ones do not.
 
 use flexbody_body::invariants::BodyFrame;
 use nalgebra::{DVector, Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -10,7 +10,8 @@ use oracle::mesh::Mesh;
 use oracle::nodal::reduced;
 use oracle::pipeline::modes;
 
-/// A rubber-like block without any symmetry, 10 modes, about its principal axes: W1, W2 and W3 all count.
+/// Returns a rubber-like block without symmetry with 10 modes about its principal axes, for which W1, W2 and
+/// W3 matter.
 fn soft_body() -> ReducedBody {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(ElementKind::Hex8, &oracle::mesh::grid([6, 4, 2]), |[x, y, z]| {
@@ -20,7 +21,8 @@ fn soft_body() -> ReducedBody {
     reduced(&body.condensed(BodyFrame::Principal).invariants)
 }
 
-/// y = (Euler parameters, omega, q, qd): at the centre of mass translation is not coupled.
+/// Returns the state of y = (Euler parameters, omega, q, qd); at the centre of mass the translation is
+/// uncoupled.
 fn unpack(y: &DVector<f64>) -> State {
     let nf = (y.len() - 7) / 2;
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(y[0], y[1], y[2], y[3]));
@@ -47,7 +49,7 @@ fn rate(body: &ReducedBody, y: &DVector<f64>, coriolis: Coriolis) -> DVector<f64
     rate
 }
 
-/// Largest relative drift of angular momentum and energy while the body tumbles, and how far omega_y swung.
+/// Largest relative drifts of angular momentum and energy while the body tumbles, and range of omega_y.
 struct Tumble {
     momentum: f64,
     energy: f64,
@@ -80,14 +82,14 @@ fn tumble(body: &ReducedBody, coriolis: Coriolis) -> Tumble {
 fn misprinted_coriolis_terms_lose_angular_momentum_and_hide_from_the_energy() {
     let body = soft_body();
     let correct = tumble(&body, Coriolis::Correct);
-    // The body turns over (Dzhanibekov) and deforms by some per cent of its size: the terms are at work.
+    // The body flips (Dzhanibekov effect) and deforms by some per cent of its size, so that the terms matter.
     assert!(correct.swing.0 < -0.99 && correct.swing.1 > 0.99, "{:?}", correct.swing);
     let radius = (0.5 * body.inertia.trace() / body.mass).sqrt();
     assert!(correct.deformation > 0.02 * radius * body.mass.sqrt(), "{}", correct.deformation);
     assert!(correct.momentum < 1e-12, "momentum drifts by {:e}", correct.momentum);
     assert!(correct.energy < 1e-12, "energy drifts by {:e}", correct.energy);
 
-    // [WP19] (16), (33), (44): W1 Qd + 2 Q'W2 Qd beside the W3 term. Measured drift: 1.7e-3.
+    // [WP19] (16), (33), (44): W1 Qd + 2 Q'W2 Qd in addition to the W3 term. Measured drift: 1.7e-3.
     let printed = tumble(&body, Coriolis::Printed);
     assert!(printed.momentum > 1e-3, "momentum drifts by {:e} only", printed.momentum);
     assert!(printed.energy < 1e-12, "energy drifts by {:e}", printed.energy);
@@ -95,13 +97,13 @@ fn misprinted_coriolis_terms_lose_angular_momentum_and_hide_from_the_energy() {
 
 #[test]
 fn euler_parameters_carry_a_factor_of_four() {
-    // [WP19] (29) to (33) and (41) to (45) lose it on one side: with w = G pd and |p| = 1, G G' is four times
-    // the identity, so the equations of omega come back from those of p as G (...) / 4.
+    // [WP19] (29) to (33) and (41) to (45) lose a factor on one side: with w = G pd and |p| = 1, G G' is four
+    // times the identity, so that the equations of omega follow from those of p as G (...) / 4.
     let p = [0.5, -0.1, 0.7, 0.5];
     let [e0, e1, e2, e3] = p.map(|v| 2.0 * v);
     let g = nalgebra::Matrix3x4::new(-e1, e0, e3, -e2, -e2, -e3, e0, e1, -e3, e2, -e1, e0);
     assert!((g * g.transpose() - Matrix3::identity() * 4.0).norm() < 1e-14);
-    // And it is the G of w = G pd in body axes: the rate of p that the integration uses gives omega back.
+    // G is that of w = G pd in body axes: the rate of p used by the integration gives omega.
     let omega = Vector3::new(0.3, -0.8, 1.1);
     let rate = Quaternion::new(p[0], p[1], p[2], p[3]) * Quaternion::from_imag(omega) * 0.5;
     let back = g * nalgebra::Vector4::new(rate.w, rate.i, rate.j, rate.k);

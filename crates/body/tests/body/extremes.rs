@@ -1,5 +1,5 @@
-//! Extreme bodies: what is kept of their digits, and which refusal they get. `docs/make_stability.py`
-//! measures such cases against high precision and writes `docs/stability.md`.
+//! Extreme bodies: accuracy that remains, and their errors. `docs/make_stability.py` compares such cases with
+//! high precision and writes `docs/stability.md`.
 
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -18,16 +18,17 @@ use oracle::files::{Triangle, write_model};
 use oracle::mesh::{Assembly, Mesh, entries};
 use oracle::random::Random;
 
-/// Young's modulus and density one: exact powers of two scale it without rounding.
+/// Material with unit Young's modulus and density, which powers of two scale without rounding.
 const UNIT: Material = Material { youngs: 1.0, poisson: 0.25, density: 1.0 };
 
-/// 0.75 x 0.5 x 0.25, all frequencies distinct; coordinates, K and M of few binary digits.
+/// Returns a block of 0.75 x 0.5 x 0.25 with distinct frequencies; coordinates, K and M have few binary
+/// digits.
 fn bar() -> Mesh {
     Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25])
 }
 
-/// A mesh of `inner` material where the first node of an element has x between `from` and `to`, of `outer`
-/// elsewhere.
+/// Returns a mesh of `inner` material for elements whose first node has x between `from` and `to`, and of
+/// `outer` material elsewhere.
 fn layered(mesh: &Mesh, (from, to): (f64, f64), inner: Material, outer: Material) -> Assembly {
     let inside = |x: [f64; 3]| (from..to).contains(&x[0]);
     let part =
@@ -44,7 +45,7 @@ fn try_convert(raw: RawModel, modes: usize, method: Method) -> Result<(FeModel, 
     Ok((checked.model, done))
 }
 
-/// A body that keeps its own identities and those against its model.
+/// Returns a body after asserting its own identities and those against its model.
 fn converted(raw: RawModel, modes: usize, method: Method) -> Conversion {
     let (model, done) = try_convert(raw, modes, method).expect("a body");
     let body = &done.body;
@@ -66,7 +67,7 @@ fn refusal(raw: RawModel, modes: usize) -> Vec<Code> {
     }
 }
 
-/// K 2^k, M 2^m, x 2^x.
+/// Returns the model with K 2^k, M 2^m, x 2^x.
 fn scaled(raw: &RawModel, [k, m, x]: [i32; 3]) -> RawModel {
     let by = |exponent: i32| f64::from(exponent).exp2();
     let times = |matrix: &CscMatrix, factor: f64| {
@@ -83,7 +84,8 @@ fn scaled(raw: &RawModel, [k, m, x]: [i32; 3]) -> RawModel {
 #[test]
 fn powers_of_two_in_the_units_change_exponents_and_no_digit() {
     let raw = bar().assemble(&UNIT, MassRule::Consistent).raw_model();
-    // Even: modes carry the root of the mass, shifts that of an eigenvalue.
+    // Exponents are even, because modes scale with the root of the mass and shifts with that of an
+    // eigenvalue.
     let scales = [
         [0, 0, -20],
         [0, 30, 10],
@@ -159,13 +161,13 @@ fn body_a_billion_lengths_away_is_the_same_as_far_as_its_coordinates_are() {
         let differences = compare_invariants(a.body.invariants(), b.body.invariants(), cross.as_ref(), &[]).1;
         (differences, codes(&b.diagnostics).contains(&Code::NodesRounded))
     };
-    // Multiples of 1/4: exact up to 2^50.
+    // Coordinates are multiples of 1/4: exact up to 2^50.
     let (differences, told) = near_and_far(&bar(), [2f64.powi(30), -(2f64.powi(29)), 2f64.powi(28)]);
     for (what, error) in differences {
         assert!(error < 1e-13, "{what}: {error:e}");
     }
     assert!(!told);
-    // Coordinates of which the spacing of numbers there leaves seven digits.
+    // Coordinates for which the spacing of numbers leaves seven digits.
     let oblong = Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.7, 0.47, 0.26]);
     let (differences, told) = near_and_far(&oblong, [1e9 / 3.0, 1e9, -1e9 / 7.0]);
     let lost = differences.iter().find(|(name, _)| name == "second_moment").expect("J").1;
@@ -176,7 +178,7 @@ fn body_a_billion_lengths_away_is_the_same_as_far_as_its_coordinates_are() {
 fn inertia_of_needles_and_foils_keeps_all_digits() {
     let mut random = Random(7);
     for size in [[1e5, 1.0, 1.0], [1e3, 1.0, 0.5], [1e3, 1e3, 1.0], [1.0, 1.0, 1.0]] {
-        // Along the axes of the model: coordinates have all digits of the small sides.
+        // Along the axes of the model the coordinates have all digits of the small sides.
         let raw =
             Mesh::block(ElementKind::Hex8, [2, 2, 2], size).assemble(&UNIT, MassRule::Consistent).raw_model();
         let body = converted(raw, 4, Method::Auto).body;
@@ -189,7 +191,8 @@ fn inertia_of_needles_and_foils_keeps_all_digits() {
             assert!((found / expected - 1.0).abs() < 1e-14, "{size:?} {k}: {found}, expected {expected}");
         }
     }
-    // Masses on an oblique line that turn with it: the moment about it is that of their rotations alone.
+    // Masses with rotary inertia on an oblique line: the moment about the line is that of their rotations
+    // alone.
     let direction = Vector3::new(random.signed(), random.signed(), random.signed()).normalize();
     let (count, rotary) = (5, 1e-10);
     let entries: Vec<(u32, u32, f64)> = (0..6 * count)
@@ -221,7 +224,7 @@ fn inertia_of_needles_and_foils_keeps_all_digits() {
     );
 }
 
-/// A slender or thin body is right as far as its own noise allows, says so, or is refused by name.
+/// A slender or thin body is accurate up to its rounding and reports it, or is refused with the reason.
 #[test]
 fn thin_bodies_lose_digits_and_say_so_or_are_refused() {
     let plate = |ratio: f64| {
@@ -273,12 +276,12 @@ fn every_mode_of_one_element_and_of_a_block_together_is_the_whole_body() {
         let raw = mesh.assemble(&UNIT, MassRule::Consistent).raw_model();
         let flexible = raw.stiffness.matrix.n_cols() - 6;
         let done = converted(raw, flexible, Method::Auto);
-        // A density of one is no matter's.
+        // A density of one is implausible for any material.
         assert_eq!(codes(&done.diagnostics), [Code::InertiaImplausible]);
         let body = done.body;
         assert_eq!((body.n_modes(), body.certificate().proved_modes), (flexible, Some(flexible)));
         let invariants = body.invariants();
-        // Parseval: stretching along an axis, x_k e_k, has no rigid part about the centre of mass.
+        // Parseval: the stretch x_k e_k along an axis has no rigid part about the centre of mass.
         for k in 0..3 {
             let sum: f64 = invariants.ibar().unwrap()[k][k].iter().map(|v| v * v).sum();
             let whole = invariants.second_moment()[(k, k)];
@@ -319,7 +322,7 @@ fn hinges_are_refused_whether_free_or_of_a_stiffness_that_rounding_hides() {
     }
 }
 
-/// What rounding the matrices to so many digits changes of the first eigenvalue is told where it is above
+/// The change of the first eigenvalue by rounding of the matrices to their digits is reported if it exceeds
 /// 1e-6.
 #[test]
 fn digits_of_files_are_told_when_they_are_gone_and_only_then() {

@@ -1,11 +1,11 @@
-//! The estimate that the first shift comes from, against tubes of beams whose first eigenvalue is known.
+//! Estimate for the first shift, compared with tubes of beams whose first eigenvalue is known.
 
 use flexbody_body::basis::{first_eigenvalue_estimate, rigid_modes};
 use flexbody_model::FeModel;
 use oracle::beams::tube;
 
-/// A tube bends in two waves around, which fields of the second degree only stretch: their Rayleigh quotients are
-/// larger by (radius / width)^2.
+/// A tube bends in two circumferential waves, which second-degree fields represent by stretching only: their
+/// Rayleigh quotients are larger by (radius / width)^2.
 #[test]
 fn the_estimate_of_a_thin_tube_is_that_of_its_bending() {
     for (around, rings, width) in [(16, 3, 0.05), (24, 4, 0.01), (32, 3, 0.002)] {

@@ -1,4 +1,4 @@
-//! Modes from lumped masses: their figures are said to be arbitrary where they are.
+//! Modes from lumped masses: arbitrary figures are marked as such.
 
 use flexbody_body::convert::{ConvertSettings, LumpedPipeline, Lumping, convert};
 use flexbody_eigen::Wanted;
@@ -7,7 +7,7 @@ use flexbody_model::{FeModel, check};
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
 
-/// A bar whose bending modes come in pairs of equal frequencies.
+/// Returns a bar whose bending modes come in pairs of equal frequencies.
 fn square_bar() -> FeModel {
     let mesh = Mesh::block(ElementKind::Hex8, [6, 2, 2], [0.6, 0.1, 0.1]);
     check(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model()).expect("a sound body").model
@@ -34,13 +34,13 @@ fn a_count_that_cuts_a_pair_of_equal_frequencies_is_named() {
             found.caution.contains(&format!("{count} modes cut a group of equal frequencies of the model"));
         assert_eq!(said, cut, "{count} modes: {}", found.caution);
         assert_eq!(found.caution.contains("of the lumped mass"), cut, "{count} modes: {}", found.caution);
-        // Six modes are five and another one: the lumped mass changes the order of the next two.
+        // Six modes differ in one: the lumped mass changes the order of the next two.
         let disjoint = found.subspace_cosine < 0.5f64.sqrt();
         assert_eq!(found.caution.is_empty(), !cut && !disjoint, "{count} modes: {}", found.caution);
     }
 }
 
-/// Nearly all mass at one end: the lowest modes of the lumped mass are others.
+/// With nearly all mass at one end the lowest modes of the lumped mass are different ones.
 #[test]
 fn subspaces_with_little_in_common_are_named() {
     let model = square_bar();

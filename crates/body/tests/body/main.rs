@@ -1,6 +1,6 @@
 //! From a model to a flexible body: bases, invariants, certified digits.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod accepted;
 mod beams;

@@ -1,4 +1,4 @@
-//! The surface that a body is drawn by: from decks, archives and meshes, through a conversion and a file.
+//! Surface for drawing a body: from decks, archives and meshes, through a conversion and a file.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Error;
@@ -15,7 +15,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-/// The matrices of the tetrahedron of `fixtures/small` with the nodes of another model: enough to read.
+/// Reads the matrices of the tetrahedron of `fixtures/small` with the nodes of another model.
 fn with_nodes(nodes: &Path) -> Result<RawModel, Error> {
     let small = |name: &str| fixtures().join("small/tet4").join(name);
     let dofs = Some(small("dofs.csv"));
@@ -35,7 +35,7 @@ fn corners(triangle: [u32; 3], x: &[[f64; 3]]) -> [Vector3<f64>; 3] {
     triangle.map(|i| x[i as usize].into())
 }
 
-/// Volume inside of a closed surface, and its area.
+/// Returns the volume inside a closed surface, and its area.
 fn volume_and_area(triangles: &[[u32; 3]], x: &[[f64; 3]]) -> (f64, f64) {
     let own = triangles.iter().map(|&triangle| {
         let [a, b, c] = corners(triangle, x);
@@ -44,7 +44,7 @@ fn volume_and_area(triangles: &[[u32; 3]], x: &[[f64; 3]]) -> (f64, f64) {
     own.fold((0.0, 0.0), |(volume, area), (v, a)| (volume + v, area + a))
 }
 
-/// Every side of a triangle is that of one other, which runs along it the other way.
+/// Asserts that every side of a triangle belongs to exactly one other triangle, in the opposite direction.
 fn assert_closed(mesh: &SurfaceMesh) {
     let mut sides: HashMap<[u32; 2], usize> = HashMap::new();
     for &[a, b, c] in mesh.triangles() {
@@ -59,8 +59,8 @@ fn assert_encloses(mesh: &SurfaceMesh, nodes: &Nodes, volume: f64, area: f64) {
     assert!((own.0 / volume - 1.0).abs() < 1e-12 && (own.1 / area - 1.0).abs() < 1e-12, "{own:?}");
 }
 
-/// The block of `fixtures/make/make_jobs.py`: its surface, and its twelve edges, four of which are two
-/// elements long.
+/// The block of `fixtures/make/make_jobs.py`: its surface and its twelve edges, four of which consist of two
+/// elements.
 #[test]
 fn decks_give_the_surface_of_their_solids() {
     let [a, b, c]: [f64; 3] = [0.2, 0.08, 0.06];
@@ -72,7 +72,7 @@ fn decks_give_the_surface_of_their_solids() {
     }
 }
 
-/// Decks of Nastran: of a job, and as places of nodes for matrices from elsewhere.
+/// Nastran decks of a job, and as node files for other matrices.
 #[test]
 fn decks_of_nastran_give_the_surface_of_their_solids() {
     let [a, b, c]: [f64; 3] = [0.2, 0.08, 0.06];
@@ -90,8 +90,8 @@ fn decks_of_nastran_give_the_surface_of_their_solids() {
     assert_eq!(turned.diagnostics()[0].code(), Code::DeckUnsupported);
 }
 
-/// Elements of the second order with the middles of their edges where Nastran lists them: G13 to G16 of CHEXA
-/// (G10 to G12 of CPENTA) between the lower and the upper face. Wrong places would fold the faces.
+/// Second-order elements with mid-edge nodes in the order of Nastran: G13 to G16 of CHEXA (G10 to G12 of
+/// CPENTA) between the lower and the upper face. A wrong order would fold the faces.
 #[test]
 fn elements_of_nastran_have_their_middles_in_place() {
     let cube: [[f64; 3]; 8] = [
@@ -136,8 +136,8 @@ fn elements_of_nastran_have_their_middles_in_place() {
     }
 }
 
-/// Cells of VTK: a voxel, the wedges that fill a brick (with and without middles of edges), a pyramid, and a
-/// vertex, which is not drawn.
+/// VTK cells: a voxel, wedges that fill a brick (with and without mid-edge nodes), a pyramid, and a vertex,
+/// which is not drawn.
 #[test]
 fn meshes_of_vtk_give_the_surface_of_their_cells() {
     let cube: [[f64; 3]; 8] = std::array::from_fn(|k| [(k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64]);
@@ -178,7 +178,7 @@ fn meshes_of_vtk_give_the_surface_of_their_cells() {
     }
 }
 
-/// The tetrahedron of `fixtures/small` in a file of Exodus: four faces.
+/// The tetrahedron of `fixtures/small` in an Exodus file: four faces.
 #[test]
 fn meshes_of_exodus_give_the_surface_of_their_elements() {
     let raw = read(&fixtures().join("small/meshes/tet4.exo"));
@@ -188,7 +188,7 @@ fn meshes_of_exodus_give_the_surface_of_their_elements() {
     assert!(volume_and_area(mesh.triangles(), &raw.nodes.positions).0 > 0.0);
 }
 
-/// Tetrahedra of the second order with the triangles of their faces beside them, which are not drawn twice.
+/// Second-order tetrahedra with explicit triangles on their faces, which are not drawn twice.
 #[test]
 fn meshes_of_gmsh_give_the_surface_once() {
     for name in ["block41.msh", "block22.msh"] {
@@ -197,7 +197,7 @@ fn meshes_of_gmsh_give_the_surface_once() {
     }
 }
 
-/// The reference elements of Gmsh: wrong middles of edges would fold the faces of solids.
+/// Reference elements of Gmsh; a wrong order of mid-edge nodes would fold the faces of solids.
 #[test]
 fn elements_of_the_second_order_have_their_middles_in_place() {
     let raw = read(&fixtures().join("small/meshes/second_order.msh"));
@@ -233,8 +233,8 @@ fn elements_of_the_second_order_have_their_middles_in_place() {
     assert_eq!(line.count(), 2, "both halves of the line");
 }
 
-/// An archive with a brick, tetrahedra written as bricks (with and without middles), a triangle written as
-/// a shell of four nodes, beams with a node that turns them, a spring and an unknown type.
+/// An archive with a brick, tetrahedra written as bricks (with and without mid-edge nodes), a triangle
+/// written as a four-node shell, beams with an orientation node, a spring and an unknown type.
 #[test]
 fn archives_of_ansys_give_the_surface() {
     let places: [[f64; 3]; 12] = [
@@ -280,7 +280,7 @@ fn archives_of_ansys_give_the_surface() {
     fs::write(&path, &text).expect("written");
     let raw = read(&path);
     let mesh = raw.mesh.as_ref().expect("a surface");
-    // Twelve triangles of the brick, four of the tetrahedron, one shell.
+    // Twelve triangles of the brick, four of the tetrahedron, one of the shell.
     assert_eq!(mesh.triangles().len(), 17);
     assert!(mesh.edges().contains(&[9, 10]), "the beam");
     let closed = SurfaceMesh::new(mesh.triangles()[..16].to_vec(), Vec::new(), 12).expect("a mesh");
@@ -293,7 +293,7 @@ fn archives_of_ansys_give_the_surface() {
             "1 of 5 elements have nodes that the model lacks: they are not drawn",
         ]
     );
-    // What cannot be read of the elements is no reason to refuse the nodes.
+    // Unreadable elements are no reason to refuse the nodes.
     for (from, to) in [("(19i9)", "(something)"), (",SOLID,         7", ",,         7"), ("      186", " ")] {
         fs::write(&path, text.replace(from, to)).expect("written");
         read(&path);
@@ -304,8 +304,8 @@ fn archives_of_ansys_give_the_surface() {
     }
 }
 
-/// A mesh beside tables: its surface, on the nodes of the table, in the body and in the file; without
-/// `mesh` there is none.
+/// A mesh in addition to tables: its surface is drawn on the nodes of the table, in the body and in the file;
+/// without `mesh` there is none.
 #[test]
 fn a_mesh_beside_tables_is_drawn_on_their_nodes() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -355,8 +355,8 @@ fn body(raw: RawModel, mesh: MeshChoice) -> FlexBody {
         .body
 }
 
-/// The body has the surface of its model on the nodes that move, in the body frame, as it is asked for; one
-/// with fewer modes has it too.
+/// The body has the requested surface of its model on the nodes that move, in the body frame; a body with
+/// fewer modes has it too.
 #[test]
 fn bodies_have_the_surface_that_is_asked_for() {
     let whole = body(job("abaqus_labels"), MeshChoice::Whole);
@@ -371,10 +371,10 @@ fn bodies_have_the_surface_that_is_asked_for() {
     assert_eq!(reduced.mesh(), whole.mesh());
 }
 
-/// Nodes without degrees of freedom are none of the body: triangles at them are left out, which is told.
+/// Nodes without degrees of freedom do not belong to the body: triangles at them are dropped with a message.
 #[test]
 fn triangles_at_nodes_without_rows_are_told() {
-    // The four nodes at the left end follow a reference node as a rigid body: CalculiX has no rows for them.
+    // The four nodes at the left end are rigidly attached to a reference node and have no rows in CalculiX.
     let checked = FeModel::from_raw(job("calculix")).expect("a model");
     assert_eq!(checked.model.mesh().map(|mesh| mesh.triangles().len()), Some(10));
     let told = checked.diagnostics.iter().find(|found| found.code() == Code::MeshPartial).expect("told");

@@ -1,5 +1,5 @@
-//! Modes that FE programs have written: every format gives the same body, the rows that a file lacks follow,
-//! what does not fit is told.
+//! Modes written by FE programs: every format gives the same body, missing rows are completed, and mismatches
+//! are reported.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Result;
@@ -19,7 +19,7 @@ fn file(name: &str) -> PathBuf {
     fixtures().join("small/modes").join(name)
 }
 
-/// Files of modes, of every format; the job that has computed them stands beside them.
+/// Returns the files of modes of every format, without the job that computed them.
 fn mode_files() -> Vec<String> {
     let entries = fs::read_dir(file("")).expect("fixtures").map(|entry| entry.expect("an entry").file_name());
     let mut names: Vec<String> = entries.map(|name| name.to_string_lossy().into_owned()).collect();
@@ -57,7 +57,7 @@ fn codes(conversion: &Conversion) -> Vec<Code> {
     conversion.diagnostics.iter().map(|d| d.code()).collect()
 }
 
-/// The flexible eigenvalues beside those that are computed here.
+/// Compares the flexible eigenvalues with computed ones.
 #[track_caller]
 fn assert_are_free_modes(model: &FeModel, imported: &Conversion, limit: f64) {
     let own = &imported.body.modes().eigenvalue;
@@ -67,7 +67,7 @@ fn assert_are_free_modes(model: &FeModel, imported: &Conversion, limit: f64) {
     }
 }
 
-/// CalculiX has solved the block; the other files are the same modes in the forms of other programs.
+/// CalculiX computed the modes of the block; the other files hold them in formats of other programs.
 #[test]
 fn every_format_has_the_modes_of_the_free_body() {
     let model = model("modes");
@@ -83,7 +83,7 @@ fn every_format_has_the_modes_of_the_free_body() {
     }
 }
 
-/// Words of 64 bits hold the modes to all digits: they are eigenvectors as they are.
+/// Words of 64 bits hold the modes with all digits: they are eigenvectors without correction.
 #[test]
 fn results_in_double_precision_are_eigenvectors() {
     let model = model("modes");
@@ -94,8 +94,8 @@ fn results_in_double_precision_are_eigenvectors() {
     assert_are_free_modes(&model, &done, 1e-12);
 }
 
-/// Bricks with internal rows and a rigid body whose reference node turns: the file has the nodes of the
-/// bricks, and among these some that follow the rigid body and have no rows.
+/// Bricks with internal rows and a rigid body whose reference node rotates: the file has the nodes of the
+/// bricks, some of which belong to the rigid body and have no rows.
 #[test]
 fn rows_that_a_file_lacks_follow_from_the_others() {
     let model = model("calculix");
@@ -108,7 +108,7 @@ fn rows_that_a_file_lacks_follow_from_the_others() {
     assert_are_free_modes(&model, &done, 1e-6);
 }
 
-/// A file of another body is told by its frequencies, one of other nodes by these.
+/// The file of another body is detected by its frequencies, that of other nodes by the node numbers.
 #[test]
 fn modes_of_another_model_are_told() {
     let model = model("modes");
@@ -122,7 +122,7 @@ fn modes_of_another_model_are_told() {
     softer.eigenvalues[8] = softer.eigenvalues[8].map(|value| 0.9 * value);
     let message = told(softer).expect("a difference");
     assert!(message.starts_with("1 of 4 flexible modes differ: mode 9 has "), "{message}");
-    // Two modes that are mixed have neither their eigenvalues nor their shapes.
+    // Two mixed modes have neither the eigenvalues nor the shapes of the originals.
     let mut mixed = modes.clone();
     for row in 0..mixed.matrix.nrows() {
         let sum = mixed.matrix[(row, 6)] + mixed.matrix[(row, 8)];
@@ -135,7 +135,7 @@ fn modes_of_another_model_are_told() {
     assert!(error.has(Code::ShapesSize), "{error}");
 }
 
-/// Two digits are too few for a mesh that is stiff beside its first mode: that is told as what it is.
+/// Two digits are too few for a mesh that is stiff relative to its first mode, and this is reported as such.
 #[test]
 fn too_few_digits_are_told_from_another_model() {
     let model = model("modes");

@@ -1,4 +1,5 @@
-//! Modes without a factor: the same modes as with one, to the promise of `fast`, or a factor after all.
+//! Modes without a factor: equal to those with a factor within the accuracy `fast`, or computed by a factor
+//! after all.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -34,18 +35,18 @@ fn cube(kind: ElementKind, cells: i32) -> FeModel {
     steel(&Mesh::block(kind, [cells; 3], [0.1; 3]))
 }
 
-/// The modes of a factor, and those that are found without one.
+/// Returns the modes with a factor and without one.
 fn both(name: &str, model: &FeModel, count: usize) -> [Conversion; 2] {
     let found = [DOUBLE, FactorChoice::Auto]
         .map(|factor| run(model, count, factor).unwrap_or_else(|e| panic!("{name}: {e}")));
     let (a, b) = (found[0].body.modes(), found[1].body.modes());
     assert_eq!(a.eigenvalue.len(), b.eigenvalue.len(), "{name}");
     for (j, (x, y)) in a.eigenvalue.iter().zip(&b.eigenvalue).enumerate() {
-        // The square of the residual, in the norm of what the residual is made of.
+        // The eigenvalue error is the square of the residual, in the norm of the residual.
         assert!((x / y - 1.0).abs() < 1e-7, "{name}, mode {j}: {x} {y}");
     }
     for (j, (x, y)) in a.residual.iter().zip(&b.residual).enumerate() {
-        // On slender bodies rounding of K allows neither way to keep the promise.
+        // For slender bodies the rounding of K exceeds the tolerance in both ways.
         assert!(*y <= f64::max(1e-6, 2.0 * x), "{name}, mode {j}: K-residual {y:e}, by a factor {x:e}");
     }
     for (what, error) in error_norms(found[0].body.invariants(), found[1].body.invariants()) {
@@ -62,7 +63,7 @@ fn way(found: &Conversion) -> Way {
     plan(found).current().way
 }
 
-/// What was said about the factor.
+/// Returns the messages about the factor.
 fn said(found: &Conversion) -> Vec<&str> {
     let about = |d: &&Diagnostic| d.code() == Code::FactorPrecision;
     found.diagnostics.iter().filter(about).map(Diagnostic::message).collect()
@@ -80,7 +81,8 @@ fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
         assert!(said(&found)[0].starts_with("no factor"), "{:?}", said(&found));
         let work = found.work;
         assert_eq!((work.factorizations, work.factor_bytes), (0, 0), "{name}");
-        // Columns of cycles, and of products with K in double precision. Elements of the second order take more.
+        // Number of columns of cycles, and of products with K in double precision. Second-order elements need
+        // more.
         let [most_solved, most_products] = match kind {
             ElementKind::Hex20 => [60, 20],
             ElementKind::Tet10 => [40, 15],
@@ -91,7 +93,8 @@ fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
     }
 }
 
-/// Wherever the modes end: where that is within a repeated eigenvalue, `fast` sees all of it and keeps the same part.
+/// If the requested number of modes ends within a repeated eigenvalue, `fast` computes all of its modes and
+/// keeps the same part.
 #[test]
 #[ignore = "slow"]
 fn the_last_modes_of_a_cube_are_those_of_a_factor() {
@@ -113,8 +116,8 @@ fn plane_bodies_and_bodies_with_arms_have_them_too() {
     assert_eq!(way(&found), Way::Cycles);
 }
 
-/// Materials whose stiffness differs by 1e4 and by 1e8, and one that hardly changes its volume: the modes of
-/// a factor, by whichever way.
+/// Materials with stiffness contrasts of 1e4 and 1e8, and a nearly incompressible one: the modes equal those
+/// of a factor in any way.
 #[test]
 #[ignore = "slow"]
 fn contrasts_of_stiffness_and_of_volume_give_the_modes_of_a_factor() {
@@ -165,7 +168,7 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
     assert!(one == bits(2) && one == bits(3));
 }
 
-/// Small bodies, guaranteed bounds and a factor that is asked for leave the cycles out.
+/// Small bodies, guaranteed bounds and a requested factor exclude the cycles.
 #[test]
 #[ignore = "slow"]
 fn a_factor_stays_where_it_is_cheaper_or_asked_for() {
@@ -182,7 +185,7 @@ fn a_factor_stays_where_it_is_cheaper_or_asked_for() {
     assert_eq!(with(Accuracy::Fast, 0.0), Way::Cycles);
 }
 
-/// A compact block with thin bars on one of its faces, whose bending no coarse level sees.
+/// Returns a compact block with thin bars on one of its faces, whose bending no coarse level represents.
 fn whiskers(cells: i32, long: i32) -> FeModel {
     let size = 0.1 / f64::from(cells);
     let all = [cells, cells, cells + long];
@@ -191,8 +194,8 @@ fn whiskers(cells: i32, long: i32) -> FeModel {
     steel(&mesh.part(|[x, y, z]| z < 0.1 || (is_bar(x) && is_bar(y))))
 }
 
-/// Corrections that gain nothing are given up after two rounds, whatever the accuracy: four took longer than the factor and
-/// all its columns.
+/// Ineffective corrections are abandoned after two rounds at any accuracy: four rounds took longer than the
+/// factor with all its columns.
 #[test]
 #[ignore = "slow"]
 fn thin_bars_on_a_block_are_factored_before_many_cycles() {

@@ -19,8 +19,8 @@ fn said(raw: &RawModel) -> Vec<Code> {
     raw.diagnostics.iter().map(|diagnostic| diagnostic.code()).collect()
 }
 
-/// The block whose grids and rows stand in a cylinder, in turned axes and in those that three grids span, in
-/// a punch file of ten digits, beside the same from OUTPUT4.
+/// The block with grids and rows in cylindrical, rotated and three-grid systems, in a punch file with ten
+/// digits, compared with the block from OUTPUT4.
 #[test]
 fn both_forms_of_nastran_are_one_model() {
     let punched = job(&main_file("nastran"), vec![set("left", "set5"), set("right", "6")]);
@@ -53,8 +53,8 @@ fn both_forms_of_nastran_are_one_model() {
     assert!(pairs.clone().all(|(a, b)| (a / b - 1.0).abs() < 1e-7), "{pairs:?}");
 }
 
-/// Grids and matrices in one file: the block condensed to its ends. Rigid motion, and so mass and moments,
-/// are exact; that the rest is not is told.
+/// Grids and matrices in one file: the block condensed to its ends. Rigid motion, and thus mass and moments,
+/// are exact; a message states that the rest is not.
 #[test]
 fn a_superelement_keeps_the_inertia_of_its_body() {
     let raw = job(&main_file("nastran_superelement"), Vec::new());
@@ -62,8 +62,8 @@ fn a_superelement_keeps_the_inertia_of_its_body() {
     assert_has_inertia_of_the_block(&body(raw, 6), 1e-10);
 }
 
-/// Condensed matrices add up large entries to the mass, and their directions agree on it to eleven digits: an
-/// external superelement of NX Nastran with six modes and more was refused for that.
+/// Condensed matrices add large entries to the mass, so that directions agree on it to eleven digits only: an
+/// external superelement of NX Nastran with six or more modes was once refused for that.
 #[test]
 fn a_superelement_whose_directions_differ_in_the_last_digits_of_the_mass_is_a_body() {
     let mut raw = job(&main_file("nastran_superelement"), Vec::new());
@@ -83,7 +83,7 @@ fn a_superelement_whose_directions_differ_in_the_last_digits_of_the_mass_is_a_bo
     assert!(identities.iter().all(|check| check.passed), "{identities:?}");
 }
 
-/// A changed copy of a small job.
+/// Returns a changed copy of a small job.
 fn changed(name: &str, change: impl Fn(&str, String) -> String) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let main = main_file(name);
@@ -104,7 +104,7 @@ fn read(path: &Path) -> Result<RawModel, Error> {
     read_model(&ModelFiles::from_job(path, None, Vec::new(), None).expect("files"))
 }
 
-/// Replaces a text that is there once in the file of this name.
+/// Replaces a text that occurs once in the file of this name.
 fn replaced(name: &str, file: &str, old: &str, new: &str) -> Result<RawModel, Error> {
     let (_folder, path) = changed(name, |own, text| {
         if own != file {
@@ -207,7 +207,7 @@ fn rows_of_output4_have_to_be_those_of_a_set() {
     assert!(error.has(Code::DeckUnsupported), "{error}");
 }
 
-/// The matrices stand in files of any name where the deck says, or under that name beside it.
+/// The matrices are in files of any name given by the deck, or under that name beside it.
 #[test]
 fn files_that_the_deck_assigns_are_found() {
     let (folder, path) = changed("nastran_op4", |file, text| match file {
@@ -232,9 +232,8 @@ fn files_that_the_deck_assigns_are_found() {
     assert!(error.has(Code::JobIncomplete) && error.to_string().contains("matrices.f12"), "{error}");
 }
 
-/// A scalar point with mass is a modal coordinate: nobody knows what it moves.
-/// A string of K that begins one row too low reaches rows of rotations, which nothing else has: they count as
-/// rows of the model, whose matrices are then not symmetric.
+/// A string of K that begins one row too low reaches empty rows of rotations: they count as rows of the
+/// model, whose matrices are then not symmetric.
 #[test]
 fn entries_of_one_side_alone_are_refused() {
     let place = tempfile::tempdir().expect("a folder");
@@ -253,6 +252,7 @@ fn entries_of_one_side_alone_are_refused() {
     assert!(error.diagnostics().iter().any(|own| own.code() == Code::MatrixAsymmetric), "{error}");
 }
 
+/// A scalar point with mass is a modal coordinate whose motion is unknown.
 #[test]
 fn modal_coordinates_without_shapes_are_refused() {
     let (_folder, path) = changed("nastran_superelement", |_, text| {
@@ -261,7 +261,7 @@ fn modal_coordinates_without_shapes_are_refused() {
     });
     let error = read(&path).expect_err("refused");
     assert!(error.has(Code::DeckUnsupported) && error.to_string().contains("modal coordinates"), "{error}");
-    // Massless, it is an internal row.
+    // Without mass it is an internal row.
     let (_folder, path) = changed("nastran_superelement", |_, text| {
         text.replace("ASET1,123", "SPOINT,901\nASET1,123") + "DMIG,KAAX,901,0,,901,0,4.0E6\n"
     });
@@ -269,8 +269,8 @@ fn modal_coordinates_without_shapes_are_refused() {
     assert_eq!(raw.dofs.expect("labels").last().map(|label| label.node), Some(901));
 }
 
-/// A DMIG entry that is given twice, or in both triangles of a symmetric matrix, is a mistake, and a file
-/// that ends within a line may have lost digits.
+/// A DMIG entry given twice, or in both triangles of a symmetric matrix, is an error, and a file that ends
+/// within a line may have lost digits.
 #[test]
 fn punch_files_that_contradict_themselves_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -302,7 +302,7 @@ fn punch_files_that_contradict_themselves_are_refused() {
     }
 }
 
-/// Matrices of OUTPUT4 by name and by role.
+/// Matrices of OUTPUT4 are found by name and by role.
 #[test]
 fn matrices_of_a_file_are_named_or_found_by_their_role() {
     let path = fixtures().join("readers/output4/text_sparse.op4");
@@ -316,7 +316,7 @@ fn matrices_of_a_file_are_named_or_found_by_their_role() {
     assert!(read(None, MatrixRole::Damping).is_err_and(|error| error.has(Code::Hdf5Layout)));
 }
 
-/// Files that another writer has made, with matrices that are not square: found, named, and refused as K.
+/// Files of another writer with rectangular matrices: found, named, and refused as K.
 #[test]
 fn public_files_are_understood() {
     let folder = oracle::shared().join("samples/nastran");

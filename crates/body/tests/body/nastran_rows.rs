@@ -1,5 +1,5 @@
-//! Rows of a Nastran deck: what follows others by rigid elements and MPC beside matrices of the g-set, and what is
-//! given by rows, or along the axes of grids, beside K and M.
+//! Rows of a Nastran deck: dependent rows of rigid elements and MPCs for matrices of the g-set, and data
+//! given by rows, or along the axes of grids, in addition to K and M.
 
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -21,7 +21,7 @@ fn small(name: &str) -> PathBuf {
     fixtures().join("small").join(name)
 }
 
-/// Copies a small job to a folder, with `cards` in its bulk data and `control` above it.
+/// Copies a small job to a folder, with `cards` in its bulk data and `control` before it.
 fn job_with(name: &str, cards: &str, control: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     for entry in fs::read_dir(small(name)).expect("a folder") {
@@ -52,20 +52,21 @@ fn dense(matrix: &CscMatrix) -> Mat<f64> {
     Mat::from_fn(matrix.n_rows(), matrix.n_cols(), |i, j| matrix.get(i, j))
 }
 
-/// The solid without constraints, with empty rotations of its grids.
+/// Returns the solid without constraints, with empty rotations of its grids, and its positions.
 fn whole() -> (RawModel, HashMap<i64, [f64; 3]>) {
     let raw = with_cards("", "").expect("a job");
     let positions = raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied()).collect();
     (raw, positions)
 }
 
-/// Displacement of a point at x that follows a grid at o: column by displacement or rotation of the grid.
+/// Returns the displacement of a point at x that is rigidly attached to a grid at o; `column` is a
+/// displacement or rotation of the grid.
 fn follows(x: [f64; 3], o: [f64; 3], direction: usize, column: usize) -> f64 {
     let r = [0, 1, 2].map(|k| x[k] - o[k]);
     let k = direction;
     match column {
         0..3 => f64::from(u8::from(k == column)),
-        // (e x r)_k of the axis e.
+        // Component k of e x r for the axis e.
         _ => match (k + 3 - (column - 3)) % 3 {
             1 => -r[(k + 1) % 3],
             2 => r[(k + 2) % 3],
@@ -74,7 +75,7 @@ fn follows(x: [f64; 3], o: [f64; 3], direction: usize, column: usize) -> f64 {
     }
 }
 
-/// T'AT beside a matrix, row by row.
+/// Compares T'AT with a matrix, row by row.
 fn assert_is_reduced(raw: &RawModel, from: &RawModel, t: impl Fn((i64, u8), (i64, u8)) -> f64) {
     let (rows, old) = (labels(raw), labels(from));
     let t = Mat::from_fn(old.len(), rows.len(), |i, j| t(old[i], rows[j]));
@@ -86,8 +87,8 @@ fn assert_is_reduced(raw: &RawModel, from: &RawModel, t: impl Fn((i64, u8), (i64
     }
 }
 
-/// RBE2 with its rotations, and the same by RBAR, RBAR1, RBE1, MPC: T'KT of the closed form, the followers without
-/// rows, and the mass of the body.
+/// RBE2 with its rotations, and equivalent RBAR, RBAR1, RBE1, MPC: T'KT of the closed form, no rows for
+/// dependent grids, and the mass of the body.
 #[test]
 fn rigid_elements_and_sums_are_applied_to_matrices_of_the_g_set() {
     let (from, x) = whole();
@@ -134,7 +135,7 @@ fn rigid_elements_and_sums_are_applied_to_matrices_of_the_g_set() {
     }
 }
 
-/// RBE3 with equal weights: the mean of the displacements, and the rotation that fits them best.
+/// RBE3 with equal weights: the mean of the displacements, and their best-fit rotation.
 #[test]
 fn averages_are_those_of_least_squares() {
     let (from, x) = whole();
@@ -173,7 +174,7 @@ fn averages_are_those_of_least_squares() {
     }
 }
 
-/// A follower of a follower follows what leads both; a rod keeps its length.
+/// Dependent grids may depend on dependent grids; a rod keeps its length.
 #[test]
 fn constraints_follow_one_another() {
     let chain = with_cards("RBAR,1,38,44,123456\nRBAR,2,29,38,123456\n", "").expect("a job");
@@ -219,8 +220,8 @@ fn constraints_that_cannot_be_applied_are_named() {
     assert!(error.has(Code::DeckSyntax), "{error}");
 }
 
-/// Matrices after the constraints have no rows of followers: nothing is applied twice. Matrices that are named one
-/// by one, with rows of followers, are refused with the deck that gives them their nodes.
+/// Matrices after the constraints have no dependent rows, so that constraints are applied once. Individually
+/// named matrices with dependent rows are refused together with the deck that defines their nodes.
 #[test]
 fn constraints_are_applied_once() {
     let (folder, path) = job_with("nastran", "RBE2,901,29,123456,35\n", "");
@@ -273,7 +274,7 @@ fn matrix_market(matrix: &CscMatrix) -> String {
     text
 }
 
-/// K of the small job along the axes of its grids, as its punch file has it.
+/// Returns K of the small job along the axes of its grids, as stored in its punch file.
 fn of_the_file(scale: f64) -> CscMatrix {
     let location = MatrixLocation::parse(
         small("nastran").join("job.pch").to_str().expect("a path").to_owned() + ":/KAAX",
@@ -283,8 +284,8 @@ fn of_the_file(scale: f64) -> CscMatrix {
     CscMatrix::from_parts(36, 36, matrix.col_ptr().to_vec(), matrix.row_idx().to_vec(), values)
 }
 
-/// Damping and geometric stiffness beside a job with CD are turned as K is, shapes by rows as the displacements of
-/// K, and modes by nodes along the axes of their grids.
+/// For a job with CD, damping and geometric stiffness are rotated like K, shapes by rows like the
+/// displacements of K, and modes by nodes along the axes of their grids.
 #[test]
 fn what_is_given_by_rows_is_turned_with_k() {
     let (folder, path) = job_with("nastran", "", "");
@@ -303,7 +304,7 @@ fn what_is_given_by_rows_is_turned_with_k() {
     let energy = |shapes: &Mat<f64>, k: &Mat<f64>| shapes.transpose() * k * shapes;
     let (given, expected) = (energy(&turned, &dense(model.stiffness().as_csc())), energy(&shapes, &own));
     assert!((&given - &expected).norm_max() < 1e-12 * expected.norm_max());
-    // Work of forces is that of the file.
+    // The work of forces is that of the file.
     let forces =
         model.in_internal_order(model.given_rows().forces(&own * &shapes).expect("rows of the model"));
     let work = turned.transpose() * forces;
@@ -328,14 +329,14 @@ fn what_is_given_by_rows_is_turned_with_k() {
     }
 }
 
-/// Labels of the rows of the punch file: ascending.
+/// Returns the labels of the rows of the punch file, ascending.
 fn model_labels(path: &Path) -> Vec<DofLabel> {
     let mut labels = job(path, Vec::new()).dofs.expect("labels");
     labels.sort_unstable();
     labels
 }
 
-/// A punch file with modes.
+/// Returns a punch file with modes.
 fn punched(labels: &[DofLabel], shapes: &Mat<f64>) -> String {
     let mut text = String::new();
     for mode in 0..shapes.ncols() {
@@ -363,7 +364,7 @@ fn punched(labels: &[DofLabel], shapes: &Mat<f64>) -> String {
     text
 }
 
-/// Matrices of all rows of the g-set fit beside a model whose empty rows are left out.
+/// Matrices of all rows of the g-set fit a model without its empty rows.
 #[test]
 fn matrices_of_the_g_set_fit_beside_reduced_rows() {
     let (folder, _) = job_with("nastran_op4", "RBE2,901,29,123456,35\n", "");
@@ -378,7 +379,7 @@ fn matrices_of_the_g_set_fit_beside_reduced_rows() {
     assert_eq!(damping.matrix.n_cols(), raw.stiffness.matrix.n_cols());
     let difference = dense(&damping.matrix) - dense(&raw.stiffness.matrix);
     assert!(difference.norm_max() < 1e-12 * dense(&damping.matrix).norm_max());
-    // An entry where K and M have none acts on nothing.
+    // An entry in a row that is empty in K and M has no effect.
     let mut lost = matrix_market(&whole.matrix).replacen(
         &format!(" {}\n", whole.matrix.nnz()),
         &format!(" {}\n", whole.matrix.nnz() + 1),

@@ -1,4 +1,4 @@
-//! Conversions that a scene has a say in: what it rules out is not computed, and what is left is the same.
+//! Conversions for a scene: terms ruled out by the scene are not computed, and the others are unchanged.
 
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{Conversion, ConvertSettings, ModalModel, convert};
@@ -31,7 +31,7 @@ fn decided(model: &FeModel, settings: &ConvertSettings, terms: &[TermDecision]) 
     modal.finish(condensed, &Context::QUIET).expect("converts")
 }
 
-/// Models with the columns of rigid motion, and those of all that is condensed.
+/// Returns models with the number of columns of rigid motion, and of all condensed columns.
 fn models() -> [(FeModel, u64, u64); 4] {
     let nf = MODES as u64;
     let mut damped = rectangle(6, 3, 0.3, [5.0, -2.0]);

@@ -1,5 +1,6 @@
-//! The attempts by which modes are searched for, for each kind of model: a change of a threshold shows here.
-//! `FLEXBODY_BLESS=1 cargo test -p flexbody-body plans -- --ignored` writes the table after a change that is meant.
+//! Planned attempts of the search for modes for each kind of model: a changed threshold is detected here.
+//! `FLEXBODY_BLESS=1 cargo test -p flexbody-body plans -- --ignored` writes the table after an intended
+//! change.
 
 use flexbody_body::basis::{ModeSettings, search_plan};
 use flexbody_eigen::{Accuracy, Plan, Wanted};
@@ -10,7 +11,7 @@ use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
 use std::fmt::Write;
 
-/// The fixtures of every kind, and blocks as `benches/performance.py` times them.
+/// Returns fixtures of every kind, and the blocks timed by `benches/performance.py`.
 fn models() -> Vec<(String, FeModel)> {
     let fixture = |name: &str| {
         let manifest = oracle::fixtures().join("models").join(name).join("model.toml");
@@ -34,7 +35,7 @@ fn models() -> Vec<(String, FeModel)> {
     names.iter().map(|name| fixture(name)).chain(blocks.map(block)).collect()
 }
 
-/// The attempts of a plan in their order.
+/// Returns the attempts of a plan in their order.
 fn attempts(plan: &Plan) -> String {
     plan.attempts.iter().map(|attempt| attempt.way.name()).collect::<Vec<_>>().join(", then ")
 }
@@ -66,7 +67,7 @@ fn plans_are_what_they_were() {
     assert!(stored == table, "the attempts have changed; stored:\n{stored}\nnow:\n{table}");
 }
 
-/// What does not fit the memory is no attempt; where nothing fits, the fewest bytes are told.
+/// Attempts that do not fit the memory are excluded; if none fits, the error states the smallest requirement.
 #[test]
 fn memory_and_time_limit_the_attempts() {
     let raw = Mesh::block(ElementKind::Hex8, [12; 3], [1.0; 3]);

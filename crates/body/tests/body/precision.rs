@@ -1,5 +1,5 @@
-//! Bodies that use up the digits of double precision, and tables that carry few: what can be told is told, to
-//! the accuracy that is left.
+//! Bodies that need all digits of double precision, and tables with few digits: limitations are reported with
+//! the remaining accuracy.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::ModeSettings;
@@ -20,7 +20,7 @@ const WAYS: [(Method, Accuracy); 4] = [
     (Method::Lanczos, Accuracy::Certified),
 ];
 
-/// The lowest modes in every way, with a proof; `what` names the case that fails.
+/// Computes the lowest modes with a proof by every method and accuracy; `what` names the case that fails.
 fn in_every_way(what: &str, body: &Assembly, count: usize, check: impl Fn(&str, &Body)) {
     for (method, accuracy) in WAYS {
         let what = format!("{what}, {count} modes, {method:?}, {accuracy:?}");
@@ -58,7 +58,7 @@ fn node_tables_of_six_digits_are_enough() {
     }
 }
 
-/// Two steel blocks with a layer between them that is `ratio` times as stiff.
+/// Returns two steel blocks with a layer between them that is `ratio` times as stiff.
 fn joined(ratio: f64) -> Assembly {
     let mesh = Mesh::block(ElementKind::Hex8, [7, 2, 2], [0.7, 0.2, 0.2]);
     let in_layer = |x: [f64; 3]| x[0] > 0.25 && x[0] < 0.35;
@@ -69,8 +69,8 @@ fn joined(ratio: f64) -> Assembly {
 
 #[test]
 fn soft_joints_keep_six_low_modes_that_scale_with_their_stiffness() {
-    // In the limit two rigid blocks on a spring: the six lowest eigenvalues are proportional to its
-    // stiffness, the others those of the blocks.
+    // In the limit of two rigid blocks on a spring the six lowest eigenvalues are proportional to its
+    // stiffness, and the others are those of the blocks.
     let reference = dense_modes(&joined(1e-5)).eigenvalues;
     for ratio in [1e-5, 1e-6, 1e-7, 1e-8] {
         let exact: Vec<f64> =
@@ -86,7 +86,7 @@ fn soft_joints_keep_six_low_modes_that_scale_with_their_stiffness() {
 #[test]
 #[ignore = "slow"]
 fn thin_plates_tell_their_noise() {
-    // 1 m x 0.7 m x 1 mm: rounding of K alone leaves 1e-6 to 1e-4 in the lowest eigenvalues.
+    // 1 m x 0.7 m x 1 mm: rounding of K alone causes errors of 1e-6 to 1e-4 in the lowest eigenvalues.
     for (kind, cells) in [(ElementKind::Hex8, [8, 6, 1]), (ElementKind::Tet10, [4, 3, 1])] {
         let body = Mesh::block(kind, cells, [1.0, 0.7, 1e-3]).assemble(&STEEL, MassRule::Consistent);
         for count in [8, 40] {

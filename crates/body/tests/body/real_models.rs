@@ -1,5 +1,5 @@
-//! Bodies that other programs meshed and assembled, through the readers and the whole pipeline, against
-//! reference numbers of another solver and against the unreduced nodal equations.
+//! Bodies meshed and assembled by other programs, through the readers and the whole pipeline, compared with
+//! reference numbers of another solver and with the unreduced nodal equations.
 
 use flexbody_body::basis::{ModeSettings, free_surface};
 use flexbody_body::invariants::{BodyFrame, Frame, LumpedMasses, condense_lumped};
@@ -16,7 +16,7 @@ use oracle::random::Random;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// A body with what is known of it.
+/// A body with its reference numbers.
 struct Case {
     name: String,
     raw: RawModel,
@@ -24,9 +24,9 @@ struct Case {
     com: Vector3<f64>,
     inertia: Matrix3<f64>,
     eigenvalues: Vec<f64>,
-    /// Relative residuals of the reference's eigenvectors.
+    /// Relative residuals of the eigenvectors of the reference.
     residuals: Vec<f64>,
-    /// A shift between eigenvalues and the number of eigenvalues below it, rigid ones included.
+    /// A shift between eigenvalues and the number of eigenvalues below it, including rigid ones.
     count: Option<(f64, usize)>,
 }
 
@@ -56,7 +56,7 @@ const SOLIDS: [&str; 10] = [
     "turbine_blade",
 ];
 
-/// The bodies that belong to the project.
+/// Returns the bodies that are part of the project.
 fn own() -> Vec<Case> {
     let folder = oracle::fixtures().join("models");
     let case = |name: &str| {
@@ -80,12 +80,12 @@ fn own() -> Vec<Case> {
     SOLIDS.map(case).into()
 }
 
-/// Where larger bodies lie beside the project on some machines.
+/// Returns the folder of larger bodies, which exists on some machines beside the project.
 fn shared_folder() -> PathBuf {
     oracle::shared().join("models")
 }
 
-/// Larger solid bodies that lie beside the project on some machines; none elsewhere.
+/// Returns larger solid bodies that are stored beside the project on some machines; empty elsewhere.
 fn shared() -> Vec<Case> {
     let case = |folder: PathBuf| {
         let reference = json(&folder.join("ref.json"));
@@ -94,7 +94,7 @@ fn shared() -> Vec<Case> {
         let (k, m, nodes) = (path("K.mtx.gz"), path("M.mtx.gz"), path("nodes.csv"));
         let mut files =
             ModelFiles::from_arguments(k, m, nodes, Some(path("dofs.csv")), None).expect("no units");
-        // Some are in mm, t, s, which changes no number.
+        // Some models are in mm, t, s without stating it; the numbers are not affected.
         files.allow_implausible = true;
         let sylvester = &modes["sylvester"];
         Case {
@@ -119,14 +119,14 @@ fn shared() -> Vec<Case> {
         .collect()
 }
 
-/// Groups of eigenvalues that agree to 1e-9.
+/// Returns the sizes of the groups of eigenvalues that agree to 1e-9.
 fn groups(eigenvalues: &[f64]) -> Vec<usize> {
     eigenvalues.chunk_by(|a, b| b / a - 1.0 < 1e-9).map(<[f64]>::len).collect()
 }
 
-/// Mass properties and frequencies of the reference to the digits that the files carry, and a count of modes
-/// that is proved. Both sides read the same matrices; eigenvalues of thin bodies keep fewer digits than the
-/// matrices have, and the reference is as good as its residuals.
+/// Asserts that mass properties and frequencies agree with the reference to the digits of the files, and that
+/// the count of modes is proved. Both sides read the same matrices; eigenvalues of thin bodies keep fewer
+/// digits than the matrices, and the accuracy of the reference is that of its residuals.
 fn agrees_with_its_reference(case: &Case) {
     let (name, count) = (&case.name, case.eigenvalues.len());
     let body = proved(case.raw.clone(), count, Method::Auto);
@@ -157,8 +157,8 @@ fn agrees_with_its_reference(case: &Case) {
     }
 }
 
-/// THE acceptance test (theory section 10, last line): generalised inertia forces from the invariants of the
-/// body's own modes are the forces that M of the file times the accelerations of all nodes sum to.
+/// Asserts the last line of theory section 10: generalised inertia forces from the invariants of the modes
+/// equal the sums of the forces M of the file times the accelerations of all nodes.
 fn obeys_the_nodal_equations(case: &Case) {
     let body = proved(case.raw.clone(), case.eigenvalues.len(), Method::Auto);
     let mass = labelled(&case.raw, &body);
@@ -166,7 +166,7 @@ fn obeys_the_nodal_equations(case: &Case) {
     for choice in BodyFrame::ALL {
         let condensed = body.condensed(choice);
         let reduced = reduced(&condensed.invariants);
-        // Mass-normalised modes: displacements of a fifth of the body's size, nothing is linearised.
+        // Modes are mass-normalised: displacements of a fifth of the size of the body, without linearisation.
         let size = 0.2 * (0.5 * case.inertia.trace()).sqrt();
         let (state, accelerations) = random_state(&mut random, condensed.shapes.ncols(), size);
         let nodal = inertia_forces(&mass, &condensed.positions, &condensed.shapes, &state, &accelerations);
@@ -180,7 +180,7 @@ fn obeys_the_nodal_equations(case: &Case) {
     }
 }
 
-/// Entries of M as the file has them, rows and columns in the model's node order.
+/// Returns the entries of M of the file, with rows and columns in the node order of the model.
 fn labelled(raw: &RawModel, body: &Body) -> Vec<(usize, usize, f64)> {
     let place: std::collections::HashMap<i64, usize> =
         body.model.nodes().ids.iter().enumerate().map(|(i, id)| (*id, i)).collect();
@@ -214,7 +214,7 @@ fn shared_bodies_obey_the_nodal_equations() {
     shared().iter().for_each(obeys_the_nodal_equations);
 }
 
-/// Row sums of the mass matrix, and the number of finite eigenvalues of a mass matrix without full rank.
+/// Row sums of the mass matrix, and the number of finite eigenvalues for a mass matrix without full rank.
 #[test]
 fn shared_bodies_agree_with_the_row_sums_and_the_rank_of_their_references() {
     for case in shared() {

@@ -1,5 +1,4 @@
-//! Residual vectors: what a basis cut off by frequency lacks of static responses, against the modal sum over
-//! all modes.
+//! Residual vectors: static response of the truncated modes, compared with the modal sum over all modes.
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Scale, Side};
@@ -15,7 +14,7 @@ use oracle::mesh::{Assembly, Mesh, grid};
 use oracle::reference::{dense, dense_modes};
 use std::path::PathBuf;
 
-/// A cylindrical shell segment of 0.5 rad with a twist: no symmetry.
+/// Returns a cylindrical shell segment of 0.5 rad with a twist, without symmetry.
 fn curved_plate() -> Assembly {
     let cells = [8, 6, 1];
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid(cells), |p| {
@@ -26,7 +25,7 @@ fn curved_plate() -> Assembly {
     mesh.assemble(&Material::STEEL, MassRule::Consistent)
 }
 
-/// The plate with two edges as interfaces.
+/// Returns the plate with two edges as interfaces.
 fn model(plate: &Assembly) -> FeModel {
     let mut raw = plate.raw_model();
     let edge = |kept: &dyn Fn(usize) -> bool| {
@@ -47,7 +46,7 @@ fn lowest(count: usize) -> ModeSettings {
     ModeSettings { wanted: Wanted::Lowest(count), ..ModeSettings::default() }
 }
 
-/// The centrifugal loads by their definition, from M as 3n x 3n entries and about another origin.
+/// Returns the centrifugal loads by their definition, from M as 3n x 3n entries and about another origin.
 fn centrifugal(plate: &Assembly) -> Mat<f64> {
     let n = plate.nodes.len();
     let mut fields = Mat::<f64>::zeros(3 * n, 6);
@@ -71,7 +70,8 @@ fn centrifugal(plate: &Assembly) -> Mat<f64> {
     loads
 }
 
-/// Relative 2-norm and energy errors of the static responses in the span of `shapes`, worst of the loads.
+/// Returns the relative 2-norm and energy errors of the static responses in the span of `shapes`, for the
+/// worst load.
 fn response_error(
     plate: &Assembly,
     exact: &Mat<f64>,
@@ -91,7 +91,7 @@ fn response_error(
     (worst, (0..loads.ncols()).map(|j| (part[(j, j)].max(0.0) / whole[(j, j)]).sqrt()).collect())
 }
 
-/// K^+ F as the sum over every flexible mode of a dense solver.
+/// Returns K^+ F as the sum over all flexible modes of a dense solver.
 fn exact_responses(plate: &Assembly, loads: &Mat<f64>) -> Mat<f64> {
     let all = dense_modes(plate);
     let modal = gram(all.shapes.as_ref(), loads.as_ref());
@@ -99,7 +99,7 @@ fn exact_responses(plate: &Assembly, loads: &Mat<f64>) -> Mat<f64> {
     combine(all.shapes.as_ref(), amplitudes.as_ref())
 }
 
-/// K^+ F by a dense factorisation of K + s M R R'M, which is K for motions without a rigid part.
+/// Returns K^+ F by a dense factorisation of K + s M R R'M, which equals K for motions without a rigid part.
 fn solved_responses(plate: &Assembly, loads: &Mat<f64>) -> Mat<f64> {
     let n = plate.n_dofs();
     let (k, m) = (dense(&plate.stiffness), dense(&plate.mass()));
@@ -112,7 +112,7 @@ fn solved_responses(plate: &Assembly, loads: &Mat<f64>) -> Mat<f64> {
             _ => 0.0,
         }
     });
-    // M-orthonormal, twice for the digits.
+    // M-orthonormalised twice for full accuracy.
     for _ in 0..2 {
         let gram = rigid.transpose() * &m * &rigid;
         let factor = gram.llt(Side::Lower).expect("independent").L().to_owned();
@@ -139,9 +139,9 @@ fn solved_responses(plate: &Assembly, loads: &Mat<f64>) -> Mat<f64> {
     responses
 }
 
-/// The experiment of theory section 8: a plate of 1 x 0.75 x 0.01 m, bent to 0.8 rad. Its response to spin
-/// about the axes is mostly bending, which the first modes have, and to a tenth stretching, which none of the
-/// first 50 has.
+/// Experiment of theory section 8: a plate of 1 x 0.75 x 0.01 m, bent to 0.8 rad. Its response to spin about
+/// the axes is mostly bending, which the first modes represent, and a tenth is stretching, which none of the
+/// first 50 modes represents.
 #[test]
 fn fifty_modes_miss_a_tenth_of_the_centrifugal_response_and_six_vectors_nothing() {
     let mesh = Mesh::from_cells(ElementKind::Hex20, &grid([8, 6, 1]), |p| {
@@ -166,7 +166,7 @@ fn fifty_modes_miss_a_tenth_of_the_centrifugal_response_and_six_vectors_nothing(
     let (displacement, energy) =
         response_error(&plate, &exact, &loads, &solution.vectors, &solution.eigenvalues);
     println!("10 + 6: displacement {displacement:.1e}, energy {energy:?}");
-    // The digits that rounding of K leaves in any solution: its stiffest motion beside its softest.
+    // Rounding of K limits the accuracy of any solution: ratio of its stiffest to its softest motion.
     let stiffest = |i: usize| plate.stiffness.get(i, i) / plate.scalar_mass.get(i / 3, i / 3);
     let highest = (0..plate.n_dofs()).map(stiffest).fold(0.0, f64::max);
     let floor = f64::EPSILON * highest / solution.eigenvalues[0];
@@ -222,7 +222,7 @@ fn free_modes_stay_what_they_are_and_proved() {
     assert!(basis.provenance[8..].iter().all(|text| text.starts_with("residual vector: ")));
     assert_eq!(solution.completeness, alone.completeness);
     assert!(solution.eigenvalues[8] > alone.completeness.shift);
-    // M-orthonormal, M-orthogonal to rigid motion, diagonal stiffness.
+    // M-orthonormal, M-orthogonal to rigid motion, with diagonal stiffness.
     let pencil = model.pencil();
     let psi = solution.vectors.as_ref();
     let count = psi.ncols();
@@ -238,13 +238,13 @@ fn responses_to_interface_loads_are_exact_and_what_adds_nothing_is_named() {
     let plate = curved_plate();
     let model = model(&plate);
     let basis = modes(&model, &lowest(6), vec![Loads::Interfaces]).expect("modes");
-    // A single node takes no torque.
+    // A single node of a solid transmits no torque.
     let [note] = basis.diagnostics.as_slice() else { panic!("{:?}", basis.diagnostics) };
     assert_eq!(note.code(), Code::LoadsCovered);
     assert!(note.message().starts_with("3 of 12"), "{note}");
     assert!(note.message().contains("corner torque z (deforms nothing)"), "{note}");
     assert_eq!(basis.solution.eigenvalues.len(), 6 + 9);
-    // Unit force along y at the corner: nodal forces written down here.
+    // Unit force along y at the corner, with nodal forces written down here.
     let mut load = Mat::zeros(3 * plate.nodes.len(), 1);
     load[(3 * 8 + 1, 0)] = 1.0;
     let exact = exact_responses(&plate, &load);
@@ -254,8 +254,8 @@ fn responses_to_interface_loads_are_exact_and_what_adds_nothing_is_named() {
     assert!(displacement < 1e-9 && energy[0] < 1e-9, "{displacement:e} {energy:?}");
 }
 
-/// Without residual vectors the part of the static responses at interfaces that free modes lack is known all the same:
-/// that of the modal sum over all modes.
+/// Without residual vectors the truncation error of free modes at interfaces is still known; it agrees with
+/// the modal sum over all modes.
 #[test]
 fn free_modes_know_what_they_lack_at_interfaces() {
     let plate = curved_plate();
@@ -279,7 +279,7 @@ fn user_loads_that_repeat_or_only_move_the_body_are_named() {
     let model = model(&plate);
     let n = 3 * plate.nodes.len();
     let pencil = model.pencil();
-    // A point force, twice that, gravity along x, the inertia load of the first mode.
+    // A point force, twice that force, gravity along x, the inertia load of the first mode.
     let first = modes(&model, &lowest(1), vec![]).expect("modes").solution.vectors;
     let inertia = pencil.apply_mass(first.as_ref());
     let gravity = pencil.apply_mass(Mat::from_fn(n, 1, |i, _| if i % 3 == 0 { 1.0 } else { 0.0 }).as_ref());
@@ -316,14 +316,14 @@ fn what_cannot_be_is_refused_before_the_work() {
     assert!(modes(&without, &lowest(5), vec![Loads::Interfaces]).expect_err("none").has(Code::InterfaceNode));
 }
 
-/// H = B'(K - w^2 M)^-1 B without the rigid motion, of modes with these eigenvalues.
+/// Returns H = B'(K - w^2 M)^-1 B without the rigid motion, for modes with these eigenvalues.
 fn transfer(shapes: &Mat<f64>, lambda: &[f64], loads: &Mat<f64>, square: f64) -> Mat<f64> {
     let modal = gram(shapes.as_ref(), loads.as_ref());
     let answered = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| modal[(p, j)] / (lambda[p] - square));
     modal.transpose() * answered
 }
 
-/// Largest difference of two transfer functions, relative to the first.
+/// Returns the largest difference of two transfer functions, relative to the first.
 fn difference(exact: &Mat<f64>, other: &Mat<f64>) -> f64 {
     (exact - other).norm_max() / exact.norm_max()
 }
@@ -335,7 +335,7 @@ fn responses_at_a_frequency_give_the_transfer_function_there_and_its_slope() {
     let all = dense_modes(&plate);
     let mut loads = Mat::zeros(3 * plate.nodes.len(), 3);
     (0..3).for_each(|k| loads[(3 * 8 + k, k)] = 1.0);
-    // Among the six modes that are kept, and beyond them.
+    // Frequencies among the six kept modes, and beyond them.
     for below in [3, 8] {
         let gap = all.eigenvalues[below + 1] - all.eigenvalues[below];
         let square = all.eigenvalues[below] + 0.4 * gap;
@@ -351,7 +351,7 @@ fn responses_at_a_frequency_give_the_transfer_function_there_and_its_slope() {
         };
         let [there, near, farther] = errors_of(vec![at]);
         assert!(there < 1e-10, "{there:e} at {hertz} Hz");
-        // What is left grows with the square of the distance: the slope is that of the model.
+        // The error grows with the square of the distance: the slope is that of the model.
         let growth = farther / near;
         assert!((3.5..5.0).contains(&growth) && near < 1e-3, "{near:e} {farther:e}");
         let [statically, ..] = errors_of(vec![Loads::Interfaces]);

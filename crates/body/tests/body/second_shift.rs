@@ -1,5 +1,5 @@
-//! Many modes go over to a second shift, among them: they are the same as those of dense algebra, on easy and on hard
-//! bodies, and of the same bits on any number of threads.
+//! A search for many modes continues at a second shift among them: the modes equal those of dense algebra,
+//! for easy and hard bodies, with equal bits on any number of threads.
 
 use flexbody_body::basis::{ModalBasis, ModeSettings, free_surface};
 use flexbody_eigen::{Accuracy, Method, Wanted, Way};
@@ -21,7 +21,7 @@ fn modes(model: &FeModel, method: Method, accuracy: Accuracy) -> ModalBasis {
     free_surface(model, &settings, &Context::QUIET).expect("modes")
 }
 
-/// Modes of a search that has tried a second shift; on hard bodies it may fail.
+/// Returns the modes of a search that tried a second shift; for hard bodies it may fail.
 fn with_second_shift(model: &FeModel, accuracy: Accuracy) -> ModalBasis {
     let found = modes(model, Method::Lanczos, accuracy);
     let plan = found.solution.plan.as_ref().expect("no dense path");
@@ -37,7 +37,7 @@ fn block(cells: [i32; 3], lengths: [f64; 3], material: Material) -> FeModel {
     checked(&Mesh::block(ElementKind::Hex8, cells, lengths).assemble(&material, MassRule::Consistent))
 }
 
-/// Quadratic tetrahedra whose mass matrix is singular.
+/// Returns quadratic tetrahedra with a singular mass matrix.
 fn singular_mass() -> FeModel {
     checked(
         &Mesh::block(ElementKind::Tet10, [5, 2, 2], [1.0, 0.42, 0.4])
@@ -45,7 +45,7 @@ fn singular_mass() -> FeModel {
     )
 }
 
-/// A block whose left half is 10^8 times as stiff as the right.
+/// Returns a block whose left half is 10^8 times as stiff as the right.
 fn contrast() -> FeModel {
     let mesh = Mesh::block(ElementKind::Hex8, [12, 5, 4], [1.2, 0.5, 0.41]);
     let half = |left: bool, youngs: f64| {
@@ -55,7 +55,7 @@ fn contrast() -> FeModel {
     checked(&half(true, 2e11).plus(&half(false, 2e3)))
 }
 
-/// Easy ones and hard ones.
+/// Returns easy and hard models.
 fn models() -> Vec<(String, FeModel)> {
     let steel = Material::STEEL;
     let own = ["cube_hex8", "bracket_hex20", "shell_folded", "frame_beams", "hex8_bubbles"];
@@ -71,8 +71,9 @@ fn models() -> Vec<(String, FeModel)> {
     own.into_iter().chain(others.map(|(name, model)| (name.to_owned(), model))).collect()
 }
 
-/// The largest relative difference of an eigenvalue, and of the square of a mode in the span of the others, that two searches
-/// may have. (Rounding of the stiffness of the needle is 1e-9 of the energy of its first mode.)
+/// Returns the largest relative difference of an eigenvalue, and of the square of a mode in the span of the
+/// others, allowed between two searches. (Rounding of the stiffness of the slender body is 1e-9 of the energy
+/// of its first mode.)
 fn same(accuracy: Accuracy) -> (f64, f64) {
     if accuracy == Accuracy::Fast { (1e-8, 1e-5) } else { (1e-9, 1e-9) }
 }
@@ -92,7 +93,7 @@ fn modes_with_a_second_shift_are_those_of_dense_algebra() {
                     "{name}, {accuracy:?}, mode {j}: {own:e} {dense:e}"
                 );
             }
-            // M-orthonormal among themselves, and spanning what the others span: all singular values are one.
+            // The modes are M-orthonormal and span the same space: all singular values are one.
             let mass = model.pencil().apply_mass(own.vectors.as_ref());
             let identity = gram(own.vectors.as_ref(), mass.as_ref());
             let cosines = gram(dense.vectors.as_ref(), mass.as_ref());

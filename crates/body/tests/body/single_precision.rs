@@ -1,5 +1,5 @@
-//! The single-precision factor: the same modes and the same promises as with a double one, or a plain word
-//! that it fails.
+//! Factor in single precision: modes and accuracy are those of a double-precision factor, or the failure is
+//! reported.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{ExitCode, Result};
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 const SINGLE: FactorChoice = FactorChoice::Always(Precision::Single);
 const DOUBLE: FactorChoice = FactorChoice::Always(Precision::Double);
 
-/// The fixture models, and some that lie beside the project on some machines.
+/// Returns the fixture models, and further models that exist on some machines beside the project.
 fn models() -> Vec<(String, FeModel)> {
     let root = oracle::root();
     let shared = oracle::shared();
@@ -30,7 +30,7 @@ fn models() -> Vec<(String, FeModel)> {
         let files =
             ModelFiles::from_arguments(file("K.mtx.gz"), file("M.mtx.gz"), file("nodes.csv"), dofs, None);
         let mut files = files.expect("default units");
-        // Some are in mm, t, s, which changes no number.
+        // Some models are in mm, t, s without stating it; the numbers are not affected.
         files.allow_implausible = true;
         let raw = read_model(&files).expect("readable files");
         (folder.display().to_string(), FeModel::from_raw(raw).expect("a sound model").model)
@@ -49,13 +49,14 @@ fn run(model: &FeModel, count: usize, factor: FactorChoice, single_pays: f64) ->
     convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, &Context::QUIET)
 }
 
-/// A steel plate of 1 m x 0.7 m: cond(K + tau M) grows with the fourth power of length over thickness.
+/// Returns a steel plate of 1 m x 0.7 m: cond(K + tau M) grows with the fourth power of length over
+/// thickness.
 fn plate(thickness: f64) -> FeModel {
     let mesh = Mesh::block(ElementKind::Hex8, [16, 12, 1], [1.0, 0.7, thickness]);
     check(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model()).expect("a sound model").model
 }
 
-/// What was said about the precision of the factor.
+/// Returns the messages about the precision of the factor.
 fn said(found: &Conversion) -> Vec<&str> {
     let about = |d: &&Diagnostic| d.code() == Code::FactorPrecision;
     found.diagnostics.iter().filter(about).map(Diagnostic::message).collect()
@@ -65,7 +66,7 @@ fn said(found: &Conversion) -> Vec<&str> {
 #[ignore = "slow"]
 fn a_single_precision_factor_gives_the_modes_and_invariants_of_a_double_one() {
     for (name, model) in models() {
-        // Where conditioning defeats it, `auto` falls back; it does not on the models of the project.
+        // `auto` falls back to double precision for ill-conditioned models, but not for those of the project.
         let [double, single] = [DOUBLE, FactorChoice::Auto]
             .map(|factor| run(&model, 20, factor, 0.0).unwrap_or_else(|e| panic!("{name}: {e}")));
         let fell_back = single.plan.as_ref().expect("a sparse factor").has_failed(Way::SinglePrecision);
@@ -78,14 +79,14 @@ fn a_single_precision_factor_gives_the_modes_and_invariants_of_a_double_one() {
             assert!((x / y - 1.0).abs() < 1e-9, "{name}, mode {j}: {x} {y}");
         }
         for (j, (x, y)) in a.residual.iter().zip(&b.residual).enumerate() {
-            // The promise of `standard`; on slender bodies rounding of K allows neither factor to keep it.
+            // Accuracy of `standard`; for slender bodies the rounding of K exceeds it with either factor.
             assert!(
                 *y <= f64::max(1e-9, 2.0 * x),
                 "{name}, mode {j}: K-residual {y:e}, in double precision {x:e}"
             );
         }
         let (exact, own) = (double.body.invariants(), single.body.invariants());
-        // modal_mass = Psi' M Psi.
+        // Identity modal_mass = Psi' M Psi.
         let mass = &own.s().unwrap()[0][0] + &own.s().unwrap()[1][1] + &own.s().unwrap()[2][2];
         for i in 0..mass.nrows() {
             for j in 0..mass.ncols() {
@@ -99,14 +100,14 @@ fn a_single_precision_factor_gives_the_modes_and_invariants_of_a_double_one() {
     }
 }
 
-/// What the certificate says about the count.
+/// Returns the count and the remark of the certificate.
 fn counted(found: &Conversion) -> (Option<usize>, Option<usize>, &str) {
     let c = found.body.certificate();
     (c.proved_modes, c.negative_pivots, c.remark.as_str())
 }
 
-/// The count in single precision proves what the one in double precision does, on every model; where its
-/// rounding may move an eigenvalue across the shift it is made again in double precision.
+/// The count in single precision agrees with the one in double precision on every model; if its rounding may
+/// move an eigenvalue across the shift, it is repeated in double precision.
 #[test]
 fn counts_in_single_precision_are_those_of_double_precision() {
     let (mut in_single, mut in_double) = (0, 0);
@@ -119,7 +120,7 @@ fn counts_in_single_precision_are_those_of_double_precision() {
         assert!(proved.is_some() && remark.is_empty(), "{name}: {remark}");
         if said.is_empty() {
             in_double += 1;
-            // Another factorisation than that of the count.
+            // The fallback needs a further factorisation.
             assert!(single.work.factorizations > double.work.factorizations, "{name}");
         } else {
             in_single += 1;
@@ -129,8 +130,8 @@ fn counts_in_single_precision_are_those_of_double_precision() {
     assert!(in_single >= 4 && in_double >= 1, "{in_single} in single precision, {in_double} in double");
 }
 
-/// A block that is nearly a cube: eigenvalues that the cube has twice or three times are apart by a hundredth
-/// of a per mille, which a count in single precision does not resolve. It is made above the next ones.
+/// A block that is nearly a cube: eigenvalues that are double or triple for the cube differ by 1e-5, which a
+/// count in single precision does not resolve. The count is made above the next eigenvalues.
 #[test]
 fn a_count_in_single_precision_is_made_above_eigenvalues_that_it_does_not_resolve() {
     let mesh = Mesh::block(ElementKind::Hex8, [8, 8, 8], [1.0, 1.0, 1.0 + 1e-5]);
@@ -161,12 +162,12 @@ fn a_thin_plate_defeats_single_precision_and_auto_falls_back_with_a_note() {
     assert_eq!((plan.precision(), plan.has_failed(Way::SinglePrecision)), (Precision::Double, true));
     assert!(said(&auto)[0].starts_with("a single-precision factor is too poor"), "{:?}", said(&auto));
     assert!(said(&double).is_empty());
-    // From there on it is the search in double precision.
+    // The search continues in double precision.
     assert_eq!(auto.body.modes().eigenvalue, double.body.modes().eigenvalue);
     assert_eq!(auto.work.factor_bytes, double.work.factor_bytes);
     assert!(auto.work.factorizations > double.work.factorizations);
 
-    // A thicker one does not, and without the wish for speed single precision is not tried at all.
+    // A thicker plate does not fail; with the default `single_pays` single precision is not tried.
     let model = plate(3e-2);
     let tried = run(&model, 10, FactorChoice::Auto, 0.0).expect("modes");
     assert_eq!(tried.plan.as_ref().expect("a sparse factor").precision(), Precision::Single);

@@ -1,5 +1,5 @@
-//! Bodies of one element and a few: all their modes, singular mass matrices, dense and sparse paths side by
-//! side, and bodies that are none.
+//! Bodies of one or a few elements: all their modes, singular mass matrices, dense and sparse methods
+//! compared, and invalid bodies.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::ExitCode;
@@ -31,7 +31,7 @@ fn one_element(kind: ElementKind) -> Assembly {
         }
         ElementKind::Tet4 | ElementKind::Tet10 => Mesh::block(kind, [1; 3], [1.0; 3]),
     };
-    // The first of the six tetrahedra alone, its nodes renumbered.
+    // The first of the six tetrahedra alone, with renumbered nodes.
     let element = &lattice.elements[0].1;
     let nodes = element.iter().map(|&i| lattice.nodes[i]).collect();
     let mesh = Mesh { nodes, elements: vec![(kind, (0..element.len()).collect())] };
@@ -97,7 +97,7 @@ fn singular_mass_gives_its_finite_modes_and_says_so() {
         let reference = dense_modes(&body);
         assert!(reference.infinite > 0);
         for method in METHODS {
-            // All that could be asked for of this size: clamped to the finite ones.
+            // The largest possible request is limited to the finite modes.
             let found = try_modes(body.raw_model(), body.n_dofs() - 6, method).expect("a sound body");
             assert_close(found.eigenvalues(), &reference.eigenvalues, 1e-10, &format!("{kind:?} {method:?}"));
             let has = |code| found.modes.diagnostics.iter().any(|d| d.code() == code);
@@ -138,7 +138,7 @@ fn every_mode_below_a_frequency_is_found() {
     let reference = dense_modes(&body);
     let model = check(body.raw_model()).expect("a sound body").model;
     for count in [1usize, 2, 3, 10, 40] {
-        // Between the groups of repeated eigenvalues only.
+        // Compares between groups of repeated eigenvalues only.
         let (below, above) = (reference.eigenvalues[count - 1], reference.eigenvalues[count]);
         if above / below < 1.0 + 1e-6 {
             continue;
@@ -154,7 +154,7 @@ fn every_mode_below_a_frequency_is_found() {
     }
 }
 
-/// The code and exit code with which a model is refused.
+/// Returns the codes and exit codes with which a model is refused.
 fn refusal(raw: RawModel, method: Method) -> Vec<(Code, ExitCode)> {
     match try_modes(raw, 10, method) {
         Ok(body) => panic!("accepted: {:?}", body.eigenvalues()),

@@ -1,4 +1,4 @@
-//! A free shaft that spins about itself, against the differential equation of Rayleigh.
+//! A free shaft spinning about its axis compared with Rayleigh's differential equation.
 
 use faer::Mat;
 use flexbody_body::basis::ModeSettings;
@@ -11,7 +11,8 @@ use flexbody_model::FeModel;
 use nalgebra::Vector3;
 use oracle::beams::{SHAFT_YOUNGS, shaft};
 
-/// The first frequency s > 0 of bending along fixed axes that turns with the spin, against it where `spin` is negative:
+/// Returns the first bending frequency s > 0 in fixed axes of the mode that whirls with the spin, or against
+/// it if `spin` is negative:
 ///
 /// ```text
 /// E I w'''' - m s^2 w + (s^2 - 2 spin s) m r^2 w'' = 0,    m: mass per length, r^2 = I / A
@@ -48,7 +49,7 @@ fn body(parts: usize, width: f64) -> FlexBody {
     convert(&model, &settings, &Context::QUIET).expect("converts").body
 }
 
-/// Rates of vibration along axes that turn with the body at `spin` about x, ascending: of
+/// Returns the frequencies of vibration in axes that rotate with the body at `spin` about x, ascending, from
 /// q'' + spin (W3' - W3) q' + (K - spin^2 W2 + spin^2 K^w) q = 0 for this axis.
 fn turning_rates(body: &FlexBody, spin: f64) -> Vec<f64> {
     let n = body.n_modes();
@@ -76,8 +77,8 @@ fn turning_rates(body: &FlexBody, spin: f64) -> Vec<f64> {
     rates
 }
 
-/// Both first frequencies of a spinning shaft converge to those of Rayleigh's equation with the square of the element
-/// size.
+/// Both first frequencies of a spinning shaft converge to those of Rayleigh's equation with the square of the
+/// element size.
 #[test]
 fn a_spinning_shaft_whirls_as_rayleighs_equation_says() {
     for width in [0.04, 0.1] {
@@ -86,7 +87,7 @@ fn a_spinning_shaft_whirls_as_rayleighs_equation_says() {
             let first = body.modes().eigenvalue[0].sqrt();
             let spin = 0.5 * first;
             let rates = turning_rates(&body, spin);
-            // Along axes that turn with the shaft whirl with the spin is slower, whirl against it faster.
+            // In axes that rotate with the shaft, forward whirl is slower and backward whirl is faster.
             let found = [rates[1] - spin, rates[0] + spin].map(|rate| rate / first - 1.0);
             let still = rayleigh(width, 0.0, [0.9 * first, 1.1 * first]);
             let expected = [-0.5, 0.5]

@@ -1,4 +1,4 @@
-//! What a flexible body refuses to be made of, all violations at once.
+//! Invalid parts of a flexible body are refused with all violations at once.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::units::UnitSystem;
@@ -133,7 +133,7 @@ fn names_are_unique_and_can_be_stored() {
 #[test]
 fn loads_of_geometric_stiffness_are_those_that_a_file_can_name() {
     use flexbody_body::flex_body::LoadKind::{Force, Named, Spin};
-    // The parts have a force and a spin.
+    // The parts have geometric stiffness for a force and a spin.
     let load = |p: &mut Parts, kind, component| {
         (p.geometric_stiffness[0].load.kind, p.geometric_stiffness[0].load.component) = (kind, component);
     };

@@ -1,6 +1,5 @@
-//! The work of the eigen-solver on the fixture models, counted: a slower algorithm fails here without any
-//! clock. `FLEXBODY_BLESS=1 cargo test -p flexbody-body work_counters` writes the table after a change that is
-//! meant.
+//! Work of the eigensolver on the fixture models in counts: a slower algorithm fails here without timing.
+//! `FLEXBODY_BLESS=1 cargo test -p flexbody-body work_counters` writes the table after an intended change.
 
 use flexbody_body::basis::{ModeSettings, free_surface};
 use flexbody_eigen::{Accuracy, EigenSolution, Method, Wanted};
@@ -101,8 +100,8 @@ fn modes_and_work_have_the_same_bits_on_any_number_of_threads() {
     assert!(one.vectors == three.vectors, "vectors differ");
 }
 
-/// Solids, nodes that rotate, in space and in the plane, and rows that belong to no node: the order of
-/// elimination is computed once for a model, and a search that finds it computed gives the same bits.
+/// Solids, nodes with rotations in space and in the plane, and internal rows: the elimination order is
+/// computed once per model, and a search that reuses it gives equal bits.
 #[test]
 fn searches_of_one_model_share_one_order_and_give_the_same_bits() {
     for name in ["cube_hex8", "shell_folded", "frame_beams", "plane_frame", "hex8_bubbles"] {

@@ -1,5 +1,5 @@
-//! Modes of a body whose K-residuals end at rounding: a free slender beam of so many elements that K x in
-//! double precision has lost most digits of the first modes.
+//! Modes of a body whose K-residuals are limited by rounding: a free slender beam with so many elements that
+//! K x in double precision loses most digits of the first modes.
 
 use faer::Mat;
 use flexbody_eigen::{
@@ -8,14 +8,15 @@ use flexbody_eigen::{
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{CscMatrix, Pencil, SymmetricMatrix, gram, uniform};
 
-/// Elements; a power of two, so that K and M have no rounding in them.
+/// Number of elements; a power of two, so that K and M are exact.
 const ELEMENTS: usize = 2048;
 
-/// Roots of cos(b) cosh(b) = 1, the free beam's.
+/// Roots of cos(b) cosh(b) = 1 for the free beam.
 const ROOTS: [f64; 4] =
     [4.730_040_744_862_704, 7.853_204_624_095_838, 10.995_607_838_001_67, 14.137_165_491_257_46];
 
-/// K and 420 M of cubic beam elements: EI = 1, mass and length one. Deflections and slopes, node by node.
+/// Returns K and 420 M of cubic beam elements with EI, mass and length one; deflection and slope of each
+/// node.
 fn beam() -> [SymmetricMatrix; 2] {
     let h = (ELEMENTS as f64).recip();
     let stiffness =
@@ -43,7 +44,7 @@ fn beam() -> [SymmetricMatrix; 2] {
     [assembled(stiffness, (h * h * h).recip()), assembled(mass, h)]
 }
 
-/// Its translation and rotation, orthonormal in 420 M.
+/// Returns translation and rotation of the beam, orthonormal in 420 M.
 fn rigid() -> Mat<f64> {
     let h = (ELEMENTS as f64).recip();
     Mat::from_fn(2 * (ELEMENTS + 1), 2, |row, k| {
@@ -53,7 +54,7 @@ fn rigid() -> Mat<f64> {
             (_, true) => (row / 2) as f64 * h - 0.5,
             (_, false) => 1.0,
         };
-        // Mass one; moment of inertia a twelfth.
+        // The mass is one, the moment of inertia 1/12.
         field / if k == 0 { 420f64.sqrt() } else { 35f64.sqrt() }
     })
 }
@@ -67,7 +68,7 @@ fn settings(accuracy: Accuracy) -> EigenSettings {
     }
 }
 
-/// The K-residuals of this body are rounding, and its modes are wanted all the same.
+/// Runs the test on modes whose K-residuals are rounding.
 fn with_modes(test: impl FnOnce(&EigenProblem<'_>, EigenSolution)) {
     let ([stiffness, mass], rigid) = (beam(), rigid());
     let problem = EigenProblem {
@@ -88,7 +89,7 @@ fn eigenvalues_keep_the_digits_that_products_in_double_precision_lose() {
         let plain = problem.pencil.apply_stiffness(solution.vectors.as_ref());
         let mut lost = 0.0f64;
         for (j, root) in ROOTS.iter().enumerate() {
-            // The error of cubic elements: (b h)^4 / 720.
+            // Error of cubic elements: (b h)^4 / 720.
             let expected = root.powi(4) / 420.0 * (1.0 + (root / ELEMENTS as f64).powi(4) / 720.0);
             let error = solution.eigenvalues[j] / expected - 1.0;
             assert!(error.abs() < 1e-11, "mode {j}: {error:e}");

@@ -23,7 +23,7 @@ impl Body {
         Self { k: vec![vec![0.0; n]; n], m: vec![vec![0.0; n]; n] }
     }
 
-    /// A bar between two nodes: stiffness `k`, mass `m` consistently (part 1/6) or lumped.
+    /// Adds a bar between two nodes: stiffness `k`, mass `m` consistent (off-diagonal 1/6) or lumped.
     fn add(&mut self, (i, j): (usize, usize), k: f64, m: f64, consistent: bool) {
         for (a, b, k, m) in [
             (i, i, k, if consistent { m / 3.0 } else { m / 2.0 }),
@@ -55,7 +55,7 @@ impl Body {
         let (stiffness, mass) = (matrix(&self.k), matrix(&self.m));
         let total: f64 = self.m.iter().flatten().sum();
         let rigid = Mat::from_fn(n, 1, |_, _| total.sqrt().recip());
-        // The Rayleigh quotient of a ramp without its mean.
+        // Rayleigh quotient of a ramp without its mean.
         let form = |a: &[Vec<f64>], x: &[f64], y: &[f64]| -> f64 {
             (0..n).map(|i| (0..n).map(|j| x[i] * a[i][j] * y[j]).sum::<f64>()).sum()
         };
@@ -76,7 +76,7 @@ impl Body {
         )
     }
 
-    /// Every bound is right by exact counts; the largest relative width.
+    /// Asserts every bound by exact counts; returns the largest relative width.
     fn assert_enclosed(&self, found: &EigenSolution) -> f64 {
         let EigenvalueBounds { lower, upper, shift_below, pivots_below, .. } =
             found.bounds.as_ref().expect("certified");
@@ -90,8 +90,8 @@ impl Body {
         let mut widest = 0.0f64;
         for (j, &lambda) in found.eigenvalues.iter().enumerate() {
             assert!(lower[j] <= lambda && lambda <= upper[j], "{j}: {} {lambda} {}", lower[j], upper[j]);
-            // Eigenvalues below the bounds, the rigid one included. `next_up`: an eigenvalue on the bound
-            // itself.
+            // Number of eigenvalues below the bounds, including the rigid one. `next_up` includes an
+            // eigenvalue on the bound itself.
             let below = count_below(&self.k, &self.m, lower[j].next_down());
             let up_to = count_below(&self.k, &self.m, upper[j].next_up());
             assert!(
@@ -106,7 +106,7 @@ impl Body {
     }
 }
 
-/// n equal masses on n - 1 equal springs.
+/// Returns n equal masses on n - 1 equal springs.
 fn chain(n: usize) -> Body {
     let mut body = Body::empty(n);
     for i in 0..n - 1 {
@@ -134,8 +134,8 @@ fn free_chains_have_the_eigenvalues_of_their_closed_form() {
 
 #[test]
 fn a_long_chain_keeps_its_digits_by_the_iterative_path() {
-    // 700 masses: beyond the dense path. lambda_1 / lambda_max = 5e-6, so plain products would keep ten
-    // digits.
+    // 700 masses exceed the dense path. lambda_1 / lambda_max = 5e-6, so that plain products would lose
+    // digits down to ten.
     let n = 700;
     let found = chain(n).solve(Wanted::Lowest(6), Method::Lanczos).expect("a sound body");
     let bounds = found.bounds.as_ref().expect("certified");
@@ -154,7 +154,7 @@ fn a_long_chain_keeps_its_digits_by_the_iterative_path() {
 
 #[test]
 fn repeated_eigenvalues_are_enclosed_as_a_block() {
-    // Five equal arms of two bars from one hub: every antisymmetric pair of arms vibrates alike, four times
+    // Five equal arms of two bars at one hub: every antisymmetric pair of arms vibrates alike, four times
     // each.
     let mut body = Body::empty(11);
     for arm in 0..5 {
@@ -167,8 +167,8 @@ fn repeated_eigenvalues_are_enclosed_as_a_block() {
     assert_eq!(fourfold, 2, "{:?}", found.eigenvalues);
     for j in 0..10 {
         assert!((bounds.upper[j] - bounds.lower[j]) / bounds.upper[j] < 1e-13);
-        // Sturm counts of the exact matrix: it repeats its eigenvalues exactly or splits them by rounding of
-        // the entries.
+        // Sturm counts of the exact matrix, whose eigenvalues repeat exactly or are split by rounding of the
+        // entries.
         assert!(count_below(&body.k, &body.m, bounds.lower[j].next_down()) <= j + 1);
         assert!(count_below(&body.k, &body.m, bounds.upper[j].next_up()) >= j + 2);
     }
@@ -204,14 +204,14 @@ fn modes_are_as_near_to_exact_ones_as_they_are_said_to_be() {
                 .collect();
             let along: f64 = exact.iter().enumerate().map(|(i, x)| x * found.vectors[(i, j)]).sum();
             let off: f64 = (0..n).map(|i| (found.vectors[(i, j)] - along * exact[i]).powi(2)).sum();
-            // The cosines themselves are right to 1e-15.
+            // The cosines themselves are accurate to 1e-15.
             assert!(off.sqrt() <= error + 2e-15, "{method:?}, mode {j}: {:e}, bound {error:e}", off.sqrt());
             assert!(error < 1e-11, "{method:?}, mode {j}: {error:e}");
         }
     }
 }
 
-/// Stiffness and mass over five decades, extra bars, some nodes without mass.
+/// Stiffness and mass over five decades, additional bars, some nodes without mass.
 fn bodies() -> impl Strategy<Value = Body> {
     let bar = (-2.5..2.5f64, -2.5..2.5f64, any::<bool>());
     (4usize..12).prop_flat_map(move |n| {
@@ -226,7 +226,7 @@ fn bodies() -> impl Strategy<Value = Body> {
             for (i, j, k) in extra.into_iter().filter(|(i, j, _)| i != j) {
                 body.add((i, j), 10f64.powf(k), 0.0, false);
             }
-            // A lumped node can lose its mass: an infinite eigenvalue.
+            // A lumped node can lose its mass, which gives an infinite eigenvalue.
             for i in 1..n - 1 {
                 if massless[i - 1] && massless[i] {
                     body.m[i][i] = 0.0;
@@ -245,8 +245,8 @@ proptest! {
     fn random_bodies_are_enclosed(body in bodies(), wanted in 1usize..12, lanczos in any::<bool>()) {
         let method = if lanczos { Method::Lanczos } else { Method::Dense };
         let found = body.solve(Wanted::Lowest(wanted), method);
-        // The highest modes of wild contrasts may not reach the residual of 1e-12; few of the bodies are like
-        // that.
+        // The highest modes for extreme contrasts may not reach the residual of 1e-12; few of the bodies are
+        // affected.
         prop_assume!(!matches!(found, Err(EigenFailure::NotConverged { .. })));
         let found = found.expect("a sound body");
         let width = body.assert_enclosed(&found);

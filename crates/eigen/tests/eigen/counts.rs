@@ -1,4 +1,4 @@
-//! Counts of eigenvalues, and modes of a given span, against the closed form.
+//! Counts of eigenvalues, and modes of a given span, compared with the closed form.
 
 use super::grid::Grid;
 use faer::Mat;
@@ -9,13 +9,13 @@ use proptest::prelude::*;
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// As many modes as the closed form has below a bound, and no other, whatever the grid and the bound.
+    /// The number of modes below a bound agrees with the closed form for any grid and bound.
     #[test]
     fn all_modes_below_a_bound_are_found(n in 3usize..40, m in 1usize..30, part in 0.0f64..0.2, lanczos: bool) {
         let grid = Grid::new([n, m], 1.0, 1.0);
         let exact = grid.exact();
         let bound = part * exact.last().expect("two nodes at least").eigenvalue;
-        // A bound on an eigenvalue has it on either side.
+        // An eigenvalue on the bound may count on either side.
         prop_assume!(exact.iter().all(|mode| (mode.eigenvalue - bound).abs() > 1e-9));
         let method = if lanczos { Method::Lanczos } else { Method::Dense };
         let settings = EigenSettings { wanted: Wanted::Below(bound), method, ..EigenSettings::default() };
@@ -56,7 +56,7 @@ fn vectors_that_are_no_modes_are_ritz_vectors_and_not_proved() {
     let found =
         modes_of_span(&grid.problem(), polynomials.clone(), &settings, &Context::QUIET).expect("vectors");
     assert_eq!(found.completeness.proof, Proof::NotProved);
-    // Rayleigh-Ritz: no value is below the eigenvalue of its number.
+    // Rayleigh-Ritz: no value is below the eigenvalue with its number.
     for (value, exact) in found.eigenvalues.iter().zip(grid.exact()) {
         assert!(*value > exact.eigenvalue, "{value} {exact:?}");
     }

@@ -17,7 +17,7 @@ fn entries(a: &SymmetricMatrix) -> Vec<(u32, u32, f64)> {
     (0..a.n()).flat_map(row).collect()
 }
 
-/// The failure of each method for changed matrices of a grid.
+/// Returns the failure of each method for changed matrices of a grid.
 fn failures(change: impl Fn(&mut Vec<(u32, u32, f64)>, &mut Vec<(u32, u32, f64)>)) -> [EigenFailure; 2] {
     let grid = Grid::new([26, 25], 1.0, 1.0);
     let (mut k, mut m) = (entries(&grid.stiffness), entries(&grid.mass));
@@ -34,7 +34,7 @@ fn failures(change: impl Fn(&mut Vec<(u32, u32, f64)>, &mut Vec<(u32, u32, f64)>
 
 #[test]
 fn a_grid_in_two_parts_has_a_motion_without_strain_energy() {
-    // All springs between the 13th and the 14th line of nodes are cut.
+    // All springs between the 13th and the 14th line of nodes are removed.
     let cut = |i: u32, j: u32| (i / 26 == 12) != (j / 26 == 12) && (i / 26).max(j / 26) == 13;
     let found = failures(|k, _| {
         let lost: Vec<(u32, f64)> = k.iter().filter(|e| cut(e.0, e.1)).map(|e| (e.0, e.2)).collect();
@@ -99,8 +99,8 @@ fn limits_are_kept_before_any_work() {
     assert!(matches!(hasty, EigenFailure::TooLong { wanted: 6, .. }), "{hasty}");
 }
 
-/// A contrast of 10^9 in the springs is beyond a factor in single precision: forced, the failure blames the precision; left
-/// open, double precision follows.
+/// A contrast of 10^9 in the springs exceeds a factor in single precision: if single precision is forced, the
+/// failure names it; otherwise double precision follows.
 #[test]
 fn single_precision_that_fails_is_blamed_or_followed_by_double() {
     let grid = Grid::new([26, 25], 1.0, 1.0);

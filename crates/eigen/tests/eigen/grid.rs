@@ -1,4 +1,5 @@
-//! Equal masses on the nodes of a free grid, joined by equal springs along its lines: every eigenpair has a closed form.
+//! Equal masses on the nodes of a free grid connected by equal springs along its lines: every eigenpair has a
+//! closed form.
 
 use faer::{Mat, MatRef};
 use flexbody_eigen::{EigenFailure, EigenProblem, EigenSettings, EigenSolution, solve};
@@ -6,17 +7,17 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::{CscMatrix, Pencil, SymmetricMatrix};
 use std::f64::consts::PI;
 
-/// A grid of n x m nodes; m = 1 is a chain.
+/// A grid of n x m nodes; for m = 1 a chain.
 pub struct Grid {
-    /// Nodes along each direction.
+    /// Numbers of nodes along each direction.
     pub nodes: [usize; 2],
     pub stiffness: SymmetricMatrix,
     pub mass: SymmetricMatrix,
-    /// The rigid motion, of unit mass.
+    /// Rigid motion, of unit modal mass.
     pub rigid: Mat<f64>,
 }
 
-/// One closed-form mode: its eigenvalue and its numbers of half waves.
+/// A closed-form mode: eigenvalue and numbers of half waves.
 #[derive(Debug, Clone, Copy)]
 pub struct Exact {
     pub eigenvalue: f64,
@@ -24,7 +25,7 @@ pub struct Exact {
 }
 
 impl Grid {
-    /// Springs of stiffness `spring` and masses `mass` at the nodes.
+    /// Builds the grid with springs of stiffness `spring` and masses `mass` at the nodes.
     pub fn new(nodes: [usize; 2], spring: f64, mass: f64) -> Self {
         let count = nodes[0] * nodes[1];
         let number = |i: usize, j: usize| (i + nodes[0] * j) as u32;
@@ -56,14 +57,15 @@ impl Grid {
         EigenProblem {
             pencil: Pencil::new(&self.stiffness, &self.mass, 1),
             rigid: self.rigid.as_ref(),
-            // The Rayleigh quotient of a ramp along the longer side is 12 k / (m n^2) or more of it: twice that.
+            // The Rayleigh quotient of a ramp along the longer side is at least 12 k / (m n^2); twice the
+            // exact eigenvalue.
             first_estimate: 2.0 * self.exact()[0].eigenvalue,
             input_error: 0.0,
             order: None,
         }
     }
 
-    /// All flexible modes, ascending: lambda = k / m sum_d 4 sin^2(pi j_d / 2 n_d).
+    /// Returns all flexible modes, ascending: lambda = k / m sum_d 4 sin^2(pi j_d / 2 n_d).
     pub fn exact(&self) -> Vec<Exact> {
         let ratio = -self.stiffness.row(0).1.iter().copied().fold(0.0, f64::min) / self.mass.diagonal()[0];
         let part = |j: usize, n: usize| 4.0 * (PI * j as f64 / (2.0 * n as f64)).sin().powi(2);
@@ -79,7 +81,7 @@ impl Grid {
         all
     }
 
-    /// The mass-normalised shape of a mode: products of cosines.
+    /// Returns the mass-normalised shape of a mode, a product of cosines.
     pub fn shape(&self, mode: &Exact) -> Vec<f64> {
         let wave = |j: usize, n: usize, i: usize| (PI * j as f64 * (i as f64 + 0.5) / n as f64).cos();
         let at = |row: usize| {
@@ -91,7 +93,7 @@ impl Grid {
         shape.into_iter().map(|x| x / mass.sqrt()).collect()
     }
 
-    /// The shapes of some modes, as columns.
+    /// Returns the shapes of some modes as columns.
     pub fn shapes(&self, modes: &[Exact]) -> Mat<f64> {
         let columns: Vec<Vec<f64>> = modes.iter().map(|mode| self.shape(mode)).collect();
         Mat::from_fn(self.rows(), modes.len(), |i, j| columns[j][i])
@@ -101,8 +103,8 @@ impl Grid {
         solve(&self.problem(), settings, &Context::QUIET)
     }
 
-    /// Holds modes to the closed form: eigenvalues to `tolerance`, and each vector to the span of the exact modes of its
-    /// eigenvalue.
+    /// Asserts that modes agree with the closed form: eigenvalues to `tolerance`, and each vector with the
+    /// span of the exact modes of its eigenvalue.
     pub fn assert_exact(&self, found: &EigenSolution, tolerance: f64, what: &str) {
         let exact = self.exact();
         for (j, lambda) in found.eigenvalues.iter().enumerate() {
@@ -112,7 +114,8 @@ impl Grid {
         self.assert_spans(&exact, found.vectors.as_ref(), tolerance, what);
     }
 
-    /// Holds each vector to the span of the exact modes near its eigenvalue: what of it lies outside is rounding.
+    /// Asserts that the part of each vector outside the span of the exact modes near its eigenvalue is
+    /// rounding.
     fn assert_spans(&self, exact: &[Exact], vectors: MatRef<'_, f64>, tolerance: f64, what: &str) {
         let mass = self.mass.diagonal()[0];
         for j in 0..vectors.ncols() {
@@ -128,7 +131,7 @@ impl Grid {
     }
 }
 
-/// A symmetric matrix of these entries; entries of one place add up.
+/// Returns a symmetric matrix of these entries; repeated entries are added.
 pub fn matrix(n: usize, entries: &[(u32, u32, f64)]) -> SymmetricMatrix {
     SymmetricMatrix::new(CscMatrix::from_triplets(n, n, entries)).expect("symmetric")
 }

@@ -1,6 +1,6 @@
 //! The eigen-solver: modes, bounds, counts, responses and refusals, against closed forms and exact arithmetic.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod beyond_rounding;
 mod certified;

@@ -1,4 +1,4 @@
-//! Static and oscillating responses against the sum over all modes in closed form.
+//! Static and harmonic responses compared with the closed-form sum over all modes.
 
 use super::grid::{Exact, Grid};
 use faer::Mat;
@@ -8,12 +8,12 @@ use flexbody_eigen::{
 use flexbody_linalg::context::{Context, WorkCounter};
 use flexbody_linalg::uniform;
 
-/// Loads without symmetry, not in equilibrium.
+/// Returns loads without symmetry that are not in equilibrium.
 fn loads(grid: &Grid) -> Mat<f64> {
     Mat::from_fn(grid.rows(), 3, |i, j| uniform(11, i as u64, j as u64) + if i == 5 * j { 4.0 } else { 0.0 })
 }
 
-/// sum_j psi_j psi_j' f / (lambda_j - square) over the modes from number `first` on.
+/// Returns sum_j psi_j psi_j' f / (lambda_j - square) over the modes from number `first` on.
 fn modal_sum(grid: &Grid, f: &Mat<f64>, first: usize, square: f64) -> Mat<f64> {
     let modes: Vec<Exact> = grid.exact().split_off(first);
     let shapes = grid.shapes(&modes);
@@ -66,7 +66,7 @@ fn further_responses_take_no_further_factor() {
     )
     .expect("responses");
     assert_eq!(counter.total().factorizations, 1);
-    // K^+ K^+ f.
+    // The expected responses are K^+ K^+ f.
     let expected = modal_sum(&grid, &x, 0, 0.0);
     assert!((&y - &expected).norm_max() < 1e-9 * expected.norm_max());
 }
@@ -76,7 +76,7 @@ fn oscillating_responses_are_the_sum_over_all_modes() {
     let grid = Grid::new([14, 11], 3.0, 0.5);
     let (f, exact) = (loads(&grid), grid.exact());
     let none = Mat::zeros(grid.rows(), 0);
-    // Between two modes, below all and above many.
+    // Squares of frequencies between two modes, below all modes and above many.
     for square in [
         0.3 * exact[0].eigenvalue,
         0.5 * (exact[4].eigenvalue + exact[5].eigenvalue),
@@ -88,7 +88,7 @@ fn oscillating_responses_are_the_sum_over_all_modes() {
         let off = (&x - &expected).norm_max() / expected.norm_max();
         assert!(off < 1e-9, "{square}: off by {off:e}");
     }
-    // On an eigenvalue there is none.
+    // At an eigenvalue the response is undefined.
     let at_mode = dynamic_responses(&grid.problem(), none.as_ref(), f, exact[3].eigenvalue, &Context::QUIET);
     assert!(matches!(at_mode, Err(EigenFailure::Inaccurate { .. })));
 }

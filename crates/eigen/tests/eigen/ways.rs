@@ -1,4 +1,4 @@
-//! Every way to find modes gives those of the closed form, in any units and any order of rows.
+//! Every method for modes agrees with the closed form, in any units and any order of rows.
 
 use super::grid::{Grid, matrix};
 use faer::Mat;
@@ -35,8 +35,8 @@ fn every_way_finds_the_modes_of_a_grid() {
     }
 }
 
-/// A square grid has its eigenvalues in pairs. Wherever the wanted modes end, those of the pairs are complete, and the
-/// same by all ways.
+/// A square grid has pairs of equal eigenvalues. Whatever the number of requested modes, pairs are complete
+/// and equal in all methods.
 #[test]
 fn repeated_eigenvalues_are_found_together() {
     let grid = Grid::new([30, 30], 1.0, 1.0);
@@ -68,7 +68,7 @@ fn units_scale_the_eigenvalues_and_the_shapes() {
 fn the_order_of_the_rows_changes_nothing_but_their_places() {
     let grid = Grid::new([31, 17], 1.0, 1.0);
     let n = grid.rows();
-    // A fixed permutation: 100 has no factor in common with the 527 rows.
+    // A fixed permutation: 100 has no common factor with the 527 rows.
     let place = |row: usize| (100 * row + 7) % n;
     let entries = |a: &flexbody_linalg::SymmetricMatrix| -> Vec<(u32, u32, f64)> {
         let row = |i: usize| {
@@ -93,7 +93,7 @@ fn the_order_of_the_rows_changes_nothing_but_their_places() {
     }
     let moved = Mat::from_fn(n, 10, |i, j| other.vectors[(place(i), j)]);
     for j in 0..10 {
-        // Which of several equal entries counts for the sign depends on the order.
+        // The entry that determines the sign among equal ones depends on the order.
         let along: f64 = (0..n).map(|i| one.vectors[(i, j)] * moved[(i, j)]).sum();
         assert!((along.abs() - 1.0).abs() < 1e-9, "mode {j}: {along}");
     }
@@ -109,7 +109,7 @@ fn accuracy_decides_what_is_promised() {
     let certified = grid.solve(&with(Accuracy::Certified)).expect("modes");
     let bounds = certified.bounds.as_ref().expect("certified");
     for (j, exact) in grid.exact().iter().take(8).enumerate() {
-        // The closed form has rounding of its own.
+        // The closed form has rounding too.
         let room = 4.0 * f64::EPSILON * exact.eigenvalue;
         assert!(
             bounds.lower[j] - room <= exact.eigenvalue && exact.eigenvalue <= bounds.upper[j] + room,

@@ -1,5 +1,4 @@
-//! Finite element bodies: exact counts around every bound, and the way from the model through the file to
-//! `check`.
+//! Finite element bodies: exact counts around every bound, from the model through the file to `check`.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::ModeSettings;
@@ -29,7 +28,7 @@ fn model(kind: ElementKind, cells: [i32; 3], rule: MassRule) -> FeModel {
     check(mesh.assemble(&Material::STEEL, rule).raw_model()).expect("a sound body").model
 }
 
-/// A (kron I_block) as rows.
+/// Returns A (kron I_block) as rows.
 fn dense(a: &SymmetricMatrix, block: usize) -> Vec<Vec<f64>> {
     let n = a.n() * block;
     let entry =
@@ -59,7 +58,7 @@ fn eigenvalues_of_a_cuboid_of_tetrahedra_lie_between_their_bounds() {
 fn certified_bodies_keep_their_guarantees_through_file_and_check() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("body.flex.h5");
-    // Singular masses and turned frames too.
+    // Includes singular masses and rotated frames.
     for (kind, rule, frame) in [
         (ElementKind::Hex8, MassRule::Consistent, BodyFrame::Principal),
         (ElementKind::Tet10, MassRule::Reduced, BodyFrame::Model),
@@ -118,7 +117,7 @@ fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
 
 #[test]
 fn guarantees_do_not_depend_on_the_number_of_threads() {
-    // More rows than one task takes.
+    // The model has more rows than one task takes.
     let model = model(ElementKind::Hex8, [10, 6, 4], MassRule::Consistent);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -136,7 +135,7 @@ fn other_levels_store_no_guarantees() {
     assert_eq!(conversion.body.certificate().guarantee, None);
 }
 
-/// A model whose mass is the same along all axes, changed by `change` of its entries (row, column, value).
+/// Returns a model whose mass is equal along all axes, with entries (row, column, value) changed by `change`.
 fn with_mass(change: impl Fn(u32, u32, f64) -> f64) -> RawModel {
     let mesh = Mesh::block(ElementKind::Hex8, [2, 2, 1], [0.4, 0.15, 0.1]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
@@ -146,10 +145,10 @@ fn with_mass(change: impl Fn(u32, u32, f64) -> f64) -> RawModel {
     raw
 }
 
-/// Three equal entries are their own mean: their sum is rounded, and a third of it may be another number.
+/// Three equal entries are their own mean, but a third of their rounded sum may be another number.
 #[test]
 fn a_mass_that_is_the_same_along_all_axes_is_bounded_as_stored() {
-    // A quarter of all mantissas above 4/3 are not a third of three times themselves.
+    // A third of three times a number differs from it for a quarter of all mantissas above 4/3.
     let is_rounded = |v: f64| (v + v + v) / 3.0 != v;
     let scaled = |k: u32| with_mass(move |_, _, v| v * (1.0 + 0.07 * f64::from(k)));
     let some_are = |raw: &RawModel| entries(&raw.mass.matrix).any(|(_, _, v)| is_rounded(v));
@@ -163,7 +162,7 @@ fn a_mass_that_is_the_same_along_all_axes_is_bounded_as_stored() {
     }
 }
 
-/// Bounds about the mean of the directions would be bounds of another model.
+/// Bounds for the mean of the directions would belong to another model.
 #[test]
 fn a_mass_that_differs_along_an_axis_by_rounding_is_not_certified() {
     let certified = settings(Accuracy::Certified, 6, BodyFrame::Principal);

@@ -1,5 +1,5 @@
-//! Models with rotations of nodes, rows without a place and masses that do not commute with rotations, from
-//! reading to the file.
+//! Models with rotations of nodes, internal rows and masses that do not commute with rotations, from reading
+//! to the file.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Error;
@@ -31,7 +31,7 @@ fn refused(raw: RawModel) -> Error {
     FeModel::from_raw(raw).expect_err("not a body as labelled")
 }
 
-/// Two frames of beams, 6 DOF per node, whose references come from scipy.
+/// Two frames of beams with six degrees of freedom per node; the references were computed by scipy.
 #[test]
 fn frames_of_beams_agree_with_their_references() {
     let root = oracle::shared();
@@ -51,7 +51,7 @@ fn frames_of_beams_agree_with_their_references() {
         };
         let lambda = numbers(&reference["modes"]["lambda_"]);
         let rigid = &reference["consistent"];
-        // The reference is dense: the eigenvalues that should be zero show its own noise.
+        // The reference is dense: eigenvalues that should be zero show its rounding.
         let noise = numbers(&reference["modes"]["rigid_lambda"]).iter().fold(0.0, |m: f64, l| m.max(l.abs()));
         assert!(noise < 1e-8 * lambda[0], "{name}");
         for method in [Method::Dense, Method::Lanczos] {
@@ -76,7 +76,8 @@ fn frames_of_beams_agree_with_their_references() {
     }
 }
 
-/// A larger frame of the project, with masses on its nodes; its reference is scipy's in extended precision.
+/// A larger frame of the project with masses on its nodes; its reference was computed by scipy in extended
+/// precision.
 #[test]
 fn the_car_frame_agrees_with_its_reference() {
     let path = oracle::fixtures().join("models/car_frame/expected.json");
@@ -111,7 +112,7 @@ fn dense_and_iterative_searches_give_the_same_body() {
     }
 }
 
-/// Rows in another order, node numbers in another order: the same body.
+/// The order of rows and of node numbers does not change the body.
 #[test]
 fn the_order_of_rows_and_nodes_does_not_matter() {
     for name in FIXTURES {
@@ -162,8 +163,8 @@ fn bodies_come_back_from_their_files_to_the_last_bit() {
     }
 }
 
-/// The body about another origin and in other axes is what its invariants say of it there, in the plane as
-/// well.
+/// Invariants about another origin and in other axes agree with those of a conversion there, also in the
+/// plane.
 #[test]
 fn invariants_follow_the_frame() {
     for name in FIXTURES {
@@ -173,11 +174,11 @@ fn invariants_follow_the_frame() {
             convert(&model, &settings, &Context::QUIET).expect("converts").body
         });
         let frame = own.frame();
-        // x_model = r0 + A x: turned back, then to an origin at -r0.
+        // x_model = r0 + A x: rotates back, then shifts the origin to -r0.
         let moved = own.invariants().rotated(&frame.axes.transpose()).shifted(-frame.origin);
         let signs = faer::Mat::from_fn(6, 6, |i, j| {
             let (a, b) = (own.modes(), other.modes());
-            // Turned shapes of one mode: the sign of their product.
+            // The sign of a mode is that of the product of both rotated shapes.
             let turned = |row: usize| -> f64 {
                 (0..3).map(|l| frame.axes[(row % 3, l)] * a.shape[(row / 3 * 3 + l, j)]).sum()
             };
@@ -226,14 +227,14 @@ fn rotations_labelled_as_displacements_are_recognised() {
     assert!(error.to_string().contains("rows are those of x for all nodes"), "{error}");
 }
 
-/// Place of each row of a solid when all rows of x come first.
+/// Returns the position of each row of a solid when all rows of x come first.
 fn component_blocked(raw: &RawModel, n: u32) -> Vec<u32> {
     let place = |id: i64| raw.nodes.ids.iter().position(|&i| i == id).expect("a node") as u32;
     let labels = raw.dofs.as_ref().expect("labels");
     labels.iter().map(|label| (u32::from(label.direction) - 1) * n + place(label.node)).collect()
 }
 
-/// A frame and a block with a reference node in one pair of matrices, their numbers apart.
+/// A frame and a block with a reference node in one pair of matrices, with disjoint node numbers.
 #[test]
 fn bodies_with_rotations_and_inner_rows_are_taken_apart() {
     let parts = [raw("frame_beams"), raw("hex8_bubbles"), raw("spring_ends")];
@@ -286,7 +287,8 @@ fn certified_says_what_it_does_not_cover() {
     assert!(digits.iter().all(|d| *d > 13.0), "{digits:?}");
 }
 
-/// f'K^+ f of the load of a constant spin, from the invariants alone: sum_j (w' W1_j w / 2)^2 / lambda_j.
+/// Returns f'K^+ f of the load of a constant spin from the invariants alone: sum_j (w' W1_j w / 2)^2 /
+/// lambda_j.
 fn spin_compliance(body: &FlexBody, spin: Vector3<f64>) -> f64 {
     let (w1, nf) = (body.invariants().w1().expect("held"), body.n_modes());
     let load = |j: usize| {
@@ -296,8 +298,7 @@ fn spin_compliance(body: &FlexBody, spin: Vector3<f64>) -> f64 {
     body.modes().eigenvalue.iter().enumerate().map(|(j, lambda)| load(j).powi(2) / lambda).sum()
 }
 
-/// The centrifugal residual vectors of bodies with rotations: with them a few modes respond to spin as all
-/// modes do.
+/// With centrifugal residual vectors a few modes respond to spin like all modes, for bodies with rotations.
 #[test]
 fn centrifugal_vectors_carry_the_response_that_all_modes_have() {
     for name in ["frame_beams", "shell_folded", "mpc_block", "hex8_edges", "plane_frame"] {
@@ -319,10 +320,11 @@ fn centrifugal_vectors_carry_the_response_that_all_modes_have() {
     }
 }
 
-/// Straight beams: modes without any displacement of the nodes (torsion), or along one axis alone (stretch).
+/// Straight beams have modes without any displacement of the nodes (torsion), or along one axis only
+/// (extension).
 #[test]
 fn straight_beams_fulfil_every_identity() {
-    // Along the axes and across them: what is zero is left with rounding of either sign.
+    // Along and across the axes zeros have rounding of either sign.
     let directions = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 2.0, 3.0], [-2.0, 0.3, 0.7], [0.1, -0.9, 0.4]];
     for (parts, direction) in [1, 2, 10].into_iter().flat_map(|parts| directions.map(|d| (parts, d))) {
         let direction = Vector3::from(direction).normalize();
@@ -334,8 +336,8 @@ fn straight_beams_fulfil_every_identity() {
     }
 }
 
-/// A bar that stretches, twists and bends: unit lumped inertia at its nodes, springs between the neighbours'
-/// relative motions.
+/// Returns a bar with extension, torsion and bending: unit lumped inertia at its nodes, springs between
+/// relative motions of neighbours.
 fn straight_beam(parts: usize, direction: Vector3<f64>) -> RawModel {
     let n = parts + 1;
     let place = |i: usize| direction * (i as f64 / parts as f64);
@@ -347,7 +349,7 @@ fn straight_beam(parts: usize, direction: Vector3<f64>) -> RawModel {
         }
     }
     for i in 0..parts {
-        // Relative displacement at the middle of the part, and relative rotation.
+        // Relative displacement at the middle of the segment, and relative rotation.
         let half = 0.5 * (place(i + 1) - place(i));
         let mut rows = vec![[0.0; 12]; 6];
         for a in 0..3 {

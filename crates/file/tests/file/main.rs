@@ -1,6 +1,6 @@
 //! The flex-body file: round trips, refusals, digest, schema.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod certified_bodies;
 mod general_models;

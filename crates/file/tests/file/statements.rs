@@ -1,5 +1,5 @@
-//! `check` holds what a file states to the numbers of the file, and interfaces to those of the model: every change
-//! of a statement that contradicts them is named, whatever the digests of the file say.
+//! `check` compares the statements of a file with its numbers, and interfaces with those of the model: every
+//! contradicting statement is named, whatever the digests of the file.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::{BasisChoice, CraigBampton};
@@ -21,14 +21,14 @@ fn converted(model: &FeModel, basis: BasisChoice, modes: usize) -> FlexBody {
     convert(model, &settings, &Context::QUIET).expect("converts").body
 }
 
-/// A link whose interfaces are `coupling`.
+/// Returns a link with interfaces of this `coupling`.
 fn link(coupling: Coupling) -> FeModel {
     let mut raw = raw_fixture("robot_link");
     raw.interfaces.iter_mut().for_each(|set| set.coupling = Some(coupling));
     model_of(raw)
 }
 
-/// The body after `change`, written to a file and read again: its digests are its own.
+/// Returns the body after `change`, written to a file and read again, so that its digests are valid.
 fn changed(body: &FlexBody, change: &dyn Fn(&mut Parts)) -> FlexBody {
     let mut parts = body.clone().into_parts();
     change(&mut parts);
@@ -77,7 +77,7 @@ fn the_proof_and_the_lumped_errors_of_free_modes_are_held_to_their_numbers() {
             ("lumped_errors", &|p| p.lumped[0].comparison[5].1 += 1e-3),
         ],
     );
-    // The lowest modes of a proved body stay proved.
+    // The lowest modes of a proved body remain proved.
     for count in [5, proved.min(body.n_modes())] {
         let modes: Vec<usize> = (0..count).collect();
         let some = body.reduced(&modes, body.groups(), Vec::new()).expect("fewer modes");
@@ -122,7 +122,7 @@ fn an_interface_that_is_called_rigid_and_is_not_is_named() {
         &some,
         &[("rigid_interfaces", &|p| p.interfaces[1].coupling = Some(Coupling::Rigid))],
     );
-    // Free modes know nothing of couplings: a warning says what the user has to know.
+    // Free modes do not depend on couplings; a warning states the deviation.
     let free = converted(&link(Coupling::Averaging), BasisChoice::default(), 6);
     let claimed = changed(&free, &|p| p.interfaces[0].coupling = Some(Coupling::Rigid));
     assert_eq!(failing(&claimed), Vec::<&str>::new());

@@ -1,5 +1,5 @@
-//! A flex-body file that was changed since it was written is refused, with the name of what was changed; how
-//! HDF5 lays it out does not matter.
+//! A flex-body file that was changed after it was written is refused with the names of the changed entries;
+//! the HDF5 layout does not matter.
 
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -14,7 +14,7 @@ struct Case {
     path: PathBuf,
 }
 
-/// 4 nodes, 3 modes with damping, one lumping scheme, one interface.
+/// Returns a body with 4 nodes, 3 modes with damping, one lumping scheme, one interface.
 fn sample() -> FlexBody {
     let mut parts = body(5, 4, 3, 1, 1).into_parts();
     parts.modes.modal_damping = Some(Mat::identity(3, 3));
@@ -28,7 +28,7 @@ fn valid() -> Case {
     Case { _folder: folder, path }
 }
 
-/// The file after `change`.
+/// Returns the file after `change`.
 fn changed(change: impl FnOnce(&hdf5::File)) -> Case {
     let case = valid();
     let file = hdf5::File::open_rw(&case.path).unwrap();
@@ -37,7 +37,7 @@ fn changed(change: impl FnOnce(&hdf5::File)) -> Case {
     case
 }
 
-/// What the refusal of the changed content says.
+/// Returns the error for the changed contents.
 fn refusal(change: impl FnOnce(&hdf5::File)) -> String {
     let error = flexbody_file::read(changed(change).path).expect_err("the file was changed");
     assert_eq!(error.diagnostics().len(), 1, "{error}");
@@ -99,7 +99,7 @@ fn attributes_additions_and_removals_are_named() {
         f.group("/certificate").unwrap().attr("shift").unwrap().write_scalar(&1.0).unwrap();
     });
     assert!(said.ends_with("changed: /certificate; added: /extra"), "{said}");
-    // An optional entry.
+    // An optional entry is removed.
     let said = refusal(|f| f.unlink("/invariants/modal_damping").unwrap());
     assert!(said.ends_with("removed: /invariants/modal_damping"), "{said}");
     let said = refusal(|f| f.link_soft("/modes/shape", "/shape").unwrap());
@@ -118,7 +118,7 @@ fn the_digests_themselves_are_held_to_each_other() {
     assert!(said.contains("were removed"), "{said}");
 }
 
-/// The lines of the documentation, followed by hand.
+/// Computes the digests by following the documentation.
 #[test]
 fn digests_are_those_of_the_documentation() {
     let case = valid();
@@ -146,7 +146,7 @@ fn a_file_that_was_changed_and_sealed_is_read() {
     assert_eq!(read.modes().damping_ratio[1], 0.5 * sample().modes().damping_ratio[1]);
 }
 
-/// Another layout of the same content: chunks, compression, order, fixed texts.
+/// Another layout of the same contents: chunks, compression, order, fixed texts.
 #[test]
 fn the_layout_of_the_file_does_not_matter() {
     let case = changed(|f| {
@@ -163,7 +163,7 @@ fn the_layout_of_the_file_does_not_matter() {
             let fixed: FixedUnicode<400> = text.as_str().parse().unwrap();
             new.new_attr::<FixedUnicode<400>>().create(name).unwrap().write_scalar(&fixed).unwrap();
         }
-        // An integer attribute made anew stands behind the others.
+        // A recreated integer attribute comes after the others.
         let value: i64 = f.attr("dimension").unwrap().read_scalar().unwrap();
         f.delete_attr("dimension").unwrap();
         f.new_attr::<i64>().create("dimension").unwrap().write_scalar(&value).unwrap();

@@ -1,4 +1,4 @@
-//! Output files appear whole or not at all, and an unusable place is known before the work.
+//! Output files appear as a whole or not at all, and an unusable path is reported before the work.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::ExitCode;
@@ -136,7 +136,7 @@ mod unix {
         for slot in &slots {
             slot.fill(b"new").unwrap();
         }
-        // What no rename can replace stands in the way of the last.
+        // A folder, which no rename can replace, is in the place of the last file.
         std::fs::create_dir(at("c")).unwrap();
         assert!(OutputSlot::commit_all(slots).is_err());
         assert_eq!(members(folder.path()), ["a", "c"]);
@@ -189,7 +189,7 @@ mod unix {
 
 #[test]
 fn a_lock_that_another_process_holds_does_not_keep_a_body_from_being_read() {
-    // A program started while a file is open inherits the lock, and holds it until it ends.
+    // A child program inherits the lock of an open file, and holds it until it ends.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("body.flex.h5");
     let written = body(3, 4, 2, 1, 1);

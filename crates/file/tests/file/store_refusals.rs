@@ -1,4 +1,4 @@
-//! Files that are not flexible bodies, or broken ones, are refused with everything that is wrong in them.
+//! Damaged files, and files that are no flexible bodies, are refused with all of their defects.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Error;
@@ -13,7 +13,7 @@ struct Case {
     path: PathBuf,
 }
 
-/// A valid file: 4 nodes, 3 modes, one lumping scheme, one interface.
+/// Returns a valid file: 4 nodes, 3 modes, one lumping scheme, one interface.
 fn valid() -> Case {
     stored(&body(5, 4, 3, 1, 1))
 }
@@ -32,7 +32,7 @@ fn refusal(path: &Path) -> Error {
     error
 }
 
-/// Damages a valid file and returns the refusal.
+/// Damages a valid file and returns the error.
 fn damaged(damage: impl FnOnce(&hdf5::File)) -> Error {
     refused(valid(), damage)
 }
@@ -161,7 +161,7 @@ fn a_newer_minor_with_unknown_entries_is_read() {
     assert_eq!(flexbody_file::read(&case.path).unwrap(), before);
 }
 
-/// 4 nodes with a surface of two triangles and an edge, or without.
+/// Returns a file with 4 nodes, with or without a surface of two triangles and an edge.
 fn drawn(mesh: bool) -> Case {
     let mut parts = body(5, 4, 3, 1, 1).into_parts();
     let surface = || SurfaceMesh::new(vec![[0, 1, 2], [1, 3, 2]], vec![[0, 3]], 4).unwrap();
@@ -170,7 +170,7 @@ fn drawn(mesh: bool) -> Case {
     stored(&FlexBody::new(parts).unwrap())
 }
 
-/// A file states the least version that has what it holds.
+/// A file states the lowest version that supports its contents.
 #[test]
 fn files_without_a_surface_are_those_of_the_version_before() {
     for (mesh, minor) in [(false, 4), (true, 5)] {
@@ -390,7 +390,7 @@ fn derived_entries_must_follow_from_the_primary_ones() {
 
 #[test]
 fn entries_of_interfaces_are_checked() {
-    // Odd sizes: with reference points and interface coordinates.
+    // Covers the sizes of reference points and interface coordinates.
     let odd = || stored(&body(5, 3, 3, 0, 1));
     let link = |f: &hdf5::File| f.group("interfaces").unwrap().member_names().unwrap().remove(0);
     let error = refused(odd(), |f| {
@@ -476,7 +476,7 @@ fn a_file_cannot_lead_out_of_itself() {
 
 #[test]
 fn huge_declared_arrays_are_refused_before_any_memory_is_taken() {
-    // 2^40 modes of nothing: consistent with each other, but never stored.
+    // 2^40 empty modes: consistent with each other, but never stored.
     const HUGE: usize = 1 << 40;
     let error = damaged(|f| {
         for name in ["eigenvalue", "residual"] {
@@ -516,7 +516,7 @@ fn many_links_to_the_same_data_do_not_multiply_it() {
     assert!(error.diagnostics().len() <= 201, "{}", error.diagnostics().len());
 }
 
-/// HDF5 2.2 hangs on this: object 0 of a global heap with the size 0.
+/// HDF5 2.2 hangs on object 0 of a global heap with the size 0.
 #[test]
 fn a_text_heap_that_never_ends_is_refused() {
     let case = valid();
@@ -526,7 +526,7 @@ fn a_text_heap_that_never_ends_is_refused() {
     bytes[heap + 24..heap + 32].fill(0);
     std::fs::write(&case.path, &bytes).unwrap();
     assert_says(&refusal(&case.path), Code::BodyUnreadable, &["the text heap at byte"]);
-    // An object that claims 2^64 - 8 bytes would be read far beyond the heap.
+    // An object with a stated size of 2^64 - 8 bytes would be read far beyond the heap.
     bytes[heap + 16] = 1;
     bytes[heap + 24..heap + 32].copy_from_slice(&(u64::MAX - 7).to_le_bytes());
     std::fs::write(&case.path, &bytes).unwrap();
@@ -563,7 +563,8 @@ fn damaged_bytes_never_panic_and_never_change_sizes() {
         }
         std::fs::write(&case.path, &damaged).unwrap();
         match flexbody_file::read(&case.path) {
-            // HDF5 keeps no checksum of plain numbers, the digests do: unused bytes may differ.
+            // HDF5 has no checksum of plain numbers, but the digests cover them: only unused bytes may
+            // differ.
             Ok(read) => assert_eq!(fingerprint(&read), fingerprint(&whole)),
             Err(_) => refused += 1,
         }

@@ -1,4 +1,4 @@
-//! The file holds a body exactly: bits, order, names; and equal bodies are equal bytes.
+//! The file stores a body exactly: bits, order, names; equal bodies give equal bytes.
 
 use oracle::file_bodies::{body, fingerprint, wild_body};
 use proptest::prelude::*;

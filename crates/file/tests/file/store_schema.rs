@@ -1,4 +1,4 @@
-//! The JSON schema describes the structure of every file that is written, and refuses others.
+//! The JSON schema describes the structure of every written file, and rejects others.
 
 use oracle::file_bodies::{body, wild_body};
 use serde_json::Value;
@@ -31,7 +31,7 @@ fn written_files_follow_the_schema() {
 #[test]
 fn every_required_entry_is_missed_when_it_is_not_there() {
     let validator = validator();
-    let whole = structure_of(&body(1, 3, 3, 1, 1)); // certified: every optional entry is there
+    let whole = structure_of(&body(1, 3, 3, 1, 1)); // certified bodies have every optional entry
     let mut removed = 0;
     for pointer in pointers(&whole) {
         let mut broken = whole.clone();
@@ -61,7 +61,8 @@ fn every_required_entry_is_missed_when_it_is_not_there() {
                 .any(|s| parent == format!("/groups/interface_coordinates/{s}"))
             || key.starts_with("digits_")
             || ["mesh", "triangles", "edges"].contains(&key.as_str())
-            // All attributes of the frame are optional, but the section of a group with attributes is always there.
+            // All attributes of the frame are optional, but the section of a group with attributes is always
+            // present.
             || pointer != "/groups/frame/attributes" && whole.pointer(&pointer) == Some(&serde_json::json!({}));
         assert_eq!(validator.is_valid(&broken), optional, "{pointer}");
         removed += 1;
@@ -105,7 +106,7 @@ fn groups_that_contain_themselves_end() {
     assert!(error.to_string().contains("more than 20000 members"), "{error}");
 }
 
-/// JSON pointers of all members of all objects.
+/// Returns JSON pointers of all members of all objects.
 fn pointers(value: &Value) -> Vec<String> {
     let Value::Object(map) = value else { return Vec::new() };
     let mut out = Vec::new();

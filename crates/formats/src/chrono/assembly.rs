@@ -1,20 +1,22 @@
-//! The coordinates of an assembly of Chrono in which its automatic gravity is that of the body.
+//! Coordinates of a Chrono assembly in which the automatic gravity of Chrono acts correctly on the body.
 //!
-//! `ChModalAssembly` multiplies M with the acceleration of gravity on the translations of all nodes, internal ones
-//! too, and keeps the rows of translations alone. Amplitudes of modes in the place of internal translations get a
-//! weight that they do not have, and torques of gravity at the boundary nodes are lost. Both are right if gravity
-//! on all translations is a rigid translation of the body, and if M times it has no rows of rotations.
+//! `ChModalAssembly` multiplies M with the acceleration of gravity on the translations of all nodes,
+//! including internal nodes, and keeps the rows of translations only. Modal amplitudes in the place of
+//! internal translations would get a weight that they do not have, and torques of gravity at the boundary
+//! nodes would be lost. Both are correct if gravity on all translations is a rigid translation of the body,
+//! and if M times it has no rows of rotations.
 //!
 //! The translation of the first internal node is therefore the displacement of the centre of mass,
-//! `N^-1 R' M q`, with R the rigid translations in the coordinates q and N = R' M R. All of the weight then acts
-//! there, and the reduction of Chrono hands it on to boundary nodes and modes with its torques. Translations of
-//! further internal nodes are amplitudes of modes on top of that displacement, rotations are amplitudes alone.
+//! `N^-1 R' M q`, with the rigid translations R in the coordinates q and N = R' M R. All of the weight then
+//! acts there, and the reduction of Chrono transfers it to boundary nodes and modes with its torques.
+//! Translations of further internal nodes are modal amplitudes on top of that displacement; rotations are
+//! amplitudes alone.
 //!
-//! The modes need not move the centre of mass in all directions. Three further coordinates, displacements of the mass
-//! that moves in no mode (the *rest*), complete the basis, and modes that are coupled to nothing fill the last node:
-//! the eigensolvers of Chrono want fewer modes than coordinates, and a mass matrix that is positive definite.
-//! Frequencies of both lie above those of all modes: a reduction to as many modes as the body has leaves them out and
-//! is the body again.
+//! The modes need not move the centre of mass in all directions. Three further coordinates, displacements of
+//! the mass that moves in no mode (the *rest*), complete the basis. Uncoupled modes fill the last node: the
+//! eigensolvers of Chrono require fewer modes than coordinates and a positive definite mass matrix.
+//! Frequencies of both lie above those of all modes. A reduction to the number of modes of the body thus
+//! removes them and reproduces the body.
 
 use crate::export::interface_matrices::InterfaceMatrices;
 use faer::Mat;
@@ -23,39 +25,43 @@ use flexbody_base::error::Result;
 use flexbody_linalg::combine;
 use nalgebra::Matrix3;
 
-/// Frequency of the rest mass over the highest of the fixed-interface modes. Higher values cost digits of the
-/// stiffness: 4 leaves 3e-11 of a deflection, 10 leaves 4e-10 (cantilever of two interfaces and six modes).
+/// Frequency of the rest mass relative to the highest fixed-interface mode. Higher values cost digits of the
+/// stiffness: 4 has an error of 3e-11 of a deflection, 10 of 4e-10 (cantilever with two interfaces and six
+/// modes).
 const REST_FREQUENCY: f64 = 4.0;
 
-/// Frequency of the modes that fill the last node over that of the rest mass.
+/// Frequency of the modes that fill the last node, relative to that of the rest mass. With [`REST_FREQUENCY`]
+/// it keeps these modes above all modes of the body, so that a reduction removes them.
 const FILL_FREQUENCY: f64 = 2.0;
 
-/// Share of the mass that is added to the rest mass, so that the basis is complete where the modes have all mass.
+/// Share of the mass that is added to the rest mass, so that the basis is complete even if the modes move all
+/// of the mass.
 const REST_SHARE: f64 = 0.01;
 
 /// Matrices of boundary nodes and internal nodes, six coordinates each.
 pub(super) struct Assembly {
-    /// M.
+    /// Mass matrix M.
     pub(super) mass: Mat<f64>,
-    /// K.
+    /// Stiffness matrix K.
     pub(super) stiffness: Mat<f64>,
-    /// R, of a body with damping.
+    /// Damping matrix R; `None` for a body without damping.
     pub(super) damping: Option<Mat<f64>>,
     /// Number of fixed-interface modes.
     pub(super) n_modes: usize,
 }
 
 impl Assembly {
-    /// Number of modes that Chrono must be asked for. Its eigensolvers find one at least: of a body without
-    /// fixed-interface modes those of the rest mass are requested.
+    /// Returns the number of modes to request from Chrono. Its eigensolvers need at least one: for a body
+    /// without fixed-interface modes the three of the rest mass are requested.
     pub(super) fn modes_to_request(n_modes: usize) -> usize {
         if n_modes == 0 { 3 } else { n_modes }
     }
 
-    /// Changes the coordinates of `given`.
+    /// Transforms `given` to the coordinates of the assembly.
     ///
     /// # Errors
-    /// [`ExportLoses`](Code::ExportLoses) if the mass matrix is none of a body, or numbers leave double precision.
+    /// [`ExportLoses`](Code::ExportLoses) if the mass matrix is not that of a body, or numbers leave double
+    /// precision.
     pub(super) fn of(given: &InterfaceMatrices<'_>) -> Result<Self> {
         let refuse = |what: &str| {
             let message = format!("chrono needs the centre of mass of the body: {what}");
@@ -81,7 +87,7 @@ impl Assembly {
     }
 }
 
-/// The matrices of a body with the rest mass: coordinates of the interfaces, amplitudes of the fixed-interface modes,
+/// Matrices of a body with the rest mass. Coordinates: interfaces, amplitudes of the fixed-interface modes,
 /// amplitudes that fill the last node, three displacements of the rest mass.
 struct Extended {
     /// Number of coordinates of the interfaces.
@@ -92,11 +98,11 @@ struct Extended {
     n_fill: usize,
     mass: Mat<f64>,
     stiffness: Mat<f64>,
-    /// Momentum of rigid translations R' M, without the rest mass (3 x coordinates of the body).
+    /// Momentum of rigid translations R' M without the rest mass (3 x coordinates of the body).
     momentum: Mat<f64>,
-    /// N = R' M R.
+    /// Total mass N = R' M R.
     total: Matrix3<f64>,
-    /// Momentum of rigid translations in the displacements of the rest mass.
+    /// Momentum of rigid translations per displacement of the rest mass.
     rest: Matrix3<f64>,
 }
 
@@ -109,7 +115,7 @@ impl Extended {
         let total = Matrix3::from_fn(|a, b| (b..n_boundary).step_by(6).map(|j| momentum[(a, j)]).sum());
         let modal = momentum.subcols(n_boundary, n_modes);
         let of_modes = combine(modal, modal.transpose());
-        // Momentum that moves in no mode, R'(M_BB - M_Bf M_fB) R, and a share of all.
+        // Mass that moves in no mode, R'(M_BB - M_Bf M_fB) R, plus a share of the total mass.
         let rest = (1.0 + REST_SHARE) * total - Matrix3::from_fn(|a, b| of_modes[(a, b)]);
         let mut extended = Self {
             n_boundary,
@@ -131,11 +137,11 @@ impl Extended {
         let (mut mass, mut stiffness) = (self.padded(given.mass), self.padded(given.stiffness));
         let (filled, first) = (nb + nf, self.size() - 3);
         let square = self.rest_frequency_squared(given);
-        // Modes that fill the last node move alone.
+        // Modes that fill the last node are uncoupled.
         for i in filled..first {
             (mass[(i, i)], stiffness[(i, i)]) = (1.0, FILL_FREQUENCY.powi(2) * square);
         }
-        // The rest mass moves with the interfaces, R'(M_BB - M_Bf M_fB), and in no mode.
+        // The rest mass couples to the interfaces by R'(M_BB - M_Bf M_fB), and to no mode.
         let modal = self.momentum.as_ref().subcols(nb, nf);
         let of_modes = combine(modal, given.mass.as_ref().submatrix(nb, 0, nf, nb));
         for a in 0..3 {
@@ -144,7 +150,7 @@ impl Extended {
                 (mass[(first + a, j)], mass[(j, first + a)]) = (coupling, coupling);
             }
             for b in 0..3 {
-                // Twice what its momentum is: M stays positive.
+                // Twice the momentum of the rest mass keeps M positive definite.
                 mass[(first + a, first + b)] = 2.0 * self.rest[(a, b)];
                 stiffness[(first + a, first + b)] = 2.0 * square * self.rest[(a, b)];
             }
@@ -152,34 +158,35 @@ impl Extended {
         (mass, stiffness)
     }
 
-    /// Number of coordinates.
+    /// Returns the number of coordinates.
     fn size(&self) -> usize {
         self.n_boundary + self.n_modes + self.n_fill + 3
     }
 
-    /// Returns a matrix of the body with zeros for all other coordinates.
+    /// Returns a matrix of the body, padded with zeros for all other coordinates.
     fn padded(&self, a: &Mat<f64>) -> Mat<f64> {
         let inner = self.n_boundary + self.n_modes;
         let of_body = |i: usize, j: usize| if i < inner && j < inner { a[(i, j)] } else { 0.0 };
         Mat::from_fn(self.size(), self.size(), of_body)
     }
 
-    /// Eigenvalue of the rest mass: above those of all fixed-interface modes; without any, above what the interfaces
-    /// vibrate with when all others are held.
+    /// Returns the eigenvalue of the rest mass: above those of all fixed-interface modes or, without modes,
+    /// above the ratios K_ii / M_ii of the interface coordinates.
     fn rest_frequency_squared(&self, given: &InterfaceMatrices<'_>) -> f64 {
         let all = if self.n_modes == 0 { 0..self.n_boundary } else { self.n_boundary..given.mass.nrows() };
         let highest = all.map(|i| given.stiffness[(i, i)] / given.mass[(i, i)]);
         REST_FREQUENCY.powi(2) * highest.filter(|v| v.is_finite()).fold(0.0, f64::max)
     }
 
-    /// Returns all coordinates for those of the nodes (square), or `None` if the mass is not positive.
+    /// Returns the square matrix from the coordinates of the nodes to all coordinates; `None` if the mass is
+    /// not positive.
     fn change(&self) -> Option<Mat<f64>> {
         let (nb, nf) = (self.n_boundary, self.n_modes + self.n_fill);
         self.total.cholesky()?;
         let inverse = self.rest.cholesky()?.inverse();
         let mut change = Mat::zeros(self.size(), self.size());
         (0..nb).for_each(|i| change[(i, i)] = 1.0);
-        // The nodes have amplitudes divided by sqrt(m): lengths, as the first three columns.
+        // Nodes have amplitudes divided by sqrt(m), which are lengths like the first three columns.
         let scale = (self.total.trace() / 3.0).sqrt();
         for k in 0..nf {
             let (row, column) = (nb + k, nb + 3 + k);
@@ -188,7 +195,7 @@ impl Extended {
                 change[(row, nb + k % 3)] = -scale;
             }
         }
-        // N u = R' M q + rest z for the displacement u of the first internal node gives z.
+        // N u = R' M q + rest z gives z for the displacement u of the first internal node.
         let of_body = combine(self.momentum.as_ref(), change.as_ref().subrows(0, nb + self.n_modes));
         let moment = |a: usize, j: usize| {
             let own = if (nb..nb + 3).contains(&j) { self.total[(a, j - nb)] } else { 0.0 };

@@ -1,4 +1,4 @@
-//! The format `chrono`: a table of the nodes and matrices as Matrix Market files.
+//! Format `chrono`: a table of the nodes, and matrices as Matrix Market files.
 
 use super::assembly::Assembly;
 use crate::export::Holding::{Lost, NotApplicable};
@@ -9,7 +9,7 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use std::fmt::Write;
 
-/// The format.
+/// Export format of Project Chrono.
 pub(crate) struct Chrono;
 
 impl ExportFormat for Chrono {
@@ -79,8 +79,8 @@ fn table(given: &InterfaceMatrices<'_>, assembly: &Assembly, [x, y, z]: [f64; 3]
     table.into_bytes()
 }
 
-/// Returns a symmetric matrix in all its entries, since readers of the general kind are the most common; zeros are
-/// left out.
+/// Returns a symmetric matrix with all its nonzero entries in the general form of Matrix Market, which more
+/// readers support than the symmetric form.
 fn matrix_market(a: &Mat<f64>) -> Vec<u8> {
     let size = a.nrows();
     let places = (0..size).flat_map(|j| (0..size).map(move |i| (i, j)));

@@ -1,4 +1,4 @@
-//! The numbers of a body, array by array.
+//! Numbers of a body, array by array.
 
 use super::layout::{ALIGNMENT, ARRAYS};
 use crate::export::{ExportFrame, Points, frames};
@@ -10,7 +10,7 @@ use flexbody_motion::dynamics::{Constants, EquationsOfMotion, Terms};
 
 /// Numbers of an array, column by column.
 pub(crate) enum Numbers {
-    /// In the precision of the file.
+    /// Floats, written in the precision of the file.
     Real(Vec<f64>),
     I32(Vec<i32>),
     I64(Vec<i64>),
@@ -19,13 +19,13 @@ pub(crate) enum Numbers {
 pub(crate) struct Array {
     pub rows: usize,
     pub columns: usize,
-    /// Numbers from one column to the next.
+    /// Number of entries from one column to the next.
     pub stride: usize,
     pub numbers: Numbers,
 }
 
 impl Array {
-    /// A matrix whose columns are filled up with zeros to a multiple of `unit` numbers.
+    /// Returns a matrix whose columns are padded with zeros to a multiple of `unit` numbers.
     fn padded(matrix: &Mat<f64>, unit: usize) -> Self {
         let (rows, columns) = (matrix.nrows(), matrix.ncols());
         let stride = rows.next_multiple_of(unit);
@@ -43,24 +43,25 @@ impl Array {
     }
 }
 
-/// Sizes, terms and arrays of a body as the file holds them.
+/// Sizes, terms and arrays of a body in the form of the file.
 pub(crate) struct Content {
-    /// T.
+    /// Number T of axes along which the body translates: 3, or 2 in the plane.
     pub translations: usize,
-    /// A.
+    /// Number A of axes about which the body rotates: 3, or 1 in the plane.
     pub axes: usize,
     /// Bits of the header entry `terms`.
     pub terms: u32,
     pub frames: Vec<ExportFrame>,
-    /// In the order of [`ARRAYS`].
+    /// Arrays in the order of [`ARRAYS`].
     pub arrays: Vec<Option<Array>>,
 }
 
 impl Content {
-    /// With arrays of numbers of `precision` bytes.
+    /// Collects the arrays with numbers of `precision` bytes.
     ///
     /// # Errors
-    /// [`ExportLoses`](Code::ExportLoses) where m_ff is not positive definite: there are no accelerations.
+    /// [`ExportLoses`](Code::ExportLoses) if m_ff is not positive definite, since accelerations are then
+    /// undefined.
     pub(super) fn new(body: &FlexBody, points: &Points, precision: usize) -> Result<Self> {
         let unit = ALIGNMENT / precision;
         let equations = EquationsOfMotion::new(body, Terms::ALL);
@@ -98,7 +99,7 @@ impl Content {
     }
 }
 
-/// The arrays of the frames.
+/// Arrays of the frames.
 struct EmbeddedFrames {
     nf: usize,
     translations: usize,
@@ -125,9 +126,12 @@ impl EmbeddedFrames {
         };
         let row = |rows: &Mat<f64>, k: usize| (0..nf).map(|j| rows[(k, j)]).collect::<Vec<f64>>();
         for frame in frames {
+            // Indices of the first rotation row and of the first stiffness matrix of the frame.
             let turned = places.rotation.len() / (nf * axes);
             let first = places.second.len() / (nf * nf);
             let mut components = 0;
+            // Symmetric parts of the geometric stiffness of loads at the frame, with a bit for each
+            // component.
             for (bit, one) in loads(body, frames, frame) {
                 components |= 1 << bit;
                 let matrix = &one.matrix;
@@ -140,6 +144,7 @@ impl EmbeddedFrames {
                 first as i32,
                 components,
             ]);
+            // Position, displacement and rotation along the axes in which the body moves.
             places.position.extend(&frame.position[..translations]);
             (0..translations).for_each(|k| places.translation.extend(row(&frame.translation, k)));
             if let Some(rotation) = &frame.rotation {
@@ -149,7 +154,7 @@ impl EmbeddedFrames {
         places
     }
 
-    /// The array of that name; none where it is empty.
+    /// Returns the array of that name; `None` if it is empty.
     fn take(&mut self, name: &str) -> Option<Array> {
         use std::mem::take;
         let (rows, numbers) = match name {
@@ -164,9 +169,9 @@ impl EmbeddedFrames {
     }
 }
 
-/// Geometric stiffness for forces and moments at a frame, with the bit of `components`: what the reference
-/// point of an interface has, as [`BodyPoint::interface`](flexbody_motion::dynamics::BodyPoint::interface)
-/// takes it.
+/// Returns the geometric stiffness for forces and moments at a frame, each with its bit in `components`. It
+/// is that of the reference point of an interface, as in
+/// [`BodyPoint::interface`](flexbody_motion::dynamics::BodyPoint::interface).
 pub(crate) fn loads<'b>(
     body: &'b FlexBody,
     frames: &[ExportFrame],

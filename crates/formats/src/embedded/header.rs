@@ -1,17 +1,18 @@
-//! The C99 header of a body: the committed template with its sizes on top, under names of its own.
+//! C99 header of a body: the committed template with the sizes of the body in front, under names of its own.
 
 use super::arrays::Content;
 use super::layout::{ARRAYS, ArrayPosition, CHECKED_FROM, HEADER, VERSION, fixed_header, header_offset};
 use flexbody_body::flex_body::FlexBody;
 use std::fmt::Write;
 
-/// The code, for a body that is called `flexbody`.
+/// Code template for a body named `flexbody`.
 const TEMPLATE: &str = include_str!("body.h");
 
-/// Longest part of a name that is the user's: C99 promises to tell names of 63 characters apart.
+/// Longest part of an identifier taken from the name of the body: C99 guarantees 63 significant characters
+/// only.
 const LONGEST_NAME: usize = 24;
 
-/// Header entries that the file must have, from the precision on.
+/// Returns the header entries that the file must have, from the precision on.
 pub(crate) fn expected(content: &Content, body: &FlexBody, precision: usize) -> [u32; 6] {
     [
         precision as u32,
@@ -23,7 +24,7 @@ pub(crate) fn expected(content: &Content, body: &FlexBody, precision: usize) -> 
     ]
 }
 
-/// The header that evaluates a file of `size` bytes whose arrays stand at `places`.
+/// Returns the header that evaluates a file of `size` bytes with arrays at `places`.
 pub(crate) fn header(
     body: &FlexBody,
     content: &Content,
@@ -46,7 +47,7 @@ pub(crate) fn header(
         .replace("FLEXBODY_", &format!("FLEXBODY_{}_", own.to_uppercase()))
 }
 
-/// Name, modes and units of the body, for a comment.
+/// Returns name, modes and units of the body for a comment.
 fn summary(body: &FlexBody) -> String {
     let units = body.units();
     format!(
@@ -59,7 +60,7 @@ fn summary(body: &FlexBody) -> String {
     )
 }
 
-/// The constants of a body as lines of C.
+/// Constants of a body as C macros.
 struct Defines(String);
 
 impl Defines {
@@ -67,7 +68,7 @@ impl Defines {
         writeln!(self.0, "#define FLEXBODY_{name} {value}").expect("strings take all text");
     }
 
-    /// Sizes of the file and of the body.
+    /// Writes the sizes of the file and of the body.
     fn body(
         &mut self,
         body: &FlexBody,
@@ -89,7 +90,7 @@ impl Defines {
         self.put("HAS_W1", &(content.terms & 1));
     }
 
-    /// Places of the arrays, one by one and as the table of the file.
+    /// Writes the positions of the arrays, individually and as the table of the file.
     fn arrays(&mut self, places: &[Option<ArrayPosition>]) {
         for (array, place) in ARRAYS.iter().zip(places) {
             let name = array.name.to_uppercase();
@@ -108,7 +109,7 @@ impl Defines {
         self.put("TABLE", &entries.join(", \\\n    "));
     }
 
-    /// What the code looks for in the file, and where.
+    /// Writes the header values that the code checks, and their offsets.
     fn file(&mut self, expected: &[u32]) {
         let values: Vec<String> = expected.iter().map(|value| format!("{value}u")).collect();
         self.put("HEADER", &values.join(", "));
@@ -120,7 +121,7 @@ impl Defines {
     }
 }
 
-/// Header entries that the code looks at one by one.
+/// Header entries that the code checks individually.
 const EXAMINED: &[&str] = &["byte_order", "version", "size", "checksum", "precision"];
 
 fn place<'p>(places: &'p [Option<ArrayPosition>], name: &str) -> Option<&'p ArrayPosition> {
@@ -128,7 +129,7 @@ fn place<'p>(places: &'p [Option<ArrayPosition>], name: &str) -> Option<&'p Arra
     places[at].as_ref()
 }
 
-/// Indices of the frames that have names.
+/// Returns macros with the indices of named frames.
 fn frame_names(content: &Content) -> String {
     let own = |name: &str| identifier(name).to_uppercase();
     let named: Vec<(usize, i64, String)> = content
@@ -154,7 +155,7 @@ fn frame_names(content: &Content) -> String {
     )
 }
 
-/// A name as a part of identifiers: small letters, digits and single underscores.
+/// Returns a name as a part of identifiers: lower-case letters, digits and single underscores.
 fn identifier(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     let mut text = words.collect::<Vec<_>>().join("_").to_ascii_lowercase();
@@ -162,7 +163,7 @@ fn identifier(name: &str) -> String {
     text.trim_end_matches('_').to_owned()
 }
 
-/// A text for comments, which nothing in it can end.
+/// Returns a text for C comments, without characters that could end the comment.
 fn plain(text: &str) -> String {
     let kept = |c: char| c.is_ascii_alphanumeric() || " .,_+-^()".contains(c);
     text.chars().take(80).map(|c| if kept(c) { c } else { '_' }).collect()

@@ -1,24 +1,23 @@
-//! What stands where in the file: the tables that drive the writer, the C header and
-//! `docs/formats/embedded.md`.
+//! Layout of the file: tables that drive the writer, the C header and `docs/formats/embedded.md`.
 
 use std::fmt::Write;
 
 /// First bytes of the file.
 pub(crate) const MAGIC: [u8; 8] = *b"FLEXBODY";
 
-/// What the byte order mark is on a machine that can read the file in place.
+/// Byte order mark; it has this value on a machine that can read the file in place.
 pub(crate) const BYTE_ORDER: u32 = 0x0102_0304;
 
-/// Version of this layout.
+/// Version of the layout.
 pub(crate) const VERSION: u32 = 1;
 
-/// Where arrays start: at multiples of a cache line.
+/// Alignment of arrays in bytes: a cache line.
 pub(crate) const ALIGNMENT: usize = 64;
 
-/// The checksum is that of all bytes from here on.
+/// Offset of the first byte that the checksum covers.
 pub(crate) const CHECKED_FROM: usize = 24;
 
-/// Entries in front of the table of arrays: name, type, content. In this order, without gaps.
+/// Entries before the table of arrays: name, type, content. They are stored in this order without gaps.
 pub(crate) const HEADER: &[(&str, HeaderType, &str)] = &[
     ("magic", HeaderType::Bytes, "`FLEXBODY`"),
     ("byte_order", HeaderType::U32, "0x01020304"),
@@ -36,7 +35,7 @@ pub(crate) const HEADER: &[(&str, HeaderType, &str)] = &[
     ("time", HeaderType::F64, "unit of time in s"),
 ];
 
-/// Types of the header.
+/// Types of header entries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum HeaderType {
     Bytes,
@@ -61,11 +60,11 @@ impl HeaderType {
     }
 }
 
-/// Entry of the table of arrays: where the array starts, rows, columns, and numbers from one column to the
-/// next; four u32.
+/// Size of an entry of the table of arrays in bytes: offset of the array, rows, columns, and stride from one
+/// column to the next; four u32.
 pub(crate) const ENTRY: usize = 16;
 
-/// An array of the file: name, rows and columns, content.
+/// Description of an array of the file.
 pub(crate) struct Described {
     /// Name: lower case here and in the documentation, upper case in the C header.
     pub name: &'static str,
@@ -77,7 +76,7 @@ const fn array(name: &'static str, shape: &'static str, content: &'static str) -
     Described { name, shape, content }
 }
 
-/// Every array that there can be, in the order of the table and of the file.
+/// All possible arrays in the order of the table and of the file.
 pub(crate) const ARRAYS: &[Described] = &[
     array("rigid", "1 + T + P x 1", "m; c; I0 of the pairs"),
     array(
@@ -144,7 +143,7 @@ const PARTS: &[(&str, &str)] = &[
     ),
 ];
 
-/// Where an array stands.
+/// Position and size of an array in the file.
 pub(crate) struct ArrayPosition {
     pub offset: usize,
     pub rows: usize,
@@ -153,29 +152,29 @@ pub(crate) struct ArrayPosition {
 }
 
 impl ArrayPosition {
-    /// The entry of the table.
+    /// Returns the entry of the table; zeros for a missing array.
     pub(super) fn entry(place: Option<&Self>) -> [u32; 4] {
-        // A file has less than 4 GiB, as the writer makes sure.
+        // The writer ensures that a file has less than 4 GiB.
         place.map_or([0; 4], |p| [p.offset, p.rows, p.columns, p.stride].map(|v| v as u32))
     }
 }
 
-/// Bytes of the entries in front of the table.
+/// Returns the size of the entries before the table in bytes.
 pub(crate) fn fixed_header() -> usize {
     HEADER.iter().map(|(_, kind, _)| kind.bytes()).sum()
 }
 
-/// Offset of a header entry.
+/// Returns the offset of a header entry in bytes.
 pub(crate) fn header_offset(name: &str) -> usize {
     HEADER.iter().take_while(|(own, ..)| *own != name).map(|(_, kind, _)| kind.bytes()).sum()
 }
 
-/// Bytes of header and table, where the first array starts.
+/// Returns the size of header and table in bytes, which is the offset of the first array.
 pub(crate) fn header_bytes() -> usize {
     (fixed_header() + ENTRY * ARRAYS.len()).next_multiple_of(ALIGNMENT)
 }
 
-/// The layout as the documentation has it.
+/// Returns the layout as Markdown for the documentation.
 pub fn embedded_markdown() -> String {
     let mut text = String::from("| offset | type | name | content |\n|---|---|---|---|\n");
     let mut line = |cells: std::fmt::Arguments<'_>| writeln!(text, "{cells}").expect("strings take all text");

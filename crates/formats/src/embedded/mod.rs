@@ -1,4 +1,4 @@
-//! A body as a binary file that real-time programs evaluate in place, and the C99 header that does so.
+//! A body as a binary file that real-time programs evaluate in place, with a C99 header that evaluates it.
 
 mod arrays;
 mod header;

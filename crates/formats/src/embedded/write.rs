@@ -1,4 +1,4 @@
-//! The file: header, table and arrays.
+//! Writer of the file: header, table and arrays.
 
 use super::arrays::{Array, Content, Numbers, loads};
 use super::header::{expected, header};
@@ -15,8 +15,8 @@ use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::{FlexBody, LoadKind, UnitLoad};
 
 /// The numbers of the equations of motion (theory 6 and 7.4) in a fixed little-endian layout, and a
-/// freestanding C99 header that evaluates them in place. Dialects: `double` and `float`, the numbers of file
-/// and header.
+/// freestanding C99 header that evaluates them in place. The dialects `double` and `float` are the number
+/// types of file and header.
 pub(crate) struct Embedded;
 
 impl ExportFormat for Embedded {
@@ -39,7 +39,7 @@ impl ExportFormat for Embedded {
     fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
         let frames = frames(body, &options.points);
         let held: Vec<_> = frames.iter().flat_map(|frame| loads(body, &frames, frame)).collect();
-        // Interfaces may be left out.
+        // Interfaces may be omitted on request.
         let asked = options.points == Points::Usual || options.points.of_interfaces();
         let holds = |load: &UnitLoad| match load.kind.interface() {
             Some(_) => !asked || held.iter().any(|(_, one)| one.load == *load),
@@ -83,6 +83,7 @@ fn bytes(
     precision: usize,
 ) -> Result<(Vec<u8>, Vec<Option<ArrayPosition>>)> {
     let mut file = vec![0; header_bytes()];
+    // Arrays, each at a multiple of the alignment, with its position for the table.
     let mut places = Vec::new();
     for (described, array) in ARRAYS.iter().zip(&content.arrays) {
         let Some(array) = array else {
@@ -105,6 +106,7 @@ fn bytes(
         refused(format!("embedded cannot hold {} bytes, 4 GiB at most", file.len()), "fewer --points")
     })?;
 
+    // Header entries, whose space was left free.
     let mut put =
         |name: &str, bytes: &[u8]| file[header_offset(name)..][..bytes.len()].copy_from_slice(bytes);
     put("magic", &MAGIC);
@@ -116,20 +118,22 @@ fn bytes(
     for (name, unit) in [("length", &units.length), ("mass", &units.mass), ("time", &units.time)] {
         put(name, &unit.to_si().to_le_bytes());
     }
+    // Table of the positions of the arrays.
     let table: Vec<u8> = places
         .iter()
         .flat_map(|place| ArrayPosition::entry(place.as_ref()))
         .flat_map(u32::to_le_bytes)
         .collect();
     file[fixed_header()..][..table.len()].copy_from_slice(&table);
+    // The checksum covers everything after itself.
     let mut checksum = Crc::new();
     checksum.update(&file[CHECKED_FROM..]);
     file[header_offset("checksum")..][..4].copy_from_slice(&checksum.sum().to_le_bytes());
     Ok((file, places))
 }
 
-/// Appends the numbers; fails with one that is too large for its precision, or with the largest of an array
-/// that is too small.
+/// Appends the numbers. Fails with a number that is too large for the precision, or with the largest number
+/// of an array if that is too small.
 fn append(file: &mut Vec<u8>, array: &Array, precision: usize) -> std::result::Result<(), f64> {
     match &array.numbers {
         Numbers::I32(values) => file.extend(values.iter().flat_map(|v| v.to_le_bytes())),

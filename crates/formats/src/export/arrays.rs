@@ -1,4 +1,4 @@
-//! Named arrays with what they are: the entries of the flex-body file, as `json` and `npz` have them.
+//! Named arrays with descriptions: the entries of the flex-body file in the form of `json` and `npz`.
 
 use super::ExportChecklist;
 use super::Holding::Held;
@@ -46,7 +46,7 @@ struct Entry<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// With the numbers of the arrays, or without.
+    /// Builds the document with the numbers of the arrays if `values` is true.
     pub(crate) fn new(attributes: &'a [NamedAttributes], arrays: &'a [NamedArray], values: bool) -> Self {
         let group = |group: &'a NamedAttributes| {
             (
@@ -68,7 +68,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// A map that keeps the order of the file: that of the interfaces counts.
+/// A map that keeps the order of the file, because the order of the interfaces matters.
 struct Ordered<'a, T>(Vec<(&'a str, T)>);
 
 impl<T: Serialize> Serialize for Ordered<'_, T> {
@@ -77,7 +77,7 @@ impl<T: Serialize> Serialize for Ordered<'_, T> {
     }
 }
 
-/// The numbers of an array, nested row by row.
+/// Numbers of an array, nested row by row.
 struct Values<'a>(&'a NamedArray);
 
 impl Serialize for Values<'_> {
@@ -90,7 +90,7 @@ impl Serialize for Values<'_> {
     }
 }
 
-/// Numbers, nested row by row as their extents say.
+/// Numbers nested row by row according to their extents.
 pub(crate) struct Nested<'a, T>(pub &'a [usize], pub &'a [T]);
 
 impl<T: Serialize> Serialize for Nested<'_, T> {

@@ -1,18 +1,19 @@
-//! The checklist of an export: every property that a body may have, and whether the file holds it.
+//! Checklist of an export: every property of a body, and its holding by the file.
 
 /// Holding of one property of a body by an export.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Holding {
     /// The file holds the property.
     Held,
-    /// The file does not hold a property of the body. The text completes the sentence "FORMAT cannot hold ...".
+    /// The file does not hold a property of the body. The text completes the sentence "FORMAT cannot hold
+    /// ...".
     Lost(String),
-    /// The body does not have the property, or the readers of the format have no use for it: nothing is reported.
+    /// The body does not have the property, or the readers of the format do not use it; nothing is reported.
     NotApplicable,
 }
 
 impl Holding {
-    /// Returns [`Lost`](Self::Lost) with the text, or [`Held`](Self::Held) without one.
+    /// Returns [`Lost`](Self::Lost) with the text, or [`Held`](Self::Held) without a text.
     pub(crate) fn held_but_for(lost: Option<String>) -> Self {
         lost.map_or(Self::Held, Self::Lost)
     }
@@ -25,10 +26,10 @@ impl Holding {
     }
 }
 
-/// Holdings of all properties of a body, in the order in which losses are reported. The type has no default: a new
-/// property does not compile before every format states its holding, by itself or with formats of the same contents. The origin and
-/// proof of the numbers (certificate, lumped comparators, fingerprints of the inputs) are in the flex-body file
-/// alone.
+/// Holdings of all properties of a body, in the order in which losses are reported. The type has no default,
+/// so that a new property compiles only after every format has stated its holding, by itself or with formats
+/// of the same contents. The origin and proof of the numbers (certificate, lumped comparators, fingerprints
+/// of the inputs) are in the flex-body file alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExportChecklist {
     /// Coupling of rigid motion and modes in the kinetic energy.
@@ -47,7 +48,7 @@ pub struct ExportChecklist {
     pub separate_w2: Holding,
     /// Geometric stiffness.
     pub geometric_stiffness: Holding,
-    /// Stiffness of inertia of nodes that turn.
+    /// Stiffness of inertia of rotating nodes.
     pub inertia_stiffness: Holding,
     /// Damping of the modes.
     pub damping: Holding,
@@ -59,9 +60,9 @@ pub struct ExportChecklist {
     pub internal_rows: Holding,
     /// Point of action of gravity on the deformed body.
     pub gravity: Holding,
-    /// Places of the interfaces.
+    /// Positions of the interfaces.
     pub interfaces: Holding,
-    /// Surface to draw the body by.
+    /// Surface for drawing the body.
     pub surface: Holding,
     /// Origin of each mode (free mode, residual vector, ...).
     pub origins_of_modes: Holding,

@@ -1,4 +1,4 @@
-//! What a format is that other programs read.
+//! Trait of export formats, and the options and results of an export.
 
 use super::ExportChecklist;
 use flexbody_base::error::Result;
@@ -10,24 +10,24 @@ use std::path::{Path, PathBuf};
 
 /// A format that other programs read.
 pub trait ExportFormat: Sync {
-    /// Name on the command line.
+    /// Returns the name on the command line.
     fn name(&self) -> &'static str;
 
-    /// Programs that read the format, in a few words.
+    /// Returns the programs that read the format, in a few words.
     fn reader(&self) -> &'static str;
 
-    /// Variants of the format, the usual one first; empty where there is a single one.
+    /// Returns the dialects of the format, the default first; empty for a format with a single form.
     fn dialects(&self) -> &'static [&'static str] {
         &[]
     }
 
-    /// Whether the file has places of the body that can be chosen ([`ExportOptions::points`]).
+    /// Returns true if the places of the body in the file can be chosen ([`ExportOptions::points`]).
     fn has_points(&self) -> bool {
         false
     }
 
-    /// Whether the file is a picture of the body: it has modes that can be chosen, plays motions, and nobody
-    /// computes with it.
+    /// Returns true if the file is a picture of the body: the number of modes can be chosen, motions can be
+    /// played, and no program computes with the file.
     fn is_picture(&self) -> bool {
         false
     }
@@ -35,39 +35,41 @@ pub trait ExportFormat: Sync {
     /// Returns the holding of every property of `body` with these options.
     fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist;
 
-    /// What its program must be told to use all of the file: settings without which a part of it is ignored.
-    /// Sentences without a full stop.
+    /// Returns the settings that the reading program needs to use all of the file; without them a part is
+    /// ignored. Each entry is a sentence without a full stop.
     fn needs(&self, _body: &FlexBody, _options: &ExportOptions) -> Vec<String> {
         Vec::new()
     }
 
-    /// What a picture leaves out of the body, with these options. Sentences without a full stop.
+    /// Returns the properties of the body that a picture leaves out with these options, as sentences without
+    /// a full stop.
     fn leaves_out(&self, _body: &FlexBody, _options: &ExportOptions) -> Vec<String> {
         Vec::new()
     }
 
-    /// The file. Called with options that the format has, and of a picture of a motion with the body as the
-    /// motion has it.
+    /// Returns the contents of the file. The options are valid for the format; for a picture of a motion the
+    /// body is in the frame of the motion.
     ///
     /// # Errors
-    /// [`ExportLoses`](flexbody_base::diagnostic::Code::ExportLoses) for a body of which no file of this format can be made.
+    /// [`ExportLoses`](flexbody_base::diagnostic::Code::ExportLoses) for a body that no file of this format
+    /// can represent.
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported>;
 }
 
-/// Options of an export. Those that a format does not have are refused by [`export`](crate::export()).
+/// Options of an export. [`export`](crate::export()) rejects options that a format does not have.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExportOptions {
-    /// Variant of the format, one of [`ExportFormat::dialects`]; none: the usual one.
+    /// Dialect of the format, one of [`ExportFormat::dialects`]; `None` for the default.
     pub dialect: Option<String>,
-    /// Which places of the body the file has.
+    /// Places of the body in the file.
     pub points: Points,
-    /// Of a picture: how many modes it has, the first ones; none: as many as are usual.
+    /// Number of modes in a picture, from the first; `None` for the default of the format.
     pub modes: Option<usize>,
-    /// Of a picture: the motion that it shows instead of modes.
+    /// Motion shown in a picture instead of modes; `None` for modes.
     pub motion: Option<RecordedMotion>,
-    /// Name of the file, for formats whose file names those beside it.
+    /// Name of the main file, for formats whose main file refers to further files.
     pub name: Option<PathBuf>,
-    /// The part that the stiffness of inertia has in a scene, told where the format cannot hold it.
+    /// Effect of the stiffness of inertia in a scene, reported if the format cannot hold it.
     pub in_scene: Option<InertiaInScene>,
 }
 
@@ -76,33 +78,33 @@ pub struct ExportOptions {
 pub struct InertiaInScene {
     /// Name of the scene.
     pub scene: String,
-    /// The part, 0.01 for 1 %.
+    /// Part of the stiffness, 0.01 for 1 %.
     pub share: f64,
 }
 
-/// Which places of the body a file has.
+/// Selection of the places of the body in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Points {
-    /// What the format needs: all nodes, or of a format with frames the interfaces where the body has some.
+    /// Default of the format: all nodes, or for a format with frames the interfaces if the body has some.
     #[default]
     Usual,
     /// All nodes.
     Nodes,
-    /// The reference points of the interfaces and the nodes of free ones.
+    /// Reference points of the interfaces, and the nodes of free interfaces.
     Interfaces,
-    /// Those of the interfaces, and the nodes with these numbers.
+    /// Places of the interfaces, and the nodes with these numbers.
     InterfacesAnd(Vec<i64>),
     /// Nodes with these numbers.
     Some(Vec<i64>),
 }
 
 impl Points {
-    /// Whether they are those of the interfaces, others beside them or not.
+    /// Returns true for a selection of the interfaces, with or without further nodes.
     pub fn of_interfaces(&self) -> bool {
         matches!(self, Self::Interfaces | Self::InterfacesAnd(_))
     }
 
-    /// Numbers of nodes that are named one by one.
+    /// Returns the numbers of nodes that are selected individually.
     pub fn named(&self) -> &[i64] {
         match self {
             Self::Some(ids) | Self::InterfacesAnd(ids) => ids,
@@ -111,19 +113,18 @@ impl Points {
     }
 }
 
-/// What an export makes: the file, and others that belong beside it.
+/// Result of an export: the main file and accompanying files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exported {
-    /// The file itself.
+    /// Bytes of the main file.
     pub file: Vec<u8>,
-    /// Further files, each with the ending that takes the place of the extension of the file: `M.mtx` stands
-    /// for a file `body.M.mtx` beside `body.csv`, `_exudyn.py` for a file `body_exudyn.py` beside
-    /// `body.hdf5`.
+    /// Accompanying files, each with the suffix that replaces the extension of the main file: `M.mtx` gives
+    /// `body.M.mtx` for `body.csv`, `_exudyn.py` gives `body_exudyn.py` for `body.hdf5`.
     pub beside: Vec<(Cow<'static, str>, Vec<u8>)>,
 }
 
 impl Exported {
-    /// Where a further file belongs, for the ending that it has.
+    /// Returns the path of an accompanying file from its suffix.
     pub fn place_beside(file: &Path, ending: &str) -> PathBuf {
         match (ending.strip_prefix('_'), file.file_stem()) {
             (Some(_), Some(stem)) => {
@@ -135,11 +136,11 @@ impl Exported {
         }
     }
 
-    /// Fills `slot`, which is for the file, and a slot for each of the others; they appear together when all
-    /// are committed.
+    /// Fills `slot` with the main file and a new slot with each of the other files. The files appear together
+    /// when all slots are committed.
     ///
     /// # Errors
-    /// FB104, FB602 when one cannot be written.
+    /// FB104 or FB602 if a file cannot be written.
     pub fn fill(&self, slot: OutputSlot) -> Result<Vec<OutputSlot>> {
         slot.fill(&self.file)?;
         let mut slots = vec![slot];
@@ -151,7 +152,7 @@ impl Exported {
         Ok(slots)
     }
 
-    /// A single file.
+    /// Returns an export of a single file.
     pub fn single(file: Vec<u8>) -> Self {
         Self { file, beside: Vec::new() }
     }

@@ -1,30 +1,30 @@
-//! Places of a body that joints and forces take hold of: what formats call nodes or frames.
+//! Places of a body at which joints and forces act: nodes or frames of the formats.
 
 use super::Points;
 use faer::Mat;
 use flexbody_body::flex_body::{FlexBody, Interface};
 
-/// One place of a body and its motion in every mode, body axes.
+/// A place of a body and its motion in every mode, body axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExportFrame {
-    /// Number: that of the node; of the reference point of an interface that is no node of the body, one
-    /// above all node numbers.
+    /// Number of the node. The reference point of an interface that is no node has a number above all node
+    /// numbers.
     pub id: i64,
-    /// Name of the interface.
+    /// Name of the interface; `None` for a node without interface.
     pub name: Option<String>,
-    /// Undeformed position. Unit: length.
+    /// Undeformed position, body axes. Unit: length.
     pub position: [f64; 3],
     /// Displacement of each mode (3 x nf).
     pub translation: Mat<f64>,
-    /// Rotation of each mode (3 x nf); `None` where the body does not know it, as of nodes of solid elements.
+    /// Rotation of each mode (3 x nf); `None` if it is unknown, as for nodes of solid elements.
     pub rotation: Option<Mat<f64>>,
 }
 
-/// The places of `body` that `points` names: nodes in the order of the body, reference points in the order of
-/// the interfaces. Of a free interface, and of one whose nodes determine no motion of a reference point, all
-/// nodes.
+/// Returns the places of `body` selected by `points`: nodes in the order of the body, reference points in the
+/// order of the interfaces. A free interface, and an interface whose nodes determine no motion of a reference
+/// point, contribute all their nodes.
 ///
-/// [`Points::Usual`] stands for the interfaces where there are some, else for all nodes.
+/// [`Points::Usual`] selects the interfaces if there are some, otherwise all nodes.
 pub fn frames(body: &FlexBody, points: &Points) -> Vec<ExportFrame> {
     let all = || (0..body.n_nodes()).map(|i| node(body, i)).collect();
     match points {
@@ -42,7 +42,7 @@ pub fn frames(body: &FlexBody, points: &Points) -> Vec<ExportFrame> {
     }
 }
 
-/// The nodes with these numbers, in the order of the body.
+/// Returns the nodes with these numbers, in the order of the body.
 pub(crate) fn named_nodes(body: &FlexBody, ids: &[i64]) -> impl Iterator<Item = ExportFrame> {
     (0..body.n_nodes()).filter(|&i| ids.contains(&body.nodes().ids[i])).map(|i| node(body, i))
 }
@@ -56,7 +56,7 @@ fn node(body: &FlexBody, i: usize) -> ExportFrame {
         name: None,
         position: body.nodes().positions[i],
         translation: rows(&modes.shape),
-        // Nodes without rotations have zeros in their place.
+        // Nodes without rotations have zeros in the array.
         rotation: modes.rotation.as_ref().map(rows).filter(turns),
     }
 }
@@ -71,8 +71,8 @@ fn interfaces(body: &FlexBody) -> Vec<ExportFrame> {
     found
 }
 
-/// The reference point of the interface with this `number` (from 0); of a free interface, and of one whose
-/// nodes determine no motion of a reference point, all nodes.
+/// Returns the reference point of the interface with this `number` (from 0). For a free interface, and for an
+/// interface whose nodes determine no motion of a reference point, returns all its nodes.
 pub(crate) fn interface_frames(body: &FlexBody, interface: &Interface, number: usize) -> Vec<ExportFrame> {
     let above = body.nodes().ids.iter().copied().max().unwrap_or(0);
     let named = |i: usize| ExportFrame { name: Some(interface.name.clone()), ..node(body, i) };
@@ -82,7 +82,8 @@ pub(crate) fn interface_frames(body: &FlexBody, interface: &Interface, number: u
     }
 }
 
-/// The reference point of an interface: the node itself where it is a single one that lies there.
+/// Returns the reference point of an interface; if the interface is a single node at that point, the node
+/// itself.
 fn reference(body: &FlexBody, interface: &Interface, id: i64) -> Option<ExportFrame> {
     let (modes, nodes) = (body.modes(), body.nodes());
     let position = interface.reference?;

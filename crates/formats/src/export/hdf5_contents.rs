@@ -8,7 +8,7 @@ use flexbody_base::output::OutputSlot;
 use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor};
 use hdf5_metno as hdf5;
 
-/// What stands under a name: its contents, and text attributes.
+/// Contents under a name, with text attributes.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Hdf5Entry {
     name: String,
@@ -16,49 +16,49 @@ pub(crate) struct Hdf5Entry {
     contents: Hdf5Contents,
 }
 
-/// Groups and arrays. Values are in row-major order; no extents: a single value.
+/// Groups and arrays. Values are in row-major order; empty extents stand for a single value.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Hdf5Contents {
-    /// A group of others.
+    /// A group of entries.
     Group(Vec<Hdf5Entry>),
     /// 64-bit floats with these extents.
     Floats(Vec<usize>, Vec<f64>),
     /// 64-bit integers with these extents.
     Integers(Vec<usize>, Vec<i64>),
-    /// One text.
+    /// A single text.
     Text(String),
 }
 
 impl Hdf5Contents {
-    /// A single number.
+    /// Returns a single number.
     pub(crate) fn number(value: f64) -> Self {
         Self::Floats(Vec::new(), vec![value])
     }
 
-    /// A list of numbers.
+    /// Returns a list of numbers.
     pub(crate) fn list(values: &[f64]) -> Self {
         Self::Floats(vec![values.len()], values.to_vec())
     }
 
-    /// An array with two extents from its entries.
+    /// Returns an array with two extents from its entries.
     pub(crate) fn from_fn(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
         let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
         Self::Floats(vec![rows, columns], places.map(|(i, j)| entry(i, j)).collect())
     }
 
-    /// An array with two extents.
+    /// Returns a matrix as an array with two extents.
     pub(crate) fn matrix(a: &Mat<f64>) -> Self {
         Self::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
     }
 
-    /// These contents under a name.
+    /// Returns these contents under a name.
     pub(crate) fn named(self, name: impl Into<String>) -> Hdf5Entry {
         Hdf5Entry { name: name.into(), attributes: Vec::new(), contents: self }
     }
 }
 
 impl Hdf5Entry {
-    /// This entry with one more text attribute.
+    /// Returns this entry with one more text attribute.
     pub(crate) fn with(mut self, attribute: &'static str, text: impl Into<String>) -> Self {
         self.attributes.push((attribute, text.into()));
         self
@@ -83,11 +83,11 @@ impl Hdf5Entry {
     }
 }
 
-/// Bytes that a text of a file can have.
+/// Largest length of a text in bytes; a longer text is an error of the export.
 const LONGEST_TEXT: usize = 1 << 16;
 
-/// A text of its own length, in ASCII where it is that: Octave stops at texts of variable length, and at
-/// those of UTF-8. The library writes it into the type of the file from a longer one.
+/// Writes a text of fixed length, in ASCII if possible: Octave cannot read texts of variable length or in
+/// UTF-8. The library converts the text from a longer type into that of the file.
 fn put_fixed_text(place: &hdf5::Group, name: &str, text: &str) -> hdf5::Result<hdf5::Dataset> {
     let wrong = |e: &dyn std::fmt::Display| hdf5::Error::from(format!("{name}: {e}"));
     let (ascii, length) = (text.is_ascii(), text.len().max(1));
@@ -115,14 +115,15 @@ fn array<T: hdf5::H5Type>(
     Ok(dataset)
 }
 
-/// The bytes of a file with these entries. HDF5 writes into a temporary file, which is gone afterwards.
+/// Returns the bytes of a file with these entries. HDF5 writes a temporary file, which is deleted afterwards.
 ///
 /// # Errors
-/// [`OutputUnwritable`](Code::OutputUnwritable) where there is no place for temporary files.
+/// [`OutputUnwritable`](Code::OutputUnwritable) if the temporary file cannot be written.
 pub(crate) fn hdf5_bytes(root: &[Hdf5Entry]) -> Result<Vec<u8>> {
     let make_bytes = || -> std::result::Result<Vec<u8>, String> {
         let name = format!("flexbody-export-{}.h5", std::process::id());
-        // The slot is never committed: its temporary file goes with it, also where a signal ends the program.
+        // The slot is never committed: its temporary file is removed with it, even if a signal ends the
+        // program.
         let slot = OutputSlot::prepare(std::env::temp_dir().join(name)).map_err(|e| e.to_string())?;
         fill(root, slot.temporary()).map_err(|e| e.to_string())?;
         std::fs::read(slot.temporary()).map_err(|e| e.to_string())

@@ -1,18 +1,18 @@
-//! The nine invariants as programs take them whose mass commutes with rotations.
+//! The nine invariants for programs whose mass commutes with rotations.
 
 use faer::Mat;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::Numbered;
 
-/// I1 to I9 of a body for programs that take I5_jk as antisymmetric in j and k and use I9 in two places: its
-/// part that is symmetric in a and b where W2 stands, the other one where W3 stands (Coriolis). I5 and I9 are
-/// always there, zero where the body does not hold them.
+/// Returns I1 to I9 of a body for programs that take I5_jk as antisymmetric in j and k and use I9 twice: its
+/// part that is symmetric in a and b for W2, the other part for W3 (Coriolis). I5 and I9 are always present,
+/// zero if the body does not hold them.
 ///
-/// For a mass that commutes with rotations this is
-/// [`Invariants::numbered`](flexbody_body::invariants::Invariants::numbered). Of others, and of a body that
-/// holds one of W2 and W3 only, I9_jk(a,b) = -(W2 + W2')/2 -+ W3_c / 2 is put together from what the body
-/// holds, with the antisymmetric part of W3: the equations then conserve momentum and energy as those of the
-/// body do. What is left out is the loss that [`general_w3`](super::losses::general_w3) tells.
+/// For a mass that commutes with rotations the result is
+/// [`Invariants::numbered`](flexbody_body::invariants::Invariants::numbered). For other masses, and for a
+/// body that holds only one of W2 and W3, I9_jk(a,b) = -(W2 + W2')/2 -+ W3_c / 2 is assembled from the terms
+/// of the body, with the antisymmetric part of W3: the equations then conserve momentum and energy like those
+/// of the body. The omitted part is the loss reported by [`general_w3`](super::losses::general_w3).
 pub(crate) fn inertia(body: &FlexBody) -> Numbered {
     let invariants = body.invariants();
     let nf = body.n_modes();

@@ -1,4 +1,4 @@
-//! K, M and D in the motions of interface frames, as reduced-order blocks take them: six coordinates for each
+//! Matrices K, M and D in the motions of interface frames for reduced-order blocks: six coordinates for each
 //! frame, then the fixed-interface modes.
 
 use super::Holding::{Held, NotApplicable};
@@ -14,18 +14,18 @@ use flexbody_linalg::combine;
 pub(crate) struct InterfaceMatrices<'a> {
     /// Name and origin of each frame, body axes. Unit: length.
     pub frames: Vec<(&'a str, [f64; 3])>,
-    /// K (nc x nc).
+    /// Stiffness matrix K (nc x nc).
     pub stiffness: &'a Mat<f64>,
-    /// M (nc x nc).
+    /// Mass matrix M (nc x nc).
     pub mass: &'a Mat<f64>,
-    /// D (nc x nc), where the body has damping: M B D_ff B' M, so that B' D B = D_ff and rigid motion is not
-    /// damped.
+    /// Damping matrix D (nc x nc); `None` without damping. D = M B D_ff B' M, so that B' D B = D_ff and rigid
+    /// motion is not damped.
     pub damping: Option<Mat<f64>>,
 }
 
 impl<'a> InterfaceMatrices<'a> {
-    /// Of a body with Craig-Bampton coordinates in space, all of whose interfaces have reference points.
-    /// `format` is named in messages.
+    /// Returns the matrices of a body in space with Craig-Bampton coordinates, all of whose interfaces have
+    /// reference points. Messages name the `format`.
     ///
     /// # Errors
     /// [`ExportLoses`](Code::ExportLoses) for any other body.
@@ -57,7 +57,7 @@ impl<'a> InterfaceMatrices<'a> {
             .iter()
             .filter_map(|interface| Some((interface.name.as_str(), interface.reference?)))
             .collect();
-        // Files may be made by anyone: what the coordinates are called must be what they are taken for.
+        // Files may come from anywhere: the names of the coordinates must agree with their expected meaning.
         let names = &coordinates.names;
         let expected = frames.iter().flat_map(|(name, _)| AXES.map(|axis| format!("{name} {axis}")));
         let modal = |name: &String| name.starts_with("fixed-interface mode ");
@@ -85,17 +85,17 @@ impl<'a> InterfaceMatrices<'a> {
 
 const AXES: [&str; 6] = ["ux", "uy", "uz", "rx", "ry", "rz"];
 
-/// Holdings of a format with such matrices. The matrices are about the motions of the frames: nodes and their modes
-/// are not in the file.
+/// Returns the holdings of a format with these matrices. The matrices describe the motions of the frames:
+/// nodes and their modes are not in the file.
 pub(crate) fn matrix_checklist(body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
     let small = "K and M are those of small motions";
     ExportChecklist {
         rigid_coupling: Held,
-        // Plane bodies are refused.
+        // Plane bodies were rejected before.
         plane: NotApplicable,
         deformed_inertia: losses::changing_inertia(body, "W1", small),
         general_w0: losses::general_w0(body),
-        // Lost with the inertia of the deformed body.
+        // These terms are lost with the inertia of the deformed body.
         coriolis_force: NotApplicable,
         general_w3: NotApplicable,
         separate_w2: NotApplicable,

@@ -1,4 +1,4 @@
-//! What formats cannot hold: the sentences that several of them need, with the size of what is lost.
+//! Sentences about properties that formats cannot hold, shared by several formats, with the size of the loss.
 
 use crate::export::Holding::{self, Held, Lost, NotApplicable};
 use crate::export::{ExportOptions, InertiaInScene};
@@ -7,14 +7,15 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::CauchySchwarz;
 use flexbody_model::UnitLoad;
 
-/// Differences of numbers that are relative to their Cauchy-Schwarz bounds: below this they are rounding, and
-/// nothing is lost.
+/// Largest difference, relative to a Cauchy-Schwarz bound, that counts as rounding and not as a loss. A
+/// larger value hides small losses; a smaller one reports rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Part of the stiffness of a motion at which the stiffness of inertia counts.
+/// Part of the stiffness of a motion from which the stiffness of inertia is reported. A larger value reports
+/// it for faster motions only.
 const PART: f64 = 0.01;
 
-/// The plane of a body, for a format in space.
+/// Returns the holding of the restriction to a plane, for a format in space.
 pub(crate) fn plane(body: &FlexBody) -> Holding {
     if body.dimension() != 2 {
         return NotApplicable;
@@ -22,18 +23,19 @@ pub(crate) fn plane(body: &FlexBody) -> Holding {
     Lost("that the body moves in its plane z = 0 only: inertia and stiffness out of the plane are missing, hold it there by a joint".to_owned())
 }
 
-/// W0 of a mass that does not commute with rotations, for a format whose first moment is c + C1 q.
+/// Returns the holding of W0 of a mass that does not commute with rotations, for a format whose first moment
+/// is c + C1 q.
 pub(crate) fn general_w0(body: &FlexBody) -> Holding {
     let invariants = body.invariants();
     let bound = CauchySchwarz::of(invariants);
     let nf = body.n_modes();
-    // Without what M alone knows of it, W0 is that of C1.
+    // Without the information in M, W0 follows from C1.
     let (own, told) = (invariants.w0(), invariants.as_solid().w0());
     let lost = largest(&own, &told, |_, column| bound.c1(column % nf));
     lost_beyond_rounding(lost, "W0 other than -C1~ (how modes move the coupling of translation and rotation)")
 }
 
-/// The symmetric part of the blocks of W3, for a format that takes them as skew.
+/// Returns the holding of the symmetric part of the blocks of W3, for a format that takes them as skew.
 pub(crate) fn general_w3(body: &FlexBody) -> Holding {
     let bound = CauchySchwarz::of(body.invariants());
     let nf = body.n_modes();
@@ -51,7 +53,7 @@ fn largest(a: &Mat<f64>, b: &Mat<f64>, bound: impl Fn(usize, usize) -> f64) -> f
         .fold(0.0, f64::max)
 }
 
-/// The loss of a difference that is larger than rounding; with a smaller one the format holds all of it.
+/// Returns the loss of a difference that exceeds rounding; for a smaller difference the property is held.
 pub(crate) fn lost_beyond_rounding(lost: f64, what: &str) -> Holding {
     Holding::held_but_for((lost > ROUNDING).then(|| {
         format!(
@@ -60,18 +62,19 @@ pub(crate) fn lost_beyond_rounding(lost: f64, what: &str) -> Holding {
     }))
 }
 
-/// Whether the body has damping: a matrix, or ratios.
+/// Returns true if the body has damping: a matrix, or ratios.
 pub(crate) fn is_damped(body: &FlexBody) -> bool {
     body.modes().modal_damping.is_some() || body.modes().damping_ratio.iter().any(|ratio| *ratio != 0.0)
 }
 
-/// Damping, for a format without.
+/// Returns the holding of damping, for a format without damping.
 #[cfg(feature = "hdf5")]
 pub(crate) fn damping(body: &FlexBody) -> Holding {
     if is_damped(body) { Lost("the damping of the modes".to_owned()) } else { NotApplicable }
 }
 
-/// Geometric stiffness of loads that `holds` does not take.
+/// Returns the holding of geometric stiffness, for a format that takes the loads for which `holds` returns
+/// true.
 pub(crate) fn geometric_stiffness(body: &FlexBody, holds: impl Fn(&UnitLoad) -> bool) -> Holding {
     let lost: Vec<String> = body
         .geometric_stiffness()
@@ -84,8 +87,8 @@ pub(crate) fn geometric_stiffness(body: &FlexBody, holds: impl Fn(&UnitLoad) -> 
     )
 }
 
-/// Stiffness of inertia for loads that `holds` does not take, with its size in a scene or else the motion at which it
-/// counts.
+/// Returns the holding of the stiffness of inertia, for a format that takes the loads for which `holds`
+/// returns true. The loss states its size in a scene, or otherwise the motion from which it matters.
 pub(crate) fn inertia_stiffness(
     body: &FlexBody,
     options: &ExportOptions,
@@ -109,7 +112,7 @@ pub(crate) fn inertia_stiffness(
     Lost(format!("{WHAT}, which reaches 1 % of the stiffness of a motion at {rates}"))
 }
 
-/// Rotations of nodes, for a format without.
+/// Returns the holding of rotations of nodes, for a format without rotations.
 #[cfg(feature = "hdf5")]
 pub(crate) fn rotations(body: &FlexBody) -> Holding {
     if body.modes().rotation.is_none() {
@@ -118,14 +121,14 @@ pub(crate) fn rotations(body: &FlexBody) -> Holding {
     Lost("the rotations of the nodes in the modes".to_owned())
 }
 
-/// Rows of the modes that belong to no node.
+/// Returns the holding of rows of the modes that belong to no node.
 pub(crate) fn internal_rows(body: &FlexBody) -> Holding {
     let Some(internal) = &body.modes().internal else { return NotApplicable };
     Lost(format!("{} rows of the modes that belong to no node", internal.shape.nrows()))
 }
 
-/// The groups of the kinetic energy, for a format with the inertia of the undeformed body; `w1` says what of
-/// W1 it lacks.
+/// Returns the holding of the groups of the kinetic energy, for a format with the inertia of the undeformed
+/// body; `w1` names the lost part of W1.
 pub(crate) fn changing_inertia(body: &FlexBody, w1: &str, why: &str) -> Holding {
     let groups = body.groups();
     let held = [(groups.w1, w1), (groups.w2, "W2"), (groups.w3, "W3")];

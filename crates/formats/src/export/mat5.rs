@@ -4,19 +4,19 @@ use faer::Mat;
 
 /// Contents of a variable.
 pub(crate) enum Mat5Value<'a> {
-    /// 64-bit floats.
+    /// Matrix of 64-bit floats.
     Matrix(&'a Mat<f64>),
-    /// Rows of characters, filled up with blanks to one length.
+    /// Rows of characters, padded with blanks to one length.
     Text(Vec<&'a str>),
 }
 
-/// The file with these variables; `None` where one of them has more bytes than the format can say.
+/// Returns the file with these variables; `None` if a variable has more bytes than the format can state.
 ///
-/// Names are those of MATLAB variables.
+/// The names must be valid names of MATLAB variables.
 pub(crate) fn mat5(variables: &[(&str, Mat5Value<'_>)]) -> Option<Vec<u8>> {
     let mut file = b"MATLAB 5.0 MAT-file, written by flexbody".to_vec();
     file.resize(124, b' ');
-    // No data of subsystems.
+    // The offset of subsystem data is zero: there are none.
     file[116..].fill(0);
     file.extend(VERSION.to_le_bytes());
     file.extend(b"IM");
@@ -64,8 +64,8 @@ fn variable(name: &str, value: &Mat5Value<'_>) -> Option<Vec<u8>> {
     Some(body)
 }
 
-/// Type, number of bytes, and the bytes filled up to a multiple of eight; up to four bytes stand in the tag
-/// itself.
+/// Returns an element: type, number of bytes, and the bytes padded to a multiple of eight; up to four bytes
+/// are in the tag itself.
 fn element(kind: u32, bytes: &[u8]) -> Option<Vec<u8>> {
     let length = u32::try_from(bytes.len()).ok()?;
     let mut out = if (1..=4).contains(&length) {

@@ -1,4 +1,4 @@
-//! What the formats that are written share: the trait, frames, losses, containers.
+//! Shared code of the export formats: the trait, frames, losses, containers.
 
 pub(crate) mod arrays;
 mod checklist;

@@ -1,22 +1,22 @@
-//! Interfaces of a body for Exudyn's markers, which take hold of mesh nodes, counted from 0, with weights.
+//! Interfaces of a body for the markers of Exudyn, which refer to mesh nodes, counted from 0, with weights.
 //!
-//! `MarkerSuperElementRigid` takes the weighted mean of the nodes as its place and, by its "alternative
-//! approach", the rotation that fits their displacements best. With equal weights this is the motion of our
-//! interfaces; `offset` leads from the mean to the reference point.
+//! `MarkerSuperElementRigid` takes the weighted mean of the nodes as its position and, by its "alternative
+//! approach", the rotation that fits their displacements best. With equal weights this is the motion of an
+//! interface of flexbody; `offset` is the vector from the mean to the reference point.
 
 use super::mesh::{Mesh, MeshInterface};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry};
 use flexbody_body::flex_body::{FlexBody, Interface};
 use nalgebra::Vector3;
 
-/// The program beside the file: loads the body, puts a joint at each interface and drives one.
+/// Accompanying Python program: loads the body, puts a joint at each interface and drives one.
 pub(crate) const SCRIPT: &str = include_str!("run.py");
 
-/// What takes the place of the file's extension in the name of that program.
+/// Suffix that replaces the extension of the file in the name of the accompanying program.
 pub(crate) const SCRIPT_NAME: &str = "_exudyn.py";
 
-/// The numbers that nodes have in the FE model, and the interfaces in their order; Exudyn's loader passes
-/// over both.
+/// Returns the node numbers of the FE model and the interfaces in their order; the loader of Exudyn ignores
+/// both.
 pub(crate) fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     let held = body.interfaces().iter().zip(&mesh.interfaces).enumerate();
     let interfaces = held.map(|(number, (own, nodes))| interface(number, own, nodes, mesh)).collect();
@@ -42,7 +42,7 @@ fn interface(number: usize, interface: &Interface, own: &MeshInterface, mesh: &M
         list("referencePoint", own.reference.as_slice()),
         list("offset", (own.reference - mean).as_slice()),
     ];
-    // The order of links in HDF5 is that of their names.
+    // HDF5 orders links by name.
     Hdf5Contents::Group(members).named(format!("interface{number:04}")).with("datatype", "dict")
 }
 

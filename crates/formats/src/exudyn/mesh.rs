@@ -1,9 +1,9 @@
-//! What Exudyn calls the mesh: the nodes that its markers take hold of, and the interfaces as sets of them.
+//! Mesh of Exudyn: the nodes that its markers are attached to, and the interfaces as sets of nodes.
 //!
-//! A marker over all nodes of an interface costs as much in every step as these are many. Where places are
-//! asked for, an interface with a rotation is six nodes on a cross about its reference point instead, which
-//! move rigidly with it: the mean of them is the reference point, and the rotation that fits them best is
-//! that of the interface, both exactly.
+//! The cost of a marker per step grows with the number of its nodes. If interfaces are selected, an interface
+//! with a rotation is therefore written as six nodes on a cross about its reference point, which move rigidly
+//! with it: the mean of the nodes is the reference point, and their best-fit rotation is that of the
+//! interface, both exactly.
 
 use crate::export::Points;
 use crate::export::frames::{ExportFrame, interface_frames, named_nodes};
@@ -11,34 +11,34 @@ use faer::Mat;
 use flexbody_body::flex_body::{FlexBody, Interface};
 use nalgebra::Vector3;
 
-/// Length of the arms of a cross where the nodes of the interface are all at its reference point, as part of
-/// the extent of the body.
+/// Smallest length of the arms of a cross, relative to the largest distance of a node of the body from the
+/// reference point.
 const ARM: f64 = 0.01;
 
-/// Nodes with their motion, and the interfaces that hold them.
+/// Nodes with their motion, and the interfaces on them.
 pub(crate) struct Mesh {
-    /// Numbers in the FE model; of the nodes of a cross, the number of its reference point.
+    /// Node numbers in the FE model; for the nodes of a cross the number of the reference point.
     pub numbers: Vec<i64>,
-    /// Positions, body axes. Unit: length.
+    /// Positions in body axes. Unit: length.
     pub positions: Vec<[f64; 3]>,
     /// Displacements in every mode (3n x nf).
     pub shape: Mat<f64>,
-    /// In the order of the body.
+    /// Interfaces in the order of the body.
     pub interfaces: Vec<MeshInterface>,
 }
 
 /// An interface as nodes of a mesh.
 pub(crate) struct MeshInterface {
-    /// Indices of its nodes.
+    /// Indices of the nodes.
     pub nodes: Vec<usize>,
-    /// Its reference point; of a free interface, the mean of its nodes. Unit: length.
+    /// Reference point; for a free interface the mean of its nodes. Unit: length.
     pub reference: Vector3<f64>,
-    /// Whether the nodes determine a rotation.
+    /// True if the nodes determine a rotation.
     pub turns: bool,
 }
 
 impl Mesh {
-    /// The nodes of `body` that `points` asks for.
+    /// Builds the mesh of the nodes of `body` selected by `points`.
     pub(super) fn new(body: &FlexBody, points: &Points) -> Self {
         match points {
             Points::Usual | Points::Nodes => Self::of_all_nodes(body),
@@ -83,16 +83,17 @@ impl Mesh {
     }
 }
 
-/// A mesh that grows place by place.
+/// Mesh under construction, extended place by place.
 struct MeshBuilder<'b> {
     body: &'b FlexBody,
     mesh: Mesh,
-    /// The motion of every node in each mode.
+    /// Motion of every node in each mode.
     columns: Vec<Vec<Vector3<f64>>>,
 }
 
 impl MeshBuilder<'_> {
-    /// Adds one node, or the six of a cross with this `arm` where the place turns; answers their indices.
+    /// Adds one node, or the six nodes of a cross with this `arm` if the place has a rotation. Returns their
+    /// indices.
     fn add(&mut self, frame: &ExportFrame, arm: f64) -> Vec<usize> {
         let column = |a: &Mat<f64>, j: usize| Vector3::from_fn(|k, _| a[(k, j)]);
         let offsets: Vec<Vector3<f64>> = match frame.rotation {
@@ -123,14 +124,15 @@ impl MeshBuilder<'_> {
     }
 }
 
-/// The reference point; a free interface, which has none of its own, is given the mean of its nodes.
+/// Returns the reference point; for a free interface without one the mean of its nodes.
 fn reference(body: &FlexBody, interface: &Interface) -> Vector3<f64> {
     let nodes = &interface.nodes;
     let sum: Vector3<f64> = nodes.iter().map(|&i| Vector3::from(body.nodes().positions[i])).sum();
     interface.reference.map_or(sum / nodes.len() as f64, Vector3::from)
 }
 
-/// Root of the mean square of the distances of the nodes from the reference point.
+/// Returns the length of the arms of a cross: the root mean square distance of the nodes from the reference
+/// point, but at least a fixed part of the largest distance in the body.
 fn arm_of(body: &FlexBody, interface: &Interface) -> f64 {
     let centre = reference(body, interface);
     let square = |position: &[f64; 3]| (Vector3::from(*position) - centre).norm_squared();
@@ -140,7 +142,8 @@ fn arm_of(body: &FlexBody, interface: &Interface) -> f64 {
     arm.max(ARM * farthest)
 }
 
-/// Whether the positions of the nodes determine a rotation: Exudyn's bodies have no others.
+/// Returns true if the positions of the nodes determine a rotation; bodies of Exudyn have no rotations of
+/// nodes.
 fn turns(body: &FlexBody, interface: &Interface) -> bool {
     let about = Interface { reference: interface.reference.or(Some([0.0; 3])), ..interface.clone() };
     let still = Mat::zeros(3 * body.n_nodes(), 1);

@@ -1,4 +1,4 @@
-//! Exudyn: the file of a body, and beside it a program that joins its interfaces to others.
+//! Exudyn: the file of a body, and an accompanying program that joins its interfaces to others.
 
 mod interfaces;
 mod mesh;

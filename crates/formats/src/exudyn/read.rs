@@ -1,5 +1,5 @@
-//! Reader and checks. Names as in FEM.py of Exudyn 1.13.6; row or column 3 j + a of a large array belongs to
-//! axis a of mode j.
+//! Reader and checks of Exudyn files. Names follow FEM.py of Exudyn 1.13.6; row or column 3 j + a of a large
+//! array belongs to axis a of mode j.
 
 use crate::import::hdf5_arrays::Hdf5Arrays;
 use crate::import::redundant::{ROUNDING, Redundant, in_other_order, lacks_w2, relative};
@@ -15,7 +15,7 @@ use flexbody_model::SurfaceMesh;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashSet;
 
-/// The format.
+/// Import format of Exudyn.
 pub(crate) struct Exudyn;
 
 const REQUIRED: [&str; 16] = [
@@ -53,6 +53,7 @@ impl ImportFormat for Exudyn {
     fn read(&self, file: &InputFile) -> Result<ImportedFile> {
         let mut arrays = Hdf5Arrays::open(file)?;
         arrays.require(&REQUIRED)?;
+        // Sizes, shapes and positions, which must agree with each other.
         let (rows, nf) = arrays.extents("modeBasis")?;
         let n = rows / 3;
         if !rows.is_multiple_of(3) {
@@ -65,6 +66,7 @@ impl ImportFormat for Exudyn {
             let what = format!("expected {nf} modes, {n} nodes and dimension 3 first, found {info:?}");
             return Err(arrays.refuse("infoList", &what));
         }
+        // Inertia arrays and their identities.
         let given = Given::read(&mut arrays, nf)?;
         let told = given.numbered();
         let general = arrays.attribute("massMatrixReduced", "mass_structure").as_deref() == Some("general");
@@ -82,6 +84,7 @@ impl ImportFormat for Exudyn {
         if general {
             notes.push("the mass does not commute with rotations, says the file: modal mass and mPsiTildePsiTilde need not agree".to_owned());
         }
+        // Parts that a body cannot hold, or that the file lacks.
         let mut lacks = Vec::new();
         let mesh = mesh(&mut arrays, n, &mut lacks)?;
         if arrays.has_members(STRESSES) {
@@ -113,7 +116,8 @@ impl ImportFormat for Exudyn {
     }
 }
 
-/// Numbers of the nodes in the FE model, which files of flexbody state; else those by which Exudyn counts, from 0.
+/// Returns the node numbers of the FE model, which files of flexbody state; otherwise the numbers of Exudyn,
+/// from 0.
 fn labels(arrays: &mut Hdf5Arrays, n: usize) -> Result<Vec<i64>> {
     let counted = || (0..n as i64).collect();
     if !arrays.has(NUMBERS) {
@@ -123,17 +127,17 @@ fn labels(arrays: &mut Hdf5Arrays, n: usize) -> Result<Vec<i64>> {
     if numbers.len() != n {
         return Err(arrays.refuse(NUMBERS, &format!("expected {n} numbers, found {}", numbers.len())));
     }
-    // The nodes of a cross have one number together.
+    // The nodes of an interface cross share one number.
     let distinct: HashSet<i64> = numbers.iter().copied().collect();
     Ok(if distinct.len() == n { numbers } else { counted() })
 }
 
-/// Triangles for drawing and contact: three indices of nodes each (k x 3), or nothing.
+/// Returns the triangles for drawing and contact (k x 3 node indices) as a surface; `None` if there are none.
 fn mesh(arrays: &mut Hdf5Arrays, n: usize, lacks: &mut Vec<String>) -> Result<Option<SurfaceMesh>> {
     if !arrays.has(TRIANGLES) {
         return Ok(None);
     }
-    // An empty list is one of floats in files of Exudyn.
+    // Files of Exudyn store an empty list as floats.
     let corners = match arrays.values::<f64>(TRIANGLES) {
         Ok(found) if found.values.is_empty() => return Ok(None),
         _ => arrays.integers(TRIANGLES)?,
@@ -142,7 +146,7 @@ fn mesh(arrays: &mut Hdf5Arrays, n: usize, lacks: &mut Vec<String>) -> Result<Op
     Ok(surface(TRIANGLES, &triangles, n, lacks))
 }
 
-/// The arrays of the file.
+/// Arrays of the file.
 struct Given {
     mass: f64,
     mtt: Mat<f64>,
@@ -186,7 +190,8 @@ impl Given {
         self.numbered_with(|axis, mode| 3 * mode + axis)
     }
 
-    /// With the place `at(axis, mode)` of an axis of a mode in large arrays.
+    /// Returns the numbered invariants; `at(axis, mode)` gives the position of an axis of a mode in large
+    /// arrays.
     fn numbered_with(&self, at: impl Fn(usize, usize) -> usize) -> Numbered {
         let nf = self.nf();
         let i9 = |row: usize, column: usize| {
@@ -271,7 +276,8 @@ impl Given {
         checks
     }
 
-    /// Arrays that are wrong by modes and right by axes are laid out by axes.
+    /// Detects large arrays ordered by axes: their identities fail in the order by modes and hold in the
+    /// order by axes.
     fn layout(&self, checks: &mut [AuditCheck]) {
         let nf = self.nf();
         let by_axes = |axis: usize, mode: usize| axis * nf + mode;
@@ -300,7 +306,7 @@ impl Given {
     fn chi_missed(&self, told: &Numbered) -> f64 {
         let skew = self.chi.cross_matrix();
         let entries = (0..9).map(|ij| (self.chi_tilde[(ij / 3, ij % 3)] - skew[(ij / 3, ij % 3)]).abs());
-        // Of a body with its centre of mass in the origin the radius of gyration is the scale.
+        // The scale is the radius of gyration, for a centre of mass at the origin.
         let gyration = (0.5 * told.i7.trace() / self.mass).abs().sqrt();
         relative(entries.fold(0.0, larger), gyration)
     }

@@ -1,10 +1,10 @@
 //! Exudyn: the file that `ObjectFFRFreducedOrderInterface.LoadFromFile` reads (FEM.py, 1.13.6).
 //!
-//! The nodal formulation of Zwölfer and Gerstmayr (Acta Mech. 2021) with matrices that are blocked by modes:
-//! three columns, along x, y and z, for each mode. With S_j~ the skew matrices of a mode shape and x~ those
-//! of the positions, mPsiTildePsi = int S_j~' S_k = -I5, mPsiTildePsiTilde = int S_j~' S_k~ = -I9, mPhitTPsi
-//! = int S_j = I3, mPhitTPsiTilde = int S_j~, mXRefTildePsi = int x~' S_j = -I4, mXRefTildePsiTilde = int x~'
-//! S_j~ = I8.
+//! The file follows the nodal formulation of Zwölfer and Gerstmayr (Acta Mech. 2021) with matrices that are
+//! blocked by modes: three columns, along x, y and z, for each mode. With the skew matrices S_j~ of a mode
+//! shape and x~ of the positions, mPsiTildePsi = int S_j~' S_k = -I5, mPsiTildePsiTilde = int S_j~' S_k~ =
+//! -I9, mPhitTPsi = int S_j = I3, mPhitTPsiTilde = int S_j~, mXRefTildePsi = int x~' S_j = -I4,
+//! mXRefTildePsiTilde = int x~' S_j~ = I8.
 
 use super::interfaces;
 use super::mesh::Mesh;
@@ -17,7 +17,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::Numbered;
 use nalgebra::{Matrix3, Vector3};
 
-/// The format.
+/// Export format of Exudyn.
 pub(crate) struct Exudyn;
 
 impl ExportFormat for Exudyn {
@@ -46,7 +46,7 @@ impl ExportFormat for Exudyn {
             inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
             damping: losses::damping(body),
             shapes: Held,
-            // An interface as a cross of nodes turns as it does in the body.
+            // An interface written as a cross of nodes rotates exactly as in the body.
             rotations: if options.points.of_interfaces() { Held } else { losses::rotations(body) },
             internal_rows: losses::internal_rows(body),
             gravity: Held,
@@ -67,8 +67,8 @@ impl ExportFormat for Exudyn {
     }
 }
 
-/// Contents of the file, in the order of the program's own writer. The attribute `datatype` is the Python
-/// type.
+/// Returns the contents of the file in the order of the writer of Exudyn. The attribute `datatype` is the
+/// Python type.
 fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     let (n, nf) = (mesh.numbers.len(), body.n_modes());
     let told = inertia(body);
@@ -98,8 +98,8 @@ fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     all
 }
 
-/// Triangles of the surface by the indices of mesh nodes (k x 3), for drawing and contact; none if the mesh is not
-/// that of the nodes.
+/// Returns the triangles of the surface as indices of mesh nodes (k x 3) for drawing and contact; empty if
+/// the mesh does not consist of the nodes of the body.
 fn triangles(body: &FlexBody, mesh: &Mesh) -> Hdf5Contents {
     let own = body.mesh().filter(|_| mesh.numbers == body.nodes().ids);
     let corners: Vec<i64> = own.map_or(Vec::new(), |own| {
@@ -108,8 +108,8 @@ fn triangles(body: &FlexBody, mesh: &Mesh) -> Hdf5Contents {
     Hdf5Contents::Integers(vec![corners.len() / 3, 3], corners)
 }
 
-/// m_ff; for a mass that does not commute with rotations with an attribute that says so, as no array of the
-/// file tells: m_ff and mPsiTildePsiTilde then need not agree. Exudyn does not look at it.
+/// Returns m_ff. For a mass that does not commute with rotations an attribute states it, because no array
+/// does: m_ff and mPsiTildePsiTilde then need not agree. Exudyn ignores the attribute.
 fn modal_mass(body: &FlexBody, told: &Numbered) -> Hdf5Entry {
     let entry = array("massMatrixReduced", Hdf5Contents::matrix(&told.i6));
     match body.invariants().general() {
@@ -118,7 +118,8 @@ fn modal_mass(body: &FlexBody, told: &Numbered) -> Hdf5Entry {
     }
 }
 
-/// What couples translation, rotation and modes. Row or column 3 j + a belongs to axis a of mode j.
+/// Returns the arrays that couple translation, rotation and modes. Row or column 3 j + a belongs to axis a of
+/// mode j.
 fn coupling(told: &Numbered, nf: usize) -> Vec<Hdf5Entry> {
     let zero = || 0.0;
     let i5 = |row: usize, k: usize| told.i5.as_ref().map_or_else(zero, |i5| i5[(row % 3 * nf + row / 3, k)]);

@@ -1,4 +1,4 @@
-//! What moves: every mode by itself, or a simulation.
+//! Animations: every mode by itself, or a simulation.
 
 use super::binary::Binary;
 use crate::picture::Played;
@@ -6,14 +6,16 @@ use nalgebra::{UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
-/// Seconds that a period of a mode takes, and the motion of a simulation.
+/// Duration of a period of a mode, and of the motion of a simulation. Unit: s.
 const PERIOD: f64 = 2.0;
 pub(super) const MOTION: f64 = 8.0;
 
-/// Key frames of a period, between which weights go along lines.
+/// Number of key frames of a period; viewers interpolate weights linearly between them. A larger value is
+/// smoother and makes the file larger.
 const STEPS: usize = 32;
 
-/// One animation for each mode, of one period, with sinusoidal weights from -1 to 1 on the mesh of `node`.
+/// Returns one animation for each mode: one period with sinusoidal weights from -1 to 1 on the mesh of
+/// `node`.
 pub(super) fn of_modes(binary: &mut Binary, names: &[String], node: usize) -> Vec<Value> {
     if names.is_empty() {
         return Vec::new();
@@ -36,8 +38,8 @@ pub(super) fn of_modes(binary: &mut Binary, names: &[String], node: usize) -> Ve
     all
 }
 
-/// A simulation: place and attitude of `node`, and weights of its mesh, which are the modal coordinates over
-/// their `largest`. Lengths are in units of so many `metres`.
+/// Returns the animation of a simulation: position and attitude of `node`, and the weights of its mesh, which
+/// are the modal coordinates divided by their `largest` values. One unit of length has `metres` metres.
 pub(super) fn of_motion(
     binary: &mut Binary,
     played: &Played<'_>,
@@ -67,14 +69,14 @@ pub(super) fn of_motion(
     json!({ "name": played.scene(), "samplers": samplers, "channels": channels })
 }
 
-/// Place of the frame at an instant, in metres.
+/// Returns the position of the frame at an output time, in metres.
 pub(super) fn place(played: &Played<'_>, instant: usize, metres: f64) -> [f32; 3] {
     let origin: Vector3<f64> = played.origin(instant) * metres;
     <[f64; 3]>::from(origin).map(|x| x as f32)
 }
 
-/// Instants at times that ascend, which those of a file and their rounding may not, and attitudes between
-/// which the way is the shorter one.
+/// Key frames with strictly ascending times, which rounding to single precision may violate, and attitudes
+/// (quaternions) with signs for the shorter rotation between them.
 struct KeyFrames {
     instants: Vec<usize>,
     times: Vec<f32>,

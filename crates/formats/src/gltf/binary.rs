@@ -1,8 +1,8 @@
-//! The two parts of a file: a description in JSON, and the numbers that it refers to.
+//! The two parts of a file: a description in JSON, and the binary numbers that it refers to.
 
 use serde_json::{Value, json};
 
-/// Types of numbers, and what buffer views are for, as glTF numbers them.
+/// Component types and targets of buffer views in the numbering of glTF.
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const VERTICES: u32 = 34962;
@@ -17,19 +17,19 @@ pub(super) struct Binary {
 }
 
 impl Binary {
-    /// Vectors at vertices, with their bounds; answers the number of the accessor, as the others do.
+    /// Adds vectors at vertices with their bounds, and returns the number of the accessor.
     pub(super) fn vertices(&mut self, vectors: &[[f32; 3]]) -> usize {
         let accessor = self.floats("VEC3", vectors, Some(VERTICES));
         self.bound(accessor, vectors);
         accessor
     }
 
-    /// Vectors at vertices that need no bounds.
+    /// Adds vectors at vertices without bounds, and returns the number of the accessor.
     pub(super) fn directions(&mut self, vectors: &[[f32; 3]]) -> usize {
         self.floats("VEC3", vectors, Some(VERTICES))
     }
 
-    /// Numbers of vertices.
+    /// Adds vertex indices, and returns the number of the accessor.
     pub(super) fn indices(&mut self, indices: &[u32]) -> usize {
         let bytes = indices.iter().flat_map(|index| index.to_le_bytes());
         let view = self.view(bytes, Some(INDICES));
@@ -38,7 +38,7 @@ impl Binary {
         }))
     }
 
-    /// Times of key frames, ascending.
+    /// Adds times of key frames, ascending, and returns the number of the accessor.
     pub(super) fn times(&mut self, times: &[f32]) -> usize {
         let times: Vec<[f32; 1]> = times.iter().map(|time| [*time]).collect();
         let accessor = self.floats("SCALAR", &times, None);
@@ -46,7 +46,7 @@ impl Binary {
         accessor
     }
 
-    /// Values at key frames.
+    /// Adds values at key frames, and returns the number of the accessor.
     pub(super) fn keys<const N: usize>(&mut self, kind: &str, keys: &[[f32; N]]) -> usize {
         self.floats(kind, keys, None)
     }
@@ -68,7 +68,7 @@ impl Binary {
         self.accessors[accessor]["max"] = json!(each(f32::max));
     }
 
-    /// All numbers have four bytes, so every view begins where they may.
+    /// Adds a buffer view. All numbers have four bytes, so that every view is aligned.
     fn view(&mut self, bytes: impl Iterator<Item = u8>, target: Option<u32>) -> usize {
         let offset = self.data.len();
         self.data.extend(bytes);
@@ -86,7 +86,7 @@ impl Binary {
         self.accessors.len() - 1
     }
 
-    /// The file; `None` where it is longer than its lengths can say.
+    /// Returns the bytes of the file; `None` if the file is longer than its length fields can state.
     pub(super) fn file(self, mut document: Value) -> Option<Vec<u8>> {
         document["buffers"] = json!([{ "byteLength": self.data.len() }]);
         document["bufferViews"] = Value::Array(self.views);

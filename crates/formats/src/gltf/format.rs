@@ -1,9 +1,9 @@
-//! glTF: the surface with a morph target for each mode, and animations of them.
+//! glTF: the surface with a morph target for each mode, and animations of the targets.
 //! <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>
 //!
-//! Lengths are metres and y is up, as glTF demands: a node at the top turns the axes of the model, whose z is
-//! taken as up. Below it the node of the body has the mesh, and one node for each interface with a reference
-//! point.
+//! Lengths are in metres and y points upwards, as glTF requires: a root node rotates the axes of the model,
+//! whose z axis is taken as vertical. Its child, the node of the body, has the mesh and one child for each
+//! interface with a reference point.
 
 use super::animations::{MOTION, of_modes, of_motion, place};
 use super::binary::Binary;
@@ -20,19 +20,20 @@ use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// The format.
+/// Export format of glTF.
 pub(crate) struct Gltf;
 
-/// Modes where nobody says how many: as many morph targets as every viewer should play.
+/// Default number of modes: as many morph targets as every viewer should play. More targets may be ignored by
+/// a viewer.
 const MODES: usize = 8;
 
-/// Largest displacement of a mode, as part of the largest extent of the body.
+/// Largest displacement of a mode, relative to the largest extent of the body.
 const DEFLECTION: f64 = 0.1;
 
-/// Numbers of all key frames of a motion at the most.
+/// Largest count of numbers in all key frames of a motion; a longer motion is thinned.
 const MOST_NUMBERS: usize = 2_000_000;
 
-/// Nodes of the file: the axes, the body; then the interfaces.
+/// Indices of the nodes of the file: axes, body, first interface.
 const AXES: usize = 0;
 const BODY: usize = 1;
 const INTERFACES: usize = 2;
@@ -50,7 +51,8 @@ impl ExportFormat for Gltf {
         true
     }
 
-    /// Mechanical properties are not applicable to a picture; [`leaves_out`](Self::leaves_out) names them.
+    /// Returns mechanical properties as not applicable to a picture; [`leaves_out`](Self::leaves_out) names
+    /// them.
     fn checklist(&self, _: &FlexBody, _: &ExportOptions) -> ExportChecklist {
         ExportChecklist {
             rigid_coupling: NotApplicable,
@@ -110,7 +112,7 @@ impl ExportFormat for Gltf {
     }
 }
 
-/// Number of modes that are shown: of a motion all of them.
+/// Returns the number of modes in the picture; by default all modes for a motion.
 fn modes(body: &FlexBody, options: &ExportOptions) -> usize {
     let usual = if options.motion.is_some() { body.n_modes() } else { body.n_modes().min(MODES) };
     options.modes.unwrap_or(usual)
@@ -120,16 +122,16 @@ fn played(motion: &RecordedMotion) -> Played<'_> {
     Played::new(motion, MOST_NUMBERS / (8 + motion.modes))
 }
 
-/// What the file shows.
+/// Contents of the picture.
 struct DrawnScene<'b> {
     body: &'b FlexBody,
     drawn: Drawn<'b>,
     names: Vec<String>,
-    /// What the positions of the mesh are told from: the origin of the frame, in model coordinates.
+    /// Origin of the frame in model coordinates; positions of the mesh are relative to it.
     origin: Vector3<f64>,
-    /// Metres in a unit of length.
+    /// Metres per unit of length.
     metres: f64,
-    /// The largest value of each modal coordinate in the motion; empty without one.
+    /// Largest value of each modal coordinate in the motion; empty without a motion.
     largest: Vec<f64>,
 }
 
@@ -149,10 +151,10 @@ impl<'b> DrawnScene<'b> {
         }
     }
 
-    /// The file.
+    /// Returns the bytes of the file.
     ///
     /// # Errors
-    /// [`ExportLoses`](Code::ExportLoses) where a length is beyond single precision, or the file too long.
+    /// [`ExportLoses`](Code::ExportLoses) if a length is beyond single precision, or the file is too long.
     fn file(&self, played: Option<&Played<'_>>) -> Result<Vec<u8>> {
         let mut binary = Binary::default();
         let mesh = self.mesh(&mut binary, played.is_some())?;
@@ -187,14 +189,17 @@ impl<'b> DrawnScene<'b> {
             let one = |point: &u32| single(Vector3::from(of_points[*point as usize]));
             vertices.points.iter().map(one).collect::<Result<Vec<_>>>()
         };
+        // Undeformed positions relative to the frame origin, in metres.
         let told: Vec<[f64; 3]> =
             positions.iter().map(|x| ((Vector3::from(*x) - self.origin) * self.metres).into()).collect();
         let position = binary.vertices(&at_vertices(&told)?);
+        // One morph target per mode: displacements at weight one.
         let mut targets = Vec::new();
         for j in 0..self.names.len() {
             let target = if moves { self.largest_motion(j) } else { self.scaled_shape(j) };
             targets.push(json!({ "POSITION": binary.vertices(&at_vertices(&target)?) }));
         }
+        // Triangles (mode 4), lines (mode 1) or, without both, points (mode 0).
         let mut primitives = Vec::new();
         if !vertices.triangles.is_empty() {
             let normal = binary.directions(&vertices.normals);
@@ -222,14 +227,14 @@ impl<'b> DrawnScene<'b> {
         Ok(mesh)
     }
 
-    /// A mode with the largest displacement that pictures of modes have, in metres.
+    /// Returns a mode in metres, scaled to the displacement that pictures of modes have.
     fn scaled_shape(&self, j: usize) -> Vec<[f64; 3]> {
         let shape = self.drawn.shape(j);
         let component = shape.as_flattened().iter().fold(0.0f64, |own, x| own.max(x.abs()));
         if component == 0.0 {
             return shape;
         }
-        // Squares of the largest numbers and of the smallest are none.
+        // Normalises by the largest component first, so that squares neither overflow nor underflow.
         let parts: Vec<Vector3<f64>> = shape.iter().map(|u| Vector3::from(*u) / component).collect();
         let longest = parts.iter().map(Vector3::norm).fold(0.0, f64::max);
         let extent = self.body.extent();
@@ -237,7 +242,7 @@ impl<'b> DrawnScene<'b> {
         parts.iter().map(|part| (part / longest * wanted).into()).collect()
     }
 
-    /// A mode as large as it ever is in the motion, in metres.
+    /// Returns a mode in metres at its largest amplitude in the motion.
     fn largest_motion(&self, j: usize) -> Vec<[f64; 3]> {
         let one = |u: &[f64; 3]| u.map(|x| x * self.largest[j] * self.metres);
         self.drawn.shape(j).iter().map(one).collect()
@@ -246,7 +251,7 @@ impl<'b> DrawnScene<'b> {
     fn nodes(&self, played: Option<&Played<'_>>) -> Result<Vec<Value>> {
         let start = match played {
             Some(played) => {
-                // That the file holds all of them is found out here.
+                // Checks that all positions of the motion fit single precision.
                 (0..played.len()).try_for_each(|at| finite(place(played, at, self.metres)).map(drop))?;
                 place(played, 0, self.metres)
             }
@@ -282,7 +287,7 @@ fn material(name: &str, colour: [f64; 4], both_sides: bool) -> Value {
     })
 }
 
-/// A vector in single precision.
+/// Returns a vector in single precision.
 fn single(x: Vector3<f64>) -> Result<[f32; 3]> {
     finite(<[f64; 3]>::from(x).map(|x| x as f32))
 }

@@ -1,36 +1,37 @@
-//! Vertices of a surface: a point has one for each smooth part of the surface around it, so that feature
-//! edges stay sharp.
+//! Vertices of a surface. A point has one vertex for each smooth part of the surface around it, so that
+//! feature edges remain sharp.
 
 use crate::picture::Drawn;
 use nalgebra::Vector3;
 use std::collections::HashSet;
 
-/// Where nothing says how a surface lies.
+/// Normal of a vertex without triangles.
 const UP: [f32; 3] = [0.0, 0.0, 1.0];
 
-/// Vertices and what is drawn between them.
+/// Vertices, and the triangles and lines between them.
 pub(super) struct Vertices {
-    /// The point that each vertex is.
+    /// Point of each vertex.
     pub points: Vec<u32>,
-    /// Triangles, by vertices.
+    /// Triangles as vertex indices.
     pub triangles: Vec<[u32; 3]>,
-    /// Lines, by vertices.
+    /// Lines as vertex indices.
     pub edges: Vec<[u32; 2]>,
-    /// Of length one; those of vertices without triangles mean nothing.
+    /// Normals of length one; those of vertices without triangles have no meaning.
     pub normals: Vec<[f32; 3]>,
 }
 
 impl Vertices {
-    /// The vertices of what is drawn, whose points lie at `positions`.
+    /// Builds the vertices of the drawn parts, whose points lie at `positions`.
     pub(super) fn new(drawn: &Drawn<'_>, positions: &[[f64; 3]]) -> Self {
         let (triangles, edges) = (drawn.triangles(), drawn.edges());
         let mut groups = CornerGroups::new(3 * triangles.len());
         join_smooth(triangles, edges, &mut groups);
         let mut own =
             Self { points: Vec::new(), triangles: Vec::new(), edges: Vec::new(), normals: Vec::new() };
-        // The first vertex of each point.
+        // First vertex of each point.
         let mut first = vec![None; drawn.len()];
         let mut of_group = vec![None; 3 * triangles.len()];
+        // One vertex for each smooth group of corners at a point.
         for (t, triangle) in triangles.iter().enumerate() {
             let corner = |k: usize| {
                 let group = groups.root(3 * t + k);
@@ -41,6 +42,7 @@ impl Vertices {
             let corners = [0, 1, 2].map(corner);
             own.triangles.push(corners);
         }
+        // Lines use the first vertex of a point.
         for edge in edges {
             let ends = edge.map(|point| *first[point as usize].get_or_insert_with(|| own.add(point)));
             own.edges.push(ends);
@@ -57,13 +59,14 @@ impl Vertices {
         self.points.len() as u32 - 1
     }
 
-    /// Means of the normals of the triangles around each vertex, weighted by area.
+    /// Returns the mean normals of the triangles around each vertex, weighted by area.
     fn normals(&self, positions: &[[f64; 3]]) -> Vec<[f32; 3]> {
-        // Products of the largest lengths and of the smallest stay numbers.
+        // Positions are scaled so that products neither overflow nor underflow.
         let size = positions.as_flattened().iter().fold(0.0f64, |own, x| own.max(x.abs()));
         let size = if size > 0.0 { size } else { 1.0 };
         let place = |vertex: u32| Vector3::from(positions[self.points[vertex as usize] as usize]) / size;
         let mut sums = vec![Vector3::zeros(); self.points.len()];
+        // The cross product of two sides is the normal times twice the area.
         for &[a, b, c] in &self.triangles {
             let area = (place(b) - place(a)).cross(&(place(c) - place(a)));
             for vertex in [a, b, c] {
@@ -78,11 +81,12 @@ impl Vertices {
     }
 }
 
-/// Joins the corners of triangles that share an edge which is no feature, and lie alike on both sides of it.
+/// Joins the corners of triangles that share an edge which is no feature edge, if the triangles have the same
+/// orientation.
 fn join_smooth(triangles: &[[u32; 3]], edges: &[[u32; 2]], groups: &mut CornerGroups) {
     let sorted = |[a, b]: [u32; 2]| if a < b { [a, b] } else { [b, a] };
     let features: HashSet<[u32; 2]> = edges.iter().map(|edge| sorted(*edge)).collect();
-    // Edge, its direction, and the corners at its ends, first the one with the lower point.
+    // Sides: edge, its direction, and the corners at its ends, the corner with the lower point first.
     let mut sides: Vec<([u32; 2], bool, [usize; 2])> = Vec::with_capacity(3 * triangles.len());
     for (t, triangle) in triangles.iter().enumerate() {
         for k in 0..3 {
@@ -93,6 +97,7 @@ fn join_smooth(triangles: &[[u32; 3]], edges: &[[u32; 2]], groups: &mut CornerGr
         }
     }
     sides.sort_unstable();
+    // Two sides in opposite directions belong to triangles of the same orientation.
     for shared in sides.chunk_by(|a, b| a.0 == b.0) {
         if let [(edge, false, one), (_, true, other)] = shared
             && !features.contains(edge)
@@ -103,7 +108,7 @@ fn join_smooth(triangles: &[[u32; 3]], edges: &[[u32; 2]], groups: &mut CornerGr
     }
 }
 
-/// Groups of corners: each points to another of its group, the first to itself.
+/// Groups of corners (union-find): each corner points to another of its group, the first to itself.
 struct CornerGroups(Vec<usize>);
 
 impl CornerGroups {

@@ -1,14 +1,15 @@
-//! Accepts the body of another program's file only where every identity of a body holds.
+//! Acceptance of imported bodies by the identities of every body.
 
 use super::Imported;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::verification::own_identities;
 
-/// Refuses an imported body that an identity of theory section 10 does not hold for: its file contradicts itself.
+/// Returns an error for an imported body that violates an identity of theory section 10: its file contradicts
+/// itself.
 ///
 /// # Errors
-/// [`ForeignUnsound`](Code::ForeignUnsound), one for every identity that does not hold.
+/// [`ForeignUnsound`](Code::ForeignUnsound), one diagnostic for every violated identity.
 pub fn accept_imported(imported: &Imported) -> Result<()> {
     let broken = own_identities(&imported.body).into_iter().filter(|check| !check.passed);
     let found: Vec<Diagnostic> = broken

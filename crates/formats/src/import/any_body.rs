@@ -1,9 +1,9 @@
-//! What is asked of every body, whatever its modes are.
+//! Requirements on every body, for any modes.
 
 use flexbody_body::invariants::{BodyFrame, Expected, Numbered, Turning};
 use nalgebra::Matrix3;
 
-/// The identities that hold in any modes.
+/// Expectations for identities that hold for any modes.
 pub(crate) const ANY_BODY: Expected<'static> = Expected {
     mass_normalised: false,
     free_surface: false,
@@ -15,15 +15,15 @@ pub(crate) const ANY_BODY: Expected<'static> = Expected {
     turning: Turning::None,
 };
 
-/// What counts as rounding in files of 10 digits and more, relative to Cauchy-Schwarz bounds; what is told
-/// twice differs by no more.
+/// Rounding in files with 10 digits and more, relative to Cauchy-Schwarz bounds. Redundant numbers may differ
+/// by this much.
 pub(crate) const DIGITS: f64 = 1e-9;
 
-/// What a principal moment of zero means.
+/// Meaning of a principal moment of zero.
 pub(crate) const NO_INERTIA: &str = "rotation about an axis through the centre of mass has no inertia: all masses lie on a line, or the inertia of the nodes is missing";
 
-/// Number of principal moments about the centre of mass that are zero but for rounding; NaN where they cannot
-/// be computed.
+/// Returns the number of principal moments about the centre of mass that are zero up to rounding; NaN if they
+/// cannot be computed.
 pub(crate) fn axes_without_inertia(inertia: &Numbered) -> f64 {
     const NOTHING: f64 = 1e-12;
     let centre = inertia.i2 / inertia.i1;
@@ -32,7 +32,7 @@ pub(crate) fn axes_without_inertia(inertia: &Numbered) -> f64 {
     if about_centre.iter().any(|entry| !entry.is_finite()) {
         return f64::NAN;
     }
-    // Rounding is that of the moments about the origin.
+    // The scale of rounding is that of the moments about the origin.
     let size = inertia.i7.amax();
     let moments = (0.5 * (about_centre + about_centre.transpose())).symmetric_eigenvalues();
     moments.iter().filter(|moment| moment.abs() <= NOTHING * size).count() as f64

@@ -1,4 +1,4 @@
-//! The audit of a file: what its format promises, and what every flexible body must fulfil.
+//! Audit of a file: checks of its format, and identities of every flexible body.
 
 use super::any_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
 use super::kind_of_modes::beside_free_surface;
@@ -9,8 +9,9 @@ use flexbody_body::flex_body::rigid_motions;
 use flexbody_body::invariants::{IdentityCheck, Invariants, identities};
 use flexbody_linalg::{dense_cholesky, symmetric_eigen};
 
-/// Radius of gyration relative to the extent of the places of the body: a rod has 0.29, a ring 0.5. Far
-/// outside lengths have different units; frames may stand for a part of a body only.
+/// Range of the radius of gyration relative to the extent of the frames: a rod has 0.29, a ring 0.5. Values
+/// far outside indicate different units of length; the range is wide because frames may cover only a part of
+/// a body.
 const GYRATION: (f64, f64) = (0.02, 5.0);
 
 /// Facts and checks of a file.
@@ -18,38 +19,38 @@ const GYRATION: (f64, f64) = (0.02, 5.0);
 pub struct Audit {
     /// Name of the format.
     pub format: &'static str,
-    /// The variant.
+    /// Detected dialect of the format.
     pub dialect: String,
-    /// Name of the body, where the file has one.
+    /// Name of the body; empty if the file has none.
     pub name: String,
-    /// m. Unit: mass of the file.
+    /// Mass m. Unit: mass of the file.
     pub mass: f64,
     /// Number of modes.
     pub n_modes: usize,
     /// Number of nodes or frames.
     pub n_frames: usize,
-    /// Frequencies sqrt(lambda) / (2 pi) of the modes by themselves, cycles per time unit of the file.
+    /// Frequencies sqrt(lambda) / (2 pi) of the modes, in cycles per time unit of the file.
     pub frequencies: Vec<f64>,
-    /// Facts that are no fault.
+    /// Notes on facts that are no errors.
     pub notes: Vec<String>,
-    /// Every check, those of the format first.
+    /// All checks, those of the format first.
     pub checks: Vec<AuditCheck>,
 }
 
 impl Audit {
-    /// The diagnostics of the checks that failed.
+    /// Returns the diagnostics of the failed checks.
     pub fn findings(&self) -> Vec<Diagnostic> {
         self.checks.iter().filter_map(AuditCheck::finding).collect()
     }
 
-    /// Whether every check passed.
+    /// Returns true if every check passed.
     pub fn passed(&self) -> bool {
         self.checks.iter().all(AuditCheck::passed)
     }
 }
 
-/// Holds a file to its format and to theory section 10. Identities pass up to `tolerance`, relative to the
-/// size of their terms, or the rounding of their formulas where that is more.
+/// Checks a file against its format and theory section 10. Identities pass up to `tolerance`, relative to the
+/// size of their terms, or up to the rounding of their formulas if that is larger.
 pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
     let body = &file.body;
     let invariants =
@@ -58,12 +59,12 @@ pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
     let mut notes = file.notes.clone();
     let identities_of_any_body = identities(&invariants, &ANY_BODY);
     if let Some(cause) = identities_of_any_body.iter().find(|check| is_cause_of_others(check)) {
-        // What follows from it would only repeat it.
+        // Checks that depend on the failed cause would only repeat it.
         checks.retain(|check| check.value.is_finite());
         checks.push(of_identity(cause.clone()));
         notes.push("checks that need a mass, and numbers, are left out".to_owned());
     } else {
-        // Of a mass that does not commute with rotations no file tells W0, which this one needs.
+        // For a mass that does not commute with rotations no file states W0, which this identity needs.
         let told = |check: &IdentityCheck| check.name != "velocity_gram_psd";
         checks.extend(identities_of_any_body.into_iter().filter(told).map(of_identity));
         checks.push(turns(body));
@@ -92,12 +93,13 @@ pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
     }
 }
 
-/// Whether a check fails without which no other means anything.
+/// Returns true if a check failed without which the other checks have no meaning.
 fn is_cause_of_others(check: &IdentityCheck) -> bool {
     matches!(check.name, "finite" | "mass_positive") && !check.passed
 }
 
-/// Rotation about every axis has inertia: [`import_body`](super::import_body()) makes no other body.
+/// Checks that the rotation about every axis has inertia; [`import_body`](super::import_body()) rejects other
+/// bodies.
 fn turns(body: &ImportedBody) -> AuditCheck {
     AuditCheck {
         name: "turns_about_every_axis",
@@ -109,10 +111,10 @@ fn turns(body: &ImportedBody) -> AuditCheck {
     }
 }
 
-/// No motion of the modes is rigid: frame and modes would move the body in the same way twice, and the mass matrix of
-/// the free body is singular.
+/// Checks that no combination of the modes is a rigid motion. Otherwise frame and modes describe the same
+/// motion twice, and the mass matrix of the free body is singular.
 fn deform(invariants: &Invariants) -> AuditCheck {
-    // A mass of no body has findings of its own.
+    // An unphysical mass has findings of its own.
     let rigid = rigid_motions(invariants).unwrap_or_default();
     let named = rigid.in_words().unwrap_or_else(|| "modes are rigid motions".to_owned());
     AuditCheck {
@@ -127,7 +129,7 @@ fn deform(invariants: &Invariants) -> AuditCheck {
     }
 }
 
-/// Findings whose size is that of an identity: those that a tolerance is about.
+/// Returns true for findings that are identities, to which a tolerance applies.
 fn is_identity(code: Code) -> bool {
     use Code::{AuditFrame, AuditIdentity, AuditImplausible, AuditLayout, AuditLumped};
     matches!(code, AuditIdentity | AuditLumped | AuditLayout | AuditImplausible | AuditFrame)
@@ -170,7 +172,7 @@ fn of_identity(check: IdentityCheck) -> AuditCheck {
     }
 }
 
-/// Mass and stiffness of the modes.
+/// Returns the checks of mass and stiffness of the modes.
 fn modal_checks(invariants: &Invariants) -> Vec<AuditCheck> {
     let (mass, stiffness) = (invariants.modal_mass(), invariants.modal_stiffness());
     let check = |name, formula, value, code, meaning: &str| AuditCheck {
@@ -218,20 +220,20 @@ fn modal_checks(invariants: &Invariants) -> Vec<AuditCheck> {
     checks
 }
 
-/// |A - A'| relative to the largest entry.
+/// Returns |A - A'| relative to the largest entry.
 fn asymmetry(a: &Mat<f64>) -> f64 {
     let skew = (a - a.transpose()).norm_max();
     if skew == 0.0 { 0.0 } else { skew / a.norm_max() }
 }
 
-/// Inertia, centre of mass and places of the body against each other.
+/// Compares inertia, centre of mass and frames of the body.
 fn size(body: &ImportedBody) -> Vec<AuditCheck> {
     let inertia = &body.inertia;
     let positions: Vec<_> = body.frames.iter().map(|frame| nalgebra::Vector3::from(frame.position)).collect();
     let centre = inertia.i2 / inertia.i1;
     let reach = |x: &nalgebra::Vector3<f64>| positions.iter().map(|y| (x - y).norm()).fold(0.0, f64::max);
     let Some(first) = positions.first() else { return Vec::new() };
-    // At least half of the largest distance of two, whatever place comes first.
+    // The distance from any frame is at least half of the largest distance between two frames.
     let extent = reach(first);
     if positions.len() < 2 || extent <= 0.0 || !extent.is_finite() {
         return Vec::new();
@@ -239,7 +241,7 @@ fn size(body: &ImportedBody) -> Vec<AuditCheck> {
     let about_centre = 0.5 * inertia.i7.trace() - inertia.i1 * centre.norm_squared();
     let gyration = (about_centre.max(0.0) / inertia.i1).sqrt();
     let ratio = gyration / extent;
-    // How many times it is out of range, so that 1 passes.
+    // Factor by which the ratio is outside its range; up to 1 passes.
     let times = (ratio / GYRATION.1).max(GYRATION.0 / ratio);
     let check = |name, formula, value, meaning| AuditCheck {
         name,
@@ -276,7 +278,7 @@ fn size(body: &ImportedBody) -> Vec<AuditCheck> {
     ]
 }
 
-/// The kind of the modes and what ties the frame to the body, in words.
+/// Returns the kind of the modes, and the reference conditions of the frame, in words.
 fn kind_of_modes(invariants: &Invariants, frames: &[ImportedFrame]) -> String {
     let Some(by) = beside_free_surface(invariants) else {
         return "modes are mass-normalised free-surface modes".to_owned();
@@ -292,10 +294,12 @@ fn kind_of_modes(invariants: &Invariants, frames: &[ImportedFrame]) -> String {
     format!("modes are no mass-normalised free-surface modes (by {by:.1e}){places}")
 }
 
-/// Displacement of a node relative to the largest of the mode up to which the node rests.
+/// Largest displacement of a node at rest, relative to the largest displacement of the mode. A smaller value
+/// misses nodes held with rounding.
 const AT_REST: f64 = 1e-9;
 
-/// Labels of the nodes that move in no mode; they may turn, as the ends of a body whose frame follows its chord.
+/// Returns the labels of the nodes that move in no mode. They may rotate, like the ends of a body whose frame
+/// follows its chord.
 fn places_at_rest(frames: &[ImportedFrame]) -> Vec<&str> {
     let modes = frames.first().map_or(0, |frame| frame.translation.ncols());
     let size = |frame: &ImportedFrame, j: usize| frame.translation.col(j).norm_max();

@@ -1,31 +1,31 @@
-//! What a file of another program says of a body, in one form for all of them.
+//! Body described by a file of another program, in a form common to all formats.
 
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::invariants::Numbered;
 use flexbody_model::{GeometricStiffness, SurfaceMesh};
 
-/// A body as a file of another program describes it. Nothing of it is checked beyond its shapes: modes may be
-/// any, matrices not symmetric, numbers not finite.
+/// A body described by a file of another program. Only array shapes are checked: modes may be arbitrary,
+/// matrices asymmetric, numbers not finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedBody {
-    /// Name, where the file has one.
+    /// Name of the body; empty if the file has none.
     pub name: String,
-    /// Units, where the file states them.
+    /// Units, if the file states them.
     pub units: Option<UnitSystem>,
-    /// Inertia about the origin of the file's body frame, along its axes.
+    /// Inertia about the origin of the body frame of the file, along its axes.
     pub inertia: Numbered,
-    /// K_ff (nf x nf).
+    /// Modal stiffness K_ff (nf x nf).
     pub modal_stiffness: Mat<f64>,
-    /// D (nf x nf), where the file has damping.
+    /// Modal damping D (nf x nf); `None` if the file has none.
     pub modal_damping: Option<Mat<f64>>,
-    /// Psi' K_geo Psi (nf x nf) of unit loads along body axes.
+    /// Geometric stiffness Psi' K_geo Psi (nf x nf) of unit loads along body axes.
     pub geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
-    /// Places of the body.
+    /// Nodes and frames of the body.
     pub frames: Vec<ImportedFrame>,
     /// Surface on the places of the body, if the file has one.
     pub mesh: Option<SurfaceMesh>,
-    /// What the file lacks of a body, or what of it cannot be taken, as fragments of sentences.
+    /// Data missing in the file or not usable, as fragments of sentences.
     pub lacks: Vec<String>,
 }
 
@@ -34,18 +34,18 @@ pub struct ImportedBody {
 pub struct ImportedFrame {
     /// Label in the file.
     pub label: String,
-    /// Name of the interface that it is, where the file says so.
+    /// Name of the interface at the frame, if the file states one.
     pub interface: Option<String>,
     /// Undeformed position in the body frame.
     pub position: [f64; 3],
     /// Displacement of each mode (3 x nf).
     pub translation: Mat<f64>,
-    /// Rotation of each mode (3 x nf), where the file has it.
+    /// Rotation of each mode (3 x nf); `None` if the file has none.
     pub rotation: Option<Mat<f64>>,
 }
 
 impl ImportedBody {
-    /// Number of modes nf.
+    /// Returns the number of modes nf.
     pub fn n_modes(&self) -> usize {
         self.inertia.i8.len()
     }

@@ -1,23 +1,24 @@
-//! With how many digits a file of text writes its numbers.
+//! Number of digits of the numbers in a text file.
 
-/// How the numbers of a file, or of a part of it, are written.
+/// Number format of a file or of a part of it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Digits {
-    /// Most decimals of numbers without an exponent, where there are such.
+    /// Largest number of decimals of numbers without an exponent; `None` if all numbers have exponents.
     fixed: Option<u32>,
-    /// Whether there are numbers with an exponent.
+    /// True if there are numbers with an exponent.
     exponents: bool,
-    /// Most significant digits of any number.
+    /// Largest number of significant digits of any number.
     significant: u32,
-    /// Numbers that are not zero.
+    /// Count of nonzero numbers.
     count: usize,
 }
 
-/// Fewer numbers say nothing: a small body by hand has short ones that are exact.
+/// Smallest count of numbers from which a number format is inferred. A smaller value would take the short
+/// exact numbers of a small body written by hand for lost digits.
 const FEW: usize = 20;
 
 impl Digits {
-    /// Takes a number as it is written into account.
+    /// Takes a number in its written form into account.
     pub(crate) fn see(&mut self, text: &str) {
         let mantissa = text.split(['e', 'E', 'd', 'D']).next().unwrap_or("");
         let digits = |part: &str| part.bytes().filter(u8::is_ascii_digit).count() as u32;
@@ -32,7 +33,7 @@ impl Digits {
         }
     }
 
-    /// The most of both.
+    /// Returns the larger of both in each property.
     pub(crate) fn most(self, other: Self) -> Self {
         Self {
             fixed: self.fixed.max(other.fixed),
@@ -42,12 +43,12 @@ impl Digits {
         }
     }
 
-    /// Whether there are too few numbers to tell how many digits the program writes.
+    /// Returns true if there are too few numbers to infer the digits of the program.
     pub(crate) fn are_few(self) -> bool {
         self.count < FEW
     }
 
-    /// `6 decimals without exponents`, `7 significant digits`.
+    /// Returns the format in words: `6 decimals without exponents`, `7 significant digits`.
     pub(crate) fn words(self) -> String {
         match self.fixed.filter(|_| !self.exponents) {
             Some(decimals) => format!("{decimals} decimals without exponents"),
@@ -55,8 +56,8 @@ impl Digits {
         }
     }
 
-    /// Half a unit of the last digit of an array whose largest number is `size`: short numbers of a file with
-    /// long ones are exact.
+    /// Returns half a unit of the last digit of an array with the largest number `size`. Short numbers in a
+    /// file with longer ones are exact.
     pub(crate) fn rounding(self, size: f64) -> f64 {
         let half = |digits: u32| 0.5 * 0.1f64.powi(digits.min(400) as i32);
         match self.fixed.filter(|_| !self.exponents) {

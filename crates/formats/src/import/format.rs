@@ -1,41 +1,42 @@
-//! What a format of another program is that is read.
+//! Trait of import formats, and the result of reading a file.
 
 use super::{AuditCheck, ImportedBody};
 use flexbody_base::error::Result;
 use flexbody_base::text::InputFile;
 
-/// A file of another program, read.
+/// Result of reading a file of another program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedFile {
     /// Name of the format.
     pub format: &'static str,
-    /// The variant that was detected, as the documentation calls it; empty where there is a single one.
+    /// Detected dialect in the terms of the documentation; empty for a format with a single form.
     pub dialect: String,
-    /// Why it is taken for that variant, and other facts that are no fault: sentences without a full stop.
+    /// Reasons for the dialect, and other facts that are no errors, as sentences without a full stop.
     pub notes: Vec<String>,
-    /// What must hold in files of this format: redundant arrays, digits, layout. What every body must fulfil
-    /// is checked elsewhere.
+    /// Checks of the format: redundant arrays, digits, layout. Identities of every body are checked
+    /// elsewhere.
     pub checks: Vec<AuditCheck>,
-    /// Why no body must be made of the file although it can be read: whole sentences without a full stop.
-    /// Checks say the same.
+    /// Reasons why no body may be made from the file although it can be read, as sentences without a full
+    /// stop. The checks report the same defects.
     pub unsound: Vec<String>,
-    /// The body.
+    /// Body described by the file.
     pub body: ImportedBody,
 }
 
-/// A format that is read.
+/// A format that can be read.
 pub trait ImportFormat: Sync {
-    /// Name on the command line.
+    /// Returns the name on the command line.
     fn name(&self) -> &'static str;
 
-    /// Whether the file can be of this format, by what stands at its beginning (of an HDF5 file by the names
-    /// in it).
+    /// Returns true if the file can be of this format, judged by its beginning (for an HDF5 file by its
+    /// names).
     fn recognises(&self, file: &InputFile) -> bool;
 
     /// Reads a file.
     ///
     /// # Errors
     /// [`ForeignUnreadable`](flexbody_base::diagnostic::Code::ForeignUnreadable) with the line,
-    /// [`ForeignIncomplete`](flexbody_base::diagnostic::Code::ForeignIncomplete) for a file from which not even shapes of arrays follow.
+    /// [`ForeignIncomplete`](flexbody_base::diagnostic::Code::ForeignIncomplete) for a file that does not
+    /// even determine the shapes of the arrays.
     fn read(&self, file: &InputFile) -> Result<ImportedFile>;
 }

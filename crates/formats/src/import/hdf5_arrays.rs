@@ -1,4 +1,4 @@
-//! Arrays of HDF5 files of other programs, whose declarations may be false.
+//! Arrays in HDF5 files of other programs, whose declared sizes may be wrong.
 
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -25,7 +25,7 @@ impl Hdf5Arrays {
     /// Opens a file.
     ///
     /// # Errors
-    /// [`ForeignUnreadable`](Code::ForeignUnreadable) when it is no HDF5 file, or a damaged one.
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable) if the file is no HDF5 file or damaged.
     pub(crate) fn open(file: &InputFile) -> Result<Self> {
         let (opened, bytes) = open_sound(file.path(), "flexible body", Code::ForeignUnreadable)?;
         let root = opened.as_group().map_err(|e| {
@@ -35,23 +35,23 @@ impl Hdf5Arrays {
         Ok(Self { root, stored: Stored::new(bytes), path: file.path().to_path_buf() })
     }
 
-    /// Whether a file is one that has datasets with all these names.
+    /// Returns true if the file is an HDF5 file with datasets of all these names.
     pub(crate) fn is_with(file: &InputFile, names: &[&str]) -> bool {
         const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
         file.bytes().starts_with(SIGNATURE)
             && Self::open(file).is_ok_and(|opened| opened.missing(names).is_empty())
     }
 
-    /// Those of `names` that are not there.
+    /// Returns the `names` that are missing in the file.
     pub(crate) fn missing<'n>(&self, names: &[&'n str]) -> Vec<&'n str> {
         let there = members(&self.root).unwrap_or_default();
         names.iter().filter(|name| !there.iter().any(|member| member == *name)).copied().collect()
     }
 
-    /// Refuses a file that lacks one of `names`.
+    /// Returns an error if one of `names` is missing.
     ///
     /// # Errors
-    /// [`ForeignIncomplete`](Code::ForeignIncomplete).
+    /// [`ForeignIncomplete`](Code::ForeignIncomplete) with the missing names.
     pub(crate) fn require(&self, names: &[&str]) -> Result<()> {
         let missing: Vec<String> = self.missing(names).iter().map(|name| format!("`{name}`")).collect();
         if missing.is_empty() {
@@ -61,26 +61,26 @@ impl Hdf5Arrays {
         Err(Diagnostic::new(Code::ForeignIncomplete, message).in_file(&self.path).into())
     }
 
-    /// Whether there is a dataset with this name.
+    /// Returns true if the file has an object with this name.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.missing(&[name]).is_empty()
     }
 
-    /// True if there is a group with this name that holds something.
+    /// Returns true if a group of this name exists and is not empty.
     pub(crate) fn has_members(&self, name: &str) -> bool {
         let group = if self.has(name) { self.root.group(name).ok() } else { None };
         group.is_some_and(|group| members(&group).is_ok_and(|names| !names.is_empty()))
     }
 
-    /// The error that says what is wrong with a dataset.
+    /// Returns an error that describes the defect of a dataset.
     pub(crate) fn refuse(&self, name: &str, what: &str) -> Error {
         Diagnostic::new(Code::ForeignUnreadable, format!("`{name}`: {what}")).in_file(&self.path).into()
     }
 
-    /// A dataset of any shape.
+    /// Reads a dataset of any shape.
     ///
     /// # Errors
-    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable) if the dataset is missing, damaged or of another type.
     pub(crate) fn values<T: Element>(&mut self, name: &str) -> Result<Values<T>> {
         let read = dataset::<T>(&self.root, name, &mut self.stored, elements);
         match read.and_then(|found| found.ok_or_else(|| "expected a dataset, found nothing".to_owned())) {
@@ -89,10 +89,10 @@ impl Hdf5Arrays {
         }
     }
 
-    /// Integers of 64 or 32 bits.
+    /// Reads integers of 64 or 32 bits.
     ///
     /// # Errors
-    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable) if the dataset is missing, damaged or of another type.
     pub(crate) fn integers(&mut self, name: &str) -> Result<Vec<i64>> {
         match self.values::<i32>(name) {
             Ok(found) => Ok(found.values.into_iter().map(i64::from).collect()),
@@ -100,10 +100,11 @@ impl Hdf5Arrays {
         }
     }
 
-    /// Floats of this shape; extents of one may be left out or added.
+    /// Reads floats of this shape; extents of one are ignored in the comparison of shapes.
     ///
     /// # Errors
-    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable) if the dataset is missing, damaged or of another type
+    /// or shape.
     pub(crate) fn floats(&mut self, name: &str, shape: &[usize]) -> Result<Vec<f64>> {
         let found = self.values::<f64>(name)?;
         let long = |shape: &[usize]| shape.iter().copied().filter(|extent| *extent != 1).collect::<Vec<_>>();
@@ -114,27 +115,30 @@ impl Hdf5Arrays {
         Ok(found.values)
     }
 
-    /// A single number.
+    /// Reads a single number.
     ///
     /// # Errors
-    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable) if the dataset is missing, damaged or not a single
+    /// float.
     pub(crate) fn number(&mut self, name: &str) -> Result<f64> {
         self.floats(name, &[]).map(|values| values[0])
     }
 
-    /// An array with two extents.
+    /// Reads a matrix.
     ///
     /// # Errors
-    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable) if the dataset is missing, damaged or of another type
+    /// or shape.
     pub(crate) fn matrix(&mut self, name: &str, rows: usize, columns: usize) -> Result<Mat<f64>> {
         let values = self.floats(name, &[rows, columns])?;
         Ok(Mat::from_fn(rows, columns, |i, j| values[i * columns + j]))
     }
 
-    /// Extents of an array that must have two.
+    /// Returns the two extents of a matrix.
     ///
     /// # Errors
-    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable) if the dataset has another number of extents, or an
+    /// extent of zero.
     pub(crate) fn extents(&self, name: &str) -> Result<(usize, usize)> {
         let shape = open_dataset(&self.root, name).map_err(|what| self.refuse(name, &what))?;
         let shape = shape.map(|dataset| dataset.shape()).unwrap_or_default();
@@ -144,7 +148,7 @@ impl Hdf5Arrays {
         }
     }
 
-    /// A text attribute of a dataset.
+    /// Returns a text attribute of a dataset; `None` if it is missing.
     pub(crate) fn attribute(&self, name: &str, attribute: &str) -> Option<String> {
         let dataset = open_dataset(&self.root, name).ok().flatten()?;
         text(&dataset, attribute).ok().flatten()

@@ -1,4 +1,4 @@
-//! A body of a file of another program as a body of ours.
+//! Conversion of the file of another program into a flexible body.
 
 use super::any_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
 use super::kind_of_modes::{beside_diagonal, beside_free_surface, beside_normalised};
@@ -18,35 +18,35 @@ use flexbody_linalg::larger;
 use flexbody_model::Nodes;
 use std::collections::HashSet;
 
-/// How far inertia may be from that of a body before nothing can be computed with it: rounding of few digits
-/// is far below.
+/// Largest violation of the inertia identities with which a body can still be computed, relative to their
+/// terms. The rounding of files with few digits is far below.
 const BROKEN: f64 = 1e-2;
 
-/// A body that was made of a file, and the diagnostics of the way.
+/// Body made from a file, with the diagnostics of the conversion.
 #[derive(Debug, Clone)]
 pub struct Imported {
     /// The body, in the frame of the file.
     pub body: FlexBody,
-    /// What was changed, what is missing.
+    /// Notes and warnings on changed and missing properties.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Makes a body of `file`, which was read from `source`; `units` count if the file states none.
+/// Makes a body of `file`, which was read from `source`; `units` apply if the file states none.
 ///
-/// Without a `frame` the body keeps that of the file, tied to it as its modes tie it: a model that holds the frame keeps
-/// its meaning. In mean axes rigid motion is taken out of the modes. A frame may stand on an interface, or on a node with
-/// rotations, by its name.
+/// Without a `frame` the body keeps the frame of the file, tied to the body by the modes of the file, so that
+/// a model that holds the frame remains valid. In mean axes the rigid motion is removed from the modes. A
+/// frame may be placed at an interface, or at a node with rotations, by its name.
 ///
-/// Modes that are mass-normalised with a diagonal stiffness to 1e-9 are taken as they are, to the last bit, if the
-/// frame is kept or they are free of rigid motion. Others are made so by the small eigenproblem, with the products
-/// that the invariants hold (theory 5.2): the body is the same in other coordinates. Rigid motions among the modes
-/// are left out.
+/// Modes that are mass-normalised with a diagonal stiffness to 1e-9 are kept bit by bit if the frame is kept
+/// or if they contain no rigid motion. Other modes are normalised by the small eigenproblem, with the
+/// products held by the invariants (theory 5.2); the body is the same in other coordinates. Rigid motions
+/// among the modes are removed.
 ///
 /// # Errors
-/// [`ForeignUnsound`](Code::ForeignUnsound) for what the reader says;
-/// [`ForeignIncomplete`](Code::ForeignIncomplete) when no place of the body is known, modes depend on each other, or
-/// the stiffness is not positive; those of [`FlexBody::new`], [`FlexBody::in_mean_axes_at`] and
-/// [`FlexBody::on_interface`].
+/// [`ForeignUnsound`](Code::ForeignUnsound) for defects found by the reader;
+/// [`ForeignIncomplete`](Code::ForeignIncomplete) if no place of the body is known, the modes are linearly
+/// dependent, or the stiffness is not positive; the errors of [`FlexBody::new`],
+/// [`FlexBody::in_mean_axes_at`] and [`FlexBody::on_interface`].
 pub fn import_body(
     file: &ImportedFile,
     source: SourceFile,
@@ -57,11 +57,13 @@ pub fn import_body(
     let given = &file.body;
     let lacking = |lack: &String| Diagnostic::new(Code::ForeignDropped, lack.clone());
     let mut diagnostics: Vec<Diagnostic> = given.lacks.iter().map(lacking).collect();
+    // Mass-normalise the modes and remove rigid motions, unless the modes are kept.
     let mut coordinates = ModalCoordinates::new(given)?;
     if let Some((change, note)) = normalising(&coordinates.invariants)? {
         diagnostics.push(note);
         coordinates = coordinates.changed(&change, &given.frames);
     }
+    // Free-surface modes imply mean axes; other modes do not state their reference conditions.
     let conditions = match beside_free_surface(&coordinates.invariants) {
         None => ReferenceConditions::MeanAxes,
         Some(_) => ReferenceConditions::Unstated,
@@ -69,6 +71,7 @@ pub fn import_body(
     let body = FlexBody::new(parts(file, coordinates, conditions, source, units))?;
     let (body, warning) = with_own_rounding(body)?;
     diagnostics.extend(warning);
+    // Move the body to the requested frame.
     let body = match frame {
         None => body,
         Some(FrameChoice::Mean(at)) => body.in_mean_axes_at(*at)?,
@@ -77,7 +80,8 @@ pub fn import_body(
     Ok(Imported { body, diagnostics })
 }
 
-/// The change to normalised modes in the frame of the file, with its note; `None` if the modes stay as they are.
+/// Returns the change to normalised modes in the frame of the file, with a note; `None` if the modes are
+/// kept.
 fn normalising(invariants: &Invariants) -> Result<Option<(ModalChange, Diagnostic)>> {
     let refuse = |reason: String| {
         let help = "flexbody audit says what is wrong with the file; write it again";
@@ -99,7 +103,8 @@ fn normalising(invariants: &Invariants) -> Result<Option<(ModalChange, Diagnosti
     Ok(Some((change, Diagnostic::new(Code::ForeignChanged, message))))
 }
 
-/// The body with an interface `name`: one that it has, or else its node of this number.
+/// Returns the body with an interface `name`: an existing interface, or the node of this number made an
+/// interface.
 fn with_interface(body: FlexBody, name: &str) -> Result<FlexBody> {
     let known = body.interfaces().iter().any(|interface| interface.name == name);
     let node = name.parse().ok().and_then(|id: i64| body.nodes().ids.iter().position(|own| *own == id));
@@ -111,7 +116,7 @@ fn with_interface(body: FlexBody, name: &str) -> Result<FlexBody> {
     FlexBody::new(parts)
 }
 
-/// Refuses what the reader found unsound, and a file without places.
+/// Returns an error for defects found by the reader, and for a file without frames.
 fn refuse_unsound(file: &ImportedFile) -> Result<()> {
     if !file.unsound.is_empty() {
         let refused = |why: &String| Diagnostic::new(Code::ForeignUnsound, why.clone());
@@ -124,10 +129,10 @@ fn refuse_unsound(file: &ImportedFile) -> Result<()> {
     Ok(())
 }
 
-/// Everything of a body that depends on its modal coordinates.
+/// Parts of a body that depend on its modal coordinates.
 struct ModalCoordinates {
     invariants: Invariants,
-    /// 3n x nf.
+    /// Displacements of the frames (3n x nf).
     shape: Mat<f64>,
     rotation: Option<Mat<f64>>,
     damping: Option<Mat<f64>>,
@@ -135,7 +140,7 @@ struct ModalCoordinates {
 }
 
 impl ModalCoordinates {
-    /// Those of the file, with the symmetries that every body has.
+    /// Takes the parts from the file and enforces the symmetries that hold for every body.
     fn new(given: &ImportedBody) -> Result<Self> {
         let invariants = sound_invariants(given)?;
         let turns = given.frames.iter().any(|frame| frame.rotation.is_some());
@@ -152,7 +157,7 @@ impl ModalCoordinates {
         })
     }
 
-    /// Returns the body in other modal coordinates.
+    /// Returns the parts in other modal coordinates.
     fn changed(self, change: &ModalChange, frames: &[ImportedFrame]) -> Self {
         let positions: Vec<[f64; 3]> = frames.iter().map(|frame| frame.position).collect();
         Self {
@@ -169,7 +174,7 @@ impl ModalCoordinates {
     }
 }
 
-/// The invariants of the file, which must be those of some body.
+/// Returns the invariants of the file, after checking the identities that hold for every body.
 fn sound_invariants(given: &ImportedBody) -> Result<Invariants> {
     let stiffness = symmetric_part(&given.modal_stiffness);
     let invariants = Invariants::from_numbered(&given.inertia, stiffness, DIGITS).with_symmetries();
@@ -186,7 +191,7 @@ fn sound_invariants(given: &ImportedBody) -> Result<Invariants> {
     Ok(invariants)
 }
 
-/// The parts of the body in its final coordinates.
+/// Assembles the parts of the body in its final coordinates.
 fn parts(
     file: &ImportedFile,
     coordinates: ModalCoordinates,
@@ -223,13 +228,13 @@ fn parts(
     }
 }
 
-/// Where the body comes from.
+/// Returns the provenance of the body.
 fn source_facts(file: &ImportedFile, invariants: &Invariants, source: SourceFile) -> Source {
     Source {
         name: file.body.name.clone(),
         files: vec![source],
         number: None,
-        // The file does not tell the degrees of freedom of the model.
+        // The file does not state the degrees of freedom of the model.
         n_dofs: 0,
         mass_structure: match invariants.general() {
             Some(_) => MassStructure::General,
@@ -271,7 +276,7 @@ fn modes(
     }
 }
 
-/// Nothing is proved of modes whose matrices are not there.
+/// Returns a certificate without proof: the system matrices of the modes are not available.
 fn certificate(file: &ImportedFile, invariants: &Invariants) -> Certificate {
     Certificate {
         proved_modes: None,
@@ -282,7 +287,7 @@ fn certificate(file: &ImportedFile, invariants: &Invariants) -> Certificate {
             "read from a {} file: the FE matrices are not known; residuals are those of the reduced matrices",
             file.format
         ),
-        // What digits of K leave of the modes, as far as the file shows it.
+        // Rounding of K_ff in the file, estimated from its entries off the diagonal.
         rigid_noise: beside_diagonal(invariants),
         rigid_residual: 0.0,
         eigenvalue_rounding: 0.0,
@@ -292,8 +297,8 @@ fn certificate(file: &ImportedFile, invariants: &Invariants) -> Certificate {
     }
 }
 
-/// The body with what the digits of its file leave of the identities of inertia, and a warning where this is
-/// more than rounding.
+/// Returns the body with the violation of the inertia identities recorded as rounding of its file, and a
+/// warning if the violation exceeds double precision.
 fn with_own_rounding(body: FlexBody) -> Result<(FlexBody, Option<Diagnostic>)> {
     let missed = body.identities(BodyFrame::Model).into_iter().filter(|check| !check.passed);
     let missed = missed.map(|check| check.value).fold(0.0, larger);
@@ -306,7 +311,7 @@ fn with_own_rounding(body: FlexBody) -> Result<(FlexBody, Option<Diagnostic>)> {
     Ok((FlexBody::new(parts)?, Some(Diagnostic::new(Code::ForeignRounded, message))))
 }
 
-/// 3n x nf of the rows of all frames, zeros where one has none.
+/// Stacks the rows of all frames (3n x nf), with zeros for frames without rows.
 fn stacked<'f>(
     frames: &'f [ImportedFrame],
     rows: impl Fn(&'f ImportedFrame) -> Option<&'f Mat<f64>>,
@@ -326,8 +331,9 @@ fn not_in_file(group: TermGroup, format: &str) -> TermDecision {
     }
 }
 
-/// Nodes with their labels as numbers. Labels that are names get numbers above all others, in their order, as places
-/// that are no nodes of the model have them; nodes are 1, 2, ... if no label is a number or two are the same.
+/// Returns the nodes with their labels as numbers. Labels that are names get numbers above all others, in
+/// their order, like reference points that are no nodes. Nodes are numbered 1, 2, ... if no label is a number
+/// or two numbers coincide.
 fn nodes(frames: &[ImportedFrame]) -> Nodes {
     let numbers: Vec<Option<i64>> = frames.iter().map(|frame| frame.label.parse().ok()).collect();
     let mut seen = HashSet::new();
@@ -345,13 +351,13 @@ fn nodes(frames: &[ImportedFrame]) -> Nodes {
     Nodes { ids, positions: frames.iter().map(|frame| frame.position).collect() }
 }
 
-/// Frames that the file calls interfaces: single nodes with their reference point there.
+/// Returns the frames that the file calls interfaces, as single nodes with their reference points there.
 fn interfaces(given: &ImportedBody) -> Vec<Interface> {
     let mut found: Vec<Interface> = Vec::new();
     for (i, frame) in given.frames.iter().enumerate() {
         let Some(name) = &frame.interface else { continue };
         match found.iter_mut().find(|interface| interface.name == *name) {
-            // Several nodes of one name: their mean is the reference point.
+            // For several nodes with one interface name the reference point is their mean position.
             Some(interface) => {
                 interface.nodes.push(i);
                 interface.reference = Some(mean_position(given, &interface.nodes));

@@ -1,5 +1,5 @@
-//! What the formats that are read share: the trait, the body as a file has it, its audit, and the way to a
-//! flexible body.
+//! Shared code of the import formats: the trait, the body described by a file, its audit, and the conversion
+//! into a flexible body.
 
 mod accepted;
 mod any_body;

@@ -1,7 +1,7 @@
-//! What files that list the nine invariants tell twice.
+//! Redundant information in files that list the nine invariants.
 //!
 //! I4 is the skew part of I8, I5 that of I9, I6 half the trace of -I9. Values are relative to the
-//! Cauchy-Schwarz bounds that I6 and I7 set, so that 1 is as far as two numbers can be apart.
+//! Cauchy-Schwarz bounds set by I6 and I7, so that 1 is the largest possible difference.
 
 use super::AuditCheck;
 use faer::Mat;
@@ -9,15 +9,16 @@ use flexbody_base::diagnostic::Code;
 use flexbody_body::invariants::Numbered;
 use flexbody_linalg::{larger, symmetric_eigen};
 
-/// Rounding of sums over the nodes of a large model.
+/// Relative rounding error of sums over the nodes of a large model, the limit of redundant numbers. A smaller
+/// value reports rounding as contradictions.
 pub(crate) const ROUNDING: f64 = 1e-10;
 
-/// The invariants and the sizes that they can have.
+/// The invariants with their bounds.
 pub(crate) struct Redundant<'n> {
     told: &'n Numbered,
-    /// sqrt(int x . x).
+    /// Bound sqrt(int x . x).
     extent: f64,
-    /// sqrt(I6_jj).
+    /// Bound sqrt(I6_jj) of each mode.
     modes: Vec<f64>,
 }
 
@@ -36,7 +37,7 @@ impl<'n> Redundant<'n> {
         pairs.map(|(j, k)| relative(missed(j, k), self.modes[j] * self.modes[k])).fold(0.0, larger)
     }
 
-    /// I4_j against the skew part of I8_j.
+    /// Returns the difference of I4_j and the skew part of I8_j.
     pub(crate) fn i4_of_i8(&self) -> f64 {
         let told = self.told;
         let missed = |j: usize| {
@@ -48,7 +49,7 @@ impl<'n> Redundant<'n> {
         (0..self.nf()).map(|j| relative(missed(j), self.extent * self.modes[j])).fold(0.0, larger)
     }
 
-    /// I5_jk = -I5_kj.
+    /// Returns the violation of I5_jk = -I5_kj.
     pub(crate) fn i5_antisymmetric(&self) -> f64 {
         let Some(i5) = &self.told.i5 else { return 0.0 };
         let nf = self.nf();
@@ -57,7 +58,7 @@ impl<'n> Redundant<'n> {
         })
     }
 
-    /// I5_jk against the skew part of I9_jk.
+    /// Returns the difference of I5_jk and the skew part of I9_jk.
     pub(crate) fn i5_of_i9(&self) -> f64 {
         let (Some(i5), Some(i9)) = (&self.told.i5, &self.told.i9) else { return 0.0 };
         let nf = self.nf();
@@ -69,7 +70,7 @@ impl<'n> Redundant<'n> {
         })
     }
 
-    /// I9_jk = I9_kj'.
+    /// Returns the violation of I9_jk = I9_kj'.
     pub(crate) fn i9_symmetric(&self) -> f64 {
         let Some(i9) = &self.told.i9 else { return 0.0 };
         let nf = self.nf();
@@ -80,13 +81,15 @@ impl<'n> Redundant<'n> {
         })
     }
 
-    /// I6 against half the trace of -I9: of a mass that commutes with rotations the same sum.
+    /// Returns the difference of I6 and half the trace of -I9, which is zero for a mass that commutes with
+    /// rotations.
     pub(crate) fn i6_of_i9(&self) -> f64 {
         let Some(i9) = &self.told.i9 else { return 0.0 };
         self.of_pairs(|j, k| (self.told.i6[(j, k)] + self.half_trace(i9, j, k)).abs())
     }
 
-    /// Least and largest eigenvalue of the modal mass that I9 tells, relative to I6, for messages.
+    /// Returns the smallest and largest eigenvalue of the modal mass implied by I9, relative to I6, for
+    /// messages.
     pub(crate) fn mass_of_i9(&self) -> Option<(f64, f64)> {
         let i9 = self.told.i9.as_ref()?;
         let scaled = |j: usize, k: usize| -self.half_trace(i9, j, k) / (self.modes[j] * self.modes[k]);
@@ -103,7 +106,8 @@ impl<'n> Redundant<'n> {
         0.5 * (0..3).map(|a| i9[(a * nf + j, a * nf + k)]).sum::<f64>()
     }
 
-    /// The check of I6 against I9 with what its failure means; `arrays` names the arrays of the file.
+    /// Returns the check of I6 against I9 with the meaning of its failure; `arrays` names the arrays of the
+    /// file.
     pub(crate) fn lumped(&self, name: &'static str, formula: &'static str, arrays: &str) -> AuditCheck {
         let sizes = match self.mass_of_i9() {
             Some((least, most)) => format!(", which by {arrays} is {least:.3} to {most:.3} of itself"),
@@ -122,8 +126,8 @@ impl<'n> Redundant<'n> {
     }
 }
 
-/// Makes findings of another order of the entries out of checks that fail, where all of these hold in that
-/// order: `other` has the names of checks that the order is seen by, with their values in the other one.
+/// Replaces failed checks by findings of another entry order if all of the checks hold in that order. `other`
+/// lists the checks that detect the order, with their values in the other order.
 pub(crate) fn in_other_order(checks: &mut [AuditCheck], other: &[(&str, f64)], meaning: &str) {
     let failed = |name: &str| checks.iter().any(|check| check.name == name && !check.passed());
     let seen: Vec<(&str, f64)> = other.iter().copied().filter(|(name, _)| failed(name)).collect();
@@ -136,7 +140,8 @@ pub(crate) fn in_other_order(checks: &mut [AuditCheck], other: &[(&str, f64)], m
     }
 }
 
-/// I9 of a body that does without W2 has no part that is symmetric in its axes, although the modes have mass.
+/// Returns true if I9 has no part symmetric in its axes although the modes have mass, as for a body without
+/// W2.
 pub(crate) fn lacks_w2(told: &Numbered) -> bool {
     let nf = told.i8.len();
     let Some(i9) = &told.i9 else { return true };
@@ -147,17 +152,17 @@ pub(crate) fn lacks_w2(told: &Numbered) -> bool {
     (0..3 * nf).all(|row| (0..3 * nf).all(|column| symmetric(row, column) == 0.0))
 }
 
-/// |A - A'| relative to the geometric mean of the diagonal entries.
+/// Returns |A - A'| relative to the geometric mean of the diagonal entries.
 pub(crate) fn asymmetry(a: &Mat<f64>) -> f64 {
     let pairs = (0..a.nrows()).flat_map(|i| (0..i).map(move |j| (i, j)));
     let bound = |i: usize, j: usize| (a[(i, i)] * a[(j, j)]).abs().sqrt();
     pairs.map(|(i, j)| relative((a[(i, j)] - a[(j, i)]).abs(), bound(i, j))).fold(0.0, larger)
 }
 
-/// `missed / size`; nothing missed is perfect whatever the size.
+/// Returns `missed / size`; 0 if `missed` is zero, even if `size` is zero.
 pub(crate) fn relative(missed: f64, size: f64) -> f64 {
     if missed == 0.0 { 0.0 } else { missed / size }
 }
 
-/// (a, b, c) in cyclic order.
+/// Indices (a, b, c) in cyclic order.
 const CYCLIC: [(usize, usize, usize); 3] = [(1, 2, 0), (2, 0, 1), (0, 1, 2)];

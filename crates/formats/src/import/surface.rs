@@ -1,9 +1,9 @@
-//! The surface of a body of another program, which is for drawing only.
+//! Surface of an imported body, for drawing only.
 
 use flexbody_model::SurfaceMesh;
 
-/// Polygons and lines of a file as the surface of `n` nodes. Polygons are split into triangles from their first
-/// corner. A file whose indices name no nodes loses its surface: `lacks` says so.
+/// Returns polygons and lines of a file as the surface of `n` nodes. Polygons are split into triangles from
+/// their first corner. If indices refer to no node, the surface is dropped and `lacks` states it.
 ///
 /// * `name`: name of the array in the file.
 pub(crate) fn surface(

@@ -1,4 +1,4 @@
-//! What the record groups must fulfil.
+//! Checks of the record groups.
 
 use super::read::body::{COUPLING, Read, by_columns, from_masses, missing};
 use super::read::records::Records;
@@ -8,10 +8,12 @@ use crate::import::redundant::{ROUNDING, Redundant, asymmetry, in_other_order, r
 use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
 
-/// Digits that a number may lack.
+/// Largest relative rounding of a number that is not reported as lost digits. A larger value accepts files
+/// with fewer digits.
 const LOST: f64 = 1e-8;
 
-/// Roundings of the last digit that an identity may add up.
+/// Number of last-digit roundings that an identity may accumulate. A smaller value reports rounding as
+/// contradictions.
 const TERMS: f64 = 10.0;
 
 pub(crate) fn checks(records: &Records, read: &Read) -> Vec<AuditCheck> {
@@ -46,7 +48,8 @@ fn digits(records: &Records) -> AuditCheck {
     }
 }
 
-/// What MBDyn skips without a word. A matrix of another size than the header says is then read wrong.
+/// Checks for text that MBDyn silently skips. A matrix of another size than the header states is then read
+/// wrongly.
 fn surplus(records: &Records) -> AuditCheck {
     let in_words = |(group, surplus): &(Option<usize>, Surplus)| {
         let zeros = if surplus.zero { ", all zero" } else { "" };
@@ -83,7 +86,7 @@ fn coupling(records: &Records) -> AuditCheck {
     }
 }
 
-/// Lumped masses: that they stand alone, are positive, and are what the modes belong to.
+/// Checks lumped masses: no other coupling group is present, all are positive, and the modes belong to them.
 fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
     let Some(lumped) = &read.lumped else { return Vec::new() };
     let n = records.n_nodes;
@@ -107,6 +110,7 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
         code: Code::AuditLumped,
         meaning: format!("{} of {n} lumped masses are negative", lumped.negative),
     };
+    // Differences between the sums over the masses and groups 9 and 12.
     let (own, sums) = (&read.body.inertia.i6, &lumped.told.i6);
     let size = |j: usize, k: usize| (own[(j, j)] * own[(k, k)]).abs().sqrt();
     let modal = (0..nf)
@@ -129,7 +133,7 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
     vec![twice, negative, consistent]
 }
 
-/// What groups 9 and 14 to 18 tell twice.
+/// Checks the redundant information of groups 9 and 14 to 18.
 fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
     let redundant = Redundant::new(&read.body.inertia);
     let limit = ROUNDING + TERMS * records.rounding();
@@ -141,6 +145,7 @@ fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
         code: Code::AuditIdentity,
         meaning: meaning.to_owned(),
     };
+    // Identities between invariants that follow from each other.
     let mut all = vec![
         identity(
             "i4_of_i8",
@@ -180,7 +185,7 @@ fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
     all
 }
 
-/// Tells groups that stand column by column from wrong ones: their identities hold in that order.
+/// Distinguishes groups stored column by column from wrong groups: their identities hold in that order.
 fn find_column_order(records: &Records, read: &Read, checks: &mut [AuditCheck]) {
     let columns = by_columns(records, &read.body.inertia);
     let redundant = Redundant::new(&columns);

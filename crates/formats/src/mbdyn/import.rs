@@ -1,4 +1,4 @@
-//! The format: recognised by its record groups.
+//! MBDyn as an import format, recognised by its record groups.
 
 use super::checks::checks;
 use super::read::body::{COUPLING, body, from_masses};
@@ -9,10 +9,10 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::text::InputFile;
 
-/// The format.
+/// Import format of MBDyn.
 pub(crate) struct Mbdyn;
 
-/// The first record group stands near the beginning.
+/// Number of bytes within which the first record group must begin.
 const HEAD: usize = 1 << 16;
 
 impl ImportFormat for Mbdyn {
@@ -44,8 +44,8 @@ impl ImportFormat for Mbdyn {
     }
 }
 
-/// Numbers that MBDyn skips and that are no zeros: the header counts other nodes or modes than the file has,
-/// and matrices are read wrong.
+/// Returns the defects of a file with nonzero numbers that MBDyn skips: the header states other counts of
+/// nodes or modes than the file has, and matrices are read wrongly.
 fn unsound(records: &Records) -> Vec<String> {
     let numbers = records.skipped.iter().filter(|(_, surplus)| surplus.numbers && !surplus.zero);
     let sentence = |(group, surplus): &(Option<usize>, Surplus)| {

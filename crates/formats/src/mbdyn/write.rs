@@ -1,11 +1,11 @@
 //! MBDyn: the `.fem` file of its modal joint (mbdyn/struct/modal.cc, commit ab748d7; manual, "Modal FEM
 //! format").
 //!
-//! Numbered record groups, read as blank-separated numbers. The modal node lies in the origin of the file's
-//! coordinates, so that I4 and I8 are about the origin of the body frame: MBDyn moves groups 5 to 7 and 12
-//! when the joint names another origin, but not groups 15 and
-//! 16. Group 11, lumped masses, would be added to groups 14 to 18 and is never written. I9_jk(a,b) of group
-//!     18 stands at the a-th of three rows, in column 3 (j nf + k) + b.
+//! The file has numbered record groups of blank-separated numbers. The modal node lies in the origin of the
+//! coordinates of the file, so that I4 and I8 are about the origin of the body frame: MBDyn moves groups 5 to
+//! 7 and 12 when the joint names another origin, but not groups 15 and 16. Group 11, lumped masses, would be
+//! added to groups 14 to 18 and is never written. I9_jk(a,b) of group 18 is in the a-th of three rows, in
+//! column 3 (j nf + k) + b.
 
 use crate::export::Holding::{self, Held, NotApplicable};
 use crate::export::inertia::inertia;
@@ -19,7 +19,7 @@ use flexbody_body::invariants::Numbered;
 use nalgebra::Matrix3;
 use std::fmt::Write;
 
-/// The format.
+/// Export format of MBDyn.
 pub(crate) struct Mbdyn;
 
 const LEVEL_19: &str = "level19";
@@ -51,7 +51,7 @@ impl ExportFormat for Mbdyn {
         ExportChecklist {
             rigid_coupling: Holding::held_but_for(no_coupling),
             plane: losses::plane(body),
-            // Without coupling the rest is lost with it.
+            // Without coupling the other inertia terms are lost with it.
             deformed_inertia: if exact { Held } else { NotApplicable },
             general_w0: if exact { losses::general_w0(body) } else { NotApplicable },
             coriolis_force: if exact { Held } else { NotApplicable },
@@ -123,19 +123,19 @@ fn is_exact(options: &ExportOptions) -> bool {
     options.dialect.as_deref() != Some(LEVEL_13)
 }
 
-/// Comment that tells readers of ours what no number of the file does.
+/// Comment line that marks a general mass for the reader of flexbody; no number of the file states it.
 const GENERAL_MASS: &str =
     "** GENERAL MASS: IT DOES NOT COMMUTE WITH ROTATIONS, RECORD GROUPS 9 AND 18 NEED NOT AGREE\n";
 
-/// Comments for people: where the numbers come from and what they are about. MBDyn reads lines into a buffer
-/// of limited length.
+/// Returns the comment lines with provenance, units and reference point. The length of a line is limited
+/// because MBDyn reads lines into a buffer of limited size.
 fn head(body: &FlexBody) -> String {
     const LONGEST_NAME: usize = 200;
     let units = body.units();
     let printable = |c: char| if c.is_control() { ' ' } else { c };
     let name: String = body.source().name.chars().map(printable).take(LONGEST_NAME).collect();
     let general = body.invariants().general().map_or("", |_| GENERAL_MASS);
-    // A name alone could look like a record group.
+    // A name alone could be read as a record group.
     format!(
         "** BODY {name}, WRITTEN BY {}\n** UNITS {}, {}, {}; ALL ABOUT THE ORIGIN OF THE NODES, WHICH IS THAT OF THE MODAL NODE\n{general}",
         generator(),
@@ -145,7 +145,8 @@ fn head(body: &FlexBody) -> String {
     )
 }
 
-/// What a place is called: the interface where it is one by itself and its name is a word, else the number.
+/// Returns the label of a place: the name of its interface if the name is a single word and the interface has
+/// no other place, otherwise the number.
 fn label(places: &[ExportFrame], place: &ExportFrame) -> String {
     let alone = |name: &&String| {
         places.iter().filter(|other| other.name.as_ref() == Some(*name)).count() == 1
@@ -156,9 +157,9 @@ fn label(places: &[ExportFrame], place: &ExportFrame) -> String {
     place.name.as_ref().filter(alone).cloned().unwrap_or_else(|| place.id.to_string())
 }
 
-/// Index of a unit load in record group 19: 1 to 6 products of angular velocities, 7 to 9 angular and 10 to
-/// 12 linear acceleration, then six for each place, force and moment. Interface nodes must stand in the joint
-/// in the order of the file.
+/// Returns the index of a unit load in record group 19: 1 to 6 products of angular velocities, 7 to 9 angular
+/// and 10 to 12 linear acceleration, then six for each place, force and moment. The joint must list the
+/// interface nodes in the order of the file.
 fn tag(load: &UnitLoad, places: &[ExportFrame]) -> Option<usize> {
     let first = match &load.kind {
         LoadKind::Spin => 1,
@@ -167,7 +168,7 @@ fn tag(load: &UnitLoad, places: &[ExportFrame]) -> Option<usize> {
         LoadKind::Force(at) | LoadKind::Moment(at) => {
             let is_there = |place: &ExportFrame| place.name.as_ref() == Some(at);
             let index = places.iter().position(is_there)?;
-            // A load at several nodes is none of theirs.
+            // A load that acts at several nodes belongs to none of them.
             if places[index + 1..].iter().any(is_there) {
                 return None;
             }
@@ -178,16 +179,16 @@ fn tag(load: &UnitLoad, places: &[ExportFrame]) -> Option<usize> {
     Some(first + load.component)
 }
 
-/// Indices of record group 19 for velocities and accelerations; those of the nodes follow.
+/// Number of indices of record group 19 for velocities and accelerations; the indices of the nodes follow.
 const LOADS_OF_MOTION: usize = 12;
 
-/// The matrices of record group 19 by their indices.
+/// Returns the matrices of record group 19 with their indices.
 fn tagged(body: &FlexBody, places: &[ExportFrame]) -> Vec<(usize, Mat<f64>)> {
     let loads = body.stiffening_loads().into_iter();
     loads.filter_map(|load| Some((tag(&load, places)?, body.stiffness_under(&load)?))).collect()
 }
 
-/// The text so far.
+/// Text of the file under construction.
 struct File(String);
 
 impl File {
@@ -243,7 +244,7 @@ impl File {
         }
     }
 
-    /// Mass, centre of mass, inertia about it.
+    /// Writes mass, centre of mass and the inertia about it.
     fn rigid(&mut self, told: &Numbered) {
         let center = told.i2 / told.i1;
         let steiner = (Matrix3::identity() * center.norm_squared() - center * center.transpose()) * told.i1;

@@ -1,4 +1,4 @@
-//! Reader and checks. Names as in external_flexible_ffr_body.cc.
+//! Reader and checks of MBSim files. Names follow external_flexible_ffr_body.cc.
 
 use crate::import::hdf5_arrays::Hdf5Arrays;
 use crate::import::redundant::{ROUNDING, asymmetry, relative};
@@ -13,7 +13,7 @@ use flexbody_linalg::larger;
 use flexbody_model::SurfaceMesh;
 use nalgebra::{Matrix3, Vector3};
 
-/// The format.
+/// Import format of MBSim.
 pub(crate) struct Mbsim;
 
 const REQUIRED: [&str; 7] = [
@@ -33,7 +33,8 @@ const STRESSES: &str = "nodal stress matrix";
 const INDICES: &str = "openmbv indices";
 const ROTATIONS: &str = "nodal shape matrix of rotation";
 
-/// Beside the diagonal of the stiffness matrix, relative to it: below this the modes are eigenmodes.
+/// Largest entry off the diagonal of the stiffness matrix, relative to the diagonal, for which the modes
+/// count as eigenmodes. A larger value demands a diagonal modal mass of modes that are coupled by stiffness.
 const DIAGONAL: f64 = 1e-8;
 
 impl ImportFormat for Mbsim {
@@ -85,18 +86,18 @@ impl ImportFormat for Mbsim {
     }
 }
 
-/// What the file integrates over the mass.
+/// Integrals over the mass in the file.
 struct Integrals {
     mass: f64,
-    /// x_a.
+    /// Integral of x_a.
     first: Vector3<f64>,
-    /// x_a x_b.
+    /// Integral of x_a x_b.
     second: Mat<f64>,
-    /// S_a (3 x nf).
+    /// Integral of S_a (3 x nf).
     shape: Mat<f64>,
-    /// x_a S_b (9 x nf), row 3 a + b.
+    /// Integral of x_a S_b (9 x nf), row 3 a + b.
     position_shape: Mat<f64>,
-    /// S_a S_b (6 nf x nf), blocks 11, 12, 13, 22, 23, 33.
+    /// Integral of S_a S_b (6 nf x nf), blocks 11, 12, 13, 22, 23, 33.
     shape_shape: Mat<f64>,
 }
 
@@ -116,7 +117,7 @@ impl Integrals {
         self.shape.ncols()
     }
 
-    /// S_ab of two modes; of blocks below the diagonal the transposed one above, as MBSim does.
+    /// Returns S_ab of two modes. A block below the diagonal is the transpose of the one above, as in MBSim.
     fn s(&self, a: usize, b: usize, j: usize, k: usize) -> f64 {
         if a > b {
             return self.s(b, a, k, j);
@@ -145,7 +146,7 @@ impl Integrals {
 }
 
 fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ImportedFrame>> {
-    // A place whose motion is not known is none.
+    // A place without known motion is not imported.
     if !(arrays.has(POSITIONS) && arrays.has(TRANSLATIONS)) {
         return Ok(Vec::new());
     }
@@ -176,7 +177,7 @@ fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ImportedFrame>> {
     Ok(labels.into_iter().enumerate().map(frame).collect())
 }
 
-/// Lines and faces of OpenMBV: indices of nodes from 0, each line or face ended by -1.
+/// Returns the surface from lines and faces of OpenMBV: node indices from 0, each line or face ended by -1.
 fn mesh(arrays: &mut Hdf5Arrays, n: usize, lacks: &mut Vec<String>) -> Result<Option<SurfaceMesh>> {
     if !arrays.has(INDICES) {
         return Ok(None);
@@ -227,7 +228,7 @@ fn checks(
             "MBSim takes one triangle of it",
         ));
     }
-    // Eigenmodes are orthogonal in the mass that they belong to.
+    // Eigenmodes are orthogonal with respect to their mass.
     if beside_diagonal(stiffness) <= DIAGONAL {
         all.push(check(
             "modal_mass_diagonal",
@@ -240,7 +241,7 @@ fn checks(
     all
 }
 
-/// Largest entry beside the diagonal, relative to the geometric mean of the two diagonal ones.
+/// Returns the largest entry off the diagonal, relative to the geometric mean of the two diagonal entries.
 fn beside_diagonal(a: &Mat<f64>) -> f64 {
     let pairs = (0..a.nrows()).flat_map(|i| (0..a.ncols()).map(move |j| (i, j)));
     let size = |i: usize, j: usize| (a[(i, i)] * a[(j, j)]).abs().sqrt();

@@ -1,9 +1,9 @@
 //! MBSim: the HDF5 file of its `ExternalFlexibleFfrBody` (external_flexible_ffr_body.cc,
 //! generic_flexible_ffr_body.cc).
 //!
-//! The integrals from which MBSim itself forms everything else: of a symmetric pair of shape functions, x_a
-//! S_b and S_a S_b. The modal mass has no place of its own, it is the sum of the integrals of S_a S_a; W2 and
-//! W3 follow from the same integrals.
+//! The file holds the integrals of x_a S_b and S_a S_b, one of each symmetric pair of shape functions, from
+//! which MBSim forms all other terms. The modal mass is not stored: it is the sum of the integrals of S_a
+//! S_a. W2 and W3 follow from the same integrals.
 
 use crate::export::Holding::{self, Held, Lost, NotApplicable};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
@@ -14,10 +14,10 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{CauchySchwarz, MassKind};
 
-/// The format.
+/// Export format of MBSim.
 pub(crate) struct Mbsim;
 
-/// Blocks of the shape function shape function integral.
+/// Blocks of the integral of two shape functions.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
 impl ExportFormat for Mbsim {
@@ -62,8 +62,8 @@ impl ExportFormat for Mbsim {
     }
 }
 
-/// S_aa of the file: those of W2 and, where the sum of these is not the modal mass, what lacks in equal
-/// parts.
+/// Returns the S_aa of the file: those of W2, plus equal parts of the difference to the modal mass if their
+/// sum is not the modal mass.
 fn diagonal(body: &FlexBody) -> [Mat<f64>; 3] {
     let invariants = body.invariants();
     let s = invariants.s();
@@ -81,8 +81,8 @@ fn diagonal(body: &FlexBody) -> [Mat<f64>; 3] {
     })
 }
 
-/// W2 that is not what gives the modal mass: of a mass that does not commute with rotations, or of a body
-/// that does not hold W2.
+/// Returns the holding of a W2 that differs from the one implied by the modal mass: for a mass that does not
+/// commute with rotations, or a body without W2.
 fn other_w2(body: &FlexBody) -> Holding {
     let invariants = body.invariants();
     let nf = body.n_modes();
@@ -113,7 +113,7 @@ fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
     let invariants = body.invariants();
     let told = inertia(body);
     let s_aa = diagonal(body);
-    // S_ab is at (b, a) of I9 where a is not b.
+    // For a != b, S_ab is at (b, a) of I9.
     let s = |pair: usize, j: usize, k: usize| match PAIRS[pair] {
         (a, b) if a == b => s_aa[a][(j, k)],
         (a, b) => told.i9.as_ref().map_or(0.0, |i9| i9[(b * nf + j, a * nf + k)]),
@@ -151,7 +151,7 @@ fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
     all
 }
 
-/// Triangles, or else edges, of the surface on the places of the file, each ended by -1.
+/// Returns the triangles, or otherwise the edges, of the surface on the places of the file, each ended by -1.
 fn openmbv_indices(body: &FlexBody, places: &[ExportFrame]) -> Option<Hdf5Entry> {
     let numbers: Vec<i64> = places.iter().map(|place| place.id).collect();
     let mesh = body.mesh()?.among(&body.nodes().ids, &numbers)?;

@@ -1,4 +1,4 @@
-//! What of a body is drawn: points, and triangles and lines between them, in the axes of the model.
+//! Drawn parts of a body: points, and triangles and lines between them, in model axes.
 
 use crate::export::Points;
 use crate::export::frames::{ExportFrame, frames};
@@ -7,8 +7,8 @@ use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 
-/// Points of a body with their motion in every mode. Nodes come first, in the order of the body; then the
-/// reference points of interfaces that are no nodes.
+/// Points of a body with their motion in every mode: nodes in the order of the body, then the reference
+/// points of interfaces that are no nodes.
 pub(crate) struct Drawn<'b> {
     body: &'b FlexBody,
     /// Indices of the nodes, ascending.
@@ -18,12 +18,13 @@ pub(crate) struct Drawn<'b> {
 }
 
 impl<'b> Drawn<'b> {
-    /// The nodes of the surface, or all of a body without one.
+    /// Returns the nodes of the surface, or all nodes of a body without a surface.
     pub(crate) fn surface(body: &'b FlexBody) -> Self {
         Self::of(body, surface_nodes(body), Vec::new())
     }
 
-    /// The same with the nodes and reference points of the interfaces, or the places that `points` names.
+    /// Returns the nodes of the surface with the nodes and reference points of the interfaces, or the places
+    /// named by `points`.
     pub(crate) fn places(body: &'b FlexBody, points: &Points) -> Self {
         let mut nodes = match points {
             Points::Usual => {
@@ -53,25 +54,25 @@ impl<'b> Drawn<'b> {
         Self { body, nodes, references, mesh }
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     pub(crate) fn len(&self) -> usize {
         self.nodes.len() + self.references.len()
     }
 
-    /// Numbers of the points.
+    /// Returns the numbers of the points.
     pub(crate) fn numbers(&self) -> Vec<i64> {
         let nodes = self.nodes.iter().map(|&node| self.body.nodes().ids[node]);
         nodes.chain(self.references.iter().map(|frame| frame.id)).collect()
     }
 
-    /// Undeformed positions. Unit: length.
+    /// Returns the undeformed positions in model coordinates. Unit: length.
     pub(crate) fn positions(&self) -> Vec<[f64; 3]> {
         let nodes = self.nodes.iter().map(|&node| self.body.nodes().positions[node]);
         let all = nodes.chain(self.references.iter().map(|frame| frame.position));
         all.map(|x| self.body.frame().to_model(x)).collect()
     }
 
-    /// Displacements in mode `j`.
+    /// Returns the displacements in mode `j`, model axes.
     pub(crate) fn shape(&self, j: usize) -> Vec<[f64; 3]> {
         let shape = self.body.modes().shape.as_ref();
         let nodes = self.nodes.iter().map(|&node| turned(self.axes(), shape, 3 * node, j));
@@ -80,7 +81,8 @@ impl<'b> Drawn<'b> {
         nodes.chain(references).collect()
     }
 
-    /// Rotations in mode `j`, zero where a point has none; `None` of a body whose nodes have none.
+    /// Returns the rotations in mode `j`, zero for points without rotations; `None` for a body whose nodes
+    /// have none.
     pub(crate) fn rotation(&self, j: usize) -> Option<Vec<[f64; 3]>> {
         let rotation = self.body.modes().rotation.as_ref()?.as_ref();
         let nodes = self.nodes.iter().map(|&node| turned(self.axes(), rotation, 3 * node, j));
@@ -91,17 +93,17 @@ impl<'b> Drawn<'b> {
         Some(nodes.chain(self.references.iter().map(reference)).collect())
     }
 
-    /// Triangles, by points; counterclockwise seen from outside.
+    /// Returns the triangles as point indices, counterclockwise seen from outside.
     pub(crate) fn triangles(&self) -> &[[u32; 3]] {
         self.mesh.as_ref().map_or(&[], |mesh| mesh.triangles())
     }
 
-    /// Lines, by points.
+    /// Returns the lines as point indices.
     pub(crate) fn edges(&self) -> &[[u32; 2]] {
         self.mesh.as_ref().map_or(&[], |mesh| mesh.edges())
     }
 
-    /// Points that no triangle and no line has.
+    /// Returns the points that belong to no triangle and no line.
     pub(crate) fn loose(&self) -> Vec<u32> {
         let drawn = self.mesh.as_ref().map_or_else(Vec::new, SurfaceMesh::drawn_nodes);
         let mut drawn = drawn.into_iter().peekable();
@@ -111,7 +113,7 @@ impl<'b> Drawn<'b> {
             .collect()
     }
 
-    /// Which points are nodes of which interface.
+    /// Returns the name of each interface with a mark (0 or 1) for each point that is one of its nodes.
     pub(crate) fn interfaces(&self) -> Vec<(&'b str, Vec<u8>)> {
         let mut all = Vec::new();
         for interface in self.body.interfaces() {
@@ -124,7 +126,8 @@ impl<'b> Drawn<'b> {
         all
     }
 
-    /// Which points are reference points and no nodes; `None` where there are none.
+    /// Returns a mark (0 or 1) for each point that is a reference point and no node; `None` without such
+    /// points.
     pub(crate) fn references(&self) -> Option<Vec<u8>> {
         let nodes = self.nodes.iter().map(|_| 0);
         (!self.references.is_empty()).then(|| nodes.chain(self.references.iter().map(|_| 1)).collect())
@@ -135,7 +138,7 @@ impl<'b> Drawn<'b> {
     }
 }
 
-/// A vector of column `j` that begins in row `row`, along the axes of the model.
+/// Returns the vector of column `j` that begins in row `row`, in model axes.
 fn turned(axes: &Matrix3<f64>, of: MatRef<'_, f64>, row: usize, j: usize) -> [f64; 3] {
     (axes * Vector3::from_fn(|k, _| of[(row + k, j)])).into()
 }
@@ -147,7 +150,7 @@ fn surface_nodes(body: &FlexBody) -> Vec<usize> {
     }
 }
 
-/// Indices of the nodes with these numbers.
+/// Returns the indices of the nodes with these numbers.
 fn indices(body: &FlexBody, numbers: &[i64]) -> Vec<usize> {
     let index: HashMap<i64, usize> = body.nodes().ids.iter().copied().zip(0..).collect();
     numbers.iter().filter_map(|number| index.get(number).copied()).collect()

@@ -1,13 +1,13 @@
-//! Names of modes as pictures show them, and of their files.
+//! Names of modes in pictures, and names of files.
 
 use crate::export::ExportOptions;
 use flexbody_body::flex_body::{FlexBody, is_static};
 
-/// Significant digits of a frequency.
+/// Number of significant digits of a frequency.
 const DIGITS: usize = 5;
 
-/// `mode_001 (123.4 Hz)` for each of the first `count` modes; of a shape that is no mode of the free body,
-/// whose frequency is no resonance, `mode_021 (residual vector: tip x)`.
+/// Returns `mode_001 (123.4 Hz)` for each of the first `count` modes, or `mode_021 (residual vector: tip x)`
+/// for a static shape, whose frequency is no resonance.
 pub(crate) fn mode_names(body: &FlexBody, count: usize) -> Vec<String> {
     let width = body.n_modes().to_string().len().max(3);
     let name = |(j, hertz): (usize, &f64)| {
@@ -21,13 +21,14 @@ pub(crate) fn mode_names(body: &FlexBody, count: usize) -> Vec<String> {
     body.frequencies_hz().iter().enumerate().take(count).map(name).collect()
 }
 
-/// Text of a body for a file that shows it: what no XML may hold, or steers a terminal, is replaced.
+/// Returns a text of a body for a picture file. Characters that XML forbids or that control a terminal are
+/// replaced.
 pub(crate) fn printable(text: &str) -> String {
     let strange = |c: char| c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}');
     text.chars().map(|c| if strange(c) { '\u{fffd}' } else { c }).collect()
 }
 
-/// What is to be done about the name of a file that viewers, which tell formats by it, would not know.
+/// Returns advice on the file name if viewers, which detect formats by the extension, would not recognise it.
 pub(crate) fn named(options: &ExportOptions, extension: &str) -> Option<String> {
     let name = options.name.as_ref()?;
     let known = name.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
@@ -36,7 +37,7 @@ pub(crate) fn named(options: &ExportOptions, extension: &str) -> Option<String> 
     (!known).then(|| format!("viewers know this format by the name of the file: call it {wanted}"))
 }
 
-/// A number with a few digits.
+/// Returns a number with a few digits.
 pub(crate) fn rounded(value: f64) -> String {
     let text = format!("{value:.*e}", DIGITS - 1);
     match text.parse::<f64>() {

@@ -1,5 +1,5 @@
-//! What pictures of a body share: the points, lines and triangles that are drawn, the names of modes, the
-//! motion that is played.
+//! Shared code of pictures of a body: the drawn points, lines and triangles, the names of modes, the played
+//! motion.
 
 mod drawn;
 mod labels;

@@ -1,65 +1,65 @@
-//! A motion as pictures play it.
+//! A motion for playback in pictures.
 
 use flexbody_file::RecordedMotion;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// Instants of a motion.
+/// Selected output times of a motion.
 pub(crate) struct Played<'m> {
     motion: &'m RecordedMotion,
-    /// Indices of the instants.
+    /// Indices of the selected times.
     chosen: Vec<usize>,
 }
 
 impl<'m> Played<'m> {
-    /// At most so many instants of a motion.
+    /// Selects at most `most` output times of a motion.
     pub(crate) fn new(motion: &'m RecordedMotion, most: usize) -> Self {
         Self { motion, chosen: motion.some_instants(most) }
     }
 
-    /// Name of the scene.
+    /// Returns the name of the scene.
     pub(crate) fn scene(&self) -> &'m str {
         &self.motion.scene
     }
 
-    /// Number of instants.
+    /// Returns the number of selected times.
     pub(crate) fn len(&self) -> usize {
         self.chosen.len()
     }
 
-    /// Time of an instant.
+    /// Returns a selected time.
     pub(crate) fn time(&self, instant: usize) -> f64 {
         self.motion.time[self.chosen[instant]]
     }
 
-    /// From the first instant to the last.
+    /// Returns the duration from the first to the last selected time.
     pub(crate) fn duration(&self) -> f64 {
         self.len().checked_sub(1).map_or(0.0, |last| self.time(last) - self.time(0))
     }
 
-    /// Modal coordinates at an instant.
+    /// Returns the modal coordinates at a selected time.
     pub(crate) fn q(&self, instant: usize) -> &'m [f64] {
         let (at, modes) = (self.chosen[instant], self.motion.modes);
         &self.motion.q[at * modes..(at + 1) * modes]
     }
 
-    /// Place of the frame at an instant, world axes.
+    /// Returns the origin of the frame at a selected time, world axes.
     pub(crate) fn origin(&self, instant: usize) -> Vector3<f64> {
         Vector3::from_column_slice(&self.motion.origins[3 * self.chosen[instant]..][..3])
     }
 
-    /// Rotation from the axes of the model, turning with the body, to those of the world.
+    /// Returns the rotation from the model axes, which turn with the body, to the world axes.
     pub(crate) fn attitude(&self, instant: usize) -> UnitQuaternion<f64> {
         let [w, i, j, k] = [0, 1, 2, 3].map(|part| self.motion.attitudes[4 * self.chosen[instant] + part]);
         UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 0.0).unwrap_or_default()
     }
 
-    /// The origin of the frame in model coordinates.
+    /// Returns the origin of the frame in model coordinates.
     pub(crate) fn origin_in_model(&self) -> Vector3<f64> {
         self.motion.origin_in_model.into()
     }
 
-    /// Places of points at an instant, and their deflections from the undeformed body, both along the axes of
-    /// the world; `shapes` are those of the modes that count.
+    /// Returns the positions of points at a selected time, and their deflections from the undeformed body,
+    /// both in world axes; `shapes` are the shapes of the modes in the picture.
     pub(crate) fn places(
         &self,
         instant: usize,
@@ -78,7 +78,7 @@ impl<'m> Played<'m> {
         positions.iter().enumerate().map(one).unzip()
     }
 
-    /// `all 101 instants`, or how many of them.
+    /// Returns the number of times in words: `all 101 instants`, `50 of 101 instants`.
     pub(crate) fn in_words(&self) -> String {
         match (self.len(), self.motion.time.len()) {
             (some, all) if some == all => format!("all {all} instants"),

@@ -1,4 +1,4 @@
-//! SID_FEM as a format that is imported.
+//! SID_FEM as an import format.
 
 use super::checks::checks;
 use super::read::arrays::FrameArrays;
@@ -13,10 +13,10 @@ use flexbody_base::text::InputFile;
 /// SID_FEM text (Wallrapp, Standard Input Data).
 pub(crate) struct SidFile;
 
-/// Bytes at the beginning in which the first keywords must be.
+/// Number of bytes within which the first keywords must occur.
 const HEAD: usize = 4096;
 
-/// Axes that are no rotation, beyond what few digits leave of one.
+/// Returns the frames whose axes differ from a rotation by more than few digits can explain.
 fn unsound(checks: &[AuditCheck]) -> Vec<String> {
     const FEW_DIGITS: f64 = 1e-2;
     let broken = |check: &&AuditCheck| {
@@ -37,7 +37,7 @@ impl ImportFormat for SidFile {
     }
 
     fn read(&self, file: &InputFile) -> Result<ImportedFile> {
-        // Names may be of any encoding, keywords and numbers are ASCII.
+        // Names may have any encoding; keywords and numbers are ASCII.
         let text = String::from_utf8_lossy(file.bytes());
         let mut listed = Listed::read(file.path(), &text)?;
         let digits = listed.digits();
@@ -46,7 +46,7 @@ impl ImportFormat for SidFile {
             listed.frames.iter().map(|frame| FrameArrays::new(frame, &listed, digits)).collect();
         let layout = Layout::detect(&listed, &arrays);
         let mut declared = Declared::of(&listed.comment);
-        // A file with geometric stiffness for acceleration has that for spin too.
+        // A file with geometric stiffness for acceleration has it for spin too.
         declared.stiffened = declared.stiffened.or((arrays.ct.sizes()[1] > 0.0).then_some(true));
         let found = checks(&listed, &arrays, &frames, &layout, &declared);
         let (body, mut notes) = body(&listed, &arrays, frames, &declared, found.spin_in_oe);

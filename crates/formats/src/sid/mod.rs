@@ -1,5 +1,5 @@
 //! SID_FEM text: Standard Input Data of a flexible body after Wallrapp, in the dialects that programs read.
-//! The reader is made from the description of the format alone and shares nothing with the writer.
+//! The reader follows the description of the format alone and shares no code with the writer.
 
 mod checks;
 pub(super) mod import;

@@ -1,4 +1,5 @@
-//! VTK: the body with its modes as one mesh, or a motion as one mesh for each instant and a list of them.
+//! VTK: the body with its modes as one mesh, or a motion as one mesh for each output time and a list of the
+//! meshes.
 
 use super::grid::{Grid, escaped};
 use crate::export::Holding::{Held, NotApplicable};
@@ -9,10 +10,10 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_file::RecordedMotion;
 use std::fmt::Write;
 
-/// The format.
+/// Export format of VTK.
 pub(crate) struct Vtk;
 
-/// Files of a motion at the most, and bytes of all of them together.
+/// Largest number of files of a motion, and largest size of all of them in bytes; a longer motion is thinned.
 const MOST_FILES: usize = 250;
 const ROOM: usize = 500_000_000;
 
@@ -33,7 +34,8 @@ impl ExportFormat for Vtk {
         true
     }
 
-    /// Mechanical properties are not applicable to a picture; [`leaves_out`](Self::leaves_out) names them.
+    /// Returns mechanical properties as not applicable to a picture; [`leaves_out`](Self::leaves_out) names
+    /// them.
     fn checklist(&self, _: &FlexBody, _: &ExportOptions) -> ExportChecklist {
         ExportChecklist {
             rigid_coupling: NotApplicable,
@@ -98,7 +100,7 @@ impl ExportFormat for Vtk {
     }
 }
 
-/// The undeformed body with a vector at every point for each mode.
+/// Returns the undeformed body with a vector at every point for each mode.
 fn with_modes(mut grid: Grid, body: &FlexBody, drawn: &Drawn<'_>, modes: usize) -> Vec<u8> {
     grid.put_field("frequency_hz", &body.frequencies_hz()[..modes]);
     let names = mode_names(body, modes);
@@ -113,14 +115,14 @@ fn with_modes(mut grid: Grid, body: &FlexBody, drawn: &Drawn<'_>, modes: usize) 
     grid.file(&drawn.positions())
 }
 
-/// The instants of a motion that are written.
+/// Returns the output times of a motion that are written.
 fn played<'m>(drawn: &Drawn<'_>, motion: &'m RecordedMotion) -> Played<'m> {
     let (cells, interfaces) = (drawn.triangles().len() + drawn.edges().len(), drawn.interfaces().len());
     let bytes = drawn.len() * (3 * 8 + 3 * 8 + 8 + interfaces) + cells * (3 * 8 + 8 + 1);
     Played::new(motion, MOST_FILES.min(ROOM / bytes.max(1)))
 }
 
-/// One mesh for each instant, and the list that ParaView opens.
+/// Returns one mesh for each output time, and the list that ParaView opens.
 fn series(grid: &Grid, drawn: &Drawn<'_>, played: &Played<'_>, modes: usize, stem: &str) -> Exported {
     let positions = drawn.positions();
     let shapes: Vec<_> = (0..modes).map(|j| drawn.shape(j)).collect();

@@ -1,37 +1,37 @@
-//! A mesh of VTK in XML: tags in front, numbers behind them as they lie in memory.
+//! A mesh of VTK in XML: tags first, then the raw bytes of the numbers.
 //! <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>
 
 use crate::picture::{Drawn, printable};
 use std::collections::HashSet;
 use std::fmt::Write;
 
-/// Numbers of the kinds of cells.
+/// Cell types of VTK.
 const VERTEX: u8 = 1;
 const LINE: u8 = 3;
 const TRIANGLE: u8 = 5;
 
-/// An unstructured grid that grows array by array.
+/// An unstructured grid under construction.
 #[derive(Clone)]
 pub(super) struct Grid {
     points: usize,
     cells: usize,
-    /// Tags of the arrays that belong to the whole, to the points, and to the cells.
+    /// Tags of the arrays of the grid, the points and the cells.
     field: String,
     point_data: String,
     cell_tags: String,
     /// Name of the first array of vectors.
     vectors: Option<String>,
-    /// Names that were given to arrays at the points.
+    /// Names already used by arrays at the points.
     taken: HashSet<String>,
     data: Appended,
 }
 
-/// Numbers that tags refer to: each array behind its length in bytes.
+/// Appended data of the tags: each array follows its length in bytes.
 #[derive(Clone, Default)]
 struct Appended(Vec<u8>);
 
 impl Grid {
-    /// Points with their numbers, the cells between them, and marks of the interfaces.
+    /// Builds the grid of points with their numbers, cells, and marks of the interfaces.
     pub(super) fn new(drawn: &Drawn<'_>) -> Self {
         let empty = String::new();
         let mut grid = Self {
@@ -57,14 +57,14 @@ impl Grid {
         grid
     }
 
-    /// Numbers of the body as a whole.
+    /// Adds numbers of the body as a whole.
     pub(super) fn put_field(&mut self, name: &str, values: &[f64]) {
         let tag = self.data.array(name, "Float64", 1, values.iter().map(|value| value.to_le_bytes()));
         let tuples = format!(" NumberOfTuples=\"{}\"/>", values.len());
         self.field += &tag.replace("/>", &tuples);
     }
 
-    /// A vector at every point.
+    /// Adds a vector at every point.
     pub(super) fn put_vectors(&mut self, name: &str, vectors: &[[f64; 3]]) {
         let name = self.own_name(name);
         self.point_data += &self.data.vectors(&name, vectors);
@@ -95,7 +95,7 @@ impl Grid {
         self.cell_tags += &self.data.array("types", "UInt8", 1, types.into_iter());
     }
 
-    /// A name that no other array at the points has: readers keep one array of each name.
+    /// Returns a name that no other array at the points has: readers keep one array per name.
     fn own_name(&mut self, wanted: &str) -> String {
         let wanted = printable(wanted);
         let mut name = wanted.clone();
@@ -107,7 +107,7 @@ impl Grid {
         name
     }
 
-    /// The file, with the points where they are.
+    /// Returns the bytes of the file with the given positions of the points.
     pub(super) fn file(mut self, positions: &[[f64; 3]]) -> Vec<u8> {
         let points = self.data.vectors("Points", positions);
         let vectors = self.vectors.as_deref().map(|name| format!(" Vectors=\"{}\"", escaped(name)));
@@ -141,7 +141,7 @@ impl Appended {
         self.array(name, "Float64", 3, vectors.as_flattened().iter().map(|value| value.to_le_bytes()))
     }
 
-    /// Appends an array; answers the tag that refers to it.
+    /// Appends an array and returns its tag.
     fn array<const N: usize>(
         &mut self,
         name: &str,
@@ -161,7 +161,7 @@ impl Appended {
     }
 }
 
-/// Text as the value of an attribute.
+/// Returns a text escaped as the value of an attribute.
 pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,5 +1,5 @@
-//! The checklists of all formats, held to their files: a property that a format holds changes the file, one that is
-//! not applicable does not, and only a picture may leave out without a message what changes the motion.
+//! Checklists of all formats compared with their files: a held property changes the file, a property that is
+//! not applicable does not, and only a picture may omit a property that affects the motion without a message.
 
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
@@ -12,9 +12,9 @@ use oracle::exported::jointed_bodies;
 /// A property of a body and its entry in the checklist.
 struct Property {
     name: &'static str,
-    /// True if bodies without it move otherwise.
+    /// True if the property affects the motion of the body.
     moves: bool,
-    /// Makes a body without the property, or with another one in its place.
+    /// Removes the property or replaces it by another one.
     remove: fn(&mut Parts),
     entry: fn(&ExportChecklist) -> &Holding,
 }
@@ -82,7 +82,7 @@ const PROPERTIES: &[Property] = &[
     },
 ];
 
-/// A body that has all of these properties, and K and M in the motions of its interfaces.
+/// Returns a body with all of these properties, and with K and M in the motions of its interfaces.
 fn body_with_everything() -> FlexBody {
     let (_, body) =
         jointed_bodies().iter().find(|(name, _)| name == "car_frame, jointed").expect("a body of beams");

@@ -1,5 +1,5 @@
-//! The embedded format: the C header, compiled as a real-time program does it, computes what the library
-//! computes. Needs a C compiler, as the project itself does.
+//! Embedded format: the C header, compiled like in a real-time program, computes the same values as the
+//! library. The test needs a C compiler, like the project itself.
 
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -25,13 +25,13 @@ use tempfile::TempDir;
 
 const STATES: usize = 4;
 
-/// Flags that the evaluation must compile with.
+/// Compiler flags with which the evaluation must compile.
 const STRICT: &[&str] = &["-Wall", "-Wextra", "-Wconversion", "-Werror", "-pedantic", "-ffreestanding"];
 
-/// The compiler and its language.
+/// Compiler and language.
 const C: &[&str] = &["cc", "-std=c99"];
 
-/// A body as a C program has it.
+/// A body compiled in a C program.
 struct Compiled {
     folder: TempDir,
     exported: Exported,
@@ -71,7 +71,7 @@ impl Compiled {
         assert_eq!(ending, "h");
         std::fs::write(path("body.h"), header).expect("writable");
         std::fs::write(path("body.bin"), &exported.file).expect("writable");
-        // The name of a type that the header defines has the prefix of all names.
+        // Type names defined by the header have the prefix of all names.
         let text = std::str::from_utf8(header).expect("ASCII");
         let small = text.split_once("_evaluation;").expect("a type").0.rsplit(' ').next().expect("a name");
         let sources = oracle::root().join("tests/embedded");
@@ -105,7 +105,7 @@ impl Compiled {
         self.folder.path().join(name)
     }
 
-    /// What opening `data`, `start` bytes behind a multiple of 64, returns.
+    /// Returns the result of opening `data` at `start` bytes after a multiple of 64.
     fn opened(&self, data: &[u8], start: usize) -> i32 {
         std::fs::write(self.path("changed.bin"), data).expect("writable");
         let start = start.to_string();
@@ -113,7 +113,7 @@ impl Compiled {
         output.status.code().unwrap_or_else(|| panic!("{}", String::from_utf8_lossy(&output.stderr)))
     }
 
-    /// The results at the states, `bytes` per number.
+    /// Returns the results at the states, with `bytes` bytes per number.
     fn results(&self, states: &[Vec<f64>], bytes: usize) -> Vec<f64> {
         let number =
             |v: &f64| if bytes == 8 { v.to_le_bytes().to_vec() } else { (*v as f32).to_le_bytes().to_vec() };
@@ -132,10 +132,10 @@ impl Compiled {
     }
 }
 
-/// q, nu, applied forces, gravity, a force and a torque that suit the body.
+/// Returns q, nu, applied forces, gravity, a force and a torque of suitable size for the body.
 fn state(random: &mut Random, body: &FlexBody) -> Vec<f64> {
     let own = lively_state(random, body);
-    // Geometric stiffness takes from the inertia what large deformations would have to give back.
+    // Geometric stiffness corrects the inertia to first order only, so that its amplitude is reduced here.
     let amount = if body.geometric_stiffness().is_empty() { 1.0 } else { 0.1 };
     let (mass, size) = (body.invariants().mass(), body.invariants().inertia().norm().sqrt());
     let rate = body.modes().eigenvalue[0].sqrt();
@@ -168,7 +168,7 @@ fn state(random: &mut Random, body: &FlexBody) -> Vec<f64> {
     .concat()
 }
 
-/// The frame as the library has it.
+/// Returns the frame as a point of the library.
 fn point(body: &FlexBody, all: &[ExportFrame], frame: &ExportFrame) -> BodyPoint {
     let alone = all.iter().filter(|other| other.name == frame.name).count() == 1;
     let interface = body.interfaces().iter().find(|interface| Some(&interface.name) == frame.name.as_ref());
@@ -180,7 +180,7 @@ fn point(body: &FlexBody, all: &[ExportFrame], frame: &ExportFrame) -> BodyPoint
     })
 }
 
-/// What the C program must find: the numbers, each with its scale.
+/// Returns the expected results of the C program, each with its scale.
 fn expected(body: &FlexBody, points: &Points, state: &[f64]) -> Vec<(f64, f64)> {
     let equations = EquationsOfMotion::new(body, Terms::ALL);
     let (nf, n, r) = (equations.n_modes(), equations.n_velocities(), equations.n_rigid());
@@ -224,7 +224,7 @@ fn expected(body: &FlexBody, points: &Points, state: &[f64]) -> Vec<(f64, f64)> 
         add(point.place(&evaluation).as_slice());
         add(point.velocity(&evaluation).as_slice());
         let turn = point.axes(&evaluation).zip(point.angular_velocity(&evaluation));
-        // FLEXBODY_NO_ORIENTATION.
+        // The code is FLEXBODY_NO_ORIENTATION for frames without orientation.
         add(&[if turn.is_some() { 0.0 } else { 10.0 }]);
         let (axes, rate) = turn.map_or(([0.0; 9], [0.0; 3]), |(axes, rate)| {
             (std::array::from_fn(|at| axes[(at / 3, at % 3)]), rate.into())
@@ -241,7 +241,7 @@ fn expected(body: &FlexBody, points: &Points, state: &[f64]) -> Vec<(f64, f64)> 
     found
 }
 
-/// Largest error of the C program relative to the largest number beside each.
+/// Returns the largest error of the C program, relative to the scale of each number.
 fn error(compiled: &Compiled, body: &FlexBody, points: &Points, bytes: usize) -> f64 {
     let mut random = Random(body.n_nodes() as u64);
     let mut states: Vec<Vec<f64>> = (0..STATES).map(|_| state(&mut random, body)).collect();
@@ -257,13 +257,13 @@ fn worst(found: &[f64], expected: &[(f64, f64)]) -> f64 {
     let error = |(found, (value, scale)): (&f64, &(f64, f64))| {
         let off = (found - value).abs();
         let relative = if off == 0.0 { 0.0 } else { off / scale };
-        // What is no number is no result.
+        // A NaN counts as an infinite error.
         if relative.is_nan() { f64::INFINITY } else { relative }
     };
     found.iter().zip(expected).map(error).fold(0.0, f64::max)
 }
 
-/// Frames where the body has interfaces, else some nodes.
+/// Returns the interfaces as frames or, without interfaces, some nodes.
 fn some_points(body: &FlexBody) -> Points {
     match body.interfaces() {
         [] => Points::Some(body.nodes().ids.iter().copied().step_by(1 + body.n_nodes() / 3).collect()),
@@ -271,8 +271,8 @@ fn some_points(body: &FlexBody) -> Points {
     }
 }
 
-/// Roundings of the largest number of a result that two orders of its sums, and what the elimination cancels,
-/// may differ by.
+/// Largest difference in roundings of the largest number of a result, for two orders of its sums and
+/// cancellation in the elimination.
 const ROUNDINGS: f64 = 500.0;
 
 #[track_caller]
@@ -299,7 +299,8 @@ fn all_fixtures() -> Vec<String> {
 #[ignore = "slow"]
 fn every_fixture_body_moves_in_c_as_in_the_library() {
     for (at, name) in all_fixtures().iter().enumerate() {
-        // The frame of the model has c, C1 and C2; numbers of modes with every rest of four and eight.
+        // The frame of the model gives nonzero c, C1 and C2; the numbers of modes cover all remainders of
+        // four and eight.
         let frame = if at % 2 == 0 { BodyFrame::Model } else { BodyFrame::Principal };
         let body = fixture(name, 3 + at % 9, frame);
         assert_same(name, &body, "double", &["-O2"]);
@@ -307,7 +308,7 @@ fn every_fixture_body_moves_in_c_as_in_the_library() {
     }
 }
 
-/// Solids and general masses, in space and in the plane.
+/// Returns solids and general masses, in space and in the plane.
 fn kinds() -> [FlexBody; 4] {
     [
         soft_block(8),
@@ -328,7 +329,8 @@ fn a_body_without_some_terms_has_neither_their_numbers_nor_their_forces() {
             let (nf, axes) = (body.n_modes(), if body.dimension() == 2 { 1 } else { 3 });
             let pairs = if axes == 3 { 6 } else { 1 };
             let mut dropped = 0;
-            // The stiffness of inertia, which is never dropped, is added to the same numbers.
+            // The stiffness of inertia, which is never dropped, is added to the arrays of geometric
+            // stiffness.
             let drops = body.inertia_stiffness().is_none();
             dropped += if groups.w2 { 0 } else { 8 * pairs * nf * nf };
             dropped += if groups.w3 { 0 } else { 8 * axes * nf * nf };
@@ -339,8 +341,8 @@ fn a_body_without_some_terms_has_neither_their_numbers_nor_their_forces() {
     }
 }
 
-/// What no fixture has: geometric stiffness of all kinds, full stiffness and damping matrices, and modes that
-/// are not mass-normalised.
+/// Adds properties that no fixture has: geometric stiffness of all kinds, full stiffness and damping
+/// matrices, and modes that are not mass-normalised.
 fn laden(body: FlexBody, random: &mut Random) -> FlexBody {
     let names: Vec<String> = body.interfaces().iter().map(|interface| interface.name.clone()).collect();
     let at = |make: fn(String) -> LoadKind| names.iter().cloned().map(make);
@@ -371,13 +373,13 @@ fn geometric_stiffness_damping_and_modes_of_any_mass_are_held() {
         let body = laden(body, &mut random);
         assert_same(&format!("kind {at}"), &body, "double", &["-O3"]);
         assert_same(&format!("kind {at}"), &body, "float", &["-O2"]);
-        // Geometric stiffness for spin is there without W2, and the rest without W3.
+        // Geometric stiffness for spin is present without W2, and the other kinds without W3.
         let bare = with_groups(&body, TermGroups::NONE);
         assert_same(&format!("kind {at}, bare"), &bare, "double", &["-O2"]);
     }
 }
 
-/// The power series of the rotation of a frame ends at an angle of 1; from there on angles are doubled.
+/// The power series of the rotation of a frame is used up to an angle of 1; larger angles are doubled.
 #[test]
 fn frames_turn_by_any_angle() {
     let body = fixture("frame_beams", 6, BodyFrame::Principal);
@@ -385,7 +387,7 @@ fn frames_turn_by_any_angle() {
     for angle in [0.999, 1.001, 3.0, 6.0] {
         let mut parts = body.clone().into_parts();
         let rotation = parts.modes.rotation.as_mut().expect("beams");
-        // The same rotation in every mode: the states below have the sum 1.
+        // Every mode has the same rotation, and the modal coordinates below add up to 1.
         for j in 0..6 {
             for (k, part) in [2.0, -1.0, 2.0].into_iter().enumerate() {
                 rotation[(9 + k, j)] = angle * part / 3.0;
@@ -397,7 +399,7 @@ fn frames_turn_by_any_angle() {
         (0..6).for_each(|j| state[j] = [0.9, -0.2, 0.3, 0.1, -0.3, 0.2][j]);
         let compiled = Compiled::new(exported(&body, "double", &points), &["-O2"]);
         let found = compiled.results(&[state.clone()], 8);
-        // Behind the results without frames: place, velocity and code.
+        // The results after those without frames: position, velocity and code.
         let trace = 1 + 4 * 12 + 2 + 7;
         let cosine = 0.5 * (found[trace] + found[trace + 4] + found[trace + 8] - 1.0);
         assert!((cosine - angle.cos()).abs() < 1e-14, "{angle}");
@@ -424,7 +426,7 @@ fn craig_bampton_bodies_have_frames_at_their_interfaces() {
     }
 }
 
-/// The header is C++ as well: the same numbers as from the library.
+/// The header compiles as C++ too and gives the numbers of the library.
 #[test]
 fn the_header_is_cpp_too() {
     for (body, standard) in kinds().into_iter().zip(["c++11", "c++17", "c++14", "c++20"]) {
@@ -444,7 +446,7 @@ fn sanitizers_find_nothing() {
     }
 }
 
-/// What `flexbody_open` returns.
+/// Return values of `flexbody_open`.
 const OK: i32 = 0;
 const TOO_SHORT: i32 = 1;
 const NOT_ALIGNED: i32 = 2;
@@ -475,10 +477,10 @@ fn other_and_damaged_files_are_refused() {
         changed
     };
     assert_eq!(compiled.opened(&with(0, b"\x89HDF"), 0), NO_BODY);
-    // What a machine of the other byte order would write, and find.
+    // The byte order mark of a machine with the other byte order.
     assert_eq!(compiled.opened(&with(8, &[1, 2, 3, 4]), 0), BYTE_ORDER);
     assert_eq!(compiled.opened(&with(12, &2u32.to_le_bytes()), 0), OTHER_VERSION);
-    // Every entry of header and table but the units, of which only the checksum knows.
+    // Covers every entry of header and table except the units, which only the checksum protects.
     for at in (16..328).step_by(4) {
         let code = compiled.opened(&with(at, &[file[at] ^ 1]), 0);
         let wanted = if at == 20 || (48..72).contains(&at) { DAMAGED } else { OTHER_BODY };
@@ -489,7 +491,7 @@ fn other_and_damaged_files_are_refused() {
         let at = 328 + random.next_u64() as usize % (file.len() - 328);
         assert_eq!(compiled.opened(&with(at, &[file[at] ^ (1 << (at % 8))]), 0), DAMAGED, "byte {at}");
     }
-    // Other bodies and precisions.
+    // Files of other bodies and precisions are refused.
     for (other, dialect) in [("frame_beams", "float"), ("satellite", "double"), ("plane_frame", "double")] {
         let other = fixture(other, 6, BodyFrame::Model);
         let foreign = exported(&other, dialect, &some_points(&other)).file;
@@ -498,7 +500,7 @@ fn other_and_damaged_files_are_refused() {
     }
 }
 
-/// Indices of a file that was made to deceive, with a checksum that fits.
+/// Refuses manipulated indices even with a valid checksum.
 #[test]
 fn indices_that_lead_nowhere_are_refused() {
     let body = laden(fixture("robot_link", 6, BodyFrame::Model), &mut Random(5));
@@ -564,7 +566,7 @@ fn what_cannot_be_held_is_told_or_refused() {
     assert!(diagnostic.message().contains("`preload`"), "{}", diagnostic.message());
     assert_eq!(export(&named, format, &ExportOptions::default(), true).expect("allowed").1.len(), 1);
 
-    // 1e60 in a file of 32-bit floats.
+    // 1e60 does not fit into a file of 32-bit floats.
     let mut parts = body.into_parts();
     parts.invariants.primary_mut().modal_stiffness[(1, 1)] = 1e60;
     let stiff = FlexBody::new(parts).expect("valid parts");

@@ -1,5 +1,5 @@
-//! Exports to Exudyn, MBDyn and MBSim: every number against the body, and against sums over the mass matrix;
-//! read back; losses told.
+//! Exports to Exudyn, MBDyn and MBSim: every number compared with the body and with sums over the mass
+//! matrix, read back, and reported losses.
 
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -19,7 +19,7 @@ use oracle::mesh::{Mesh, grid};
 use oracle::partial::{combinations, with_groups};
 use oracle::random::Random;
 
-/// Formats that are read back, with their dialects; SID has tests of its own.
+/// Returns the formats that are read back, with their dialects; SID has tests of its own.
 fn formats() -> Vec<(&'static str, &'static str)> {
     let names = IMPORT_FORMATS.iter().map(|format| format.name()).filter(|name| *name != "sid");
     let of_name = |name| match find_format(name).expect("a format").dialects() {
@@ -37,7 +37,7 @@ fn options(dialect: &str, points: Points) -> ExportOptions {
     }
 }
 
-/// The file, and what it lost.
+/// Returns the file and its losses.
 fn written(body: &FlexBody, format: &str, options: &ExportOptions) -> (Vec<u8>, Vec<String>) {
     let (exported, mut losses) =
         export(body, find_format(format).expect("a format"), options, true).expect("written");
@@ -71,7 +71,7 @@ fn told(imported: &ImportedFile) -> Invariants {
     Invariants::from_numbered(&imported.body.inertia, imported.body.modal_stiffness.clone(), 1e-12)
 }
 
-/// What of a body these formats hold: no W0 beyond C1, W3 antisymmetric.
+/// Returns the invariants that these formats hold: no W0 beyond C1, W3 antisymmetric.
 fn held(body: &FlexBody) -> Invariants {
     let mut held = body.invariants().clone();
     let nf = body.n_modes();
@@ -102,7 +102,7 @@ fn every_fixture_is_read_back_with_every_number() {
                 if exact {
                     values(&body, &found, format, &case);
                     let audit = audit(&found, 1e-9);
-                    // What is lost of a general mass leaves one that no distribution of mass has.
+                    // The lossy export of a general mass gives invariants that no distribution of mass has.
                     let general = body.invariants().general().is_some();
                     let excused = ["scalar_gram_psd", "velocity_gram_psd"];
                     let wrong = audit.checks.iter().filter(|check| !check.passed());
@@ -123,23 +123,23 @@ fn every_fixture_is_read_back_with_every_number() {
     }
 }
 
-/// Inertia and stiffness.
+/// Compares inertia and stiffness.
 fn values(body: &FlexBody, found: &ImportedFile, format: &str, case: &str) {
     assert_eq!(&found.body.modal_stiffness, body.invariants().modal_stiffness(), "{case}");
-    // MBSim has m_ff as a sum: of a general mass W2 is what it makes of it.
+    // MBSim states m_ff as a sum, which replaces W2 of a general mass.
     let own_w2 = format != "mbsim" || body.invariants().general().is_none();
     same(&held(body), &told(found), own_w2, case);
 }
 
-/// Equal but for what these programs do not look at: the part of W2 that is skew in its axes, where it is not
-/// what W3 is.
+/// Asserts equality except for the part of W2 that these programs ignore: the part skew in its axes, if it
+/// differs from W3.
 fn same(expected: &Invariants, found: &Invariants, with_w2: bool, case: &str) {
     let composed = expected.general().is_some() || !expected.groups().w3;
     for (what, difference) in primary_differences(expected, found) {
         let exact = what != "second_moment" && (what != "S" || (with_w2 && !composed));
         assert!(!exact || difference < 1e-13, "{case}: {what} {difference:.1e}");
     }
-    // Files have I0, of which the second moment of a thin body is a small difference.
+    // Files have I0; the second moment of a thin body is a small difference of its entries.
     let apart = (expected.inertia() - found.inertia()).norm() / expected.inertia().norm();
     assert!(apart < 1e-14, "{case}: I0 {apart:.1e}");
     let (Some(own), Some(other)) = (expected.w2(), found.w2()) else { return };
@@ -154,7 +154,7 @@ fn same(expected: &Invariants, found: &Invariants, with_w2: bool, case: &str) {
 }
 
 fn places(body: &FlexBody, found: &ImportedFile, format: &str, case: &str) {
-    // Of Exudyn files all nodes, with their numbers in the model.
+    // Exudyn files have all nodes, with their numbers in the model.
     let points = if format == "exudyn" { Points::Nodes } else { Points::Usual };
     let places = frames(body, &points);
     assert_eq!(found.body.frames.len(), places.len(), "{case}");
@@ -174,7 +174,7 @@ fn places(body: &FlexBody, found: &ImportedFile, format: &str, case: &str) {
     }
 }
 
-/// A block without symmetry, its model and its body about a point that is not its centre of mass.
+/// Returns a block without symmetry, its model, and its body about a point other than the centre of mass.
 fn block() -> (FeModel, FlexBody) {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([3, 2, 2]), |[x, y, z]| {
@@ -184,7 +184,7 @@ fn block() -> (FeModel, FlexBody) {
     (FeModel::from_raw(raw.clone()).expect("a body").model, body_of(raw, 5, BodyFrame::Model))
 }
 
-/// Sums over the mass matrix, as the papers and programs write them.
+/// Sums over the mass matrix as defined in the papers and programs.
 struct Sums {
     body: FlexBody,
     /// Nodes i and j, and the entry of Ms.
@@ -233,7 +233,7 @@ fn array(file: &hdf5::File, name: &str) -> (Vec<f64>, Vec<usize>) {
     (dataset.read_raw().expect("floats"), dataset.shape())
 }
 
-/// The file as the HDF5 library sees it.
+/// Opens the file with the HDF5 library.
 fn opened<T>(bytes: &[u8], look: impl FnOnce(&hdf5::File) -> T) -> T {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("file.h5");
@@ -308,8 +308,8 @@ fn arrays_of_exudyn_are_the_products_of_fem_py() {
     });
 }
 
-/// What Exudyn's marker makes of the nodes, their mean and the rotation that fits them best, moves as the
-/// interface of the body.
+/// The marker of Exudyn takes the mean and the best-fit rotation of the nodes, which move like the interface
+/// of the body.
 #[test]
 fn interfaces_of_exudyn_are_nodes_whose_mean_motion_is_that_of_the_interface() {
     let body = fixture("bracket_hex20", 5, BodyFrame::Principal);
@@ -322,7 +322,7 @@ fn interfaces_of_exudyn_are_nodes_whose_mean_motion_is_that_of_the_interface() {
         assert_eq!(groups.len(), body.interfaces().len());
         for (group, interface) in groups.iter().zip(body.interfaces()) {
             let text = |name: &str| {
-                // Fixed length, as every reader takes it.
+                // Texts have a fixed length, which every reader accepts.
                 let text: hdf5::types::FixedAscii<64> =
                     group.dataset(name).expect(name).read_scalar().expect("text");
                 text.as_str().to_owned()
@@ -365,7 +365,7 @@ fn interfaces_of_exudyn_are_nodes_whose_mean_motion_is_that_of_the_interface() {
     });
 }
 
-/// Numbers of a record group.
+/// Returns the numbers of a record group.
 fn group(text: &str, number: usize) -> Vec<f64> {
     let title = format!("** RECORD GROUP {number},");
     let lines = text.lines().skip_while(|line| !line.starts_with(&title)).skip(1);
@@ -471,14 +471,14 @@ fn groups_that_a_body_does_without_are_zero_and_the_rest_stays_consistent() {
                 true,
                 &format!("{format} {groups:?}"),
             );
-            // What is not held is zero in the file.
+            // Dropped terms are zero in the file.
             let inertia = &found.body.inertia;
             let symmetric = inertia.i8.iter().map(|i8| (i8 + i8.transpose()).norm()).fold(0.0, f64::max);
             assert_eq!(symmetric == 0.0, !groups.w1, "{format} {groups:?}");
             let i5 = inertia.i5.as_ref().expect("in every file").norm_max();
             assert_eq!(i5 == 0.0, !groups.w3, "{format} {groups:?}");
         }
-        // MBSim takes W2 from the same integrals as the modal mass.
+        // MBSim takes W2 from the integrals that give the modal mass.
         let (bytes, losses) = written(&reduced, "mbsim", &ExportOptions::default());
         assert_eq!(
             losses.iter().any(|loss| loss.contains("without W2")),
@@ -524,7 +524,7 @@ fn damping_and_geometric_stiffness_are_held_where_there_is_a_place() {
     let losses = written(&body, "exudyn", &ExportOptions::default()).1;
     assert_eq!(losses.len(), 2, "{losses:?}");
     assert!(losses[1].contains("damping"), "{losses:?}");
-    // Level 13 has damping, and neither coupling nor stress stiffening.
+    // Level 13 has damping, but neither coupling nor stress stiffening.
     let (bytes, losses) = written(&body, "mbdyn", &options("level13", Points::Usual));
     assert_eq!(losses.len(), 2, "{losses:?}");
     let text = String::from_utf8(bytes).expect("text");
@@ -557,7 +557,7 @@ fn what_is_lost_is_told_with_its_size() {
     }
 }
 
-/// W2 of MBSim differs by what its loss says, and by no more.
+/// W2 of MBSim differs by the reported loss and no more.
 #[test]
 fn the_size_of_a_loss_is_what_is_lost() {
     let body = fixture("shell_folded", 5, BodyFrame::Principal);
@@ -575,7 +575,7 @@ fn the_size_of_a_loss_is_what_is_lost() {
     assert!(told.contains(&format!("{lost:.1e}")), "{told}: {lost:.1e}");
 }
 
-/// What MBDyn ignores without a setting is said, and only where the file has it.
+/// Settings that MBDyn needs are reported if the file has the data that they affect.
 #[test]
 fn mbdyn_says_what_its_input_must_have() {
     let plain = fixture("bracket_hex20", 3, BodyFrame::Principal);
@@ -595,8 +595,8 @@ fn mbdyn_says_what_its_input_must_have() {
     assert!(nodes.contains("2 or more interface nodes"), "{nodes}");
 }
 
-/// Six nodes on a cross have the place and the rotation of the interface, also of nodal rotations that Exudyn
-/// has no other form for.
+/// Six nodes on a cross have the position and the rotation of the interface, including nodal rotations that
+/// Exudyn cannot represent otherwise.
 #[test]
 fn interfaces_of_exudyn_are_crosses_of_six_nodes_where_places_are_asked_for() {
     for model in ["bracket_hex20", "car_frame"] {

@@ -1,5 +1,5 @@
-//! SID_FEM text: what is written is the body. The equations of motion are evaluated from the file as public
-//! readers print them.
+//! SID_FEM text represents the body. The equations of motion are evaluated from the file in the form used by
+//! public readers.
 
 use faer::Mat;
 use flexbody_base::text::InputFile;
@@ -34,7 +34,8 @@ fn sid() -> &'static dyn ExportFormat {
     find_format("sid").expect("a format")
 }
 
-/// The body of a model, with random geometric stiffness for the motion of its frame in place of its own.
+/// Returns the body of a model with random geometric stiffness for the motion of its frame in place of its
+/// own.
 fn strained(model: &str, random: &mut Random) -> FlexBody {
     let mut parts = fixture(model, MODES, BodyFrame::Model).into_parts();
     parts.geometric_stiffness.clear();
@@ -60,7 +61,7 @@ fn read(text: &str) -> ImportedFile {
     format.read(&file).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// max |a - b| beside max |b|.
+/// Returns max |a - b| relative to max |b|.
 fn apart(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
     assert_eq!((a.nrows(), a.ncols()), (b.nrows(), b.ncols()));
     let (d, size) = ((a - b).norm_max(), b.norm_max());
@@ -76,7 +77,7 @@ fn stiffness(body: &[GeometricStiffness<Mat<f64>>], load: &UnitLoad) -> Option<M
     body.iter().find(|one| one.load == *load).map(|one| one.matrix.clone())
 }
 
-/// Entry of an array as the text has it, read by the test itself.
+/// Arrays of the text, read by the test itself.
 struct Arrays {
     nq: usize,
     lines: Vec<String>,
@@ -117,7 +118,7 @@ impl Arrays {
     fn m1(&self, name: &'static str, i: usize, j: usize, k: usize) -> f64 {
         let [first, middle, last] = match self.dialect {
             "fembeam" => [i, j, k],
-            // Numbers as the reader of EMBSlib stores them, which its Modelica takes row by row.
+            // Numbers in the storage order of EMBSlib, whose Modelica part takes them row by row.
             "embs" => {
                 let (rows, at) = (self.rows(name), i * self.nq + k);
                 [at % rows, at / rows, j]
@@ -132,13 +133,13 @@ impl Arrays {
         stated.expect("a size").parse().expect("a number")
     }
 
-    /// A symmetric matrix, of which some dialects list one triangle.
+    /// Returns a symmetric matrix, of which some dialects list one triangle.
     fn square(&self, name: &'static str) -> DMatrix<f64> {
         let entry = |i: usize, j: usize| self.entry(name, &format!("m0({},{})", i + 1, j + 1));
         DMatrix::from_fn(self.nq, self.nq, |i, j| entry(i, j).or_else(|| entry(j, i)).unwrap_or(0.0))
     }
 
-    /// M0 + sum_k M1_k q_k.
+    /// Returns M0 + sum_k M1_k q_k.
     fn at(&self, name: &'static str, nrow: usize, ncol: usize, q: &[f64]) -> DMatrix<f64> {
         DMatrix::from_fn(nrow, ncol, |i, j| {
             let moved: f64 = q.iter().enumerate().map(|(k, q)| self.m1(name, i, j, k) * q).sum();
@@ -158,7 +159,7 @@ impl Arrays {
         Matrix3::new(j[0], j[3], j[4], j[3], j[1], j[5], j[4], j[5], j[2])
     }
 
-    /// Gr(qd) (3 x 3) or Ge(qd) (nq x 3), by the order of columns that the dialect has.
+    /// Returns Gr(qd) (3 x 3) or Ge(qd) (nq x 3), in the column order of the dialect.
     fn gyroscopic(&self, name: &'static str, nrow: usize, qd: &[f64]) -> DMatrix<f64> {
         let by_modes =
             ["fembeam", "embs"].contains(&self.dialect) || (self.dialect == "py-sid" && name == "Gr");
@@ -168,7 +169,7 @@ impl Arrays {
         })
     }
 
-    /// What the equations of SID have on their left side: forces (3), torques (3), modal forces.
+    /// Returns the left side of the equations of SID: forces (3), torques (3), modal forces.
     fn balance(&self, state: &State) -> DVector<f64> {
         let State { a, alpha, omega, q, qd, qdd } = state;
         let nq = self.nq;
@@ -209,7 +210,7 @@ impl Arrays {
     }
 }
 
-/// Acceleration of the origin and of the frame, body axes, and the modes.
+/// Accelerations of the origin and of the frame in body axes, and the modal state.
 struct State {
     a: Vector3<f64>,
     alpha: Vector3<f64>,
@@ -220,8 +221,8 @@ struct State {
 }
 
 impl State {
-    /// A state whose modal coordinates and rates are `size` of what the body's inertia is; in the plane of a
-    /// plane body.
+    /// Returns a state with modal coordinates and rates of the relative size `size` to the inertia of the
+    /// body; a plane body moves in its plane.
     fn random(body: &FlexBody, size: f64, random: &mut Random) -> Self {
         let (nf, plane) = (body.n_modes(), body.dimension() == 2);
         let inertia = body.invariants().inertia().trace().sqrt();
@@ -236,7 +237,7 @@ impl State {
         Self { a, alpha, omega, q: modal(size), qd: modal(size * rate), qdd: modal(size * rate * rate) }
     }
 
-    /// What the equations of the body have, in the order and with the zeros of SID.
+    /// Returns the forces of the equations of the body, in the order and with the zeros of SID.
     fn own(&self, body: &FlexBody) -> DVector<f64> {
         let equations = EquationsOfMotion::new(body, Terms::ALL);
         let mut evaluation = Evaluation::new(&equations);
@@ -245,14 +246,14 @@ impl State {
             let of = |&i: &usize| if i < 3 { linear[i] } else { angular[i - 3] };
             rigid.iter().map(of).chain(modal.iter().copied()).collect()
         };
-        // V = 0: then V' is the acceleration of the origin.
+        // For V = 0, V' is the acceleration of the origin.
         evaluation.set(&self.q, &put(&Vector3::zeros(), &self.omega, &self.qd));
         let mut forces = vec![0.0; equations.n_velocities()];
         evaluation.balance(&put(&self.a, &self.alpha, &self.qdd), &mut forces);
         DVector::from_vec(forces)
     }
 
-    /// Of the six rigid rows of SID those that a plane body has.
+    /// Selects the rigid rows of SID that a plane body has.
     fn rows(body: &FlexBody, all: &DVector<f64>) -> DVector<f64> {
         let rigid: &[usize] = if body.dimension() == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
         let values = rigid.iter().map(|&i| all[i]).chain(all.iter().skip(6).copied());
@@ -260,8 +261,8 @@ impl State {
     }
 }
 
-/// Largest difference of the equations of SID and those of the body beside the largest entry: of force,
-/// torque, and modal forces.
+/// Returns the largest difference of the equations of SID and of the body relative to the largest entry: of
+/// force, torque and modal forces.
 fn equations_apart(body: &FlexBody, arrays: &Arrays, state: &State) -> [f64; 3] {
     let (sid, own) = (State::rows(body, &arrays.balance(state)), state.own(body));
     let d = if body.dimension() == 2 { 2 } else { 3 };
@@ -273,7 +274,7 @@ fn equations_apart(body: &FlexBody, arrays: &Arrays, state: &State) -> [f64; 3] 
     })
 }
 
-/// A body that commutes with rotations: no W0 of its own.
+/// Returns true for a mass that commutes with rotations, which has no W0 of its own.
 fn is_solid(body: &FlexBody) -> bool {
     body.invariants().general().is_none()
 }
@@ -342,14 +343,14 @@ fn the_equations_of_the_file_are_those_of_the_body_to_first_order() {
         for body in [&own, &strained(&model, &mut random)] {
             for name in sid().dialects() {
                 let arrays = Arrays::new(&text(body, &dialect(name)), name, MODES);
-                // Undeformed and at rest of the modes: exact.
+                // Undeformed and without modal motion the equations are exact.
                 let rest = State { qd: vec![0.0; MODES], ..State::random(body, 0.0, &mut random) };
                 let worst = equations_apart(body, &arrays, &rest);
                 assert!(worst.iter().all(|v| *v < 1e-12), "{model} {name}: {worst:?}");
                 if !is_solid(body) {
                     continue;
                 }
-                // The difference is of second order: a hundredth when the motion of the modes is a tenth.
+                // The difference is of second order: a tenth of the modal motion gives a hundredth.
                 let mut state = State::random(body, 1e-3, &mut random);
                 let large = difference(body, &arrays, &state);
                 for v in state.q.iter_mut().chain(&mut state.qd).chain(&mut state.qdd) {
@@ -357,7 +358,7 @@ fn the_equations_of_the_file_are_those_of_the_body_to_first_order() {
                 }
                 let small = difference(body, &arrays, &state);
                 let scale = state.own(body).amax();
-                // Modal forces have no terms of second order at all.
+                // Modal forces have no second-order terms.
                 for row in 0..large.len() {
                     let bound = 0.012 * large.amax() + 1e-12 * scale;
                     assert!(
@@ -376,8 +377,7 @@ fn difference(body: &FlexBody, arrays: &Arrays, state: &State) -> DVector<f64> {
     State::rows(body, &arrays.balance(state)) - state.own(body)
 }
 
-/// What SID leaves out of the modal forces of a solid without geometric stiffness is nothing: these are exact
-/// at any deformation.
+/// The modal forces of a solid without geometric stiffness are exact in SID at any deformation.
 #[test]
 fn modal_forces_of_solids_are_exact_at_any_deformation() {
     for model in ["bracket_hex20", "cube_hex8", "gear_disc"] {
@@ -452,8 +452,7 @@ fn frames_are_interfaces_or_the_nodes_that_are_asked_for() {
     }
 }
 
-/// Readers of the files of FEMBS and PY_SID split the line at a sign of equality; MatMorembs and FEMBeam
-/// write none.
+/// Readers of FEMBS and PY_SID files split the line at a sign of equality; MatMorembs and FEMBeam write none.
 #[test]
 fn the_part_has_a_name_in_the_dialects_that_have_one() {
     let mut parts = fixture("hex8_edges", 4, BodyFrame::Model).into_parts();
@@ -478,7 +477,7 @@ fn what_cannot_be_held_is_told() {
     };
     assert!(said("bracket_hex20").is_empty() && said("turbine_blade").is_empty());
     assert!(said("plane_frame").iter().any(|loss| loss.contains("plane")));
-    // Stiffness of inertia is written as geometric stiffness is.
+    // The stiffness of inertia is written like geometric stiffness.
     assert!(said("frame_beams").is_empty(), "{:?}", said("frame_beams"));
     let body = fixture("bracket_hex20", MODES, BodyFrame::Model);
     let body = stressed(body, &[LoadKind::Named("bolts".to_owned())], 1.0, &mut Random(2));
@@ -488,7 +487,7 @@ fn what_cannot_be_held_is_told() {
     assert_eq!(warnings.len(), 1);
 }
 
-/// Names of arrays that the reader of EMBSlib looks for anywhere in a line.
+/// Names of arrays that the reader of EMBSlib detects anywhere in a line.
 const KEYWORDS: [&str; 13] =
     ["refmod", "frame", "mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De"];
 
@@ -511,7 +510,7 @@ fn embs_has_keywords_in_the_heads_of_its_arrays_alone_and_lines_that_its_reader_
                 assert!(found.is_none_or(|keyword| *keyword == words), "{name}, line {number}: {line}");
                 inside.extend(found.copied().filter(|keyword| *keyword == words));
             }
-            // Counts of five digits, numbers of 19 characters before the exponent.
+            // Counts have five digits at most, numbers 19 characters before the exponent.
             if let Some((key, value)) = words.split_once("= ") {
                 let digits = |text: &str| text.split(|c: char| !c.is_ascii_digit()).map(str::len).max();
                 assert!(digits(key).is_none_or(|most| most <= 5), "{line}");
@@ -577,7 +576,7 @@ fn what_embslib_leaves_out_is_told() {
     assert!(sid().checklist(&body, &ExportOptions::default()).losses().is_empty());
     let told = sid().checklist(&body, &dialect("embs")).losses();
     assert!(matches!(&told[..], [loss] if loss.starts_with("the geometric stiffness for ")), "{told:?}");
-    // Modes that move the centre of mass.
+    // The modes move the centre of mass.
     let body = oracle::file_bodies::body(2, 4, 3, 1, 0);
     let coriolis = |name: &str| {
         sid().checklist(&body, &dialect(name)).losses().iter().any(|loss| loss.contains("Coriolis"))

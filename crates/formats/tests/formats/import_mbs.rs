@@ -1,5 +1,5 @@
-//! Files of MBDyn, MBSim and Exudyn: each fault gives its finding and no other, damaged ones an error with a
-//! line, none a panic.
+//! Files of MBDyn, MBSim and Exudyn: each defect gives its own finding and no other; damaged files give an
+//! error with a line and never a panic.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Error;
@@ -47,12 +47,12 @@ fn read(bytes: &[u8], format: &str) -> Result<ImportedFile, Error> {
     find_import_format(format).expect("a format").read(&InputFile::open(&path).map_err(Error::from)?)
 }
 
-/// Names and codes of the checks of the format that fail.
+/// Returns names and codes of the failed checks of the format.
 fn findings(imported: &ImportedFile) -> Vec<(&'static str, Code)> {
     imported.checks.iter().filter(|check| !check.passed()).map(|check| (check.name, check.code)).collect()
 }
 
-/// The text with the `at`-th number of a record group changed.
+/// Returns the text with the `at`-th number of a record group changed.
 fn with_number(text: &str, group: usize, at: usize, change: impl Fn(f64) -> f64) -> String {
     let title = format!("** RECORD GROUP {group},");
     let (mut inside, mut seen) = (false, 0);
@@ -73,7 +73,7 @@ fn with_number(text: &str, group: usize, at: usize, change: impl Fn(f64) -> f64)
     text.lines().map(line).collect::<Vec<_>>().join("\n") + "\n"
 }
 
-/// Numbers of a record group.
+/// Returns the numbers of a record group.
 fn numbers(text: &str, group: usize) -> Vec<f64> {
     let title = format!("** RECORD GROUP {group},");
     let lines = text.lines().skip_while(|line| !line.starts_with(&title)).skip(1);
@@ -81,7 +81,7 @@ fn numbers(text: &str, group: usize) -> Vec<f64> {
     words.map(|word| word.parse().expect("a number")).collect()
 }
 
-/// The text without some record groups.
+/// Returns the text without some record groups.
 fn without(text: &str, groups: &[usize]) -> String {
     let mut drop = false;
     let keep = |line: &&str| {
@@ -97,7 +97,7 @@ fn without(text: &str, groups: &[usize]) -> String {
     text.lines().filter(keep).collect::<Vec<_>>().join("\n") + "\n"
 }
 
-/// The text with a record group before its end.
+/// Returns the text with a record group inserted before its end.
 fn with_group(text: &str, title: &str, values: &[String]) -> String {
     text.replace("** END OF FILE", &format!("** RECORD GROUP {title}\n{}\n** END OF FILE", values.join("\n")))
 }
@@ -132,7 +132,7 @@ fn each_fault_of_an_mbdyn_file_is_its_finding() {
     assert_eq!(of(&with_number(&text, 9, 0, twist)), [("modal_mass_of_i9", Lumped)]);
     let both = [("i5_antisymmetric", Identity), ("i5_of_i9", Identity)];
     assert_eq!(of(&with_number(&text, 17, 1, twist)), both);
-    // I9_12(1,1) and I9_21(1,1): symmetric, but another mass of the modes.
+    // I9_12(1,1) and I9_21(1,1) changed alike: symmetric, but with another modal mass.
     let diagonal = with_number(&with_number(&text, 18, 3, twist), 18, 3 * nf, twist);
     assert_eq!(of(&diagonal), [("modal_mass_of_i9", Lumped)]);
     assert_eq!(
@@ -155,7 +155,7 @@ fn each_fault_of_an_mbdyn_file_is_its_finding() {
     let negative = with_group(&no_coupling, "11, MASSES", &lumped_groups(&negative));
     assert_eq!(of(&negative), [("lumped_masses_positive", Lumped), carried]);
 
-    // Matrices of three rows by columns, as the manual calls them.
+    // Three-row matrices are stored by columns, as the manual describes them.
     let mut columns = text.clone();
     for (group, width) in [(14, nf), (15, nf), (16, 3 * nf), (17, nf * nf), (18, 3 * nf * nf)] {
         let values: Vec<f64> = numbers(&text, group);
@@ -166,7 +166,7 @@ fn each_fault_of_an_mbdyn_file_is_its_finding() {
     let found = of(&columns);
     assert!(!found.is_empty() && found.iter().all(|(_, code)| *code == Code::AuditLayout), "{found:?}");
 
-    // Six decimals of everything, as of %f.
+    // All numbers have six decimals, as written by %f.
     let fixed = text.lines().map(|line| match line.starts_with("**") || line.starts_with("REV") {
         true => line.to_owned(),
         false => line
@@ -185,7 +185,7 @@ fn each_fault_of_an_mbdyn_file_is_its_finding() {
     assert_eq!(found, [("digits", Digits)]);
 }
 
-/// MBDyn reads as many numbers as the header says and skips the rest of the file up to the next record group.
+/// MBDyn reads as many numbers as the header states and skips the text up to the next record group.
 #[test]
 fn what_mbdyn_skips_is_a_finding() {
     let text = fem();
@@ -194,7 +194,7 @@ fn what_mbdyn_skips_is_a_finding() {
         let imported = read(text.as_bytes(), "mbdyn").expect("readable");
         (findings(&imported), imported.unsound)
     };
-    // femgen writes a row of zeros too many.
+    // femgen writes an additional row of zeros.
     let masses = row_sums();
     let mut rows = lumped_groups(masses.masses());
     rows.push("0.0 0.0 0.0 0.0 0.0 0.0".to_owned());
@@ -202,7 +202,7 @@ fn what_mbdyn_skips_is_a_finding() {
     let (found, unsound) = of(&zeros);
     assert_eq!(found, [surplus, ("lumped_masses_carry_modes", Code::AuditLumped)]);
     assert!(unsound.is_empty(), "{unsound:?}");
-    // A line of words without the signs of a comment is harmless; numbers are not, wherever they stand.
+    // A line of words without a comment mark is harmless; numbers are not, wherever they are.
     let group = "** RECORD GROUP 9,";
     let (found, unsound) = of(&text.replacen(group, &format!("a remark\n{group}"), 1));
     assert!(found == [surplus] && unsound.is_empty(), "{found:?}");
@@ -211,7 +211,7 @@ fn what_mbdyn_skips_is_a_finding() {
         assert_eq!((found, unsound.len()), (vec![surplus], 1));
         assert!(unsound[0].contains("of record group 8"), "{unsound:?}");
     }
-    // A header that counts fewer modes than there are.
+    // The header states fewer modes than the file has.
     let (found, unsound) = of(&text.replacen("REV0 18 3", "REV0 18 2", 1));
     assert!(found.contains(&surplus) && unsound.len() > 3, "{found:?} {unsound:?}");
     let imported = read(text.replacen("REV0 18 3", "REV0 18 2", 1).as_bytes(), "mbdyn").expect("readable");
@@ -220,7 +220,7 @@ fn what_mbdyn_skips_is_a_finding() {
     assert!(error.has(Code::ForeignUnsound), "{error}");
 }
 
-/// Titles of modes may be blank lines, and numbers may touch.
+/// Titles of modes may be blank lines, and numbers may be adjacent without a blank.
 #[test]
 fn shapes_are_read_as_mbdyn_reads_them() {
     let text = fem();
@@ -240,7 +240,7 @@ fn shapes_are_read_as_mbdyn_reads_them() {
     assert_eq!((findings(&found), found.body), (Vec::new(), own));
 }
 
-/// MBDyn's sums over lumped masses are the invariants that the body has with these masses.
+/// The sums of MBDyn over lumped masses are the invariants of the body with these masses.
 #[test]
 fn bodies_of_lumped_masses_are_taken_as_mbdyn_takes_them() {
     let masses = row_sums();
@@ -251,7 +251,7 @@ fn bodies_of_lumped_masses_are_taken_as_mbdyn_takes_them() {
         let found = read(text.as_bytes(), "mbdyn").expect("readable");
         assert_eq!(found.dialect, "level13");
         let mut told = found.body.inertia.clone();
-        // Their own mass of the modes; the file has the consistent one.
+        // The expected modal mass is that of the lumped masses; the file has the consistent one.
         let expected = condense_lumped(
             &masses,
             &body.nodes().positions,
@@ -285,7 +285,7 @@ fn errors_name_the_line() {
     };
     let group_9 = line_of("** RECORD GROUP 9,");
     unreadable(&with_number(&text, 9, 0, |_| f64::NAN), group_9 + 1, "no finite number");
-    // An exponent of three digits as Fortran writes it, which MBDyn takes for two numbers.
+    // A three-digit exponent in Fortran form, which MBDyn reads as two numbers.
     let digits = format!("{:.16e}", numbers(&text, 9)[0]);
     unreadable(&text.replacen(&digits, "1.2345678901-101", 1), group_9 + 1, "letter of the exponent");
     unreadable(&text.replacen("** RECORD GROUP 9,", "** RECORD GROUP 8,", 1), group_9, "twice");
@@ -303,14 +303,14 @@ fn errors_name_the_line() {
     let (code, _, message) = error(&without(&text, &[6, 10]));
     assert_eq!((code, message.as_str()), (Code::ForeignIncomplete, "the file lacks record groups 6, 10"));
     assert_eq!(error(&without(&text, &[12])).0, Code::ForeignIncomplete);
-    // A header that promises more than any memory holds.
+    // The header states counts beyond any memory.
     assert_eq!(
         error(&text.replacen("REV0 18 3", "REV0 18446744073709551615 4294967295", 1)).0,
         Code::ForeignUnreadable
     );
 }
 
-/// The file with some values of a dataset changed, by their index.
+/// Returns the file with some values of a dataset changed, by their index.
 fn with_values(bytes: &[u8], name: &str, change: impl Fn(usize, f64) -> f64) -> Vec<u8> {
     edited(bytes, |file| {
         let dataset = file.dataset(name).expect(name);
@@ -364,7 +364,7 @@ fn each_fault_of_an_exudyn_file_is_its_finding() {
         twist("mPsiTildePsi", &[1]),
         [("psi_tilde_psi_antisymmetric", Identity), ("psi_tilde_psi_of_psi_tilde_psi_tilde", Identity)]
     );
-    // All large arrays by axes, then modes.
+    // All large arrays are ordered by axes, then modes.
     let by_axes = |i: usize| i % nf * 3 + i / nf;
     let mut mixed = bytes.clone();
     for (name, rows, columns) in [
@@ -425,7 +425,7 @@ fn hdf5_files_that_lack_something_are_refused_by_its_name() {
     }
 }
 
-/// One change of the bytes, at a place given as a fraction of the length.
+/// A change of the bytes at a position given as a fraction of the length.
 #[derive(Debug, Clone)]
 enum Damage {
     Set(f64, u8),
@@ -481,8 +481,7 @@ static EXPORTS: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is changed, reading ends in a body or in a report, and so do audit and import of what is
-    /// read.
+    /// Any damage ends in a body or in a report; audit and import of a readable file end likewise.
     #[test]
     fn damaged_files_never_panic(which in 0..IMPORT_FORMATS.len(), damages in proptest::collection::vec(damage(), 1..4)) {
         let (format, bytes) = &EXPORTS[which];
@@ -507,8 +506,8 @@ proptest! {
     }
 }
 
-/// A public body whose frame stands on its clamped ends keeps it: with the frame held its middle yields as the file says,
-/// read and written again.
+/// A public body whose frame is fixed to its clamped ends keeps the frame: the compliance of its middle with
+/// the frame held agrees with the file, also after export and import.
 #[test]
 fn a_clamped_public_body_keeps_its_frame() {
     let shared = oracle::shared().join("cases/targets/mbsim/modal_reduced_beam.h5");

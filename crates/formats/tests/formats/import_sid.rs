@@ -1,5 +1,5 @@
-//! SID_FEM text of other writers: every fault gives the finding that names it, and nothing else; no file
-//! makes the reader panic.
+//! SID_FEM text of other writers: every defect gives its own finding and no other, and no file makes the
+//! reader panic.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Error;
@@ -18,7 +18,7 @@ use proptest::prelude::*;
 use std::path::Path;
 use std::sync::LazyLock;
 
-/// A solid of three modes with a few frames, in every dialect.
+/// A solid with three modes and a few frames, in every dialect.
 static FILES: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
     let body = fixture("bracket_hex20", 3, BodyFrame::Model);
     let points = Points::Some(body.nodes().ids.iter().step_by(97).copied().collect());
@@ -55,14 +55,14 @@ fn read(text: &str) -> ImportedFile {
     try_read(text.as_bytes()).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Findings as `CODE check`.
+/// Returns findings in the form `CODE check`.
 fn findings(imported: &ImportedFile) -> Vec<String> {
     let failed = imported.checks.iter().filter(|check| !check.passed());
     failed.map(|check| format!("{} {}", check.code.id(), check.name)).collect()
 }
 
-/// The file with every entry of its objects as `change` has it: object, key without blanks, value; `None`
-/// takes it out.
+/// Returns the file with every entry of its objects replaced by `change`, which takes object, key without
+/// blanks, and value; `None` removes the entry.
 fn edited(text: &str, change: impl Fn(&str, &str, &str) -> Option<(String, String)>) -> String {
     let mut inside: Vec<&str> = Vec::new();
     let mut out = String::new();
@@ -101,7 +101,7 @@ fn same(key: &str, value: &str) -> Option<(String, String)> {
     Some((key.to_owned(), value.to_owned()))
 }
 
-/// Indices of `m0(1,2)` or `m1(1,2,3)`.
+/// Returns the indices of `m0(1,2)` or `m1(1,2,3)`.
 fn indices(key: &str) -> Vec<usize> {
     let inner = key[3..].trim_end_matches(')');
     inner.split(',').map(|i| i.parse().expect("an index")).collect()
@@ -128,7 +128,7 @@ fn sound_files_have_no_findings_and_name_their_dialect() {
 
 #[test]
 fn the_numbers_alone_tell_the_dialect() {
-    // What a writer says of itself in the first line is taken away.
+    // The name of the writer is removed from the first line.
     let anonymous = |text: &str| text.replacen("flexbody", "someone", 1);
     for (name, text) in FILES.iter() {
         let imported = read(&anonymous(text));
@@ -137,7 +137,8 @@ fn the_numbers_alone_tell_the_dialect() {
     }
 }
 
-/// Files of both orders by modes were called mode-blocked; their m1 has the mode in the middle.
+/// Files with both arrays ordered by modes had the dialect name mode-blocked earlier; their m1 has the mode
+/// in the middle.
 #[test]
 fn files_by_modes_are_embs_also_under_the_earlier_name() {
     let by_modes = edited(file("fembs"), |object, key, v| match object {
@@ -177,16 +178,16 @@ fn indentation_case_exponents_line_ends_and_the_first_line_do_not_matter() {
     }
 }
 
-/// Column of Gr or Ge in the other order.
+/// Returns the column of Gr or Ge in the other order.
 fn reblocked(key: &str) -> String {
-    // Three modes and three axes.
+    // The file has three modes and three axes.
     let (row, column) = (indices(key)[0], indices(key)[1] - 1);
     format!("m0({row},{})", 3 * (column % 3) + column / 3 + 1)
 }
 
 type Change = fn(&str, &str, &str) -> Option<(String, String)>;
 
-/// Whether a line of an object is an entry.
+/// Returns true if a line of an object is an entry.
 fn entry(key: &str) -> bool {
     key.starts_with('m') && key.contains('(')
 }
@@ -306,7 +307,7 @@ fn every_fault_gives_the_finding_that_names_it() {
             assert!(finding.is_none_or(|finding| finding.message().contains(check.formula)));
         }
     }
-    // Of every format: lengths in two units.
+    // This check applies to every format: lengths in two units.
     let millimetres = read(&edited(text, |object, key, v| {
         if object == "origin" && key.starts_with("m0") { scaled(key, v, 1000.0) } else { same(key, v) }
     }));
@@ -316,7 +317,7 @@ fn every_fault_gives_the_finding_that_names_it() {
     assert!(read(&edited(text, in_radians)).checks.iter().any(|check| check.meaning.contains("2 pi")));
 }
 
-/// Frequencies of the texts as angular frequencies.
+/// Replaces the frequencies in the texts by angular frequencies.
 fn in_radians(_: &str, key: &str, v: &str) -> Option<(String, String)> {
     match v.strip_prefix("Eigen Mode").and_then(|rest| rest.split_once(':')) {
         Some((mode, frequency)) => {
@@ -327,8 +328,8 @@ fn in_radians(_: &str, key: &str, v: &str) -> Option<(String, String)> {
     }
 }
 
-/// What no first line tells: a Ct of order 1 has geometric stiffness, and then Oe1 has some too; without it
-/// Oe1 that is not Me is a finding.
+/// Without a declaration in the first line, a Ct of order 1 implies geometric stiffness, also in Oe1; without
+/// it an Oe1 that disagrees with Me is a finding.
 #[test]
 fn geometric_stiffness_is_known_by_ct_where_nothing_declares_it() {
     let sid = find_format("sid").expect("a format");
@@ -346,7 +347,7 @@ fn geometric_stiffness_is_known_by_ct_where_nothing_declares_it() {
     assert_eq!(findings_of(&[LoadKind::Spin]), (vec!["FB741 oe1_is_me".to_owned()], 6));
 }
 
-/// The value of an entry of an object in the order that `fembs` has; zeros are not listed.
+/// Returns the value of an entry of an object in the order of `fembs`; zeros are not listed.
 fn value_of(text: &str, object: &str, key: &str) -> f64 {
     let (_, rest) = text.split_once(&format!("\n           {object}\n")).expect("an object");
     let (inside, _) = rest.split_once(&format!("end {object}")).expect("its end");
@@ -357,7 +358,7 @@ fn value_of(text: &str, object: &str, key: &str) -> f64 {
     found.map_or(0.0, |(_, v)| value(v.trim()))
 }
 
-/// What is wrong with the coupling of a file with this change, in words.
+/// Returns the findings about the coupling of a file after this change, and their words.
 fn coupling_of(
     text: &str,
     change: impl Fn(&str, &str, &str) -> Option<(String, String)>,
@@ -370,7 +371,7 @@ fn coupling_of(
 #[test]
 fn couplings_that_are_zero_are_told_for_what_they_are() {
     let text = file("fembs");
-    // Free modes have no Cr0: a skew part of Gr is Gr's own fault.
+    // Free modes have no Cr0, so that a skew part of Gr is an error of Gr.
     let size = 0.01 * value_of(text, "Gr", "m0(1,1)").abs().max(value_of(text, "Gr", "m0(2,4)").abs());
     let moved = |key: &str, v: &str, by: f64| same(key, &format!("{:.16e}", value(v) + by));
     let (found, words) = coupling_of(text, |object, key, v| match (object, key) {
@@ -381,7 +382,7 @@ fn couplings_that_are_zero_are_told_for_what_they_are() {
     });
     assert_eq!(found, ["FB740 gr_skew_is_cr0"], "{words}");
     assert!(words.contains("Gr is wrong"), "{words}");
-    // Cr1 is there, but has nothing that Ge could come from.
+    // Cr1 is present, but Ge cannot come from it.
     let (found, words) = coupling_of(text, |object, key, v| match object {
         "Cr" if key.starts_with("m1") => same(key, &format!("{:e}", value(v).abs())),
         _ => same(key, v),
@@ -395,7 +396,7 @@ fn couplings_that_are_zero_are_told_for_what_they_are() {
     assert!(words.contains("Cr1 is zero although Ge is not"), "{words}");
 }
 
-/// FEMBS puts all of 2 Cr1 into Ge, with the geometric stiffness for angular acceleration that is in Cr1.
+/// FEMBS writes all of 2 Cr1 into Ge, including the geometric stiffness for angular acceleration in Cr1.
 #[test]
 fn ge_with_the_symmetric_part_of_cr1_is_named() {
     let sid = find_format("sid").expect("a format");
@@ -419,7 +420,7 @@ fn ge_with_the_symmetric_part_of_cr1_is_named() {
     assert!(check.meaning.contains("Ge is 2 Cr1") && check.meaning.contains("FEMBS"), "{}", check.meaning);
 }
 
-/// Frames that are mirrored or not orthonormal are found, and no body is made of them.
+/// Frames that are mirrored or not orthonormal are detected, and no body is made of the file.
 #[test]
 fn axes_that_are_no_rotation_are_refused() {
     let cases: [(Change, &str); 2] = [
@@ -445,7 +446,7 @@ fn axes_that_are_no_rotation_are_refused() {
     }
 }
 
-/// Axes of a frame that are a rotation are sound; that they are not taken is said.
+/// Rotated axes of a frame are valid; a note states that they are not taken over.
 #[test]
 fn turned_axes_of_a_frame_are_noted() {
     let note = |imported: &ImportedFile| {
@@ -537,7 +538,7 @@ fn unreadable_files_are_told_with_their_line() {
             try_read(format!("{}{}", &text[..start], &text[end..]).as_bytes()).expect_err("incomplete");
         assert!(error.has(Code::ForeignIncomplete), "{missing}: {error}");
     }
-    // Many modes by a word alone.
+    // A single number declares many modes.
     let many = broken(line_of("nelastq"), "nelastq = 100000000");
     let many = many.split_once('\n').expect("lines").1;
     assert!(try_read(many.as_bytes()).expect_err("modes").has(Code::ForeignIncomplete));
@@ -547,7 +548,7 @@ fn unreadable_files_are_told_with_their_line() {
 fn samples_of_other_programs_have_the_findings_that_they_are_known_for() {
     let root = oracle::shared();
     for (name, dialect, modes, expected) in [
-        // Columns 4 to 6 of Oe1 are not symmetric; rotational inertia of the nodes is in Me and Cr, not in Oe
+        // Columns 4 to 6 of Oe1 are not symmetric; rotary inertia of the nodes is in Me and Cr, but not in Oe
         // and Gr.
         (
             "Beam_3m.SID_FEM",
@@ -573,7 +574,7 @@ fn samples_of_other_programs_have_the_findings_that_they_are_known_for() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
 
-    /// Whatever is done to a file, it is read or refused.
+    /// A damaged file is read or refused.
     #[test]
     fn damaged_files_are_read_or_refused(
         dialect in 0..5usize,

@@ -1,6 +1,6 @@
 //! Files of other programs: exports, imports, round trips.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod checklists;
 mod export_arrays;

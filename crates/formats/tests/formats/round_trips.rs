@@ -1,5 +1,5 @@
-//! Every format that is read, on every body of the fixtures: what was written comes back, is recognised, and
-//! passes its audit.
+//! Round trips through every format that can be read, for every body of the fixtures: the file is recognised,
+//! gives the body back, and passes its audit.
 
 use faer::Mat;
 use flexbody_base::provenance::SourceFile;
@@ -15,8 +15,8 @@ use oracle::exported::on_interfaces;
 use oracle::flexible::fixture;
 use std::path::Path;
 
-/// Bodies of the fixtures: all models in the principal frame, some in that of the model, where the origin is
-/// not the centre of mass.
+/// Returns the bodies of the fixtures: all models in the principal frame, some in the frame of the model,
+/// whose origin is not the centre of mass.
 fn bodies() -> Vec<(String, FlexBody)> {
     let models = oracle::fixtures().join("models");
     let mut names: Vec<String> = std::fs::read_dir(models)
@@ -33,7 +33,7 @@ fn bodies() -> Vec<(String, FlexBody)> {
     bodies
 }
 
-/// Every format that is written and read, with each of its dialects.
+/// Returns every format that is written and read, with each of its dialects.
 fn readable() -> Vec<(&'static dyn ExportFormat, &'static dyn ImportFormat, Option<&'static str>)> {
     let mut all = Vec::new();
     for format in FORMATS.iter().copied() {
@@ -62,7 +62,7 @@ fn taken(imported: &ImportedFile) -> Imported {
     import_body(imported, source, flexbody_base::units::UnitSystem::default(), None).expect("a body")
 }
 
-/// What no format of other programs tells of a general mass: W0 beyond C1.
+/// Returns the invariants without the part of a general mass that no format states: W0 beyond C1.
 fn without_w0(invariants: &Invariants) -> Invariants {
     let mut told = invariants.clone();
     if let Some(general) = &mut told.primary_mut().general {
@@ -72,8 +72,8 @@ fn without_w0(invariants: &Invariants) -> Invariants {
     told
 }
 
-/// What the reader of SID adds to the stiffness under angular acceleration: Cr1 holds both this and W3, of which Ge tells
-/// the antisymmetric part.
+/// Returns the stiffness under angular acceleration that the reader of SID adds: Cr1 holds this stiffness and
+/// W3, and Ge gives only the antisymmetric part of W3.
 fn symmetric_w3_of_sid(body: &FlexBody, back: &FlexBody, load: &UnitLoad) -> Mat<f64> {
     let nf = body.n_modes();
     let (Some(own), Some(told)) = (body.invariants().w3(), back.invariants().w3()) else {
@@ -111,10 +111,10 @@ fn what_is_written_comes_back() {
             let file = written(&body, *format, *dialect, folder.path());
             assert_eq!(recognise(&file).expect("known").name(), reader.name(), "{what}");
             let imported = reader.read(&file).expect(&what);
-            // A file without coupling says so in its audit, and what it has is right.
+            // The audit of a file without coupling reports that; its other contents are correct.
             let coupled = *dialect != Some("level13");
             let found = audit(&imported, 1e-11);
-            // What MBSim keeps of a mass that does not commute with rotations is a body of no mass.
+            // The part of a mass that does not commute with rotations kept by MBSim belongs to no mass.
             let lossless = format.checklist(&body, &ExportOptions::default()).losses().is_empty();
             let whole =
                 coupled && (body.invariants().general().is_none() || lossless || format.name() != "mbsim");
@@ -131,10 +131,10 @@ fn what_is_written_comes_back() {
             let (own, told) = (body.invariants(), back.invariants());
             let general = own.general().is_some();
             for (quantity, apart) in primary_differences(&without_w0(own), told) {
-                // Of S and W3 of such a mass the formats keep what their equations have, each its own part;
-                // and say so.
+                // For such a mass each format keeps the part of S and W3 that its equations use, and reports
+                // the rest.
                 if general && ["S", "W3"].contains(&quantity.as_str()) {
-                    // Of SID the symmetric part comes back with the stiffness under angular acceleration.
+                    // SID returns the symmetric part of W3 with the stiffness under angular acceleration.
                     if quantity == "W3" && apart > 1e-12 && lossless && format.name() != "sid" {
                         complain(format!("W3 is lost by {apart:.1e}, which is not told"));
                     }
@@ -155,13 +155,13 @@ fn what_is_written_comes_back() {
             if difference(&body.modes().shape, &back.modes().shape) > 1e-15 {
                 complain("the shapes differ".to_owned());
             }
-            // SID knows W2 and the geometric stiffness for spin as one: it comes back as the latter, and the
-            // equations are the same.
+            // SID stores W2 and the geometric stiffness for spin as a sum, which is read back as the latter;
+            // the equations are equal.
             let joined = back.groups() != body.groups();
             for one in
                 back.geometric_stiffness().iter().filter(|one| !(joined && one.load.kind == LoadKind::Spin))
             {
-                // The stiffness of inertia of nodes that turn comes back as geometric stiffness.
+                // The stiffness of inertia of rotating nodes is read back as geometric stiffness.
                 let own = body.stiffness_under(&one.load).map(|own| match format.name() {
                     "sid" => own + symmetric_w3_of_sid(&body, &back, &one.load),
                     _ => own,

@@ -1,5 +1,5 @@
-//! Small files that would unpack to very much: no more is unpacked than head and shape of the matrix announce, and
-//! nothing that the memory cannot hold.
+//! Small files that would unpack to a very large size: no more is unpacked than the header and the shape of
+//! the matrix allow, and nothing beyond the memory.
 
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
@@ -43,7 +43,7 @@ fn a_matrix_market_file_is_read_up_to_its_first_entry_too_many() {
     assert_refused(&path, Code::MatrixCount, "header announces 78 entries, the file has more");
 }
 
-/// Matrices without a head have the rows that their job has.
+/// Matrices without a header have the rows of their job.
 #[test]
 fn lines_without_a_head_are_no_more_than_their_rows_can_have() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -59,7 +59,7 @@ fn lines_without_a_head_are_no_more_than_their_rows_can_have() {
     assert!(error.to_string().contains("declares") && error.has(Code::MatrixCount), "{error}");
 }
 
-/// An array of NumPy with such a header, and so many zeros.
+/// Returns a NumPy array with this header and data.
 fn npy(descr: &str, shape: &str, data: Vec<u8>) -> Vec<u8> {
     let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
     let mut bytes = b"\x93NUMPY\x01\0".to_vec();
@@ -182,7 +182,7 @@ fn pointers_and_chunks_of_hdf5_are_those_of_the_matrix() {
     assert_refused(&path, Code::MatrixCount, "has chunks of 8000000 values for 1 values");
 }
 
-/// Writes a file with the group K, whose only index is 0; nothing of the file stays open.
+/// Writes a file with the group K, whose only index is 0; no handle stays open.
 fn written(path: &Path, fill: impl Fn(&hdf5_metno::Group)) {
     let file = hdf5_metno::File::create(path).expect("a file");
     let group = file.create_group("K").expect("a group");

@@ -1,5 +1,4 @@
-//! Damaged files: whatever is changed in a valid file, reading it ends in a model or in a report, never in a
-//! panic.
+//! Damaged files: any change of a valid file ends in a model or in a report, never in a panic.
 
 use flexbody_base::diagnostic::Severity;
 use flexbody_input::{ModelFiles, ModelSource, READERS, read_manifest, read_model};
@@ -12,7 +11,7 @@ fn fixture(path: &str) -> PathBuf {
     oracle::fixtures().join(path)
 }
 
-/// Reads a model of which one file is replaced by `bytes`.
+/// Reads a model in which one file is replaced by `bytes`.
 fn read(role: &str, name: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -66,12 +65,12 @@ fn damages() -> impl Strategy<Value = Vec<Damage>> {
 }
 
 fn cases(default: u32) -> ProptestConfig {
-    // PROPTEST_CASES asks for more.
+    // The variable PROPTEST_CASES sets the number of cases.
     let cases = std::env::var("PROPTEST_CASES").ok().and_then(|v| v.parse().ok()).unwrap_or(default);
     ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
 }
 
-/// Files of a folder of the fixtures.
+/// Returns the files of a folder of the fixtures.
 fn files(folder: &str) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(fixture(folder)).unwrap();
     let mut all: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -79,19 +78,19 @@ fn files(folder: &str) -> Vec<PathBuf> {
     all
 }
 
-/// True if a file is HDF5, of whatever format.
+/// Returns true if a file is HDF5, of any format.
 fn is_hdf5(path: &Path) -> bool {
     std::fs::read(path).unwrap().starts_with(b"\x89HDF")
 }
 
-/// Files of every matrix format: those in HDF5, or the others.
+/// Returns the files of every matrix format: those in HDF5, or the others.
 fn matrices(hdf5: bool) -> Vec<PathBuf> {
     let folders = READERS.iter().map(|reader| reader.name().to_lowercase().replace(' ', "-"));
     let all = folders.flat_map(|folder| files(&format!("readers/{folder}")));
     all.filter(|path| is_hdf5(path) == hdf5).collect()
 }
 
-/// Files of nodes of every format of meshes: those in HDF5, or the others.
+/// Returns the files of nodes of every mesh format: those in HDF5, or the others.
 fn meshes(hdf5: bool) -> Vec<PathBuf> {
     files("small/meshes").into_iter().filter(|path| is_hdf5(path) == hdf5).collect()
 }
@@ -130,8 +129,8 @@ proptest! {
 }
 
 proptest! {
-    // Always the same cases: what the HDF5 library itself does with a damaged file is not ours to find by
-    // chance.
+    // The cases are fixed, because the behaviour of the HDF5 library on damaged files should not fail the
+    // test at random.
     #![proptest_config(ProptestConfig { rng_seed: proptest::test_runner::RngSeed::Fixed(20), ..cases(600) })]
 
     #[test]

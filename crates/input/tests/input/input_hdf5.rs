@@ -13,7 +13,7 @@ use std::str::FromStr;
 
 type Entries = Vec<(usize, usize, f64)>;
 
-/// Builds a file by `build` and reads a matrix from it.
+/// Builds a file with `build` and reads a matrix from it.
 fn read(group: Option<&str>, role: MatrixRole, build: impl FnOnce(&File)) -> Result<RawMatrix> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m.h5");
@@ -63,11 +63,11 @@ fn put_index(group: &Group, name: &str, values: &[usize], index: Index, packed: 
     }
 }
 
-/// Stores entries (any order, duplicates allowed) in a group.
+/// Stores entries (in any order, duplicates allowed) in a group.
 fn store(group: &Group, n: usize, entries: &Entries, layout: Layout, index: Index, packed: bool) {
     let mut entries = entries.clone();
     match layout {
-        Layout::Columns => entries.sort_by_key(|e| e.1), // stable
+        Layout::Columns => entries.sort_by_key(|e| e.1), // a stable sort keeps the order of duplicates
         Layout::Rows => entries.sort_by_key(|e| e.0),
         Layout::Coordinates => {}
     }
@@ -106,7 +106,8 @@ fn lower(entries: &Entries) -> Entries {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 120, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Layout, index type, chunks and a declared triangle do not matter, and asymmetry is not hidden.
+    /// The result does not depend on layout, index type, chunks and a declared triangle, and asymmetry is
+    /// detected.
     #[test]
     fn any_layout_comes_back(
         n in 2..8usize,
@@ -120,12 +121,12 @@ proptest! {
         if triangle {
             entries.iter_mut().for_each(|e| *e = (e.0.max(e.1), e.0.min(e.1), e.2));
         } else {
-            entries.extend([(1, 0, 3.0), (0, 1, 4.0)]); // both sides, and not symmetric
+            entries.extend([(1, 0, 3.0), (0, 1, 4.0)]); // entries in both triangles, not symmetric
         }
         let full: Entries = if triangle {
             entries.iter().flat_map(|&(i, j, v)| [Some((i, j, v)), (i != j).then_some((j, i, v))]).flatten().collect()
         } else if layout == Layout::Rows {
-            // Rows are taken for columns: the transpose, which is as asymmetric.
+            // Rows are read as columns: the transpose, which is equally asymmetric.
             entries.iter().map(|&(i, j, v)| (j, i, v)).collect()
         } else {
             entries.clone()
@@ -163,7 +164,7 @@ fn the_role_chooses_among_several_matrices() {
     assert_eq!(raw.matrix, expected(3, &mass));
     let raw = read(Some("/fe/b"), MatrixRole::Stiffness, build(["fe/a", "fe/b"])).unwrap();
     assert_eq!(raw.matrix, expected(3, &mass));
-    // Neither or both of them named after the role: ask.
+    // If none or both are named after the role, the user must select one.
     for names in [["a", "b"], ["x/K", "y/K"], ["M", "mass"]] {
         let error = read(None, MatrixRole::Stiffness, build(names)).unwrap_err();
         assert!(error.has(Code::Hdf5Layout), "{names:?}: {error}");
@@ -185,7 +186,7 @@ fn one_triangle_needs_a_word_about_it() {
         }
     };
     for word in ["lower", "upper", "L", "true"] {
-        // By columns or by rows, nothing says which the writer meant: one triangle is one triangle.
+        // A triangle by columns or by rows gives the same matrix.
         let raw = read(None, MatrixRole::Stiffness, build(Some(word))).unwrap();
         assert_eq!(raw.matrix, expected(3, &small()), "{word}");
     }
@@ -286,8 +287,8 @@ fn links_to_other_files_are_not_followed() {
     }
 }
 
-/// A soft link may lead through an external one: the numbers then lie in another file, whatever the fingerprint of this
-/// one says.
+/// A soft link may lead through an external link: the numbers are then in another file, which the fingerprint
+/// of this one does not cover.
 #[test]
 fn soft_links_are_not_followed() {
     let folder = tempfile::tempdir().unwrap();
@@ -308,7 +309,7 @@ fn soft_links_are_not_followed() {
     }
 }
 
-/// A path that HDF5 cannot take is an error, not a panic.
+/// A path that HDF5 cannot open gives an error, not a panic.
 #[test]
 fn names_with_blanks_and_accents_are_fine() {
     let folder = tempfile::tempdir().unwrap();

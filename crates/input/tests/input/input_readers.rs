@@ -24,7 +24,7 @@ fn read_text(text: &str) -> flexbody_base::error::Result<RawMatrix> {
     read_bytes("K.mtx", text.as_bytes())
 }
 
-/// The matrix of `fixtures/readers`.
+/// Returns the reference matrix of `fixtures/readers`.
 fn reference() -> CscMatrix {
     let mut triplets = Vec::new();
     for i in 0..6u32 {
@@ -59,7 +59,7 @@ fn every_registered_reader_reads_its_fixtures_and_nobody_elses() {
                 let by_content: Vec<&str> =
                     READERS.iter().filter(|r| r.recognises(&bytes)).map(|r| r.name()).collect();
                 assert_eq!(by_content, [reader.name()], "{shown}");
-                // The content decides, not the name.
+                // The format is detected from the content, not from the name.
                 assert_eq!(read_bytes("matrix.unknown", &bytes).unwrap().matrix, reference(), "{shown}");
             }
             let name = path.file_name().unwrap().to_str().unwrap();
@@ -71,12 +71,12 @@ fn every_registered_reader_reads_its_fixtures_and_nobody_elses() {
     }
 }
 
-/// An array of NumPy.
+/// Returns a NumPy array in C order.
 fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     npy_in_order("False", descr, shape, data)
 }
 
-/// An array of NumPy whose first index runs fastest where `fortran` is `True`.
+/// Returns a NumPy array; the first index runs fastest if `fortran` is `True`.
 fn npy_in_order(fortran: &str, descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     let header = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}\n");
     [&b"\x93NUMPY\x01\0"[..], &(header.len() as u16).to_le_bytes(), header.as_bytes(), data].concat()
@@ -92,7 +92,7 @@ fn archive(members: &[(&str, Vec<u8>)]) -> Vec<u8> {
     zip.finish().expect("an archive").into_inner()
 }
 
-/// A matrix of two rows in archives of SciPy that are well, and not.
+/// Valid and invalid SciPy archives of a matrix with two rows.
 #[test]
 fn archives_of_scipy_are_read_or_refused() {
     let whole = |values: &[i16]| {
@@ -124,7 +124,7 @@ fn archives_of_scipy_are_read_or_refused() {
         ])
     };
     assert_eq!(read_bytes("K.npz", &csc(&[0, 1, 2])).expect("a matrix").matrix.values(), [2.0, 3.0]);
-    // Blocks of 2 x 1, in both orders of numpy.
+    // Blocks of 2 x 1, in both NumPy orders.
     let bsr = |fortran: &str, shape: &str, columns: &[i16], pointers: &[i16], values: &[f64]| {
         archive(&[
             ("indices", whole(columns)),
@@ -168,15 +168,15 @@ fn dialects_of_matrix_market_mean_the_same() {
     let expected = CscMatrix::from_triplets(3, 3, &[(0, 0, 2e5), (1, 0, -1.5), (0, 1, -1.5), (2, 2, 4.0)]);
     for text in [
         "%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 2e5\n2 1 -1.5\n3 3 4\n",
-        // upper triangle, any case, comments and blank lines anywhere, CRLF, tabs, no line end at the end
+        // Upper triangle, any case, comments and blank lines anywhere, CRLF, tabs, no line end at the end.
         "%%MATRIXMARKET Matrix COORDINATE Real SYMMETRIC\r\n% c\r\n\r\n 3\t3  3\r\n%\r\n1 2 -1.5\r\n\r\n  3 3 4.0 \r\n% c\r\n1 1 200000.",
-        // Fortran
+        // Fortran exponents.
         "%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n 1 1 0.2D+06\n 2 1 -.15d1\n 3 3 +4.0D+00\n",
-        // general, explicit zeros, duplicates, any order
+        // General matrix, explicit zeros, duplicates, any order.
         "%%MatrixMarket matrix coordinate real general\n3 3 8\n3 3 1\n1 2 -1.5\n2 2 0.0\n2 1 -1.5\n3 3 3\n1 1 2e5\n2 3 0\n3 2 -0.0\n",
-        // an explicit zero on the other side of the diagonal is no entry; duplicates that cancel are none
+        // An explicit zero in the other triangle is no entry; duplicates that cancel are none.
         "%%MatrixMarket matrix coordinate real symmetric\n3 3 6\n1 1 2e5\n2 1 -1.5\n3 3 4\n1 3 0\n3 2 7\n3 2 -7\n",
-        // integer values are real numbers; comment after a value; byte order mark
+        // Integer values are read as reals; comment after a value; byte order mark.
         "\u{feff}%%MatrixMarket matrix coordinate integer symmetric\n3 3 4\n1 1 200000\n2 1 -1 % half\n3 3 4\n2 1 0\n",
     ] {
         let expected = if text.contains("integer") {
@@ -205,7 +205,7 @@ fn an_unsymmetric_general_matrix_is_delivered_as_it_is() {
 
 #[test]
 fn line_numbers_count_across_pieces_and_packing() {
-    // Several pieces of one MiB; the bad line is far behind.
+    // The text has several blocks of one MiB; the invalid line is in a late one.
     let n = 150_000;
     let mut text = format!("%%MatrixMarket matrix coordinate real symmetric\n% c\n{n} {n} {n}\n");
     for i in 1..=n {
@@ -225,7 +225,7 @@ fn the_same_bits_at_any_number_of_threads() {
     let n = 20_000u64;
     let mut text = format!("%%MatrixMarket matrix coordinate real symmetric\n{n} {n} {}\n", 10 * n);
     for k in 0..10 * n {
-        // A fixed pseudo-random walk with many duplicates of values whose sums depend on the order.
+        // A fixed pseudo-random sequence with many duplicates whose sums depend on the order.
         let mixed = k.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 33;
         let (i, j) = (k % n, mixed % (k % n + 1) % 3);
         text +=
@@ -260,7 +260,7 @@ fn digits_follow_the_values_not_the_padding() {
     assert_eq!(file(&|v| format!("{:.16e}", format!("{v:.5e}").parse::<f64>().unwrap())), 6);
 }
 
-/// A way to write one and the same matrix.
+/// Format variant of a written matrix.
 #[derive(Debug, Clone)]
 struct Dialect {
     general: bool,
@@ -338,14 +338,15 @@ fn write(n: usize, entries: &[(usize, usize, f64)], dialect: &Dialect) -> (Strin
         _ => (
             "K".into(),
             ruzstd::encoding::compress_to_vec(bytes, ruzstd::encoding::CompressionLevel::Fastest),
-        ), // no extension at all
+        ), // no extension
     }
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Triangle, order, duplicates, packing and number style do not matter, to the last bit.
+    /// The result does not depend on triangle, order, duplicates, compression and number style, to the last
+    /// bit.
     #[test]
     fn a_symmetric_matrix_in_any_dialect_comes_back(
         n in 1..9usize,
@@ -382,7 +383,7 @@ proptest! {
     }
 }
 
-/// Real matrices, where the folder with them is there.
+/// Real matrices, if the folder with them exists.
 #[test]
 fn real_models_are_read_with_the_digits_they_have() {
     let Some(models) = shared_models() else { return };

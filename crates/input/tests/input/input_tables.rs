@@ -166,7 +166,7 @@ fn a_manifest_nested_without_end_is_refused() {
     }
 }
 
-/// Manifest texts, and whether they are in order.
+/// Manifest texts, and true for valid ones.
 const MANIFESTS: &[(&str, bool)] = &[
     ("[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", true),
     ("[model]\nname='b'\ndimension=2\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\ndofs='d'\n", true),
@@ -335,7 +335,7 @@ fn all_that_is_wrong_with_all_files_is_reported_at_once() {
     assert!(error.diagnostics().iter().all(|d| d.severity() == Severity::Error && d.file().is_some()));
 }
 
-/// A pipe would make us wait for its writer.
+/// A pipe would wait for its writer.
 #[cfg(unix)]
 #[test]
 fn devices_are_refused() {

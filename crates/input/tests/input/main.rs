@@ -1,6 +1,6 @@
-//! Files of models that are read: formats, manifest, names, damages.
+//! Reading of model files: formats, manifest, names, damage.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod bombs;
 mod input_fuzz;

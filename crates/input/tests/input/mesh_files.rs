@@ -1,4 +1,4 @@
-//! Nodes and sets in meshes of open codes: VTK in both of its forms, Exodus.
+//! Nodes and sets in meshes of open formats: both forms of VTK, and Exodus.
 
 use crate::node_files::{nodes, tetrahedron};
 use flexbody_base::diagnostic::Code;
@@ -13,7 +13,8 @@ fn mesh(name: &str) -> PathBuf {
     fixtures().join("small/meshes").join(name)
 }
 
-/// The tetrahedron with nodes in the mesh `content`. Its rows are told by labels, which have the numbers of the table.
+/// Reads the tetrahedron with nodes in the mesh `content`. Labels with the numbers of the table define its
+/// rows.
 fn read(name: &str, content: &[u8], sets: &[&str]) -> Result<RawModel, Error> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join(name);
@@ -21,7 +22,8 @@ fn read(name: &str, content: &[u8], sets: &[&str]) -> Result<RawModel, Error> {
     tetrahedron(&path, None, sets)
 }
 
-/// What meshio and VTK have written of the tetrahedron, in text and in every packing: the same places to the last bit.
+/// Files of the tetrahedron written by meshio and VTK, in text and in every packing, give equal positions to
+/// the last bit.
 #[test]
 fn meshes_of_vtk_have_the_places_of_the_table() {
     let places: Vec<[f64; 3]> = nodes().iter().map(|(_, x)| *x).collect();
@@ -40,14 +42,14 @@ fn meshes_of_vtk_have_the_places_of_the_table() {
         assert_eq!(raw.nodes.positions, places, "{name}");
         assert_eq!(raw.nodes.ids, [0, 1, 2, 3], "{name}: points are numbered as ParaView shows them");
     }
-    // The rows are labelled by other numbers, so that the set is known but none of its nodes has a row.
+    // The rows have labels with other numbers, so that the set is known but none of its nodes has a row.
     for name in ["tet4_zlib.vtu", "tet4_ascii.vtu", "tet4.exo"] {
         let error = tetrahedron(&mesh(name), None, &["left"]).expect_err("other numbers");
         assert!(error.to_string().contains("no node of the set `left`"), "{name}: {error}");
     }
 }
 
-/// Global ids number the points, and zeros and ones at the points are a set.
+/// Global ids number the points, and an array of zeros and ones at the points is a set.
 #[test]
 fn global_ids_and_marks_are_read() {
     let own = nodes();
@@ -60,7 +62,7 @@ fn global_ids_and_marks_are_read() {
     }
 }
 
-/// Meshes of Exodus as meshio writes them (one array of coordinates, places as numbers), and as Exodus itself does.
+/// Exodus meshes written by meshio (one array of coordinates, positions as numbers) and by Exodus itself.
 #[test]
 fn meshes_of_exodus_have_nodes_and_sets() {
     let own = nodes();
@@ -106,7 +108,7 @@ fn damaged_meshes_are_refused_where_they_are_damaged() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is written comes back to the last bit: text, and numbers of every width in both orders.
+    /// Written points are read back to the last bit: text, and numbers of every width in both byte orders.
     #[test]
     fn points_of_vtk_come_back(
         places in proptest::collection::vec([-1e6..1e6f64, -1e6..1e6, -1e-6..1e-6], 1..30),

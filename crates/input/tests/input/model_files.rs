@@ -1,5 +1,4 @@
-//! Test models as files: whatever part of the matrices is stored, in whatever order, the same model comes
-//! back.
+//! Test models as files: any stored triangle and order of the matrices gives the same model.
 
 use flexbody_base::units::UnitSystem;
 use flexbody_input::{read_manifest, read_model};
@@ -8,7 +7,7 @@ use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{DofOrder, Numbering, Triangle, reordered, write_model};
 use oracle::mesh::{Mesh, entries};
 
-/// Entries that are not zero: readers drop the others, sums of element matrices may cancel.
+/// Returns the nonzero entries: readers drop zeros, and sums of element matrices may cancel.
 fn nonzeros(matrix: &CscMatrix) -> Vec<(u32, u32, f64)> {
     entries(matrix).filter(|(_, _, value)| *value != 0.0).collect()
 }

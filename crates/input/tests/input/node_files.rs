@@ -1,4 +1,4 @@
-//! Nodes and labels of rows in the files of FE programs and meshers.
+//! Nodes and labels of rows in files of FE programs and meshers.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Error;
@@ -8,7 +8,7 @@ use oracle::fixtures;
 use std::fs;
 use std::path::Path;
 
-/// The files of the tetrahedron of `fixtures/small`, with nodes and labels in other files.
+/// Reads the tetrahedron of `fixtures/small` with nodes and labels from other files.
 pub fn tetrahedron(nodes: &Path, dofs: Option<&Path>, sets: &[&str]) -> Result<RawModel, Error> {
     let small = |name: &str| fixtures().join("small/tet4").join(name);
     let dofs = dofs.map_or_else(|| small("dofs.csv"), Path::to_path_buf);
@@ -24,7 +24,7 @@ pub fn tetrahedron(nodes: &Path, dofs: Option<&Path>, sets: &[&str]) -> Result<R
     read_model(&files)
 }
 
-/// Numbers and positions of the tetrahedron.
+/// Returns numbers and positions of the tetrahedron.
 pub fn nodes() -> Vec<(i64, [f64; 3])> {
     let own = fixtures().join("small/tet4/nodes.csv");
     let raw = tetrahedron(&own, None, &[]).expect("readable");
@@ -38,7 +38,7 @@ fn written(name: &str, text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
     (folder, path)
 }
 
-/// The tetrahedron in the formats of Ansys: archive with a component, table between tabs with decimal commas,
+/// The tetrahedron in Ansys formats: archive with a component, tab-separated table with decimal commas,
 /// listing.
 #[test]
 fn nodes_of_ansys_are_those_of_the_table() {
@@ -115,12 +115,12 @@ fn damaged_node_files_are_refused_where_they_are_damaged() {
     }
 }
 
-/// Both versions of a mesh of Gmsh, and the nodes of a deck of the same places.
+/// Both versions of a Gmsh mesh, and the nodes of a deck with the same positions.
 #[test]
 fn meshes_of_gmsh_have_nodes_and_groups() {
     let read = ["block41.msh", "block22.msh"].map(|name| {
         let path = fixtures().join("small/meshes").join(name);
-        // The matrices belong to another model: what is wrong is found later.
+        // The matrices belong to another model; the mismatch is detected later.
         let raw = tetrahedron(&path, None, &["left end"]);
         raw.unwrap_or_else(|error| panic!("{name}: {error}"))
     });
@@ -166,8 +166,8 @@ fn mappings_of_ansys_label_the_rows() {
     assert!(error.has(Code::DofCount), "{error}");
 }
 
-/// The rotor that Ansys has exported, with its mapping and its node list with decimal commas: K R = 0 shows
-/// that rows and places belong together.
+/// The rotor exported by Ansys with its mapping and its node list with decimal commas: K R = 0 shows that
+/// rows and positions belong together.
 #[test]
 fn the_rotor_of_ansys_is_read_as_it_was_written() {
     let folder = oracle::shared().join("samples/ansys");

@@ -1,4 +1,4 @@
-//! Matrices of MATLAB and PETSc: whatever is written comes back, and what is no matrix is refused by name.
+//! Matrices of MATLAB and PETSc: written matrices are read back, and other files are refused with the reason.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Result;
@@ -105,7 +105,7 @@ impl Order {
         element
     }
 
-    /// Up to four bytes within the tag.
+    /// Writes up to four bytes within the tag.
     fn short_element(self, kind: u32, bytes: &[u8]) -> Vec<u8> {
         let mut element = [self.four((bytes.len() as u32) << 16 | kind), bytes.to_vec()].concat();
         element.resize(8, 0);
@@ -160,7 +160,7 @@ proptest! {
     }
 }
 
-/// K and M stand in one file beside arrays, texts, structs and cells.
+/// K and M are in one file together with arrays, texts, structs and cells.
 #[test]
 fn variables_of_matlab_are_taken_by_role_or_by_name() {
     let one = CscMatrix::from_triplets(6, 6, &[0, 1, 2, 3, 4, 5].map(|k| (k, k, 1.0)));

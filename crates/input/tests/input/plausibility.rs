@@ -1,5 +1,5 @@
-//! Mass beside stiffness and positions: M in another order or of another mesh, units that disagree, exchanged
-//! matrices. Every mistake is made on a sound model, of which nothing is told.
+//! Plausibility of mass, stiffness and positions: M in another order or from another mesh, contradictory
+//! units, exchanged matrices. Every mistake is made in a valid model that gives no message.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::{Error, ExitCode};
@@ -65,7 +65,7 @@ fn refused(raw: RawModel) -> Error {
     FeModel::from_raw(raw).expect_err("a mistake")
 }
 
-/// Matrix rows of each node, by direction.
+/// Returns the matrix rows of each node, by direction.
 fn rows_of_nodes(raw: &RawModel) -> Vec<Vec<u32>> {
     let implied = || {
         let d = raw.dimension;
@@ -83,7 +83,7 @@ fn rows_of_nodes(raw: &RawModel) -> Vec<Vec<u32>> {
     rows.into_values().map(|own| own.into_values().collect()).collect()
 }
 
-/// The mass of node i at the place of node `to[i]`, where both have as many rows.
+/// Moves the mass of node i to node `to[i]` if both have the same number of rows.
 fn with_mass_moved(raw: &RawModel, to: &[usize]) -> RawModel {
     let rows = rows_of_nodes(raw);
     let mut place: Vec<u32> = (0..raw.mass.matrix.n_cols() as u32).collect();
@@ -157,8 +157,8 @@ fn a_random_order_of_the_mass_is_refused() {
     }
 }
 
-/// On linear elements every exchange is told. On quadratic ones nodes of the same elements that have the same
-/// mass are left, whose exchange changes little.
+/// On linear elements every exchange of two nodes is reported. On quadratic elements some nodes of one
+/// element have equal mass, so that their exchange changes little.
 #[test]
 fn two_exchanged_nodes_are_told() {
     for (name, all) in [
@@ -197,8 +197,7 @@ fn two_exchanged_nodes_are_told() {
 
 #[test]
 fn nodes_of_one_element_that_are_exchanged_are_named() {
-    // A corner and the middle of an edge that belong to one element alone: K couples them with the same
-    // nodes.
+    // A corner and the middle of an edge that belong to one element only: K couples both with the same nodes.
     let raw = Mesh::block(ElementKind::Hex20, [3, 1, 1], [3.0, 1.0, 1.0])
         .assemble(&Material::STEEL, MassRule::Consistent)
         .raw_model();
@@ -245,7 +244,7 @@ fn other_orders_of_rows_are_recognised() {
     );
 }
 
-/// A mass that hangs on several nodes without stiffness between them couples each of them with each other.
+/// A mass distributed over several nodes without stiffness between them couples every pair of these nodes.
 #[test]
 fn a_mass_spread_over_nodes_is_a_warning() {
     let mut raw = raw_fixture("cube_hex8");
@@ -299,7 +298,7 @@ fn densities_and_speeds_are_those_of_the_material() {
             "{name}: {lower} {median} {upper}"
         );
     }
-    // Bars: the speed of sound along them; nothing is known of their density.
+    // For bars the speed of sound along them is known, but not their density.
     let frame = facts(raw_fixture("frame_beams"));
     assert!(frame.densities.is_none());
     let speed = (7e10f64 / 2700.0 / 3.0).sqrt();
@@ -335,8 +334,8 @@ fn densities_of_no_matter_are_refused() {
     assert!(help.contains("mm, t, s"), "{help}");
 }
 
-/// Numbers whose units nothing states are taken for m, kg, s, and refused with the units in which they are those of matter:
-/// densities of solids, speeds of sound of everything else.
+/// Numbers without stated units are taken as m, kg, s. Implausible numbers are refused with units that would
+/// make them plausible: densities of solids, speeds of sound of other models.
 #[test]
 fn numbers_without_units_are_those_of_matter() {
     let unstated = |raw: RawModel| RawModel { units: UnitSystem::default(), ..raw };
@@ -359,11 +358,11 @@ fn numbers_without_units_are_those_of_matter() {
         let codes = told(RawModel { allow_implausible: true, ..raw.clone() });
         assert!(!codes.is_empty() && !codes.contains(&Code::DensityImplausible), "{codes:?}");
     }
-    // What is that of matter in m, kg, s needs no units.
+    // Plausible numbers in m, kg, s need no units.
     for name in ["cube_hex8", "shell_folded", "frame_beams", "bar_c3d8r"] {
         assert_eq!(told(unstated(raw_fixture(name))), [], "{name}");
     }
-    // Matrices in memory may have no dimension.
+    // Matrices in memory have no path.
     let mut in_memory = bracket.clone();
     in_memory.stiffness.path = Default::default();
     assert_eq!(told(in_memory), [Code::InertiaImplausible]);

@@ -1,5 +1,5 @@
-//! Rotated nodes of Ansys: the rows of K and M, and of what is given beside them, stand along axes whose angles the
-//! archive or the list of nodes has.
+//! Rotated nodes of Ansys: the rows of K and M, and of further data, are along axes whose angles are in the
+//! archive or the list of nodes.
 
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -12,7 +12,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-/// THXY, THYZ, THZX of the nodes of the brick.
+/// Angles THXY, THYZ, THZX of the nodes of the brick. Unit: degrees.
 const ANGLES: [[f64; 3]; 8] = [
     [30.0, 0.0, 0.0],
     [0.0; 3],
@@ -30,7 +30,7 @@ fn model(folder: &Path) -> RawModel {
     raw.expect("a model")
 }
 
-/// Axes by three turns about axes that stand.
+/// Returns the axes after three successive rotations about current axes.
 fn axes([xy, yz, zx]: [f64; 3]) -> Matrix3<f64> {
     let about = |axis, degrees: f64| Rotation3::from_axis_angle(&axis, degrees.to_radians());
     let first = about(Vector3::z_axis(), xy);
@@ -128,7 +128,7 @@ fn rows_of_rotated_nodes_are_turned_by_their_angles() {
             }
         }
     }
-    // A rotated node whose third direction is not there.
+    // The third direction of a rotated node is missing.
     let text = fs::read_to_string(folder.path().join("dofs.csv")).expect("a table");
     let first = raw.nodes.ids[0];
     fs::write(folder.path().join("dofs.csv"), text.replacen(&format!("{first},3\n"), "999,1\n", 1))

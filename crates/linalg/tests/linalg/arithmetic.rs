@@ -1,4 +1,4 @@
-//! The double-double kernels against rational arithmetic: they err no more than their documentation says.
+//! Double-double kernels compared with rational arithmetic: their errors are within the documented limits.
 #![allow(clippy::needless_range_loop)] // eliminations read best with their indices
 
 use faer::Mat;
@@ -11,19 +11,19 @@ use num_traits::{Signed, ToPrimitive, Zero};
 use oracle::exact::exact;
 use oracle::random::Random;
 
-/// u^2.
+/// Square of the unit roundoff u.
 const U2: f64 = f64::EPSILON * f64::EPSILON / 4.0;
 
 fn value(x: DoubleDouble) -> BigRational {
     exact(x.hi) + exact(x.lo)
 }
 
-/// |found - truth| / |truth|.
+/// Returns |found - truth| / |truth|.
 fn error(found: DoubleDouble, truth: &BigRational) -> f64 {
     ((value(found) - truth) / truth).abs().to_f64().expect("a number")
 }
 
-/// Over thirty decades, of either sign, with a full second part.
+/// Returns a number over thirty decades of either sign, with a full second part.
 fn number(r: &mut Random) -> DoubleDouble {
     let hi = r.signed() * 10f64.powf(15.0 * r.signed());
     DoubleDouble::sum(hi, hi * f64::EPSILON * 0.25 * r.signed())
@@ -36,7 +36,7 @@ fn every_operation_keeps_its_bound() {
         let (a, b) = (number(&mut r), number(&mut r));
         let (x, y) = (value(a), value(b));
         assert!(error(a + b, &(&x + &y)) <= 3.1 * U2, "{a:?} + {b:?}");
-        // Nearly equal numbers: the difference keeps its relative accuracy.
+        // For nearly equal numbers the difference keeps its relative accuracy.
         let near = DoubleDouble::sum(a.hi, -a.lo);
         assert!(error(a - near, &(&x - value(near))) <= 3.1 * U2, "{a:?} - {near:?}");
         assert!(error(a * b, &(&x * &y)) <= 4.1 * U2, "{a:?} * {b:?}");
@@ -141,7 +141,7 @@ fn small_pencils_have_the_eigenvalues_of_their_characteristic_polynomial() {
         assert!((determinant(&around(-1.0)) * determinant(&around(1.0))).is_negative(), "eigenvalue {i}");
     }
     assert!(kappa.windows(2).all(|w| w[0].hi < w[1].hi));
-    // P x = kappa Q x and x'Qx = 1 to the rounding of x, where each row counts beside its own decades.
+    // P x = kappa Q x and x'Qx = 1 to the rounding of x, with each row relative to its own decades.
     for j in 0..n {
         let times = |a: &[Vec<DoubleDouble>], i: usize| {
             (0..n).fold(DoubleDouble::default(), |sum, k| sum + a[i][k] * vectors[(k, j)])

@@ -1,5 +1,5 @@
-//! Factors of random sparse matrices against dense algebra: solutions, inertia, semidefiniteness, and the same bits on any
-//! number of threads.
+//! Factors of random sparse matrices compared with dense algebra: solutions, inertia, semidefiniteness, and
+//! equal bits on any number of threads.
 
 use faer::Mat;
 use flexbody_linalg::{
@@ -8,8 +8,8 @@ use flexbody_linalg::{
 };
 use proptest::prelude::*;
 
-/// A symmetric matrix with about `degree` entries to the left of the diagonal in each row, whose diagonal exceeds the sum
-/// of the others in its row by `excess`.
+/// Returns a symmetric matrix with about `degree` entries to the left of the diagonal in each row. The
+/// diagonal exceeds the sum of the magnitudes of the other entries of its row by `excess`.
 fn random_matrix(n: usize, degree: usize, excess: f64, seed: u64) -> SymmetricMatrix {
     let mut entries = Vec::new();
     let mut sums = vec![excess; n];
@@ -56,7 +56,8 @@ proptest! {
         let double = Cholesky::<f64>::new(&analysis, &pencil, tau).expect("positive definite");
         let mut y = b.clone();
         double.solve_in_place(y.as_mut());
-        // The diagonal exceeds the others by tau / 2: the inverse has a norm of 2 / tau at the most.
+        // The diagonal exceeds the other entries by tau / 2, so that the norm of the inverse is at most 2 /
+        // tau.
         prop_assert!((&y - &x).norm_max() < 1e-13 * size / tau);
         let single = Cholesky::<f32>::new(&analysis, &pencil, tau).expect("positive definite");
         let mut y = b.clone();
@@ -64,7 +65,8 @@ proptest! {
         prop_assert!((&y - &x).norm_max() < 1e-5 * size / tau);
     }
 
-    /// By Sylvester's law the negative pivots of K - sigma M are the eigenvalues below sigma, for M = 1 those of K.
+    /// By Sylvester's law the negative pivots of K - sigma M count the eigenvalues below sigma, those of K
+    /// for M = 1.
     #[test]
     fn negative_pivots_are_the_eigenvalues_below_the_shift(n in 2usize..120, degree in 0usize..4, seed: u16, part in 0.0f64..1.0) {
         let k = random_matrix(n, degree, 0.0, seed.into());
@@ -88,12 +90,12 @@ proptest! {
         prop_assert!((&y - &x).norm_max() < 1e-12 * n as f64 * values[n - 1].max(1.0) / nearest);
     }
 
-    /// A factor row by row agrees, and names the rows that a semidefinite matrix leaves without a pivot: one for each
-    /// connected part of a matrix whose rows sum to zero.
+    /// A factor row by row agrees, and names the rows without a pivot of a semidefinite matrix: one for each
+    /// connected part if the rows sum to zero.
     #[test]
     fn a_semidefinite_matrix_has_a_null_row_for_each_part(n in 1usize..100, degree in 0usize..3, seed: u16) {
         let a = random_matrix(n, degree, 0.0, seed.into());
-        // Entries made negative: a graph Laplacian.
+        // Entries are made negative: a graph Laplacian.
         let laplacian: Vec<_> = (0..n)
             .flat_map(|i| {
                 let (columns, values) = a.row(i);
@@ -102,7 +104,7 @@ proptest! {
                 }).collect::<Vec<_>>()
             })
             .collect();
-        // What several entries of one place add up to may be less than their sizes: the diagonal is their sum.
+        // Repeated entries at one place may partly cancel; the diagonal is their sum.
         let mut sums = vec![0.0; n];
         laplacian.iter().filter(|e| e.0 != e.1).for_each(|e| sums[e.0 as usize] -= e.2);
         let entries: Vec<_> = laplacian

@@ -1,6 +1,6 @@
-//! Sparse linear algebra: factors against dense algebra, sums beyond rounding against exact arithmetic.
+//! Sparse linear algebra: factors compared with dense algebra, compensated sums with exact arithmetic.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod arithmetic;
 mod factors;

@@ -1,4 +1,4 @@
-//! The test models themselves: an error in them would be an error in every oracle.
+//! Test models: an error in them would be an error in every oracle.
 
 use flexbody_linalg::CscMatrix;
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -17,7 +17,7 @@ fn product(matrix: &CscMatrix, x: &[f64]) -> Vec<f64> {
     y
 }
 
-/// Sum of |K_ij x_j| per row, the scale of rounding in `product`.
+/// Returns the sum of |K_ij x_j| per row, the scale of rounding in `product`.
 fn magnitude(matrix: &CscMatrix, x: &[f64]) -> f64 {
     let mut y = vec![0.0; matrix.n_rows()];
     for (r, c, v) in entries(matrix) {
@@ -26,7 +26,7 @@ fn magnitude(matrix: &CscMatrix, x: &[f64]) -> f64 {
     y.into_iter().fold(0.0, f64::max)
 }
 
-/// Field u = a + G x at every node, node-major.
+/// Returns the field u = a + G x at every node, node-major.
 fn linear_field(nodes: &[[f64; 3]], shift: [f64; 3], gradient: [[f64; 3]; 3]) -> Vec<f64> {
     nodes
         .iter()
@@ -38,8 +38,8 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m, v| m.max(v.abs()))
 }
 
-/// A block with every node moved at random: no two elements are alike. Mid-edge nodes of tetrahedra stay in
-/// place.
+/// Returns a block with every node moved at random, so that all elements differ. Mid-edge nodes of tetrahedra
+/// stay in place.
 fn distorted(kind: ElementKind) -> Mesh {
     let mut random = Random(7);
     let corner = random.vector::<3>();
@@ -104,7 +104,7 @@ fn patch_test_constant_strain_has_exact_energy_and_no_inner_force() {
     }
 }
 
-/// Nodes inside the distorted block: those that every one of the eight surrounding cells holds.
+/// Returns the nodes inside the distorted block, which belong to eight cells each.
 fn inner_nodes(body: &Assembly, kind: ElementKind) -> Vec<usize> {
     let reference = Mesh::block(kind, [3, 2, 2], [3.0, 2.0, 2.0]);
     assert_eq!(reference.nodes.len(), body.nodes.len());
@@ -132,7 +132,7 @@ fn cuboid_mass_and_inertia_are_exact() {
 
 #[test]
 fn linear_tetrahedra_have_the_textbook_mass() {
-    // rho V / 20 (1 + delta_ij).
+    // Entries rho V / 20 (1 + delta_ij).
     let nodes = [[0.0, 0.0, 0.0], [2.0, 0.1, 0.0], [0.3, 1.5, 0.2], [0.1, 0.2, 1.1]];
     let material = Material { youngs: 1.0, poisson: 0.25, density: 3.0 };
     let (_, mass) = ElementKind::Tet4.matrices(&nodes, &material, MassRule::Consistent);
@@ -148,8 +148,8 @@ fn linear_tetrahedra_have_the_textbook_mass() {
 
 #[test]
 fn quadratic_tetrahedra_have_the_textbook_mass() {
-    // rho V / 420 times: corners 6, 1; corner to its edge -4, to another edge -6; edges 32, touching 16,
-    // opposite 8.
+    // Entries rho V / 420 times: corners 6, 1; corner to its edge -4, to another edge -6; edges 32, adjacent
+    // 16, opposite 8.
     let nodes = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let edges = oracle::elements::TET_EDGES;
     let mut all = nodes.to_vec();
@@ -180,7 +180,7 @@ fn quadratic_tetrahedra_have_the_textbook_mass() {
 
 #[test]
 fn one_trilinear_cube_has_its_closed_form_spectrum() {
-    // Parity splits the 24 modes of the unit cube: K by itself first, then the free body's lambda.
+    // Parity separates the 24 modes of the unit cube: first those of K alone, then lambda of the free body.
     let unit = Material { youngs: 1.0, poisson: 0.2, density: 1.0 };
     let body = Mesh::block(ElementKind::Hex8, [1; 3], [1.0; 3]).assemble(&unit, MassRule::Consistent);
     let (lambda, mu) = unit.lame();
@@ -189,8 +189,8 @@ fn one_trilinear_cube_has_its_closed_form_spectrum() {
     for (value, times) in [
         (1.5 * lambda + mu, 1),               // dilatation x
         (mu, 5),                              // constant deviatoric strain
-        ((2.0 * lambda + 3.0 * mu) / 6.0, 3), // bending (x y, 0, z y), its two curvatures alike
-        (mu / 2.0, 3),                        // the same, opposite
+        ((2.0 * lambda + 3.0 * mu) / 6.0, 3), // bending (x y, 0, z y), both curvatures in phase
+        (mu / 2.0, 3),                        // bending with both curvatures in opposite phase
         (2.0 * mu / 3.0, 1),                  // warping (y z, x z, x y)
         (mu / 6.0, 2),                        // twist
         ((lambda + 4.0 * mu) / 18.0, 3),      // x y z

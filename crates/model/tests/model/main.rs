@@ -1,6 +1,6 @@
-//! Finite element models of own elements.
+//! Finite element models assembled from own elements.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod assembler;
 mod stress_relations;

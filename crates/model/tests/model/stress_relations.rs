@@ -1,5 +1,5 @@
-//! Geometric stiffness held to what a stress does under rigid motion: the true stress stiffness of solids and beams for
-//! every load, and what is no stress stiffness or that of another load.
+//! Checks of geometric stiffness by its behaviour under rigid motion: true stress stiffness of solids and
+//! beams for every load, and matrices that are no stress stiffness or belong to another load.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_linalg::CscMatrix;
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 const CODES: [Code; 3] =
     [Code::GeometricStiffnessMotion, Code::GeometricStiffnessLoad, Code::GeometricStiffnessRough];
 
-/// A body with dense matrices, held nowhere or at some rows.
+/// A body with dense matrices, free or held at some rows.
 struct Body {
     raw: RawModel,
     k: DMatrix<f64>,
@@ -37,7 +37,8 @@ fn sparse(a: &DMatrix<f64>) -> CscMatrix {
 }
 
 impl Body {
-    /// `rows`: rows of each node, three displacements and perhaps three rotations.
+    /// Builds the body; `rows` is the number of rows of each node, three displacements and optionally three
+    /// rotations.
     fn new(raw: RawModel, rows: usize, held: &[usize]) -> Self {
         let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
         let mut rigid = DMatrix::zeros(k.nrows(), 6);
@@ -55,7 +56,7 @@ impl Body {
         Self { raw, k, m, rigid, held }
     }
 
-    /// Displacements under a load: with rows held, or free with the inertia forces that balance it.
+    /// Returns the displacements under a load: with rows held, or free with balancing inertia forces.
     fn response(&self, load: &DVector<f64>) -> DVector<f64> {
         let n = self.k.nrows();
         if self.held.is_empty() {
@@ -74,7 +75,7 @@ impl Body {
         all
     }
 
-    /// Forces -M a of an acceleration that depends on the place.
+    /// Returns the forces -M a of an acceleration field.
     fn inertia(&self, rows: usize, a: impl Fn(Vector3<f64>) -> Vector3<f64>) -> DVector<f64> {
         let mut field = DVector::zeros(self.k.nrows());
         for (i, x) in self.raw.nodes.positions.iter().enumerate() {
@@ -88,7 +89,8 @@ impl Body {
         Vector3::new(momenta[(1, 5)], momenta[(2, 3)], momenta[(0, 4)]) / momenta[(0, 0)]
     }
 
-    /// Codes of this list, and messages, of the model with one geometric stiffness.
+    /// Returns the codes on geometric stiffness, and the messages, for the model with one geometric
+    /// stiffness.
     fn told(&self, kind: LoadKind, component: usize, matrix: &DMatrix<f64>) -> (Vec<Code>, String) {
         let matrix = RawMatrix { matrix: sparse(matrix), digits: 17, path: PathBuf::from("Kg.mtx") };
         let given = GeometricStiffness { load: UnitLoad { kind, component }, matrix };
@@ -106,7 +108,7 @@ fn told(raw: RawModel) -> (Vec<Code>, String) {
     (found.iter().map(|one| one.code()).collect(), text)
 }
 
-/// A bent and tapered bar of hexahedra, turned in space, with its first layer of nodes held or not.
+/// Returns a bent and tapered bar of hexahedra, rotated in space, with its first layer of nodes held or free.
 fn solid(is_held: bool) -> (Mesh, Body) {
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([6, 2, 2]), |p| {
         [
@@ -127,7 +129,7 @@ fn solid(is_held: bool) -> (Mesh, Body) {
     (mesh, body)
 }
 
-/// Every kind of load of a body with three rows for each node: its kind, its component and its forces.
+/// Returns every kind of load of a body with three rows per node: kind, component and forces.
 fn loads(body: &Body) -> Vec<(LoadKind, usize, DVector<f64>)> {
     let (centre, tip) = (body.centre(), || "tip".to_owned());
     let e = |k: usize| Vector3::ith(k, 1.0);
@@ -144,7 +146,7 @@ fn loads(body: &Body) -> Vec<(LoadKind, usize, DVector<f64>)> {
             false => e(k).cross(&e(l).cross(&x)) + e(l).cross(&e(k).cross(&x)),
         };
         all.push((LoadKind::Spin, component, body.inertia(3, |x| pair(x - centre))));
-        // About another point, as `--frame model` takes it.
+        // Spin about another point, like with `--frame model`.
         all.push((LoadKind::Spin, component, body.inertia(3, pair)));
     }
     all.push((
@@ -155,7 +157,7 @@ fn loads(body: &Body) -> Vec<(LoadKind, usize, DVector<f64>)> {
     all
 }
 
-/// A force and a moment at the mean of the nodes of the tip, with unequal forces at its nodes.
+/// Returns a force and a moment at the mean of the nodes of the tip, distributed unequally over its nodes.
 fn at_tip(body: &Body, force: Vector3<f64>, moment: Vector3<f64>) -> DVector<f64> {
     let nodes: Vec<usize> = body.raw.interfaces[0].nodes.iter().map(|&id| id as usize - 1).collect();
     let place = |i: usize| Vector3::from(body.raw.nodes.positions[i]);
@@ -186,7 +188,7 @@ fn at_tip(body: &Body, force: Vector3<f64>, moment: Vector3<f64>) -> DVector<f64
     load
 }
 
-/// K(u) - K(0) of total-Lagrangian hexahedra of St. Venant and Kirchhoff's material, per unit of u.
+/// Returns K(u) - K(0) of total-Lagrangian hexahedra with St. Venant-Kirchhoff material, per unit of u.
 fn difference_of_tangents(mesh: &Mesh, material: &Material, u: &DVector<f64>) -> DMatrix<f64> {
     let small = 1e-7 / u.amax();
     let n = 3 * mesh.nodes.len();
@@ -264,7 +266,7 @@ fn the_difference_of_tangents_is_refused_for_every_load() {
     for is_held in [false, true] {
         let (mesh, body) = solid(is_held);
         for (kind, component, load) in loads(&body) {
-            // A free body is not stressed by the acceleration of its origin.
+            // The acceleration of its origin does not stress a free body.
             if !is_held && matches!(kind, LoadKind::Acceleration | LoadKind::AngularAcceleration) {
                 continue;
             }
@@ -300,7 +302,7 @@ fn the_stiffness_of_another_load_is_refused() {
                 continue;
             }
             let own = stress_stiffness(&mesh, &body.response(load));
-            // Inertia relief takes all of these loads.
+            // Inertia relief applies to all of these loads.
             if !is_held && matches!(kind, LoadKind::Acceleration | LoadKind::AngularAcceleration) {
                 let (_, _, other) = &all[(i + 2) % 12];
                 let matrix = stress_stiffness(&mesh, &body.response(other));
@@ -354,7 +356,7 @@ fn a_stress_with_small_errors_is_taken_with_a_warning() {
     let u = body.response(&load);
     let own = stress_stiffness(&mesh, &u);
     let other = difference_of_tangents(&mesh, &Material::STEEL, &u) - &own;
-    // Of the initial displacements so much as is a small part of the stress stiffness.
+    // The part of initial displacements that is small compared with the stress stiffness.
     let part = own.amax() / other.amax();
     let (codes, text) = body.told(kind.clone(), component, &(&own + &other * (2e-3 * part)));
     assert_eq!(codes, [Code::GeometricStiffnessRough], "{text}");
@@ -362,14 +364,14 @@ fn a_stress_with_small_errors_is_taken_with_a_warning() {
     assert_eq!(codes, [Code::GeometricStiffnessMotion], "{text}");
 }
 
-/// A chain of beams with six rows for each node, held at its first node or free.
+/// Returns a chain of beams with six rows per node, held at its first node or free.
 fn beams(places: &[[f64; 3]], is_held: bool) -> Body {
     let mut raw = chain("beams", places);
     raw.interfaces = vec![NodeSet::new("tip", vec![places.len() as i64])];
     Body::new(raw, 6, if is_held { &[0] } else { &[] })
 }
 
-/// K_geo of a straight chain under normal forces (Przemieniecki): 6/5, l/10, 2 l^2/15, -l^2/30.
+/// Returns K_geo of a straight chain under normal forces (Przemieniecki): 6/5, l/10, 2 l^2/15, -l^2/30.
 fn normal_force_stiffness(body: &Body, u: &DVector<f64>) -> DMatrix<f64> {
     let places = &body.raw.nodes.positions;
     let mut all = DMatrix::zeros(6 * places.len(), 6 * places.len());
@@ -409,7 +411,7 @@ fn beams_are_held_to_the_relations_of_their_points() {
     for is_held in [false, true] {
         let body = beams(&places, is_held);
         let centre = body.centre();
-        // All that pulls along the line: the trace of the spin, and a force at the tip.
+        // Loads that pull along the line: the trace of the spin, and a force at the tip.
         let along = body.inertia(6, |x| -(x - centre));
         let own = normal_force_stiffness(&body, &body.response(&along));
         let named = || LoadKind::Named("pulled".to_owned());

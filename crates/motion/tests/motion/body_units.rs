@@ -1,5 +1,4 @@
-//! A body in other units moves as it did: energies, momenta and accelerations change with their units and in
-//! nothing else.
+//! Motion of a body in other units: energies, momenta and accelerations change by their units only.
 
 use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{BasisChoice, CraigBampton, ModeSettings};
@@ -14,12 +13,12 @@ use oracle::flexible::{fixture, stressed};
 use oracle::general::raw_fixture;
 use oracle::random::Random;
 
-/// Units that no model of the fixtures has.
+/// Returns units that no fixture model uses.
 fn other() -> UnitSystem {
     UnitSystem::parse("in", "lb", "ms").expect("known units")
 }
 
-/// What numbers of mass, length and time are multiplied by.
+/// Returns the factors of numbers of mass, length and time.
 fn factors(body: &FlexBody) -> [f64; 3] {
     let (old, new) = (body.units(), other());
     [
@@ -48,7 +47,7 @@ fn equations_of_motion_keep_their_meaning() {
         let (a, b) =
             (EquationsOfMotion::new(&body, Terms::ALL), EquationsOfMotion::new(&in_other, Terms::ALL));
         let (r, n) = (a.n_rigid(), a.n_velocities());
-        // Unit of each entry of nu, and of the forces that do work on it.
+        // Unit of each entry of nu, and of the conjugate forces.
         let translations = if r == 3 { 2 } else { 3 };
         let unit = |i: usize| match i {
             i if i < translations => length / time,
@@ -56,7 +55,7 @@ fn equations_of_motion_keep_their_meaning() {
             _ => modal / time,
         };
         let energy = mass * length * length / (time * time);
-        // Small deflections: the geometric stiffness is a random one.
+        // Deflections are small because the geometric stiffness is random.
         let amplitude = |j: usize| 1e-6 * body.extent() / body.largest_displacement(j);
         let q: Vec<f64> = (0..a.n_modes()).map(|j| amplitude(j) * random.signed()).collect();
         let nu: Vec<f64> = (0..n).map(|_| random.signed()).collect();

@@ -1,5 +1,5 @@
-//! The reduced equations of motion of the library against equations written out term by term, nodes and
-//! conservation laws.
+//! Reduced equations of motion of the library compared with equations written out term by term, with nodes,
+//! and with conservation laws.
 
 use faer::Mat;
 use flexbody_body::flex_body::FlexBody;
@@ -17,7 +17,7 @@ use oracle::general::{
 use oracle::nodal::{deviation, random_state};
 use oracle::random::Random;
 
-/// A solid without any symmetry: eight vectors with M = Ms kron I, two of them without a place, five shapes.
+/// Returns a solid without symmetry: eight rows of M = Ms kron I, two of them internal, and five shapes.
 fn random_solid(seed: u64) -> (NodalBody, FlexBody) {
     let mut random = Random(seed);
     let positions: Vec<[f64; 3]> = (0..6).map(|_| random.vector::<3>()).collect();
@@ -34,7 +34,7 @@ fn random_solid(seed: u64) -> (NodalBody, FlexBody) {
     (nodal, body)
 }
 
-/// A body with any symmetric mass matrix, four shapes.
+/// Returns a body with an arbitrary symmetric mass matrix and four shapes.
 fn random_general(seed: u64) -> (NodalBody, FlexBody) {
     let nodal = random_body(seed);
     let body = made_of(
@@ -53,7 +53,7 @@ fn mass_matrix(evaluation: &Evaluation<'_>) -> DMatrix<f64> {
     DMatrix::from_row_slice(n, n, &matrix)
 }
 
-/// Momenta, energies and mass matrix are those of the oracle.
+/// Asserts that momenta, energies and mass matrix agree with the oracle.
 fn assert_quantities(
     what: &str,
     evaluation: &Evaluation<'_>,
@@ -92,7 +92,7 @@ fn random_bodies_move_like_their_nodes() {
     }
 }
 
-/// Section 3 as it is printed, in the velocities (R' world, omega, qd).
+/// Section 3 in its printed form, with the velocities (R' world, omega, qd).
 #[test]
 fn solids_have_the_terms_of_section_three() {
     let converted = ["cube_hex8", "bracket_hex20"].map(|name| fixture(name, 12, BodyFrame::Model));
@@ -122,7 +122,7 @@ fn solids_have_the_terms_of_section_three() {
 #[test]
 fn converted_bodies_have_the_terms_of_section_six() {
     for name in ["cube_hex8", "bracket_hex20", "frame_beams", "shell_folded", "mpc_block", "hex8_bubbles"] {
-        // About its centre of mass a free body's origin is accelerated by rounding only.
+        // The origin of a free body at its centre of mass has an acceleration of rounding only.
         let body = to_first_order(fixture(name, 10, BodyFrame::Model));
         let (equations, oracle) = (EquationsOfMotion::new(&body, Terms::ALL), oracle(&body));
         let state = lively_state(&mut Random(7), &body);
@@ -135,7 +135,7 @@ fn converted_bodies_have_the_terms_of_section_six() {
     }
 }
 
-/// Terms that are dropped are those of an oracle whose arrays are zero.
+/// Dropped terms agree with an oracle whose arrays are zero.
 #[test]
 fn dropped_terms_are_zero_arrays() {
     for seed in 0..8u64 {
@@ -151,7 +151,7 @@ fn dropped_terms_are_zero_arrays() {
                     array.fill(0.0);
                 }
             }
-            // Small enough that the inertia stays positive without W2.
+            // The amplitude keeps the inertia positive without W2.
             let (state, _) = random_state(&mut Random(60 + seed), body.n_modes(), 0.01);
             let equations = EquationsOfMotion::new(&body, terms);
             assert_eq!(equations.terms(), terms);
@@ -165,8 +165,8 @@ fn dropped_terms_are_zero_arrays() {
     }
 }
 
-/// The forces are polynomials, of second degree in each coordinate and velocity: central differences of any
-/// step are exact.
+/// The forces are polynomials of second degree in each coordinate and velocity, so that central differences
+/// of any step are exact.
 #[test]
 fn jacobians_are_the_differences_of_the_forces() {
     let bodies = (0..6).flat_map(|seed| [random_solid(seed).1, random_general(seed).1]);
@@ -178,7 +178,7 @@ fn jacobians_are_the_differences_of_the_forces() {
         let body = stressed(body, &motion[..at % 4], 1.0, &mut random);
         let mut parts = body.into_parts();
         parts.modes.modal_damping = Some(Mat::from_fn(nf, nf, |i, j| 0.1 * (1 + i.min(j)) as f64));
-        // Of the size of the other forces.
+        // The stiffness is scaled to the other forces.
         parts.invariants.primary_mut().modal_stiffness =
             Mat::from_fn(nf, nf, |i, j| 0.3 * (1 + i.min(j)) as f64);
         let body = FlexBody::new(parts).expect("valid parts");
@@ -204,7 +204,7 @@ fn jacobians_are_the_differences_of_the_forces() {
             let scale = DVector::from_vec(by_nu.clone()).amax() + DVector::from_vec(by_q.clone()).amax();
             for j in 0..nf {
                 let [ahead, behind] = [0.5, -0.5].map(|step| balance(&moved(&q, j, step), &nu));
-                // The difference has the rounding of both.
+                // The difference has the rounding of both terms.
                 let scale = scale + ahead.amax() + behind.amax();
                 let difference = ahead - behind;
                 for i in 0..n {
@@ -223,7 +223,7 @@ fn jacobians_are_the_differences_of_the_forces() {
     }
 }
 
-/// Accelerations and the forces that they need are inverse to each other, damping included.
+/// Accelerations and the forces that cause them are inverse to each other, including damping.
 #[test]
 fn balance_returns_the_applied_forces() {
     for seed in 0..10 {
@@ -244,7 +244,7 @@ fn balance_returns_the_applied_forces() {
             evaluation.balance(rates.as_slice(), back.as_mut_slice());
             let scale = applied.norm() + DVector::from_column_slice(evaluation.velocity_forces()).norm();
             assert!((&back - &applied).norm() < 1e-11 * scale, "seed {seed}: {:e}", (back - applied).norm());
-            // What damping takes.
+            // Force and power of damping.
             let at_rest = State { qd: DVector::zeros(nf), omega: Vector3::zeros(), ..state.clone() };
             let moving = State { qd: DVector::from_element(nf, 1e-3), ..at_rest.clone() };
             let modal = |evaluation: &mut Evaluation<'_>, state: &State| {
@@ -265,7 +265,7 @@ fn balance_returns_the_applied_forces() {
     }
 }
 
-/// Forces at nodes do the power that the nodes take; gravity is that of the mass.
+/// Forces at nodes have the power of the nodal motion; gravity has that of the mass.
 #[test]
 fn loads_do_the_power_of_the_nodes() {
     for seed in 0..10 {
@@ -281,7 +281,7 @@ fn loads_do_the_power_of_the_nodes() {
             let point = BodyPoint::node(&body, node);
             assert!(!point.turns());
             point.add_force(&evaluation, &force, forces.as_mut_slice());
-            // By hand: x + u and its velocity.
+            // Computed by hand: x + u and its velocity.
             let shape = |q: &DVector<f64>| {
                 Vector3::from_fn(|k, _| (0..5).map(|j| body.modes().shape[(3 * node + k, j)] * q[j]).sum())
             };
@@ -294,7 +294,7 @@ fn loads_do_the_power_of_the_nodes() {
         }
         assert!((forces.dot(&nu) - power).abs() < 1e-12 * power.abs().max(1.0), "seed {seed}");
 
-        // A solid in free fall: the origin and nothing else is accelerated by what gravity adds.
+        // In free fall gravity accelerates only the origin of a solid.
         let gravity = Vector3::new(0.5, -9.0, 3.0);
         let free = accelerations(&equations, &state, |_, _| {});
         let fall = accelerations(&equations, &state, |at, forces| {

@@ -1,5 +1,5 @@
-//! What motion keeps: energy and momenta of all terms, of every truncation and of general masses; and what
-//! misprints lose.
+//! Conservation of energy and momenta: with all terms, for every truncation and for general masses; and
+//! violations by misprints.
 
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
@@ -14,7 +14,7 @@ use oracle::motion::{Drift, Kept, orientation, velocity_rates};
 use oracle::random::Random;
 use oracle::turning::{block, disc_on_shaft};
 
-/// Energy and world momenta (about the world origin), with `potential` energy.
+/// Returns energy and world momenta (about the world origin), including the `potential` energy.
 fn kept(equations: &EquationsOfMotion, y: &DVector<f64>, potential: f64) -> Kept {
     let nf = equations.n_modes();
     let mut evaluation = Evaluation::new(equations);
@@ -25,7 +25,8 @@ fn kept(equations: &EquationsOfMotion, y: &DVector<f64>, potential: f64) -> Kept
     Kept { energy: evaluation.kinetic_energy() + evaluation.elastic_energy() + potential, linear, angular }
 }
 
-/// Spin about the middle axis with a fifth of the first circular frequency, bent and flying at the start.
+/// Returns a spin about the middle axis with a fifth of the first circular frequency, with deformation and
+/// translation at the start.
 fn start(body: &FlexBody) -> DVector<f64> {
     let nf = body.n_modes();
     let omega: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
@@ -80,7 +81,7 @@ fn energy_and_momenta_are_kept_by_every_truncation() {
     }
 }
 
-/// Each kind of load by itself and all together, of a solid and of a general mass, in gravity.
+/// Each kind of load by itself and all together, for a solid and for a general mass, under gravity.
 #[test]
 #[ignore = "slow"]
 fn energy_is_kept_with_geometric_stiffness() {
@@ -88,7 +89,7 @@ fn energy_is_kept_with_geometric_stiffness() {
     for body in [soft_block(10), fixture("frame_beams", 6, BodyFrame::Model)] {
         let lambda = body.modes().eigenvalue[0];
         let radius = (body.invariants().inertia()[(1, 1)] / body.invariants().mass()).sqrt();
-        // Motion of second order of nodes whose modes move like the body turns: some hundredths of the first
+        // Second-order motion of nodes whose modes rotate with the body: some hundredths of the first
         // stiffness.
         let sizes = [0.5, 0.5 / radius, 0.5];
         let single = (0..3).map(|at| at..at + 1);
@@ -112,7 +113,7 @@ fn energy_is_kept_with_geometric_stiffness() {
             assert!(drift.energy < 1e-10 && drift.deformation > 0.05, "{kinds:?}: {drift:?}");
             let free = tumble(&stiff, Terms::ALL, nothing, |_| 0.0);
             assert!(free.worst() < 1e-10 && free.turns > 2.0, "{kinds:?}: {free:?}");
-            // And it acts.
+            // The geometric stiffness has an effect.
             let without = Terms { geometric_stiffness: false, ..Terms::ALL };
             let soft = tumble(&stiff, without, nothing, |_| 0.0);
             assert!((soft.deformation / free.deformation - 1.0).abs() > 1e-6, "{kinds:?}");
@@ -120,7 +121,7 @@ fn energy_is_kept_with_geometric_stiffness() {
     }
 }
 
-/// [WP19] (16) and guideline IV: Q'W2 Qd twice in place of Q'W2 Qd + Qd'W2 Q, and the W3 term.
+/// Misprint [WP19] (16) and guideline IV: 2 Q'W2 Qd in place of Q'W2 Qd + Qd'W2 Q, and the W3 term.
 #[test]
 fn misprinted_coriolis_terms_lose_angular_momentum_and_hide_from_the_energy() {
     let body = soft_block(10);
@@ -148,7 +149,7 @@ fn gravity_keeps_the_energy() {
         let load = |at: &Evaluation<'_>, axes: &Matrix3<f64>, _: &DVector<f64>, forces: &mut [f64]| {
             at.add_gravity(&(axes.transpose() * gravity), forces);
         };
-        // s(q) = c + C1 q + q'K^a q / 2, with the stiffness of inertia of the nodes that turn.
+        // s(q) = c + C1 q + q'K^a q / 2, with the stiffness of inertia of rotating nodes.
         let potential = |y: &DVector<f64>| {
             let q = y.rows(7, nf);
             let of_inertia = body.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);

@@ -1,4 +1,4 @@
-//! The equations of motion in other coordinates of the rotation, and in the plane.
+//! Equations of motion in other coordinates of the rotation, and in the plane.
 
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
@@ -11,14 +11,14 @@ use oracle::flexible::{body_of, fixture, oracle, to_first_order};
 use oracle::plane::rectangle;
 use oracle::random::Random;
 
-/// Derivative at 0 to the sixth order in the step, the rounding of f divided by it.
+/// Returns the derivative at 0 to the sixth order in the step; its rounding is that of f divided by the step.
 fn slope<const R: usize, const C: usize>(f: impl Fn(f64) -> SMatrix<f64, R, C>) -> SMatrix<f64, R, C> {
     let h = 0.003;
     let difference = |k: f64| f(k * h) - f(-k * h);
     (difference(1.0) * 45.0 - difference(2.0) * 9.0 + difference(3.0)) / (60.0 * h)
 }
 
-/// A' dA/dt is the skew matrix of omega = G theta', and dG/dt theta' the drift.
+/// Asserts that A' dA/dt is the skew matrix of omega = G theta', and dG/dt theta' the drift.
 fn assert_kinematics<const R: usize, O: Orientation<R>>(
     make: impl Fn(&SVector<f64, R>) -> O,
     theta: &SVector<f64, R>,
@@ -44,7 +44,7 @@ fn maps_of_the_rotation_are_its_derivatives() {
         let half: f64 = 0.5 * angle;
         let e = axis * half.sin();
         let p = SVector::<f64, 4>::new(half.cos(), e.x, e.y, e.z);
-        // Rates of unit parameters are orthogonal to them.
+        // Rates of unit Euler parameters are orthogonal to them.
         let any = SVector::<f64, 4>::from(random.vector::<4>());
         let rate: SVector<f64, 4> = any - p * p.dot(&any);
         let at = EulerParameters(p.into());
@@ -59,13 +59,13 @@ fn maps_of_the_rotation_are_its_derivatives() {
         };
         let turning = at.axes().transpose() * slope(|t| circle(t).axes());
         assert!((turning - omega.cross_matrix()).norm() < 1e-11, "{angle}: omega");
-        // G(p') p' = 0.
+        // Identity G(p') p' = 0.
         assert!((EulerParameters(rate.into()).map() * rate).norm() < 1e-15);
     }
     assert_kinematics(|a| PlaneAngle(a[0]), &SVector::<f64, 1>::new(0.7), &SVector::<f64, 1>::new(1.3));
 }
 
-/// Series and closed forms of the rotation vector are one function.
+/// Series and closed form of the rotation vector agree.
 #[test]
 fn small_and_large_rotation_vectors_meet() {
     let axis = Vector3::new(0.6, -0.48, 0.64);
@@ -76,7 +76,7 @@ fn small_and_large_rotation_vectors_meet() {
     assert!((below.drift(&rate) - above.drift(&rate)).norm() < 1e-11);
 }
 
-/// nu = H x', and for any x'': Mc nu' + h, carried over by H', is H'Mc H x'' + H'(Mc dH/dt x' + h).
+/// Asserts nu = H x' and, for any x'': H'(Mc nu' + h) = H'Mc H x'' + H'(Mc dH/dt x' + h).
 fn assert_form<const R: usize>(body: &FlexBody, orientation: &impl Orientation<R>, random: &mut Random) {
     let equations = EquationsOfMotion::new(body, Terms::ALL);
     let (nf, n) = (equations.n_modes(), equations.n_velocities());
@@ -148,7 +148,7 @@ fn other_coordinates_have_the_same_equations() {
     }
 }
 
-/// (4.1) and (4.2) as they are printed.
+/// Equations (4.1) and (4.2) in their printed form.
 #[test]
 fn plane_bodies_have_the_terms_of_section_four() {
     let body = body_of(rectangle(5, 2, 0.7, [1.0, 2.0]), 8, BodyFrame::Model);

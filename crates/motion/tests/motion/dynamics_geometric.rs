@@ -1,5 +1,5 @@
-//! Geometric stiffness in the equations of motion: it is the stiffness that theory (7.3) says, and motion of
-//! second order of the nodes.
+//! Geometric stiffness in the equations of motion: it equals theory (7.3), and the second-order motion of the
+//! nodes.
 
 use faer::Mat;
 use flexbody_body::flex_body::FlexBody;
@@ -13,7 +13,7 @@ use oracle::random::Random;
 
 const MOTION: [LoadKind; 3] = [LoadKind::Spin, LoadKind::Acceleration, LoadKind::AngularAcceleration];
 
-/// Sum of the matrices of a kind times `amounts`, in the order of its components, times q.
+/// Returns the sum of the matrices of a kind times `amounts`, in the order of its components, times q.
 fn product(body: &FlexBody, kind: &LoadKind, amounts: &[f64], q: &[f64]) -> DVector<f64> {
     let mut sum = DVector::zeros(q.len());
     for one in body.geometric_stiffness().iter().filter(|one| one.load.kind == *kind) {
@@ -25,12 +25,12 @@ fn product(body: &FlexBody, kind: &LoadKind, amounts: &[f64], q: &[f64]) -> DVec
     sum
 }
 
-/// (7.3): what the forces on the modes have more with geometric stiffness is K_geo q.
+/// (7.3): the modal forces with geometric stiffness exceed those without by K_geo q.
 #[test]
 fn the_modes_are_stiffened_by_the_motion_of_the_frame() {
     for (at, name) in ["bracket_hex20", "frame_beams", "plane_frame"].into_iter().enumerate() {
         let mut parts = fixture(name, 6, BodyFrame::Model).into_parts();
-        // It would hide the rest.
+        // The elastic stiffness would dominate the difference.
         parts.invariants.primary_mut().modal_stiffness = Mat::zeros(6, 6);
         let plain = FlexBody::new(parts).expect("valid parts");
         for kinds in [&MOTION[..1], &MOTION[1..2], &MOTION[2..], &MOTION] {
@@ -66,13 +66,13 @@ fn the_modes_are_stiffened_by_the_motion_of_the_frame() {
     }
 }
 
-/// Masses at points that move by x + Psi q and, of second order, by q'H q / 2.
+/// Masses at points that move by x + Psi q plus the second-order motion q'H q / 2.
 struct Points {
     mass: Vec<f64>,
     positions: Vec<Vector3<f64>>,
-    /// Row 3 i + k.
+    /// Shape of point i along k in row 3 i + k.
     shapes: DMatrix<f64>,
-    /// H of point i along k, at 3 i + k.
+    /// H of point i along k at index 3 i + k.
     second: Vec<DMatrix<f64>>,
 }
 
@@ -91,7 +91,7 @@ impl Points {
         }
     }
 
-    /// sum_i m_i H_ik f_ik for a field f.
+    /// Returns sum_i m_i H_ik f_ik for a field f.
     fn weighted(&self, field: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Mat<f64> {
         let nf = self.shapes.ncols();
         let mut sum = DMatrix::zeros(nf, nf);
@@ -102,8 +102,8 @@ impl Points {
         to_faer(&sum)
     }
 
-    /// With geometric stiffness by its definition: the inertia forces -M a of a unit load do the work -q'K q
-    /// / 2 on the motion of second order.
+    /// Returns the body with geometric stiffness by its definition: the inertia forces -M a of a unit load do
+    /// the work -q'K q / 2 on the second-order motion.
     fn body(&self) -> FlexBody {
         let (n, nf) = (self.mass.len(), self.shapes.ncols());
         let mass = DMatrix::from_fn(3 * n, 3 * n, |i, j| if i == j { self.mass[i / 3] } else { 0.0 });
@@ -138,7 +138,7 @@ impl Points {
         FlexBody::new(parts).expect("valid parts")
     }
 
-    /// Kinetic energy, momentum and angular momentum about the origin, with all powers of q.
+    /// Returns kinetic energy, momentum and angular momentum about the origin with all powers of q.
     fn motion(
         &self,
         q: &DVector<f64>,
@@ -163,8 +163,8 @@ impl Points {
     }
 }
 
-/// Kinetic energy, momentum and first moment are those of masses whose motion is known to second order: what
-/// is left is of third.
+/// Kinetic energy, momentum and first moment agree with masses whose motion is known to second order; the
+/// difference is of third order.
 #[test]
 fn geometric_stiffness_is_the_inertia_of_motion_of_second_order() {
     let mut random = Random(17);
@@ -187,13 +187,13 @@ fn geometric_stiffness_is_the_inertia_of_motion_of_second_order() {
         ]
     };
     let (coarse, fine) = (errors(1e-2, Terms::ALL), errors(5e-3, Terms::ALL));
-    // No momentum is left out.
+    // The momentum is complete.
     assert!(fine[1] < 1e-14, "{fine:?}");
     for at in [0, 2] {
         let order = (coarse[at] / fine[at]).log2();
         assert!((order - 3.0).abs() < 0.1, "order {order}, {at}");
     }
-    // Without, the error is of second order.
+    // Without geometric stiffness the error is of second order.
     let without = Terms { geometric_stiffness: false, ..Terms::ALL };
     let (coarse, fine) = (errors(1e-2, without), errors(5e-3, without));
     for at in 0..3 {
@@ -202,8 +202,8 @@ fn geometric_stiffness_is_the_inertia_of_motion_of_second_order() {
     }
 }
 
-/// The momenta change as p' = F - omega x p, h' = tau - omega x h - V x p and `modal_momentum_rate` say: they
-/// are cubic in time along straight lines, for which five points are exact.
+/// Momenta change by p' = F - omega x p, h' = tau - omega x h - V x p and `modal_momentum_rate`: they are
+/// cubic in time along straight lines, for which five points are exact.
 #[test]
 fn momenta_change_as_their_rates_say() {
     for (at, name) in ["bracket_hex20", "frame_beams"].into_iter().enumerate() {
@@ -243,7 +243,7 @@ fn momenta_change_as_their_rates_say() {
     }
 }
 
-/// Terms are switched by themselves.
+/// Terms are switched independently.
 #[test]
 fn geometric_stiffness_stays_without_the_inertia_that_it_corrects() {
     let body = stressed(fixture("bracket_hex20", 4, BodyFrame::Principal), &MOTION, 1.0, &mut Random(3));

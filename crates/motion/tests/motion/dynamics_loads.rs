@@ -1,4 +1,4 @@
-//! Forces and torques at nodes and interfaces: the power that they do, the motion that they act on, and their
+//! Forces and torques at nodes and interfaces: their power, the motion that they act on, and their
 //! derivatives.
 
 use flexbody_body::flex_body::FlexBody;
@@ -16,7 +16,7 @@ use oracle::random::Random;
 
 const CELL: f64 = 0.05;
 
-/// A bracket with its ends as interfaces, the second about a point far from its nodes.
+/// Returns a bracket with interfaces at its ends, the second about a point far from its nodes.
 fn bracket() -> FlexBody {
     let mesh = Mesh::bracket(ElementKind::Hex8, 4, 2, CELL);
     let set = |name: &str, axis: usize, reference: Reference| {
@@ -30,7 +30,7 @@ fn bracket() -> FlexBody {
     body_of(raw, 8, BodyFrame::Principal)
 }
 
-/// A plane strip with one of its ends.
+/// Returns a plane strip with an interface at one end.
 fn strip() -> FlexBody {
     let mut raw = rectangle(8, 3, 0.4, [0.3, -0.1]);
     let nodes = (1..=raw.nodes.len() as i64).step_by(9).collect();
@@ -42,7 +42,7 @@ fn interface(body: &FlexBody, at: usize) -> BodyPoint {
     BodyPoint::interface(body, &body.interfaces()[at], Terms::ALL).expect("a reference point")
 }
 
-/// Points of all kinds with their bodies.
+/// Returns points of all kinds with their bodies.
 fn points() -> Vec<(&'static str, FlexBody, BodyPoint)> {
     let random = &mut Random(1);
     let at = |name: &str| [LoadKind::Force(name.to_owned()), LoadKind::Moment(name.to_owned())];
@@ -61,7 +61,7 @@ fn points() -> Vec<(&'static str, FlexBody, BodyPoint)> {
     ]
 }
 
-/// Amplitudes for which the point turns, or moves where it has no orientation, by numbers of the size of one.
+/// Returns amplitudes of unit size for which the point rotates, or moves if it has no orientation.
 fn state(random: &mut Random, body: &FlexBody, point: &BodyPoint) -> (Vec<f64>, Vec<f64>) {
     let equations = EquationsOfMotion::new(body, Terms::ALL);
     let mut evaluation = Evaluation::new(&equations);
@@ -79,7 +79,7 @@ fn state(random: &mut Random, body: &FlexBody, point: &BodyPoint) -> (Vec<f64>, 
     (numbers(nf, 0.7 / size), [rigid, numbers(nf, 0.7 / size)].concat())
 }
 
-/// Loads along directions that the body has.
+/// Returns loads along directions in which the body can move.
 fn loads(random: &mut Random, body: &FlexBody) -> (Vector3<f64>, Vector3<f64>) {
     let (mut force, mut torque) = (Vector3::from(random.vector::<3>()), Vector3::from(random.vector::<3>()));
     if body.dimension() == 2 {
@@ -89,14 +89,14 @@ fn loads(random: &mut Random, body: &FlexBody) -> (Vector3<f64>, Vector3<f64>) {
     (force, torque)
 }
 
-/// f'(0) from four values; exact to the fourth power of the step.
+/// Returns f'(0) from four values; exact to the fourth power of the step.
 fn derivative(step: f64, mut f: impl FnMut(f64) -> DVector<f64>) -> DVector<f64> {
     let near = f(step) - f(-step);
     (near * 8.0 - (f(2.0 * step) - f(-2.0 * step))) / (12.0 * step)
 }
 
-/// f at time 0 and its rate while the velocities nu stay what they are in body axes; the evaluation is left
-/// at time 0.
+/// Returns f at time 0 and its rate for velocities nu constant in body axes; the evaluation is left at time
+/// 0.
 fn along(
     evaluation: &mut Evaluation<'_>,
     (q, nu): (&[f64], &[f64]),
@@ -134,7 +134,7 @@ fn forces_and_torques_do_their_power() {
     }
 }
 
-/// Velocity and angular velocity are the rates of place and axes.
+/// Velocity and angular velocity are the rates of position and axes.
 #[test]
 fn points_move_as_their_velocities_say() {
     for (what, body, point) in points() {
@@ -165,7 +165,7 @@ fn points_move_as_their_velocities_say() {
     }
 }
 
-/// Rates of the velocities in the world while nu is constant in body axes.
+/// Rates of the velocities in the world for nu constant in body axes.
 #[test]
 fn velocities_drift_as_they_say() {
     for (what, body, point) in points() {
@@ -190,7 +190,7 @@ fn velocities_drift_as_they_say() {
     }
 }
 
-/// A load at an averaging interface is its share of forces at the nodes (theory 5.3).
+/// A load at an averaging interface is distributed to forces at the nodes (theory 5.3).
 #[test]
 fn loads_at_an_interface_are_forces_at_its_nodes() {
     let body = bracket();
@@ -218,8 +218,8 @@ fn loads_at_an_interface_are_forces_at_its_nodes() {
     }
 }
 
-/// Every load of a body at one state; the axes of the body are turned by a small rotation from where the
-/// loads were resolved.
+/// Applies every load of a body at one state; the axes of the body are rotated by a small angle from those in
+/// which the loads are resolved.
 fn apply(
     evaluation: &Evaluation<'_>,
     point: &BodyPoint,

@@ -1,4 +1,5 @@
-//! `deformation = "static"`: states of equilibrium stay as they are, exist where they should, and turn with the world.
+//! Option `deformation = "static"`: equilibria remain, exist under the expected conditions, and do not depend
+//! on the attitude.
 
 use flexbody_base::error::Error;
 use flexbody_body::flex_body::{FlexBody, GeometricStiffness, LoadKind, UnitLoad};
@@ -15,7 +16,7 @@ use oracle::turning::block;
 use std::f64::consts::TAU;
 use std::fs;
 
-/// A solid bar along x with the interface `root`.
+/// Returns a solid bar along x with the interface `root`.
 fn bar() -> RawModel {
     let mesh = Mesh::block(ElementKind::Hex8, [4, 1, 1], [1.0, 0.2, 0.16]);
     let root = (1..=mesh.nodes.len() as i64).filter(|i| mesh.nodes[*i as usize - 1][0] < 1e-9).collect();
@@ -26,7 +27,7 @@ fn bar() -> RawModel {
     raw
 }
 
-/// A block whose rigid end is one node with rotations, the interface `root`.
+/// Returns a block whose rigid end is one node with rotations, the interface `root`.
 fn rigid_ended() -> RawModel {
     let mut raw = block(ElementKind::Hex8).raw;
     let reference = *raw.nodes.ids.last().expect("a node");
@@ -49,7 +50,7 @@ fn first_rate(body: &FlexBody) -> f64 {
     body.modes().eigenvalue[0].sqrt()
 }
 
-/// The deformation at the start, and the largest change of it in the norm of the elastic energy.
+/// Returns the initial deformation, and its largest change in the norm of the elastic energy.
 fn rest_and_change(body: &FlexBody, recording: &Recording) -> (DVector<f64>, f64) {
     let stiffness = body.invariants().modal_stiffness();
     let stiffness = DMatrix::from_fn(stiffness.nrows(), stiffness.ncols(), |i, j| stiffness[(i, j)]);
@@ -60,7 +61,7 @@ fn rest_and_change(body: &FlexBody, recording: &Recording) -> (DVector<f64>, f64
     (states[0].clone(), largest / size(&states[0]))
 }
 
-/// A carried body that turns evenly stays deformed as it starts, whatever its attitude in the world.
+/// A carried body with constant rotation keeps its initial deformation for any attitude in the world.
 #[test]
 fn carried_equilibria_turn_with_the_world() {
     for (name, body) in [
@@ -91,7 +92,7 @@ fn carried_equilibria_turn_with_the_world() {
     }
 }
 
-/// Slow spins deform by rates that lie far below the inertia of the whole body.
+/// Slow spins cause deformation rates far below the inertia of the whole body.
 #[test]
 fn slow_spins_settle() {
     let mut random = Random(11);
@@ -114,7 +115,7 @@ fn slow_spins_settle() {
     }
 }
 
-/// Nothing deforms a body in free fall, nor one that drifts.
+/// A body in free fall or at constant velocity does not deform.
 #[test]
 fn nothing_deforms_what_falls_freely() {
     for body in [body_of(bar(), 10, BodyFrame::Model), fixture("shell_folded", 10, BodyFrame::Principal)] {
@@ -133,8 +134,8 @@ fn nothing_deforms_what_falls_freely() {
     }
 }
 
-/// Geometric stiffness three times the elastic one leaves a quarter of the deflection, and half of a stiffness
-/// that it takes away leaves twice.
+/// Geometric stiffness of three times the elastic one gives a quarter of the deflection, and a reduction by
+/// half doubles it.
 #[test]
 fn geometric_stiffness_as_large_as_the_elastic_one_settles() {
     let body = body_of(bar(), 12, BodyFrame::Principal);
@@ -156,7 +157,7 @@ fn geometric_stiffness_as_large_as_the_elastic_one_settles() {
         assert!(change < 1e-8, "{share}: {change:e}");
         assert!((&q - &plain * left).norm() < 1e-6 * plain.norm(), "{share}: {q} {plain}");
     }
-    // A spin that takes all stiffness has an equilibrium that no body keeps.
+    // For a spin that cancels all stiffness the equilibrium is unstable.
     let mut parts = body.clone().into_parts();
     let matrix = faer::Scale(-3.0 / (rate * rate)) * &stiffness;
     parts.geometric_stiffness =

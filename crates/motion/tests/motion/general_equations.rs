@@ -1,5 +1,5 @@
-//! Bodies whose mass matrix does not commute with rotations (theory section 6): the equations in constant
-//! invariants against the unreduced nodal body, and both against what nature keeps.
+//! Bodies whose mass matrix does not commute with rotations (theory section 6): equations in constant
+//! invariants compared with the unreduced nodal body, and both with conservation laws.
 
 use faer::Mat;
 use flexbody_body::basis::ModeSettings;
@@ -40,14 +40,14 @@ fn invariants_give_the_accelerations_of_the_nodes() {
         assert!(difference.norm() < 1e-13 * body.linear_momentum(&state).norm(), "seed {seed}");
         let difference = body.angular_momentum(&state) - reduced.angular_momentum(&state);
         assert!(difference.norm() < 1e-13 * body.angular_momentum(&state).norm(), "seed {seed}");
-        // M is general indeed: the formulas for M = Ms kron I would do something else.
+        // M is general: the formulas for M = Ms kron I give different accelerations.
         let wrong =
             deviation(&body.accelerations(&state), &body.accelerations_for_rotation_invariant_mass(&state));
         assert!(wrong > 1e-2, "seed {seed}: {wrong:e}");
     }
 }
 
-/// Where M = Ms kron I, inner vectors included, section 6 is section 3, and the nodal formula of [ZG19]
+/// For M = Ms kron I, including internal rows, section 6 equals section 3, and the nodal formula of [ZG19]
 /// holds.
 #[test]
 fn rotation_invariant_mass_gives_the_equations_of_section_three() {
@@ -80,7 +80,7 @@ fn rotation_invariant_mass_gives_the_equations_of_section_three() {
     }
 }
 
-/// A model of the fixtures about its centre of mass in model axes, and the reference numbers beside it.
+/// A model of the fixtures about its centre of mass in model axes, with its reference numbers.
 struct Fixture {
     body: NodalBody,
     eigenvalues: Vec<f64>,
@@ -98,7 +98,7 @@ fn fixture(name: &str, modes: usize) -> Fixture {
 
     let rigid = rigid_velocities(&rows, &raw.nodes.positions);
     let block = rigid.transpose() * dense(&m) * &rigid;
-    // From the motions that a plane model has too.
+    // Taken from the motions that a plane model has too.
     let com = Vector3::new(block[(1, 5)], -block[(0, 5)], block[(0, 4)]) / block[(0, 0)];
     let positions: Vec<[f64; 3]> =
         raw.nodes.positions.iter().map(|x| (Vector3::from(*x) - com).into()).collect();
@@ -134,7 +134,7 @@ fn matrix(value: &Value) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j])
 }
 
-/// Two programs, two eigen-solvers: the dense invariants of scipy beside each fixture.
+/// Two programs with two eigensolvers: the dense invariants computed by scipy for each fixture.
 #[test]
 fn invariants_of_the_fixtures_are_the_reference() {
     for name in FIXTURES {
@@ -153,8 +153,7 @@ fn invariants_of_the_fixtures_are_the_reference() {
         assert!((reduced.mass / mass - 1.0).abs() < 1e-13, "{name}");
         assert!(reduced.first_moment.norm() < 1e-13 * size * mass.sqrt(), "{name}");
         let inertia = DMatrix::from_fn(3, 3, |k, l| reduced.inertia[(k, l)]);
-        // Scaled as the Cauchy-Schwarz inequality bounds them: C1, C2 vanish, W0 where M is rotation
-        // invariant.
+        // Scaled by the Cauchy-Schwarz bounds: C1 and C2 vanish, and W0 if M is rotation invariant.
         for (what, found, scale) in [
             ("I0", &inertia, size * size),
             ("W0", &w0, mass.sqrt()),
@@ -175,8 +174,8 @@ fn invariants_of_the_fixtures_are_the_reference() {
 
 const MODES: usize = 6;
 
-/// A body that spins about its middle axis with a fifth of its first circular frequency, bent and moving at
-/// the start.
+/// Simulates a body spinning about its middle axis with a fifth of its first circular frequency, bent and
+/// translating at the start.
 fn tumble(fixture: &Fixture, periods: f64, rate: impl Fn(&DVector<f64>) -> DVector<f64>) -> Drift {
     let (body, omega) = (&fixture.body, fixture.eigenvalues.iter().map(|l| l.sqrt()).collect::<Vec<f64>>());
     let eigen = body.invariants().reduced.inertia.symmetric_eigen();
@@ -220,26 +219,26 @@ fn tumbling_bodies_keep_energy_and_momenta() {
     }
 }
 
-/// What theory section 6 warns of: formulas for M = Ms kron I on a frame whose M is not of that kind.
+/// Formulas for M = Ms kron I fail for a frame whose M is not of that kind, as theory section 6 warns.
 #[test]
 #[ignore = "slow"]
 fn formulas_for_rotation_invariant_mass_drift_on_a_frame() {
     let fixture = fixture("frame_beams", MODES);
     let (body, exact) = (&fixture.body, fixture.body.invariants());
-    // The nodal formula of [ZG19]; section 3 with the right invariants, though W3 is not skew.
+    // The nodal formula of [ZG19], and section 3 with the correct invariants although W3 is not skew.
     let nodes = |y: &DVector<f64>| rates(y, |s| body.accelerations_for_rotation_invariant_mass(s));
     let section_three =
         |y: &DVector<f64>| rates(y, |s| exact.reduced.free_accelerations(s, Coriolis::Correct));
     for (what, drift) in
         [("nodes", tumble(&fixture, 20.0, nodes)), ("section 3", tumble(&fixture, 20.0, section_three))]
     {
-        // What does not turn with the nodes is all that these formulas mistake (7e-6 to 4e-5 and 1.3e-5 to 1.2e-4 were
-        // measured); the right ones keep 1e-10.
+        // These formulas err by the mass that does not rotate with the nodes (7e-6 to 4e-5 and 1.3e-5 to
+        // 1.2e-4 were measured); the correct ones conserve to 1e-10.
         assert!(drift.energy > 1e-6 && drift.angular > 2e-6, "{what}: {drift:?}");
     }
 }
 
-/// What flexbody makes of a fixture, about its centre of mass in model axes.
+/// Returns the conversion of a fixture about its centre of mass in model axes.
 fn converted(name: &str, modes: usize) -> Conversion {
     let raw = raw_fixture(name);
     let model = FeModel::from_raw(raw).expect("a body").model;
@@ -251,12 +250,13 @@ fn converted(name: &str, modes: usize) -> Conversion {
     convert(&model, &settings, &flexbody_linalg::context::Context::QUIET).expect("converts")
 }
 
-/// The invariants of a conversion with the signs of `like`: signs are free where rotations decide them.
+/// Returns the invariants of a conversion with the signs of `like`; rotations may leave the signs
+/// undetermined.
 fn signed(conversion: &Conversion, like: &GeneralBody) -> GeneralBody {
     let own = conversion.body.invariants();
     let nf = own.n_modes();
     let w2 = own.w2().expect("held");
-    // Modes 0 and j: the sign of their largest product.
+    // The relative sign of modes 0 and j is that of their largest product.
     let sign = |j: usize| {
         let products = (0..9).map(|ab| (ab / 3 * nf, ab % 3 * nf + j));
         let (a, b) = products
@@ -268,7 +268,7 @@ fn signed(conversion: &Conversion, like: &GeneralBody) -> GeneralBody {
     };
     let t = Mat::from_fn(nf, nf, |i, j| if i == j { sign(j) } else { 0.0 });
     let own = own.with_basis(t.as_ref());
-    // The sign of the first mode itself shows in what is linear.
+    // The sign of the first mode follows from linear terms.
     let mut result = GeneralBody { reduced: oracle::nodal::reduced(&own), w0: dense(&own.w0()) };
     let linear = |body: &GeneralBody| body.reduced.w1.dot(&like.reduced.w1) + body.w0.dot(&like.w0);
     if linear(&result) < 0.0 {
@@ -278,14 +278,14 @@ fn signed(conversion: &Conversion, like: &GeneralBody) -> GeneralBody {
     result
 }
 
-/// Rows that describe the rotation about z and displacements in the plane, of a matrix with these blocks of
+/// Returns the rows for the rotation about z and in-plane displacements of a matrix with these blocks of
 /// rows.
 fn in_plane(a: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
     a.select_rows(rows).select_columns(columns)
 }
 
-/// The stiffness of inertia is that of the reference, which has it from displacements of second order of the
-/// directors; signs of modes are free.
+/// Compares the stiffness of inertia with the reference, which computes it from second-order displacements of
+/// the directors; signs of modes are free.
 fn assert_stiffness_of_inertia(name: &str, body: &FlexBody, reference: &Value) {
     let Some(own) = body.inertia_stiffness() else {
         return assert!(reference["K_a"].is_null(), "{name} turns");
@@ -346,12 +346,12 @@ fn conversions_have_these_invariants_and_move_like_the_nodes() {
         if plane {
             continue;
         }
-        // The unreduced nodes, moved by the conversion's own modes.
+        // The unreduced nodes, moved by the modes of the conversion.
         let nodes = nodal_body(name, &conversion.body);
         let own = conversion.body.invariants();
         let own = GeneralBody { reduced: oracle::nodal::reduced(own), w0: dense(&own.w0()) };
         let (mut state, _) = random_state(&mut Random(77), nf, 0.05 * size);
-        // Spin and modes of one time scale: elastic forces would hide all others.
+        // Spin and modes have one time scale; otherwise elastic forces would dominate all others.
         let rate = fixture.eigenvalues[0].sqrt();
         state.omega *= 0.1 * rate;
         state.velocity *= rate * size;
@@ -359,7 +359,7 @@ fn conversions_have_these_invariants_and_move_like_the_nodes() {
             state.q[j] *= fixture.eigenvalues[0] / fixture.eigenvalues[j];
             state.qd[j] *= rate;
         }
-        // About the centre of mass the origin of some bodies is not accelerated at all.
+        // The origin of some bodies has no acceleration about the centre of mass.
         let scale = state.omega.norm_squared() * size / mass;
         let (a, b) = (nodes.accelerations(&state), own.accelerations(&state));
         let error = (a.rows(0, 3) - b.rows(0, 3)).norm() / scale.max(a.rows(0, 3).norm());
@@ -372,8 +372,8 @@ fn conversions_have_these_invariants_and_move_like_the_nodes() {
     }
 }
 
-/// The unreduced model of a fixture with the modes that its body has, rotations and rows without a place
-/// included.
+/// Returns the unreduced model of a fixture with the modes of its body, including rotations and internal
+/// rows.
 fn nodal_body(name: &str, body: &FlexBody) -> NodalBody {
     let raw = raw_fixture(name);
     let (modes, ids) = (body.modes(), &body.nodes().ids);
@@ -401,7 +401,7 @@ fn nodal_body(name: &str, body: &FlexBody) -> NodalBody {
     NodalBody::new(&k, &m, &rows, &positions, &shapes)
 }
 
-/// The conversion's own invariants keep energy and momenta of what they describe.
+/// The invariants of the conversion conserve energy and momenta.
 #[test]
 fn converted_bodies_keep_energy_and_momenta() {
     for name in ["frame_beams", "shell_folded", "mpc_block"] {
@@ -413,7 +413,7 @@ fn converted_bodies_keep_energy_and_momenta() {
     }
 }
 
-/// Section 6 and sections 2 to 3 on solids, about any frame.
+/// Section 6 agrees with sections 2 to 3 for solids, in any frame.
 #[test]
 fn the_general_condensation_of_a_solid_is_that_of_its_scalar_mass() {
     for name in ["cube_hex8", "bracket_hex20"] {

@@ -1,8 +1,8 @@
-//! Integrators: orders of convergence, what they keep, interpolation, jumps, and refusals.
+//! Integrators: orders of convergence, conserved quantities, interpolation, jumps, and failures.
 
 use flexbody_motion::integration::{Explicit, Failure, Gauss, Method, Oscillator, System, Work, integrate};
 
-/// y' = f(t, y) with unit scales.
+/// Equation y' = f(t, y) with unit scales.
 struct Equation<F> {
     dimension: usize,
     rates: F,
@@ -36,7 +36,7 @@ impl<F: FnMut(f64, &[f64], &mut [f64])> System for Equation<F> {
 
 const ECCENTRICITY: f64 = 0.5;
 
-/// Two bodies in the plane: position and velocity, unit gravity, period 2 pi.
+/// Returns the two-body problem in the plane: position and velocity, unit gravity, period 2 pi.
 fn orbit() -> Equation<impl FnMut(f64, &[f64], &mut [f64])> {
     Equation::new(4, |_, y, rates| {
         let cube = y[0].hypot(y[1]).powi(3);
@@ -44,7 +44,7 @@ fn orbit() -> Equation<impl FnMut(f64, &[f64], &mut [f64])> {
     })
 }
 
-/// The orbit at a time, by Kepler's equation; time zero is the closest point.
+/// Returns the orbit at a time by Kepler's equation; time zero is the closest point.
 fn on_orbit(time: f64) -> [f64; 4] {
     let e = ECCENTRICITY;
     let mut anomaly = time;
@@ -60,12 +60,12 @@ fn gauss(order: usize, step: f64) -> Method {
     Method::Gauss { method: Gauss::new(4, order), step }
 }
 
-/// Steps of one length: a tolerance that nothing misses.
+/// Returns a method with fixed steps, by a tolerance that every step meets.
 fn explicit(step: f64) -> Method {
     Method::Explicit(Explicit::new(4, 1e300, step))
 }
 
-/// Largest error of an orbit at the instants.
+/// Returns the largest error of an orbit at the given times, and the work.
 fn orbit_error(mut method: Method, instants: &[f64]) -> (f64, Work) {
     let mut state = on_orbit(instants[0]);
     let mut worst = 0.0_f64;
@@ -94,7 +94,7 @@ fn methods_converge_with_their_order() {
 
 #[test]
 fn interpolation_has_order_seven() {
-    // Places within the steps of both lengths, after one period of the coarser.
+    // Times within the steps of both lengths, after one period of the coarser.
     let error = |step: f64| {
         let instants: Vec<f64> =
             [0.0].into_iter().chain((0..40).map(|i| 1.0 + 0.0173 * f64::from(i))).collect();
@@ -112,7 +112,7 @@ fn the_error_follows_the_tolerance() {
             Method::Explicit(Explicit::new(4, tolerance, 1.0)),
             &[0.0, 20.0 * std::f64::consts::PI],
         );
-        // Errors of phase grow with the square of the time: 60 of it.
+        // Phase errors grow with the square of the time, here 60.
         assert!(error < 3600.0 * 4.0 * tolerance, "{tolerance:e}: {error:e}, {work:?}");
         assert!(work.rejected * 2 < work.steps, "{work:?}");
     }
@@ -129,7 +129,7 @@ fn gauss_keeps_the_energy_of_the_orbit_within_bounds() {
             let error = (energy(y) - begun).abs();
             let worst = if time < 1500.0 { &mut early } else { &mut late };
             *worst = worst.max(error);
-            // Angular momentum is quadratic: kept to rounding.
+            // Angular momentum is quadratic and conserved to rounding.
             let momentum = y[0] * y[3] - y[1] * y[2] - (1.0 - ECCENTRICITY * ECCENTRICITY).sqrt();
             assert!(momentum.abs() < 1e-13, "order {order}: angular momentum {momentum:e} at {time}");
             Ok::<(), Failure>(())
@@ -141,7 +141,7 @@ fn gauss_keeps_the_energy_of_the_orbit_within_bounds() {
 
 #[test]
 fn stiff_oscillators_are_solved_without_iterations_of_their_own() {
-    // A slow pendulum beside oscillators of 1e4 times its frequency, steps of 5000 of their periods.
+    // A slow pendulum with oscillators of 1e4 times its frequency, with steps of 5000 of their periods.
     let stiffness = [1.0, 1e8];
     let mut system = Equation::new(4, |_, y: &[f64], rates: &mut [f64]| {
         rates.copy_from_slice(&[y[2], y[3], -y[0].sin(), -stiffness[1] * y[1] - 3.0 * y[3]]);
@@ -169,7 +169,7 @@ fn no_step_passes_over_a_jump() {
         let mut system = Equation::new(4, |time, _: &[f64], rates: &mut [f64]| {
             rates.fill(if time < jump { 1.0 } else { -2.0 });
         });
-        // The value of f at the jump itself counts for nothing.
+        // The value of f at the jump itself has no effect.
         let mut state = [0.0; 4];
         integrate(&mut method, &mut system, &mut state, &[0.0, 1.0], breaks, |_, _| Ok::<(), Failure>(()))
             .expect("polynomials");
@@ -181,7 +181,7 @@ fn no_step_passes_over_a_jump() {
     assert!(run(explicit(), &[jump]) < 1e-14);
 }
 
-/// A table and the run that it belongs to may end at times that differ by rounding.
+/// A table and its run may end at times that differ by rounding.
 #[test]
 fn breaks_a_few_roundings_apart_stop_nothing() {
     for apart in [1, 2, 3, 5, 10, 20, 40, 100] {
@@ -208,7 +208,7 @@ fn breaks_a_few_roundings_apart_stop_nothing() {
             assert!(found.iter().all(|error| *error < 1e-14), "{apart} roundings: {found:?}");
         }
     }
-    // Where only the run ends there, as when a table's last time was computed another way.
+    // Only the run ends there, like for a table whose last time was computed in another way.
     let mut state = [0.0; 4];
     let mut system = Equation::new(4, |_, _: &[f64], rates: &mut [f64]| rates.fill(1.0));
     let instants = [0.0, 0.7_f64.next_up()];

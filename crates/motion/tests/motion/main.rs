@@ -1,6 +1,6 @@
-//! Equations of motion and their integration, and the physics that must come out.
+//! Equations of motion, their integration, and the resulting physics.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod body_units;
 mod dynamics;

@@ -1,5 +1,5 @@
-//! Motion of one body by the integrators: against another integrator in other variables, what is kept, loads
-//! and prescribed motion.
+//! Motion of one body by the integrators: compared with another integrator in other variables, conserved
+//! quantities, loads and prescribed motion.
 
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
@@ -13,7 +13,8 @@ use oracle::flexible::{fixture, soft_block};
 use oracle::integrate as reference;
 use oracle::motion::{adaptive, conserving, orientation, run, velocity_rates};
 
-/// Spin about an axis near the middle one with `spin` of the first circular frequency, bent, flying.
+/// Returns a spin about an axis near the middle one with `spin` times the first circular frequency, with
+/// deformation and translation.
 fn tumbling(body: &FlexBody, spin: f64) -> Configuration {
     let rate = body.modes().eigenvalue[0].sqrt();
     let radius = body.invariants().inertia()[(2, 2)].sqrt();
@@ -31,12 +32,12 @@ fn tumbling(body: &FlexBody, spin: f64) -> Configuration {
     }
 }
 
-/// Times of one turn.
+/// Returns the time of one turn.
 fn turn(start: &Configuration) -> f64 {
     std::f64::consts::TAU / start.omega.norm()
 }
 
-/// Largest difference of two configurations: attitude, and modes and rates relative to `scale`.
+/// Returns the largest difference of two configurations: attitude, and modes and rates relative to `scale`.
 fn difference(a: &Configuration, b: &Configuration, scale: &Configuration) -> f64 {
     let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
     let apart = |x: &[f64], y: &[f64]| size(&x.iter().zip(y).map(|(x, y)| x - y).collect::<Vec<_>>());
@@ -44,7 +45,8 @@ fn difference(a: &Configuration, b: &Configuration, scale: &Configuration) -> f6
     turn.max(apart(&a.q, &b.q) / size(&scale.q)).max((a.omega - b.omega).norm() / scale.omega.norm())
 }
 
-/// The same motion in velocities and by extrapolation: nothing shared but the accelerations.
+/// Computes the motion in velocities and by extrapolation; only the accelerations are shared with the
+/// library.
 fn by_velocities(
     equations: &EquationsOfMotion,
     start: &Configuration,
@@ -121,8 +123,8 @@ fn methods_converge_with_their_order_on_a_tumbling_body() {
 #[test]
 #[ignore = "slow"]
 fn a_free_body_keeps_momenta_to_rounding_and_its_energy_for_a_hundred_thousand_steps() {
-    // Spatial, plane, and of a general mass whose frame is away from the centre of mass: there the method is
-    // not symplectic.
+    // A spatial body, a plane body, and a general mass whose frame is away from the centre of mass, for which
+    // the method is not symplectic.
     for (body, order, limit) in [
         (soft_block(6), 4, 1e-6),
         (fixture("plane_frame", 6, BodyFrame::Principal), 4, 1e-7),
@@ -150,7 +152,7 @@ fn a_free_body_keeps_momenta_to_rounding_and_its_energy_for_a_hundred_thousand_s
     }
 }
 
-/// Gravity, and a force and a torque that follow the body.
+/// Gravity, and a force and a torque that rotate with the body.
 struct Loads {
     gravity: Vector3<f64>,
     force: Vector3<f64>,
@@ -211,7 +213,7 @@ fn a_body_falls_as_a_point_and_turns_as_if_it_did_not() {
     }
 }
 
-/// Spin about the third axis that rises smoothly, about the origin held still or not.
+/// Spin about the third axis that rises smoothly; the origin is held if `held` is true.
 struct SpinUp {
     rate: f64,
     duration: f64,
@@ -244,12 +246,12 @@ fn prescribed_spin_takes_the_torque_that_the_momentum_needs() {
         let (places, balances) =
             run(&equations, &spin, &start, adaptive(1e-12), &[0.0, duration, 1.5 * duration], &[duration]);
         let (begun, ended) = (balances[0], balances[2]);
-        // Half a turn of the profile's mean rate, then of the full one.
+        // Half a turn at the mean rate of the profile, then half a turn at the full rate.
         let angle: f64 = spin.rate * duration;
         let exact = angle.cos();
         assert!((places[2].attitude.axes()[(0, 0)] - exact).abs() < 1e-9, "{exact}");
         assert!((places[2].omega - Vector3::z() * spin.rate).norm() < 1e-13 * spin.rate);
-        // Momenta come from the velocities, impulses from the torque.
+        // Momenta are computed from the velocities, impulses from the torque.
         let angular = ended.angular - begun.angular - ended.angular_impulse;
         assert!(angular.norm() < 1e-9 * ended.angular.norm(), "{angular}");
         let energy = ended.kinetic + ended.elastic - begun.kinetic - begun.elastic;

@@ -1,5 +1,5 @@
-//! The nodal equations of the library against the dense oracles, the reduced equations and what must hold of
-//! them.
+//! Nodal equations of the library compared with dense oracles, with the reduced equations, and with
+//! conservation laws.
 
 use faer::Mat;
 use flexbody_body::basis::ModeSettings;
@@ -21,10 +21,10 @@ use oracle::general::{FIXTURES, dense, raw_fixture, to_faer};
 use oracle::random::Random;
 use oracle::unreduced::{Unreduced, configuration, holding, soft_block, soft_plate, times};
 
-/// What rounding may do: conditions at nodes amplify it, and so do null vectors of M.
+/// Relative rounding limit; conditions at nodes and null vectors of M amplify rounding.
 const LIMIT: f64 = 1e-11;
 
-/// Solids, plane bodies, general masses without rotational mass, and masses without an inverse.
+/// Returns solids, plane bodies, general masses without rotary mass, and singular masses.
 fn bodies() -> Vec<(String, Unreduced)> {
     let made = [
         ("hex8", soft_block(ElementKind::Hex8, [3, 2, 1])),
@@ -36,7 +36,7 @@ fn bodies() -> Vec<(String, Unreduced)> {
     made.chain(fixtures.into_iter().filter(|(_, body)| body.model.director_mass().is_none())).collect()
 }
 
-/// Shapes without what the conditions forbid: Psi - R (C R)^-1 C Psi.
+/// Returns the shapes without the motions that the conditions forbid: Psi - R (C R)^-1 C Psi.
 pub(super) fn held_shapes(body: &Unreduced, held: &[DofLabel]) -> Mat<f64> {
     let rigid = dense(&body.model.rigid_fields(body.frame.origin.into(), 1.0));
     let shapes = dense(&body.shapes);
@@ -49,8 +49,8 @@ pub(super) fn held_shapes(body: &Unreduced, held: &[DofLabel]) -> Mat<f64> {
     to_faer(&left)
 }
 
-/// Accelerations, momenta and energies against the oracle, whose modes are a basis of all displacements that
-/// the conditions allow.
+/// Compares accelerations, momenta and energies with the oracle, whose modes span all displacements that the
+/// conditions allow.
 fn assert_oracle(
     what: &str,
     body: &Unreduced,
@@ -93,7 +93,7 @@ fn assert_oracle(
         let velocity = state.axes.transpose() * state.velocity;
         let origin = state.axes * (linear + state.omega.cross(&velocity));
         let spin = state.omega.norm_squared();
-        // A frame that is fixed to nodes follows the fastest modes.
+        // A frame fixed to nodes follows the fastest modes, which sets the scale.
         let size = |from: usize| expected.rows(from, 3).norm();
         compare("R''", origin.as_slice(), &expected.as_slice()[..3], spin * length + size(0));
         compare("omega'", angular.as_slice(), &expected.as_slice()[3..6], spin + size(3));
@@ -117,7 +117,7 @@ fn accelerations_are_those_of_the_dense_oracle() {
     }
 }
 
-/// Two thirds of the rank of M are missing: reduced integration.
+/// Reduced integration: two thirds of the rank of M are missing.
 #[test]
 fn masses_of_low_rank_are_condensed() {
     let body = Unreduced::fixture("bar_c3d8r");
@@ -125,7 +125,7 @@ fn masses_of_low_rank_are_condensed() {
     assert_oracle("bar_c3d8r", &body, &ReferenceConditions::MeanAxes, &body.shapes, 1e-10);
 }
 
-/// The axes of the frame name components, nothing else.
+/// The axes of the frame only define components.
 #[test]
 fn the_axes_of_the_frame_do_not_matter() {
     for name in ["mpc_block", "plane_frame"] {
@@ -164,7 +164,7 @@ fn the_axes_of_the_frame_do_not_matter() {
     }
 }
 
-/// A checked model and what flexbody makes of it, in its principal frame.
+/// Returns a checked model and its body in the principal frame.
 fn converted(raw: RawModel, modes: usize) -> (FeModel, FlexBody) {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
@@ -174,7 +174,7 @@ fn converted(raw: RawModel, modes: usize) -> (FeModel, FlexBody) {
     (model, body)
 }
 
-/// The same body with the modes Psi T.
+/// Returns the body with the modes Psi T.
 fn in_other_modes(body: FlexBody, t: &Mat<f64>) -> FlexBody {
     let mut parts = body.into_parts();
     let times = |a: &Mat<f64>| a * t;
@@ -188,7 +188,7 @@ fn in_other_modes(body: FlexBody, t: &Mat<f64>) -> FlexBody {
     FlexBody::new(parts).expect("valid parts")
 }
 
-/// A modal state: spin and modes of one time scale.
+/// Returns a modal state with spin and modes of one time scale.
 fn modal_state(seed: u64, body: &FlexBody) -> Configuration {
     let mut random = Random(seed);
     let (nf, plane) = (body.n_modes(), body.dimension() == 2);
@@ -215,7 +215,7 @@ fn modal_state(seed: u64, body: &FlexBody) -> Configuration {
     }
 }
 
-/// The velocities nu of a state.
+/// Returns the velocities nu of a state.
 fn velocities(equations: &EquationsOfMotion, state: &Configuration) -> Vec<f64> {
     let velocity = state.attitude.axes().tr_mul(&state.velocity);
     let rigid: Vec<f64> = match equations.n_rigid() {
@@ -225,8 +225,8 @@ fn velocities(equations: &EquationsOfMotion, state: &Configuration) -> Vec<f64> 
     rigid.into_iter().chain(state.qd.iter().copied()).collect()
 }
 
-/// [ZG19] eq. 67 to 72: with H = blkdiag(I, I, Psi), H'(M of all nodes) H and the velocity forces are those
-/// of the reduced equations, for modes of any kind.
+/// Asserts [ZG19] eq. 67 to 72: with H = blkdiag(I, I, Psi), H'(M of all nodes) H and the velocity forces
+/// equal those of the reduced equations, for any modes.
 fn assert_projection(name: &str, raw: RawModel) {
     let (model, free) = converted(raw, 10);
     let state = modal_state(3, &free);
@@ -250,7 +250,7 @@ fn assert_projection(name: &str, raw: RawModel) {
         let mut own = Evaluation::new(&reduced);
         own.set(&state.q, &velocities(&reduced, &state));
 
-        // Of the accelerations and forces of translation, rotation and modes.
+        // Scales of the accelerations and forces of translation, rotation and modes.
         let (rate, size) = (body.modes().eigenvalue[0], body.invariants().inertia()[(2, 2)].sqrt());
         let root = body.invariants().mass().sqrt();
         let translations = r.div_ceil(2);
@@ -265,7 +265,7 @@ fn assert_projection(name: &str, raw: RawModel) {
         };
         let acceleration = |i: usize| [rate * size / root, rate, rate * size][group(i)];
         let force = [rate * size * root, rate * size * size, rate * size];
-        // What products with K round away, |Psi|'|K| |u|.
+        // Bound of the rounding of products with K: |Psi|'|K| |u|.
         let u = Mat::from_fn(lifted.u.len(), 1, |i, _| lifted.u[i]);
         let mut terms = Mat::zeros(u.nrows(), 1);
         sum_terms(model.stiffness(), 1, u.as_ref(), terms.as_mut(), f64::abs);
@@ -276,7 +276,7 @@ fn assert_projection(name: &str, raw: RawModel) {
             }
             None => 0.0,
         };
-        // No acceleration, then each by itself: velocity forces and columns of the mass matrix.
+        // Zero accelerations give the velocity forces, unit accelerations the columns of the mass matrix.
         for column in 0..=n {
             let a: Vec<f64> = (0..n).map(|i| if i + 1 == column { acceleration(i) } else { 0.0 }).collect();
             let (rigid, modal) = a.split_at(r);
@@ -313,7 +313,7 @@ fn projected_on_modes_they_are_the_reduced_equations() {
     assert_projection("tet10", soft_block(ElementKind::Tet10, [2, 1, 1]));
 }
 
-/// Larger models that lie beside the project on some machines.
+/// Larger models that are stored beside the project on some machines.
 #[test]
 #[ignore = "slow"]
 fn real_models_have_the_reduced_equations() {
@@ -330,21 +330,21 @@ fn real_models_have_the_reduced_equations() {
         let files = ModelFiles::from_arguments(k, m, path("nodes.csv"), Some(path("dofs.csv")), None)
             .expect("no units");
         let dimension = if name == "i_plane_stress" { 2 } else { 3 };
-        // Some are in mm, t, s, which changes no number.
+        // Some models are in mm, t, s without stating it; the numbers are not affected.
         let files = ModelFiles { dimension, allow_implausible: true, ..files };
         assert_projection(name, read_model(&files).expect("readable"));
     }
 }
 
-/// Differences of accelerations, and their sizes: of the origin (in the size of those of the nodes), of the
+/// Differences of accelerations and their sizes: of the origin (scaled by those of the nodes), of the
 /// rotation, and of the nodes.
 struct Apart {
     errors: [f64; 3],
     sizes: [f64; 3],
 }
 
-/// Accelerations of nodes and of all modes under the same loads. Deformation, its rates, the square of the spin and
-/// the loads are of the size `amplitude`.
+/// Compares accelerations of nodes and of all modes under the same loads. Deformation, its rates, the square
+/// of the spin and the loads are proportional to `amplitude`.
 fn accelerations_apart(
     (model, body): &(FeModel, FlexBody),
     amplitude: f64,
@@ -393,9 +393,9 @@ fn accelerations_apart(
     }
 }
 
-/// Without rotational mass the equations of all modes are those of the nodes. With it those of modes have the
-/// kinetic energy to second order of the displacements: accelerations of the nodes that are as small as these differ
-/// by their square, those of the frame by the third power.
+/// Asserts that accelerations of all modes agree with those of the nodes. Without rotary mass the equations
+/// are equal. With rotary mass the modal equations have the kinetic energy to second order of the
+/// displacements: accelerations of the nodes differ by their square, those of the frame by the third power.
 fn assert_same_accelerations(
     what: &str,
     whole: &(FeModel, FlexBody),
@@ -418,7 +418,7 @@ fn assert_same_accelerations(
     assert!(relative[2] > 1e-7, "{what}: no terms of higher order in {relative:?}");
 }
 
-/// Gravity and forces at nodes, of solids, plane bodies, general masses and bodies with massless rows.
+/// Gravity and forces at nodes, for solids, plane bodies, general masses and bodies with massless rows.
 #[test]
 fn loads_accelerate_the_nodes_as_they_accelerate_all_modes() {
     let raws = ["frame_beams", "frame_lumped", "shell_folded", "mpc_block", "plane_frame", "spring_ends"]
@@ -465,7 +465,7 @@ fn damping_matrices_act_on_the_nodes() {
         let (alpha, beta) = (0.2 * lambda.sqrt(), 0.01 / lambda.sqrt());
         let rayleigh = RawModel { damping: Some(Damping::Rayleigh { alpha, beta }), ..raw };
         assert_same_accelerations(name, &converted(rayleigh, 10_000), |_, _| {}, |_, _, _| {});
-        // The same on the diagonal of K alone.
+        // The damping is proportional to the diagonal of K alone.
         let raw = raw_fixture(name);
         let diagonal: Vec<(u32, u32, f64)> = (0..n as u32)
             .map(|i| (i, i, 0.01 * beta * raw.stiffness.matrix.get(i as usize, i as usize)))
@@ -479,7 +479,7 @@ fn damping_matrices_act_on_the_nodes() {
     }
 }
 
-/// Of a solid the conditions take the moment that linear elastic forces have about the deformed body, and
+/// For a solid the conditions carry the moment of the linear elastic forces about the deformed body, and
 /// nothing else.
 #[test]
 fn conditions_of_solids_hold_the_moment_of_elastic_forces() {
@@ -497,7 +497,7 @@ fn conditions_of_solids_hold_the_moment_of_elastic_forces() {
             evaluation
                 .set(&equations.state(&configuration(shapes, &state)).expect("a state"))
                 .expect("a state");
-            // Forces of nodes do not change it.
+            // Nodal forces do not change that moment.
             evaluation.add_force(1, &(Vector3::x() * body.eigenvalues[0]));
             let mut rates = vec![0.0; equations.dimension()];
             evaluation.rates(&mut rates).expect("rates");
@@ -572,7 +572,7 @@ fn what_has_no_nodal_equations_says_why() {
     assert!(matches!(error, NodalError::ConditionsViolated { part } if part > 0.01 && part < 1.0), "{error}");
 }
 
-/// Another frame shows the same places and velocities of the nodes, and the same kinetic energy.
+/// Another frame gives the same positions and velocities of the nodes, and the same kinetic energy.
 #[test]
 fn frames_of_solids_show_the_same_nodes() {
     for (name, raw) in [("hex8", soft_block(ElementKind::Hex8, [3, 2, 1])), ("plate", soft_plate())] {
@@ -603,7 +603,7 @@ fn frames_of_solids_show_the_same_nodes() {
             assert!(difference < 1e-11 * speed, "{name}: node {i} {difference:e}");
         }
         assert!((a.kinetic_energy() / b.kinetic_energy() - 1.0).abs() < 1e-12, "{name}");
-        // And back.
+        // Reframing back gives the first configuration.
         let back = mean.reframed(&b.configuration()).expect("the first frame");
         let difference = DVector::from_vec(back.u) - DVector::from_vec(start.u);
         assert!(difference.amax() < 1e-13 * body.size, "{name}: {:e}", difference.amax());

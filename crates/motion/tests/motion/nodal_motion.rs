@@ -1,5 +1,5 @@
-//! Trajectories of all nodes: what they keep, that the reduced equations follow them, and what shortened or
-//! misprinted equations do.
+//! Trajectories of all nodes: conserved quantities, agreement with the reduced equations, and the effect of
+//! truncated or misprinted equations.
 
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
@@ -19,14 +19,14 @@ use oracle::flexible::oracle;
 use oracle::general::raw_fixture;
 use oracle::unreduced::{holding, soft_block, soft_plate};
 
-/// Relative to the energy of the internal motion.
+/// Tolerance of the integration, relative to the energy of the internal motion.
 const TOLERANCE: f64 = 1e-12;
 
 fn model_of(raw: RawModel) -> FeModel {
     FeModel::from_raw(raw).expect("a body").model
 }
 
-/// What flexbody makes of a model with so many modes, in the principal frame.
+/// Returns the body of a model with this number of modes, in the principal frame.
 fn body_of(model: &FeModel, modes: usize) -> FlexBody {
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
     convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, &Context::QUIET)
@@ -34,16 +34,16 @@ fn body_of(model: &FeModel, modes: usize) -> FlexBody {
         .body
 }
 
-/// All that there are.
+/// A number of modes beyond that of any model.
 const ALL: usize = 10_000;
 
-/// Radius of gyration.
+/// Returns the radius of gyration times sqrt(2), the length scale of the body.
 fn radius(body: &FlexBody) -> f64 {
     (body.invariants().inertia().trace() / body.invariants().mass()).sqrt()
 }
 
-/// Spin about nearly the middle axis (of a plane body z) with `spin` times the first circular frequency, and
-/// flight; without deformation.
+/// Returns a spin about nearly the middle axis (for a plane body z) with `spin` times the first circular
+/// frequency, and a translation; without deformation.
 fn spinning(body: &FlexBody, spin: f64) -> Configuration {
     let rate = spin * body.modes().eigenvalue[0].sqrt();
     let plane = body.dimension() == 2;
@@ -66,20 +66,20 @@ fn spinning(body: &FlexBody, spin: f64) -> Configuration {
     }
 }
 
-/// The same, bent in every mode.
+/// Returns the spinning configuration with deformation in every mode.
 fn tumbling(body: &FlexBody, spin: f64, deformation: f64) -> Configuration {
     let (lambda, size) = (&body.modes().eigenvalue, radius(body) * body.invariants().mass().sqrt());
     let q = lambda.iter().map(|l| deformation * size * lambda[0] / l).collect();
     Configuration { q, ..spinning(body, spin) }
 }
 
-/// Instants over so many periods of the first mode.
+/// Returns times over this number of periods of the first mode.
 fn instants(body: &FlexBody, periods: f64) -> Vec<f64> {
     let period = std::f64::consts::TAU / body.modes().eigenvalue[0].sqrt();
     (0..=10).map(|i| periods * period * f64::from(i) / 10.0).collect()
 }
 
-/// Places of all nodes at each instant, world axes.
+/// Positions of all nodes at each time, world axes.
 type Path = Vec<Vec<Vector3<f64>>>;
 
 fn nodal_path(equations: &NodalEquations<'_>, start: &NodalConfiguration, instants: &[f64]) -> Path {
@@ -125,20 +125,21 @@ fn reduced_path(
     path
 }
 
-/// Largest distance of a node between two paths.
+/// Returns the largest distance of a node between two paths.
 fn distance(a: &Path, b: &Path) -> f64 {
     let pairs = a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b));
     pairs.fold(0.0, |m, (a, b)| m.max((a - b).norm()))
 }
 
-/// How far nodes come from where the rigid body would be: the change of the distances between them.
+/// Returns the largest change of a distance between nodes, a measure of deformation.
 fn stretch(path: &Path) -> f64 {
     let first = &path[0];
     let pairs = path.iter().flat_map(|now| (1..now.len()).map(move |i| (now, i)));
     pairs.fold(0.0, |m, (now, i)| m.max(((now[i] - now[0]).norm() - (first[i] - first[0]).norm()).abs()))
 }
 
-/// Solids, a body with massless rotations, a plane body: with all modes the reduced equations are the nodal ones.
+/// With all modes the reduced equations equal the nodal ones for solids, a body with massless rotations and a
+/// plane body.
 #[test]
 #[ignore = "slow"]
 fn all_modes_move_as_the_nodes_do() {
@@ -163,8 +164,8 @@ fn all_modes_move_as_the_nodes_do() {
     }
 }
 
-/// Where rotations carry mass, the reduced equations with all modes have the kinetic energy to second order of the
-/// displacements: paths differ by the square of the deformation.
+/// If rotations carry mass, the reduced equations with all modes have the kinetic energy to second order of
+/// the displacements: paths differ by the square of the deformation.
 #[test]
 #[ignore = "slow"]
 fn all_modes_move_as_turned_nodes_do_to_second_order() {
@@ -176,7 +177,7 @@ fn all_modes_move_as_turned_nodes_do_to_second_order() {
         let lifting = NodalModes::new(&equations, &body).expect("the modes of this model");
         let instants = instants(&body, 0.5);
         let [coarse, fine] = [1.0, 0.5].map(|amplitude: f64| {
-            // The deformation by spin goes with its square.
+            // The deformation by spin is proportional to its square.
             let start = tumbling(&body, 0.2 * amplitude.sqrt(), 0.02 * amplitude);
             let nodal = nodal_path(&equations, &lifting.lift(&start), &instants);
             let reduced = reduced_path(&model, &body, &EmptySpace, &start, &instants);
@@ -189,8 +190,8 @@ fn all_modes_move_as_turned_nodes_do_to_second_order() {
     }
 }
 
-/// Distance between the motions with mean axes and with a frame fixed to nodes, and the deformation, for
-/// spins that are halved.
+/// Returns the distance between the motions with mean axes and with a frame fixed to nodes, and the
+/// deformation, for spins that are halved.
 fn between_frames(model: &FeModel, body: &FlexBody, conditions: &ReferenceConditions) -> Vec<(f64, f64)> {
     let path = |conditions: &ReferenceConditions, spin: f64| {
         let equations = NodalEquations::new(model, body.frame(), conditions).expect("equations");
@@ -205,8 +206,8 @@ fn between_frames(model: &FeModel, body: &FlexBody, conditions: &ReferenceCondit
     spins.map(of_spin).to_vec()
 }
 
-/// The frame of a solid, or of one with a rigid region, is a matter of description but for K u, which is linear in
-/// the displacements from it: motions differ by the square of the deformation.
+/// The frame of a solid, or of a solid with a rigid region, affects only K u, which is linear in the
+/// displacements from it: motions differ by the square of the deformation.
 #[test]
 #[ignore = "slow"]
 fn mean_axes_and_held_nodes_are_the_same_motion_to_second_order() {
@@ -219,15 +220,15 @@ fn mean_axes_and_held_nodes_are_the_same_motion_to_second_order() {
     for (what, found) in [("solid", solid), ("rigid region", region)] {
         for pair in found.windows(2) {
             let [distance, deformation] = [pair[0].0 / pair[1].0, pair[0].1 / pair[1].1];
-            // The deformation goes with the square of the spin.
+            // The deformation is proportional to the square of the spin.
             assert!(deformation > 3.5 && deformation < 4.5, "{what}: deformation {deformation}");
             assert!((14.0..20.0).contains(&distance), "{what}: distance {distance}");
         }
     }
 }
 
-/// Linear momentum and angular momentum about the centre of mass of a solid: sums of m_ij v_j and x_i x m_ij
-/// v_j over places and velocities of its nodes in the world.
+/// Returns linear momentum, and angular momentum about the centre of mass, of a solid: sums of m_ij v_j and
+/// x_i x m_ij v_j over positions and velocities of its nodes in the world.
 fn momenta_of_nodes(model: &FeModel, at: &NodalEvaluation<'_>) -> (Vector3<f64>, Vector3<f64>) {
     let mass = model.scalar_mass().expect("a solid");
     let weighted = |of: &dyn Fn(usize) -> Vector3<f64>, i: usize| -> Vector3<f64> {
@@ -245,8 +246,8 @@ fn momenta_of_nodes(model: &FeModel, at: &NodalEvaluation<'_>) -> (Vector3<f64>,
     (linear, angular)
 }
 
-/// Largest relative drifts of energy, linear and angular momentum in the first and in the second half of a
-/// motion.
+/// Returns the largest relative drifts of energy, linear and angular momentum in the first and in the second
+/// half of a motion.
 fn drifts(
     equations: &NodalEquations<'_>,
     start: &NodalConfiguration,
@@ -286,7 +287,7 @@ fn long_motion_keeps_energy_and_momenta() {
         let method = Method::Explicit(Explicit::new(equations.dimension(), TOLERANCE, f64::INFINITY));
         for [energy, linear, angular] in drifts(&equations, &start, method, &instants) {
             assert!(energy < 1e-9, "energy {energy:e}");
-            // To rounding, whatever the error of the method.
+            // Momenta are conserved to rounding for any error of the method.
             assert!(linear < 1e-12 && angular < 1e-12, "momenta {linear:e} {angular:e}");
         }
     }
@@ -303,7 +304,7 @@ fn long_motion_keeps_energy_and_momenta() {
     assert!(after[1] < 1e-12 && after[2] < 1e-12, "momenta {after:?}");
 }
 
-/// A frame motion without deformation.
+/// Returns a motion of the frame without deformation.
 fn spinning_nodes(equations: &NodalEquations<'_>, start: &Configuration) -> NodalConfiguration {
     let Configuration { origin, attitude, velocity, omega, .. } = start;
     let zero = vec![0.0; equations.n_rows()];
@@ -317,7 +318,7 @@ fn spinning_nodes(equations: &NodalEquations<'_>, start: &Configuration) -> Noda
     }
 }
 
-/// [WP19] (16): the skew part of Q'W2 Qd twice.
+/// Misprint [WP19] (16): the skew part of Q'W2 Qd counted twice.
 struct Misprint {
     w2: DMatrix<f64>,
 }
@@ -333,7 +334,7 @@ impl Surroundings for Misprint {
     }
 }
 
-/// What modes lack falls with their number; what a misprint adds stays, with all modes.
+/// The truncation error falls with the number of modes; the error of a misprint remains with all modes.
 #[test]
 #[ignore = "slow"]
 fn truncation_and_misprints_show_against_the_nodes() {
@@ -362,7 +363,7 @@ fn truncation_and_misprints_show_against_the_nodes() {
     assert!(printed > 1e-3 && right < 1e-8, "printed {printed:e}, right {right:e}");
 }
 
-/// Some thousand rows: the motion of a bracket of 20-node bricks, 2052 rows, is that of many modes.
+/// The motion of a bracket of 20-node bricks with 2052 rows agrees with that of many modes.
 #[test]
 #[ignore = "slow"]
 fn a_real_model_runs() {

@@ -1,4 +1,4 @@
-//! Nodes with rotational mass in the nodal equations: against the points that they carry, at large rotations.
+//! Nodal equations with rotary mass compared with the carried points, at large rotations.
 
 use super::nodal_equations::held_shapes;
 use faer::Mat;
@@ -26,14 +26,14 @@ use oracle::turned_energy::{TurnedEnergy, Velocities};
 use oracle::turning::{dense, sparse};
 use oracle::unreduced::{Unreduced, configuration, holding, times};
 
-/// Displacement that differences step by: their errors of sixth order and the rounding of second derivatives meet
+/// Displacement step of the differences: errors of sixth order and the rounding of second derivatives balance
 /// at some 1e-11.
 const STEP: f64 = 1e-2;
 
-/// What differences leave; the largest that was found is 2e-10.
+/// Limit of the errors of differences; the largest measured error is 2e-10.
 const NUMERIC: f64 = 1e-9;
 
-/// A rubber block, askew, whose last layer of nodes a reference node beside it carries.
+/// Returns a skewed rubber block whose last layer of nodes is rigidly attached to a reference node beside it.
 fn block_with_rigid_face() -> (Carriers, RawModel) {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([3, 1, 1]), |[x, y, z]| {
@@ -51,8 +51,9 @@ fn block_with_rigid_face() -> (Carriers, RawModel) {
     (carriers, model)
 }
 
-/// Masses on arms, and a mass between all rows that rigid motion does not feel: no part of it is what points and
-/// directors have, and rows of rotations carry linear momentum that does not turn with them.
+/// Returns masses on arms, plus a mass between all rows that is zero in rigid motion: it cannot be
+/// represented by points and directors, and rows of rotations carry linear momentum that does not rotate with
+/// them.
 fn any_mass() -> Unreduced {
     let (carriers, raw) = masses_on_beams(&star(BeamMass::Lumped), 3);
     let (n, positions) = (carriers.rows(), &carriers.positions);
@@ -74,12 +75,12 @@ fn any_mass() -> Unreduced {
         let sum = dense(&a.matrix) + half.transpose() * &half * size;
         RawMatrix { matrix: sparse(&((&sum + sum.transpose()) * 0.5)), ..a.clone() }
     };
-    // What has a mass in common must have a stiffness.
+    // Nodes coupled by mass must be coupled by stiffness.
     let (mass, stiffness) = (with_any(&raw.mass, 1e-5), with_any(&raw.stiffness, 1e-5));
     Unreduced::new(RawModel { mass, stiffness, ..raw })
 }
 
-/// A state in `shapes` whose largest rotation of a node about an axis is `turn`.
+/// Returns a state in `shapes` whose largest rotation of a node about an axis is `turn`.
 fn turned_state(body: &Unreduced, shapes: &Mat<f64>, seed: u64, turn: f64) -> State {
     let mut state = body.lively_state(seed, 0.1);
     let u = times(shapes, &state.q);
@@ -96,12 +97,12 @@ fn bodies() -> [(&'static str, Carriers, Unreduced); 2] {
     [("rigid face", face, Unreduced::new(solid)), ("arms", arms, Unreduced::new(beams))]
 }
 
-/// The difference of two vectors over a scale.
+/// Returns the difference of two vectors over a scale.
 fn apart(a: &[f64], b: &[f64], scale: f64) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt() / scale
 }
 
-/// Kinetic energy and momenta are those of the points that the nodes carry.
+/// Kinetic energy and momenta equal those of the points carried by the nodes.
 #[test]
 fn turned_nodes_have_the_energy_and_momenta_of_what_they_carry() {
     for (name, carriers, body) in bodies() {
@@ -135,8 +136,8 @@ fn turned_nodes_have_the_energy_and_momenta_of_what_they_carry() {
     }
 }
 
-/// The forces of d'Alembert on the points, with the accelerations of the equations, are in balance with the
-/// stiffness, gravity, and what holds the conditions; of a body that is driven the rest is what drives it.
+/// The d'Alembert forces on the points, with the accelerations of the equations, balance stiffness, gravity
+/// and constraint forces of the conditions; for a driven body the remainder is the driving force.
 #[test]
 fn turned_nodes_accelerate_as_what_they_carry() {
     for (name, carriers, body) in bodies() {
@@ -154,7 +155,8 @@ fn turned_nodes_accelerate_as_what_they_carry() {
     }
 }
 
-/// What is out of balance relative to the inertia forces: force, torque, and forces of the rows beside C'lambda.
+/// Returns the imbalance relative to the inertia forces: force, torque, and forces of the rows other than
+/// C'lambda.
 fn unbalanced(
     equations: &NodalEquations<'_>,
     carriers: &Carriers,
@@ -202,7 +204,7 @@ fn unbalanced(
     let (drive, drive_torque) = evaluation.driving_force();
     let left = rows.clone() + times(&body.stiffness, &u) - carriers.onto_rows(&u, &weights, STEP);
 
-    // C' of mean axes is M R: the rows are out of balance by what is orthogonal to it.
+    // C' of mean axes is M R: the imbalance of the rows is their part orthogonal to it.
     let rigid = body.model.rigid_fields((*origin).into(), 1.0);
     let conditions = &body.mass * &rigid;
     let conditions = DMatrix::from_fn(n, 6, |i, j| conditions[(i, j)]);
@@ -216,7 +218,7 @@ fn unbalanced(
     ]
 }
 
-/// Consistent masses of beams, shells and a rigid region: T by blocks of M, and Lagrange's equations of it.
+/// Consistent masses of beams, shells and a rigid region: T from blocks of M, and its Lagrange equations.
 #[test]
 fn general_masses_obey_the_equations_of_their_energy() {
     let fixtures = [("frame_beams", 0.3), ("plane_frame", 0.3), ("mpc_block", 0.3), ("shell_folded", 0.1)];
@@ -233,7 +235,7 @@ fn general_masses_obey_the_equations_of_their_energy() {
     }
 }
 
-/// Energy, momenta and accelerations where the origin of the frame is `off` from the centre of mass.
+/// Compares energy, momenta and accelerations with the origin of the frame at `off` from the centre of mass.
 fn assert_energy(
     name: &str,
     body: &Unreduced,
@@ -282,7 +284,7 @@ fn assert_energy(
     assert!(error.iter().all(|error| *error < 1e-8), "{name}, {conditions:?}, off {off:?}: {error:?}");
 }
 
-/// A constant velocity of flight changes no acceleration, whatever the mass is.
+/// A constant translational velocity changes no acceleration, for any mass.
 #[test]
 fn flight_changes_no_acceleration() {
     let fixtures = ["frame_beams", "plane_frame", "mpc_block", "shell_folded"]
@@ -318,12 +320,12 @@ fn flight_changes_no_acceleration() {
             (slow.2 - fast.2).norm() / slow.2.norm(),
             apart(&slow.3, &fast.3, DVector::from_column_slice(&slow.3).norm()),
         ];
-        // Rounding of thirty times the velocity, with the ratio of the frequencies of the body in u''.
+        // Rounding of thirty times the velocity, multiplied by the frequency ratio of the body in u''.
         assert!(errors.iter().all(|error| *error < 1e-10), "{name}: {errors:?}");
     }
 }
 
-/// Energy, and the momenta of the points, of free motion with large turns.
+/// Energy and momenta of the points are conserved in free motion with large rotations.
 #[test]
 fn turned_nodes_keep_energy_and_momenta() {
     for (name, carriers, body) in bodies() {
@@ -362,13 +364,13 @@ fn turned_nodes_keep_energy_and_momenta() {
             Ok::<(), Failure>(())
         })
         .expect("integrates");
-        // Of momenta the rounding of the differences of the oracle is left, of the energy that and the steps.
+        // Momenta drift by the rounding of the oracle differences, the energy by that and the steps.
         assert!(largest.iter().all(|drift| *drift < 1e-11), "{name}: {largest:?}");
     }
 }
 
-/// Two discs on a common axis that springs hold together. While one leans over by phi (complex, of both transverse
-/// axes at rest) the other leans by -phi, and I_d phi'' - i I_p Omega phi' + 2 k phi = 0.
+/// Two discs on a common axis connected by springs. While one disc inclines by phi (complex, of both
+/// transverse axes at rest), the other inclines by -phi, and I_d phi'' - i I_p Omega phi' + 2 k phi = 0.
 #[test]
 fn discs_whirl_at_the_frequencies_of_the_textbook() {
     const SPIN: f64 = 3.0;
@@ -394,8 +396,8 @@ fn discs_whirl_at_the_frequencies_of_the_textbook() {
         let mut method = Method::Explicit(Explicit::new(state.len(), 1e-11, f64::INFINITY));
         let (mut motion, mut other) = (NodalMotion::free(&equations), NodalMotion::free(&equations));
         let mut error = 0.0f64;
-        // Roots of I_d s^2 - I_p Omega s - 2 k = 0 for phi = exp(i s t); at first phi = LEAN along y, at rest in the
-        // turning axes: phi' = i Omega phi.
+        // Roots of I_d s^2 - I_p Omega s - 2 k = 0 for phi = exp(i s t). Initially phi = LEAN along y, at
+        // rest in the rotating axes: phi' = i Omega phi.
         let root = ((polar * SPIN).powi(2) + 8.0 * SPRING * DIAMETRAL).sqrt();
         let [fast, slow] = [1.0, -1.0].map(|sign| (polar * SPIN + sign * root) / (2.0 * DIAMETRAL));
         let part = (SPIN - slow) / (fast - slow);
@@ -407,13 +409,13 @@ fn discs_whirl_at_the_frequencies_of_the_textbook() {
             Ok::<(), Failure>(())
         })
         .expect("integrates");
-        // Steps with the tolerance 1e-11 of the energy of the lean, a part of 1e-10 of that of the spin.
+        // The steps have the tolerance 1e-11 of the energy of the inclination, 1e-10 of that of the spin.
         assert!(error < 1e-7, "I_p {polar}: {error:e}");
     }
 }
 
-/// Two nodes at one place with a mass and the moments of inertia of a disc about x, and springs between their
-/// displacements and rotations.
+/// Returns two nodes at one place with a mass and the moments of inertia of a disc about x, and springs
+/// between their displacements and rotations.
 fn discs(polar: f64, diametral: f64, spring: f64) -> FeModel {
     let mass = DMatrix::from_diagonal(&DVector::from_fn(12, |row, _| match row {
         0..6 => 1.0,
@@ -438,9 +440,9 @@ fn discs(polar: f64, diametral: f64, spring: f64) -> FeModel {
     FeModel::from_raw(raw).expect("a body").model
 }
 
-/// A body whose frame a node carries: accelerations of the nodes and of all modes, and reactions, which are as small as
-/// the deformation, differ by its square. (Of consistent beams the rest of the mass stays along the axes of the frame,
-/// which are others here than those of the modes: terms of the Coriolis forces of first order.)
+/// A body whose frame is carried by a node: accelerations of the nodes and of all modes, and reactions,
+/// differ by the square of the deformation. (For consistent beams the remaining mass stays along the axes of
+/// the frame, which differ from those of the modes: Coriolis terms of first order.)
 #[test]
 fn carried_nodes_accelerate_as_carried_modes_to_second_order() {
     let (_, arms) = masses_on_beams(&star(BeamMass::Lumped), 3);
@@ -454,7 +456,7 @@ fn carried_nodes_accelerate_as_carried_modes_to_second_order() {
         let carried = body.carried(&Carrier::Node(node)).expect("carried");
         let at = |amplitude| carried_apart(&model, &carried, node, amplitude);
         if name == "rigid face" {
-            // The only node that turns is the one that carries: the equations are the same.
+            // The only rotating node is the carrier, so that the equations are equal.
             assert!(at(1.0).iter().all(|error| *error < 1e-11), "{name}: {:?}", at(1.0));
             continue;
         }
@@ -465,7 +467,7 @@ fn carried_nodes_accelerate_as_carried_modes_to_second_order() {
     }
 }
 
-/// Relative differences of the accelerations of nodes, the force and the torque of the carrier.
+/// Returns the relative differences of nodal accelerations, carrier force and carrier torque.
 fn carried_apart(model: &FeModel, body: &FlexBody, node: i64, amplitude: f64) -> [f64; 3] {
     let conditions = ReferenceConditions::AtRest(NodalPoint::node(model, node as usize - 1));
     let equations = NodalEquations::new(model, body.frame(), &conditions).expect("equations");

@@ -1,4 +1,4 @@
-//! Errors of a motion against a reference: what is known of made-up motions, and of bodies in two bases.
+//! Errors of a motion relative to a reference: known errors of artificial motions, and bodies in two bases.
 
 use faer::Mat;
 use flexbody_body::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
@@ -29,14 +29,14 @@ fn motion(body: &FlexBody, scene: &Scene) -> Trace {
     trace(body, scene, &Context::QUIET).expect("a motion").0
 }
 
-/// The motion with other modal coordinates.
+/// Returns the motion with other modal coordinates.
 fn changed(motion: &Trace, change: impl Fn(usize, &mut Vec<f64>)) -> Trace {
     let mut other = motion.clone();
     other.q.iter_mut().enumerate().for_each(|(i, q)| change(i, q));
     other
 }
 
-/// The largest of values, none of them negative.
+/// Returns the largest of nonnegative values.
 fn most(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, f64::max)
 }
@@ -57,7 +57,8 @@ fn the_attitude_is_apart_by_the_angle_of_a_turn() {
     let recording = motion(&body, &scene(30.0));
     for angle in [1e-9, 1e-3, 3.0] {
         let (sin, cos) = f64::sin_cos(0.5 * angle);
-        // A turn about the x axis of the body behind it; the sign of Euler parameters means nothing.
+        // A rotation about the x axis of the body after its attitude; the sign of Euler parameters has no
+        // meaning.
         let mut turned = recording.clone();
         for attitude in &mut turned.attitude {
             let [a, b, c, d] = attitude.0;
@@ -86,9 +87,9 @@ fn deformations_are_apart_by_their_elastic_energy_and_the_nodes_that_move_most()
     let most_energy = most(recording.elastic.iter().copied());
     let expected = (0.5 * body.modes().eigenvalue[2] * amplitude * amplitude / most_energy).sqrt();
     let stress = errors.stress.expect("a deformed body");
-    // What the motion does between the places where it was looked at adds a little to its largest energy.
+    // The motion between the evaluated times adds slightly to its largest energy.
     assert!((stress / expected - 1.0).abs() < 1e-3 && stress <= expected, "{stress} {expected}");
-    // The mode moves no node further than the one that it moves most along some axis does.
+    // No node moves further than the one with the largest displacement along an axis.
     let shape = &body.modes().shape;
     let of_node = |q: &[f64], i: usize| {
         Vector3::from_fn(|k, _| q.iter().enumerate().map(|(j, q)| shape[(3 * i + k, j)] * q).sum::<f64>())
@@ -147,8 +148,8 @@ fn watched_points_and_reactions_count_relative_to_their_largest() {
     let errors = history.largest();
     assert!((errors.reaction.expect("a reaction") - 0.02).abs() < 1e-4);
     assert!((errors.deflection.expect("a path") - 0.1).abs() < 1e-15);
-    // What grows like time is twice as large in the end as in the middle of the run, however unevenly it was
-    // looked at.
+    // A linearly growing error is twice as large at the end as in the middle of the run, for any distribution
+    // of evaluated times.
     let grown = history.growth(&a, &Tolerance::default());
     assert!((1.8..2.1).contains(&grown.expect("an error that grows")), "{grown:?}");
     let mut tolerant = Tolerance::default();
@@ -166,7 +167,7 @@ fn what_is_too_small_to_count_is_measured_against_the_least_that_counts() {
     let recording = motion(&body, &at_rest);
     let other = changed(&recording, |_, q| q[0] += 1e-20);
     let errors = Measure::new(&body, &recording).of_subset(&other, &[0, 1, 2, 3]).largest();
-    // The extent of a body is that along the axes of the model.
+    // The extent of a body is measured along the axes of the model.
     let least = Resolution::new(&Stage::new(&body, &at_rest).expect("a stage").body, None);
     let lambda = body.modes().eigenvalue[0];
     let expected = (0.5 * lambda).sqrt() * 1e-20 / least.root_energy;
@@ -180,7 +181,7 @@ fn what_is_not_a_number_is_not_within_a_tolerance() {
     assert!(!errors.within(&Tolerance::default()));
 }
 
-/// Free modes, and residual vectors for spin.
+/// Returns bodies of free modes alone, and with residual vectors for spin.
 fn bodies(model: &FeModel) -> [FlexBody; 2] {
     let made = |count: usize, residual_vectors: Vec<Loads>| {
         let modes = ModeSettings { wanted: Wanted::Lowest(count), ..ModeSettings::default() };
@@ -215,7 +216,7 @@ fn two_bases_of_one_model_are_apart_by_the_energy_of_the_difference_of_displacem
     let recordings = [trace_at(&candidate, &turning, &whole.time, &Context::QUIET).expect("a motion"), whole];
     let found = Measure::new(&reference, &recordings[1]).of_other(&recordings[0], &modes).largest();
 
-    // Displacements of all rows, and their energy, one instant after the other.
+    // Displacements of all rows and their energy, one time after the other.
     let displacements = |which: usize, i: usize| {
         let q = &recordings[which].q[i];
         Mat::from_fn(vectors[which].nrows(), 1, |row, _| {
@@ -230,7 +231,7 @@ fn two_bases_of_one_model_are_apart_by_the_energy_of_the_difference_of_displacem
     let stress = found.stress.expect("a deformed body");
     assert!(expected > 1e-3, "residual vectors matter here: {expected}");
     assert!((stress / expected - 1.0).abs() < 1e-3, "{stress} {expected}");
-    // A basis is no distance from itself, to the square root of rounding in K.
+    // A basis has zero distance from itself, to the square root of the rounding in K.
     let own = gram(vectors[1].as_ref(), weighted(&vectors[1]).as_ref());
     let itself = OtherModes::new(&reference, &reference, own.as_ref()).expect("one body");
     let errors = Measure::new(&reference, &recordings[1]).of_other(&recordings[1], &itself).largest();

@@ -1,5 +1,5 @@
-//! Bodies that hold some modes and some groups of the kinetic energy only: what is left is what it was, and a
-//! body of its own.
+//! Bodies that hold only some modes and some groups of the kinetic energy: the remaining terms are unchanged,
+//! and the body is valid.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroup, TermGroups};
@@ -15,7 +15,7 @@ use oracle::partial::{combinations, decisions, with_groups};
 use oracle::plane::rectangle;
 use oracle::random::Random;
 
-/// Solids, a general mass, and both in the plane.
+/// Returns solids, a general mass, and both in the plane.
 fn bodies() -> [FlexBody; 4] {
     [
         soft_block(8),
@@ -30,7 +30,7 @@ fn all_modes_and_all_groups_are_the_body_itself() {
     for body in bodies() {
         let all: Vec<usize> = (0..body.n_modes()).collect();
         assert_eq!(body.reduced(&all, TermGroups::ALL, Vec::new()).expect("a body"), body);
-        // Also of a body that lacks some already: its decisions stay.
+        // A body that already lacks groups keeps its decisions.
         let partial = with_groups(&body, TermGroups { w1: true, ..TermGroups::NONE });
         assert_eq!(partial.reduced(&all, TermGroups::ALL, Vec::new()).expect("a body"), partial);
     }
@@ -52,7 +52,7 @@ fn what_is_held_is_what_the_full_body_has_and_nothing_else_is_there() {
             let failed: Vec<_> =
                 partial.identities(BodyFrame::Model).into_iter().filter(|check| !check.passed).collect();
             assert!(failed.is_empty(), "{groups:?}: {failed:?}");
-            // What is compared is what both hold.
+            // Only terms held by both bodies are compared.
             for (name, difference) in primary_differences(own, full) {
                 assert_eq!(difference, 0.0, "{groups:?}: {name}");
             }
@@ -136,7 +136,7 @@ fn equations_have_the_terms_that_are_asked_for_and_held() {
                     evaluation.accelerations(&vec![0.0; 6 + nf], &mut rates).expect("a body");
                     (rates, evaluation.kinetic_energy(), evaluation.angular_momentum())
                 };
-                // The same numbers in the same order: the same bits.
+                // Equal numbers in the same order give equal bits.
                 assert_eq!(of(&partial), of(&masked), "{groups:?}");
             }
         }
@@ -186,10 +186,10 @@ fn an_evaluation_of_inertia_alone_takes_a_tenth_at_ninety_modes() {
     let body = fixture("bracket_hex20", 90, BodyFrame::Principal);
     let rigid = with_groups(&body, TermGroups::NONE);
     let of = |body: &FlexBody| EquationsOfMotion::new(body, Terms::ALL).multiplications();
-    // 2 panels of 32 rows for what is linear in q, 12 rows in forces and momenta, 33 in the elimination, 4 of
+    // 2 panels of 32 rows for terms linear in q, 12 rows in forces and momenta, 33 in the elimination, 4 of
     // K_ff and D.
     assert_eq!(of(&rigid), 90 * (2 * 32 + 12 + 33 + 4));
-    // W1 6 rows; W2 17 panels and 18 rows; W3 twice 9 panels and 6 rows.
+    // W1 has 6 rows; W2 17 panels and 18 rows; W3 twice 9 panels and 6 rows.
     assert_eq!(of(&body), of(&rigid) + 90 * (6 + 17 * 32 + 18 + 2 * 9 * 32 + 6));
     assert!(of(&body) >= 10 * of(&rigid));
 }
@@ -227,7 +227,7 @@ fn decisions_must_be_those_of_the_body() {
     refused(&all, without_w1, with(&|t| t.bound = f64::NAN), schema, "`terms.W1.bound` is NaN");
     refused(&all, without_w1, with(&|t| t.limit = -1.0), schema, "`terms.W1.limit` is -1e0");
     refused(&all, without_w1, with(&|t| t.reason = "\0".to_owned()), schema, "contains a NUL");
-    // Nor may entries say what the groups do not.
+    // Entries must agree with the stated groups.
     let mut parts = with_groups(&body, without_w1).into_parts();
     parts.invariants.primary_mut().ibar[0][0][1] = 1.0;
     let error = FlexBody::new(parts).expect_err("entries of W1");

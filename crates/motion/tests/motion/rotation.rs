@@ -1,4 +1,4 @@
-//! Rotating bodies against closed forms: the unstable middle axis, the stretch of a spinning bar, the turning
+//! Rotating bodies compared with closed forms: unstable middle axis, extension of a spinning bar, precession
 //! of the vibration of a spinning ring.
 
 use flexbody_body::flex_body::FlexBody;
@@ -14,7 +14,7 @@ use oracle::mesh::Mesh;
 use oracle::motion::{adaptive, conserving, run};
 use std::f64::consts::{PI, TAU};
 
-/// At rest at the origin.
+/// Returns the body at rest at the origin.
 fn rest(body: &FlexBody) -> Configuration {
     Configuration {
         origin: Vector3::zeros(),
@@ -26,7 +26,7 @@ fn rest(body: &FlexBody) -> Configuration {
     }
 }
 
-/// Complete elliptic integral of the first kind of modulus k, by the arithmetic-geometric mean.
+/// Returns the complete elliptic integral of the first kind of modulus k, by the arithmetic-geometric mean.
 fn elliptic_k(k: f64) -> f64 {
     let (mut a, mut b) = (1.0, (1.0 - k * k).sqrt());
     while (a - b).abs() > 1e-15 * a {
@@ -35,8 +35,8 @@ fn elliptic_k(k: f64) -> f64 {
     0.5 * PI / a
 }
 
-/// Half the period of a rigid top (Landau, Lifshitz, Mechanics, 37): the time between two flips about the
-/// middle axis.
+/// Returns half the period of a rigid top (Landau, Lifshitz, Mechanics, 37): the time between two flips about
+/// the middle axis.
 fn rigid_flip(moments: [f64; 3], omega: Vector3<f64>) -> f64 {
     let [a, b, c] = moments;
     let double_energy = a * omega.x * omega.x + b * omega.y * omega.y + c * omega.z * omega.z;
@@ -60,7 +60,7 @@ fn a_flexible_body_flips_about_its_middle_axis_like_a_rigid_top_as_it_stiffens()
         let spin = ratio * body.modes().eigenvalue[0].sqrt();
         let mut start = rest(&body);
         start.omega = Vector3::new(0.05, 1.0, 0.1) * spin;
-        // In balance with its centrifugal load, so that it does not ring: K q = W1' part, to first order.
+        // Starts in equilibrium with the centrifugal load to avoid vibration: K q = W1' part, to first order.
         let mut evaluation = Evaluation::new(&equations);
         let mut nu = vec![0.0; 6 + body.n_modes()];
         nu[3..6].copy_from_slice(start.omega.as_slice());
@@ -80,13 +80,13 @@ fn a_flexible_body_flips_about_its_middle_axis_like_a_rigid_top_as_it_stiffens()
         assert!(crossings.len() >= 2, "it flips: {crossings:?}");
         ((crossings[1] - crossings[0]) / flip - 1.0).abs()
     };
-    // The body gives way to the square of spin over frequency.
+    // The deformation is proportional to the square of spin over frequency.
     let (fast, slow) = (error(0.04), error(0.02));
     let order = (fast / slow).log2();
     assert!(slow < 0.02 && (order - 2.0).abs() < 0.2, "{fast:e}, {slow:e}: order {order}");
 }
 
-/// Spin about the third axis, from nothing to `rate`.
+/// Spin about the third axis, from zero to `rate`.
 struct SpinUp {
     rate: f64,
     duration: f64,
@@ -105,11 +105,11 @@ impl Surroundings for SpinUp {
     }
 }
 
-/// (E A u')' + rho A w^2 (x + u) = 0 with free ends: the stretch of half a bar of length 2 l, tan(k l)/k - l
-/// with k = w sqrt(rho/E). Without W2 the load does not grow with u: rho w^2 l^3 / 3E.
+/// (E A u')' + rho A w^2 (x + u) = 0 with free ends gives the extension of half a bar of length 2 l: tan(k
+/// l)/k - l with k = w sqrt(rho/E). Without W2 the load does not grow with u: rho w^2 l^3 / 3E.
 #[test]
 fn a_spinning_bar_stretches_as_far_as_the_closed_form_says() {
-    // Without lateral contraction a bar of hexahedra is the bar of the formula.
+    // Without lateral contraction a bar of hexahedra follows the formula.
     let material = Material { youngs: 1.0, poisson: 0.0, density: 1.0 };
     let length = 2.0;
     let spin = 0.5; // k l = 0.5
@@ -136,21 +136,21 @@ fn a_spinning_bar_stretches_as_far_as_the_closed_form_says() {
     let [coarse, fine] = [4, 8].map(|cells| (stretch(cells, Terms::ALL) / full - 1.0).abs());
     let order = (coarse / fine).log2();
     assert!(fine < 5e-3 && (order - 2.0).abs() < 0.25, "{full}: {coarse:e}, {fine:e}, order {order}");
-    // A given load stretches linear elements exactly, as far as their nodes go.
+    // Linear elements extend exactly at their nodes under a given load.
     let error = (stretch(4, without) / linear - 1.0).abs();
     assert!(error < 1e-11, "{error:e}");
     assert!((full / linear - 1.0) > 0.05, "the closed forms differ");
 }
 
-/// Bryan's effect: in-plane vibration with n waves of a thin ring that spins with W turns at g W against the
-/// ring's modes, in their plane of amplitudes, g = 2n / (n^2 + 1); the two frequencies of the pair are split
-/// by 2 g W (G. H. Bryan, On the beats in the vibrations of a revolving cylinder or bell, 1890).
+/// Bryan's effect: in-plane vibration with n waves of a thin ring that spins at W precesses at g W against
+/// the modes of the ring, in their plane of amplitudes, g = 2n / (n^2 + 1); the two frequencies of the pair
+/// are split by 2 g W (G. H. Bryan, On the beats in the vibrations of a revolving cylinder or bell, 1890).
 #[test]
 fn the_vibration_of_a_spinning_ring_turns_with_bryans_factor() {
     let mesh = Mesh::ring(ElementKind::Hex20, 24, 1.0, 0.03);
     let body =
         body_of(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model(), 8, BodyFrame::Principal);
-    // The axis of the ring is that of the largest moment, the third; the pair is coupled by W3 about it.
+    // The axis of the ring is that of the largest moment, the third; W3 about it couples the pair of modes.
     let (w3, nf) = (body.invariants().w3().expect("held"), body.n_modes());
     let coupling = |j: usize| w3[(2 * nf + j, j + 1)].abs();
     let pair = (0..nf - 1).max_by(|&a, &b| coupling(a).total_cmp(&coupling(b))).expect("modes");
@@ -163,7 +163,7 @@ fn the_vibration_of_a_spinning_ring_turns_with_bryans_factor() {
     let mut start = rest(&body);
     start.omega = Vector3::z() * spin;
     start.q[pair] = 1e-3 * body.invariants().mass().sqrt();
-    // Half the time in which the vibration goes over to the other mode, and all of it.
+    // Half the time in which the vibration transfers to the other mode, and all of it.
     let over = PI / (2.0 * factor * spin);
     let instants = [0.0, 0.5 * over, over];
     let (states, _) = run(&equations, &EmptySpace, &start, adaptive(1e-10), &instants, &[]);

@@ -1,4 +1,4 @@
-//! Rates that are not settled: the axis of a needle.
+//! Rates that do not converge: rotation about the axis of a slender body.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_body::flex_body::FlexBody;
@@ -9,13 +9,13 @@ use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::body_of;
 use oracle::mesh::Mesh;
 
-/// A brick of so many widths along x, with four free modes.
+/// Returns a brick whose length along x is `ratio` times its width, with four free modes.
 fn slender(ratio: f64) -> FlexBody {
     let mesh = Mesh::block(ElementKind::Hex8, [4, 1, 1], [1.0, 1.0 / ratio, 1.3 / ratio]);
     body_of(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model(), 4, BodyFrame::Principal)
 }
 
-/// The scene of a free rotation through about a radian.
+/// Returns the scene of a free rotation through about a radian.
 fn turning(tolerance: f64, duration: f64, rates: [f64; 3]) -> Scene {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
@@ -27,7 +27,7 @@ fn turning(tolerance: f64, duration: f64, rates: [f64; 3]) -> Scene {
     LoadCases::read_single(&path, None).expect("a scene")
 }
 
-/// Rates about the axis, and what is told of them.
+/// Returns the rates about the axis, and the diagnostic about them.
 fn rates_of(body: &FlexBody, scene: &Scene) -> (Vec<f64>, Option<Diagnostic>) {
     let recording = simulate(body, scene, &Context::QUIET).expect("a motion").0;
     let told = unsettled_rate(body, scene, &recording, &Context::QUIET).expect("a body");
@@ -36,8 +36,8 @@ fn rates_of(body: &FlexBody, scene: &Scene) -> (Vec<f64>, Option<Diagnostic>) {
 
 const RATES: [f64; 3] = [0.001, 1.0, 0.5];
 
-/// The momentum about the axis of a needle is a part of 1e-10 of the whole, and the rate about it is what the error of the
-/// whole leaves.
+/// The momentum about the axis of a slender body is 1e-10 of the whole, so that the rate about it is
+/// determined by the error of the whole.
 #[test]
 fn the_rate_of_a_needle_that_changes_with_the_step_is_told() {
     let needle = slender(1e5);
@@ -52,7 +52,7 @@ fn the_rate_of_a_needle_that_changes_with_the_step_is_told() {
     assert!(settled.is_none(), "{settled:?}");
 }
 
-/// All bodies turn by the same angle, about the axis, across it alone, and about all axes.
+/// Asserts that rotations by the same angle about the axis, across it, and about all axes give no diagnostic.
 fn assert_nothing_told(ratio: f64, tolerance: f64) {
     let body = slender(ratio);
     for rates in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.7, 0.7], RATES] {

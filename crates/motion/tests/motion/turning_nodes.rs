@@ -1,5 +1,5 @@
-//! Nodes that turn and carry mass: rigid regions, offset masses, discs. The oracles know nothing of directors: all
-//! nodes of a rigid region with the plain mass of the solid and finite rotations of the region, masses as points on
+//! Rotating nodes that carry mass: rigid regions, offset masses, discs. The oracles do not use directors: all
+//! nodes of a rigid region with the mass of the solid and finite rotations of the region, masses as points on
 //! rigid arms, closed forms of the rotor.
 
 use faer::Mat;
@@ -28,7 +28,8 @@ fn converted(raw: RawModel, modes: usize, frame: BodyFrame) -> (FeModel, FlexBod
     (model, body)
 }
 
-/// All nodes of a block in the body frame, at modal coordinates q, the rigid region turned by a finite rotation.
+/// All nodes of a block in the body frame at modal coordinates q, with the rigid region rotated by a finite
+/// rotation.
 struct AllNodes<'b> {
     block: &'b Block,
     body: &'b FlexBody,
@@ -50,7 +51,7 @@ impl AllNodes<'_> {
         (place, sum(&modes.shape), sum(rotation))
     }
 
-    /// Places (n x 3).
+    /// Returns the positions (n x 3).
     fn places(&self, q: &DVector<f64>) -> DMatrix<f64> {
         let (at, moved, turned) = self.of_reference(q);
         let shape = &self.body.modes().shape;
@@ -69,7 +70,7 @@ impl AllNodes<'_> {
         places
     }
 
-    /// Mode j of all nodes (n x 3), the region turned to first order.
+    /// Returns mode j of all nodes (n x 3), with the region rotated to first order.
     fn mode(&self, j: usize) -> DMatrix<f64> {
         let mut unit = DVector::zeros(self.body.n_modes());
         unit[j] = 1.0;
@@ -87,26 +88,26 @@ impl AllNodes<'_> {
         mode
     }
 
-    /// Second moments x_k' Ms y_l (3 x 3).
+    /// Returns the second moments x_k' Ms y_l (3 x 3).
     fn moments(&self, x: &DMatrix<f64>, y: &DMatrix<f64>) -> Matrix3<f64> {
         let product = x.transpose() * (&self.block.mass * y);
         Matrix3::from_fn(|k, l| product[(k, l)])
     }
 
-    /// First moment of the deformed body.
+    /// Returns the first moment of the deformed body.
     fn first_moment(&self, q: &DVector<f64>) -> Vector3<f64> {
         let sums = &self.block.mass * self.places(q);
         Vector3::from_fn(|k, _| sums.column(k).sum())
     }
 
-    /// Inertia of the deformed body about the origin of the frame.
+    /// Returns the inertia of the deformed body about the origin of the frame.
     fn inertia(&self, q: &DVector<f64>) -> Matrix3<f64> {
         let x = self.places(q);
         let j = self.moments(&x, &x);
         Matrix3::identity() * j.trace() - j
     }
 
-    /// C(q)_kj: angular momentum about the axis k of a unit rate of mode j, by central differences.
+    /// Returns C(q)_kj, the angular momentum about axis k of a unit rate of mode j, by central differences.
     fn coupling(&self, q: &DVector<f64>, step: f64) -> DMatrix<f64> {
         let x = self.places(q);
         let mut coupling = DMatrix::zeros(3, q.len());
@@ -227,7 +228,7 @@ fn the_stiffness_of_inertia_is_what_a_finite_rotation_of_the_region_does() {
     }
 }
 
-/// The same body, described about two origins and along other axes, feels the same forces.
+/// A body described about two origins and along different axes has the same forces.
 #[test]
 fn two_frames_describe_one_body() {
     for raw in [
@@ -243,7 +244,7 @@ fn two_frames_describe_one_body() {
             .in_model_axes(a.frame().axes.transpose() * (b.frame().origin - a.frame().origin))
             .expect("a body");
         let (own, other) = (moved.inertia_stiffness().expect("turns"), b.inertia_stiffness().expect("turns"));
-        // Modes of both are the same up to their signs, which the frame does not change here.
+        // The modes are equal including signs, which the frame does not change here.
         let difference = other.largest_difference(own);
         assert!(difference < 1e-12, "{name}: {difference:e}");
         let w1 = |body: &FlexBody| body.invariants().w1().expect("held");
@@ -252,7 +253,7 @@ fn two_frames_describe_one_body() {
     }
 }
 
-/// Accelerations of the modes and of the frame, along its axes, of a body that moves freely.
+/// Returns the accelerations of the modes and of the frame, along its axes, of a freely moving body.
 fn free_accelerations(
     body: &FlexBody,
     velocity: Vector3<f64>,
@@ -270,7 +271,7 @@ fn free_accelerations(
     evaluation.set(q, &nu);
     let (free, mut found) = (vec![0.0; nu.len()], vec![0.0; nu.len()]);
     evaluation.accelerations(&free, &mut found).expect("a body with mass");
-    // V' + omega x V: the acceleration of the origin in space.
+    // V' + omega x V is the acceleration of the origin in space.
     let turned = omega.cross(&velocity);
     let kept = if equations.n_rigid() == 3 { 2 } else { 3 };
     (0..kept).for_each(|k| found[k] += turned[k]);
@@ -309,26 +310,27 @@ fn a_constant_velocity_changes_nothing() {
     }
 }
 
-/// Natural frequencies of the rotor that spins with `spin` about its shaft, in the turning frame, by the classical
-/// equations in space: M x'' + Omega G x' + K x = 0 for the deflections and inclinations of all discs, whose
-/// frequencies are shifted by the spin. The rigid motions of the shaft across its axis are held, as those of a body
-/// whose frame has its motion prescribed.
+/// Returns the natural frequencies of the rotor spinning with `spin` about its shaft, in the rotating frame,
+/// from the classical equations in space: M x'' + Omega G x' + K x = 0 for the deflections and inclinations
+/// of all discs, whose frequencies are shifted by the spin. The rigid motions of the shaft across its axis
+/// are held, like for a body with prescribed motion of its frame.
 fn classical_whirl(raw: &RawModel, spin: f64) -> Vec<f64> {
     let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
-    // Of every node uy, uz, ry, rz.
+    // Rows uy, uz, ry, rz of every node.
     let lateral: Vec<usize> = (0..k.nrows()).filter(|row| [1, 2, 4, 5].contains(&(row % 6))).collect();
     let part =
         |a: &DMatrix<f64>| DMatrix::from_fn(lateral.len(), lateral.len(), |i, j| a[(lateral[i], lateral[j])]);
     let (k, own) = (part(&k), part(&m));
     let n = lateral.len();
-    // Angular momentum Ip Omega along the shaft e_x turns with it: moments Ip Omega (-rz', ry') about y and z.
+    // The angular momentum Ip Omega along the shaft axis e_x rotates with it: moments Ip Omega (-rz', ry')
+    // about y and z.
     let mut g = DMatrix::zeros(n, n);
     for node in 0..n / 4 {
         let polar = m[(6 * node + 3, 6 * node + 3)];
         g[(4 * node + 2, 4 * node + 3)] = polar;
         g[(4 * node + 3, 4 * node + 2)] = -polar;
     }
-    // In the modes of the shaft at rest, without its four rigid ones.
+    // Transforms to the modes of the shaft at rest, without its four rigid ones.
     let lower = own.cholesky().expect("mass").l();
     let inverse = lower.try_inverse().expect("regular");
     let modes = (&inverse * k * inverse.transpose()).symmetric_eigen();
@@ -340,13 +342,13 @@ fn classical_whirl(raw: &RawModel, spin: f64) -> Vec<f64> {
     a.view_mut((0, n), (n, n)).copy_from(&DMatrix::identity(n, n));
     (0..n).for_each(|j| a[(n + j, j)] = -modes.eigenvalues[elastic[j]]);
     a.view_mut((n, n), (n, n)).copy_from(&(-shapes.transpose() * g * &shapes * spin));
-    // e^{i w t} in space is e^{i (w -+ Omega) t} in the turning frame; whirl forwards has w > 0 with the spin. The
-    // sign comes from the eigenvector: uz = -i uy for a circle from y to z.
+    // e^{i w t} in space is e^{i (w -+ Omega) t} in the rotating frame; forward whirl has w > 0 with the
+    // spin. The sign comes from the eigenvector: uz = -i uy for a circle from y to z.
     let eigenvalues = a.complex_eigenvalues();
     let complex = a.map(|value| nalgebra::Complex::new(value, 0.0));
     let mut seen = Vec::new();
     for value in eigenvalues.iter().filter(|value| value.im > 1.0) {
-        // Inverse iteration for the vector.
+        // Inverse iteration for the eigenvector.
         let shifted = &complex
             - DMatrix::identity(2 * n, 2 * n) * (value + nalgebra::Complex::new(1e-7, 1e-7) * value.im);
         let lu = shifted.lu();
@@ -376,7 +378,7 @@ fn discs_whirl_as_classical_rotors_do() {
         let spin = 0.4 * body.modes().eigenvalue[0].sqrt();
         let own = body.invariants();
         let (w2, w3) = (own.w2().expect("held"), own.w3().expect("held"));
-        // q'' + 2 w G q' + (Lambda - w^2 (W2_xx - K_xx)) q = 0, G = W3_x'.
+        // q'' + 2 w G q' + (Lambda - w^2 (W2_xx - K_xx)) q = 0 with G = W3_x'.
         let of_inertia = stiffness(&body, LoadKind::Spin, 0);
         let k = DMatrix::from_fn(nf, nf, |i, j| {
             own.modal_stiffness()[(i, j)] - spin * spin * (w2[(i, j)] - of_inertia[(i, j)])
@@ -397,7 +399,8 @@ fn discs_whirl_as_classical_rotors_do() {
     }
 }
 
-/// A mass on a rigid arm, as the inertia of the node that it hangs on and as a point on a stiff massless arm.
+/// A mass on a rigid arm as inertia of the node that carries it is equivalent to a point on a stiff massless
+/// arm.
 #[test]
 fn an_offset_mass_is_a_point_on_a_stiff_arm() {
     let offset = Vector3::new(0.05, 0.3, -0.2);
@@ -413,7 +416,7 @@ fn an_offset_mass_is_a_point_on_a_stiff_arm() {
     let mut m = dense(&plain.mass.matrix).resize(33, 33, 0.0);
     (30..33).for_each(|row| m[(row, row)] = mass);
     let mut arm = k.resize(33, 33, 0.0);
-    // A spring of 1e12 along every axis between the point and where the rigid arm holds it: u - t - theta x r.
+    // Springs of 1e12 along every axis between the point and the end of the rigid arm: u - t - theta x r.
     for c in 0..3 {
         let mut tie = DVector::zeros(33);
         tie[30 + c] = 1.0;
@@ -432,7 +435,8 @@ fn an_offset_mass_is_a_point_on_a_stiff_arm() {
     };
     let (_, point) = converted(as_node, 8, BodyFrame::Com);
 
-    // The load of rest f(w) on the modes, energy f' K^-1 f / 2: it does not depend on signs of modes.
+    // The static load f(w) on the modes has the energy f' K^-1 f / 2, which does not depend on the signs of
+    // modes.
     for axis in [Vector3::new(1.0, 0.0, 0.0), Vector3::new(0.3, -0.8, 0.5), Vector3::new(0.0, 0.6, 0.8)] {
         let energy = |body: &FlexBody| {
             let (w1, nf) = (body.invariants().w1().expect("held"), body.n_modes());
@@ -452,7 +456,8 @@ fn an_offset_mass_is_a_point_on_a_stiff_arm() {
     }
 }
 
-/// Gravity is an acceleration: under it the body does what it does without, in a frame that falls.
+/// Gravity is equivalent to an acceleration of the frame: the motion is that without gravity, in a falling
+/// frame.
 #[test]
 fn gravity_is_an_acceleration_of_the_frame() {
     for raw in [raw_fixture("shell_folded"), block(ElementKind::Hex8).raw, disc_on_shaft(2.0)] {
@@ -494,9 +499,9 @@ fn gravity_is_an_acceleration_of_the_frame() {
     }
 }
 
-/// A cantilever of small point masses with a mass on a rigid arm at its tip, spun about axes through its root: the
-/// deflection of the tip is F L^3 / 3 E I + M L^2 / 2 E I of the centrifugal force F at the mass and its moment M about
-/// the tip, and F a^2 (3 L - a) / 6 E I of the forces of the points at a.
+/// A cantilever of small point masses with a mass on a rigid arm at its tip, spinning about axes through its
+/// root. The deflection of the tip is F L^3 / 3 E I + M L^2 / 2 E I for the centrifugal force F at the mass
+/// and its moment M about the tip, plus F a^2 (3 L - a) / 6 E I for the forces of the points at a.
 #[test]
 fn a_cantilever_with_an_offset_mass_has_the_closed_form() {
     let plain = disc_on_shaft(1.0);
@@ -554,8 +559,8 @@ fn a_cantilever_with_an_offset_mass_has_the_closed_form() {
     }
 }
 
-/// An inclined elbow of consistent beams: what does not turn with the nodes changes its response to spin by an amount
-/// that falls with the square of the element size.
+/// An inclined elbow of consistent beams: the mass that does not rotate with the nodes changes the response
+/// to spin by an amount that falls with the square of the element size.
 #[test]
 fn refinement_takes_what_does_not_turn_away() {
     let response = |parts: usize| {

@@ -1,5 +1,5 @@
-//! Velocity and acceleration of watched points, and what the reference conditions carry: as differences of
-//! the places, as the unreduced equations have them, and in closed form.
+//! Velocity and acceleration of watched points, and forces of the reference conditions: compared with
+//! differences of positions, with the unreduced equations, and with closed forms.
 
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
@@ -17,7 +17,7 @@ use oracle::general::raw_fixture;
 use oracle::scenes::nothing_happens;
 use oracle::unreduced::{soft_block, soft_plate};
 
-/// The scene of a text, as the program reads it.
+/// Reads the scene of a text like the program.
 fn scene(text: &str) -> Scene {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
@@ -29,8 +29,8 @@ fn recorded(body: &FlexBody, scene: &Scene) -> Recording {
     simulate(body, scene, &Context::QUIET).expect("a motion").0
 }
 
-/// What is left of the velocity and of the acceleration when central differences of the places are taken from
-/// them, relative to the largest.
+/// Returns the differences of velocity and acceleration from central differences of the positions, relative
+/// to the largest.
 fn beside_differences(path: &Path, width: f64) -> [f64; 2] {
     let inner = 1..path.place.len() - 1;
     let largest = |vectors: &[Vector3<f64>]| vectors.iter().map(|v| v.norm()).fold(0.0, f64::max);
@@ -42,8 +42,8 @@ fn beside_differences(path: &Path, width: f64) -> [f64; 2] {
     [most(&velocity) / largest(&path.velocity), most(&acceleration) / largest(&path.acceleration)]
 }
 
-/// Half the distance of the instants leaves a quarter of the difference. Nothing is compared at kinks: these
-/// scenes have none.
+/// Half the distance of the output times gives a quarter of the difference. These scenes have no kinks, where
+/// differences would not converge.
 #[test]
 fn velocities_and_accelerations_are_derivatives_of_the_places() {
     let tumbling = "gravity = [0, 0, -9810]\n[initial]\nvelocity = [500, 0, 2000]\nangular_velocity = [28, 900, 4]\n\
@@ -77,9 +77,9 @@ fn velocities_and_accelerations_are_derivatives_of_the_places() {
     }
 }
 
-/// Steady spin about a held axis: every point moves on a circle, whatever the deformation is that the spin
-/// holds. Explicit steps let rounding grow up to their tolerance, and accelerations see that times the largest
-/// eigenvalue: the tolerance is as small as it may be.
+/// For a steady spin about a held axis every point moves on a circle, with the deformation caused by the
+/// spin. Explicit steps let rounding grow up to their tolerance, and accelerations amplify it by the largest
+/// eigenvalue: the tolerance is therefore the smallest possible.
 #[test]
 fn a_steady_spin_has_centripetal_accelerations() {
     let body = fixture("bracket_hex20", 6, BodyFrame::Principal);
@@ -99,7 +99,7 @@ fn a_steady_spin_has_centripetal_accelerations() {
     }
 }
 
-/// A model with all of its modes, along its own axes.
+/// Returns a model with all of its modes, along its own axes.
 fn whole(raw: RawModel) -> (FeModel, FlexBody) {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(10_000), ..ModeSettings::default() };
@@ -108,8 +108,8 @@ fn whole(raw: RawModel) -> (FeModel, FlexBody) {
     (model, body)
 }
 
-/// The body turns, flies and vibrates under gravity; all nodes are watched. Deformation, gravity and the square of the
-/// spin are of the size `amplitude`.
+/// Returns a scene in which the body rotates, translates and vibrates under gravity; all nodes are watched.
+/// Deformation, gravity and the square of the spin are proportional to `amplitude`.
 fn lively(body: &FlexBody, amplitude: f64) -> Scene {
     let (rate, mass) = (body.modes().eigenvalue[0].sqrt(), body.invariants().mass());
     let plane = body.dimension() == 2;
@@ -127,8 +127,8 @@ fn lively(body: &FlexBody, amplitude: f64) -> Scene {
     scene
 }
 
-/// Largest differences from the unreduced equations: of velocities and accelerations of the nodes, relative to the
-/// largest, of the torque of the conditions, and of their force relative to that of the accelerations.
+/// Largest differences from the unreduced equations: velocities and accelerations of the nodes, relative to
+/// the largest, torque of the conditions, and their force relative to that of the accelerations.
 #[derive(Debug, Default)]
 struct Differences {
     velocity: f64,
@@ -185,7 +185,7 @@ fn differences(model: &FeModel, body: &FlexBody, scene: &Scene) -> Differences {
 }
 
 /// With all modes the nodes of the reduced body have the velocities and accelerations of the unreduced
-/// equations, and the reference conditions carry what lambda does there; of damped bodies too.
+/// equations, and the forces of the reference conditions equal lambda there; also for damped bodies.
 #[test]
 fn watched_nodes_and_conditions_are_those_of_the_unreduced_equations() {
     let solid = |mut raw: RawModel, damping: Option<Damping<RawMatrix>>| {
@@ -212,9 +212,9 @@ fn watched_nodes_and_conditions_are_those_of_the_unreduced_equations() {
     }
 }
 
-/// The same where rotations carry mass, which the reduced equations have to second order of the displacements: half the
-/// amplitude halves what accelerations differ by. No torque of the conditions is recorded then, since it is no sum over
-/// invariants.
+/// If rotations carry mass, the reduced equations hold to second order of the displacements: half the
+/// amplitude halves the relative difference of accelerations. The torque of the conditions is then not
+/// recorded, because it is no sum over invariants.
 #[test]
 fn watched_nodes_that_turn_are_those_of_the_unreduced_equations_to_second_order() {
     let (model, body) = whole(raw_fixture("mpc_block"));
@@ -224,7 +224,7 @@ fn watched_nodes_that_turn_are_those_of_the_unreduced_equations_to_second_order(
     assert!((1.8..2.2).contains(&ratio) && fine.acceleration < 1e-3, "{coarse:?} and {fine:?}");
 }
 
-/// A carrier is the reference condition of the body that hangs from it: its reaction is all that there is.
+/// The carrier is the reference condition of a carried body: its reaction is the only constraint force.
 #[test]
 fn a_carried_body_has_no_mean_axes() {
     let body = fixture("bracket_hex20", 4, BodyFrame::Principal);

@@ -1,12 +1,13 @@
-//! Axes of charts: a range of values, its scale and the values that are marked.
+//! Axes of charts: range of values, scale and tick marks.
 
 use crate::numbers::significant;
 
-/// Intervals between the marked values of a linear axis.
+/// Approximate number of intervals between the ticks of a linear axis; the step is rounded to 1, 2 or 5 times
+/// a power of ten.
 const INTERVALS: f64 = 4.0;
-/// Labels that a logarithmic axis has at most: more would touch each other on the smallest panel.
+/// Largest number of labels of a logarithmic axis; more labels would overlap on the smallest panel.
 const MOST_LABELS: f64 = 7.0;
-/// Decades below which the multiples 2 and 5 of powers of ten are marked as well.
+/// Number of decades below which the multiples 2 and 5 of powers of ten are labelled as well.
 const FEW_DECADES: f64 = 2.0;
 
 /// Scale of an axis.
@@ -14,7 +15,7 @@ const FEW_DECADES: f64 = 2.0;
 pub(crate) enum Scale {
     /// Equal steps for equal differences.
     Linear,
-    /// Equal steps for equal ratios; values that are not positive have no place.
+    /// Equal steps for equal ratios; values that are not positive are not drawn.
     Logarithmic,
 }
 
@@ -27,10 +28,10 @@ impl Scale {
     }
 }
 
-/// A range of values with its marked values.
+/// Range of values with its ticks.
 #[derive(Debug, Clone)]
 pub(crate) struct Axis {
-    /// Quantity or unit, which stands beside the axis.
+    /// Quantity or unit shown beside the axis.
     pub label: String,
     scale: Scale,
     ends: [f64; 2],
@@ -38,7 +39,7 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// Returns the linear axis from one round value to another around all `values`; `None` if none of them is finite.
+    /// Returns the linear axis between round values around all `values`; `None` if no value is finite.
     pub(crate) fn around(label: &str, values: impl Iterator<Item = f64>) -> Option<Self> {
         let finite = values.filter(|value| value.is_finite());
         let (mut low, mut high) = finite
@@ -56,7 +57,7 @@ impl Axis {
         Some(Self::new(label, Scale::Linear, [first * step, last * step], marked))
     }
 
-    /// Returns the axis from the first value to the last; `None` if the range is empty.
+    /// Returns the axis from the first to the last value; `None` if the range is empty.
     pub(crate) fn between(label: &str, scale: Scale, ends: [f64; 2]) -> Option<Self> {
         let [low, high] = ends.map(|end| scale.of(end));
         if !(low.is_finite() && high.is_finite() && low < high) {
@@ -76,8 +77,8 @@ impl Axis {
         Some(Self::new(label, scale, ends, marked.into_iter()))
     }
 
-    /// Returns the logarithmic axis over whole decades around all positive `values`, cut to the `most` highest ones;
-    /// `None` without a positive value.
+    /// Returns the logarithmic axis over whole decades around all positive `values`, limited to the `most`
+    /// highest decades; `None` without a positive value.
     pub(crate) fn decades(label: &str, values: impl Iterator<Item = f64>, most: f64) -> Option<Self> {
         let positive = values.filter(|value| *value > 0.0 && value.is_finite()).map(f64::log10);
         let (low, high) = positive.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), power| {
@@ -104,32 +105,33 @@ impl Axis {
         Self { label: label.to_owned(), scale, ends, ticks }
     }
 
-    /// Returns the axis with other labels at its marked values.
+    /// Returns the axis with other tick labels.
     pub(crate) fn with_labels(mut self, label: impl Fn(f64) -> String) -> Self {
         self.ticks.iter_mut().for_each(|(value, text)| *text = label(*value));
         self
     }
 
-    /// First and last value.
+    /// Returns the first and the last value.
     #[cfg(feature = "hdf5")]
     pub(crate) fn ends(&self) -> [f64; 2] {
         self.ends
     }
 
-    /// Place of a value from 0 to 1; a value beyond an end stands at that end. `None` for a value that has no place.
+    /// Returns the position of a value on the axis, from 0 to 1; a value beyond an end is placed at that end.
+    /// `None` for a value that the scale cannot show.
     pub(crate) fn at(&self, value: f64) -> Option<f64> {
         let [low, high] = self.ends.map(|end| self.scale.of(end));
         let at = self.scale.of(value);
         at.is_finite().then(|| (at.clamp(low, high) - low) / (high - low))
     }
 
-    /// Places and labels of the marked values.
+    /// Returns positions and labels of the ticks.
     pub(crate) fn ticks(&self) -> impl Iterator<Item = (f64, &str)> {
         self.ticks.iter().filter_map(|(value, label)| Some((self.at(*value)?, label.as_str())))
     }
 }
 
-/// The next of 1, 2, 5 times a power of ten that is not below `step`.
+/// Returns the smallest of 1, 2 and 5 times a power of ten that is not below `step`.
 fn round_step(step: f64) -> f64 {
     let power = 10f64.powf(step.log10().floor());
     let round = [1.0, 2.0, 5.0, 10.0].into_iter().find(|factor| factor * power >= step * (1.0 - 1e-12));

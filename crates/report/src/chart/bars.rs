@@ -4,7 +4,7 @@ use super::{At, Axis, STYLES, label, segment};
 use crate::html::Plain;
 use maud::{Markup, Render, html};
 
-/// Places on the drawing, in its own units: the names of the groups, the bars, the values at their ends.
+/// Layout of the drawing in its own units: names of the groups, bars, values at their ends.
 const NAMES: f64 = 112.0;
 const PLOT: f64 = 560.0;
 const VALUES: f64 = 168.0;
@@ -20,11 +20,11 @@ pub(crate) struct Bars {
     pub groups: Vec<(String, Vec<Bar>)>,
 }
 
-/// One bar; a value that is not known has none.
+/// A bar. An infinite value fills the plot; an unknown value (NaN) has a label only.
 pub(crate) struct Bar {
     pub style: usize,
     pub value: f64,
-    /// Value and name, which stand at the end of the bar.
+    /// Text of the value, and name, shown at the end of the bar.
     pub label: String,
     pub name: String,
 }
@@ -71,7 +71,7 @@ impl Bars {
     }
 }
 
-/// A name that fits beside the bars.
+/// Returns a name shortened to fit beside the bars.
 fn shortened(name: &str) -> String {
     const LONGEST: usize = 16;
     if name.chars().count() <= LONGEST {

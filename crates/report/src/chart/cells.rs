@@ -1,15 +1,15 @@
-//! Values in rows and columns as cells of different strength.
+//! Map of values in rows and columns, as cells of different strength.
 
 use super::{At, Axis, label};
 use crate::html::Plain;
 use crate::numbers::significant;
 use maud::{Markup, Render, html};
 
-/// Decades of the scale, below 1, and steps of the colour in all.
+/// Number of decades of the scale below 1, and number of colour steps.
 pub(crate) const DECADES: i32 = 4;
 pub(crate) const STEPS: usize = 12;
 
-/// Places on the drawing, in its own units.
+/// Layout of the drawing in its own units.
 const LEFT: f64 = 44.0;
 const TOP: f64 = 20.0;
 const WIDEST: f64 = 430.0;
@@ -17,15 +17,15 @@ const WIDEST: f64 = 430.0;
 /// A map of values from 0 to 1 on a logarithmic scale.
 pub(crate) struct Cells {
     pub description: String,
-    /// Names of the rows; `None`: their numbers.
+    /// Names of the rows; `None` for row numbers.
     pub names: Option<Vec<String>>,
     pub values: Vec<Vec<f64>>,
-    /// Name of the cell in a row and a column, which a pointer at it shows.
+    /// Name of the cell in a row and a column, shown when the pointer is over it.
     pub place: fn(usize, usize) -> String,
 }
 
-/// The step of the scale that a value is in, from 0; `None` below the scale.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // from 0 on, before
+/// Returns the colour step of a value, from 0; `None` below the scale.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the value is not negative
 pub(crate) fn step(value: f64) -> Option<usize> {
     let last = STEPS - 1;
     if value.is_nan() || value > 1.0 {
@@ -69,7 +69,7 @@ impl Render for Cells {
     }
 }
 
-/// The colours of the scale with their values.
+/// Draws the colours of the scale with their values.
 pub(crate) fn colour_scale() -> Markup {
     let width = 300.0 / STEPS as f64;
     let axis = Axis::decades("", [10f64.powi(-DECADES), 1.0].into_iter(), f64::from(DECADES));

@@ -11,21 +11,21 @@ pub(crate) use cells::{Cells, DECADES, STEPS, colour_scale, step};
 use crate::html::{Plain, raised};
 use maud::{Markup, Render, html};
 
-/// Places on the drawing, in its own units: the labels of the vertical axis, the panels, the names of the series.
+/// Layout of the drawing in its own units: labels of the vertical axis, panels, names of the series.
 const LEFT: f64 = 92.0;
 const WIDTH: f64 = 600.0;
 const NAMES: f64 = 148.0;
 const TOP: f64 = 24.0;
 const BOTTOM: f64 = 52.0;
-/// Distance of two panels.
+/// Distance between two panels.
 const GAP: f64 = 30.0;
-/// Distance of two names.
+/// Distance between two names in the legend.
 const NAME: f64 = 18.0;
 /// Half the size of a mark.
 const MARK: f64 = 4.0;
-/// Columns that the points of a line are gathered to: no more can be seen.
+/// Number of columns that the points of a line are reduced to; a screen cannot resolve more.
 const COLUMNS: usize = 600;
-/// Lines and colours of the style sheet.
+/// Number of lines and colours in the style sheet.
 pub(crate) const STYLES: usize = 3;
 
 /// Panels with a common horizontal axis, one above the other.
@@ -45,13 +45,13 @@ pub(crate) struct Panel {
 
 /// Points of one kind.
 pub(crate) struct Series {
-    /// Name in the legend; a series without one is not in it.
+    /// Name in the legend; a series with an empty name has no legend entry.
     pub name: String,
     pub mark: Mark,
     /// Number of the line and colour in the style sheet.
     pub style: usize,
     pub points: Vec<[f64; 2]>,
-    /// Texts that a pointer at the points shows; empty for none.
+    /// Texts shown when the pointer is over a point; empty for none.
     pub titles: Vec<String>,
 }
 
@@ -62,7 +62,8 @@ impl Series {
     }
 }
 
-/// Drawing of the points of a series; trade studies, which need HDF5, have most of them.
+/// Drawing style of the points of a series. Most of the styles are used by trade studies only, which need
+/// HDF5.
 #[cfg_attr(not(feature = "hdf5"), allow(dead_code))]
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Mark {
@@ -79,7 +80,7 @@ pub(crate) enum Mark {
     Ring,
 }
 
-/// A coordinate with the digits that a drawing needs.
+/// A coordinate, written with the digits that a drawing needs.
 pub(super) struct At(pub f64);
 
 impl Render for At {
@@ -88,12 +89,12 @@ impl Render for At {
     }
 }
 
-/// A line of the class.
+/// Returns an SVG line of a class.
 pub(super) fn segment(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Markup {
     html! { line class=(class) x1=(At(x1)) y1=(At(y1)) x2=(At(x2)) y2=(At(y2)) {} }
 }
 
-/// A label of the given anchor: `start`, `middle` or `end`.
+/// Returns a label with the given anchor: `start`, `middle` or `end`.
 pub(super) fn label(class: &str, anchor: &str, [x, y]: [f64; 2], text: &str) -> Markup {
     html! { text class=(class) x=(At(x)) y=(At(y)) text-anchor=(anchor) { (Plain(text)) } }
 }
@@ -124,7 +125,7 @@ impl Render for Chart {
     }
 }
 
-/// A panel at its place.
+/// A panel with its position in the chart.
 struct Placed<'c> {
     x: &'c Axis,
     panel: &'c Panel,
@@ -159,7 +160,7 @@ impl Placed<'_> {
         }
     }
 
-    /// Labels of the horizontal axis, below the panel.
+    /// Draws the labels of the horizontal axis below the panel.
     fn below(&self) -> Markup {
         let y = self.bottom();
         html! {
@@ -194,7 +195,7 @@ impl Placed<'_> {
         html! { polyline class={ "l" (style) } points=(places.join(" ")) {} }
     }
 
-    /// Names of the series beside the panel, each behind its mark.
+    /// Draws the names of the series beside the panel, each behind its mark.
     fn legend(&self) -> Markup {
         let from = LEFT + WIDTH + 10.0;
         let named =
@@ -213,7 +214,7 @@ impl Placed<'_> {
     }
 }
 
-/// The mark of a point, by shape and colour.
+/// Draws the mark of a point, by shape and colour.
 fn mark(series: &Series, [x, y]: [f64; 2], title: Option<&String>) -> Markup {
     let style = series.style;
     let title = html! { @if let Some(title) = title { title { (Plain(title)) } } };
@@ -237,12 +238,14 @@ fn mark(series: &Series, [x, y]: [f64; 2], title: Option<&String>) -> Markup {
     }
 }
 
-/// The pieces of a line: whole, or of angles between the jumps from one end of the circle to the other.
+/// Splits a line into pieces; lines of angles are split where the angle jumps from one end of the circle to
+/// the other.
 fn pieces(points: &[[f64; 2]], mark: Mark) -> impl Iterator<Item = &[[f64; 2]]> {
     points.chunk_by(move |a, b| mark != Mark::Angle || (b[1] - a[1]).abs() <= 180.0)
 }
 
-/// The finite points of a line, gathered to the smallest and the largest value of every column where there are many.
+/// Returns the finite points of a line. If there are many, keeps only the smallest and the largest value of
+/// each column.
 fn gathered(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let all: Vec<[f64; 2]> = points.iter().copied().filter(|[_, value]| value.is_finite()).collect();
     let size = all.len().div_ceil(COLUMNS);
@@ -296,7 +299,7 @@ mod tests {
     fn points_stand_where_their_values_are_and_unknown_ones_nowhere() {
         let y = || Axis::decades("", [1e-2, 1.0].into_iter(), 9.0).expect("a range");
         let chart = drawn(y(), Mark::Disc, vec![[1.0, 1.0], [2.0, f64::NAN], [3.0, 0.0], [5.0, 1e-3]]);
-        // Two points, and one in the legend.
+        // The chart has two points, and one mark in the legend.
         assert_eq!(chart.matches("<circle").count(), 3, "{chart}");
         assert!(chart.contains(&format!("cx=\"{LEFT:.1}\" cy=\"{TOP:.1}\"")), "{chart}");
         assert!(chart.contains(&format!("cx=\"{:.1}\" cy=\"{:.1}\"", LEFT + WIDTH, TOP + 100.0)), "{chart}");

@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 use std::collections::BTreeSet;
 
 impl BodyComparison {
-    /// Compares the interfaces of the same names; `tolerance` is that of reference points, relative to the radius
-    /// of gyration.
+    /// Compares the interfaces of the same names; `tolerance` applies to reference points, relative to the
+    /// radius of gyration.
     pub(super) fn interfaces(&mut self, pair: &Pair<'_>, tolerance: f64) {
         let (a, b) = (pair.a.interfaces(), pair.b.interfaces());
         let neither = a.is_empty() && b.is_empty();
@@ -50,7 +50,7 @@ impl BodyComparison {
         self.notes.extend(notes);
     }
 
-    /// Says in words how two interfaces of one name differ.
+    /// Returns the differences of two interfaces of one name in words.
     fn differences(&self, pair: &Pair<'_>, a: &Interface, b: &Interface) -> Vec<String> {
         let name = &a.name;
         let mut found = Vec::new();
@@ -64,7 +64,7 @@ impl BodyComparison {
             ));
         }
         let stated = |interface: &Interface| interface.coupling.map_or("not stated", |c| c.name());
-        // A file of another program may have no place for it.
+        // The format of another program may not store the coupling.
         let unknown =
             |body: &FlexBody, interface: &Interface| !is_placed(body) && interface.coupling.is_none();
         if a.coupling != b.coupling && !unknown(pair.a, a) && !unknown(pair.b, b) {

@@ -1,5 +1,5 @@
-//! Comparison of the matrices of modes (nf x nf) beside the invariants: damping, geometric stiffness, stiffness of
-//! inertia.
+//! Comparison of the modal matrices (nf x nf) other than the invariants: damping, geometric stiffness,
+//! stiffness of inertia.
 
 use super::{BodyComparison, Pair, relative};
 use faer::Mat;
@@ -8,12 +8,12 @@ use flexbody_body::invariants::InertiaStiffness;
 use flexbody_linalg::{gram, larger, largest_entry};
 use std::ops::Range;
 
-/// Stiffness of unit loads.
+/// Modal stiffness matrices of unit loads.
 type OfLoads = Vec<GeometricStiffness<Mat<f64>>>;
 
 impl BodyComparison {
-    /// Compares damping and the stiffness of unit loads. `basis` carries the modes of b to those of a; without one
-    /// norms over groups of modes are compared.
+    /// Compares damping and the stiffness of unit loads. `basis` transforms the modes of `b` to those of `a`;
+    /// without a basis, norms over groups of modes are compared.
     pub(super) fn modal_matrices(&mut self, pair: &Pair<'_>, basis: Option<&Mat<f64>>, tolerance: f64) {
         let matrices = Matrices { groups: &pair.groups, basis };
         let paths = "/modes/damping_ratio, /invariants/modal_damping";
@@ -43,7 +43,8 @@ impl BodyComparison {
         }
     }
 
-    /// Compares the stiffness of unit loads, which was moved by `distance` into the frame of a.
+    /// Compares the stiffness of unit loads of both bodies; that of `b` was shifted by `distance` into the
+    /// frame of `a`.
     fn stiffness_of_loads(
         &mut self,
         quantity: &'static str,
@@ -54,13 +55,14 @@ impl BodyComparison {
     ) {
         let Some(found) = matrices.of_loads(&loads.a, &loads.b_in_frame_of_a) else { return };
         let meaning = "largest entry / largest of the kind of load";
-        // K about another point is K less that of acceleration times the distance.
+        // The stiffness of spin about another point differs by the stiffness of acceleration times the
+        // distance, whose rounding is lost.
         let lost = found.rounding(&loads.b, distance);
         self.row(quantity, meaning, found.difference, tolerance + lost);
         self.notes.extend(found.missing.into_iter().map(|note| format!("{quantity} for {note}")));
     }
 
-    /// Compares D_pq / (2 sqrt(omega_p omega_q)), whose diagonal has the damping ratios.
+    /// Compares D_pq / (2 sqrt(omega_p omega_q)); the diagonal holds the damping ratios.
     fn damping(&mut self, pair: &Pair<'_>, matrices: &Matrices<'_>, tolerance: f64) {
         let root: Vec<f64> = pair.a.modes().eigenvalue.iter().map(|lambda| lambda.powf(0.25)).collect();
         let ratios =
@@ -88,8 +90,8 @@ fn largest_ratio(body: &FlexBody) -> f64 {
     body.modes().damping_ratio.iter().copied().fold(0.0, larger)
 }
 
-/// Returns the largest difference of the damping ratios over groups of modes: their sum, weighted by frequency, is
-/// the same in every basis of a repeated eigenvalue.
+/// Returns the largest difference of the damping ratios over groups of modes. The frequency-weighted sum over
+/// a group is the same in every basis of a repeated eigenvalue.
 fn difference_of_ratios(pair: &Pair<'_>) -> f64 {
     let sum = |body: &FlexBody, g: &Range<usize>| {
         let modes = body.modes();
@@ -101,7 +103,7 @@ fn difference_of_ratios(pair: &Pair<'_>) -> f64 {
     pair.groups.iter().map(of_group).fold(0.0, larger)
 }
 
-/// Way of comparing matrices of modes of two bodies.
+/// Comparison of modal matrices of two bodies, by entries or by norms.
 struct Matrices<'a> {
     groups: &'a [Range<usize>],
     basis: Option<&'a Mat<f64>>,
@@ -113,7 +115,7 @@ struct LoadDifference {
     difference: f64,
     /// Largest entry of every kind of load.
     sizes: Vec<(LoadKind, f64)>,
-    /// Loads that one of the bodies has no matrix for, in words.
+    /// Loads without a matrix in one of the bodies, in words.
     missing: Vec<String>,
 }
 
@@ -131,15 +133,17 @@ impl Matrices<'_> {
         pairs.map(|(g, h)| (norm(a, g, h) - norm(b, g, h)).abs()).fold(0.0, larger)
     }
 
-    /// Compares matrices of unit loads along the same axes about the same point; `None` if there are none. A load
-    /// without a matrix has the matrix zero.
+    /// Compares matrices of unit loads along the same axes about the same point; `None` if there are none. A
+    /// missing matrix counts as zero.
     fn of_loads(&self, a: &OfLoads, b: &OfLoads) -> Option<LoadDifference> {
         let nf = a.first().or(b.first())?.matrix.nrows();
+        // Loads of either body, each once.
         let mut loads: Vec<&UnitLoad> = a.iter().map(|one| &one.load).collect();
         loads.extend(b.iter().map(|one| &one.load).filter(|load| a.iter().all(|one| one.load != **load)));
         let of = |all: &OfLoads, load: &UnitLoad| {
             all.iter().find(|one| one.load == *load).map(|one| one.matrix.clone())
         };
+        // Largest entry of each kind of load, the scale of its differences.
         let mut found = LoadDifference { difference: 0.0, sizes: Vec::new(), missing: Vec::new() };
         for one in a.iter().chain(b) {
             let size = largest_entry(one.matrix.as_ref());
@@ -148,6 +152,7 @@ impl Matrices<'_> {
                 None => found.sizes.push((one.load.kind.clone(), size)),
             }
         }
+        // Differences load by load; a missing matrix counts as zero.
         for load in loads {
             let (own, other) = (of(a, load), of(b, load));
             let zero = || Mat::zeros(nf, nf);
@@ -174,7 +179,8 @@ impl LoadDifference {
         self.sizes.iter().find(|(known, _)| known == kind).map_or(0.0, |(_, size)| *size)
     }
 
-    /// Returns the rounding of matrices about a point at the distance `d`, relative to the smallest size of a kind.
+    /// Returns the rounding error of matrices shifted by the distance `d`, relative to the smallest size of a
+    /// kind of load.
     fn rounding(&self, before: &OfLoads, d: f64) -> f64 {
         if d == 0.0 {
             return 0.0;

@@ -1,5 +1,5 @@
-//! Comparison of the rows of the modes beside the displacements: rotations of nodes, rows without a place, moments
-//! of the mass that turns with the nodes.
+//! Comparison of the nodal data of the modes other than displacements: rotations of nodes, internal rows,
+//! moments of nodal rotary inertia.
 
 use super::{BodyComparison, Pair, product, relative, turned};
 use crate::mass_properties::gyration_radius;
@@ -11,8 +11,8 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 impl BodyComparison {
-    /// Compares what bodies with the same nodes have beside displacements; `order` gives the node of b for each of
-    /// a, `basis` carries the modes of b to those of a.
+    /// Compares nodal data other than displacements of bodies with the same nodes. `order` gives the node of
+    /// `b` for each node of `a`; `basis` transforms the modes of `b` to those of `a`.
     pub(super) fn nodal_rows(
         &mut self,
         pair: &Pair<'_>,
@@ -40,7 +40,8 @@ impl BodyComparison {
         let radius = gyration_radius(pair.a.invariants());
         let of_group = |g: &Range<usize>| {
             let norm = |x: &Mat<f64>| x.as_ref().subcols(g.start, g.len()).norm_l2();
-            // Modes that bend nothing have rotations of rounding.
+            // Modes without bending have rotations that are rounding; the displacements over the radius bound
+            // the scale.
             relative(norm(&(&own - &other)), larger(norm(&own), norm(&a.shape) / radius))
         };
         let largest = pair.groups.iter().map(of_group).fold(0.0, larger);
@@ -85,8 +86,8 @@ impl BodyComparison {
     }
 }
 
-/// Returns the largest difference of a group of modes, relative to the largest group; infinite if the labels of the
-/// rows differ.
+/// Returns the largest difference of a group of modes, relative to the largest group; infinite if the labels
+/// of the rows differ.
 fn internal_difference(
     a: &InternalRows,
     b: &InternalRows,

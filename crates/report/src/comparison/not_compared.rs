@@ -2,17 +2,18 @@
 
 use flexbody_body::flex_body::FlexBody;
 
-/// Entries that belong together.
+/// Entries of the file that belong together.
 struct Entries {
     /// Name of the entries.
     name: &'static str,
-    /// Their paths in the file.
+    /// Paths of the entries in the file.
     paths: &'static str,
     /// True if a body has such entries.
     has: fn(&FlexBody) -> bool,
 }
 
-/// Entries that are never compared: they say where a body comes from and what was proved, or follow from others.
+/// Entries that are never compared: they record the origin and the proofs of a body, or follow from other
+/// entries.
 const NEVER: &[Entries] = &[
     Entries { name: "provenance", paths: "/@generator, /@format_minor, /source", has: |_| true },
     Entries {
@@ -48,7 +49,7 @@ const NEVER: &[Entries] = &[
     },
 ];
 
-/// Entries that are compared only where both bodies have the same nodes.
+/// Entries that are compared only if both bodies have the same nodes.
 const WITH_COMMON_NODES: &[Entries] = &[
     Entries {
         name: "nodes and modes at them",

@@ -12,7 +12,7 @@ impl Packed {
         Self::of_bytes(name, &values.flat_map(i16::to_le_bytes).collect::<Vec<u8>>())
     }
 
-    /// Indices of so many vertices: 16 bits each where these are enough.
+    /// Packs vertex indices as 16-bit integers if `vertices` is small enough, otherwise as 32-bit integers.
     pub(crate) fn indices(name: &'static str, vertices: usize, values: &[u32]) -> Self {
         let bytes: Vec<u8> = if vertices > usize::from(u16::MAX) {
             values.iter().flat_map(|value| value.to_le_bytes()).collect()
@@ -34,12 +34,12 @@ impl Packed {
     }
 }
 
-/// The element that holds an array.
+/// Returns the element of the page that holds an array.
 pub(crate) fn script(array: &Packed) -> String {
     format!("<script type=\"text/plain\" id=\"data-{}\">{}</script>\n", array.name, array.base64)
 }
 
-/// Bytes as text (RFC 4648, section 4).
+/// Returns bytes as base64 (RFC 4648, section 4).
 fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);

@@ -1,4 +1,4 @@
-//! Drawn parts of a body: its surface, thinned where it is large, or its nodes as points.
+//! Drawn parts of a body: its surface, with fewer triangles if it is large, or its nodes as points.
 
 use super::arrays::Packed;
 use crate::numbers::counted;
@@ -6,38 +6,38 @@ use faer::MatRef;
 use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
 use nalgebra::{Matrix3, Vector3};
 
-/// Half a step of 16-bit numbers, relative to the largest.
+/// Half a step of a 16-bit number, relative to the largest.
 #[cfg(feature = "hdf5")]
 pub(crate) const HALF_STEP: f64 = 0.5 / STEPS;
-/// Steps of 16-bit numbers from zero to the largest.
+/// Number of steps of a 16-bit number from zero to the largest.
 const STEPS: f64 = 32767.0;
 
-/// Fewer nodes than these show no shape, however many modes there are.
+/// Smallest number of drawn nodes. Fewer nodes show no recognisable shape, however many modes share the page.
 const LEAST: usize = 300;
 
-/// Nodes and lines of a page.
+/// Nodes and triangles that a page draws.
 pub(crate) struct Drawing<'b> {
     body: &'b FlexBody,
     mesh: Option<SurfaceMesh>,
-    /// Nodes that are drawn, ascending.
+    /// Drawn nodes, ascending.
     nodes: Vec<u32>,
-    /// Their places in model coordinates.
+    /// Positions of the drawn nodes in model coordinates. Unit: length.
     places: Vec<[f64; 3]>,
-    /// Middle of the box around them.
+    /// Centre of the box around the drawn nodes. Unit: length.
     centre: Vector3<f64>,
-    /// Half its largest extent.
+    /// Half the largest extent of the box. Unit: length.
     half: f64,
-    /// Largest component and largest displacement of every mode at these nodes.
+    /// Largest component and largest displacement of each mode at the drawn nodes.
     sizes: Vec<[f64; 2]>,
 }
 
 impl<'b> Drawing<'b> {
-    /// The surface of at most so many `triangles` or, without a number, what `room` bytes of text hold, with
-    /// the first `modes` at the most.
+    /// Builds the drawing of a body with at most `triangles` triangles or, without a number, as many as
+    /// `room` bytes of text hold together with at most the first `modes` modes.
     pub(crate) fn new(body: &'b FlexBody, triangles: Option<usize>, room: usize, modes: usize) -> Self {
         let modes = modes.min(body.n_modes());
-        // Six bytes for the place and for each shape, and two triangles for each node; four letters for three
-        // bytes.
+        // A node needs six bytes for its position and six for each shape, plus two triangles; base64 writes
+        // three bytes as four letters.
         let most = (room / (8 + 8 * modes + 32)).max(LEAST);
         let positions = &body.nodes().positions;
         let mesh = body.mesh().and_then(|mesh| mesh.decimated(positions, triangles.unwrap_or(2 * most)));
@@ -66,7 +66,7 @@ impl<'b> Drawing<'b> {
         own
     }
 
-    /// Displacement of a drawn node in a mode, body axes.
+    /// Returns the displacement of a drawn node in a mode, in body axes.
     fn displacement(&self, node: u32, j: usize) -> Vector3<f64> {
         let shape = &self.body.modes().shape;
         Vector3::from_fn(|k, _| shape[(3 * node as usize + k, j)])
@@ -81,7 +81,7 @@ impl<'b> Drawing<'b> {
         self.nodes.iter().fold([0.0; 2], larger)
     }
 
-    /// Positions, shapes, triangles and edges as the page has them.
+    /// Returns positions, shapes, triangles and edges in the form that the page reads.
     pub(crate) fn arrays(&self) -> Vec<Packed> {
         let axes = self.body.frame().axes;
         let half = if self.half > 0.0 { self.half } else { 1.0 };
@@ -104,23 +104,23 @@ impl<'b> Drawing<'b> {
         arrays
     }
 
-    /// Number of modes that it moves in.
+    /// Returns the number of modes in the drawing.
     pub(crate) fn modes(&self) -> usize {
         self.sizes.len()
     }
 
-    /// Places of the vertices in model coordinates.
+    /// Returns the positions of the vertices in model coordinates.
     pub(crate) fn places(&self) -> &[[f64; 3]] {
         &self.places
     }
 
-    /// Vertices of every triangle.
+    /// Returns the vertices of every triangle.
     pub(crate) fn triangle_corners(&self) -> Vec<[u32; 3]> {
         let triangles = self.mesh.iter().flat_map(SurfaceMesh::triangles);
         triangles.filter_map(|nodes| self.vertices_of(nodes)).collect()
     }
 
-    /// Vertices of every edge.
+    /// Returns the vertices of every edge.
     pub(crate) fn edge_ends(&self) -> Vec<[u32; 2]> {
         let edges = self.mesh.iter().flat_map(SurfaceMesh::edges);
         edges.filter_map(|nodes| self.vertices_of(nodes)).collect()
@@ -134,7 +134,7 @@ impl<'b> Drawing<'b> {
         Some(own)
     }
 
-    /// The vertex of the page that draws a node of the body.
+    /// Returns the vertex of the page that draws a node of the body; `None` if the node is not drawn.
     pub(crate) fn vertex(&self, node: usize) -> Option<u32> {
         let node = u32::try_from(node).ok()?;
         self.nodes.binary_search(&node).ok().and_then(|at| u32::try_from(at).ok())
@@ -152,7 +152,7 @@ impl<'b> Drawing<'b> {
         self.mesh.as_ref().map_or(0, |mesh| mesh.edges().len())
     }
 
-    /// `surface`, `lines` or `points`.
+    /// Returns the kind of drawing: `surface`, `lines` or `points`.
     pub(crate) fn kind(&self) -> &'static str {
         match (self.triangles(), self.edges()) {
             (0, 0) => "points",
@@ -161,7 +161,7 @@ impl<'b> Drawing<'b> {
         }
     }
 
-    /// `1200 triangles, thinned from 4000`.
+    /// Returns the size of the drawing: `1200 triangles, thinned from 4000`.
     pub(crate) fn in_words(&self) -> String {
         let all = self.body.mesh().map_or(0, |mesh| mesh.triangles().len());
         match self.kind() {
@@ -178,48 +178,48 @@ impl<'b> Drawing<'b> {
         self.centre.into()
     }
 
-    /// Position that 32767 stands for.
+    /// Returns the length that the integer 32767 stands for in the positions. Unit: length.
     pub(crate) fn half(&self) -> f64 {
         self.half
     }
 
-    /// Largest distance of a drawn node from the centre; of a single node 1.
+    /// Returns the largest distance of a drawn node from the centre; 1 for a single node.
     pub(crate) fn radius(&self) -> f64 {
         let distance = |x: &[f64; 3]| (Vector3::from(*x) - self.centre).norm();
         let radius = self.places.iter().map(distance).fold(0.0, f64::max);
         if radius > 0.0 { radius } else { 1.0 }
     }
 
-    /// Component of the shape of mode `j` that 32767 stands for.
+    /// Returns the component of the shape of mode `j` that the integer 32767 stands for.
     pub(crate) fn scale(&self, j: usize) -> f64 {
         self.sizes[j][0]
     }
 
-    /// Largest displacement of a drawn node in mode `j`.
+    /// Returns the largest displacement of a drawn node in mode `j`.
     pub(crate) fn largest(&self, j: usize) -> f64 {
         self.sizes[j][1]
     }
 
-    /// Largest distance of a drawn node from its place, along an axis.
+    /// Returns the largest rounding error of the drawn position of a node along an axis.
     #[cfg(feature = "hdf5")]
     pub(crate) fn position_error(&self) -> f64 {
         self.half * HALF_STEP
     }
 }
 
-/// Numbers from -1 to 1 in steps.
-#[allow(clippy::cast_possible_truncation)] // they are in range
+/// Rounds numbers from -1 to 1 to 16-bit integers.
+#[allow(clippy::cast_possible_truncation)] // values are clamped to the range
 fn in_steps(x: Vector3<f64>) -> [i16; 3] {
     [x.x, x.y, x.z].map(|x| (x * STEPS).round().clamp(-STEPS, STEPS) as i16)
 }
 
-/// Indices below `n`, `most` at the most, at equal distances.
+/// Returns at most `most` equally spaced indices below `n`.
 fn evenly(n: usize, most: usize) -> Vec<u32> {
     let count = n.min(most);
     (0..count).filter_map(|i| u32::try_from(i as u128 * n as u128 / count as u128).ok()).collect()
 }
 
-/// Vectors in columns (3 x k) in other axes, one after the other.
+/// Returns vectors in columns (3 x k) in other axes, one after the other.
 pub(super) fn turned(axes: &Matrix3<f64>, vectors: MatRef<'_, f64>) -> Vec<f64> {
     let one = |j: usize| axes * Vector3::from_fn(|k, _| vectors[(k, j)]);
     (0..vectors.ncols()).flat_map(|j| <[f64; 3]>::from(one(j))).collect()

@@ -1,5 +1,5 @@
-//! A body in a report: drawn to be turned and moved in its modes where scripts run, a still picture where
-//! they do not, and on paper.
+//! Picture of a body in a report: an interactive drawing of its modes if scripts run, otherwise (and on
+//! paper) a still picture.
 
 use super::arrays::script;
 use super::drawing::Drawing;
@@ -10,21 +10,21 @@ use flexbody_body::flex_body::FlexBody;
 
 const PANEL: &str = include_str!("panel.html");
 
-/// Room for positions, shapes and mesh in a report, in bytes: it stays below 4 MB.
+/// Size limit of positions, shapes and mesh in a report, in bytes; the report then stays below 4 MB.
 const ROOM: usize = 2_600_000;
-/// Modes that a report moves at the most.
+/// Largest number of modes that a report animates.
 const MODES: usize = 60;
 
-/// The parts of a report that draw its body.
+/// Parts of a report that draw its body.
 pub(crate) struct Embedded {
     /// Element with the picture.
     pub panel: String,
-    /// Elements for the end of the page: numbers and script.
+    /// Elements for the end of the page: data and script.
     pub scripts: String,
 }
 
 impl Embedded {
-    /// `None` for a body that has nothing to draw.
+    /// Builds the picture; `None` for a body without anything to draw.
     pub(crate) fn of(body: &FlexBody) -> Option<Self> {
         let still = still(body)?;
         let drawing = Drawing::new(body, None, ROOM, MODES);
@@ -42,7 +42,7 @@ impl Embedded {
     }
 }
 
-/// Drawn parts in words, with those that are left out.
+/// Returns the drawn and the omitted parts in words.
 fn drawn(body: &FlexBody, drawing: &Drawing<'_>) -> String {
     let mut told = vec![match drawing.kind() {
         "points" => "nodes as points, since the file has no surface".to_owned(),

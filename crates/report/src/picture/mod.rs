@@ -1,4 +1,4 @@
-//! Pictures of a body: what of it is drawn, the numbers and the script that move it in a page, and a still
+//! Pictures of a body: selection of the drawn parts, data and script of an interactive picture, and a still
 //! picture.
 
 mod arrays;

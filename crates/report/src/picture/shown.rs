@@ -1,4 +1,4 @@
-//! Data of a body for the script of a page: names, places of its points, modes and interfaces.
+//! Data of a body for the script of a page: names, positions, modes and interfaces.
 
 use super::drawing::{Drawing, turned};
 use crate::facts::UnitFacts;
@@ -9,13 +9,13 @@ use flexbody_body::flex_body::{FlexBody, Interface, is_static};
 use flexbody_body::invariants::principal_axes;
 use serde::Serialize;
 
-/// The script that draws a body in a page, from the numbers and texts that the page has.
+/// Script that draws a body in a page from the data of the page.
 pub(crate) const SCRIPT: &str = include_str!("view.js");
 
-/// The centre of mass and the principal axes, in model axes.
+/// Centre of mass and principal axes, in model axes.
 pub(super) struct Placed {
     pub centre_of_mass: [f64; 3],
-    /// Moments ascending.
+    /// Principal axes, by ascending moments.
     pub principal: [[f64; 3]; 3],
 }
 
@@ -29,13 +29,13 @@ impl Placed {
         }
     }
 
-    /// End of an axis of this length from the centre of mass.
+    /// Returns the end of an axis of the given length from the centre of mass.
     pub(super) fn axis_end(&self, axis: &[f64; 3], length: f64) -> [f64; 3] {
         [0, 1, 2].map(|k| self.centre_of_mass[k] + length * axis[k])
     }
 }
 
-/// The texts and few numbers of a page, as its script reads them. Places are in model axes.
+/// Texts and scalar data of a page for its script. Positions are in model axes.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct ShownBody<'a, M> {
@@ -43,7 +43,7 @@ pub(crate) struct ShownBody<'a, M> {
     generator: String,
     units: UnitFacts,
     terms: Vec<(&'static str, String)>,
-    /// Of two dimensions: seen from above at first.
+    /// True for a body of two dimensions; its initial view is from above.
     plane: bool,
     vertices: usize,
     centre: [f64; 3],
@@ -52,7 +52,7 @@ pub(crate) struct ShownBody<'a, M> {
     modes: Vec<ShownMode>,
     interfaces: Vec<ShownInterface>,
     centre_of_mass: [f64; 3],
-    /// Principal axes, moments ascending.
+    /// Principal axes, by ascending moments.
     principal: [[f64; 3]; 3],
     motion: Option<&'a M>,
 }
@@ -61,7 +61,7 @@ pub(crate) struct ShownBody<'a, M> {
 struct ShownMode {
     label: String,
     kind: String,
-    /// Largest component of the shape at a drawn node: what 32767 stands for.
+    /// Component that the integer 32767 stands for: the largest component of the shape at a drawn node.
     scale: f64,
     /// Largest displacement of a drawn node.
     largest: f64,
@@ -73,12 +73,13 @@ struct ShownInterface {
     reference: Option<[f64; 3]>,
     /// Drawn nodes of the interface.
     nodes: Vec<u32>,
-    /// Displacement of the reference point in each mode, three numbers each.
+    /// Displacement of the reference point in each mode, three numbers per mode.
     motion: Vec<f64>,
 }
 
 impl<'a, M: Serialize> ShownBody<'a, M> {
-    /// Data of `body` with the modes of `drawing`, with `terms` beside it, moved by `motion`.
+    /// Collects the data of `body` with the modes of `drawing`, the `terms` beside the picture, and the
+    /// `motion`.
     pub(crate) fn new(
         body: &FlexBody,
         drawing: &Drawing<'_>,
@@ -104,7 +105,7 @@ impl<'a, M: Serialize> ShownBody<'a, M> {
         }
     }
 
-    /// Returns the data as JSON in which no text ends the element of the page.
+    /// Returns the data as JSON in which no text can end the element of the page.
     pub(crate) fn json(&self) -> String {
         let json = serde_json::to_string(self).expect("structs of numbers and texts are valid JSON");
         json.replace('<', "\\u003c")

@@ -1,5 +1,4 @@
-//! A still picture of a body for print and for pages whose scripts do not run: SVG, drawn from the back to
-//! the front.
+//! Still picture of a body for print and for pages without running scripts: SVG, drawn from back to front.
 
 use super::drawing::Drawing;
 use super::shown::Placed;
@@ -7,25 +6,26 @@ use flexbody_body::flex_body::FlexBody;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::fmt::Write;
 
-/// Triangles at the most.
+/// Largest number of triangles; more make the page larger.
 const TRIANGLES: usize = 1800;
-/// Room for the places of nodes without a surface, in bytes: some 1500 points.
+/// Size limit for the positions of nodes without a surface, in bytes: some 1500 points.
 const ROOM: usize = 60_000;
-/// Size on the page, in its own units; the height follows the part.
+/// Size on the page in its own units; the height follows the shape of the part.
 const WIDTH: f64 = 560.0;
 const LEAST_HEIGHT: f64 = 200.0;
 const MOST_HEIGHT: f64 = 460.0;
 const MARGIN: f64 = 26.0;
 /// Length of the principal axes, relative to the radius of the drawing.
 const AXIS: f64 = 0.75;
-/// Steps of the page that surfaces are drawn in, for each of its units.
+/// Grid steps per page unit for the coordinates of surfaces. A larger value gives finer coordinates and a
+/// larger file.
 const FINE: f64 = 5.0;
-/// Steps of the shading.
+/// Number of brightness steps of the shading.
 const SHADES: f64 = 14.0;
-/// The colour of the part in full light.
+/// Colour of the part in full light (red, green, blue).
 const PART: [f64; 3] = [185.0, 198.0, 214.0];
 
-/// The picture; `None` where there is nothing to draw.
+/// Returns the picture; `None` if there is nothing to draw.
 pub(crate) fn still(body: &FlexBody) -> Option<String> {
     let drawing = Drawing::new(body, Some(TRIANGLES), ROOM, 0);
     if drawing.vertices() == 0 {
@@ -48,13 +48,13 @@ pub(crate) fn still(body: &FlexBody) -> Option<String> {
     Some(svg)
 }
 
-/// From model coordinates to the page, seen as the moving picture is at first.
+/// Projection from model coordinates to the page, with the initial view of the moving picture.
 struct Projection {
     turn: Matrix3<f64>,
     centre: Vector3<f64>,
     radius: f64,
     scale: f64,
-    /// Of the page, of the point that the corner of the box around the part is drawn at.
+    /// Position on the page of the corner of the box around the part.
     shift: [f64; 2],
     height: f64,
 }
@@ -75,6 +75,7 @@ impl Projection {
             shift: [0.0; 2],
             height: 0.0,
         };
+        // Box around the part and its principal axes, as seen by the viewer.
         let axes = placed.principal.map(|axis| placed.axis_end(&axis, AXIS * own.radius));
         let seen: Vec<Vector3<f64>> = drawing.places().iter().chain(&axes).map(|x| own.turned(x)).collect();
         let bound =
@@ -82,9 +83,11 @@ impl Projection {
         let low = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
         let high = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
         let [wide, tall] = [0, 1].map(|k| high[k] - low[k]);
+        // Largest scale at which the box fits the page within its margins.
         let room = [WIDTH - 2.0 * MARGIN, MOST_HEIGHT - 2.0 * MARGIN];
         own.scale = (room[0] / wide).min(room[1] / tall);
         own.height = (own.scale * tall + 2.0 * MARGIN).max(LEAST_HEIGHT);
+        // Centre the box on the page.
         own.shift = [
             0.5 * (WIDTH - own.scale * (low[0] + high[0])),
             0.5 * (own.height + own.scale * (low[1] + high[1])),
@@ -93,7 +96,8 @@ impl Projection {
         numbers.iter().all(|x| x.is_finite()).then_some(own)
     }
 
-    /// Relative to the middle of the part, in the axes of the page; the third points to the eye.
+    /// Returns a point relative to the centre of the part, in the axes of the page; the third axis points to
+    /// the viewer.
     fn turned(&self, x: &[f64; 3]) -> Vector3<f64> {
         self.turn * (Vector3::from(*x) - self.centre)
     }
@@ -103,7 +107,7 @@ impl Projection {
     }
 }
 
-/// A piece of the drawing: how far to the front, and how it is painted.
+/// A path of the drawing with its depth and paint.
 struct PaintedPath {
     depth: f64,
     paint: Paint,
@@ -117,7 +121,7 @@ enum Paint {
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // colours are from 0 to 255
-/// Triangles and edges from the back to the front; pieces of one paint that follow each other are one path.
+/// Draws triangles and edges from back to front; consecutive pieces with the same paint form one path.
 fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
     let seen: Vec<Vector3<f64>> = drawing.places().iter().map(|x| view.turned(x)).collect();
     let mut pieces: Vec<PaintedPath> = Vec::new();
@@ -129,7 +133,7 @@ fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
     }
     for ends in drawing.edge_ends() {
         let ends = ends.map(|i| seen[i as usize]);
-        // An edge lies before the faces that it belongs to.
+        // An edge is drawn slightly in front of its faces, so that they do not cover it.
         let depth = 0.5 * (ends[0].z + ends[1].z) + 0.02 * view.radius;
         pieces.push(PaintedPath { depth, paint: Paint::Edge, path: path(view, &ends) });
     }
@@ -153,7 +157,7 @@ fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
     svg.push_str("</g>\n");
 }
 
-/// `M10 20l5-3`: the first point, and the way to each of the others.
+/// Returns an SVG path, `M10 20l5-3`: the first point, then relative steps.
 fn path(view: &Projection, points: &[Vector3<f64>]) -> String {
     let mut path = String::new();
     let mut before = [0.0; 2];
@@ -169,15 +173,15 @@ fn path(view: &Projection, points: &[Vector3<f64>]) -> String {
     path
 }
 
-/// Brightness of a triangle, by its angle to the light.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // from 0 to 1 before
+/// Returns the brightness of a triangle from its angle to the light.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the value is from 0 to SHADES
 fn shade([a, b, c]: &[Vector3<f64>; 3]) -> u8 {
     let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
     let light = Vector3::new(0.25, 0.35, 1.0).normalize();
     ((0.45 + 0.55 * normal.dot(&light).abs()) * SHADES).round() as u8
 }
 
-/// Nodes as points: those at the back are drawn fainter.
+/// Draws nodes as points in three layers by depth; points at the back are fainter.
 fn points(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
     let mut layers = [const { String::new() }; 3];
     for place in drawing.places() {
@@ -204,7 +208,7 @@ fn principal_axes(svg: &mut String, placed: &Placed, view: &Projection) {
     }
 }
 
-/// The axes of the model.
+/// Draws the axes of the model in a corner.
 fn corner(svg: &mut String, view: &Projection) {
     let from = [34.0, view.height - 34.0];
     for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
@@ -213,7 +217,7 @@ fn corner(svg: &mut String, view: &Projection) {
     }
 }
 
-/// A line with its name at the end.
+/// Draws a line with its name at the end.
 fn arrow(svg: &mut String, class: &str, name: &str, [x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) {
     let away = |from: f64, to: f64| if (to - from).abs() < 1.0 { 0.0 } else { 9.0 * (to - from).signum() };
     let (near, below) = (to_x + away(x, to_x), to_y + 0.6 * away(y, to_y) + 4.0);

@@ -1,4 +1,4 @@
-//! The motion of a simulation, as a page plays it.
+//! Motion of a simulation for playback in a page.
 
 use crate::numbers::counted;
 use crate::picture::Packed;
@@ -6,10 +6,10 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_file::RecordedMotion;
 use serde::Serialize;
 
-/// Numbers of all instants that a page has at the most.
+/// Largest count of numbers for all output times of a page; a longer recording is thinned to equal steps.
 const MOST: usize = 400_000;
 
-/// Instants of a motion.
+/// Output times of a motion.
 #[derive(Debug, Clone, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct ShownMotion {
@@ -18,7 +18,7 @@ pub(super) struct ShownMotion {
     origin_in_model: [f64; 3],
     /// Largest deflection. Unit: length.
     largest: f64,
-    /// Middle of the box around the path of the origin, and how far the path goes from there.
+    /// Centre of the box around the path of the origin; `reach` is the largest distance of the path from it.
     middle: [f64; 3],
     reach: f64,
     #[serde(skip)]
@@ -34,13 +34,14 @@ pub(super) struct ShownMotion {
 }
 
 impl ShownMotion {
-    /// The instants of a motion, or some at equal steps with the first and the last.
+    /// Collects the output times of a motion, or some at equal steps including the first and the last.
     pub(super) fn new(motion: &RecordedMotion, body: &FlexBody) -> Self {
         let written = motion.time.len();
         let chosen = motion.some_instants(MOST / (8 + motion.modes));
         let some = |of: &[f64], width: usize| -> Vec<f64> {
             chosen.iter().flat_map(|&i| &of[i * width..(i + 1) * width]).copied().collect()
         };
+        // Box around the path of the origin, and the largest distance of the path from its centre.
         let origins = some(&motion.origins, 3);
         let bound = |k: usize, pick: fn(f64, f64) -> f64, start: f64| {
             origins.iter().skip(k).step_by(3).copied().fold(start, pick)
@@ -81,7 +82,7 @@ impl ShownMotion {
         &self.scene
     }
 
-    /// `2000 of 100000 instants`.
+    /// Returns the number of times: `2000 of 100000 instants`.
     pub(super) fn in_words(&self) -> String {
         if self.written == self.time.len() {
             self.written.to_string()

@@ -1,4 +1,4 @@
-//! `compare` looks at every entry of the flex-body file, or lists it as not compared. The entries are those of
+//! `compare` compares every entry of the flex-body file or lists it as not compared. The entries are those of
 //! `docs/format.md`.
 
 use faer::Mat;
@@ -16,7 +16,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use oracle::report_bodies::block;
 use std::collections::BTreeMap;
 
-/// A body that has every entry of the file.
+/// Returns a body with every entry of the file.
 fn complete() -> FlexBody {
     let mut parts = block(BodyFrame::Principal).into_parts();
     let (n, nf) = (parts.nodes.ids.len(), parts.modes.eigenvalue.len());
@@ -102,10 +102,10 @@ fn complete() -> FlexBody {
     FlexBody::new(parts).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// An entry, and a change of it.
+/// An entry of the file, and a change of it.
 type Change = (&'static str, fn(&mut Parts));
 
-/// Primary entries that a comparison looks at, each with a change of it.
+/// Primary entries that a comparison covers, each with a change.
 const CHANGES: &[Change] = &[
     ("/@dimension", flatten),
     ("/@units_length", |p| p.units = UnitSystem::parse("mm", "kg", "s").expect("units")),
@@ -156,7 +156,7 @@ fn general(parts: &mut Parts) -> &mut GeneralTerms {
     parts.invariants.primary_mut().general.as_mut().expect("general terms")
 }
 
-/// Makes a plane body of it.
+/// Turns the body into a plane body.
 fn flatten(parts: &mut Parts) {
     parts.dimension = 2;
     parts.frame = Frame::model();
@@ -166,8 +166,8 @@ fn flatten(parts: &mut Parts) {
     general(parts).plane = true;
 }
 
-/// Paths of the entries of `docs/format.md` (attributes after `@`), each with the words "derived" or "always" that
-/// mark those that carry no information of their own.
+/// Returns the paths of the entries of `docs/format.md` (attributes after `@`). The flag is true for entries
+/// marked "derived" or "always", which carry no information of their own.
 fn documented() -> Vec<(String, bool)> {
     let page = include_str!("../../../../docs/format.md");
     let (mut group, mut separator, mut found) = ("", '/', Vec::new());
@@ -189,7 +189,7 @@ fn documented() -> Vec<(String, bool)> {
     found
 }
 
-/// Every entry of the file of a body, as text.
+/// Returns every entry of the file of a body as text.
 fn entries(body: &FlexBody) -> BTreeMap<String, String> {
     let (attributes, arrays) = contents(body);
     let arrays = arrays.into_iter().map(|array| (format!("/{}", array.path), format!("{:?}", array.values)));
@@ -200,14 +200,14 @@ fn entries(body: &FlexBody) -> BTreeMap<String, String> {
     arrays.chain(attributes).collect()
 }
 
-/// True if `path` is one of those that `pattern` stands for (`<name>` is any name).
+/// Returns true if `path` matches `pattern` (`<name>` is any name).
 fn is_of(pattern: &str, path: &str) -> bool {
     let parts = |text: &str| -> Vec<String> { text.split(['/', '@']).map(str::to_owned).collect() };
     let (pattern, path) = (parts(pattern), parts(path));
     pattern.len() == path.len() && pattern.iter().zip(&path).all(|(p, x)| p.starts_with('<') || p == x)
 }
 
-/// Paths that the output lists as not compared.
+/// Returns the paths that the output lists as not compared.
 fn listed(comparison: &BodyComparison) -> Vec<String> {
     let text = comparison.text();
     let lines = text.lines().filter_map(|line| line.strip_prefix("not compared: "));
@@ -232,7 +232,7 @@ fn every_entry_of_the_file_is_compared_or_derived_or_listed_as_not_compared() {
         });
         let change = CHANGES.iter().find(|(changed, _)| *changed == path);
         let Some((_, change)) = change else {
-            // Digests are of what was written.
+            // Digests depend on the written numbers.
             let told = follows || is_listed || ["/@digests", "/@sha256"].contains(&path.as_str());
             assert!(told, "{path} is neither compared nor listed");
             continue;
@@ -286,7 +286,7 @@ fn interfaces_that_differ_are_named() {
     let (rows, text) = differing(|p| drop(p.interfaces.remove(0)));
     assert_eq!(rows, ["interfaces"], "{text}");
     assert!(text.contains("interface `left` is in the first body only"), "{text}");
-    // Their order in the file, and that of the nodes, says nothing.
+    // The order of interfaces and of their nodes carries no information.
     let (rows, text) = differing(|p| {
         p.interfaces.reverse();
         p.interfaces[0].nodes.reverse();
@@ -305,7 +305,7 @@ fn damping_and_stiffness_of_loads_that_differ_are_named() {
     assert_eq!(rows, ["stiffness of inertia"], "{text}");
 }
 
-/// A file of another program may have no place for interfaces, damping and the like: what it has none of is listed.
+/// A file of another program may lack interfaces, damping and other data; they are listed as not compared.
 #[test]
 fn what_a_file_of_another_program_has_none_of_is_listed() {
     let (body, mut parts) = (complete(), complete().into_parts());
@@ -328,7 +328,7 @@ fn what_a_file_of_another_program_has_none_of_is_listed() {
     }
 }
 
-/// One body in other frames, in other bases and without common nodes.
+/// The result is the same in other frames, in other bases and without common nodes.
 #[test]
 fn frames_signs_and_node_numbers_make_no_difference_to_what_is_beside_the_invariants() {
     let body = complete();

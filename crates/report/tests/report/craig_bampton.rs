@@ -57,8 +57,8 @@ fn reports_call_a_healthy_body_healthy() {
     assert!(json["modes"]["worst_residual"].as_f64().expect("a number") < 1e-8);
 }
 
-/// The record of the fixed-interface modes stands in the file, follows a change of units, and stays with the modes that are
-/// kept.
+/// The record of the fixed-interface modes is stored in the file, follows a change of units, and is kept when
+/// modes are selected.
 #[test]
 fn the_record_goes_with_the_body() {
     let body = body(&model(bracket([Coupling::Rigid, Coupling::Rigid])), 5);

@@ -1,4 +1,5 @@
-//! Damping of the modes: ratios, Rayleigh damping and matrices, against closed forms and against each other.
+//! Damping of the modes: ratios, Rayleigh damping and matrices, compared with closed forms and with each
+//! other.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Result;
@@ -41,7 +42,7 @@ fn matrix(n: usize, entries: &[(u32, u32, f64)]) -> Damping<RawMatrix> {
     Damping::Matrix(RawMatrix { matrix: CscMatrix::from_triplets(n, n, entries), ..raw })
 }
 
-/// alpha M + beta K as a matrix.
+/// Returns alpha M + beta K as a matrix.
 fn rayleigh_matrix(alpha: f64, beta: f64) -> Damping<RawMatrix> {
     let raw = block().raw_model();
     let mut all: Vec<_> = entries(&raw.mass.matrix).map(|(r, c, v)| (r, c, alpha * v)).collect();
@@ -72,7 +73,7 @@ fn bands_are_in_hertz_whatever_the_unit_of_time() {
     let band = |to_hz, ratio| DampingBand { to_hz, ratio };
     let split = 0.5 * (hertz[4] + hertz[5]);
     let mut raw = damped(Damping::Bands(vec![band(split, 0.01), band(f64::INFINITY, 0.05)]));
-    // The same body in milliseconds: K has 1e-6 of its numbers.
+    // The body in milliseconds: the numbers of K are multiplied by 1e-6.
     raw.units = UnitSystem::parse("m", "kg", "ms").unwrap();
     let n = raw.stiffness.matrix.n_cols();
     let all: Vec<_> = entries(&raw.stiffness.matrix).map(|(r, c, v)| (r, c, 1e-6 * v)).collect();
@@ -108,7 +109,7 @@ fn a_matrix_of_rayleigh_damping_gives_what_rayleigh_damping_gives() {
 
 #[test]
 fn a_dashpot_couples_modes_as_its_end_points_move_in_every_frame() {
-    // c between uy of node 1 and uz of the last node.
+    // Damper c between uy of node 1 and uz of the last node.
     let c = 50.0;
     let n = block().raw_model().stiffness.matrix.n_cols() as u32;
     let (p, q) = (1, n - 1);

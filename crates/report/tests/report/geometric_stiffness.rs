@@ -1,5 +1,5 @@
-//! Geometric stiffness of unit loads: against direct nodal products, beams in closed form, and itself in
-//! other axes.
+//! Geometric stiffness of unit loads compared with direct nodal products, closed forms of beams, and itself
+//! in other axes.
 
 use faer::{Mat, Scale};
 use flexbody_base::diagnostic::Code;
@@ -26,7 +26,7 @@ use std::path::PathBuf;
 
 const SPIN: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
-/// Without transverse strain, so that a bar is a beam.
+/// Material with zero Poisson's ratio, so that a bar follows beam theory.
 const BEAM: Material = Material { youngs: 210e9, poisson: 0.0, density: 7850.0 };
 
 /// A body with its matrices.
@@ -42,7 +42,7 @@ impl Case {
         Self { mesh, body, material }
     }
 
-    /// A block without symmetry.
+    /// Returns a block without symmetry.
     fn skew_block() -> Self {
         let mesh = Mesh::from_cells(ElementKind::Hex8, &oracle::mesh::grid([4, 2, 1]), |p| {
             [0.2 * p[0] + 0.02 * p[1] * p[2], 0.1 * p[1] * (1.0 + 0.1 * p[0]), 0.07 * p[2] + 0.01 * p[0]]
@@ -50,7 +50,8 @@ impl Case {
         Self::new(mesh, Material::STEEL)
     }
 
-    /// K_geo of the free body under the forces `load` (3n x 1) and the inertia forces that balance them.
+    /// Returns K_geo of the free body under the forces `load` (3n x 1) and the inertia forces that balance
+    /// them.
     fn stressed(&self, load: &Mat<f64>) -> CscMatrix {
         let modes = dense_modes(&self.body);
         let modal = modes.shapes.transpose() * load;
@@ -59,14 +60,14 @@ impl Case {
         self.mesh.geometric_stiffness(&self.material, &moved.col(0).iter().copied().collect::<Vec<_>>())
     }
 
-    /// K_geo of the free body under a unit force along an axis, half of it at each of two nodes.
+    /// Returns K_geo of the free body under a unit force along an axis, half of it at each of two nodes.
     fn pulled(&self, nodes: [usize; 2], axis: usize) -> CscMatrix {
         let mut force = Mat::zeros(self.body.n_dofs(), 1);
         nodes.iter().for_each(|node| force[(3 * node + axis, 0)] = 0.5);
         self.stressed(&force)
     }
 
-    /// M times an acceleration of every node.
+    /// Returns M times an acceleration of every node.
     fn inertia_load(&self, acceleration: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Mat<f64> {
         let mut load = Mat::zeros(self.body.n_dofs(), 1);
         for (row, column, value) in entries(&self.body.scalar_mass) {
@@ -76,7 +77,7 @@ impl Case {
         load
     }
 
-    /// The six matrices of the body's own centrifugal stress.
+    /// Returns the six matrices of the centrifugal stress of the body.
     fn spin(&self) -> Vec<GeometricStiffness<RawMatrix>> {
         let matrix = |&(k, l): &(usize, usize)| {
             let e = |axis: usize| Vector3::ith(axis, 1.0);
@@ -95,7 +96,8 @@ impl Case {
     }
 }
 
-/// Blocks of a string between two nodes (indices): the multiple `size` of the identity at each, the opposite between them.
+/// Returns the stiffness of a string between two nodes (indices): `size` times the identity at each node, and
+/// its negative between them.
 fn string(n: usize, [a, b]: [usize; 2], size: f64) -> CscMatrix {
     let entries = (0..3).flat_map(|k| {
         let [a, b] = [3 * a + k, 3 * b + k].map(|row| row as u32);
@@ -127,7 +129,7 @@ fn refusal(raw: RawModel) -> flexbody_base::error::Error {
     run(raw, BodyFrame::Principal, BasisChoice::default()).expect_err("not to be converted")
 }
 
-/// Shapes of a body in the axes of its model (3n x nf).
+/// Returns the shapes of a body in the axes of its model (3n x nf).
 fn in_model_axes(body: &FlexBody) -> Mat<f64> {
     let (shape, axes) = (&body.modes().shape, body.frame().axes);
     Mat::from_fn(shape.nrows(), shape.ncols(), |row, j| {
@@ -135,7 +137,7 @@ fn in_model_axes(body: &FlexBody) -> Mat<f64> {
     })
 }
 
-/// Psi' A Psi entry by entry.
+/// Returns Psi' A Psi, computed entry by entry.
 fn product(a: &CscMatrix, shapes: &Mat<f64>) -> Mat<f64> {
     let mut out = Mat::zeros(shapes.ncols(), shapes.ncols());
     for (row, column, value) in entries(a) {
@@ -148,7 +150,7 @@ fn product(a: &CscMatrix, shapes: &Mat<f64>) -> Mat<f64> {
     out
 }
 
-/// Sum of the matrices of one kind times `amount` of each component.
+/// Returns the sum of the matrices of one kind times `amount` of each component.
 fn sum<'a>(
     matrices: impl Iterator<Item = (&'a UnitLoad, &'a Mat<f64>)>,
     kind: &LoadKind,
@@ -183,7 +185,7 @@ fn entries_are_the_nodal_products_of_the_turned_load_in_every_frame() {
         all.push(given(LoadKind::AngularAcceleration, k, turned));
         all.push(given(LoadKind::Force("tip".to_owned()), k, case.pulled([0, 1], k)));
     }
-    // Not the whole kind: the missing axes count as zero.
+    // Only one axis of the kind is given; missing axes count as zero.
     all.push(given(LoadKind::Force("side".to_owned()), 1, case.pulled([2, 3], 1)));
     all.push(given(LoadKind::Named("heat".to_owned()), 0, all[3].matrix.matrix.clone()));
     for frame in [BodyFrame::Model, BodyFrame::Com, BodyFrame::Principal] {
@@ -237,20 +239,21 @@ fn a_turned_model_is_stiffened_by_the_turned_spin() {
     assert!((at(&b, &spin) - &signed).norm_max() > 0.1 * signed.norm_max());
 }
 
-/// A bar along x about the origin, thinner along z than along y.
+/// Returns a bar along x about the origin, thinner along z than along y.
 fn bar() -> Case {
     let mesh = Mesh::block(ElementKind::Hex8, [32, 1, 1], [1.0, 0.04, 0.03]);
     Case::new(mesh.moved(&Matrix3::identity(), [-0.5, -0.02, -0.015]), BEAM)
 }
 
-/// The first bending shape of a free beam, symmetric about its middle: slope and deflection at x / L = s.
+/// Returns slope and deflection at x / L = s of the first bending shape of a free beam, symmetric about its
+/// middle.
 fn first_bending(s: f64) -> (f64, f64) {
     let k = 4.730_040_744_862_704;
     let (a, b) = ((k / 2.0f64).cosh(), (k / 2.0f64).cos());
     (k * ((k * s).sinh() / a - (k * s).sin() / b), (k * s).cosh() / a + (k * s).cos() / b)
 }
 
-/// Integral over the beam, by Simpson's rule.
+/// Returns the integral over the beam by Simpson's rule.
 fn along_beam(f: impl Fn(f64) -> f64) -> f64 {
     let n = 2000;
     let weight = |i: usize| {
@@ -265,7 +268,7 @@ fn along_beam(f: impl Fn(f64) -> f64) -> f64 {
     (0..=n).map(|i| weight(i) * f(i as f64 / n as f64 - 0.5)).sum::<f64>() / (3 * n) as f64
 }
 
-/// The mode with the most motion along an axis, and least frequency.
+/// Returns the lowest mode whose motion is mainly along an axis.
 fn bending_along(body: &FlexBody, axis: usize) -> usize {
     let s = body.invariants().s().unwrap();
     (0..body.n_modes()).find(|&j| s[axis][axis][(j, j)] > 0.9).expect("a bending mode")
@@ -274,7 +277,7 @@ fn bending_along(body: &FlexBody, axis: usize) -> usize {
 #[test]
 fn tension_raises_bending_frequencies_as_that_of_a_beam_and_pressure_lowers_them() {
     let case = bar();
-    // Pulled at both ends by a unit force: uniform stress 1 / A.
+    // A unit tension at both ends gives the uniform stress 1 / A.
     let ends = |i: usize| if case.body.nodes[i][0] < -0.49 { -0.25 } else { 0.25 };
     let at_end = |i: usize| case.body.nodes[i][0].abs() > 0.49;
     let pull = Mat::from_fn(case.body.n_dofs(), 1, |row, _| {
@@ -313,14 +316,14 @@ fn a_spinning_beam_stiffens_as_its_centrifugal_tension_says_and_softens_without(
         let found = stored(&body, &LoadKind::Spin, &unit)[(mode, mode)];
         println!("spin about {spin_axis}, bending along {bending}: {:.4} of the beam's", found / tension);
         assert!((found / tension - 1.0).abs() < 0.02, "{found} {tension}");
-        // In the plane of rotation the centrifugal term takes 1 of it, across it nothing.
+        // The centrifugal term subtracts 1 in the plane of rotation and 0 across it.
         let taken: f64 = (0..3)
             .filter(|k| *k != spin_axis)
             .map(|k| body.invariants().s().unwrap()[k][k][(mode, mode)])
             .sum();
         assert!(if bending == spin_axis { taken < 0.01 } else { taken > 0.99 });
         assert!(found > taken);
-        // So do the equations of motion at the rate of the first bending frequency.
+        // The equations of motion give the same at the rate of the first bending frequency.
         let (mut nu, lambda) = (vec![0.0; 16], body.modes().eigenvalue[mode]);
         nu[3 + spin_axis] = lambda.sqrt();
         let equations = EquationsOfMotion::new(&body, Terms::ALL);
@@ -356,7 +359,7 @@ fn without_geometric_stiffness_the_report_tells_the_rate_and_centrifugal_loads_w
             assert_eq!(lowest < 0.0, lost, "axis {axis}, {part}: {lowest:e}");
         }
     }
-    // The axes are those of the model, whatever the frame of the body is.
+    // The axes are those of the model in any frame of the body.
     let turned = run(case.raw(Vec::new()), BodyFrame::Principal, centrifugal()).expect("a sound body");
     assert!((turned.body.frame().axes - nalgebra::Matrix3::identity()).amax() > 0.1);
     for (axis, rate) in rates.iter().enumerate() {
@@ -368,7 +371,7 @@ fn without_geometric_stiffness_the_report_tells_the_rate_and_centrifugal_loads_w
         told.message().to_owned()
     };
     assert_eq!(words(&done.diagnostics), words(&turned.diagnostics));
-    // About no axis is the rate lower than the one that is told, and about some axis it is as low.
+    // The reported rate is the lowest over all axes, and one axis attains it.
     let message = warning.expect("a warning").message();
     let words: Vec<&str> = message.split_whitespace().collect();
     let hertz = words.iter().position(|word| *word == "Hz").expect("a rate") - 1;
@@ -420,7 +423,7 @@ fn file_reports_and_recomputation_hold_what_was_given() {
     let schema =
         serde_json::from_str(include_str!("../../../../schemas/report.schema.json")).expect("a schema");
     assert!(jsonschema::validator_for(&schema).expect("a schema").is_valid(&json));
-    // Largest |kappa| of K_geo v = kappa K_ff v; K_ff is diagonal.
+    // Largest |kappa| of K_geo v = kappa K_ff v, with diagonal K_ff.
     let g = &body.geometric_stiffness()[0];
     let lambda = &body.modes().eigenvalue;
     let relative = Mat::from_fn(10, 10, |p, q| g.matrix[(p, q)] / (lambda[p] * lambda[q]).sqrt());
@@ -545,7 +548,8 @@ fn bodies_of_one_pair_of_matrices_take_their_own_rows() {
     let at = |id: i64| id as usize - 1;
     let row = |id: i64| 3 * at(id) as u32;
     let (mine, other) = (row(first[1]), row(others[0]));
-    // A string of unit compression along x from the tip to the node one unit beside it pushes the tip along x.
+    // A string under unit compression along x, from the tip to the node one unit away, pushes the tip along
+    // x.
     let place = |id: i64| case.body.nodes[at(id)];
     let beside = |id: &i64| (0..3).all(|k| place(*id)[k] == place(1)[k] + if k == 0 { 1.0 } else { 0.0 });
     let neighbour = *first.iter().find(|id| beside(id)).expect("a unit cube");
@@ -591,7 +595,7 @@ fn files_without_the_group_are_older_and_those_that_break_it_are_refused() {
         file.close().expect("closed");
         flexbody_file::read(&path)
     };
-    // Digests came with format 1.4.
+    // Digests exist since format 1.4.
     let older = changed(&|file| {
         file.unlink("geometric_stiffness").expect("removed");
         ["digests", "sha256"].iter().for_each(|name| file.delete_attr(name).expect("removed"));

@@ -1,5 +1,5 @@
-//! Histories and rigid motion from files: they mean what the same numbers mean in the scene, a recorded
-//! motion that is fed back is reproduced, and as many rows as there are change nothing.
+//! Histories and rigid motion from files: equivalent to the same numbers in the scene, recorded motions are
+//! reproduced when fed back, and the number of rows has no effect.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::flex_body::FlexBody;
@@ -19,7 +19,7 @@ fn body(modes: usize) -> FlexBody {
     body_of(footed_block(), modes, BodyFrame::Principal)
 }
 
-/// The motion in a scene beside which there are these files.
+/// Simulates a scene with these accompanying files.
 fn run(body: &FlexBody, text: &str, files: &[(&str, &str)]) -> Recording {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in files {
@@ -31,7 +31,7 @@ fn run(body: &FlexBody, text: &str, files: &[(&str, &str)]) -> Recording {
     simulate(body, &scene, &Context::QUIET).unwrap_or_else(|error| panic!("{error}\n{text}")).0
 }
 
-/// Rows of numbers.
+/// Returns rows of numbers as a table.
 fn table(head: &str, rows: impl Iterator<Item = Vec<f64>>) -> String {
     rows.fold(format!("{head}\n"), |mut text, row| {
         let cells: Vec<String> = row.iter().map(|value| format!("{value:e}")).collect();
@@ -40,7 +40,7 @@ fn table(head: &str, rows: impl Iterator<Item = Vec<f64>>) -> String {
     })
 }
 
-/// Largest difference of the modal coordinates relative to the largest.
+/// Returns the largest difference of the modal coordinates, relative to the largest.
 fn apart(a: &Recording, b: &Recording) -> f64 {
     assert_eq!(a.time, b.time);
     let most = |size: &dyn Fn(usize, usize) -> f64| {
@@ -61,7 +61,7 @@ const LOADS: &str = "[[load]]\nnode = 3\nforce = [2e-3, 1e-3, -3e-3]\nhistory = 
                      [[load]]\ninterface = \"foot\"\nforce = [1e-3, 0, 2e-3]\ntorque = [0, 1e-3, 0]\naxes = \"model\"\n\
                      history = { to = 1, duration = 2 }\n";
 
-/// A free run under loads, whose rotation changes its axis.
+/// Returns a free run under loads, whose rotation changes its axis.
 fn free(outputs: usize) -> String {
     format!(
         "gravity = [0.02, -0.01, -0.05]\n[run]\nduration = 6\ntolerance = 1e-12\noutputs = {outputs}\n\
@@ -69,7 +69,7 @@ fn free(outputs: usize) -> String {
     )
 }
 
-/// The same with its rotation given.
+/// Returns the run with its rotation prescribed.
 fn driven(spin: &str) -> String {
     let start = if spin.contains("attitude_from") { "" } else { "rotation = [0.4, -0.3, 0.8]\n" };
     format!(
@@ -78,15 +78,15 @@ fn driven(spin: &str) -> String {
     )
 }
 
-/// A free motion that was recorded and is fed back as the rotation is reproduced with no torque, the better
-/// the more rows there are: the error of a cubic spline through the angular velocity falls with the fourth
+/// A recorded free motion that is fed back as prescribed rotation is reproduced with zero torque, more
+/// accurately with more rows: the error of a cubic spline through the angular velocity falls with the fourth
 /// power of the distance of the rows, that of its derivative with the third.
 #[test]
 fn a_free_motion_that_is_fed_back_is_reproduced_without_a_torque() {
     let body = body(6);
     let axes = body.frame().axes;
     let reference = run(&body, &free(60), &[]);
-    // The torque that holds a body of this inertia against the spin it has.
+    // The scale is the torque that this spin needs on a body of this inertia.
     let spin = reference.states.iter().map(|state| state.omega.norm()).fold(0.0, f64::max);
     let scale = body.invariants().inertia().trace() * spin * spin;
     let ways = [
@@ -102,7 +102,7 @@ fn a_free_motion_that_is_fed_back_is_reproduced_without_a_torque() {
             "time,w1,w2,w3,b1,b2,b3,p0,p1,p2,p3",
             recorded.time.iter().zip(&recorded.states).enumerate().map(|(row, (time, state))| {
                 let attitude = state.attitude.axes();
-                // Euler parameters are those of the same rotation with either sign.
+                // Euler parameters of either sign describe one rotation.
                 let own =
                     EulerParameters::of_axes(&(attitude * axes)).0.map(|p| if row % 3 == 1 { -p } else { p });
                 let (world, own_axes) = (attitude * state.omega, axes.tr_mul(&state.omega));
@@ -125,18 +125,19 @@ fn a_free_motion_that_is_fed_back_is_reproduced_without_a_torque() {
     for (way, (few, many)) in ways.iter().zip(few.iter().zip(&many)) {
         let order = |k: usize| (few[k] / many[k]).log2();
         assert!(many[0] < 1e-4 && many[1] < 1e-4 && many[2] < 1e-6, "{way}: {few:?}, {many:?}");
-        // Attitudes are differentiated twice, beside the ends of the file with one order less.
+        // Attitudes are differentiated twice, which costs one order at the ends of the file.
         let of_torque = if way.contains("attitude_from") { 1.8 } else { 2.7 };
         assert!(order(0) > 2.7 && order(1) > of_torque, "{way}: {few:?}, {many:?}");
     }
 }
 
-/// Three columns along one direction are a rate about this axis: with straight lines and with cubics, along
+/// Three columns along one direction are equivalent to a rate about this axis: with lines and cubics, along
 /// axes of the model, the body and the world.
 #[test]
 fn columns_of_one_direction_are_the_spin_about_an_axis() {
     let body = body(5);
-    // Beyond the end of the run: at its last row a table of the scene has the rate after it.
+    // The table extends beyond the end of the run, because a table of the scene holds the last rate after its
+    // last row.
     let (times, rates) = ([0.0, 0.7, 1.9, 3.0, 4.2, 7.0], [0.0, 0.3, 0.2, 0.5, 0.1, 0.4]);
     let axis = Vector3::new(1.0, 2.0, -1.0).normalize();
     let start = RotationVector(Vector3::new(0.4, -0.3, 0.8)).axes();
@@ -178,14 +179,13 @@ fn columns_of_one_direction_are_the_spin_about_an_axis() {
     }
 }
 
-/// Loads in columns are the loads that the same numbers make in the scene, with units and times changed on
-/// the way.
+/// Loads in columns equal the loads with these numbers in the scene, with changed units and times.
 #[test]
 fn loads_from_columns_are_those_of_the_scene() {
     let body = body(5);
     let (times, values) = ([0.0, 0.7, 1.9, 3.0, 6.0], [0.0, 3.0, -2.0, 1.0, 2.0]);
     let head = "[run]\nduration = 6\ntolerance = 1e-12\noutputs = 60\n[[watch]]\nnode = 3\n";
-    // Kilo and milli: values times 1e-3, times from 2000 on in thousandths.
+    // Factors kilo and milli: values times 1e-3, times from 2000 on in thousandths.
     let rows = times
         .iter()
         .zip(values)
@@ -220,8 +220,8 @@ fn loads_from_columns_are_those_of_the_scene() {
     }
 }
 
-/// What carries a body follows columns as it follows an axis and a direction; the way, the velocity and the
-/// acceleration are one motion.
+/// The carrier of a body may follow columns or an axis and a direction; displacement, velocity and
+/// acceleration describe one motion.
 #[test]
 fn a_carried_body_follows_columns() {
     let body = body(8);
@@ -287,7 +287,7 @@ fn a_carried_body_follows_columns() {
     }
 }
 
-/// A history of a hundred thousand rows is integrated in about as many steps as the sine that it has sampled.
+/// A history of 100,000 rows needs about as many integration steps as the sine that it samples.
 #[test]
 fn rows_are_no_steps() {
     let body = body(4);
@@ -312,8 +312,8 @@ fn rows_are_no_steps() {
     assert!(apart(&sine, &sampled) < 1e-8);
 }
 
-/// Outside of a file a history holds where the scene says so, and only there; one that ends within rounding
-/// of the end goes on.
+/// Outside its rows a history is extended only if the scene allows it; an end that differs from that of the
+/// run by rounding is accepted.
 #[test]
 fn a_file_covers_the_run_or_the_scene_says_what_is_outside() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -341,8 +341,9 @@ fn a_file_covers_the_run_or_the_scene_says_what_is_outside() {
     assert!(place(&unknown.replace("value = 2", "value = 2, outside = \"hold\""), "0 2\n5 4\n").is_ok());
 }
 
-/// Two rows whose times differ by rounding alone would be an infinite rate; every table refuses them, and where they stand
-/// is told. Rows that are close for a reason are taken: a step of a nanosecond, and dates in seconds.
+/// Two rows whose times differ by rounding alone would give an infinite rate; every table refuses them and
+/// names their position. Close rows with a real distance are accepted: a step of a nanosecond, and dates in
+/// seconds.
 #[test]
 fn rows_that_rounding_alone_tells_apart_are_refused() {
     let run = "[run]\nduration = 1\n";
@@ -390,7 +391,7 @@ fn rows_that_rounding_alone_tells_apart_are_refused() {
         let sound = read(&scene.replace('T', "0.300000001"), &rows("0.300000001"));
         assert!(!sound.is_err_and(|error| error.to_string().contains("rounding")), "{scene}");
     }
-    // A date in seconds every millisecond.
+    // Dates in seconds, one row per millisecond.
     let date = |row: u32| 1.7e9 + 1e-3 * f64::from(row);
     let dated = table("t,a", (0..=1100).map(|row| vec![date(row), f64::from(row)]));
     let scene = of_file(", time_zero = 1.7e9");

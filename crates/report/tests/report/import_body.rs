@@ -1,4 +1,4 @@
-//! Bodies that another program describes, whatever its modes are: taken as bodies, and audited.
+//! Bodies described by other programs with arbitrary modes: conversion and audit.
 
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -17,7 +17,7 @@ use oracle::mesh::{Mesh, grid};
 use oracle::random::Random;
 use std::path::Path;
 
-/// A block without any symmetry, its model and its body.
+/// Returns a block without symmetry, its model and its body.
 fn block(modes: usize) -> (FeModel, FlexBody) {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([4, 3, 2]), |[x, y, z]| {
@@ -28,7 +28,7 @@ fn block(modes: usize) -> (FeModel, FlexBody) {
     (model, body_of(assembly.raw_model(), modes, BodyFrame::Principal))
 }
 
-/// A file that describes `body` by other modes.
+/// Returns a file that describes `body` by other modes.
 fn file_with(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> ImportedFile {
     let frame = |i: usize| ImportedFrame {
         label: body.nodes().ids[i].to_string(),
@@ -73,7 +73,7 @@ fn random(random: &mut Random, rows: usize, columns: usize) -> Mat<f64> {
     Mat::from_fn(rows, columns, |_, _| random.signed())
 }
 
-/// The rigid motions of the nodes (3n x 6).
+/// Returns the rigid motions of the nodes (3n x 6).
 fn rigid(body: &FlexBody) -> Mat<f64> {
     flexbody_model::rigid_fields(&body.nodes().positions, 3, [0.0; 3], 1.0)
 }
@@ -92,7 +92,7 @@ fn free_surface_modes_are_taken_to_the_last_bit() {
         assert_eq!(taken.modes().shape, body.modes().shape, "{name}");
         assert_eq!(taken.invariants().modal_stiffness(), body.invariants().modal_stiffness(), "{name}");
         let (own, told) = (taken.invariants(), body.invariants());
-        // What a file does not tell of a general mass is W0 beyond C1.
+        // A file does not state W0 of a general mass beyond C1.
         let mut without_w0 = told.clone();
         if let Some(general) = &mut without_w0.primary_mut().general {
             let solid = told.as_solid();
@@ -112,7 +112,7 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     let (model, body) = block(7);
     let mut numbers = Random(5);
     let (nf, mass) = (body.n_modes(), model.scalar_mass().expect("a solid"));
-    // Every mode with a rigid motion as large as itself, and all mixed with each other.
+    // A rigid motion of equal size is added to every mode, and all modes are mixed.
     let mix = random(&mut numbers, nf, nf) + Mat::<f64>::identity(nf, nf);
     let own = &body.modes().shape;
     let size = own.norm_max();
@@ -120,7 +120,7 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     let stiffness = mix.transpose() * body.invariants().modal_stiffness() * &mix;
     let invariants = condense(mass, &body.nodes().positions, shape.as_ref(), stiffness);
     let mut told = file_with(&body, &shape, &invariants);
-    // A damping that is not diagonal, and what it is in the modes of the body.
+    // A damping matrix that is not diagonal, and its transform to the mixed modes.
     let damping = Mat::from_fn(nf, nf, |i, j| 0.01 * (1 + i.min(j)) as f64);
     told.body.modal_damping = Some(mix.transpose() * &damping * &mix);
 
@@ -140,7 +140,7 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     let strict = Tolerances { frequency: 1e-11, invariants: 1e-9, ..Tolerances::default() };
     let comparison = compare(&in_frame, &taken, &strict).expect("comparable");
     assert!(comparison.same_nodes() && comparison.passed(), "{}", comparison.text());
-    // Signs of the modes apart.
+    // Modes are equal up to their signs.
     let sign = |j: usize| {
         let products = (0..3 * body.n_nodes()).map(|row| own[(row, j)] * taken.modes().shape[(row, j)]);
         products.sum::<f64>().signum()
@@ -153,8 +153,8 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     assert!(apart < 1e-9 * damping.norm_max(), "{apart:e}");
 }
 
-/// The frame of a file is kept: the displacements of the nodes for the elastic forces of the modes are those of the file,
-/// with the frame held, and so is everything that is linear in the modes.
+/// The frame of a file is kept: with the frame held, nodal displacements under modal elastic forces agree
+/// with the file, and so do all terms linear in the modes.
 #[test]
 fn a_frame_that_the_modes_tie_to_the_body_is_kept() {
     let (model, body) = block(7);
@@ -194,7 +194,7 @@ fn a_frame_that_the_modes_tie_to_the_body_is_kept() {
         &compliance(&shape, &invariants.modal_mass()),
         "m",
     );
-    // C1' = X'C1' and K_geo' = X'K_geo X with Psi' = Psi X, in quantities of the nodes.
+    // C1' = X'C1' and K_geo' = X'K_geo X with Psi' = Psi X, expressed by nodal quantities.
     let inverse = |a: &Mat<f64>, shape: &Mat<f64>, m: &Mat<f64>| {
         let moved = solve(m, &shape.transpose().to_owned());
         moved.transpose() * a * &moved
@@ -209,12 +209,12 @@ fn a_frame_that_the_modes_tie_to_the_body_is_kept() {
         &momentum(invariants.c1(), &shape, &m),
         "C1",
     );
-    // Mean axes need the geometric stiffness of the rigid motions, which the file does not have.
+    // Mean axes need the geometric stiffness of the rigid motions, which the file lacks.
     let refused = imported_in(&told, Some(&BodyFrame::Com.into())).expect_err("geometric stiffness");
     assert!(refused.has(Code::CarrierImpossible), "{refused}");
 }
 
-/// Six rigid motions mixed into the modes are found as a span, and taken out.
+/// Six rigid motions mixed into the modes are detected as a span and removed.
 #[test]
 fn rigid_motions_mixed_into_the_modes_are_named_and_left_out() {
     let (model, body) = block(5);
@@ -238,7 +238,7 @@ fn rigid_motions_mixed_into_the_modes_are_named_and_left_out() {
     assert!(messages[0].contains("6 combinations of the modes are rigid motions"), "{messages:?}");
     let Imported { body: taken, diagnostics } = imported(&file).expect("a body");
     assert!(diagnostics[0].message().contains("6 combinations"), "{}", diagnostics[0]);
-    // What is left is M-orthogonal to all rigid motions: mean axes.
+    // The remaining modes are M-orthogonal to all rigid motions: mean axes.
     assert_eq!(*taken.conditions(), ReferenceConditions::MeanAxes);
     assert_eq!(taken.n_modes(), 5);
     for (own, told) in taken.modes().eigenvalue.iter().zip(lambda) {
@@ -287,7 +287,7 @@ fn what_is_no_body_is_refused_in_words() {
     refused(&|b| b.inertia.i7[(0, 0)] = f64::NAN, Code::ForeignIncomplete, "no NaN");
     refused(&|b| b.modal_stiffness[(0, 0)] *= -1.0, Code::ForeignIncomplete, "not positive definite beside");
     refused(&|b| b.inertia.i3[(0, 1)] = 1e3, Code::ForeignIncomplete, "mode 2 and rigid motion together");
-    // Masses on the axis x.
+    // All masses lie on the x axis.
     let line =
         |b: &mut ImportedBody| b.inertia.i7 = nalgebra::Matrix3::from_diagonal(&[0.0, 1.0, 1.0].into());
     refused(&line, Code::ForeignIncomplete, "all masses lie on a line");
@@ -301,7 +301,7 @@ fn what_is_no_body_is_refused_in_words() {
     );
 }
 
-/// A file whose body breaks an identity is refused as such: the message speaks of the file, not of a model.
+/// A file whose body violates an identity is refused with a message about the file, not about a model.
 #[test]
 fn a_file_that_breaks_an_identity_is_told_to_be_wrong() {
     let (_, body) = block(3);
@@ -346,27 +346,27 @@ fn an_audit_passes_a_body_and_names_what_is_wrong_with_another() {
         change(&mut bad.body);
         audit(&bad, 1e-9)
     };
-    // Lengths of nodes in millimetres, inertia in metres.
+    // Positions of nodes are in millimetres, inertia in metres.
     let millimetres = of(&|b| b.frames.iter_mut().for_each(|f| f.position = f.position.map(|x| 1000.0 * x)));
     assert_eq!(codes(&millimetres), [Code::AuditUnits]);
     assert!(millimetres.findings()[0].message().contains("1e-3"), "{}", millimetres.findings()[0]);
-    // An inertia that no body has.
+    // The inertia is impossible for any body.
     assert!(codes(&of(&|b| b.inertia.i7[(0, 0)] *= 9.0)).contains(&Code::AuditImplausible));
     assert_eq!(codes(&of(&|b| b.inertia.i1 = f64::NAN)), [Code::AuditImplausible]);
-    // What has no mass has one finding, not one for each number that is divided by it.
+    // A body without mass has a single finding, not one for each quotient.
     for mass in [0.0, -3.0] {
         let found = of(&|b| b.inertia.i1 = mass);
         assert_eq!(codes(&found), [Code::AuditImplausible], "{:?}", found.findings());
         assert!(found.findings()[0].message().contains("mass is not positive"));
     }
-    // No body is made of masses on a line (see above), and the audit says so.
+    // The conversion refuses masses on a line, and the audit reports them.
     let line = of(&|b| b.inertia.i7 = nalgebra::Matrix3::from_diagonal(&[0.0, 1.0, 1.0].into()));
     assert!(line.findings().iter().any(|f| f.message().contains("all masses lie on a line")), "{line:?}");
-    // A coupling a thousand times too large: modes would carry negative energy.
+    // A coupling a thousand times too large: modes would have negative energy.
     assert!(codes(&of(&|b| b.inertia.i3[(0, 0)] = 1e3)).contains(&Code::AuditIdentity));
     assert!(codes(&of(&|b| b.modal_stiffness = Mat::zeros(4, 4))).contains(&Code::AuditImplausible));
     assert!(codes(&of(&|b| b.modal_stiffness[(0, 1)] += 1.0)).contains(&Code::AuditIdentity));
-    // What the tolerance allows passes.
+    // Differences within the tolerance pass.
     let slightly = |by: f64| of(&|b| b.modal_stiffness[(0, 1)] += by * b.modal_stiffness.norm_max());
     assert!(slightly(1e-10).passed() && !slightly(1e-8).passed());
 }

@@ -1,5 +1,5 @@
-//! Shapes from elsewhere give the same body as modes computed here, whatever basis, precision, order and file
-//! they come in; what they are not is said.
+//! Imported shapes give the same body as computed modes in any basis, precision, order and file format;
+//! shapes that are no modes are reported.
 
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -21,7 +21,7 @@ use std::path::PathBuf;
 
 const COUNT: usize = 12;
 
-/// A bracket whose matrix rows stand in no order at all.
+/// Returns a bracket whose matrix rows have an arbitrary order.
 fn bracket() -> FeModel {
     let raw = Mesh::bracket(ElementKind::Hex8, 4, 2, 0.05)
         .assemble(&Material::STEEL, MassRule::Consistent)
@@ -39,7 +39,7 @@ fn free(model: &FeModel) -> Mat<f64> {
     free_surface(model, &settings, &Context::QUIET).expect("a sound model").solution.vectors
 }
 
-/// Columns in internal order, by matrix rows.
+/// Reorders columns from internal order to matrix rows.
 fn by_matrix_rows(model: &FeModel, columns: &Mat<f64>) -> Mat<f64> {
     let n = columns.nrows();
     let row_of = model.in_internal_order(Mat::from_fn(n, 1, |row, _| row as f64));
@@ -155,7 +155,7 @@ fn what_adds_nothing_is_left_out_and_named() {
     let model = bracket();
     let modes = free(&model);
     let rigid = rigid_fields(&model.nodes().positions, 3, [0.0; 3], 1.0);
-    // Twelve modes, the third again, six rigid motions, a sum of two.
+    // Twelve modes, the third repeated, six rigid motions, and a sum of two modes.
     let shapes = Mat::from_fn(modes.nrows(), COUNT + 8, |i, j| match j {
         _ if j < COUNT => modes[(i, j)],
         COUNT => 7.0 * modes[(i, 2)],
@@ -203,7 +203,7 @@ fn shapes_that_are_no_eigenvectors_keep_every_identity() {
     let done = converted(&model, BasisChoice::Imported(imported(&model, &shapes, 17)), Accuracy::Standard);
     assert_eq!(codes(&done), [Code::ShapesSpan]);
     assert!(done.diagnostics[0].message().starts_with("4 of 9 modes"));
-    // The eigenvectors among them are still proved complete, and the report does not claim more.
+    // The eigenvectors among them are still proved complete, and the report claims no more.
     let certificate = done.body.certificate();
     assert_eq!((certificate.proved_modes, certificate.negative_pivots), (Some(5), Some(11)));
     let invariants = done.body.invariants();
@@ -235,7 +235,7 @@ fn shapes_that_do_not_fit_are_refused() {
     assert!(none.has(Code::ShapesNone) && none.has(Code::ShapesRigid));
 }
 
-/// scipy's eigenvectors of a fixture model, as numpy saved them.
+/// Returns a fixture model and eigenvectors computed by scipy, saved by numpy.
 fn bar() -> (FeModel, PathBuf) {
     let folder = oracle::fixtures().join("models/bar_c3d8r");
     let files = read_manifest(folder.join("model.toml")).expect("manifest");
@@ -255,7 +255,7 @@ fn eigenvectors_of_scipy_give_the_same_invariants() {
     let comparison = compare(&free_body, &done.body, &strict).expect("comparable");
     assert!(comparison.passed(), "{comparison:#?}");
     assert_eq!(done.body.certificate().proved_modes, Some(COUNT));
-    // scipy's file has the six rigid modes too, and is among the sources.
+    // The file of scipy includes the six rigid modes, and is listed among the sources.
     assert_eq!(codes(&done), [Code::ShapesRigid]);
     assert_eq!(done.body.source().files.last().map(|file| file.role.as_str()), Some("shapes"));
 }

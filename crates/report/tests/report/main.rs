@@ -1,6 +1,6 @@
 //! Reports and comparisons of bodies.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod comparison_coverage;
 mod craig_bampton;

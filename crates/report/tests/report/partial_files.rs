@@ -1,5 +1,5 @@
-//! Files of bodies that lack groups of the kinetic energy: they hold what the body holds, say what was
-//! dropped, and no less.
+//! Files of bodies without some groups of the kinetic energy: they hold the terms of the body and state the
+//! dropped groups.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
@@ -13,7 +13,7 @@ use oracle::plane::rectangle;
 use proptest::prelude::*;
 use serde_json::Value;
 
-/// Solids, a general mass, and both in the plane.
+/// Returns solids, a general mass, and both in the plane.
 fn bodies() -> [FlexBody; 4] {
     [
         soft_block(5),
@@ -92,7 +92,7 @@ fn bounds_and_limits_that_are_not_known_are_absent() {
     let body = soft_block(3);
     let mut terms = decisions(TermGroups::NONE);
     (terms[0].bound, terms[0].limit, terms[1].tier) = (f64::INFINITY, f64::INFINITY, 2);
-    terms.reverse(); // A body has them in the order of the groups.
+    terms.reverse(); // the body sorts them into the order of the groups
     let partial = body.reduced(&[0, 1, 2], TermGroups::NONE, terms).expect("a body");
     let (_folder, path) = written(&partial);
     let structure = flexbody_file::structure(&path).expect("a structure");
@@ -103,7 +103,7 @@ fn bounds_and_limits_that_are_not_known_are_absent() {
     assert_eq!(flexbody_file::read(&path).expect("read"), partial);
 }
 
-/// Damages the file of a body without W1 and gives what the reader says.
+/// Damages the file of a body without W1 and returns the message of the reader.
 fn refused(body: &FlexBody, damage: impl FnOnce(&hdf5::File)) -> String {
     let (_folder, path) = written(body);
     let file = hdf5::File::open_rw(&path).expect("opens");
@@ -152,12 +152,12 @@ fn files_that_keep_what_is_not_there_or_drop_what_is_are_refused() {
         tier.write_scalar(&300_i64).expect("written");
     });
     says(error, "/terms@W1_tier: expected 0, 1 or 2, found 300");
-    // All of one decision gone: the group is dropped for no reason.
+    // All entries of one decision are removed: no reason for dropping the group remains.
     let error = refused(&partial, |f| {
         ["W1_reason", "W1_tier", "W1_bound", "W1_limit"].into_iter().for_each(|name| attribute(name)(f));
     });
     says(error, "`invariants` does not hold W1, but no decision of `terms` drops it");
-    // A group said to be dropped whose datasets are gone too, but not those of the lumped masses.
+    // A group is declared as dropped and its datasets are removed, but not those of the lumped masses.
     let error = refused(&body, |f| {
         set_text(f, "W3", "dropped");
         f.unlink("invariants/W3").expect("unlinked");
@@ -190,7 +190,7 @@ fn reports_say_what_was_dropped() {
     );
     let html = render(&facts, Format::Html);
     assert!(html.contains("W3 dropped"));
-    // Without W2 nobody says that the centrifugal term softens nothing.
+    // Without W2 the report does not claim that the centrifugal term softens nothing.
     let without =
         render(&Facts::new(&with_groups(&body, TermGroups::NONE), &RunData::default()), Format::Text);
     assert!(!without.contains("soften"), "{without}");
@@ -216,7 +216,7 @@ fn a_partial_body_compares_in_what_both_hold() {
             assert_eq!(row("S (W2, W3, m_ff)"), groups.w2);
         }
     }
-    // What is compared is seen when it differs.
+    // Compared groups are reported if they differ.
     let body = soft_block(4);
     let groups = TermGroups { w3: true, ..TermGroups::NONE };
     let mut parts = with_groups(&body, groups).into_parts();

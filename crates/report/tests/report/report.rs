@@ -1,4 +1,4 @@
-//! Reports say what the body is, in three formats, and no more than is proved.
+//! Reports describe the body in three formats and claim no more than is proved.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_body::flex_body::{FlexBody, Guarantee, MassStructure, Parts, Storage};
@@ -67,7 +67,7 @@ fn the_three_formats_are_these_bytes() {
 fn guarantees_are_said_with_no_more_digits_than_they_have() {
     let body = changed(|parts| {
         let eigenvalue = &parts.modes.eigenvalue;
-        // The fourth mode is known worst, and from above only.
+        // The fourth mode has the widest bounds, and an upper bound only.
         let width = |j: usize| if j == 3 { 2e-9 } else { 1e-14 };
         let mut digits = DIGITS.map(|_| 15.75);
         digits[8] = 15.29;
@@ -148,7 +148,7 @@ proptest! {
     }
 }
 
-/// Lines are broken elsewhere, and more of them are shown where they are short.
+/// Lines break at other places, and terms with short lines get more of them.
 #[test]
 fn a_narrow_terminal_shows_what_a_wide_one_shows() {
     let (body, run) = (engine_mount(), run_data());
@@ -161,7 +161,7 @@ fn a_narrow_terminal_shows_what_a_wide_one_shows() {
     assert_eq!(words(Screen::default().with_columns(100)), usual);
 }
 
-/// Warnings and interfaces take lines of their own.
+/// Warnings and interfaces add lines to the summary of this body.
 #[test]
 fn the_summary_of_a_usual_body_is_read_in_seconds() {
     let body = changed(|parts| parts.interfaces.clear());
@@ -171,7 +171,7 @@ fn the_summary_of_a_usual_body_is_read_in_seconds() {
     assert!(lines <= 14 && told.lines().count() <= 18, "{told}");
 }
 
-/// What limits the use of a body is never left to the report.
+/// Limitations of a body are always in the summary, not in the report alone.
 #[test]
 fn the_summary_keeps_what_the_body_cannot_do() {
     let told = |change: &dyn Fn(&mut Parts)| {
@@ -255,7 +255,7 @@ fn mass_properties_do_not_depend_on_the_body_frame() {
             }
         }
     }
-    // The cuboid of the test: m = 6, I = m (b^2 + c^2) / 12 with sides 3, 2, 1, centred at (1.5, 1, 0.5).
+    // Cuboid of the test: m = 6, I = m (b^2 + c^2) / 12 with sides 3, 2, 1, centred at (1.5, 1, 0.5).
     let exact = [6.0 * 5.0 / 12.0, 6.0 * 10.0 / 12.0, 6.0 * 13.0 / 12.0];
     for k in 0..3 {
         assert!((principal["body"]["principal_inertia"][k].as_f64().unwrap() - exact[k]).abs() < 1e-13);
@@ -265,7 +265,7 @@ fn mass_properties_do_not_depend_on_the_body_frame() {
     }
     let words = |facts: &serde_json::Value| facts["body"]["frame"].as_str().unwrap().to_owned();
     assert_eq!(words(&principal), "origin at the centre of mass, axes of the model, which are principal");
-    // The sides of the cuboid are along the model axes: they are principal, too.
+    // The sides of the cuboid are parallel to the model axes, which are therefore principal.
     assert_eq!(words(&com), "origin at the centre of mass, axes of the model, which are principal");
     assert_eq!(words(&model), "origin of the model, axes of the model, which are principal");
 }
@@ -423,7 +423,7 @@ fn the_page_loads_nothing() {
     assert!(html.contains("default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"));
 }
 
-/// Everything but the turning and moving is there without scripts: a picture, words and numbers.
+/// Without scripts the page still has a picture, words and numbers; only the animation is missing.
 #[test]
 fn the_page_is_whole_without_scripts() {
     let body = engine_mount();
@@ -440,7 +440,7 @@ fn the_page_is_whole_without_scripts() {
     ] {
         assert!(page.contains(part), "{part}");
     }
-    // A cell for every entry that is not zero: only the diagonal of W2 of this body.
+    // Every nonzero entry has a cell: only the diagonal of W2 of this body.
     assert_eq!(page.matches("<title>mode 1: 0.67</title>").count(), 1);
     assert!(!page.contains("<title>modes "), "no entry of two modes");
     let frequencies = body.frequencies_hz().len();
@@ -481,7 +481,7 @@ fn identities_and_diagnostics_are_told_as_they_are() {
     assert_eq!(found["diagnostics"][0]["code"], "FB510");
 }
 
-/// A page whose scripts are empty, and what was in them.
+/// Returns a page with empty scripts, and the texts of the scripts.
 fn without_scripts(html: &str) -> (String, Vec<String>) {
     let (mut page, mut scripts, mut rest) = (String::new(), Vec::new(), html);
     while let Some(start) = rest.find("<script") {
@@ -494,7 +494,7 @@ fn without_scripts(html: &str) -> (String, Vec<String>) {
     (page + rest, scripts)
 }
 
-/// Every element is closed in order, and every `<` and `&` is markup.
+/// Asserts that every element is closed in order, and that every `<` and `&` is markup.
 fn well_formed(html: &str) {
     let (html, _) = without_scripts(html);
     let style = html.find("<style>").unwrap()..html.find("</style>").unwrap();

@@ -1,5 +1,4 @@
-//! `compare` sees every difference of two bodies, and none that is only a matter of signs, bases, order or
-//! frames.
+//! `compare` detects every difference of two bodies and ignores signs, bases, order and frames.
 
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -37,7 +36,7 @@ fn changed(body: &FlexBody, change: impl FnOnce(&mut Parts)) -> FlexBody {
     FlexBody::new(parts).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Shapes of the same modes: signs flipped, the bases of the two repeated eigenvalues turned.
+/// Returns the shapes of the modes with flipped signs and rotated bases of the two repeated eigenvalues.
 fn other_basis(shape: &Mat<f64>) -> Mat<f64> {
     let (c, s) = (0.6, 0.8);
     let mut t = Mat::<f64>::zeros(6, 6);
@@ -62,7 +61,7 @@ fn other_basis(shape: &Mat<f64>) -> Mat<f64> {
 fn a_body_agrees_with_itself_to_the_last_bit() {
     for body in [block(BodyFrame::Principal), block(BodyFrame::Model), engine_mount()] {
         let comparison = compared(&body, &body);
-        // Aligning multiplies by an identity that the singular value decomposition rounds.
+        // The alignment multiplies by an identity with the rounding of the singular value decomposition.
         assert!(comparison.rows().iter().all(|row| row.difference < 1e-14), "{}", comparison.text());
         assert!(comparison.text().ends_with("the bodies agree\n"));
     }
@@ -140,7 +139,7 @@ fn each_quantity_is_told_apart() {
             &["modal stiffness"],
             changed(&body, |p| p.invariants.primary_mut().modal_stiffness[(5, 5)] *= 1.0 + 1e-6),
         ),
-        // Moved in space: all of it, but nothing in the body frame.
+        // Moving the frame in space changes the global positions, but nothing in the body frame.
         (&["centre of mass", "node positions", "first moment"], changed(&body, |p| p.frame.origin.x += 1e-7)),
     ];
     cases.push((
@@ -181,7 +180,7 @@ fn other_nodes_leave_what_needs_no_common_node() {
     let worse = changed(&renumbered, |p| p.invariants.primary_mut().s[1][1][(2, 2)] += 1e-6);
     assert_eq!(failed(&compared(&body, &worse)), ["norms of S"]);
 
-    // A finer mesh has the same mass and centre; its inertia is exact too, the modes are near.
+    // A finer mesh has the same mass and centre; its inertia is exact too, and its modes are close.
     let (mass, positions) = mesh([6, 6, 4]);
     let shape = shapes(&mass, &positions);
     let (frame, _) = choose_frame(&mass, &positions, BodyFrame::Principal).unwrap();
@@ -208,7 +207,7 @@ fn bodies_with_different_numbers_of_modes_are_compared_in_what_they_have_in_comm
     let common = |a: &FlexBody, b: &FlexBody| compare_common(a, b, &Tolerances::default());
     let refused = compare(&body, &some(&[0, 1, 2]), &Tolerances::default()).unwrap_err();
     assert!(refused.has(Code::BodyIncomparable) && refused.to_string().contains("--common"), "{refused}");
-    // Modes 1 and 2, and 4 and 5, have one eigenvalue each: of the last list mode 1 is no mode in common.
+    // Modes 1 and 2, and 4 and 5, are repeated: mode 1 of the last list is therefore not compared.
     for modes in [&[0, 1, 2][..], &[2, 5], &[5], &[0, 2]] {
         for (a, b) in [(&body, &some(modes)), (&some(modes), &body)] {
             let comparison = common(a, b).expect("comparable");
@@ -219,7 +218,7 @@ fn bodies_with_different_numbers_of_modes_are_compared_in_what_they_have_in_comm
     }
     let refused = common(&body, &some(&[0])).unwrap_err();
     assert!(refused.has(Code::BodyIncomparable) && refused.to_string().contains("repeated"), "{refused}");
-    // A mode that differs is not taken for one that is missing.
+    // A changed mode is compared and not taken for a missing one.
     let wrong = changed(&some(&[2, 5]), |p| {
         p.modes.eigenvalue[1] *= 1.03;
         p.invariants.primary_mut().modal_stiffness[(1, 1)] *= 1.03;
@@ -235,7 +234,7 @@ fn other_units_and_other_mode_counts_cannot_be_compared() {
     let tonnes = changed(&body, |p| p.units = UnitSystem::parse("mm", "t", "s").unwrap());
     let error = compare(&body, &tonnes, &Tolerances::default()).unwrap_err();
     assert!(error.has(Code::BodyIncomparable) && error.diagnostics().len() == 2, "{error}");
-    // Two names of one unit are the same.
+    // Two names of one unit are equal.
     let tonne = changed(&body, |p| p.units = UnitSystem::parse("mm", "tonne", "s").unwrap());
     assert!(compared(&tonnes, &tonne).passed());
     let error = compare(&body, &block(BodyFrame::Model), &Tolerances::default()).unwrap_err();
@@ -257,8 +256,8 @@ fn a_distant_origin_costs_the_digits_that_it_costs_and_no_more() {
         let comparison = compared(a, b);
         assert!(comparison.passed(), "{}", comparison.text());
         let widest = comparison.rows().iter().map(|r| r.tolerance).fold(0.0, f64::max);
-        // 8 eps m d^2 / J_min, d = 2.3e4, m = 6, J_min = 0.5: far below the difference that must be seen
-        // next.
+        // The tolerance is 8 eps m d^2 / J_min with d = 2.3e4, m = 6, J_min = 0.5: far below the difference
+        // detected next.
         assert!(widest < 1.2e-5, "{}", comparison.text());
     }
     let other = changed(&principal, |p| p.invariants.primary_mut().second_moment *= 1.0 + 1e-4);

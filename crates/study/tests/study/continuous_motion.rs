@@ -1,5 +1,5 @@
-//! Errors, extremes and verdicts belong to the continuous motion: which instants a scene writes has no part
-//! in them.
+//! Errors, extremes and verdicts refer to the continuous motion: the output times of a scene do not affect
+//! them.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::flex_body::FlexBody;
@@ -16,7 +16,7 @@ use oracle::scenes::{bodies, doing, seeded};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
-/// The block with loads at two of its nodes that bend it, over so many periods of its first mode.
+/// Returns the block with bending loads at two of its nodes, over this number of periods of its first mode.
 fn scene(body: &FlexBody, periods: f64, outputs: usize, history: &History) -> Scene {
     let rate = body.modes().eigenvalue[0].sqrt();
     let (mass, size) = (body.invariants().mass(), body.invariants().inertia().trace().sqrt());
@@ -55,7 +55,7 @@ fn scene(body: &FlexBody, periods: f64, outputs: usize, history: &History) -> Sc
     }
 }
 
-/// A pulse shorter than the periods of most modes, between two of a hundred instants.
+/// Returns a pulse shorter than the periods of most modes, between two of a hundred output times.
 fn pulse(body: &FlexBody, periods: f64) -> History {
     let duration = periods * TAU / body.modes().eigenvalue[0].sqrt();
     let at = |part: f64| part * duration;
@@ -66,13 +66,13 @@ fn motion(body: &FlexBody, scene: &Scene) -> Recording {
     simulate(body, scene, &Context::QUIET).expect("a motion").0
 }
 
-/// Largest deflection of the watched points at the instants that were written.
+/// Returns the largest deflection of the watched points at the output times.
 fn written(recording: &Recording) -> f64 {
     recording.paths.iter().flat_map(|path| &path.deflection).map(|d| d.norm()).fold(0.0, f64::max)
 }
 
-/// The largest difference of the deflections of two motions at the same instants, relative to the largest
-/// deflection.
+/// Returns the largest difference of the deflections of two motions at the same times, relative to the
+/// largest deflection.
 fn apart(reference: &Recording, other: &Recording) -> f64 {
     let pairs = reference.paths.iter().zip(&other.paths);
     let all = pairs.flat_map(|(a, b)| a.deflection.iter().zip(&b.deflection));
@@ -83,7 +83,7 @@ fn apart(reference: &Recording, other: &Recording) -> f64 {
 fn a_pulse_between_two_instants_is_seen() {
     let body = soft_block(38);
     let scene = |outputs| scene(&body, 40.0, outputs, &pulse(&body, 40.0));
-    // 20,000 instants, looked at one by one, are the oracle; two see nothing of the pulse.
+    // 20,000 output times are the oracle; two output times miss the pulse.
     let fine = motion(&body, &scene(20_000));
     let coarse = motion(&body, &scene(2));
     let nodes = |q: &[f64]| {
@@ -92,7 +92,7 @@ fn a_pulse_between_two_instants_is_seen() {
         (0..body.n_nodes()).map(|i| Vector3::from_fn(|k, _| at(3 * i + k)).norm()).fold(0.0, f64::max)
     };
     let largest = fine.states.iter().map(|state| nodes(&state.q)).fold(0.0, f64::max);
-    // The extent of a body is that along the axes of the model.
+    // The extent of a body is measured along the axes of the model.
     let staged = Stage::new(&body, &scene(2)).expect("a stage").body.into_owned();
     let largest = largest / staged.extent();
     for recording in [&fine, &coarse] {
@@ -126,7 +126,7 @@ fn a_selection_for_a_pulse_holds_at_every_instant() {
 fn a_load_that_is_sampled_once_in_its_period_is_seen() {
     let body = soft_block(12);
     let rate = body.modes().eigenvalue[0].sqrt();
-    // As many instants as oscillations: all of them see the same phase.
+    // The number of output times equals that of oscillations, so that all of them have the same phase.
     let history = History::Sine { amplitude: 1.0, frequency: 5.0 * rate / TAU, phase: 0.0 };
     let of = |outputs| {
         let scene = scene(&body, 20.0, outputs, &history);
@@ -139,7 +139,7 @@ fn a_load_that_is_sampled_once_in_its_period_is_seen() {
 proptest! {
     #![proptest_config(seeded(12, 11))]
 
-    /// Pulses, resonances and kinks, looked at as seldom as twice and as often as 20,000 times.
+    /// Pulses, resonances and kinks with 2 to 20,000 output times.
     #[test]
     fn verdicts_do_not_depend_on_the_outputs(
         of in 0..4usize,
@@ -158,7 +158,7 @@ proptest! {
         let again = select(whole, &[], &scene.clone().into(), &Context::QUIET).expect("a selection");
         prop_assert_eq!(&first, &again);
 
-        // What is written is within the extremes, and where it is dense reaches them.
+        // Output values are within the extremes, and reach them if the output is dense.
         let sparse = motion(whole, &scene);
         scene.run.outputs = 20_000;
         let dense = motion(whole, &scene);
@@ -189,7 +189,7 @@ fn the_steps_of_both_methods_do_not_depend_on_the_outputs() {
         assert_eq!(few.work.steps, many.work.steps);
         let (a, b) = (few.states.last().expect("an end"), many.states.last().expect("an end"));
         assert_eq!(a, b, "the same steps, the same bits");
-        // An instant within a step is as accurate as the method.
+        // The motion within a step is as accurate as the method.
         let exact = {
             let mut scene = scene(&body, 5.0, 3, &pulse(&body, 5.0));
             scene.run.scheme = Scheme::Adaptive { tolerance: 1e-12 };
@@ -209,7 +209,7 @@ fn a_body_at_rest_does_not_drift() {
     at_rest.watched.clear();
     let drift = motion(&body, &at_rest).drift();
     assert!(drift.energy < 1e-6 && drift.linear < 1e-6 && drift.angular < 1e-6, "{drift:?}");
-    // Rounding of what flies past is no energy of the body either.
+    // Rounding of a fast translation is no energy of the body either.
     at_rest.initial.velocity = Vector3::new(1e3, -2e3, 5e2);
     let drift = motion(&body, &at_rest).drift();
     assert!(drift.energy < 1e-6 && drift.linear < 1e-12, "{drift:?}");
@@ -231,7 +231,7 @@ fn runs_of_more_steps_than_allowed_are_refused_before_they_begin() {
     let mut short = scene(&body, 5.0, 10, &History::Constant(1.0));
     short.run.most_steps = 3;
     assert_eq!(refused(&short), Code::RunTooLong);
-    // What is allowed is counted in steps of the method, whatever breaks the histories have.
+    // The limit counts steps of the method, whatever breakpoints the histories have.
     let pulse = History::Table { times: vec![0.0, 0.5, 0.6, 0.8], values: vec![0.0, 0.0, 1.0, 0.0] };
     let mut exact = scene(&body, 1.0, 10, &pulse);
     exact.run.scheme = Scheme::Conserving { order: 4, step: Some(0.01) };

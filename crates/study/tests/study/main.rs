@@ -1,6 +1,6 @@
-//! What a scene needs of a body, against motions of all nodes.
+//! Selections and trade studies compared with motions of all nodes.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod continuous_motion;
 mod nodal_reference;

@@ -1,5 +1,5 @@
-//! The motion of all nodes in every kind of scene: with all modes of its model a body moves as the nodes do, to
-//! second order of the displacements where rotations of nodes carry mass.
+//! Motion of all nodes in every kind of scene: with all modes of its model a body moves like the nodes, to
+//! second order of the displacements if rotations of nodes carry mass.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::ModeSettings;
@@ -22,23 +22,22 @@ use oracle::scenes::nothing_happens;
 use oracle::unreduced::soft_plate;
 use proptest::prelude::*;
 
-/// More modes than there are.
+/// A number of modes beyond that of any model.
 const ALL: usize = 10_000;
 
-/// Implicit steps: the nodes take the same, so that what is left between them is the rounding of both.
+/// Limit for implicit steps, which the nodes share, so that the difference is rounding.
 const SAME_STEPS: f64 = 1e-7;
 
-/// Ratio of the fastest to the slowest mode above which steps that the reduced equations can iterate are too
-/// many for a test.
+/// Ratio of the fastest to the slowest mode above which a test would need too many implicit steps.
 const STIFF: f64 = 100.0;
 
-/// Explicit steps with the tolerances 1e-9 of the body and 1e-8 of the nodes, thousands of them: what is left
-/// is that of the steps, and falls with their tolerance.
+/// Limit for thousands of explicit steps with the tolerances 1e-9 of the body and 1e-8 of the nodes: the
+/// difference is the step error, which falls with the tolerance.
 const EXPLICIT: f64 = 1e-5;
 const FALLS: f64 = 10.0;
 
-/// A model with the interfaces `left` (averaging, its reference point beside its nodes) and `right` (rigid)
-/// at both ends along x.
+/// Returns a model with the interfaces `left` (averaging, with its reference point off the nodes) and `right`
+/// (rigid) at its ends along x.
 fn with_ends(mut raw: RawModel) -> RawModel {
     let x: Vec<f64> = raw.nodes.positions.iter().map(|x| x[0]).collect();
     let (least, most) = x.iter().fold((f64::INFINITY, -f64::INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
@@ -65,7 +64,7 @@ fn with_ends(mut raw: RawModel) -> RawModel {
     raw
 }
 
-/// A rubber beam of some bricks, askew.
+/// Returns a skewed rubber beam of a few bricks.
 fn solid() -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([3, 1, 1]), |[x, y, z]| {
@@ -85,8 +84,8 @@ fn body_of(model: &FeModel, modes: usize) -> FlexBody {
         .body
 }
 
-/// First circular frequency, mass, and length of a body: what forces and rates are measured in. Forces and the
-/// squares of spins go with the amplitude.
+/// Scales of a body: first circular frequency, mass and length. Forces and the squares of spins are
+/// proportional to the amplitude.
 struct Size {
     amplitude: f64,
     rate: f64,
@@ -112,12 +111,12 @@ impl Size {
         Self { amplitude, rate, spin, fastest, force, torque: force * radius, plane: body.dimension() == 2 }
     }
 
-    /// A vector in the plane of a plane body.
+    /// Returns a vector; for a plane body in its plane.
     fn along(&self, v: [f64; 3]) -> Vector3<f64> {
         Vector3::new(v[0], v[1], if self.plane { 0.0 } else { v[2] })
     }
 
-    /// A vector about which a plane body turns.
+    /// Returns a rotation vector; for a plane body normal to its plane.
     fn about(&self, v: [f64; 3]) -> Vector3<f64> {
         if self.plane { Vector3::new(0.0, 0.0, v[2]) } else { v.into() }
     }
@@ -130,7 +129,7 @@ impl Size {
         History::Sine { amplitude: 1.0, frequency: times * self.rate / std::f64::consts::TAU, phase: 0.3 }
     }
 
-    /// Nothing acts, for a period of the first mode.
+    /// Returns a scene without loads over a period of the first mode.
     fn scene(&self, scheme: Scheme) -> Scene {
         let mut scene = nothing_happens("all nodes", std::f64::consts::TAU / self.rate, 1e-9);
         (scene.run.outputs, scene.run.scheme) = (10, scheme);
@@ -144,11 +143,11 @@ impl Size {
     }
 
     fn steps(&self, order: usize) -> Scheme {
-        // The reduced equations leave the modes of a body that is carried, and torques, to their iteration.
+        // The reduced equations iterate on the modes of a carried body, and on torques.
         Scheme::Conserving { order, step: Some(0.5 / self.fastest) }
     }
 
-    /// Forces and torques at both interfaces, along axes of the world and of the model.
+    /// Returns forces and torques at both interfaces, along axes of the world and of the model.
     fn at_interfaces(&self, torques: bool) -> Vec<Load> {
         let along = |direction: Vector3<f64>, factor: &History| VectorHistory::Along {
             direction,
@@ -179,9 +178,9 @@ impl Size {
         Some(Spin { velocity, axes: Axes::Model, start: None, hold })
     }
 
-    /// Carried about an axis beside it that moves.
+    /// Returns a carrier that rotates about a moving axis beside it.
     fn carried(&self, by: Point) -> Option<Carried> {
-        // Loads by the square of the spin and by its rate go with the amplitude.
+        // Loads by the square of the spin and by its rate are proportional to the amplitude.
         let (to, change) = (0.2 * self.spin, 0.2 * self.rate * self.amplitude);
         let rate = History::Ramp { from: to - change, to, start: 0.0, duration: 5.0 / self.rate };
         let axis = self.about([0.5, 0.3, 1.0]).normalize();
@@ -198,14 +197,14 @@ impl Size {
     }
 }
 
-/// The motion of a body, that of the nodes of its model, and the errors between them.
+/// Returns the motion of a body, and its errors relative to the motion of the nodes of its model.
 fn errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> (Trace, OutputErrors) {
     let stage = Stage::new(body, scene).expect("a stage");
     let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET).expect("a motion");
     let nodal =
         NodalReference::new(model, &stage.body, &stage.scene, &motion, &Context::QUIET).expect("a reference");
     if matches!(scene.run.scheme, Scheme::Conserving { .. }) {
-        // Steps end where they do.
+        // Both integrations use the same steps.
         assert_eq!(nodal.time(), motion.time, "the same steps");
     }
     let own = trace_at(&stage.body, &stage.scene, nodal.time(), &Context::QUIET).expect("a motion");
@@ -213,7 +212,7 @@ fn errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> (Trace, OutputErro
     (motion, errors)
 }
 
-/// With all modes the body moves as the nodes do, with most of them left out it does not.
+/// Asserts that the body moves like the nodes with all modes, but not with few modes.
 fn assert_same(what: &str, raw: &RawModel, scene: impl Fn(&Size, Scheme) -> Scene) {
     let model = model_of(raw.clone());
     if model.director_mass().is_some() {
@@ -224,7 +223,7 @@ fn assert_same(what: &str, raw: &RawModel, scene: impl Fn(&Size, Scheme) -> Scen
     let explicit = Scheme::Adaptive { tolerance: 1e-9 };
     let mut fine = f64::INFINITY;
     let mut schemes = vec![(explicit, EXPLICIT)];
-    // What is carried is integrated explicitly, whatever the scene says.
+    // A carried body is integrated explicitly in any scheme.
     if size.fastest < STIFF * size.rate && scene(&size, explicit).carried.is_none() {
         schemes.extend([2, 4, 6].map(|order| (size.steps(order), SAME_STEPS)));
     }
@@ -253,9 +252,9 @@ fn assert_same(what: &str, raw: &RawModel, scene: impl Fn(&Size, Scheme) -> Scen
     assert!(errors.stress.is_some_and(|error| error > 1e-3), "{what} with four modes: {errors:?}");
 }
 
-/// With all modes a body whose rotations carry mass has the kinetic energy of the nodes to second order of the
-/// displacements: half the amplitude halves the errors, which are parts of the motion. Implicit steps show the errors of
-/// explicit ones.
+/// Asserts that a body whose rotations carry mass has the kinetic energy of the nodes to second order of the
+/// displacements: half the amplitude halves the relative errors. Implicit steps give the errors of explicit
+/// steps.
 fn assert_second_order(what: &str, model: &FeModel, scene: impl Fn(&Size, Scheme) -> Scene) {
     let whole = body_of(model, ALL);
     let explicit = Scheme::Adaptive { tolerance: 1e-9 };
@@ -271,11 +270,11 @@ fn assert_second_order(what: &str, model: &FeModel, scene: impl Fn(&Size, Scheme
         assert!(fine < 0.01 && (1.7..2.3).contains(&(coarse / fine)), "{what}: {coarse:e} and {fine:e}");
     }
     if let (Some(coarse), Some(fine)) = (coarse.reaction, fine.reaction) {
-        // The frame alone has these, of third order.
+        // Only the frame has these errors, of third order.
         let least = if is_carried { 1.7 } else { 3.4 };
         assert!(fine < 0.01 && coarse / fine > least, "{what}: {coarse:e} and {fine:e}");
     }
-    // What is carried is integrated explicitly, whatever the scene says.
+    // A carried body is integrated explicitly in any scheme.
     if !is_carried {
         for (implicit, fine) in parts(&at(0.05, true).0).into_iter().zip(parts(&fine)) {
             assert!((implicit / fine - 1.0).abs() < 0.01, "{what}: {implicit:e} by implicit steps, {fine:e}");
@@ -333,7 +332,7 @@ fn ratios_damp_the_modes_on_the_nodes() {
         scene
     };
     assert_same("solid", &solid(), scene);
-    // The model says it.
+    // The model states the damping.
     let own = RawModel { damping: Some(Damping::Ratio(0.08)), ..solid() };
     assert_same("of the model", &own, |size, scheme| Scene {
         loads: size.at_interfaces(true),
@@ -344,7 +343,7 @@ fn ratios_damp_the_modes_on_the_nodes() {
         requirements: Requirements::default(),
         ..scene(size, scheme)
     });
-    // The ratio of the scene takes its place on the nodes as well.
+    // The damping ratio of the scene replaces that of the model for the nodes too.
     assert_same("replaced", &rayleigh, |size, scheme| {
         let mut scene = scene(size, scheme);
         scene.requirements.replaces_damping = true;
@@ -373,8 +372,9 @@ fn what_carries_a_body_moves_it() {
     }
 }
 
-/// A node carries beams along a line. While it turns them, the tolerances of steps are parts of the energy of the spin:
-/// too much beside this deformation (`carried_nodes_accelerate_as_carried_modes_to_second_order` has the spin).
+/// A node carries beams along a line. For a rotating node, the tolerances of steps are relative to the energy
+/// of the spin, which is too large compared with this deformation
+/// (`carried_nodes_accelerate_as_carried_modes_to_second_order` covers the spin).
 #[test]
 fn a_node_carries_beams() {
     let raw = with_ends(star(BeamMass::Consistent));
@@ -404,8 +404,8 @@ fn settled_starts_have_the_static_deformation_of_the_nodes() {
     }
 }
 
-/// What hangs from an interface begins in equilibrium too, under gravity and the acceleration of what carries
-/// it: its first frequency is far below that of the free body.
+/// A body carried by an interface starts in equilibrium too, under gravity and the acceleration of its
+/// carrier: its first frequency is far below that of the free body.
 #[test]
 fn a_carried_body_starts_in_equilibrium() {
     assert_same("solid", &solid(), |size, scheme| {
@@ -419,7 +419,7 @@ fn a_carried_body_starts_in_equilibrium() {
     });
 }
 
-/// Steps that are halved: those of the explicit method have their own error control.
+/// Halves the implicit steps; the explicit method has error control.
 #[test]
 fn implicit_and_explicit_steps_meet_in_one_motion() {
     let model = model_of(solid());
@@ -427,7 +427,7 @@ fn implicit_and_explicit_steps_meet_in_one_motion() {
     let size = Size::new(&whole);
     let scene =
         |scheme| Scene { loads: size.at_interfaces(true), spin: size.spin(false), ..size.scene(scheme) };
-    // Against a motion that is exact: the collocation of order 4 converges like h^4.
+    // The reference is accurate; the collocation of order 4 converges like h^4.
     let exact = scene(Scheme::Adaptive { tolerance: 1e-11 });
     let error = |step: f64| {
         let stage = Stage::new(&whole, &scene(Scheme::Conserving { order: 4, step: Some(step / size.rate) }))

@@ -1,8 +1,8 @@
-//! A random search for bodies and scenes that break the estimate of what a body lacks of its model, or the
-//! verdict of a selection: both are held to the motion of all nodes.
+//! Random search for bodies and scenes that violate the estimated error of a body relative to its model, or
+//! the verdict of a selection; both are compared with the motion of all nodes.
 //!
-//! The suite runs a few seeds. `FLEXBODY_VERDICTS=200 cargo test -p flexbody-study random_verdicts -- --nocapture`
-//! runs so many and prints the distribution; with `FLEXBODY_BLESS=1` it becomes `docs/verdicts.md`.
+//! The suite runs a few seeds. `FLEXBODY_VERDICTS=200 cargo test -p flexbody-study random_verdicts --
+//! --nocapture` runs 200 and prints the distribution; with `FLEXBODY_BLESS=1` it is written to `docs/verdicts.md`.
 
 use flexbody_base::error::Result;
 use flexbody_body::basis::ModeSettings;
@@ -31,32 +31,33 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
-/// Seeds that the suite runs, and those of driven cases: noise, a blow and a resonance.
+/// Number of seeds of the suite, and seeds of the driven cases: noise, a blow and a resonance.
 const FEW: u64 = 6;
 const FEW_DRIVEN: [u64; 3] = [2, 4, 6];
 
-/// Largest deflection that a load makes by itself, relative to the extent of the body: equations of all nodes
-/// and estimates are of small deformation.
+/// Largest deflection under a load alone, relative to the extent of the body: nodal equations and estimates
+/// assume small deformation.
 const DEFLECTION: f64 = 2e-3;
 
-/// Errors below this part of a tolerance are those of integration and rounding.
+/// Errors below this part of a tolerance are errors of integration and rounding.
 const COUNTS: f64 = 1e-3;
 
-/// What there is to say of the distribution, in words.
+/// Remarks on the distribution.
 const REMAINS: &str = "\nThe estimate moves what is lacking together with the modes that the body has, by the mass that they share; answers the inertia of what is lacking, and forces at the frequencies where their spectrum has peaks; and looks twelve times into the period of the fastest motion that counts\n\
     and three times between two rows of a table. What the equations of a body take as approximate counts as well. Gyroscopic and centrifugal forces of what is lacking are not counted, nor is what the equations of a body leave out in second order of the deformation (frames whose nodal rotations carry mass,\n\
     enriched so far that nothing else is left: deflections of which less than a tenth of the truth is told, where the truth is below a hundredth of the tolerance).\n";
 
-/// How loads begin, and what comes to them. A shock excites modes without end, which no number of responses follows.
+/// Kind of start of the loads, and additional loads. A shock excites unlimited modes, which no number of
+/// responses can follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Start {
     Calm,
     Shock,
-    /// A small force oscillates with a mode that the body lacks.
+    /// A small force oscillates at the frequency of a truncated mode.
     Resonance,
     /// A force strikes between the rows of a long table.
     Blow,
-    /// A small force of a long table of random values.
+    /// A small force from a long table of random values.
     Noise,
 }
 
@@ -73,7 +74,7 @@ impl Start {
         }
     }
 
-    /// Effectivities that the suite allows.
+    /// Returns the range of effectivities that the suite allows.
     fn near(self) -> std::ops::Range<f64> {
         match self {
             Self::Calm => 0.6..1.7,
@@ -83,7 +84,7 @@ impl Start {
     }
 }
 
-/// A body and a scene that nobody chose.
+/// A random body and scene.
 struct Case {
     seed: u64,
     what: String,
@@ -93,16 +94,16 @@ struct Case {
     modes: usize,
 }
 
-/// What came of it.
+/// Result of a case.
 struct Outcome {
     seed: u64,
     what: String,
     start: Start,
-    /// Estimated over true error of the body before and after it was enriched, where the true error counts.
+    /// Estimated over true error of the body before and after enrichment, if the true error is significant.
     effectivity: Vec<(&'static str, f64)>,
-    /// Whether the selection says that its tolerances hold, and its true error over the tolerance.
+    /// Flag that the selection claims to meet its tolerances, and its true error over the tolerance.
     verdict: (bool, f64),
-    /// The output that this error is of.
+    /// Output with that error.
     output: &'static str,
 }
 
@@ -118,7 +119,7 @@ fn pick(random: &mut Random, count: u64) -> u64 {
     random.next_u64() % count
 }
 
-/// A block of bricks, askew, whose stiffness and density change along it.
+/// Returns a skewed block of bricks with stiffness and density that vary along it.
 fn graded_block(random: &mut Random) -> RawModel {
     let cells = [3 + pick(random, 3) as i32, 1 + pick(random, 2) as i32, 1];
     let size = [between(random, 0.3, 0.7), between(random, 0.2, 0.5), between(random, 0.1, 0.4)];
@@ -138,7 +139,7 @@ fn graded_block(random: &mut Random) -> RawModel {
     left.plus(&right).raw_model()
 }
 
-/// The same with an interface `root` of the four nodes of least x.
+/// Returns the model with an interface `root` of the four nodes with the smallest x.
 fn with_root(raw: RawModel) -> RawModel {
     let mut order: Vec<usize> = (0..raw.nodes.ids.len()).collect();
     order.sort_by(|&a, &b| raw.nodes.positions[a][0].total_cmp(&raw.nodes.positions[b][0]));
@@ -153,7 +154,7 @@ fn with_root(raw: RawModel) -> RawModel {
     RawModel { interfaces: vec![root], ..raw }
 }
 
-/// A body: solid, plane, or with rotations of its nodes.
+/// Returns a random body: solid, plane, or with rotations of its nodes.
 fn model(random: &mut Random) -> (String, FeModel) {
     let (name, raw) = match pick(random, 5) {
         0 => {
@@ -167,8 +168,8 @@ fn model(random: &mut Random) -> (String, FeModel) {
     (name, FeModel::from_raw(raw).expect("a sound model").model)
 }
 
-/// What carries a body in a third of the cases: its root, or a node that has rotations, which turns faster
-/// and faster, swings along a line, or rests. Drawn from numbers of its own.
+/// Returns the carrier of a body in a third of the cases: its root, or a node with rotations, which rotates
+/// with growing rate, oscillates along a line, or rests. It is drawn from a separate random stream.
 fn carried(seed: u64, model: &FeModel, speed: f64, probe: &FlexBody) -> Option<Carried> {
     let random = &mut Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     if pick(random, 3) != 0 {
@@ -203,7 +204,7 @@ fn carried(seed: u64, model: &FeModel, speed: f64, probe: &FlexBody) -> Option<C
     Some(Carried { by, spin, translation })
 }
 
-/// Loads along body axes are along the principal ones.
+/// Returns settings with a principal frame, so that loads along body axes are along principal axes.
 fn settings(modes: usize) -> ConvertSettings {
     ConvertSettings {
         frame: BodyFrame::Principal.into(),
@@ -213,7 +214,7 @@ fn settings(modes: usize) -> ConvertSettings {
     }
 }
 
-/// A history of a load, from zero where nothing is to begin with a shock.
+/// Returns a history of a load; it starts from zero unless the case begins with a shock.
 fn history(random: &mut Random, start: Start, duration: f64, rate: f64) -> History {
     let frequency = between(random, 0.1, 2.0) * rate / TAU;
     match (start, pick(random, 3)) {
@@ -227,7 +228,7 @@ fn history(random: &mut Random, start: Start, duration: f64, rate: f64) -> Histo
 }
 
 fn case(seed: u64) -> Case {
-    // Seeds that follow one another shall not give streams that do.
+    // The multiplier separates the random streams of consecutive seeds.
     let mut random = Random(seed.wrapping_mul(0x5851_f42d_4c95_7f2d));
     let random = &mut random;
     let (name, model) = model(random);
@@ -288,7 +289,7 @@ fn case(seed: u64) -> Case {
     Case { seed, what, model, scene, start, modes }
 }
 
-/// The case of a seed with a force that drives modes beyond those of the body.
+/// Returns the case of a seed with a force that excites truncated modes.
 fn driven_case(seed: u64) -> Case {
     let mut case = case(seed);
     let random = &mut Random(seed.wrapping_mul(0xd134_2543_de82_ef95));
@@ -321,7 +322,7 @@ fn driven_case(seed: u64) -> Case {
     case
 }
 
-/// A half sine of about a period, in a table of rows that are zero before and after it.
+/// Returns a half sine of about a period, in a table with zero rows before and after it.
 fn blow(random: &mut Random, duration: f64, size: f64, frequency: f64) -> History {
     let rows = 45 + pick(random, 100) as usize;
     let width = between(random, 0.4, 2.0) / frequency;
@@ -338,7 +339,7 @@ fn blow(random: &mut Random, duration: f64, size: f64, frequency: f64) -> Histor
     History::Table { times, values }
 }
 
-/// Random values, four in a period, from zero.
+/// Returns random values, four per period, starting from zero.
 fn noise(random: &mut Random, duration: f64, size: f64, frequency: f64) -> History {
     let rows = (4.0 * frequency * duration).ceil() as usize;
     let times: Vec<f64> = (0..=rows).map(|i| duration * i as f64 / rows as f64).collect();
@@ -346,7 +347,7 @@ fn noise(random: &mut Random, duration: f64, size: f64, frequency: f64) -> Histo
     History::Table { times, values }
 }
 
-/// How the frame of the body moves, in words.
+/// Returns the motion of the body frame in words.
 fn frame(scene: &Scene) -> &'static str {
     match &scene.carried {
         Some(Carried { spin: Some(_), .. }) => "carried and spun",
@@ -357,11 +358,11 @@ fn frame(scene: &Scene) -> &'static str {
     }
 }
 
-/// Makes the loads so large that they deflect the body by [`DEFLECTION`].
+/// Scales the loads so that they deflect the body by [`DEFLECTION`].
 fn scale_loads(scene: &mut Scene, probe: &FlexBody) {
     let mut alone = scene.clone();
     (alone.spin, alone.initial) = (None, Initial { settled: scene.initial.settled, ..Initial::default() });
-    // Deflections of a load this small are linear in it.
+    // Deflections under a load this small are linear in it.
     let small = 1e-9 * probe.modes().eigenvalue[0] * probe.invariants().mass() * probe.extent();
     alone.loads.iter_mut().for_each(|load| load.force = load.force.scaled(small));
     let (motion, _) = trace(probe, &alone, &Context::QUIET).expect("a motion");
@@ -369,7 +370,7 @@ fn scale_loads(scene: &mut Scene, probe: &FlexBody) {
     scene.loads.iter_mut().for_each(|load| load.force = load.force.scaled(factor));
 }
 
-/// Errors of `body` in `scene` against the motion of all nodes.
+/// Returns the errors of `body` in `scene` relative to the motion of all nodes.
 fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> Result<OutputErrors> {
     let stage = Stage::new(body, scene)?;
     let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET)?;
@@ -389,7 +390,7 @@ fn errors_beside(
     Ok(nodal.errors(body, &own).expect("a body of the model").largest())
 }
 
-/// Effectivities of an estimate where the true errors count.
+/// Returns the effectivities of an estimate for significant true errors.
 fn effectivities(estimated: &OutputErrors, found: &OutputErrors, tolerance: f64) -> Vec<(&'static str, f64)> {
     let both = estimated.zip(*found).named().into_iter();
     both.filter_map(|(name, (estimated, found))| Some((name, estimated?, found?)))
@@ -434,7 +435,7 @@ fn outcome(case: &Case) -> Result<Outcome> {
     Ok(Outcome { seed: *seed, what: what.clone(), start: *start, effectivity, verdict, output })
 }
 
-/// Judges one scene, and prints the result as soon as it is there.
+/// Evaluates one case, and prints the result immediately.
 fn told(case: &Case) -> Result<Outcome> {
     let result = outcome(case);
     match &result {
@@ -446,14 +447,14 @@ fn told(case: &Case) -> Result<Outcome> {
     result
 }
 
-/// Quantiles of numbers: the least, 5 %, the median, 95 % and the largest.
+/// Returns the minimum, 5 %, median, 95 % and maximum of numbers.
 fn quantiles(mut values: Vec<f64>) -> Option<[f64; 5]> {
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
     Some([0.0, 0.05, 0.5, 0.95, 1.0].map(|part| values[(part * last as f64).round() as usize]))
 }
 
-/// The distribution as a page.
+/// Returns the distribution as a page.
 fn page(outcomes: &[Outcome], not_run: &[String]) -> String {
     let mut page = String::from(
         "<!-- Written by FLEXBODY_BLESS=1 FLEXBODY_VERDICTS=COUNT cargo test -p flexbody-study random_verdicts -->\n\n\

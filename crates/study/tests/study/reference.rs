@@ -1,5 +1,5 @@
-//! What a body lacks of its model, as it is estimated, against the motion of all nodes; bodies that are
-//! enriched; starts without a shock.
+//! Estimated errors of a body relative to its model, compared with the motion of all nodes; enriched bodies;
+//! starts without a shock.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::{BasisChoice, CraigBampton, ModeSettings};
@@ -24,7 +24,7 @@ use oracle::mesh::{Mesh, grid};
 use oracle::scenes::nothing_happens;
 use proptest::prelude::*;
 
-/// A rubber beam of some bricks, askew, with an interface at one end.
+/// Returns a skewed rubber beam of bricks with an interface at one end.
 fn model() -> FeModel {
     beam([4, 1, 1])
 }
@@ -57,7 +57,7 @@ fn raw_rooted_beam(element: ElementKind, rule: MassRule, cells: [i32; 3], coupli
     RawModel { interfaces, ..raw }
 }
 
-/// Loads and spins of the scenes are along the axes of the body, which are principal.
+/// Returns settings with a principal frame, so that loads and spins of the scenes are along principal axes.
 fn settings(modes: usize) -> ConvertSettings {
     ConvertSettings {
         frame: BodyFrame::Principal.into(),
@@ -71,13 +71,13 @@ fn body(model: &FeModel, modes: usize) -> FlexBody {
     convert(model, &settings(modes), &Context::QUIET).expect("a body").body
 }
 
-/// The first circular frequency of the model.
+/// Returns the first circular frequency of the model.
 fn first_rate(model: &FeModel) -> f64 {
     body(model, 1).modes().eigenvalue[0].sqrt()
 }
 
-/// A free body that turns and is pulled at a node by a force that swings from zero, for some of its first
-/// periods.
+/// Returns a free rotating body pulled at a node by a force that oscillates from zero, over a few of its
+/// first periods.
 fn pulled(model: &FeModel, node: usize, force: Vector3<f64>, swing: f64, spin: Vector3<f64>) -> Scene {
     let rate = first_rate(model);
     Scene {
@@ -104,7 +104,7 @@ fn pulled(model: &FeModel, node: usize, force: Vector3<f64>, swing: f64, spin: V
     }
 }
 
-/// The estimate for a body as it is.
+/// Returns the estimate for a body without enrichment.
 fn estimated(model: &FeModel, body: &FlexBody, scene: &Scene) -> ReferenceError {
     let found = enrich(
         model,
@@ -118,13 +118,13 @@ fn estimated(model: &FeModel, body: &FlexBody, scene: &Scene) -> ReferenceError 
     found.rounds[0].last().expect("an estimate").clone()
 }
 
-/// The error against the motion of all nodes: of deflection and stress.
+/// Returns the errors of deflection and stress relative to the motion of all nodes.
 fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> [f64; 2] {
     let errors = all_true_errors(model, body, scene);
     [errors.deflection, errors.stress].map(|error| error.expect("a deformed body"))
 }
 
-/// All errors against the motion of all nodes.
+/// Returns all errors relative to the motion of all nodes.
 fn all_true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> OutputErrors {
     let stage = Stage::new(body, scene).expect("a stage");
     let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET).expect("a motion");
@@ -133,20 +133,20 @@ fn all_true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> OutputErr
     nodal.errors(&stage.body, &motion).expect("of one model").largest()
 }
 
-/// How the frame of a body moves that is not free.
+/// Prescribed motion of the body frame.
 #[derive(Debug, Clone, Copy)]
 enum Given {
-    /// A spin that grows, with the centre of mass held.
+    /// A growing spin with the centre of mass held.
     Spin,
-    /// Carried by the root, which rests.
+    /// Carried by the root at rest.
     Rest,
-    /// Carried by the root, which swings along a line.
+    /// Carried by the root, which oscillates along a line.
     Swing,
-    /// Carried by the root, which turns faster and faster about an axis beside it.
+    /// Carried by the root, which rotates with growing rate about an axis beside it.
     Turn,
 }
 
-/// A body that is pulled as in [`pulled`] while its frame moves in a given way.
+/// Returns a body pulled like in [`pulled`] with prescribed motion of its frame.
 fn driven(model: &FeModel, given: Given, node: usize, force: Vector3<f64>, swing: f64) -> Scene {
     let rate = first_rate(model);
     let mut scene = pulled(model, node, force, swing, Vector3::zeros());
@@ -186,7 +186,7 @@ fn a_body_with_all_modes_lacks_nothing() {
     let whole = body(&model, usize::MAX);
     let scene = pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::new(0.002, 0.003, 0.001));
     let lack = estimated(&model, &whole, &scene);
-    // What double precision leaves of residuals in the norm of K^+.
+    // Rounding of the residuals in the norm of K^+.
     assert!(lack.worst < 1e-6, "{lack:?}");
 }
 
@@ -201,7 +201,8 @@ fn a_driven_body_with_all_modes_lacks_nothing() {
     }
 }
 
-/// Reactions have no static part to be estimated by: what is lacking is seen in them by its inertia.
+/// Reactions have no static part from which an error could be estimated: truncated modes affect them by their
+/// inertia.
 #[test]
 fn a_driven_body_lacks_in_its_reaction_what_all_nodes_say() {
     let model = model();
@@ -229,7 +230,7 @@ fn a_driven_body_lacks_in_its_reaction_what_all_nodes_say() {
     }
 }
 
-/// What a carried body lacks joins it as residual vectors of the free one.
+/// The truncated response of a carried body is added as residual vectors of the free body.
 #[test]
 fn responses_join_a_body_that_is_carried() {
     let model = model();
@@ -250,8 +251,8 @@ fn responses_join_a_body_that_is_carried() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// The estimate is linear and without gyroscopic terms: it is near where deflections are small and the
-    /// body turns slowly.
+    /// The estimate is linear and without gyroscopic terms: it is accurate for small deflections and slow
+    /// rotation.
     #[test]
     fn the_estimate_is_near_the_true_error(
         (modes, node) in (3usize..9, 0usize..20),
@@ -270,9 +271,9 @@ proptest! {
     }
 }
 
-/// The mass of ten-node tetrahedra with four points is singular: motions without mass follow loads at once,
-/// in what all nodes say as in the estimate. A single force has a resultant, so that the body accelerates.
-/// A body with all modes lacks these motions and nothing else.
+/// The mass of ten-node tetrahedra with four points is singular: motions without mass follow loads
+/// immediately, both in the nodal motion and in the estimate. A single force has a resultant, so that the
+/// body accelerates. A body with all modes lacks only these motions.
 #[test]
 fn motions_without_mass_follow_a_force_that_accelerates_the_body() {
     let model = beam_of(ElementKind::Tet10, MassRule::Reduced, [1, 1, 1]);
@@ -289,7 +290,7 @@ fn motions_without_mass_follow_a_force_that_accelerates_the_body() {
     }
 }
 
-/// Instants of a thousand periods, ten times as many as were followed once.
+/// Covers a thousand periods, ten times an earlier limit.
 #[test]
 #[ignore = "slow"]
 fn a_long_run_is_followed() {
@@ -319,12 +320,12 @@ fn responses_join_until_what_is_lacking_does_not_count() {
     let (first, last) = (&rounds[0], &rounds[rounds.len() - 1]);
     assert!(first.modes == 4 && first.worst > 1.0, "{rounds:?}");
     assert!(last.modes == made.body.n_modes() && last.worst < 0.3 * first.worst, "{rounds:?}");
-    // As all nodes tell, whom nobody asked.
+    // The reference motion of all nodes confirms the estimate, which does not use it.
     let [_, before] = true_errors(&model, &body(&model, 4), &scene);
     let [deflection, after] = true_errors(&model, &made.body, &scene);
     assert!(before > 0.2 && after < 0.3 * before && deflection < 0.1, "{before} {after} {deflection}");
     assert!(after < 2.5 * last.errors.stress.expect("a deformed body"), "{after} {rounds:?}");
-    // Every one of them says where it comes from.
+    // Every added shape states its origin.
     let provenance = &made.body.modes().provenance;
     assert!(provenance.iter().any(|from| from.contains("motion 1")), "{provenance:?}");
 }
@@ -343,7 +344,7 @@ fn a_shock_is_no_reason_for_modes_without_end() {
     let lack = shocked.rounds[0].last().expect("an estimate");
     assert!(lack.worst > 1.0 && lack.modes == shocked.made.body.n_modes(), "{:?}", shocked.rounds);
     assert!(lack.modes < model.rows().len() / 2, "{:?}", shocked.rounds);
-    // The same load is there before.
+    // With a static start the load acts before the motion.
     scene.initial.settled = true;
     let calm = tailoring.convert(&model, &scene.clone().into(), &Context::QUIET).expect("a body");
     assert!(calm.rounds[0].last().expect("an estimate").worst < PART_OF_REFERENCE, "{:?}", calm.rounds);
@@ -366,12 +367,12 @@ fn shapes_of_the_motion_hold_the_tolerances_and_are_no_more_than_free_modes() {
     assert!(selection.holds(), "{selection:?}");
     let errors = true_errors(&model, &own.body, &scene);
     assert!(errors.iter().all(|error| *error < 0.05), "{errors:?}");
-    // What every body has to fulfil.
+    // Identities of every body.
     accept(&own.body).expect("the identities");
     assert_eq!(own.body.source().settings["basis"], "scene");
 }
 
-/// A body of the shapes of two motions serves both; one of the shapes of either does not serve the other.
+/// A body with the shapes of two motions serves both; a body with the shapes of one does not serve the other.
 #[test]
 fn shapes_of_several_motions_serve_all_of_them() {
     let model = model();
@@ -438,8 +439,8 @@ fn a_static_start_stays_as_it_is() {
     assert!(spread(&energies(&scene)) > 0.5);
 }
 
-/// Damping of the model acts on what the body lacks too: a force at the frequency of a mode beyond its own builds up less
-/// than it would without (by a third, as 0.69 instead of 0.46 of the stress).
+/// The damping of the model acts on the truncated modes too: a force at the frequency of a truncated mode
+/// builds up less than without damping (by a third, to 0.46 instead of 0.69 of the stress).
 #[test]
 fn what_is_lacking_is_damped_as_the_model_is() {
     let undamped = model();
@@ -456,7 +457,7 @@ fn what_is_lacking_is_damped_as_the_model_is() {
     }
 }
 
-/// Errors of the motion of `body` against that of `whole`, both of one model.
+/// Returns the errors of the motion of `body` relative to that of `whole`, both of one model.
 fn errors_beside(model: &FeModel, whole: &FlexBody, body: &FlexBody, scene: &Scene) -> OutputErrors {
     let [of_whole, own] = [whole, body].map(|body| Stage::new(body, scene).expect("a stage"));
     let (motion, _) = trace(&of_whole.body, &of_whole.scene, &Context::QUIET).expect("a motion");
@@ -469,9 +470,9 @@ fn errors_beside(model: &FeModel, whole: &FlexBody, body: &FlexBody, scene: &Sce
     Measure::new(&of_whole.body, &motion).of_other(&moved, &modes).largest()
 }
 
-/// A Craig-Bampton body keeps its rigid root rigid, and lacks nothing of a model whose root is rigid when it has all
-/// fixed-interface modes: with few of them it lacks what that body does differently. The model whose root deforms is
-/// another one, by far.
+/// A Craig-Bampton body keeps its rigid root rigid. With all fixed-interface modes it agrees with a model
+/// whose root is rigid; with few modes it has the error of truncation. A model whose root deforms differs by
+/// far.
 #[test]
 fn a_rigid_interface_is_rigid_in_the_model_that_the_body_is_compared_with() {
     let model = rooted_beam(ElementKind::Hex8, MassRule::Consistent, [4, 1, 1], Coupling::Rigid);

@@ -1,5 +1,5 @@
-//! A scene means the same whatever frame a body was converted with: one golden scene, three frames, one
-//! motion, one selection, one study.
+//! The meaning of a scene does not depend on the frame of the conversion: one golden scene in three frames
+//! gives one motion, one selection, one study.
 
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
@@ -28,7 +28,7 @@ const POINTS: &str = "[[watch]]\nnode = 3\n[[watch]]\ninterface = \"foot\"\n[[wa
 const LOADS: &str = "[[load]]\nnode = 3\nforce = [2e-3, 1e-3, -3e-3]\nhistory = { amplitude = 1, frequency = 0.3 }\n\
                      [[load]]\ninterface = \"foot\"\nforce = [1e-3, 0, 2e-3]\ntorque = [0, 1e-3, 0]\naxes = \"model\"\n";
 
-/// Free, spun and carried.
+/// Returns scenes of a free, a spun and a carried body.
 fn golden() -> [(&'static str, Scene); 4] {
     let head = "gravity = [0.02, -0.01, -0.05]\n[run]\nduration = 8\noutputs = 40\ntolerance = 1e-12\n";
     let free = "[initial]\norigin = [1, 2, 3]\nvelocity = [0.1, -0.2, 0.3]\nrotation = [0.4, -0.3, 0.8]\nangular_velocity = [0.05, 0.3, -0.1]\n";
@@ -45,7 +45,8 @@ fn golden() -> [(&'static str, Scene); 4] {
     .map(|(name, middle)| (name, scene(&format!("{head}{middle}{LOADS}{POINTS}"))))
 }
 
-/// Largest differences of places, deflections, attitudes, spins and reactions, relative to their largest.
+/// Returns the largest differences of positions, deflections, attitudes, spins and reactions, relative to
+/// their largest values.
 fn apart(a: &Recording, b: &Recording) -> f64 {
     let relative = |pairs: &mut dyn Iterator<Item = (Vector3<f64>, Vector3<f64>)>, least: f64| {
         let (mut size, mut difference) = (least, 0.0f64);
@@ -84,7 +85,7 @@ fn one_scene_is_one_motion_in_three_frames() {
     }
 }
 
-/// The same vectors, said along the axes of each body, of the model and of the world.
+/// Vectors stated along axes of the body, of the model and of the world are equivalent.
 #[test]
 fn vectors_along_other_axes_say_the_same() {
     let bodies = bodies();
@@ -108,7 +109,7 @@ fn vectors_along_other_axes_say_the_same() {
         let own = run(&text("body", "body", vectors.map(|v| axes.tr_mul(&v))));
         let world = run(&text("world", "model", [turn * vectors[0], vectors[1]]));
         assert!(apart(&model, &own) < 1e-9 && apart(&model, &world) < 1e-9);
-        // At the start every node is where the model has it, turned about the model's origin.
+        // Initially every node is at its position of the model, rotated about the origin of the model.
         let at = model.paths[0].place[0];
         let raw = footed_block();
         let expected = turn * Vector3::from(raw.nodes.positions[2]);

@@ -1,4 +1,4 @@
-//! Guaranteed bounds of the selection, and a random search for a motion that breaks them.
+//! Guaranteed bounds of the selection, and a random search for a motion that violates them.
 
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
@@ -16,10 +16,10 @@ use oracle::random::Random;
 use oracle::scenes::{Doing, Shape, bodies, direction, doing, seeded, shape, some_modes};
 use proptest::prelude::*;
 
-/// Rounding of sums of squares.
+/// Factor for the rounding of sums of squares.
 const ROUNDING: f64 = 1.0 + 1e-10;
 
-/// What the integration may add to a difference of motions, relative to the motion.
+/// Integration error of a difference of motions, relative to the motion.
 const INTEGRATION: f64 = 1e-5;
 
 fn length(x: &[f64]) -> f64 {
@@ -30,7 +30,7 @@ fn weighted(x: &[f64], weights: &[f64]) -> f64 {
     x.iter().zip(weights).map(|(x, w)| (x * w).powi(2)).sum::<f64>().sqrt()
 }
 
-/// What a scene, simulated, has to say about the bounds.
+/// A scene that is simulated to test the bounds.
 struct Tested<'t> {
     body: &'t FlexBody,
     scene: &'t Scene,
@@ -63,17 +63,17 @@ impl<'t> Tested<'t> {
         TrialRuns { body, scene, situation, loads, watched, context: Context::QUIET }
     }
 
-    /// The motion at the instants of the scene.
+    /// Returns the motion at the output times of the scene.
     fn recording(&self, kept: TermGroups) -> Recording {
         simulate(self.body, &self.with(kept), &Context::QUIET).expect("a motion").0
     }
 
-    /// The continuous motion of the whole body.
+    /// Returns the continuous motion of the whole body.
     fn whole(&self) -> Trace {
         self.runs().motion(TermGroups::ALL).expect("a motion").0
     }
 
-    /// That with some groups, where that of the whole body was looked at.
+    /// Returns the motion with some groups, at the evaluated times of the whole body.
     fn beside(&self, whole: &Trace, kept: TermGroups) -> Trace {
         trace_at(self.body, &self.with(kept), &whole.time, &Context::QUIET).expect("a motion")
     }
@@ -94,7 +94,7 @@ impl<'t> Tested<'t> {
     }
 }
 
-/// What goes beyond its bound by more than integration does.
+/// Quantities that exceed their bounds by more than the integration error.
 #[derive(Default)]
 struct Broken(Vec<String>);
 
@@ -106,8 +106,8 @@ impl Broken {
     }
 }
 
-/// What breaks a bound in a scene: of amplitudes and errors, with every set of groups, at both tiers, a
-/// priori and along the motion.
+/// Returns the violated bounds of a scene: of amplitudes and errors, with every set of groups, at both tiers,
+/// a priori and along the motion.
 fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
     let stage = Stage::new(body, scene).expect("one frame");
     let (body, scene) = (&*stage.body, &*stage.scene);
@@ -122,7 +122,7 @@ fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
     for kept in combinations() {
         let own = tested.recording(kept);
         let fine = tested.runs().fine_motion(kept).expect("a motion");
-        // None where the spin turns too fast to be followed.
+        // `None` if the spin is too fast to be resolved.
         let steps = fine.as_ref().unwrap_or(&own);
         let errors = measure.of_subset(&tested.beside(&continuous, kept), &all).largest();
         let most = |of: &dyn Fn(usize) -> f64| (0..own.time.len()).map(of).fold(0.0, f64::max);
@@ -139,15 +139,15 @@ fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
         for norms in tested.tiers() {
             let tier = norms.tier;
             let energy = most(&|i| weighted(&own.states[i].q, &root));
-            // What integration is accurate to: that of the motion, and that of centrifugal loads, which are
-            // there or not.
+            // Accuracy of the integration: that of the motion, and that of the centrifugal loads, which some
+            // groups include.
             let spun = tested.tiers()[0].centrifugal_energy * driven.rotation.largest.powi(2);
             let size = energy.max(spun).max(most(&|i| weighted(&whole.states[i].q, &root)));
             if let Some(amplitude) = driven.amplitude(kept, &norms) {
                 let coordinate = most(&|i| length(&own.states[i].q));
                 let rate = most(&|i| length(&own.states[i].qd));
                 let energy_rate = most(&|i| weighted(&own.states[i].qd, &root));
-                // Rates of change between instants of the fine motion are means of q''.
+                // Rates of change between times of the fine motion are means of q''.
                 let mean = |i: usize| {
                     let (a, b) = (&steps.states[i], &steps.states[i + 1]);
                     let step = steps.time[i + 1] - steps.time[i];
@@ -197,12 +197,12 @@ fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
     found.0
 }
 
-/// e'X e.
+/// Returns e'X e.
 fn along(x: &DMatrix<f64>, e: &Vector3<f64>) -> f64 {
     (e.transpose() * x * e)[0]
 }
 
-/// What the terms of a body are for a direction of rotation and amplitudes, beside the norms of both tiers.
+/// Compares the terms of a body for a direction of rotation and amplitudes with the norms of both tiers.
 fn check_sizes(body: &FlexBody, e: &Vector3<f64>, any: &Vector3<f64>, q: &DVector<f64>) {
     let (own, eigenvalues) = (body.invariants(), &body.modes().eigenvalue);
     let nf = body.n_modes();
@@ -214,7 +214,7 @@ fn check_sizes(body: &FlexBody, e: &Vector3<f64>, any: &Vector3<f64>, q: &DVecto
     let size = q.norm();
     let (linear, quadratic) = (&w1 * &kron, kron.transpose() * &w2 * &kron);
 
-    // The inequalities of theory section 7.
+    // Inequalities of theory section 7.
     let inertia = e.dot(&(own.inertia() * e)).sqrt();
     assert!(along(&linear, e).abs() <= 2.0 * size * inertia * ROUNDING);
     assert!((0.0..=size * size * ROUNDING).contains(&along(&quadratic, e)));
@@ -229,7 +229,7 @@ fn check_sizes(body: &FlexBody, e: &Vector3<f64>, any: &Vector3<f64>, q: &DVecto
         for (actual, rigid) in fields(&actual).into_iter().zip(fields(&rigid)) {
             assert!(actual <= rigid, "{actual} above {rigid}");
         }
-        // About an axis the rotation is about that; the torque has all directions.
+        // With a fixed axis the rotation is about it; the torque may have any direction.
         let w = axis.unwrap_or(any);
         let load = spin(w) * (w1.transpose() * 0.5) * w;
         let of_w2 = spin(w) * &w2 * spin(w).transpose();
@@ -264,7 +264,7 @@ proptest! {
         let plane = body.dimension() == 2;
         let unit = |v: [f64; 3]| if plane { Vector3::z() } else { Vector3::from(v).normalize() };
         let mut random = Random(seed);
-        // Any, of equal energies, and of one mode.
+        // Random amplitudes, amplitudes of equal energies, and a single mode.
         let q = DVector::from_fn(body.n_modes(), |j, _| match focus {
             0 => random.signed(),
             1 => random.signed() / body.modes().eigenvalue[j].sqrt(),
@@ -281,7 +281,7 @@ proptest! {
     fn no_motion_of_given_rotation_breaks_a_bound(of in 0..4usize, bits in any::<u8>(), doing in doing(30.0)) {
         let body = damped(some_modes(&bodies()[of], bits), &doing);
         let scene = doing.scene(&body, false);
-        // Tables may be steeper than the integration can follow at its tolerance.
+        // Tables may be steeper than the integration can resolve at its tolerance.
         prop_assume!(follows(&body, &scene));
         let broken = search(&body, &scene);
         prop_assert!(broken.is_empty(), "{:#?}", broken);
@@ -291,7 +291,7 @@ proptest! {
 proptest! {
     #![proptest_config(seeded(12, 9))]
 
-    /// The same about an axis that changes, along axes that turn or that are fixed in space.
+    /// Random motions about a changing axis, along rotating or fixed axes.
     #[test]
     #[ignore = "slow"]
     fn no_motion_about_a_changing_axis_breaks_a_bound(
@@ -321,8 +321,8 @@ proptest! {
 proptest! {
     #![proptest_config(seeded(16, 4))]
 
-    /// The same where torques turn with the deformation, which is large: interfaces of the rod turn by up to
-    /// half a radian.
+    /// Random motions under torques that rotate with a large deformation: interfaces of the rod rotate by up
+    /// to half a radian.
     #[test]
     fn no_motion_under_torques_breaks_a_bound(
         bits in any::<u8>(),
@@ -350,7 +350,7 @@ proptest! {
     }
 }
 
-/// The torque that turns an interface by half a radian, statically.
+/// Returns the static torque that rotates an interface by half a radian.
 fn turning_torque(body: &FlexBody, interface: &str) -> f64 {
     let interface = body.interfaces().iter().find(|one| one.name == interface).expect("one of the body");
     let point = BodyPoint::interface(body, interface, Terms::NONE).expect("a point");
@@ -365,28 +365,28 @@ fn turning_torque(body: &FlexBody, interface: &str) -> f64 {
     0.5 / compliance
 }
 
-/// Whether the body can be simulated with every set of groups.
+/// Returns true if the body can be simulated with every set of groups.
 fn follows(body: &FlexBody, scene: &Scene) -> bool {
     let stage = Stage::new(body, scene).expect("one frame");
     let tested = Tested::new(&stage.body, &stage.scene);
     combinations().all(|kept| tested.runs().motion(kept).is_ok() && tested.runs().fine_motion(kept).is_ok())
 }
 
-/// The body with the damping of the scene, which runs ask for.
+/// Returns the body with the damping of the scene.
 fn damped(body: FlexBody, doing: &Doing) -> FlexBody {
     let mut parts = body.into_parts();
     parts.modes.damping_ratio.fill(doing.damping);
     FlexBody::new(parts).expect("a body")
 }
 
-/// What once broke a bound: (body, modes as bits, what it does).
+/// Asserts that a motion that once violated a bound no longer does: index of the body, modes as bits, motion.
 fn broken_once(of: usize, bits: u8, doing: &Doing) {
     let body = damped(some_modes(&bodies()[of], bits), doing);
     let broken = search(&body, &doing.scene(&body, false));
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
-/// The Euler force between two instants that look at the motion was not seen.
+/// The Euler force between two evaluated times was missed.
 #[test]
 #[ignore = "slow"]
 fn a_spin_that_reverses_between_two_instants_counts() {
@@ -395,7 +395,7 @@ fn a_spin_that_reverses_between_two_instants_counts() {
     broken_once(2, 0b100100, &doing);
 }
 
-/// Errors were taken relative to another motion than the one that they are measured against.
+/// Errors were relative to another motion than the reference.
 #[test]
 #[ignore = "slow"]
 fn errors_are_relative_to_the_motion_that_they_are_measured_against() {
@@ -414,7 +414,7 @@ fn errors_are_relative_to_the_motion_that_they_are_measured_against() {
     broken_once(1, 0b101110, &doing);
 }
 
-/// The least torque that counts was that of another radius of gyration in the plane.
+/// The smallest significant torque of a plane body used another radius of gyration.
 #[test]
 fn the_least_torque_of_a_plane_body_is_that_of_its_recording() {
     let doing = Doing {
@@ -428,7 +428,7 @@ fn the_least_torque_of_a_plane_body_is_that_of_its_recording() {
     broken_once(3, 0b111000, &doing);
 }
 
-/// Nothing but what is said.
+/// A motion at rest, from which the cases differ in the stated fields.
 const RESTING: Doing = Doing {
     axis: [0.0, 0.0, 1.0],
     spin: Shape::Constant(0.0),

@@ -1,5 +1,5 @@
-//! What `select` decides holds when it is measured: the selected body against the whole one, in the scene and
-//! at the limits of it.
+//! Decisions of `select` hold when measured: the selected body compared with the whole body, in the scene and
+//! at its limits.
 
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use oracle::scenes::{bodies, doing, nothing_happens, seeded, some_modes};
 use proptest::prelude::*;
 
-/// What integration adds to errors.
+/// Contribution of the integration to the errors.
 const INTEGRATION: f64 = 1e-5;
 
 fn selected(body: &FlexBody, scene: &Scene) -> Selection {
@@ -23,7 +23,7 @@ fn reduced(body: &FlexBody, selection: &Selection) -> FlexBody {
     body.reduced(&selection.modes, selection.groups, selection.terms.clone()).expect("a body")
 }
 
-/// The scene with rotation `factor` times as fast.
+/// Returns the scene with `factor` times the rate of rotation.
 fn faster(scene: &Scene, factor: f64) -> Scene {
     let mut scene = scene.clone();
     scene.requirements.motion = MotionRange::default();
@@ -34,8 +34,8 @@ fn faster(scene: &Scene, factor: f64) -> Scene {
     scene
 }
 
-/// The largest error over its tolerance of a selected body in a scene; `None` where the whole body cannot
-/// follow it.
+/// Returns the largest error over its tolerance of a selected body in a scene; `None` if the whole body
+/// cannot be integrated there.
 fn measured(whole: &FlexBody, selection: &Selection, scene: &Scene) -> Option<f64> {
     let (reference, _) = trace(whole, scene, &Context::QUIET).ok()?;
     let own = reduced(whole, selection);
@@ -60,7 +60,7 @@ proptest! {
     ) {
         let whole = some_modes(&bodies()[of], bits);
         let mut doing = doing;
-        // Slow enough that something may be dropped, and that the free body stays in one piece.
+        // The rate is low enough for dropping terms, and for a stable free body.
         doing.rate *= if mild { 1e-3 } else { 0.2 };
         let mut scene = doing.scene(&whole, free);
         scene.requirements.tolerance.errors = PerQuantity::all(tolerance);
@@ -108,7 +108,7 @@ proptest! {
     }
 }
 
-/// A scene that is not simulated.
+/// Returns a scene without simulation.
 fn idle(requirements: Requirements) -> Scene {
     let mut scene = Scene { requirements, ..nothing_happens("idle", 0.0, 1e-9) };
     (scene.run.duration, scene.run.outputs) = (None, 500);
@@ -130,7 +130,7 @@ fn without_a_run_only_bounds_and_the_band_decide() {
     let selection = selected(body, &idle(Requirements { band: Some(band), ..Requirements::default() }));
     assert_eq!((selection.groups, selection.modes), (TermGroups::ALL, vec![0, 1, 2, 3]));
 
-    // Joints that turn the body slowly, and a deflection that is not looked at.
+    // Joints that rotate the body slowly, and no requirement on the deflection.
     let mut slow = Requirements::default();
     slow.attachment.kind = AttachmentKind::Stiff;
     slow.motion.angular_velocity = Some(Range::Any(1e-5 * body.modes().eigenvalue[0].sqrt()));

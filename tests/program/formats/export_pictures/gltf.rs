@@ -10,10 +10,10 @@ use oracle::file_bodies::{body, wild_body};
 use proptest::prelude::*;
 use serde_json::Value;
 
-/// Relative rounding of single precision, with room for two of them.
+/// Relative rounding of single precision, with a margin for two roundings.
 const SINGLE: f64 = 2.0e-7;
 
-/// The nodes that are drawn, and where, relative to the origin of the frame in metres.
+/// Returns the drawn nodes, and their positions relative to the origin of the frame in metres.
 fn drawn(body: &FlexBody) -> Vec<(usize, [f64; 3])> {
     let nodes: Vec<usize> = match body.mesh() {
         Some(mesh) => mesh.drawn_nodes().into_iter().map(|node| node as usize).collect(),
@@ -31,7 +31,7 @@ fn apart(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)
 }
 
-/// The place of every drawn node is that of a vertex, whose targets are proportional to the shapes.
+/// Asserts that every drawn node has a vertex at its position, with targets proportional to the shapes.
 fn check(body: &FlexBody, glb: &Glb) {
     let (positions, targets) = glb.vertices();
     let nodes = drawn(body);
@@ -41,7 +41,7 @@ fn check(body: &FlexBody, glb: &Glb) {
     let at =
         |own: &[f64; 3]| positions.iter().position(|x| apart(x, own) <= SINGLE * size).expect("a vertex");
     let vertices: Vec<usize> = nodes.iter().map(|(_, place)| at(place)).collect();
-    // Nodes at one place cannot be told apart.
+    // Nodes at one position cannot be distinguished.
     let alone = |vertex: usize| vertices.iter().filter(|own| **own == vertex).count() == 1;
     assert_eq!(targets.len(), body.n_modes().min(8));
     for (j, target) in targets.iter().enumerate() {
@@ -88,7 +88,7 @@ fn check_primitives(glb: &Glb, vertices: usize, targets: usize) {
     }
 }
 
-/// An animation for each mode: its weight is a sine of one period, the others rest.
+/// Asserts that each mode has an animation: its weight is a sine of one period, the other weights are zero.
 fn check_animations(glb: &Glb, targets: usize) {
     let names = glb.json["meshes"][0]["extras"]["targetNames"].as_array().expect("names");
     let animations = glb.json["animations"].as_array().expect("animations");
@@ -113,7 +113,7 @@ fn bodies_of_every_kind_come_back() {
         let glb = Glb::read(&file(body, "gltf", None));
         check(body, &glb);
         let nodes = glb.json["nodes"].as_array().expect("nodes");
-        // z of the model is up, which is y here.
+        // The vertical axis z of the model is y in the file.
         let turned: Vec<f64> =
             nodes[0]["rotation"].as_array().expect("a rotation").iter().map(number).collect();
         let up = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(
@@ -156,7 +156,7 @@ proptest! {
         check(&body, &Glb::read(&file(&body, "gltf", None)));
     }
 
-    /// Numbers beyond single precision are refused; what is written is in order.
+    /// Numbers beyond single precision are refused; other bodies give valid files.
     #[test]
     fn wild_bodies_are_written_or_refused(seed in any::<u64>(), n in 1..9usize, nf in 1..4usize) {
         let body = wild_body(seed, n, nf.min(3 * n), 0, 2);

@@ -1,5 +1,5 @@
-//! Exports that are pictures of a body: `vtk` and `gltf`. Each is read back by a strict reader of its layout
-//! and compared with the body, for all fixture models, for random bodies, and for a motion.
+//! Picture exports `vtk` and `gltf`. Each is read back by a strict reader of its layout and compared with the
+//! body, for all fixture models, for random bodies, and for a motion.
 
 mod gltf;
 mod motion;

@@ -1,4 +1,4 @@
-//! Pictures of a simulation: both formats show the same motion, and it is that of the file.
+//! Pictures of a simulation: both formats show the recorded motion.
 
 use super::readers::{Glb, Vtu};
 use crate::program::flexbody;
@@ -10,7 +10,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// Runs `flexbody`, which must succeed, and gives what it says of it.
+/// Runs `flexbody`, asserts that it succeeds, and returns its messages.
 fn done(folder: &Path, line: &str) -> String {
     let run = flexbody(folder, &line.split_whitespace().collect::<Vec<_>>());
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
@@ -18,7 +18,7 @@ fn done(folder: &Path, line: &str) -> String {
     text(&run.stdout) + &text(&run.stderr)
 }
 
-/// A folder with the body of a block with a surface and an interface, as `body.flex.h5`.
+/// Creates a folder with the body of a block with a surface and an interface, as `body.flex.h5`.
 pub fn block() -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let job = fixtures().join("small/abaqus_labels/job.inp");
@@ -49,7 +49,7 @@ fn played(scene: &str) -> Played {
 }
 
 impl Played {
-    /// Where a node is at an instant, and its deflection, along the axes of the world.
+    /// Returns the position of a node at an output time, and its deflection, in world axes.
     fn place(&self, instant: usize, number: i64) -> ([f64; 3], [f64; 3]) {
         let Self { body, motion, .. } = self;
         let [w, i, j, k] = [0, 1, 2, 3].map(|part| motion.attitudes[4 * instant + part]);
@@ -69,7 +69,7 @@ fn apart(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)
 }
 
-/// The meshes of all instants are where the motion says.
+/// Asserts that the meshes of all output times agree with the motion.
 fn check_vtk(played: &Played, instants: usize) {
     let place = played.folder.path();
     let said = done(place, "export body.flex.h5 --to vtk --simulation motion.h5 -o played.pvd");
@@ -92,7 +92,7 @@ fn check_vtk(played: &Played, instants: usize) {
     }
 }
 
-/// Vertices that are moved as a viewer moves them are where the motion says, in metres.
+/// Asserts that vertices moved like in a viewer agree with the motion, in metres.
 fn check_gltf(played: &Played, instants: usize) {
     let place = played.folder.path();
     done(place, "export body.flex.h5 --to gltf --simulation motion.h5 -o played.glb");
@@ -139,7 +139,7 @@ fn both_formats_show_a_carried_body() {
     check_gltf(&played, 11);
 }
 
-/// A run with more instants than files are reasonable is thinned, with a note.
+/// A run with too many output times for separate files is thinned, with a note.
 #[test]
 fn long_motions_are_thinned() {
     let played = played(&TUMBLE.replace("outputs = 20", "outputs = 1000"));

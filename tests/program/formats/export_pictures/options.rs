@@ -1,4 +1,4 @@
-//! What can be asked of a picture, what it says of itself, and what is refused.
+//! Options of pictures, their messages, and refusals.
 
 use super::motion::block;
 use super::readers::{Glb, Vtu};
@@ -41,7 +41,7 @@ fn modes_are_chosen_by_their_number() {
     }
 }
 
-/// Damping, geometric stiffness and the like are in no picture: nothing of it is a loss that needs a word.
+/// Pictures hold neither damping nor geometric stiffness; none of this counts as a loss.
 #[test]
 fn pictures_of_every_body_need_no_permission() {
     for (name, body) in bodies() {
@@ -76,10 +76,10 @@ fn what_makes_no_sense_is_refused_and_leaves_nothing() {
     let convert = ["convert", job, "--units", "m,kg,s", "--modes", "3", "-o", "fewer.flex.h5", "--quiet"];
     assert!(flexbody(place, &convert).status.success());
     refused(place, "export fewer.flex.h5 --to gltf --simulation spin.h5 -o x.glb", "FB735");
-    // The name of a mesh of the motion is that of an input.
+    // A mesh of the motion would replace an input.
     fs::copy(place.join("body.flex.h5"), place.join("x_0001.vtu")).expect("copied");
     refused(place, "export x_0001.vtu --to vtk --simulation spin.h5 -o x.pvd", "FB801");
-    // Viewers would not know the file by this name.
+    // Viewers do not recognise this extension.
     let run = flexbody(place, &["export", "body.flex.h5", "--to", "gltf", "-o", "x.gltf"]);
     let said = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(

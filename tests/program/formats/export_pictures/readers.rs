@@ -1,11 +1,11 @@
-//! Strict readers of the two layouts, written from their descriptions.
+//! Strict readers of both picture formats, written from their descriptions.
 
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// An array of a mesh of VTK.
+/// An array of a VTK mesh.
 pub struct Array {
-    /// Name of the element that it stands in.
+    /// Name of the parent element.
     pub parent: String,
     pub name: String,
     pub kind: String,
@@ -30,7 +30,7 @@ impl Array {
     }
 }
 
-/// A mesh of VTK with its numbers in raw bytes behind the tags.
+/// A VTK mesh with raw binary numbers after the tags.
 pub struct Vtu {
     pub points: usize,
     pub cells: usize,
@@ -71,7 +71,7 @@ impl Vtu {
         Self { points: number("NumberOfPoints"), cells: number("NumberOfCells"), arrays, head }
     }
 
-    /// The only array of this name in the element `parent`.
+    /// Returns the only array of this name in the element `parent`.
     pub fn array(&self, parent: &str, name: &str) -> &Array {
         let found: Vec<&Array> =
             self.arrays.iter().filter(|array| array.parent == parent && array.name == name).collect();
@@ -87,7 +87,7 @@ impl Vtu {
         self.array("PointData", "node").integers()
     }
 
-    /// Kind and points of every cell.
+    /// Returns kind and points of every cell.
     pub fn cells(&self) -> Vec<(u8, Vec<usize>)> {
         let connectivity = self.array("Cells", "connectivity").integers();
         let offsets = self.array("Cells", "offsets").integers();
@@ -104,7 +104,7 @@ impl Vtu {
     }
 }
 
-/// The attributes of a tag.
+/// Returns the attributes of a tag.
 fn attributes(tag: &str) -> BTreeMap<String, String> {
     let parts: Vec<&str> = tag.split('"').collect();
     let value = |text: &str| {
@@ -144,7 +144,8 @@ impl Glb {
         glb
     }
 
-    /// Every accessor lies in its view, every view in the buffer, and stated bounds are those of the numbers.
+    /// Asserts that every accessor lies in its view, every view in the buffer, and that stated bounds are
+    /// correct.
     fn check_accessors(&self) {
         let mut end = 0;
         for view in self.json["bufferViews"].as_array().expect("views") {
@@ -179,7 +180,7 @@ impl Glb {
         &self.data[offset as usize..][..length as usize]
     }
 
-    /// The numbers of an accessor, and how many belong together.
+    /// Returns the numbers of an accessor, and its number of components.
     pub fn floats(&self, accessor: usize) -> (Vec<f64>, usize) {
         let about = &self.json["accessors"][accessor];
         assert_eq!(about["componentType"], 5126);
@@ -211,7 +212,7 @@ impl Glb {
         self.json["meshes"][0]["primitives"].as_array().expect("primitives")
     }
 
-    /// Positions of the vertices, and their displacements at weight one of every target.
+    /// Returns the positions of the vertices, and their displacements at weight one of every target.
     pub fn vertices(&self) -> (Vec<[f64; 3]>, Vec<Vec<[f64; 3]>>) {
         let primitive = &self.primitives()[0];
         let none = Vec::new();
@@ -222,7 +223,7 @@ impl Glb {
         )
     }
 
-    /// Times and values of the channel of an animation with this path.
+    /// Returns times and values of the channel of an animation with this path.
     pub fn channel(&self, animation: usize, path: &str) -> (Vec<f64>, Vec<f64>) {
         let animation = &self.json["animations"][animation];
         let channels = animation["channels"].as_array().expect("channels");

@@ -19,7 +19,7 @@ fn with_points(body: &FlexBody, points: Points) -> Vtu {
     Vtu::read(&export(body, format, &options, false).expect("written").0.file)
 }
 
-/// What a file says of the body's nodes is what the body says; answers the numbers of the points that are no
+/// Asserts that the nodal data of a file agree with the body; returns the numbers of the points that are no
 /// nodes.
 fn check(body: &FlexBody, vtu: &Vtu) -> Vec<i64> {
     let index: BTreeMap<i64, usize> = body.nodes().ids.iter().copied().zip(0..).collect();
@@ -54,7 +54,7 @@ fn check(body: &FlexBody, vtu: &Vtu) -> Vec<i64> {
     numbers.into_iter().filter(|number| !index.contains_key(number)).collect()
 }
 
-/// Every point belongs to a cell, of the kinds that there are.
+/// Asserts that every point belongs to a cell of a known kind.
 fn check_cells(vtu: &Vtu) {
     let mut used = BTreeSet::new();
     for (kind, points) in vtu.cells() {
@@ -96,7 +96,7 @@ fn bodies_of_every_kind_come_back() {
     }
 }
 
-/// Reference points move as the fit of their nodes does.
+/// Reference points move like the fit of their nodes.
 #[test]
 fn reference_points_are_those_of_the_interfaces() {
     let (_, body) = bodies().iter().find(|(name, _)| name == "bracket_hex20, jointed").expect("a body");
@@ -130,8 +130,8 @@ proptest! {
     }
 }
 
-/// The reader of meshes finds nodes with their numbers and interfaces as sets: the model converts with them as
-/// it does with its table.
+/// The reader of meshes finds nodes with their numbers and interfaces as sets: the model converts with the
+/// mesh as with its table.
 #[test]
 fn our_own_reader_takes_the_nodes() {
     let folder = tempfile::tempdir().expect("a folder");

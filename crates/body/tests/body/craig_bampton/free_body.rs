@@ -1,15 +1,15 @@
-//! A Craig-Bampton body in its own terms: what is proved of its fixed-interface modes, how near its
-//! frequencies are to those of the free body, and static condensation.
+//! Facts of a Craig-Bampton body: proof of its fixed-interface modes, deviation of its frequencies from those
+//! of the free body, and static condensation.
 
 use super::*;
 use oracle::craig_bampton::record;
 
-/// Eigenvalues below this part of the first that is left out are estimated well.
+/// Largest ratio of an eigenvalue to the first truncated one for which the estimate is accurate.
 const FAR_BELOW: f64 = 0.25;
 
-/// lower <= lambda <= estimate <= theta for every mode, and the estimate has found nearly all of theta -
-/// lambda far below the cut; the smallest part that it found there, and the largest ratio of the bound to the
-/// truth.
+/// Asserts lower <= lambda <= estimate <= theta for every mode, and that the estimate finds nearly all of
+/// theta - lambda far below the cut. Returns the smallest fraction found there, and the largest ratio of the
+/// bound to the exact value.
 fn check_against(exact: &[f64], basis: &ModalBasis, held: &[f64], what: &str) -> [f64; 2] {
     let theta = &basis.solution.eigenvalues;
     let fixed = basis.fixed_interface.as_ref().expect("recorded");
@@ -18,7 +18,7 @@ fn check_against(exact: &[f64], basis: &ModalBasis, held: &[f64], what: &str) ->
     let (mut least, mut most) = (1.0f64, 1.0f64);
     for (j, theta) in theta.iter().enumerate() {
         let (lambda, estimate, lower) = (exact[j], fixed.free_estimate[j], fixed.free_lower[j]);
-        // What eigenvalues of dense and sparse solutions differ by.
+        // Difference between eigenvalues of dense and sparse solutions.
         let rounding = 1e-9 * theta;
         let all = format!("{what}, mode {j}: {lower:e} <= {lambda:e} <= {estimate:e} <= {theta:e}");
         assert!(lower <= lambda + rounding && lambda <= estimate + rounding && estimate <= *theta, "{all}");
@@ -44,7 +44,7 @@ fn estimates_and_bounds_enclose_the_frequencies_of_the_free_body() {
         let model = model(raw);
         for count in [0, 1, 4, 10, 25, usize::MAX] {
             let found = check_against(&exact, &craig_bampton(&model, count), &held, &what);
-            // A single fixed-interface mode leaves most of the motion to the bound.
+            // With a single fixed-interface mode the bound is wide.
             let allowed = if count < 4 { 1.7 } else { 1.25 };
             assert!(found[0] > 0.95 && found[1] < allowed, "effectivity with {count} modes: {found:?}");
             (least, most) = (least.min(found[0]), most.max(found[1]));
@@ -78,7 +78,7 @@ fn the_frequencies_of_fixtures_are_told_as_well_as_free_modes_know_them() {
     }
 }
 
-/// K and M of static condensation are those of the constraint modes from definitions, and the inertia of the
+/// K and M of static condensation equal those of the constraint modes by definition, and the inertia of the
 /// rigid body is exact.
 #[test]
 fn without_fixed_interface_modes_the_body_is_statically_condensed() {

@@ -1,8 +1,8 @@
-//! Interfaces that share nodes: bodies of them among those that every oracle holds, and what is refused.
+//! Interfaces that share nodes: valid bodies compared with every oracle, and refused ones.
 
 use super::*;
 
-/// Couplings of interfaces that share nodes; at least one of two averages.
+/// Couplings of interfaces that share nodes; at least one of two is averaging.
 const SHARING: [[Coupling; 2]; 4] = [
     [Coupling::Averaging, Coupling::Averaging],
     [Coupling::Rigid, Coupling::Averaging],
@@ -10,7 +10,8 @@ const SHARING: [[Coupling; 2]; 4] = [
     [Coupling::Averaging, Coupling::Free],
 ];
 
-/// The bracket or the strip with nodes of its second interface, and some more, in the first as well.
+/// Returns the bracket or strip with some nodes of its second interface, and further nodes, added to the
+/// first.
 fn shared(couplings: [Coupling; 2], raw: RawModel) -> RawModel {
     let mut raw = raw;
     let taken: Vec<i64> = raw.interfaces[1].nodes.iter().copied().take(2).collect();
@@ -19,12 +20,13 @@ fn shared(couplings: [Coupling; 2], raw: RawModel) -> RawModel {
     raw
 }
 
-/// Brackets and strips whose interfaces share nodes.
+/// Returns brackets and strips whose interfaces share nodes.
 pub fn models() -> impl Iterator<Item = RawModel> {
     SHARING.into_iter().flat_map(|c| [shared(c, bracket(c)), shared(c, strip(c))])
 }
 
-/// The same motions with unit coordinates, also of interfaces that share nodes: changed at the `free` rows alone.
+/// Returns the motions with unit coordinates for interfaces that share nodes: changed at the `free` rows
+/// only.
 pub fn with_unit_coordinates(motion: Mat<f64>, weights: &Mat<f64>, free: impl Fn(usize) -> bool) -> Mat<f64> {
     let c = weights.ncols();
     let missing = Mat::<f64>::identity(c, c) - weights.transpose() * &motion;
@@ -45,7 +47,7 @@ pub fn with_unit_coordinates(motion: Mat<f64>, weights: &Mat<f64>, free: impl Fn
     motion + &own * normal.partial_piv_lu().solve(missing)
 }
 
-/// Motions that follow from those of other interfaces are refused, with the node that both have.
+/// Interfaces whose motions follow from other interfaces are refused, with the shared node.
 #[test]
 fn interfaces_whose_motions_follow_from_others_are_refused() {
     use Coupling::{Averaging, Free, Rigid};
@@ -60,7 +62,7 @@ fn interfaces_whose_motions_follow_from_others_are_refused() {
     for couplings in [[Averaging, Averaging], [Rigid, Averaging], [Free, Averaging], [Rigid, Free]] {
         told(couplings, &|first| first.to_vec());
     }
-    // Some nodes of its own leave a rigid interface, or a mean, as little independent of another rigid one.
+    // A few nodes of its own do not make a rigid or averaging interface independent of another rigid one.
     told([Rigid, Rigid], &|first| [&first[..1], &[1, 2, 30]].concat());
     told([Rigid, Averaging], &|first| [first, &[1]].concat());
     let other = |first: &[i64]| (1..).filter(|id| !first.contains(id)).take(6).collect::<Vec<i64>>();

@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// A bar of 5000 times its width with a third of its modes: B'M B = I holds to the rounding of its summands, which is
-/// above the limit of other bodies, and a mass that is wrong is still found.
+/// For a bar of 5000 times its width with a third of its modes, B'M B = I holds to the rounding of its
+/// summands, which exceeds the limit of other bodies; a wrong mass is still detected.
 #[test]
 fn many_modes_of_a_slender_bar_hold_to_the_rounding_of_their_summands() {
     let mesh = Mesh::block(ElementKind::Hex8, [60, 1, 1], [1.0, 2e-4, 2e-4]);

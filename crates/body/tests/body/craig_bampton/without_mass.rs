@@ -1,4 +1,4 @@
-//! Interfaces that carry no mass.
+//! Interfaces without mass.
 
 use super::{bracket, lowest};
 use flexbody_body::basis::{BasisChoice, CraigBampton};
@@ -10,7 +10,8 @@ use flexbody_model::{Coupling, FeModel, RawModel};
 use nalgebra::DMatrix;
 use oracle::turning::dense;
 
-/// The flexible eigenvalues of a model with a diagonal mass: rows without mass follow the others statically.
+/// Returns the flexible eigenvalues of a model with a diagonal mass: rows without mass follow the others
+/// statically.
 fn condensed_eigenvalues(raw: &RawModel) -> Vec<f64> {
     let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
     let (heavy, light): (Vec<usize>, Vec<usize>) = (0..k.nrows()).partition(|&i| m[(i, i)] > 0.0);
@@ -25,8 +26,8 @@ fn condensed_eigenvalues(raw: &RawModel) -> Vec<f64> {
     eigenvalues.split_off(6)
 }
 
-/// Shapes that move no mass are where elastic forces hold them: with all fixed-interface modes the body has all modes of
-/// the model, although as many of its shapes as interfaces have rows without mass are left out.
+/// Shapes without mass follow elastic forces statically: with all fixed-interface modes the body has all
+/// modes of the model, although the shapes of interface rows without mass are removed.
 #[test]
 fn interfaces_without_mass_leave_all_modes() {
     for couplings in

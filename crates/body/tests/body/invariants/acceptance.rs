@@ -1,6 +1,5 @@
-//! THE acceptance test: generalised inertia forces from the invariants are the forces that M times the nodal
-//! accelerations sum to, for random motions of bodies with random and smooth shapes, in any basis and any
-//! frame.
+//! Acceptance test: generalised inertia forces from the invariants equal the sums of M times the nodal
+//! accelerations, for random motions of bodies with random and smooth shapes, in any basis and any frame.
 
 use super::bodies::{Body, orthonormalised, random_matrix, smooth_shapes};
 use faer::Mat;
@@ -10,7 +9,8 @@ use oracle::models::{self, Model};
 use oracle::nodal::{deviation, inertia_forces, random_state, reduced};
 use oracle::random::Random;
 
-/// Deviation of the reduced forces and, for comparison, of the forces with the misprinted Coriolis terms.
+/// Returns the deviation of the reduced forces and, for comparison, of the forces with the misprinted
+/// Coriolis terms.
 fn deviations(body: &Body, random: &mut Random, displacement: f64) -> (f64, f64) {
     let nf = body.shapes.ncols();
     let invariants = condense(&body.scalar_mass, &body.positions, body.shapes.as_ref(), Mat::zeros(nf, nf));
@@ -48,7 +48,7 @@ fn check_model(model: Model) {
         let size = (properties.inertia.trace() / properties.mass).sqrt();
         let orthonormal = orthonormalised(&model.scalar_mass, &positions, &smooth, false);
         let noise = random_matrix(&mut random, 3 * positions.len(), 4);
-        // Displacements of a third of the body's size: nothing is linearised.
+        // Displacements of a third of the size of the body, without linearisation.
         for (kind, shapes, displacement) in [
             ("smooth", smooth, 0.3 * size),
             ("orthonormal", orthonormal, 0.3 * size * properties.mass.sqrt()),

@@ -5,7 +5,7 @@ use faer::{Mat, MatRef};
 use flexbody_body::invariants::{Invariants, align, compare_invariants, condense};
 use oracle::random::Random;
 
-/// Rotation by an angle in the plane of modes p and q.
+/// Returns the rotation by an angle in the plane of modes p and q.
 fn plane_rotation(nf: usize, p: usize, q: usize, angle: f64) -> Mat<f64> {
     let mut t = Mat::<f64>::identity(nf, nf);
     (t[(p, p)], t[(p, q)], t[(q, p)], t[(q, q)]) = (angle.cos(), -angle.sin(), angle.sin(), angle.cos());
@@ -17,7 +17,7 @@ fn condensed(body: &Body, shapes: MatRef<'_, f64>) -> Invariants {
     condense(&body.scalar_mass, &body.positions, shapes, Mat::identity(nf, nf))
 }
 
-/// Modes of b: signs changed, 1..3 turned, 4..7 mirrored and turned.
+/// Returns the modes of b: changed signs, 1..3 rotated, 4..7 reflected and rotated.
 fn disguise() -> Mat<f64> {
     let mut t = plane_rotation(8, 1, 2, 2.1) * plane_rotation(8, 4, 6, -0.7) * plane_rotation(8, 5, 6, 1.3);
     for column in [0, 4, 7] {
@@ -93,7 +93,7 @@ fn numbers_that_are_not_finite_are_reported() {
     let mut cross = random_matrix(&mut Random(1), 3, 3);
     cross[(1, 2)] = f64::NAN;
     assert!(align(cross.as_ref(), std::slice::from_ref(&(0..3))).agreement.is_nan());
-    // Outside of every block the entry does not matter.
+    // Entries outside of every block have no effect.
     assert!(align(cross.as_ref(), &[]).agreement.is_finite());
     assert_eq!(align(Mat::<f64>::zeros(0, 0).as_ref(), &[]).basis.nrows(), 0);
 }

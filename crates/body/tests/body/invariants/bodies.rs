@@ -1,4 +1,4 @@
-//! Synthetic bodies and shapes that several tests use.
+//! Synthetic bodies and shapes shared by several tests.
 
 use faer::Mat;
 use flexbody_body::invariants::{Invariants, primary_differences};
@@ -9,7 +9,7 @@ use oracle::models::symmetric;
 use oracle::nodal::expand;
 use oracle::random::Random;
 
-/// Ms, its expansion, node positions and shapes.
+/// Scalar mass Ms, its expansion, node positions and shapes.
 pub struct Body {
     pub scalar_mass: SymmetricMatrix,
     pub mass: Vec<(usize, usize, f64)>,
@@ -22,7 +22,7 @@ impl Body {
         Self { mass: expand(&scalar_mass), scalar_mass, positions, shapes }
     }
 
-    /// A cuboid away from the origin, with random shapes.
+    /// Returns a cuboid away from the origin with random shapes.
     pub fn cuboid(seed: u64, modes: usize) -> Self {
         let cuboid = Cuboid { cells: [4, 3, 2], low: [0.3, -0.2, 0.1], size: [1.0, 0.7, 0.4], density: 2.5 };
         let positions = cuboid.positions();
@@ -30,7 +30,7 @@ impl Body {
         Self::new(cuboid.scalar_mass(), positions, shapes)
     }
 
-    /// Nodes, masses and shapes without any structure; Ms is symmetric and nothing more.
+    /// Returns nodes, masses and shapes without structure; Ms is only symmetric.
     pub fn random(seed: u64, n: usize, modes: usize) -> Self {
         let mut random = Random(seed);
         let mut triplets = Vec::new();
@@ -52,7 +52,7 @@ pub fn random_matrix(random: &mut Random, rows: usize, columns: usize) -> Mat<f6
     Mat::from_fn(rows, columns, |_, _| random.signed())
 }
 
-/// Smooth displacement fields over the nodes: waves of random direction, length and phase.
+/// Returns smooth displacement fields over the nodes: waves of random direction, length and phase.
 pub fn smooth_shapes(random: &mut Random, positions: &[[f64; 3]], modes: usize) -> Mat<f64> {
     let size = positions.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
     let mut shapes = Mat::zeros(3 * positions.len(), modes);
@@ -70,7 +70,8 @@ pub fn smooth_shapes(random: &mut Random, positions: &[[f64; 3]], modes: usize) 
     shapes
 }
 
-/// Makes shapes M-orthonormal and, with `free`, M-orthogonal to rigid motion: Gram-Schmidt, twice.
+/// Returns shapes made M-orthonormal and, if `free` is true, M-orthogonal to rigid motion, by Gram-Schmidt
+/// applied twice.
 pub fn orthonormalised(
     scalar_mass: &SymmetricMatrix,
     positions: &[[f64; 3]],
@@ -113,12 +114,13 @@ pub fn orthonormalised(
     Mat::from_fn(3 * n, shapes.ncols(), |row, p| basis[rigid + p][row])
 }
 
-/// A matrix that every test can pass through as modal stiffness.
+/// Returns a matrix that tests use as modal stiffness.
 pub fn stiffness(modes: usize) -> Mat<f64> {
     Mat::from_fn(modes, modes, |p, q| if p == q { 10.0 + p as f64 } else { 0.1 / (p + q) as f64 })
 }
 
-/// Asserts that the primary data agree relative to their Cauchy-Schwarz bounds; modal stiffness counts.
+/// Asserts that the primary data agree relative to their Cauchy-Schwarz bounds, including the modal
+/// stiffness.
 #[track_caller]
 pub fn assert_agree(what: &str, exact: &Invariants, other: &Invariants, limit: f64) {
     for (name, difference) in primary_differences(exact, other) {

@@ -1,4 +1,4 @@
-//! Bodies whose inertia data are known on paper.
+//! Bodies with known closed forms of the inertia data.
 
 use super::bodies::stiffness;
 use faer::Mat;
@@ -71,10 +71,10 @@ fn homogeneous_strains_of_a_cuboid_follow_from_its_second_moments() {
             }
         }
     }
-    // The rotation e_z x r, modes (y, x) - (x, y): C2 is its column of I0.
+    // The rotation e_z x r is the difference of the modes (y, x) and (x, y): its C2 is a column of I0.
     let c2 = invariants.c2();
     assert!(near(c2[(2, 3)] - c2[(2, 1)], invariants.inertia()[(2, 2)]));
-    // A stretch by q along x changes I(q) as the inertia of the stretched cuboid: (1 + q)^2 J_xx.
+    // A stretch by q along x changes I(q) to the inertia of the stretched cuboid: (1 + q)^2 J_xx.
     let (w1, w2, q) = (invariants.w1().expect("held"), invariants.w2().expect("held"), 0.3);
     let moment = invariants.inertia()[(1, 1)] + w1[(1, 9)] * q + w2[(9, 9)] * q * q;
     assert!(near(moment, (1.0 + q) * (1.0 + q) * j[0] + j[2]));
@@ -83,7 +83,7 @@ fn homogeneous_strains_of_a_cuboid_follow_from_its_second_moments() {
 
 #[test]
 fn layout_is_component_blocked() {
-    // Point masses on a frame of their own: everything can be read off.
+    // Point masses in a frame of their own: all invariants can be written down.
     let mass = oracle::models::symmetric(2, &[(0, 0, 2.0), (1, 1, 3.0)]);
     let positions = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let mut shapes = Mat::zeros(6, 2);

@@ -1,4 +1,4 @@
-//! Error norms of lumped invariants: right scale, right order, nothing hidden.
+//! Error norms of lumped invariants: correct scale and order, and no hidden errors.
 
 use super::bodies::{Body, orthonormalised, stiffness};
 use faer::Mat;
@@ -12,7 +12,7 @@ fn norm(table: &[(String, f64)], name: &str) -> f64 {
     table.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("no {name}")).1
 }
 
-/// A cuboid about its centre with free, mass-normalised shapes.
+/// Returns a cuboid about its centre with free, mass-normalised shapes.
 fn free_body(cells: [usize; 3], modes: usize) -> (Body, Invariants) {
     let size = [1.0, 0.4, 0.2];
     let cuboid = Cuboid { cells, low: size.map(|s| -0.5 * s), size, density: 2.0 };
@@ -41,7 +41,7 @@ fn nothing_differs_from_itself() {
 fn norms_are_those_of_a_known_error() {
     let (_, exact) = free_body([4, 3, 3], 3);
     let mut other = exact.clone();
-    // J grows by a factor: I0 by the same, nothing else.
+    // J grows by a factor: I0 grows by that factor, and nothing else changes.
     other.primary_mut().second_moment *= 1.25;
     let table = error_norms(&exact, &other);
     for name in ["I0_frobenius", "I0_spectral", "I0_max"] {
@@ -57,7 +57,7 @@ fn norms_are_those_of_a_known_error() {
     {
         assert!((norm(&table, name) - 0.21).abs() < 1e-13, "{name}");
     }
-    // W3 is relative to its bound 1 where it is smaller itself.
+    // W3 is relative to its bound 1 if it is smaller.
     let size = exact.w3().expect("held").norm_l2();
     assert!(size > 0.1 && size < 1.0, "{size}");
     assert!((norm(&table, "W3_frobenius") - 0.21 * size).abs() < 1e-13);
@@ -66,7 +66,7 @@ fn norms_are_those_of_a_known_error() {
     let other = exact.with_basis((Mat::<f64>::identity(8, 8) * faer::Scale(1.1)).as_ref());
     assert!((norm(&error_norms(&exact, &other), "W3_frobenius") - 0.21).abs() < 1e-13);
 
-    // A centre of mass that moves by 1 % of the radius of gyration.
+    // The centre of mass moves by 1 % of the radius of gyration.
     let radius = (exact.second_moment().trace() / exact.mass()).sqrt();
     let mut other = exact.clone();
     other.primary_mut().first_moment.y += 0.01 * radius * exact.mass();
@@ -87,7 +87,7 @@ fn lost_free_surface_conditions_are_relative_to_their_bounds() {
         assert!((norm(&table, name) - 1e-3).abs() < 1e-12, "{name}");
     }
     let mut other = exact.clone();
-    // C2_z = Ibar_xy - Ibar_yx; z carries the largest moment of this body.
+    // C2_z = Ibar_xy - Ibar_yx; z has the largest moment of this body.
     other.primary_mut().ibar[0][1][1] += 1e-3 * exact.inertia()[(2, 2)].sqrt();
     let table = error_norms(&exact, &other);
     for name in ["C2_frobenius", "C2_spectral", "C2_max"] {
@@ -114,7 +114,7 @@ fn norms_do_not_depend_on_units_or_axes() {
     let axes = oracle::random::Random(4).rotation();
     let table = error_norms(&exact, &other);
     for (name, value) in error_norms(&exact.rotated(&axes), &other.rotated(&axes)) {
-        // Entry by entry the axes matter; the W matrices change by an orthogonal factor only.
+        // Entry norms depend on the axes; the W matrices change by an orthogonal factor only.
         if !name.ends_with("max") {
             assert!((value - norm(&table, &name)).abs() < 1e-12 * (1.0 + value), "{name}");
         }

@@ -1,4 +1,4 @@
-//! Transformations of the invariants are the invariants of the transformed body.
+//! Transformed invariants equal the invariants of the transformed body.
 
 use super::bodies::{Body, assert_agree, random_matrix, stiffness};
 use faer::Mat;
@@ -91,7 +91,7 @@ fn numbering_of_the_nodes_does_not_matter() {
 
 #[test]
 fn units_scale_every_invariant_by_its_dimension() {
-    // Micrometres and nanograms: powers of ten far from one, and shapes of their own unit.
+    // Micrometres and nanograms: powers of ten far from one, and a separate unit of the shapes.
     let (length, mass, shape) = (1e6, 1e12, 1e-3);
     let body = Body::cuboid(5, 4);
     let n = body.positions.len();

@@ -1,4 +1,4 @@
-//! The condensation against the definitions, evaluated with twice the digits on the 3n x 3n mass matrix.
+//! Condensation compared with the definitions, evaluated with twice the digits on the 3n x 3n mass matrix.
 
 use super::bodies::{Body, assert_agree, orthonormalised, random_matrix, smooth_shapes};
 use faer::Mat;
@@ -7,7 +7,7 @@ use oracle::models;
 use oracle::nodal::brute_force;
 use oracle::random::Random;
 
-/// Independent evaluations agree to this, relative to the Cauchy-Schwarz bound of each entry.
+/// Largest difference of independent evaluations, relative to the Cauchy-Schwarz bound of each entry.
 const LIMIT: f64 = 1e-13;
 
 #[test]
@@ -48,7 +48,7 @@ fn real_bodies_agree_with_the_definitions() {
 
 #[test]
 fn sums_do_not_lose_digits_with_the_number_of_nodes() {
-    // Half a million nodes of mass 0.1: naive summation would be off by 1e-11.
+    // Half a million nodes of mass 0.1: naive summation would have an error of 1e-11.
     let n = 500_000;
     let masses = LumpedMasses::user(vec![0.1; n], n).expect("masses");
     let shapes = Mat::from_fn(3 * n, 1, |_, _| 0.1);

@@ -1,4 +1,4 @@
-//! The body frame: centre of mass and principal axes without loss of digits, canonical.
+//! Body frame: centre of mass and principal axes without loss of digits, in canonical form.
 
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -17,7 +17,7 @@ fn rigid(mass: &SymmetricMatrix, positions: &[[f64; 3]]) -> Invariants {
 fn a_body_a_million_lengths_away_keeps_its_digits() {
     let near = Cuboid { cells: [8, 4, 2], low: [0.0; 3], size: [1.0, 0.5, 0.25], density: 64.0 };
     let (mass, positions) = (near.scalar_mass(), near.positions());
-    // A power of two: the coordinates stay exact, so that nothing but the algorithm loses digits.
+    // The shift is a power of two: coordinates stay exact, so that only the algorithm could lose digits.
     let far: Vec<[f64; 3]> = positions.iter().map(|x| x.map(|v| v + 1048576.0)).collect();
     for choice in [BodyFrame::Com, BodyFrame::Principal] {
         let (near_frame, near_properties) = choose_frame(&mass, &positions, choice).expect("a body");
@@ -33,7 +33,7 @@ fn a_body_a_million_lengths_away_keeps_its_digits() {
         assert!((a.inertia() - b.inertia()).amax() < 1e-14 * a.inertia().amax());
         assert!(b.first_moment().amax() < 1e-15 * b.mass());
     }
-    // What a second moment about the distant origin leaves after a shift.
+    // Accuracy of a second moment about the distant origin after a shift.
     let (frame, properties) = choose_frame(&mass, &far, BodyFrame::Com).expect("a body");
     let naive = rigid(&mass, &far).shifted(frame.origin).inertia();
     assert!((naive - properties.inertia).amax() > 1e-6 * properties.inertia.amax());
@@ -45,7 +45,7 @@ fn a_distant_origin_is_rounded_and_the_first_moment_says_so() {
     let (mass, positions) = (body.scalar_mass(), body.positions());
     let (frame, properties) = choose_frame(&mass, &positions, BodyFrame::Com).expect("a body");
     let invariants = rigid(&mass, &frame.to_body(&positions));
-    // One half of the spacing of numbers at 1e6.
+    // Half of the spacing of numbers at 1e6.
     assert!(invariants.first_moment().amax() <= 6e-11 * properties.mass);
     // About its own centre of mass the inertia has all digits of these coordinates.
     let central = invariants.shifted(invariants.first_moment() / invariants.mass()).inertia();
@@ -58,7 +58,7 @@ fn a_heavy_tip_does_not_spoil_the_inertia() {
     let mass = symmetric(3, &[(0, 0, 1e9), (1, 1, 1.0), (2, 2, 1.0)]);
     let positions = [[1.0, 0.0, 0.0], [0.0, 0.25, 0.0], [0.0, -0.25, 0.0]];
     let (_, properties) = choose_frame(&mass, &positions, BodyFrame::Principal).expect("a body");
-    // About the centre of mass: 2 m d^2 (reduced mass) about y, the same plus 2 * 0.25^2 about z.
+    // About the centre of mass: 2 m d^2 (reduced mass) about y, plus 2 * 0.25^2 about z.
     let about_y = 2.0 * 1e9 / (1e9 + 2.0);
     assert!((properties.inertia[(1, 1)] / about_y - 1.0).abs() < 1e-15);
     assert!((properties.inertia[(0, 0)] / 0.125 - 1.0).abs() < 1e-15);
@@ -70,9 +70,9 @@ fn symmetric_bodies_keep_the_model_axes() {
         ([1.0, 1.0, 1.0], Matrix3::identity()),
         // Plate: the two small moments are equal, the large one is about z.
         ([1.0, 1.0, 0.1], Matrix3::identity()),
-        // Bar along z: its small moment comes first.
+        // Bar along z: the small moment comes first.
         ([0.1, 0.1, 1.0], Matrix3::new(0., 1., 0., 0., 0., 1., 1., 0., 0.)),
-        // Three moments: about z < y < x, and the third axis closes a right-handed frame.
+        // Three distinct moments: about z < y < x, and the third axis completes a right-handed frame.
         ([0.1, 0.2, 1.0], Matrix3::new(0., 0., -1., 0., 1., 0., 1., 0., 0.)),
     ] {
         let body = Cuboid { cells: [3, 4, 5], low: [0.1, 0.7, -3.0], size, density: 7.8e-9 };
@@ -123,7 +123,7 @@ fn bodies_without_mass_or_place_are_refused() {
     let unit = symmetric(2, &[(0, 0, 1.0), (1, 1, 1.0)]);
     let positions = [[0.0; 3], [1.0, 0.0, 0.0]];
     for value in [-1.0, f64::NAN, f64::INFINITY] {
-        // A NaN never equals its own transpose: the mean of both takes it.
+        // A NaN differs from its transpose, so that the symmetric mean is used.
         let triplets = [(0, 0, value), (1, 1, value)];
         let mass = SymmetricMatrix::symmetrised(CscMatrix::from_triplets(2, 2, &triplets));
         let error = choose_frame(&mass, &positions, BodyFrame::Com).expect_err("refused");

@@ -1,4 +1,4 @@
-//! The identities hold for exact bodies, and each of them fails for a body that breaks it.
+//! The identities hold for exact bodies, and each of them fails for a body that violates it.
 
 use super::bodies::{Body, orthonormalised, random_matrix};
 use faer::Mat;
@@ -29,7 +29,7 @@ fn diagonal() -> Mat<f64> {
     Mat::from_fn(5, 5, |p, q| if p == q { EIGENVALUES[p] } else { 0.0 })
 }
 
-/// An exact body: free, mass-normalised shapes in the principal frame.
+/// Returns an exact body: free, mass-normalised shapes in the principal frame.
 fn exact() -> Invariants {
     let body = Body::cuboid(51, 5);
     let frame = choose_frame(&body.scalar_mass, &body.positions, BodyFrame::Principal).expect("a body").0;
@@ -47,7 +47,7 @@ fn exact_bodies_fulfil_every_identity() {
     let checks = identities(&exact(), &expected());
     assert_eq!(failed(&checks), [""; 0]);
     assert_eq!(checks.len(), 21);
-    // Far inside the limits: rounding, nothing else.
+    // Values are far below the limits: rounding only.
     assert!(checks.iter().all(|check| check.value < 1e-13), "{checks:?}");
     for (i, check) in checks.iter().enumerate() {
         assert!(checks[..i].iter().all(|other| other.name != check.name), "{} twice", check.name);
@@ -129,7 +129,7 @@ fn each_identity_fails_for_a_body_that_breaks_it() {
         ("w3_skew", |b| b.primary_mut().s[1][2][(2, 2)] += 1e-9),
         ("w3_bounded", |b| b.primary_mut().s[1][2][(0, 1)] += 1.5),
         ("scalar_gram_psd", |b| {
-            // Each bound holds, together they do not: x and psi_1 are parallel, 1 and psi_1 are not
+            // Each bound holds, but not all together: x and psi_1 are parallel, 1 and psi_1 are not
             // orthogonal.
             b.primary_mut().ibar[0][0][0] = 0.9 * b.second_moment()[(0, 0)].sqrt();
             b.primary_mut().c1[(0, 0)] = 0.9 * b.mass().sqrt();
@@ -180,7 +180,7 @@ fn each_stored_invariant_is_checked_against_its_source() {
         damage(&mut derived);
         assert!(failed(&derived_identities(&exact(), &derived)).contains(name), "{name} passes");
     }
-    // Mode-blocked instead of component-blocked: the classical mistake.
+    // Mode-blocked instead of component-blocked: a common mistake.
     let mut derived = exact().derived();
     let w1 = exact().w1().expect("held");
     derived.w1 = Some(Mat::from_fn(3, 15, |k, column| w1[(k, (column % 3) * 5 + column / 3)]));

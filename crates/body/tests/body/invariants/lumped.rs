@@ -1,4 +1,4 @@
-//! Lumped comparators against reference numbers of other programs and against their definitions.
+//! Lumped comparators compared with reference numbers of other programs and with their definitions.
 
 use super::bodies::{Body, assert_agree};
 use faer::Mat;
@@ -19,7 +19,7 @@ fn matrix(value: &Value) -> Matrix3<f64> {
     Matrix3::from_fn(|k, l| value[k][l].as_f64().expect("number"))
 }
 
-/// Asserts mass, centre of mass and inertia about it; the lumped ones in the frame of the consistent mass.
+/// Asserts mass, centre of mass and inertia about it; lumped values are in the frame of the consistent mass.
 fn assert_rigid(what: &str, model: &Model, masses: Option<&LumpedMasses>, expected: &Value) {
     let (frame, properties) =
         choose_frame(&model.scalar_mass, &model.positions, BodyFrame::Com).expect("a body");
@@ -32,7 +32,7 @@ fn assert_rigid(what: &str, model: &Model, masses: Option<&LumpedMasses>, expect
     let com = body.first_moment() / body.mass();
     let inertia = body.shifted(com).inertia();
     let size = (properties.inertia.trace() / properties.mass).sqrt();
-    // The references are sums over all entries at the model's own origin, without compensation.
+    // The references are sums over all entries about the origin of the model, without compensation.
     assert!((body.mass() / expected["mass"].as_f64().expect("mass") - 1.0).abs() < 1e-13, "{what}: mass");
     assert!((frame.origin + com - vector(&expected["com"])).amax() < 1e-12 * size, "{what}: centre of mass");
     let difference = (inertia - matrix(&expected["inertia_com"])).amax();
@@ -105,7 +105,7 @@ fn both_schemes_keep_the_mass_and_row_sums_the_centre_of_mass() {
         assert!((lumped.mass() / exact.mass() - 1.0).abs() < 1e-14);
     }
     assert!((row_sum.first_moment() - exact.first_moment()).amax() < 1e-15 * exact.mass());
-    // Row sums of a trilinear cuboid: h^2/6 per direction and element row too much.
+    // Row sums of a trilinear cuboid exceed the exact moment by h^2/6 per direction and element row.
     let excess =
         row_sum.second_moment()[(0, 0)] / exact.mass() - exact.second_moment()[(0, 0)] / exact.mass();
     assert!((excess - 0.25f64.powi(2) / 6.0).abs() < 1e-15);

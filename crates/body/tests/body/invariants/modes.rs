@@ -1,4 +1,4 @@
-//! Real bodies with their own modes: norms of the invariants that another program found on another road.
+//! Real bodies with their own modes: norms of the invariants computed independently by another program.
 
 use super::bodies::orthonormalised;
 use faer::Mat;
@@ -12,7 +12,7 @@ use flexbody_linalg::context::Context;
 use flexbody_model::rigid_fields;
 use oracle::models::{self, Model};
 
-/// Modal stiffness, shapes and eigenvalues in the frame of the positions.
+/// Shapes, modal stiffness and eigenvalues in the frame of the positions.
 struct Modes {
     shapes: Mat<f64>,
     stiffness: Mat<f64>,
@@ -44,9 +44,9 @@ fn assert_norms(what: &str, body: &Invariants, reference: &serde_json::Value) {
     let [w1, w2, w3] = [&derived.w1, &derived.w2, &derived.w3].map(|group| group.as_ref().expect("held"));
     let inertia = Mat::from_fn(3, 3, |k, l| derived.inertia[(k, l)]);
     let rotation = body.second_moment().trace().sqrt();
-    // Modes have a residual of 1e-9 and relative gaps of 3 % and more: mode errors of 3e-8. Norms that do not
-    // vanish change by their square, and by what the reference rounds; norms that vanish by symmetry change
-    // by the errors.
+    // Modes have a residual of 1e-9 and relative gaps of at least 3 %: mode errors of 3e-8. Nonzero norms
+    // change by their square and by the rounding of the reference; norms that vanish by symmetry change by
+    // the errors themselves.
     for (name, norm, scale, limit) in [
         ("I0", inertia.norm_l2(), inertia.norm_l2(), 1e-11),
         ("W1", w1.norm_l2(), w1.norm_l2(), 1e-9),
@@ -64,7 +64,7 @@ fn assert_norms(what: &str, body: &Invariants, reference: &serde_json::Value) {
 fn norms_are_those_of_the_reference_program() {
     for model in models::own() {
         let count = model.reference["invariant_norms"]["modes"].as_u64().expect("count") as usize;
-        // Model axes: the modes need no rotation.
+        // In model axes the modes need no rotation.
         let frame = choose_frame(&model.scalar_mass, &model.positions, BodyFrame::Com).expect("a body").0;
         let positions = frame.to_body(&model.positions);
         let modes = modes(&model, &positions, count);

@@ -1,4 +1,4 @@
-//! What a file says of the body.
+//! Conversion of the record groups into a body.
 
 use super::lumped::{Lumped, lumped};
 use super::records::Records;
@@ -12,23 +12,25 @@ use nalgebra::{Matrix3, Vector3};
 /// Groups of the invariants that couple rigid motion and modes.
 pub(crate) const COUPLING: [usize; 5] = [14, 15, 16, 17, 18];
 
-/// A body, and what was found on the way.
+/// A body and its lumped masses.
 pub(crate) struct Read {
     pub(crate) body: ImportedBody,
     pub(crate) lumped: Option<Lumped>,
 }
 
-/// Whether the coupling of the body is taken from lumped masses: as MBDyn does where nothing else is there.
+/// Returns true if the coupling of the body is computed from lumped masses, as MBDyn does if the file has no
+/// coupling groups.
 pub(crate) fn from_masses(records: &Records) -> bool {
     records.has(11) && !COUPLING.iter().any(|group| records.has(*group))
 }
 
-/// Groups of the coupling that are not there.
+/// Returns the missing coupling groups.
 pub(crate) fn missing(records: &Records) -> Vec<String> {
     COUPLING.iter().filter(|group| !records.has(**group)).map(usize::to_string).collect()
 }
 
-/// Mass, centre of mass and inertia come from group 12, or from lumped masses; `None` where both are missing.
+/// Returns the body with mass, centre of mass and inertia from group 12, or from lumped masses; `None` if
+/// both are missing.
 pub(crate) fn body(records: &Records) -> Option<Read> {
     let nf = records.n_modes;
     let square = |values: &[f64]| Mat::from_fn(nf, nf, |i, j| values[i * nf + j]);
@@ -38,7 +40,7 @@ pub(crate) fn body(records: &Records) -> Option<Read> {
         Some(masses) if from_masses(records) => masses.told.clone(),
         _ => file(records, Order::Rows),
     };
-    // MBDyn leaves what group 12 says in its place.
+    // In MBDyn the values of group 12 take precedence.
     match (records.get(12), &lumped) {
         (Some(values), _) => rigid(&mut inertia, values),
         (None, Some(masses)) => {
@@ -74,16 +76,16 @@ pub(crate) fn body(records: &Records) -> Option<Read> {
     Some(Read { body, lumped })
 }
 
-/// Order of the entries of the matrices of three rows in groups 14 to 18.
+/// Storage order of the three-row matrices in groups 14 to 18.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {
-    /// As MBDyn reads them.
+    /// Row by row, as MBDyn reads them.
     Rows,
-    /// As its manual says.
+    /// Column by column, as the manual of MBDyn describes.
     Columns,
 }
 
-/// Groups 14 to 18 as they stand in the file.
+/// Returns groups 14 to 18 of the file.
 fn file(records: &Records, order: Order) -> Numbered {
     let nf = records.n_modes;
     let at = |group: usize, a: usize, column: usize| {
@@ -95,7 +97,7 @@ fn file(records: &Records, order: Order) -> Numbered {
     };
     let i9 = |row: usize, column: usize| at(18, row / nf, 3 * (row % nf * nf + column % nf) + column / nf);
     let i5 = |row: usize, k: usize| at(17, row / nf, row % nf * nf + k);
-    // Large arrays are made only where the file has them.
+    // Large arrays are allocated only if the file has them.
     Numbered {
         i1: 0.0,
         i2: Vector3::zeros(),
@@ -110,12 +112,12 @@ fn file(records: &Records, order: Order) -> Numbered {
     }
 }
 
-/// The invariants that the file would tell in the order of columns, beside the same mass and modal mass.
+/// Returns the invariants of the file in column order, with the same mass and modal mass.
 pub(crate) fn by_columns(records: &Records, told: &Numbered) -> Numbered {
     Numbered { i1: told.i1, i2: told.i2, i6: told.i6.clone(), i7: told.i7, ..file(records, Order::Columns) }
 }
 
-/// Mass, centre of mass, inertia about it.
+/// Sets mass, first moment and inertia about the origin from mass, centre of mass and inertia about it.
 fn rigid(told: &mut Numbered, values: &[f64]) {
     let center = Vector3::new(values[1], values[2], values[3]);
     told.i1 = values[0];
@@ -134,12 +136,12 @@ fn frame(records: &Records, node: usize, turns: bool, named: &[String]) -> Impor
         interface: is_interface.then(|| label.clone()),
         position: records.position(node),
         translation: rows(0),
-        // Nodes of solids have zeros.
+        // Nodes of solid elements have zero rotations.
         rotation: turns.then(|| rows(3)),
     }
 }
 
-/// Group 19, and the labels of the nodes that its forces act at.
+/// Returns group 19 and the labels of the nodes at which its forces act.
 fn stiffening(
     records: &Records,
     lacks: &mut Vec<String>,

@@ -1,22 +1,21 @@
-//! The invariants that MBDyn itself makes of lumped masses (record group 11), in Modal.cc: sums over the
-//! nodes.
+//! Invariants that MBDyn computes from lumped masses (record group 11) in Modal.cc, as sums over the nodes.
 
 use super::records::Records;
 use faer::Mat;
 use flexbody_body::invariants::{Numbered, TermGroups};
 use nalgebra::{Matrix3, Vector3};
 
-/// Masses and inertias of the nodes, and what follows from them.
+/// Invariants of the lumped masses of the nodes, and their negative masses.
 pub(crate) struct Lumped {
-    /// I1 to I9 about the origin; I6 is the modal mass of the lumped masses.
+    /// Invariants I1 to I9 about the origin; I6 is the modal mass of the lumped masses.
     pub(crate) told: Numbered,
-    /// Nodes with a mass below zero.
+    /// Number of nodes with a negative mass.
     pub(crate) negative: usize,
-    /// Sum of the magnitudes of negative masses over that of all.
+    /// Sum of the magnitudes of negative masses divided by the sum of all magnitudes.
     pub(crate) negative_share: f64,
 }
 
-/// What a file of record groups 8 and 11 says.
+/// Returns the lumped masses of record groups 8 and 11; `None` without group 11.
 pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
     let diagonal = records.get(11)?;
     let (n, nf) = (records.n_nodes, records.n_modes);
@@ -34,6 +33,7 @@ pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
     };
     let (mut i5, mut i9) = (Mat::zeros(3 * nf, nf), Mat::zeros(3 * nf, 3 * nf));
     let (mut negative, mut below, mut all) = (0, 0.0, 0.0);
+    // Sums over the nodes with mass m, inertia J about the node, position x, shape psi and rotation theta.
     for node in 0..n {
         let [mass, _, _, jx, jy, jz] = *diagonal[6 * node..].first_chunk::<6>().expect("six per node");
         let x = Vector3::from(records.position(node));
@@ -42,10 +42,12 @@ pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
         negative += usize::from(mass < 0.0);
         below += (-mass).max(0.0);
         all += mass.abs();
+        // Rigid body: sum m, sum m x, sum J - m x~ x~.
         told.i1 += mass;
         told.i2 += x * mass;
         told.i7 += inertia - x.cross_matrix() * x.cross_matrix() * mass;
         for j in 0..nf {
+            // Linear in a mode: sum m psi, sum m x~ psi + J theta, -sum m x~ psi~.
             let (psi, turn) = (shape(0, j), shape(3, j));
             let coupled = x.cross(&psi) * mass + inertia * turn;
             for a in 0..3 {
@@ -54,6 +56,8 @@ pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
             }
             told.i8[j] -= x.cross_matrix() * psi.cross_matrix() * mass;
             for k in 0..nf {
+                // Quadratic: sum m psi_j . psi_k + theta_j . J theta_k, sum m psi_j x psi_k, sum m psi_j~
+                // psi_k~.
                 let other = shape(0, k);
                 told.i6[(j, k)] += psi.dot(&other) * mass + turn.dot(&(inertia * shape(3, k)));
                 let (cross, double) = (psi.cross(&other), psi.cross_matrix() * other.cross_matrix());

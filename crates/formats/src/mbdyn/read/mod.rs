@@ -1,4 +1,4 @@
-//! The `.fem` file as record groups, and the body that they describe.
+//! Record groups of the `.fem` file, and the body that they describe.
 
 pub(super) mod body;
 mod lumped;

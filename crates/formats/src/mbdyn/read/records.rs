@@ -1,5 +1,5 @@
-//! The record groups of a file, read as MBDyn does: of each group as many numbers as the header says. What
-//! stands after them MBDyn skips without a word; here it is told.
+//! Record groups of a file, read like MBDyn: for each group the count of numbers given by the header. MBDyn
+//! silently skips further text after the numbers; this reader records it.
 
 use super::words::{GROUP, Surplus, Words};
 use crate::import::digits::Digits;
@@ -9,32 +9,32 @@ use std::collections::BTreeMap;
 
 /// Beginning of the last line.
 const END: &str = "** END OF FILE";
-/// Beginning of the comment of flexbody's own files about a mass that does not commute with rotations.
+/// Beginning of the comment in files of flexbody for a mass that does not commute with rotations.
 const GENERAL_MASS: &str = "** GENERAL MASS";
 
-/// Groups without which MBDyn reads no file.
+/// Groups required by MBDyn.
 const REQUIRED: [usize; 8] = [1, 2, 5, 6, 7, 8, 9, 10];
 
 /// Contents of a file.
 #[derive(Default)]
 pub(crate) struct Records {
-    /// The word before the counts, which MBDyn ignores.
+    /// Word before the counts; MBDyn ignores it.
     pub(crate) revision: String,
     pub(crate) n_nodes: usize,
     pub(crate) n_modes: usize,
     pub(crate) labels: Vec<String>,
-    /// Shapes, six numbers for each node of each mode.
+    /// Shapes: six numbers for each node of each mode.
     pub(crate) shapes: Vec<f64>,
-    /// Numbers of the groups that hold nothing else, in the order of the file.
+    /// Numbers of the groups without special structure, by group.
     numbers: BTreeMap<usize, Vec<f64>>,
     /// Index and matrix of group 19.
     pub(crate) stiffening: Vec<(usize, Vec<f64>)>,
-    /// Whether the file says that record groups 9 and 18 need not agree.
+    /// True if the file states that record groups 9 and 18 need not agree.
     pub(crate) general: bool,
-    /// Whether the line that ends a file is there.
+    /// True if the last line of the file is present.
     pub(crate) ended: bool,
     pub(crate) digits: Digits,
-    /// What MBDyn skips, and the record group before it; none before the first.
+    /// Text that MBDyn skips, with the preceding record group; `None` before the first group.
     pub(crate) skipped: Vec<(Option<usize>, Surplus)>,
 }
 
@@ -73,7 +73,7 @@ impl Records {
         Ok(records)
     }
 
-    /// Takes a line between record groups, the last of which is `group`.
+    /// Processes a line between record groups; `group` is the previous group.
     fn comment(&mut self, line: usize, text: &str, group: Option<usize>) {
         self.ended = text.starts_with(END);
         self.general |= text.starts_with(GENERAL_MASS);
@@ -82,7 +82,7 @@ impl Records {
         }
     }
 
-    /// Takes note of words where none are expected.
+    /// Records words at a place where none are expected.
     fn skip(&mut self, group: Option<usize>, surplus: Surplus) {
         if surplus.words == 0 {
             return;
@@ -96,7 +96,7 @@ impl Records {
         }
     }
 
-    /// Record group 1; gives the number of rejected modes, whose shapes come first.
+    /// Reads record group 1. Returns the number of rejected modes, whose shapes come first.
     fn header(&mut self, words: &mut Words<'_>) -> Result<usize> {
         const WHAT: &str = "record group 1";
         words.take_line();
@@ -153,7 +153,7 @@ impl Records {
                 self.numbers.insert(group, values);
             }
         }
-        // Coordinates are short where the model is, and initial values.
+        // Coordinates and initial values may have few digits on purpose, so that their digits do not count.
         if matches!(group, 2..=7) {
             words.digits = before;
         }
@@ -176,33 +176,34 @@ impl Records {
         Ok(())
     }
 
-    /// Half a unit of the last digit of a number of size one, as far as the file shows it.
+    /// Returns half a unit of the last digit of a number of size one; 0 if the file has too few numbers to
+    /// tell.
     pub(crate) fn rounding(&self) -> f64 {
         if self.digits.are_few() { 0.0 } else { self.digits.rounding(1.0) }
     }
 
-    /// Numbers of a group.
+    /// Returns the numbers of a group.
     pub(crate) fn get(&self, group: usize) -> Option<&[f64]> {
         self.numbers.get(&group).map(Vec::as_slice)
     }
 
-    /// Whether the group is there.
+    /// Returns true if the group is present.
     pub(crate) fn has(&self, group: usize) -> bool {
         self.numbers.contains_key(&group) || group == 19 && !self.stiffening.is_empty()
     }
 
-    /// Component of a shape: 0 to 2 translation, 3 to 5 rotation.
+    /// Returns a component of a shape: 0 to 2 translation, 3 to 5 rotation.
     pub(crate) fn shape(&self, node: usize, component: usize, mode: usize) -> f64 {
         self.shapes[(mode * self.n_nodes + node) * 6 + component]
     }
 
-    /// Position of a node; groups 5 to 7 are required.
+    /// Returns the position of a node; groups 5 to 7 are required.
     pub(crate) fn position(&self, node: usize) -> [f64; 3] {
         [5, 6, 7].map(|group| self.get(group).map_or(f64::NAN, |values| values[node]))
     }
 }
 
-/// The number in the title of a record group, where it may stand after those that were `seen`.
+/// Returns the number in the title of a record group, after checking that it may follow the groups in `seen`.
 fn group_number(title: &str, seen: &[usize]) -> std::result::Result<usize, String> {
     let digits = title.trim_start();
     let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());

@@ -1,4 +1,4 @@
-//! Lines and blank-separated words of a file, with their places.
+//! Lines and blank-separated words of a file with their positions.
 
 use crate::import::digits::Digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -8,15 +8,15 @@ use std::path::Path;
 /// First words of a record group.
 pub(crate) const GROUP: &str = "** RECORD GROUP ";
 
-/// A place in the text.
+/// Reading position in the text.
 pub(crate) struct Words<'t> {
     path: &'t Path,
     lines: Vec<&'t str>,
-    /// Index of the line that is read.
+    /// Index of the current line.
     line: usize,
-    /// The rest of the line that is read.
+    /// Rest of the current line.
     rest: &'t str,
-    /// Digits of the numbers of record groups that no program writes short on purpose.
+    /// Number format of the record groups that no program writes with few digits on purpose.
     pub(crate) digits: Digits,
 }
 
@@ -27,7 +27,7 @@ impl<'t> Words<'t> {
         Self { path, lines, line: 0, rest, digits: Digits::default() }
     }
 
-    /// Number of the line that is read, from 1.
+    /// Returns the number of the current line, from 1.
     pub(crate) fn at(&self) -> usize {
         self.line + 1
     }
@@ -44,7 +44,7 @@ impl<'t> Words<'t> {
         Diagnostic::new(Code::ForeignIncomplete, what).in_file(self.path).into()
     }
 
-    /// What is left of the line, and on to the next one.
+    /// Returns the rest of the line and advances to the next line.
     pub(crate) fn take_line(&mut self) -> Option<&'t str> {
         if self.line >= self.lines.len() {
             return None;
@@ -55,7 +55,7 @@ impl<'t> Words<'t> {
         Some(rest)
     }
 
-    /// The next word, wherever it stands.
+    /// Returns the next word, on this line or a later one.
     pub(crate) fn word(&mut self) -> Option<&'t str> {
         loop {
             let rest = self.rest.trim_start();
@@ -69,7 +69,7 @@ impl<'t> Words<'t> {
         }
     }
 
-    /// The next word of a record that is not complete yet.
+    /// Returns the next word of an incomplete record; an error at the end of the record group.
     pub(crate) fn expect(&mut self, what: &str) -> Result<&'t str> {
         match self.word() {
             Some(word) if word.starts_with("**") => {
@@ -83,7 +83,8 @@ impl<'t> Words<'t> {
         }
     }
 
-    /// The next number. One that touches the next, as fields of Fortran do, ends where that begins.
+    /// Returns the next number. Adjacent Fortran fields without a blank are separated where the next number
+    /// begins.
     pub(crate) fn number(&mut self, what: &str) -> Result<f64> {
         let word = self.expect(what)?;
         let (word, touching) = word.split_at(end_of_number(word));
@@ -94,7 +95,7 @@ impl<'t> Words<'t> {
             )));
         }
         if !touching.is_empty() {
-            // What was taken ends where the rest of the line begins.
+            // The rest of the line begins after the number.
             let line = self.lines[self.line];
             self.rest = &line[line.len() - self.rest.len() - touching.len()..];
         }
@@ -107,7 +108,8 @@ impl<'t> Words<'t> {
         }
     }
 
-    /// `count` numbers, as far as the file has them: what a header promises is not believed.
+    /// Returns `count` numbers. The memory grows with the numbers in the file, because the count in a header
+    /// may be wrong.
     pub(crate) fn numbers(&mut self, count: usize, what: &str) -> Result<Vec<f64>> {
         let mut values = Vec::new();
         while values.len() < count {
@@ -116,13 +118,14 @@ impl<'t> Words<'t> {
         Ok(values)
     }
 
-    /// A whole number that is not negative.
+    /// Returns an integer that is not negative.
     pub(crate) fn count(&mut self, what: &str) -> Result<usize> {
         let word = self.expect(what)?;
         word.parse().map_err(|_| self.refuse(format!("{what}: {word:?} is no count")))
     }
 
-    /// What stands up to the next comment, which is not taken: nothing, of a record group that is over.
+    /// Returns the words up to the next comment, which is not consumed; none are expected after a complete
+    /// record group.
     pub(crate) fn surplus(&mut self) -> Surplus {
         let mut found = Surplus::of(self.at(), "");
         while self.line < self.lines.len() && !self.rest.trim_start().starts_with("**") {
@@ -132,14 +135,14 @@ impl<'t> Words<'t> {
         found
     }
 
-    /// Words where none are expected, up to the end of the line.
+    /// Returns the words up to the end of the line where none are expected.
     pub(crate) fn surplus_of_line(&mut self) -> Surplus {
         let line = self.at();
         Surplus::of(line, self.take_line().unwrap_or(""))
     }
 
-    /// Takes the title of a mode: a comment, or a blank line where the numbers follow. Gives the line where
-    /// it should be.
+    /// Consumes the title of a mode: a comment, or a blank line before the numbers. The error is the line
+    /// where the title should be.
     pub(crate) fn take_title(&mut self) -> std::result::Result<(), usize> {
         let first = self.at();
         while self.rest.trim().is_empty() && self.line < self.lines.len() {
@@ -153,20 +156,20 @@ impl<'t> Words<'t> {
     }
 }
 
-/// Words where none are expected.
+/// Words at a place where none are expected.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Surplus {
-    /// Line of the first.
+    /// Line of the first word.
     pub(crate) line: usize,
     pub(crate) words: usize,
-    /// Whether all of the words are zeros.
+    /// True if all of the words are zeros.
     pub(crate) zero: bool,
-    /// Whether all of the words are numbers.
+    /// True if all of the words are numbers.
     pub(crate) numbers: bool,
 }
 
 impl Surplus {
-    /// The words of a line.
+    /// Returns the words of a line.
     pub(crate) fn of(line: usize, text: &str) -> Self {
         let mut found = Self { line, words: 0, zero: true, numbers: true };
         found.see(line, text);
@@ -186,8 +189,8 @@ impl Surplus {
     }
 }
 
-/// Bytes of the number that a word begins with: up to a sign that neither begins it nor follows the letter of
-/// an exponent.
+/// Returns the length in bytes of the number at the beginning of a word: up to a sign that is neither the
+/// first character nor follows the letter of an exponent.
 fn end_of_number(word: &str) -> usize {
     let bytes = word.as_bytes();
     let is_next = |&at: &usize| matches!(bytes[at], b'+' | b'-') && !matches!(bytes[at - 1], b'e' | b'E');

@@ -1,14 +1,15 @@
-//! Digits that were lost in writing.
+//! Check of the digits that were lost in writing.
 
 use crate::import::AuditCheck;
 use crate::sid::read::arrays::{Array, Arrays, FrameArrays};
 use crate::sid::read::parse::Listed;
 use flexbody_base::diagnostic::Code;
 
-/// Digits that a number may lack, relative to the largest of its array.
+/// Largest relative rounding of an array that is not reported as lost digits. A larger value accepts files
+/// with fewer digits.
 const LOST: f64 = 1e-8;
 
-/// The constant (order 0) or linear (order 1) part of an array: half a unit of its last digit beside its
+/// Constant (order 0) or linear (order 1) part of an array, with half a unit of its last digit and its
 /// largest number.
 struct Part {
     array: &'static str,
@@ -23,7 +24,7 @@ impl Part {
     }
 }
 
-/// The part of all arrays that has lost most.
+/// Returns the check of the part with the largest loss of digits.
 pub(super) fn digits(listed: &Listed<'_>, arrays: &Arrays, frames: &[FrameArrays]) -> AuditCheck {
     let mut parts = parts_of_body(arrays);
     parts.extend(parts_of_frames(frames));
@@ -63,7 +64,7 @@ fn parts_of_body(arrays: &Arrays) -> Vec<Part> {
     named.into_iter().flat_map(both_orders).collect()
 }
 
-/// The constant parts of the arrays of frames, each the worst of all frames.
+/// Returns the constant parts of the arrays of frames, each from the frame with the largest loss.
 fn parts_of_frames(frames: &[FrameArrays]) -> [Part; 3] {
     type Chosen = fn(&FrameArrays) -> Option<&Array>;
     let named: [(&'static str, Chosen); 3] = [

@@ -1,4 +1,4 @@
-//! What the arrays of the frames say of each other.
+//! Identities between the arrays of the frames.
 
 use super::missed::{Missed, largest_entry};
 use crate::import::AuditCheck;
@@ -8,7 +8,7 @@ use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
 use nalgebra::{Matrix3, Vector3};
 
-/// The checks of the frames; none of a file that has none and states none.
+/// Returns the checks of the frames; empty for a file that has no frames and states none.
 pub(super) fn frame_checks(listed: &Listed<'_>, frames: &[FrameArrays]) -> Vec<AuditCheck> {
     if frames.is_empty() && listed.stated_frames.unwrap_or(0) == 0 {
         return Vec::new();
@@ -60,7 +60,7 @@ fn number_of_frames(listed: &Listed<'_>, frames: &[FrameArrays]) -> AuditCheck {
     }
 }
 
-/// An identity of all frames: the worst of them, and the label of that frame.
+/// Worst value of an identity over all frames, with the label of that frame.
 struct WorstFrame<'l> {
     missed: Missed,
     label: Option<&'l str>,
@@ -90,7 +90,7 @@ impl WorstFrame<'_> {
     }
 }
 
-/// origin.M1 against phi.
+/// Returns the difference of origin.M1 and phi.
 fn origin_missed(frame: &FrameArrays, nq: usize) -> Missed {
     Missed {
         by: largest_entry(3, nq, |a, k| frame.origin.linear(k, a, 0) - frame.phi.m0[(a, k)]),
@@ -99,7 +99,7 @@ fn origin_missed(frame: &FrameArrays, nq: usize) -> Missed {
     }
 }
 
-/// AP.M1 against the skew matrices of psi.
+/// Returns the difference of AP.M1 and the skew matrices of psi; `None` if the frame lacks one of them.
 fn axes_missed(frame: &FrameArrays, nq: usize) -> Option<Missed> {
     let (psi, ap) = (frame.psi.as_ref()?, frame.ap.as_ref()?);
     let missed_by_mode = |k: usize| {
@@ -113,7 +113,7 @@ fn axes_missed(frame: &FrameArrays, nq: usize) -> Option<Missed> {
     })
 }
 
-/// M1 of phi or psi against itself with its modes exchanged; `None` where there is none.
+/// Returns the asymmetry of M1 of phi or psi in its modes; `None` without M1.
 fn symmetry_missed(array: &Array, nq: usize) -> Option<Missed> {
     array.m1.as_ref()?;
     let missed_along = |a: usize| largest_entry(nq, nq, |k, l| array.linear(l, a, k) - array.linear(k, a, l));
@@ -124,8 +124,7 @@ fn symmetry_missed(array: &Array, nq: usize) -> Option<Missed> {
     })
 }
 
-/// The undeformed axes of every frame. Those of the body have no other, so that a mirrored frame is one of
-/// another body.
+/// Checks that the undeformed axes of every frame are a rotation. A mirrored frame belongs to another body.
 fn undeformed_axes(listed: &Listed<'_>, frames: &[FrameArrays]) -> AuditCheck {
     let (mut total, mut what) = (Missed { by: 0.0, scale: 1.0, rounding: 0.0 }, String::new());
     for (frame, listed) in frames.iter().zip(&listed.frames) {

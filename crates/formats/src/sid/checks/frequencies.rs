@@ -1,4 +1,4 @@
-//! Frequencies in the texts of the modes, beside those of the matrices.
+//! Comparison of the frequencies in the texts of the modes with those of the matrices.
 
 use crate::import::AuditCheck;
 use crate::sid::read::arrays::Arrays;
@@ -6,14 +6,16 @@ use crate::sid::read::parse::Listed;
 use flexbody_base::diagnostic::Code;
 use std::f64::consts::TAU;
 
-/// Frequencies in texts are often those of the model before its reduction.
+/// Relative tolerance of frequencies in texts, which are often those of the model before its reduction. A
+/// smaller value reports the error of the reduction.
 const FREQUENCY: f64 = 0.01;
 
-/// Entries of Ke beside the diagonal, relative to it, with which the diagonal still gives frequencies.
+/// Largest entries of Ke off the diagonal, relative to the diagonal, for which the diagonal gives the
+/// frequencies.
 const DIAGONAL: f64 = 1e-6;
 
-/// The frequency of a text such as `Eigen Mode 1 : 9.089 Hz` in the unit of the text, half a unit of its last
-/// digit, and whether it is in radians.
+/// Returns the frequency in a text such as `Eigen Mode 1 : 9.089 Hz` in the unit of the text, half a unit of
+/// its last digit, and true if the unit is radians.
 fn frequency_of(text: &str) -> Option<(f64, f64, bool)> {
     let words: Vec<&str> =
         text.split([' ', '\t', ':', '=', ',', ';']).filter(|word| !word.is_empty()).collect();
@@ -31,8 +33,8 @@ fn frequency_of(text: &str) -> Option<(f64, f64, bool)> {
     })
 }
 
-/// The text that is farthest off; `None` where no mode has a frequency in its text, or modes are coupled by
-/// Ke.
+/// Returns the check of the text with the largest difference; `None` if no text has a frequency or the modes
+/// are coupled by Ke.
 pub(crate) fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditCheck> {
     let (ke, me, nq) = (&arrays.ke.m0, &arrays.me.m0, arrays.nq);
     let coupled = (0..nq).any(|i| {
@@ -41,7 +43,8 @@ pub(crate) fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditC
     if coupled {
         return None;
     }
-    // Mode, what the text says beside what the matrices say, and by how much more than its digits it differs.
+    // Compared values: mode, frequency of the text, frequency of the matrices, and the relative difference
+    // beyond the digits of the text.
     let compared = |&(mode, text): &(usize, &str)| {
         let (said, half, radians) = frequency_of(text)?;
         let lambda = (mode < nq).then(|| ke[(mode, mode)] / me[(mode, mode)])?;

@@ -1,17 +1,18 @@
-//! By how much an identity between arrays is missed, beside what the digits of the file allow.
+//! Violation of an identity between arrays, compared with the digits of the file.
 
 use crate::import::AuditCheck;
 use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
 
-/// What identities may be missed by, relative to the Cauchy-Schwarz bounds of their arrays, beside the digits
-/// of the file: sums over the nodes of a large model in double precision.
+/// Violation of identities allowed beyond the digits of the file, relative to the Cauchy-Schwarz bounds of
+/// their arrays: the rounding of sums over the nodes of a large model in double precision.
 const ROUNDING: f64 = 1e-10;
 
-/// Roundings of the last digit that one identity may add up.
+/// Number of last-digit roundings that one identity may accumulate. A smaller value reports rounding as
+/// contradictions.
 const TERMS: f64 = 10.0;
 
-/// One identity: by how much it is missed, the size of its terms, and half units of their last digits.
+/// Violation of an identity, with the scale of its terms and half a unit of their last digits.
 pub(super) struct Missed {
     pub by: f64,
     pub scale: f64,
@@ -36,8 +37,8 @@ impl Missed {
     }
 }
 
-/// The largest magnitude of `entry` over all rows and columns. A NaN, from numbers beyond the range of double
-/// precision, passes nothing.
+/// Returns the largest magnitude of `entry` over all rows and columns. A NaN, from numbers beyond double
+/// precision, is returned as NaN and fails every check.
 pub(super) fn largest_entry(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> f64 {
     let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
     places.map(|(i, j)| entry(i, j).abs()).fold(0.0, larger)

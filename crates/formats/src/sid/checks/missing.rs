@@ -1,4 +1,4 @@
-//! Arrays that are zero although others say that they must not be.
+//! Detection of arrays that are zero although other arrays require them.
 
 use super::missed::largest_entry;
 use crate::import::AuditCheck;
@@ -8,10 +8,11 @@ use crate::sid::read::layout::Layout;
 use flexbody_base::diagnostic::Code;
 use nalgebra::Matrix3;
 
-/// Below this part of its bound an array is zero but for rounding.
+/// Largest part of its bound for which an array counts as zero. A larger value reports small arrays as
+/// missing.
 const NOTHING: f64 = 1e-9;
 
-/// Arrays that are not there, and the contradiction in words.
+/// Missing arrays, and the contradictions in words.
 pub(crate) struct Missing {
     arrays: Vec<&'static str>,
     why: Vec<String>,
@@ -22,7 +23,7 @@ struct Sizes {
     mdcm1: f64,
     ct0: f64,
     cr0: f64,
-    /// All of Cr1, and what is skew in the modes.
+    /// All of Cr1, and its part that is skew in the modes.
     cr1: [f64; 2],
     j1: f64,
     gr0: f64,
@@ -55,14 +56,15 @@ impl Sizes {
         }
     }
 
-    /// Whether the modes move no centre of mass, as free modes do, of which Cr0 is zero too.
+    /// Returns true if the modes move neither the centre of mass nor the angular momentum, like free modes,
+    /// for which Cr0 is zero.
     fn are_free(&self, arrays: &Arrays) -> bool {
         let [bound_t, bound_r, _] = arrays.bounds();
         self.ct0.max(self.mdcm1) <= NOTHING * bound_t && self.cr0 <= NOTHING * bound_r
     }
 }
 
-/// Whether Cr0 is zero as of free modes, so that a skew part of Gr is a fault of Gr.
+/// Returns true if Cr0 is zero like for free modes, so that a skew part of Gr is an error of Gr.
 pub(crate) fn is_free(arrays: &Arrays, layout: &Layout) -> bool {
     Sizes::of(arrays, layout).are_free(arrays)
 }
@@ -104,7 +106,7 @@ impl Missing {
         }
     }
 
-    /// Whether none of the arrays `names` is missing.
+    /// Returns true if none of the arrays `names` is missing.
     pub(crate) fn none_of(&self, names: &[&str]) -> bool {
         names.iter().all(|name| !self.arrays.contains(name))
     }

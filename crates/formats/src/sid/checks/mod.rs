@@ -1,4 +1,4 @@
-//! What the redundant arrays of a SID file must fulfil.
+//! Checks of the redundant arrays of a SID file.
 
 mod digits;
 mod frames;

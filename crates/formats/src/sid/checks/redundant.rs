@@ -1,4 +1,4 @@
-//! What the redundant arrays of the body must fulfil.
+//! Identities between redundant arrays of the body.
 
 use super::digits::digits;
 use super::frames::frame_checks;
@@ -13,15 +13,15 @@ use crate::sid::read::parse::Listed;
 use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
 
-/// The checks of a file, and what they say of its Oe1.
+/// Checks of a file, and their conclusion about Oe1.
 pub(crate) struct RedundancyChecks {
     pub(crate) checks: Vec<AuditCheck>,
-    /// Whether Oe1 holds more than Me does: geometric stiffness for spin, or inertia that does not belong to
-    /// Me.
+    /// True if Oe1 holds more than Me implies: geometric stiffness for spin, or inertia that does not belong
+    /// to Me.
     pub(crate) spin_in_oe: bool,
 }
 
-/// Holds the arrays of a file to each other. The checks stand in the order of a report.
+/// Compares the arrays of a file with each other. The checks are in the order of a report.
 pub(crate) fn checks(
     listed: &Listed<'_>,
     arrays: &Arrays,
@@ -47,8 +47,7 @@ pub(crate) fn checks(
     RedundancyChecks { checks: all, spin_in_oe: centrifugal.spin_in_oe }
 }
 
-/// The arrays of the body, how they are to be read, and which of them are not there: identities of those are
-/// left out.
+/// Arrays of the body, their layout and the missing arrays. Identities of missing arrays are skipped.
 struct Identities<'a> {
     arrays: &'a Arrays,
     layout: &'a Layout,
@@ -56,16 +55,16 @@ struct Identities<'a> {
     missing: Missing,
 }
 
-/// The checks of Oe1, and what they say of the masses behind the arrays.
+/// Checks of Oe1, and their conclusion about the masses behind the arrays.
 struct LinearCentrifugal {
     checks: Vec<AuditCheck>,
-    /// Whether Oe1 belongs to another mass than Me, where it should not.
+    /// True if Oe1 belongs to another mass than Me although it should not.
     two_masses: bool,
     spin_in_oe: bool,
 }
 
 impl Identities<'_> {
-    /// mdCM1 against Ct0.
+    /// Compares mdCM1 with Ct0.
     fn first_moment(&self) -> Option<AuditCheck> {
         if !self.missing.none_of(&["mdCM1", "Ct"]) {
             return None;
@@ -85,7 +84,7 @@ impl Identities<'_> {
         ))
     }
 
-    /// The symmetric part of Gr against J1.
+    /// Compares the symmetric part of Gr with J1.
     fn gyroscopic_symmetric(&self) -> Option<AuditCheck> {
         if !self.missing.none_of(&["Gr", "J1"]) {
             return None;
@@ -106,7 +105,8 @@ impl Identities<'_> {
         ))
     }
 
-    /// The skew part of Gr against Cr0. Where Oe1 does not belong to Me either, the two come from two masses.
+    /// Compares the skew part of Gr with Cr0. If Oe1 does not belong to Me either, the two arrays come from
+    /// different masses.
     fn gyroscopic_skew(&self, two_masses: bool) -> Option<AuditCheck> {
         if !self.missing.none_of(&["Gr", "Cr0"]) {
             return None;
@@ -138,7 +138,7 @@ impl Identities<'_> {
         Some(missed.check("gr_skew_is_cr0", "skew(Gr_k) = -(Cr0_k)~", code, meaning))
     }
 
-    /// Ge against Cr1.
+    /// Compares Ge with Cr1.
     fn coriolis(&self) -> Option<AuditCheck> {
         if !self.missing.none_of(&["Ge", "Cr1"]) {
             return None;
@@ -166,12 +166,12 @@ impl Identities<'_> {
         }
     }
 
-    /// Gr and Ge in the order that the dialect has.
+    /// Compares the column orders of Gr and Ge with those of the dialect.
     fn layouts(&self) -> Vec<AuditCheck> {
         let (arrays, own) = (self.arrays, self.layout);
         let (why, gr, ge) = match own.declared {
             Some((name, gr, ge)) => (format!("the dialect is {name}"), gr, ge),
-            // No dialect has Gr by components and Ge by modes; with every other order there is one.
+            // No dialect has Gr by components and Ge by modes; every other combination belongs to a dialect.
             None if own.gr == Blocks::Component => ("Gr is component-blocked".to_owned(), own.gr, own.gr),
             None => return Vec::new(),
         };
@@ -180,7 +180,7 @@ impl Identities<'_> {
         };
         let [_, bound, _] = arrays.bounds();
         let [even, odd] = gr.gr_misfit(arrays);
-        // Where neither order fits, that is another finding.
+        // If neither order fits, the mismatch is another finding.
         let gr_by = if gr == own.gr { 0.0 } else { even.max(odd) };
         let ge_by = if ge == own.ge { 0.0 } else { ge.ge_misfit(arrays) };
         let gr_scale = scale(bound, &[arrays.gr.sizes()[0]]);
@@ -200,7 +200,7 @@ impl Identities<'_> {
         ]
     }
 
-    /// Oe0 against J1, and whether its last two columns are exchanged.
+    /// Compares Oe0 with J1, and detects exchanged last two columns.
     fn constant_centrifugal(&self) -> Vec<AuditCheck> {
         if !self.missing.none_of(&["Oe0", "J1"]) {
             return Vec::new();
@@ -227,7 +227,7 @@ impl Identities<'_> {
         vec![identity, order]
     }
 
-    /// max |Oe0 - what J1 makes it|, with the last two columns `exchanged` or as they are.
+    /// Returns the largest |Oe0 + J1 terms|, with the last two columns `exchanged` or in their given order.
     fn oe0_misfit(&self, exchanged: bool) -> f64 {
         largest_entry(self.arrays.nq, 6, |k, column| {
             let (a, b) = PAIRS[if exchanged && column > 3 { 9 - column } else { column }];
@@ -236,7 +236,7 @@ impl Identities<'_> {
         })
     }
 
-    /// Oe1: that it is symmetric, and against Me.
+    /// Checks that Oe1 is symmetric and agrees with Me.
     fn linear_centrifugal(&self) -> LinearCentrifugal {
         let stiffened = self.declared.stiffened == Some(true);
         let mut found = LinearCentrifugal { checks: Vec::new(), two_masses: false, spin_in_oe: stiffened };
@@ -257,7 +257,7 @@ impl Identities<'_> {
             let trace = trace(self.arrays, scale);
             let general = self.declared.general;
             found.spin_in_oe |= !(trace.passed() || general);
-            // Where the file says that there is more in Oe1, nothing has to fit.
+            // The trace need not agree if the file declares further contents of Oe1.
             if !(stiffened || general) {
                 found.two_masses = !trace.passed();
                 found.checks.push(trace);
@@ -266,7 +266,7 @@ impl Identities<'_> {
         found
     }
 
-    /// Ct1, where there is such.
+    /// Checks the symmetry of Ct1; `None` if the file has no Ct1.
     fn acceleration_stiffness(&self) -> Option<AuditCheck> {
         let ct = &self.arrays.ct;
         ct.m1.as_ref()?;
@@ -291,13 +291,13 @@ impl Identities<'_> {
     }
 }
 
-/// The size of what an identity compares: the bound that the mass sets, or what stands in the file where that
-/// is larger.
+/// Returns the scale of an identity: the bound set by the mass, or the largest entry of the arrays if that is
+/// larger.
 fn scale(bound: f64, sizes: &[f64]) -> f64 {
     sizes.iter().fold(bound.max(0.0), |most, size| most.max(*size))
 }
 
-/// M1 symmetric in its row and its mode.
+/// Checks that M1 is symmetric in its row and mode indices.
 fn symmetric_in_modes(
     array: &Array,
     scale: f64,
@@ -312,7 +312,7 @@ fn symmetric_in_modes(
     Missed { by, scale, rounding: 2.0 * array.rounding[1] }.check(name, formula, Code::AuditIdentity, meaning)
 }
 
-/// Oe1 against Me.
+/// Compares the trace of Oe1 with Me.
 fn trace(arrays: &Arrays, scale: f64) -> AuditCheck {
     let nq = arrays.nq;
     let sum = |k: usize, l: usize| (0..3).map(|c| arrays.oe.linear(l, k, c)).sum::<f64>();

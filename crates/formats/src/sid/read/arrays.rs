@@ -1,4 +1,4 @@
-//! The arrays of the body, dense, and how exactly they are written.
+//! Dense arrays of the body, with the rounding of their numbers.
 
 use super::parse::{Listed, ListedFrame};
 use super::taylor::Taylor;
@@ -6,10 +6,10 @@ use crate::import::digits::Digits;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
-/// M0 + sum_k M1_k q_k, zero where the file has nothing.
+/// An array M0 + sum_k M1_k q_k, zero if the file has no such object.
 pub(crate) struct Array {
     pub(crate) m0: Mat<f64>,
-    /// None where all are zero.
+    /// M1 of each mode; `None` if all are zero.
     pub(crate) m1: Option<Vec<Mat<f64>>>,
     /// Half a unit of the last digit of M0 and M1.
     pub(crate) rounding: [f64; 2],
@@ -27,29 +27,29 @@ impl Array {
         Self { m0, m1, rounding }
     }
 
-    /// Entry of M1 of a mode.
+    /// Returns an entry of M1 of a mode.
     pub(crate) fn linear(&self, k: usize, i: usize, j: usize) -> f64 {
         self.m1.as_ref().map_or(0.0, |m1| m1[k][(i, j)])
     }
 
-    /// Largest entries of M0 and M1.
+    /// Returns the largest entries of M0 and M1.
     pub(crate) fn sizes(&self) -> [f64; 2] {
         [largest(&self.m0), self.m1.iter().flatten().map(largest).fold(0.0, f64::max)]
     }
 }
 
-/// Largest absolute entry; NaN never is one here.
+/// Returns the largest absolute entry; the entries are never NaN.
 pub(crate) fn largest(a: &Mat<f64>) -> f64 {
     a.col_iter().flat_map(|column| column.iter()).fold(0.0, |most: f64, v| most.max(v.abs()))
 }
 
-/// The arrays of the body.
+/// Arrays of the body.
 pub(crate) struct Arrays {
     pub(crate) nq: usize,
     pub(crate) mass: f64,
     pub(crate) mass_rounding: f64,
     pub(crate) first_moment: Array,
-    /// J as the file has it.
+    /// Inertia J in the form of the file.
     pub(crate) inertia: Array,
     pub(crate) ct: Array,
     pub(crate) cr: Array,
@@ -62,10 +62,10 @@ pub(crate) struct Arrays {
     pub(crate) de: Array,
 }
 
-/// Columns of Oe: w1^2, w2^2, w3^2, w1 w2, w2 w3, w1 w3.
+/// Axis pairs of the columns of Oe: w1^2, w2^2, w3^2, w1 w2, w2 w3, w1 w3.
 pub(crate) const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
-/// Places of the column J: 11, 22, 33, 12, 13, 23.
+/// Index into the column J: 11, 22, 33, 12, 13, 23.
 const INERTIA: [[usize; 3]; 3] = [[0, 3, 4], [3, 1, 5], [4, 5, 2]];
 
 impl Arrays {
@@ -89,28 +89,28 @@ impl Arrays {
         }
     }
 
-    /// J0.
+    /// Returns J0.
     pub(crate) fn j0(&self) -> Matrix3<f64> {
         square(&self.inertia.m0)
     }
 
-    /// J1_k.
+    /// Returns J1_k.
     pub(crate) fn j1(&self, k: usize) -> Matrix3<f64> {
         self.inertia.m1.as_ref().map_or_else(Matrix3::zeros, |m1| square(&m1[k]))
     }
 
-    /// Row k of Cr0.
+    /// Returns row k of Cr0.
     pub(crate) fn cr0(&self, k: usize) -> Vector3<f64> {
         Vector3::from_fn(|a, _| self.cr.m0[(k, a)])
     }
 
-    /// Cr1(k, l, a) - Cr1(l, k, a): what Ge is.
+    /// Returns Cr1(k, l, a) - Cr1(l, k, a), the value of Ge.
     pub(crate) fn cr1_skew(&self, k: usize, l: usize, a: usize) -> f64 {
         self.cr.linear(l, k, a) - self.cr.linear(k, l, a)
     }
 
-    /// Cauchy-Schwarz bounds of what is linear in one mode beside translation and beside rotation, and of
-    /// what is quadratic.
+    /// Returns the Cauchy-Schwarz bounds of terms linear in one mode with translation and with rotation, and
+    /// of quadratic terms.
     pub(crate) fn bounds(&self) -> [f64; 3] {
         let modal = (0..self.nq).map(|k| self.me.m0[(k, k)].abs()).fold(0.0, f64::max);
         let rigid = 0.5 * self.j0().trace().abs();
@@ -122,11 +122,11 @@ fn square(j: &Mat<f64>) -> Matrix3<f64> {
     Matrix3::from_fn(|a, b| if j.ncols() == 3 { j[(a, b)] } else { j[(INERTIA[a][b], 0)] })
 }
 
-/// The arrays of a frame.
+/// Arrays of a frame.
 pub(crate) struct FrameArrays {
     pub(crate) origin: Array,
     pub(crate) phi: Array,
-    /// None where the frame does not know it.
+    /// Rotations; `None` if the frame does not have them.
     pub(crate) psi: Option<Array>,
     pub(crate) ap: Option<Array>,
 }

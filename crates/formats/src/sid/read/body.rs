@@ -1,4 +1,4 @@
-//! The body of a file.
+//! Conversion of the arrays of a file into a body.
 
 use super::arrays::{Array, Arrays, FrameArrays, largest};
 use super::parse::Listed;
@@ -9,27 +9,28 @@ use flexbody_body::invariants::{Numbered, TermGroups};
 use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
 use nalgebra::Vector3;
 
-/// Parts of Cr1 and of Oe1 that are rounding, relative to their largest entry.
+/// Largest entries of Cr1 and Oe1 that count as rounding, relative to their largest entry. A smaller value
+/// takes rounding for geometric stiffness.
 const ROUNDING: f64 = 1e-10;
 
-/// Facts of the body that the first line declares.
+/// Facts of the body declared in the first line.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Declared {
     pub(crate) name: String,
     pub(crate) units: Option<UnitSystem>,
-    /// Whether Oe1 has geometric stiffness, where the line tells.
+    /// True if Oe1 has geometric stiffness; `None` if the line does not state it.
     pub(crate) stiffened: Option<bool>,
-    /// Whether Cr1 has geometric stiffness, as far as the line tells.
+    /// True if the line states that Cr1 has geometric stiffness.
     pub(crate) turned: bool,
-    /// Whether the mass is one that does not commute with rotations.
+    /// True if the mass does not commute with rotations.
     pub(crate) general: bool,
-    /// Whether W2 is left out on purpose.
+    /// True if W2 is omitted on purpose.
     pub(crate) without_w2: bool,
 }
 
 impl Declared {
     pub(crate) fn of(comment: &str) -> Self {
-        // `Geo_Stiff=no`, `Geo_Stiff= yes`.
+        // Blanks are removed: `Geo_Stiff=no` and `Geo_Stiff= yes` are both in use.
         let words: String = comment.to_lowercase().split_whitespace().collect();
         let mut found = Self::default();
         if let Some(facts) = comment.strip_prefix("flexbody ") {
@@ -61,8 +62,8 @@ impl Declared {
     }
 }
 
-/// The body of a file, and notes on how its arrays were taken. `spin_in_oe`: Oe1 holds more than Me, which is
-/// taken as geometric stiffness for spin.
+/// Returns the body of a file, and notes on the interpretation of its arrays. If `spin_in_oe` is true, Oe1
+/// holds more than Me implies and is taken as geometric stiffness for spin.
 pub(crate) fn body(
     listed: &Listed<'_>,
     arrays: &Arrays,
@@ -71,6 +72,7 @@ pub(crate) fn body(
     spin_in_oe: bool,
 ) -> (ImportedBody, Vec<String>) {
     let mut terms = Terms { arrays, stiffness: Vec::new(), notes: Vec::new() };
+    // W3, W2 and geometric stiffness are separated from arrays that hold them as sums.
     let i5 = terms.coupling(declared.general && !declared.turned);
     let i9 = terms.centrifugal(i5.as_ref(), spin_in_oe);
     terms.accelerated();
@@ -98,7 +100,7 @@ pub(crate) fn body(
     (body, notes)
 }
 
-/// The nine invariants; `i5` and `i9` are those of W3 and W2, where the file has them.
+/// Returns the nine invariants; `i5` and `i9` are those of W3 and W2 if the file has them.
 fn numbered(arrays: &Arrays, i5: Option<Mat<f64>>, i9: Option<Mat<f64>>) -> Numbered {
     let nq = arrays.nq;
     let i8 = |k: usize| 0.5 * (arrays.j1(k) - arrays.cr0(k).cross_matrix());
@@ -117,7 +119,7 @@ fn numbered(arrays: &Arrays, i5: Option<Mat<f64>>, i9: Option<Mat<f64>>) -> Numb
     }
 }
 
-/// Arrays of the file that a body of ours has no place for.
+/// Returns the data of the file that a flexible body cannot hold.
 fn lacks(arrays: &Arrays) -> Vec<String> {
     let mut lacks = Vec::new();
     if largest(&arrays.ksigma.m0) > 0.0 {
@@ -129,7 +131,7 @@ fn lacks(arrays: &Arrays) -> Vec<String> {
     lacks
 }
 
-/// What is read from arrays that hold terms of the kinetic energy and geometric stiffness together.
+/// Terms separated from arrays that hold kinetic energy and geometric stiffness together.
 struct Terms<'a> {
     arrays: &'a Arrays,
     stiffness: Vec<GeometricStiffness<Mat<f64>>>,
@@ -137,8 +139,8 @@ struct Terms<'a> {
 }
 
 impl Terms<'_> {
-    /// W3 from Cr1: its skew part; what is symmetric in the modes is geometric stiffness for angular
-    /// acceleration, or W3 too of a mass that does not commute with rotations (`general`).
+    /// Returns W3 from the skew part of Cr1. The part that is symmetric in the modes is geometric stiffness
+    /// for angular acceleration or, for a mass that does not commute with rotations (`general`), also W3.
     fn coupling(&mut self, general: bool) -> Option<Mat<f64>> {
         let (arrays, nq) = (self.arrays, self.arrays.nq);
         arrays.cr.m1.as_ref()?;
@@ -159,7 +161,7 @@ impl Terms<'_> {
         (largest(&i5) > 0.0).then_some(i5)
     }
 
-    /// I9 from Oe1, unless that is taken as geometric stiffness for spin.
+    /// Returns I9 from Oe1; `None` if Oe1 is taken as geometric stiffness for spin.
     fn centrifugal(&mut self, i5: Option<&Mat<f64>>, spin_in_oe: bool) -> Option<Mat<f64>> {
         let (arrays, nq) = (self.arrays, self.arrays.nq);
         arrays.oe.m1.as_ref()?;
@@ -178,7 +180,7 @@ impl Terms<'_> {
         None
     }
 
-    /// Geometric stiffness for acceleration from Ct1.
+    /// Takes the geometric stiffness for acceleration from Ct1.
     fn accelerated(&mut self) {
         let Some(m1) = &self.arrays.ct.m1 else { return };
         let along = |a: usize| symmetric_part(self.arrays.nq, |k, l| m1[l][(k, a)]);
@@ -187,7 +189,7 @@ impl Terms<'_> {
     }
 }
 
-/// I9 = -W2: its part symmetric in the modes is Oe1, the other that of W3.
+/// Returns I9 = -W2: the part symmetric in the modes comes from Oe1, the other part from W3.
 fn centrifugal(nq: usize, oe1: impl Fn(usize, usize, usize) -> f64, i5: Option<&Mat<f64>>) -> Mat<f64> {
     Mat::from_fn(3 * nq, 3 * nq, |row, column| {
         let (a, k, b, l) = (row / nq, row % nq, column / nq, column % nq);
@@ -205,12 +207,12 @@ fn centrifugal(nq: usize, oe1: impl Fn(usize, usize, usize) -> f64, i5: Option<&
     })
 }
 
-/// The symmetric part of the matrix with these entries.
+/// Returns the symmetric part of the matrix with these entries.
 fn symmetric_part(nq: usize, entry: impl Fn(usize, usize) -> f64) -> Mat<f64> {
     Mat::from_fn(nq, nq, |k, l| 0.5 * (entry(k, l) + entry(l, k)))
 }
 
-/// Takes the components that are not zero.
+/// Adds the components that are not zero.
 fn push(
     stiffness: &mut Vec<GeometricStiffness<Mat<f64>>>,
     kind: &LoadKind,
@@ -221,13 +223,14 @@ fn push(
     }
 }
 
-/// Whether the axes of a frame are turned against those of the body by more than rounding.
+/// Returns true if the axes of a frame differ from those of the body by more than rounding.
 fn has_own_axes(frame: &FrameArrays) -> bool {
     let beside = |ap: &Array| (&ap.m0 - Mat::<f64>::identity(3, 3)).norm_max();
     frame.ap.as_ref().is_some_and(|ap| beside(ap) > ROUNDING + ap.rounding[0])
 }
 
-/// A frame; one with phi1 or psi1 is an interface, whose forces or moments have geometric stiffness.
+/// Returns a frame. A frame with phi1 or psi1 is an interface whose forces or moments have geometric
+/// stiffness.
 fn place(
     label: &str,
     arrays: FrameArrays,

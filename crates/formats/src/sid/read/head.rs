@@ -1,20 +1,20 @@
-//! What stands before `part`: the numbers of nodes and modes, and free text.
+//! Lines before `part`: the numbers of nodes and modes, and free text.
 
 use super::lines::Lines;
 use flexbody_base::diagnostic::Diagnostic;
 
-/// The lines before `part`.
+/// Contents of the lines before `part`.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Head {
-    /// Free text behind the counts; of further lines everything.
+    /// Free text after the counts, and the whole text of further lines.
     pub(crate) comment: String,
-    /// Numbers of nodes and modes.
+    /// Numbers of nodes and modes, if stated.
     pub(crate) stated: Option<(usize, usize)>,
 }
 
 impl Head {
-    /// Reads up to `part` inclusive. The first line is `21 4 :No. nodes, No. modes:text` or, of FEMBeam,
-    /// `3 nodes, 2 modes, text`; further ones are text.
+    /// Reads up to and including `part`. The first line is `21 4 :No. nodes, No. modes:text` or, from
+    /// FEMBeam, `3 nodes, 2 modes, text`; further lines are text.
     pub(crate) fn read(lines: &mut Lines<'_>) -> Result<Self, Diagnostic> {
         let mut head: Option<Self> = None;
         loop {

@@ -1,4 +1,4 @@
-//! The dialect of a file: what its names say, and what its numbers say.
+//! Dialect of a file, from its names and from its numbers.
 
 use super::arrays::Arrays;
 use super::parse::Listed;
@@ -9,17 +9,17 @@ use nalgebra::Matrix3;
 /// Order of the columns of Gr and Ge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Blocks {
-    /// Column a nq + k.
+    /// Column a nq + k for axis a and mode k.
     Component,
-    /// Column 3 k + a.
+    /// Column 3 k + a for axis a and mode k.
     Mode,
 }
 
 impl Blocks {
-    /// Both orders.
+    /// Both column orders.
     const ALL: [Self; 2] = [Self::Component, Self::Mode];
 
-    /// `component-blocked`, `mode-blocked`.
+    /// Returns the order in words: `component-blocked` or `mode-blocked`.
     pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Component => "component-blocked",
@@ -34,12 +34,12 @@ impl Blocks {
         }
     }
 
-    /// Gr_k.
+    /// Returns Gr_k.
     pub(crate) fn gr(self, arrays: &Arrays, k: usize) -> Matrix3<f64> {
         Matrix3::from_fn(|row, a| arrays.gr.m0[(row, self.column(a, k, arrays.nq))])
     }
 
-    /// max |sym(Gr_k) - J1_k| and max |skew(Gr_k) + Cr0_k~|.
+    /// Returns max |sym(Gr_k) - J1_k| and max |skew(Gr_k) + Cr0_k~|.
     pub(crate) fn gr_misfit(self, arrays: &Arrays) -> [f64; 2] {
         let misfit = |k: usize| {
             let gr = self.gr(arrays, k);
@@ -49,12 +49,12 @@ impl Blocks {
         (0..arrays.nq).map(misfit).fold([0.0; 2], |most, now| [most[0].max(now[0]), most[1].max(now[1])])
     }
 
-    /// max |Ge(k; l, a) - (Cr1(k, l, a) - Cr1(l, k, a))|.
+    /// Returns max |Ge(k; l, a) - (Cr1(k, l, a) - Cr1(l, k, a))|.
     pub(crate) fn ge_misfit(self, arrays: &Arrays) -> f64 {
         self.ge_beside(arrays, |k, l, a| arrays.cr1_skew(k, l, a))
     }
 
-    /// max |Ge(k; l, a) - 2 Cr1(k, l, a)|, which is the same where Cr1 is skew in the modes.
+    /// Returns max |Ge(k; l, a) - 2 Cr1(k, l, a)|, which equals the other misfit if Cr1 is skew in the modes.
     pub(crate) fn ge_doubled(self, arrays: &Arrays) -> f64 {
         self.ge_beside(arrays, |k, l, a| 2.0 * arrays.cr.linear(l, k, a))
     }
@@ -74,10 +74,11 @@ impl Blocks {
     }
 }
 
-/// Misfits of both layouts tell one only when they differ by this factor.
+/// Largest ratio of the misfits of two layouts for which the smaller one decides. A larger value decides on
+/// less evidence.
 const CLEAR: f64 = 0.1;
 
-/// The layout that fits, by what it is missed by; `None` where both are alike.
+/// Returns the layout with the clearly smaller misfit; `None` if both are similar.
 fn fitting(misfit: impl Fn(Blocks) -> f64) -> Option<Blocks> {
     let [component, mode] = Blocks::ALL.map(misfit);
     if component < CLEAR * mode {
@@ -89,7 +90,7 @@ fn fitting(misfit: impl Fn(Blocks) -> f64) -> Option<Blocks> {
     }
 }
 
-/// A dialect by its layout; the first of a layout is meant where names do not say more.
+/// Dialects with their layouts; the first dialect of a layout is assumed if names do not decide.
 const DIALECTS: [(&str, Blocks, Blocks); 5] = [
     ("fembs", Blocks::Component, Blocks::Component),
     ("py-sid", Blocks::Mode, Blocks::Component),
@@ -101,12 +102,12 @@ const DIALECTS: [(&str, Blocks, Blocks); 5] = [
 /// Earlier name of the layout of `embs`.
 const MODE_BLOCKED: &str = "mode-blocked";
 
-/// The dialect.
+/// Detected dialect.
 pub(crate) struct Layout {
     pub(crate) dialect: &'static str,
-    /// What the names say, where they do.
+    /// Dialect and layout declared by names; `None` if the names do not decide.
     pub(crate) declared: Option<(&'static str, Blocks, Blocks)>,
-    /// How Gr and Ge are to be read, by the numbers.
+    /// Orders of Gr and Ge found from the numbers.
     pub(crate) gr: Blocks,
     pub(crate) ge: Blocks,
     pub(crate) reason: String,
@@ -137,7 +138,8 @@ impl Layout {
     }
 }
 
-/// Reads the arrays. Where no name says the dialect, `m1` is counted by rows if J1 is the symmetric part of Gr only so.
+/// Reads the arrays. If no name states the dialect, `m1` is taken as counted by rows if J1 is the symmetric
+/// part of Gr only in that order.
 pub(crate) fn arrays_in_order(listed: &mut Listed<'_>, digits: Digits) -> Arrays {
     let arrays = Arrays::new(listed, digits);
     if listed.modes != ModeIndex::Middle || declared(listed).0.is_some() || arrays.inertia.m1.is_none() {
@@ -154,7 +156,7 @@ pub(crate) fn arrays_in_order(listed: &mut Listed<'_>, digits: Digits) -> Arrays
     arrays
 }
 
-/// The dialect by names, and why.
+/// Returns the dialect declared by names, and the reason.
 fn declared<'l>(listed: &'l Listed<'_>) -> (Option<&'l str>, String) {
     if let Some(name) = listed.named_dialect() {
         let name = if name == MODE_BLOCKED { "embs" } else { name };

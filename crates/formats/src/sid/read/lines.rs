@@ -1,25 +1,25 @@
-//! The lines of a file: keywords and assignments.
+//! Lines of a file: keywords and assignments.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use std::path::Path;
 
-/// One line that is not blank.
+/// A line that is not blank.
 pub(crate) struct Line<'t> {
-    /// Number from 1.
+    /// Number of the line from 1.
     pub(crate) number: usize,
-    /// The line without blanks around.
+    /// Text of the line without surrounding blanks.
     pub(crate) text: &'t str,
-    /// What stands before the first `=`: lower case, words one blank apart.
+    /// Text before the first `=`: lower case, words separated by one blank.
     pub(crate) key: String,
-    /// What stands after it, without blanks around.
+    /// Text after the first `=`, without surrounding blanks.
     pub(crate) value: Option<&'t str>,
 }
 
-/// The lines of a file one after the other.
+/// Iterator over the lines of a file.
 pub(crate) struct Lines<'t> {
     path: &'t Path,
     lines: std::iter::Enumerate<std::str::Lines<'t>>,
-    /// Number of the last line that was given.
+    /// Number of the last line returned.
     last: usize,
 }
 
@@ -28,12 +28,12 @@ impl<'t> Lines<'t> {
         Self { path, lines: text.lines().enumerate(), last: 0 }
     }
 
-    /// FB730 at a line.
+    /// Returns the diagnostic FB730 at a line.
     pub(crate) fn unreadable(&self, line: usize, message: impl Into<String>) -> Diagnostic {
         Diagnostic::new(Code::ForeignUnreadable, message).in_file(self.path).at_line(line)
     }
 
-    /// The next line; it is an error when the file ends inside of `inside`.
+    /// Returns the next line; an error if the file ends within `inside`.
     pub(crate) fn next(&mut self, inside: &str) -> Result<Line<'t>, Diagnostic> {
         for (at, text) in self.lines.by_ref() {
             if text.trim().is_empty() {
@@ -51,7 +51,7 @@ impl<'t> Lines<'t> {
         Err(self.unreadable(self.last.max(1), format!("the file ends inside of `{inside}`")))
     }
 
-    /// The last line but blanks must be the end: what follows is told.
+    /// Returns an error if a line that is not blank follows the end.
     pub(crate) fn finish(mut self) -> Result<(), Diagnostic> {
         match self.next("") {
             Ok(line) => Err(self.unreadable(line.number, "text after `end part`")),
@@ -59,7 +59,7 @@ impl<'t> Lines<'t> {
         }
     }
 
-    /// A whole number that is not negative.
+    /// Returns the value of a line as an integer that is not negative.
     pub(crate) fn count(&self, line: &Line<'_>) -> Result<usize, Diagnostic> {
         let value = line.value.unwrap_or("");
         value.parse().map_err(|_| {
@@ -67,7 +67,7 @@ impl<'t> Lines<'t> {
         })
     }
 
-    /// A finite number with an exponent of either letter, and its text.
+    /// Returns the value of a line as a finite number, with exponent letter E or D, and its text.
     pub(crate) fn number(&self, line: &Line<'t>) -> Result<(f64, &'t str), Diagnostic> {
         let value = line.value.unwrap_or("");
         let wrong = || {

@@ -1,4 +1,4 @@
-//! The structure of the file: `part`, `new modal`, `refmod`, `frame` and the objects.
+//! Structure of the file: `part`, `new modal`, `refmod`, `frame` and the objects.
 
 use super::head::Head;
 use super::lines::{Line, Lines};
@@ -7,7 +7,7 @@ use crate::import::digits::Digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use std::path::Path;
 
-/// Objects of the body in the order of the format, lower case, with other names that are in use.
+/// Objects of the body in the order of the format, lower case, with alternative names.
 const OBJECTS: [(&str, &[&str]); 11] = [
     ("mdcm", &["mcm"]),
     ("j", &["mmi"]),
@@ -22,16 +22,18 @@ const OBJECTS: [(&str, &[&str]); 11] = [
     ("de", &[]),
 ];
 
-/// Objects of a frame.
+/// Objects of a frame in the order of the format.
 const FRAME_OBJECTS: [&str; 5] = ["origin", "phi", "psi", "ap", "sigma"];
 
-/// Modes of which a file of any length may be.
+/// Largest number of modes that a short file may state. A longer file may state up to sqrt(64 n) modes for n
+/// listed numbers; the limit prevents huge arrays from a single number.
 const MODES_OF_ANY_FILE: usize = 100;
 
-/// Numbers of frames that a file of any length may stand for.
+/// Largest product of frames and modes that a short file may state. A longer file may state up to 64 times
+/// its listed numbers.
 const NUMBERS_OF_ANY_FILE: usize = 1_000_000;
 
-/// A frame as it is listed; its objects in the order of [`FRAME_OBJECTS`].
+/// A frame of the file; its objects are in the order of [`FRAME_OBJECTS`].
 pub(crate) struct ListedFrame {
     pub(crate) label: String,
     line: usize,
@@ -45,15 +47,15 @@ impl ListedFrame {
     }
 }
 
-/// A file as it is listed.
+/// Parsed contents of a file.
 pub(crate) struct Listed<'t> {
-    /// Text of the first line behind the counts.
+    /// Text of the first line after the counts.
     pub(crate) comment: String,
-    /// Number of frames by the first line.
+    /// Number of frames stated in the first line.
     pub(crate) stated_frames: Option<usize>,
     pub(crate) mass: f64,
     pub(crate) nq: usize,
-    /// (mode from 0, text).
+    /// Texts of the modes: (mode from 0, text).
     pub(crate) mode_texts: Vec<(usize, &'t str)>,
     pub(crate) frames: Vec<ListedFrame>,
     objects: [Option<Taylor>; 11],
@@ -61,7 +63,7 @@ pub(crate) struct Listed<'t> {
 }
 
 impl<'t> Listed<'t> {
-    /// The object of that name, lower case; `None` also where it lists nothing.
+    /// Returns the object with this lower-case name; `None` if it is missing or lists no entries.
     pub(crate) fn object(&self, name: &str) -> Option<&Taylor> {
         let at = OBJECTS.iter().position(|(known, _)| *known == name)?;
         self.objects[at].as_ref().filter(|object| !object.is_empty())
@@ -70,7 +72,7 @@ impl<'t> Listed<'t> {
     /// Reads and checks a file.
     ///
     /// # Errors
-    /// FB730, FB731.
+    /// FB730 if the file cannot be parsed; FB731 if required objects or numbers are missing.
     pub(crate) fn read(path: &'t Path, text: &'t str) -> Result<Self, Diagnostic> {
         let mut lines = Lines::new(path, text);
         let Head { comment, stated } = Head::read(&mut lines)?;
@@ -98,8 +100,9 @@ impl<'t> Listed<'t> {
         Ok(listed)
     }
 
-    /// Says what required object is missing, or that there are fewer numbers than a body of so many modes and
-    /// frames can have: arrays are made of the sizes that the file states, which nothing else bounds.
+    /// Returns an error that names a missing required object, or states that the file has fewer numbers than
+    /// its modes and frames need. The check precedes the allocation of arrays, whose sizes are otherwise
+    /// unbounded.
     fn refuse_incomplete(&self) -> Result<(), String> {
         for at in [0, 1, 4, 9] {
             if self.objects[at].is_none() {
@@ -120,12 +123,12 @@ impl<'t> Listed<'t> {
         Ok(())
     }
 
-    /// Whether J is a 3 x 3 matrix.
+    /// Returns true if J is a 3 x 3 matrix.
     pub(crate) fn has_square_inertia(&self) -> bool {
         self.object("j").is_some_and(|j| j.ncol == 3)
     }
 
-    /// Whether a moment has the names of MatMorembs.
+    /// Returns true if a moment has its MatMorembs name.
     pub(crate) fn has_morembs_names(&self) -> bool {
         self.objects[..2].iter().flatten().any(|object| matches!(object.name.as_str(), "mcm" | "mmi"))
     }
@@ -135,7 +138,7 @@ impl<'t> Listed<'t> {
         self.objects.iter().flatten().chain(frame_objects)
     }
 
-    /// Names of objects that list something and have no `structure`, each once.
+    /// Returns the distinct names of objects that list entries without a `structure`.
     pub(crate) fn inferred(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for object in self.all_objects().filter(|object| object.inferred && !object.is_empty()) {
@@ -146,19 +149,20 @@ impl<'t> Listed<'t> {
         names
     }
 
-    /// The digits of the whole file.
+    /// Returns the number format of the whole file.
     pub(crate) fn digits(&self) -> Digits {
         self.all_objects().map(|object| object.digits).fold(Digits::default(), Digits::most)
     }
 
-    /// Dialect that the first line of a file of flexbody names.
+    /// Returns the dialect named in the first line of a file written by flexbody.
     pub(crate) fn named_dialect(&self) -> Option<&str> {
         let facts = self.comment.strip_prefix("flexbody ")?;
         facts.split(", ").find_map(|fact| fact.strip_prefix("dialect "))
     }
 
-    /// Finds the place of the mode in `m1`: columns of one number tell, of three modes where there are three columns
-    /// nothing does. The first line alone tells the order of EMBSlib here, whose indices fit every array.
+    /// Finds the position of the mode index in `m1`. Arrays with one column decide; with three modes and
+    /// arrays of three columns the order is ambiguous. The order of EMBSlib fits every array, so that only
+    /// the first line can indicate it here.
     fn find_mode_index(&mut self) {
         if self.named_dialect() == Some("embs") {
             self.modes = ModeIndex::Rows;
@@ -194,7 +198,7 @@ impl<'t> Listed<'t> {
         Ok(())
     }
 
-    /// (nrow, ncol) of the object of that name.
+    /// Returns the expected size (nrow, ncol) of the object with this name.
     pub(crate) fn shape(&self, name: &str) -> (usize, usize) {
         let nq = self.nq;
         match name {
@@ -213,7 +217,7 @@ impl<'t> Listed<'t> {
     }
 }
 
-/// What stands in `new modal`, up to `end part`.
+/// Contents of `new modal`, up to `end part`.
 #[derive(Default)]
 struct Modal<'t> {
     refmod: Option<Refmod<'t>>,
@@ -238,7 +242,7 @@ impl<'t> Modal<'t> {
         Ok(modal)
     }
 
-    /// Reads what begins with `line`.
+    /// Reads the part of the file that begins with `line`.
     fn read_part(&mut self, lines: &mut Lines<'t>, line: &Line<'t>) -> Result<(), Diagnostic> {
         let twice =
             |lines: &Lines<'_>| lines.unreadable(line.number, format!("`{}` is there twice", line.key));

@@ -1,11 +1,11 @@
-//! An object of the file: sizes and the entries that are listed.
+//! An object of the file: its sizes and listed entries.
 
 use super::lines::{Line, Lines};
 use crate::import::digits::Digits;
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
 
-/// An entry, indices from 0; of `m0` the third is not used.
+/// An entry with indices from 0; the third index is unused for `m0`.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     index: [usize; 3],
@@ -13,38 +13,38 @@ struct Entry {
     value: f64,
 }
 
-/// An object M0 + sum_k M1_k q_k as it is listed.
+/// A parsed object M0 + sum_k M1_k q_k.
 #[derive(Debug)]
 pub(crate) struct Taylor {
     pub(crate) name: String,
-    /// Line of its name.
+    /// Line of the name of the object.
     pub(crate) line: usize,
     pub(crate) nrow: usize,
     pub(crate) ncol: usize,
     nq: usize,
     structure: usize,
-    /// Whether the file has no `structure` of it.
+    /// True if the file states no `structure` for the object.
     pub(crate) inferred: bool,
     m0: Vec<Entry>,
     m1: Vec<Entry>,
-    /// Digits of the entries.
+    /// Number format of the entries.
     pub(crate) digits: Digits,
 }
 
-/// Places of the indices of an entry of M1 in `m1(., ., .)`.
+/// Meaning of the three indices of an entry `m1(., ., .)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ModeIndex {
-    /// (row, mode, column).
+    /// Order (row, mode, column).
     Middle,
-    /// (row, column, mode).
+    /// Order (row, column, mode).
     Last,
-    /// (row, mode, column) of the place that an entry has when entries are counted mode by mode and then row by row,
-    /// while they are counted row by row and then mode by mode: for EMBSlib.
+    /// Order for EMBSlib. Entries are counted row by row, then mode by mode; the file lists the indices (row,
+    /// mode, column) that the same count has mode by mode, then row by row.
     Rows,
 }
 
 impl ModeIndex {
-    /// Words about `m1` in the reason of a layout.
+    /// Returns the index order in words, as a reason for a layout.
     pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Middle => "m1 has the mode as its middle index",
@@ -53,12 +53,13 @@ impl ModeIndex {
         }
     }
 
-    /// [row, column, mode] for the three indices of an entry, of an array of `nrow` rows and `nq` modes.
+    /// Returns [row, column, mode] for the three indices of an entry of an array with `nrow` rows and `nq`
+    /// modes.
     fn place(self, [first, second, third]: [usize; 3], nrow: usize, nq: usize) -> [usize; 3] {
         match self {
             Self::Middle => [first, third, second],
             Self::Last => [first, second, third],
-            // An index that is too large stays too large.
+            // An index that is too large remains too large, so that the check detects it.
             Self::Rows if first >= nrow || second >= nq => [first, third, second],
             Self::Rows => {
                 let count = second * nrow + first;
@@ -71,7 +72,7 @@ impl ModeIndex {
 const SIZES: [&str; 6] = ["order", "nrow", "ncol", "nq", "nqn", "structure"];
 
 impl Taylor {
-    /// Reads up to `end NAME`.
+    /// Reads an object up to `end NAME`.
     pub(crate) fn read(lines: &mut Lines<'_>, head: &Line<'_>) -> Result<Self, Diagnostic> {
         let name = head.key.clone();
         let Listing { sizes, m0, m1, digits } = Listing::read(lines, &name)?;
@@ -97,7 +98,7 @@ impl Taylor {
         }
     }
 
-    /// Why an object with this `order` and `nqn` cannot be read.
+    /// Returns the reason why an object with this `order` and `nqn` cannot be read, if there is one.
     fn wrong(&self, order: usize, nqn: Option<usize>) -> Option<&'static str> {
         if order > 1 || nqn.is_some_and(|nqn| nqn > 0) {
             Some("is of an order above 1")
@@ -110,17 +111,17 @@ impl Taylor {
         }
     }
 
-    /// Number of entries.
+    /// Returns the number of entries.
     pub(crate) fn n_entries(&self) -> usize {
         self.m0.len() + self.m1.len()
     }
 
-    /// Whether no entry is listed and none is meant.
+    /// Returns true if no entry is listed and the structure implies none.
     pub(crate) fn is_empty(&self) -> bool {
         self.n_entries() == 0 && self.structure != 4
     }
 
-    /// Whether the indices of `m1` can be meant so.
+    /// Returns true if the indices of `m1` are valid in the order `modes`.
     pub(crate) fn admits(&self, modes: ModeIndex, nq: usize) -> bool {
         self.m1.iter().all(|entry| {
             let [_, column, mode] = modes.place(entry.index, self.nrow, nq);
@@ -128,7 +129,7 @@ impl Taylor {
         })
     }
 
-    /// Checks sizes and indices for a body of `nq` modes, `shape` being (nrow, ncol).
+    /// Checks sizes and indices for a body with `nq` modes and the expected `shape` (nrow, ncol).
     pub(crate) fn check(
         &self,
         lines: &Lines<'_>,
@@ -147,7 +148,7 @@ impl Taylor {
             );
             return Err(lines.unreadable(self.line, message));
         }
-        // Some leave it at 0 where nothing depends on q.
+        // Some programs leave nq at 0 if nothing depends on q.
         if self.nq != nq && !(self.nq == 0 && self.m1.is_empty()) {
             let message = format!("`{name}` has nq = {}, the body {nq} modes", self.nq);
             return Err(lines.unreadable(self.line, message));
@@ -158,7 +159,7 @@ impl Taylor {
         Ok(())
     }
 
-    /// Checks that the indices of M0 or M1 are within its sizes, and each there once.
+    /// Checks that the indices of M0 or M1 are within their limits and occur once.
     fn check_entries(
         &self,
         lines: &Lines<'_>,
@@ -193,10 +194,10 @@ impl Taylor {
         Ok(())
     }
 
-    /// M0.
+    /// Returns M0.
     ///
     /// # Panics
-    /// Here and below when [`Taylor::check`] did not pass.
+    /// Panics if [`Taylor::check`] did not pass.
     pub(crate) fn constant(&self, (nrow, ncol): (usize, usize)) -> Mat<f64> {
         if self.structure == 4 && self.m0.is_empty() {
             return Mat::identity(nrow, ncol);
@@ -207,7 +208,7 @@ impl Taylor {
         all
     }
 
-    /// M1_k of every mode; none where all are zero.
+    /// Returns M1_k of every mode; `None` if all are zero. Panics if [`Taylor::check`] did not pass.
     pub(crate) fn linear(
         &self,
         (nrow, ncol): (usize, usize),
@@ -226,7 +227,7 @@ impl Taylor {
         Some(all)
     }
 
-    /// A symmetric matrix may list one triangle.
+    /// Copies the listed triangle of a symmetric matrix to the other triangle.
     fn mirror(&self, a: &mut Mat<f64>) {
         if self.structure != 2 || a.nrows() != a.ncols() {
             return;
@@ -243,10 +244,10 @@ impl Taylor {
     }
 }
 
-/// The lines of an object.
+/// Lines of an object.
 #[derive(Default)]
 struct Listing {
-    /// In the order of [`SIZES`].
+    /// Sizes in the order of [`SIZES`].
     sizes: [Option<usize>; 6],
     m0: Vec<Entry>,
     m1: Vec<Entry>,
@@ -279,8 +280,8 @@ impl Listing {
     }
 }
 
-/// What `structure` of an object must be that has none, by the entries that it lists: ccx2sid writes none.
-/// Objects that are symmetric by their meaning may list one triangle.
+/// Returns the `structure` of an object that states none (ccx2sid writes none), inferred from its entries.
+/// Objects that are symmetric by definition may list one triangle.
 fn inferred_structure(name: &str, m0: &[Entry], m1: &[Entry]) -> usize {
     const SYMMETRIC: [&str; 5] = ["j", "mmi", "me", "ke", "de"];
     let all = || m0.iter().chain(m1);
@@ -295,7 +296,7 @@ fn inferred_structure(name: &str, m0: &[Entry], m1: &[Entry]) -> usize {
     }
 }
 
-/// `m0( 1, 2)`, `m1(1,2,3)`: order and indices from 0.
+/// Parses `m0( 1, 2)` or `m1(1,2,3)`: order and indices from 0.
 fn place(key: &str) -> Option<(usize, [usize; 3])> {
     let (name, rest) = key.split_once('(')?;
     let order = match name.trim_end() {

@@ -1,4 +1,4 @@
-//! The arrays of SID from the numbered invariants and geometric stiffness of a body.
+//! Arrays of SID from the numbered invariants and the geometric stiffness of a body.
 
 use super::dialect::{Blocks, Dialect};
 use super::text::Taylor;
@@ -11,10 +11,10 @@ use flexbody_model::LoadKind;
 use flexbody_motion::dynamics::{Stiffening, stiffness_under};
 use nalgebra::Matrix3;
 
-/// Places of (11, 22, 33, 12, 13, 23), the order of J.
+/// Indices of the components (11, 22, 33, 12, 13, 23), the order of J.
 const INERTIA: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// (K + K') / 2 of the components of a kind of load, `None` where not one is given.
+/// Returns (K + K') / 2 for the components of a kind of load; `None` if the body has none of them.
 fn stiffness(body: &FlexBody, kind: &LoadKind) -> Option<Vec<Mat<f64>>> {
     let (nf, entry) = (body.n_modes(), stiffness_under(body, kind, Stiffening::All)?);
     let symmetric_part = |component: usize| Mat::from_fn(nf, nf, |i, j| entry(component, i, j));
@@ -25,7 +25,7 @@ fn per_mode(nf: usize, matrix: impl FnMut(usize) -> Mat<f64>) -> Vec<Mat<f64>> {
     (0..nf).map(matrix).collect()
 }
 
-/// J as the dialect has it.
+/// Returns J in the form of the dialect.
 fn inertia(dialect: &Dialect, i: &Matrix3<f64>) -> Mat<f64> {
     let i = 0.5 * (i + i.transpose());
     if dialect.square_inertia {
@@ -35,7 +35,7 @@ fn inertia(dialect: &Dialect, i: &Matrix3<f64>) -> Mat<f64> {
     }
 }
 
-/// Columns of Gr or Ge in the order of the dialect: `entry(row, axis, mode)`.
+/// Returns the columns of Gr or Ge in the order of the dialect, from `entry(row, axis, mode)`.
 fn blocks(nrow: usize, nf: usize, order: Blocks, entry: impl Fn(usize, usize, usize) -> f64) -> Mat<f64> {
     let mut all = Mat::zeros(nrow, 3 * nf);
     for row in 0..nrow {
@@ -48,10 +48,10 @@ fn blocks(nrow: usize, nf: usize, order: Blocks, entry: impl Fn(usize, usize, us
     all
 }
 
-/// mdCM to De, in the order of the file.
+/// Returns the arrays from mdCM to De in the order of the file.
 ///
 /// The elastic forces (7.3) of theory section 7 are in Ct(q) (a - g), Cr(q) alpha and Oe(q) of the spin
-/// products; with them the rows of translation and rotation get the same Ct(q), Cr(q) as (7.4) has.
+/// products. The rows of translation and rotation then have the same Ct(q), Cr(q) as (7.4).
 pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
     let terms = Terms::new(body);
     let Terms { numbered, nf, w1, .. } = &terms;
@@ -79,7 +79,7 @@ pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
         terms.cr(),
         Taylor::symmetric("Me", numbered.i6.clone()),
         Taylor::constant("Gr", blocks(3, nf, dialect.gr, |row, a, k| 2.0 * numbered.i8[k][(row, a)])),
-        // The Coriolis force takes the skew part only, which is all of a solid.
+        // The Coriolis force needs the skew part only; for a solid the symmetric part is zero.
         Taylor::constant("Ge", blocks(nf, nf, dialect.ge, |k, a, l| terms.w3(a, l, k) - terms.w3(a, k, l))),
         terms.oe(),
         Taylor::zero("ksigma", nf, 1),
@@ -88,13 +88,13 @@ pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
     ]
 }
 
-/// The terms of a body that the arrays are made of.
+/// Terms of a body from which the arrays are formed.
 struct Terms {
     numbered: Numbered,
     nf: usize,
     /// I8 + I8' of every mode.
     w1: Vec<Matrix3<f64>>,
-    /// Geometric stiffness for acceleration, angular acceleration and spin.
+    /// Geometric stiffness for acceleration, angular acceleration and spin; `None` without.
     acceleration: Option<Vec<Mat<f64>>>,
     turn: Option<Vec<Mat<f64>>>,
     spin: Option<Vec<Mat<f64>>>,
@@ -113,7 +113,7 @@ impl Terms {
         }
     }
 
-    /// Entry (l, k) of the block of I5 of an axis, zero without W3.
+    /// Returns entry (l, k) of the block of I5 for an axis; zero without W3.
     fn w3(&self, a: usize, l: usize, k: usize) -> f64 {
         self.numbered.i5.as_ref().map_or(0.0, |i5| i5[(a * self.nf + l, k)])
     }
@@ -149,7 +149,7 @@ impl Terms {
         )
     }
 
-    /// Entry of Oe1 for a pair of axes: W2, with geometric stiffness for spin.
+    /// Returns an entry of Oe1 for a pair of axes: W2 plus geometric stiffness for spin.
     fn centrifugal(&self, k: usize, l: usize, pair: usize) -> f64 {
         let nf = self.nf;
         let (a, b) = LoadKind::SPIN[pair];
@@ -161,12 +161,12 @@ impl Terms {
     }
 }
 
-/// Entry of a component of geometric stiffness, zero without.
+/// Returns an entry of a component of geometric stiffness; zero without.
 fn entry(stiffness: Option<&Vec<Mat<f64>>>, component: usize, i: usize, j: usize) -> f64 {
     stiffness.map_or(0.0, |stiffness| stiffness[component][(i, j)])
 }
 
-/// A frame with the stiffness of a unit force and a unit moment there.
+/// A frame with the stiffness of a unit force and a unit moment at it.
 pub(crate) struct StiffenedFrame {
     pub(crate) frame: ExportFrame,
     force: Option<Vec<Mat<f64>>>,
@@ -174,7 +174,7 @@ pub(crate) struct StiffenedFrame {
 }
 
 impl StiffenedFrame {
-    /// origin, phi, psi and AP. The motion of second order (7.5) is phi1 and psi1.
+    /// Returns origin, phi, psi and AP. The second-order motion (7.5) is in phi1 and psi1.
     pub(crate) fn objects(&self) -> Vec<Taylor> {
         let ExportFrame { position, translation, rotation, .. } = &self.frame;
         let nf = translation.ncols();
@@ -208,7 +208,7 @@ impl StiffenedFrame {
         ]
     }
 
-    /// Whether a force or moment of this kind acts here and the file has its stiffness.
+    /// Returns true if a force or moment of this kind acts at the frame and the file has its stiffness.
     pub(crate) fn holds(&self, kind: &LoadKind) -> bool {
         kind.interface() == self.frame.name.as_deref()
             && match kind {
@@ -219,7 +219,7 @@ impl StiffenedFrame {
     }
 }
 
-/// The frames of the file. Stiffness of forces at an interface belongs to its reference point.
+/// Returns the frames of the file. Stiffness of forces at an interface belongs to the reference point.
 pub(crate) fn places(body: &FlexBody, points: &crate::export::Points) -> Vec<StiffenedFrame> {
     let place = |frame: ExportFrame| {
         let interface = body

@@ -1,16 +1,16 @@
-//! What the dialects of SID_FEM differ in.
+//! Differences of the dialects of SID_FEM.
 
-/// Which index runs fastest in the columns of Gr and Ge.
+/// Order of the columns of Gr and Ge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Blocks {
-    /// Column a nq + k: the modes of one axis beside each other.
+    /// Column a nq + k: the modes of one axis are adjacent.
     Component,
-    /// Column 3 k + a: the axes of one mode beside each other.
+    /// Column 3 k + a: the axes of one mode are adjacent.
     Mode,
 }
 
 impl Blocks {
-    /// Column of axis `a` and mode `k`.
+    /// Returns the column of axis `a` and mode `k`.
     pub(crate) fn column(self, a: usize, k: usize, nq: usize) -> usize {
         match self {
             Self::Component => a * nq + k,
@@ -19,21 +19,22 @@ impl Blocks {
     }
 }
 
-/// Places of the indices of an entry of M1 in `m1(., ., .)`.
+/// Meaning of the three indices of an entry `m1(., ., .)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ModeIndex {
-    /// (row, mode, column).
+    /// Order (row, mode, column).
     Middle,
-    /// (row, column, mode).
+    /// Order (row, column, mode).
     Last,
-    /// Entries are counted row by row, then mode by mode, then by columns; the file has for each the place (row, mode,
-    /// column) that it has when entries are counted mode by mode, then row by row. EMBSlib stores M1 in the second
-    /// order and hands the numbers on to an array of Modelica, which takes them in the first.
+    /// Order for EMBSlib. Entries are counted row by row, then mode by mode, then by columns; the file lists
+    /// for each entry the indices (row, mode, column) that the same count has mode by mode, then row by row.
+    /// EMBSlib stores M1 in the second order and passes the numbers to a Modelica array, which takes them in
+    /// the first.
     Rows,
 }
 
 impl ModeIndex {
-    /// The three indices, from 0, of an entry of an array of `nrow` rows and `nq` modes.
+    /// Returns the three indices, from 0, of an entry of an array with `nrow` rows and `nq` modes.
     pub(crate) fn indices(self, [row, column, mode]: [usize; 3], nrow: usize, nq: usize) -> [usize; 3] {
         match self {
             Self::Middle => [row, mode, column],
@@ -46,33 +47,33 @@ impl ModeIndex {
     }
 }
 
-/// Word behind `new modal =`.
+/// Text after `new modal`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ModalName {
-    /// Neither a word nor a sign of equality.
+    /// Neither a name nor a sign of equality follows.
     Absent,
-    /// The name of the body. Readers of these files split the line at the sign of equality.
+    /// Name of the body, after a sign of equality at which readers of these files split the line.
     OfBody,
-    /// A word that is fixed for all bodies: a reader looks for names of arrays in all of the line.
+    /// Word that is fixed for all bodies, because a reader searches the whole line for names of arrays.
     Fixed(&'static str),
 }
 
-/// Limits of a reader that overruns its memory beyond them.
+/// Limits of a reader that writes beyond its memory if they are exceeded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Limits {
     /// Largest number of frames, modes and columns.
     pub(crate) count: usize,
-    /// Bytes of the first line.
+    /// Largest length of the first line in bytes.
     pub(crate) first_line: usize,
 }
 
-/// A dialect.
+/// A dialect of SID_FEM.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Dialect {
     pub(crate) name: &'static str,
     /// Names of the first moment and of the inertia.
     pub(crate) moments: [&'static str; 2],
-    /// Whether J is a symmetric 3 x 3 matrix instead of a column of six.
+    /// True if J is a symmetric 3 x 3 matrix instead of a column of six.
     pub(crate) square_inertia: bool,
     pub(crate) gr: Blocks,
     pub(crate) ge: Blocks,
@@ -80,8 +81,8 @@ pub(crate) struct Dialect {
     /// True if symmetric matrices list one triangle instead of both.
     pub(crate) triangle: bool,
     pub(crate) modal_name: ModalName,
-    /// Largest number of a frame, for a reader that has room for no other than 1 to this one: frames are counted if one
-    /// of their nodes has another. `Some(0)` always counts them.
+    /// Largest frame number that the reader accepts; `None` without a limit. If a node has another number
+    /// than 1 to this one, the frames are numbered 1, 2, ... instead. `Some(0)` always numbers them.
     pub(crate) largest_frame: Option<i64>,
     pub(crate) limits: Option<Limits>,
     /// Letter of exponents.
@@ -102,7 +103,7 @@ const FEMBS: Dialect = Dialect {
     exponent: 'D',
 };
 
-/// All dialects, the usual one first.
+/// All dialects, the default first.
 pub(crate) const DIALECTS: [Dialect; 5] = [
     FEMBS,
     Dialect {
@@ -110,7 +111,7 @@ pub(crate) const DIALECTS: [Dialect; 5] = [
         moments: ["mCM", "mmi"],
         triangle: true,
         modal_name: ModalName::Absent,
-        // matflex has an array of structures with all numbers up to the largest one.
+        // matflex has an array of structures for all numbers up to the largest one.
         largest_frame: Some(1_000_000),
         exponent: 'E',
         ..FEMBS
@@ -122,8 +123,8 @@ pub(crate) const DIALECTS: [Dialect; 5] = [
         gr: Blocks::Mode,
         ge: Blocks::Mode,
         mode_index: ModeIndex::Last,
-        // FEMBeam lists one triangle, but its reader mirrors none: of J it would lose the products of inertia
-        // above the diagonal.
+        // FEMBeam lists one triangle, but its reader mirrors none: the products of inertia above the diagonal
+        // of J would be lost.
         triangle: false,
         modal_name: ModalName::Absent,
         exponent: 'E',
@@ -132,10 +133,10 @@ pub(crate) const DIALECTS: [Dialect; 5] = [
     EMBS,
 ];
 
-/// EMBSlib (Modelica, github.com/vwaurich/EMBS_ModelicaLib), by the source of its reader, `ReadSID_C.h` of 2022-06-30.
-/// EMBSlib knows the letter D alone in exponents, holds five digits of a whole number and 511 bytes of a line, and takes a
-/// line for the head of an array wherever one of mdCM, J, Ct, Cr, Me, Gr, Ge, Oe, ksigma, Ke, De, frame, refmod
-/// stands in it.
+/// EMBSlib (Modelica, github.com/vwaurich/EMBS_ModelicaLib), from the source of its reader, `ReadSID_C.h` of
+/// 2022-06-30. EMBSlib accepts the letter D only in exponents, five digits of an integer and 511 bytes of a
+/// line. It takes any line that contains one of mdCM, J, Ct, Cr, Me, Gr, Ge, Oe, ksigma, Ke, De, frame,
+/// refmod for the head of an array.
 pub(crate) const EMBS: Dialect = Dialect {
     name: "embs",
     gr: Blocks::Mode,
@@ -147,6 +148,6 @@ pub(crate) const EMBS: Dialect = Dialect {
     ..FEMBS
 };
 
-/// Their names.
+/// Names of all dialects.
 pub(crate) const NAMES: [&str; 5] =
     [DIALECTS[0].name, DIALECTS[1].name, DIALECTS[2].name, DIALECTS[3].name, DIALECTS[4].name];

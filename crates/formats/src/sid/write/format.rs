@@ -1,4 +1,4 @@
-//! SID_FEM as an export format: the file around its arrays, and what it cannot hold.
+//! SID_FEM as an export format: the file around its arrays, and its losses.
 
 use super::arrays::{StiffenedFrame, modal, places};
 use super::dialect::{DIALECTS, Dialect, EMBS, Limits, ModalName, NAMES};
@@ -13,7 +13,7 @@ use flexbody_body::invariants::CauchySchwarz;
 use flexbody_model::{LoadKind, UnitLoad};
 
 /// SID_FEM text (Wallrapp, Standard Input Data of flexible members in multibody systems, 1993). The equations
-/// of SID have the inertia of a body to first order in q; the file has every number of the exact ones.
+/// of SID hold the inertia of a body to first order in q; every number in the file is exact.
 pub(crate) struct Sid;
 
 impl ExportFormat for Sid {
@@ -50,7 +50,7 @@ impl ExportFormat for Sid {
             general_w3: Held,
             separate_w2: Held,
             geometric_stiffness: geometric_stiffness(body, holds),
-            // Written as geometric stiffness is.
+            // The stiffness of inertia is written like geometric stiffness.
             inertia_stiffness: Held,
             damping: Held,
             shapes: Held,
@@ -107,15 +107,16 @@ impl ExportFormat for Sid {
     }
 }
 
-/// Returns the dialect of an export. Names that are none are refused before.
+/// Returns the dialect of an export. Unknown names were rejected before.
 fn chosen(options: &ExportOptions) -> &'static Dialect {
     let name = options.dialect.as_deref().unwrap_or(DIALECTS[0].name);
     DIALECTS.iter().find(|dialect| dialect.name == name).unwrap_or(&DIALECTS[0])
 }
 
-/// The Coriolis force on the frame of modes that move the centre of mass, which EMBSlib leaves out.
+/// Returns the holding of the Coriolis force on the frame of modes that move the centre of mass, which
+/// EMBSlib omits.
 fn coriolis_of_frame(body: &FlexBody) -> Holding {
-    /// Share of a bound that is rounding.
+    /// Share of the bound that counts as rounding.
     const ROUNDING: f64 = 1e-9;
     let bound = CauchySchwarz::of(body.invariants());
     let c1 = body.invariants().c1();
@@ -129,13 +130,13 @@ fn coriolis_of_frame(body: &FlexBody) -> Holding {
     }))
 }
 
-/// True if frames have the numbers 1, 2, ... in place of those of nodes and reference points.
+/// Returns true if frames are numbered 1, 2, ... instead of by node and reference point.
 fn are_counted(places: &[StiffenedFrame], dialect: &Dialect) -> bool {
     let beyond = |largest: i64| places.iter().any(|place| !(1..=largest).contains(&place.frame.id));
     dialect.largest_frame.is_some_and(beyond)
 }
 
-/// Returns the table of the frames: number in the file, number of the node, name of the interface, place.
+/// Returns the table of the frames: number in the file, number of the node, name of the interface, position.
 fn frame_table(places: &[StiffenedFrame]) -> String {
     let row = |(i, place): (usize, &StiffenedFrame)| {
         let [x, y, z] = place.frame.position;
@@ -151,7 +152,7 @@ fn file(body: &FlexBody, places: &[StiffenedFrame], dialect: &Dialect) -> String
     let mut text = Text::new(dialect, nf);
     let mut head = format!("{:5}{nf:5}    :No. nodes, No. modes:{}", places.len(), comment(body, dialect));
     if let Some(Limits { first_line, .. }) = dialect.limits {
-        // With the end of the line it fills the buffer of the reader.
+        // Leaves one byte for the end of the line in the buffer of the reader.
         let whole = |end: &usize| head.is_char_boundary(*end);
         head.truncate((0..first_line.min(head.len() + 1)).rev().find(whole).unwrap_or(0));
     }
@@ -179,14 +180,15 @@ fn file(body: &FlexBody, places: &[StiffenedFrame], dialect: &Dialect) -> String
     text.out
 }
 
-/// A name as one word without a sign of equality, which readers take for the end of a key; none of a body
-/// without a name.
+/// Returns a name as one word without a sign of equality, which readers take for the end of a key; empty for
+/// a body without a name.
 fn word(name: &str) -> String {
     let words = name.split(|c: char| c.is_whitespace() || c.is_control() || c == '=');
     words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
 }
 
-/// What the rest of the file does not tell: dialect, units, what Oe1 holds beside W2, name.
+/// Returns the facts that the rest of the file does not contain: dialect, units, contents of Oe1 other than
+/// W2, name.
 fn comment(body: &FlexBody, dialect: &Dialect) -> String {
     let mut facts =
         vec![concat!("flexbody ", env!("CARGO_PKG_VERSION")).to_owned(), format!("dialect {}", dialect.name)];

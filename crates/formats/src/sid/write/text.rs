@@ -1,16 +1,16 @@
-//! The text of SID_FEM: objects, their entries and numbers.
+//! Text of SID_FEM: objects, their entries and numbers.
 
 use super::dialect::Dialect;
 use faer::Mat;
 use std::fmt::Write;
 
-/// The reason why `write!` cannot fail here.
+/// Reason why `write!` cannot fail here.
 const TO_A_STRING: &str = "writing to a String cannot fail";
 
-/// How the entries of an object are to be understood.
+/// Meaning of the listed entries of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Structure {
-    /// All are zero.
+    /// All entries are zero.
     Zero,
     Symmetric,
     Full,
@@ -20,9 +20,9 @@ pub(crate) enum Structure {
 pub(crate) struct Taylor {
     pub(crate) name: &'static str,
     pub(crate) structure: Structure,
-    /// nrow x ncol.
+    /// Constant part (nrow x ncol).
     pub(crate) m0: Mat<f64>,
-    /// nq of nrow x ncol; none of an object of order 0.
+    /// Linear parts, nq matrices of nrow x ncol; `None` for an object of order 0.
     pub(crate) m1: Option<Vec<Mat<f64>>>,
 }
 
@@ -49,7 +49,7 @@ impl Taylor {
     }
 }
 
-/// A file as it grows.
+/// Text of a file under construction.
 pub(crate) struct Text<'d> {
     pub(crate) out: String,
     dialect: &'d Dialect,
@@ -61,18 +61,19 @@ impl<'d> Text<'d> {
         Self { out: String::new(), dialect, nq }
     }
 
-    /// A line that is no assignment.
+    /// Writes a line that is no assignment.
     pub(crate) fn line(&mut self, indent: usize, line: &str) {
         writeln!(self.out, "{:indent$}{line}", "").expect(TO_A_STRING);
     }
 
-    /// `key = value`, the signs of equality below each other.
+    /// Writes `key = value` with aligned signs of equality.
     pub(crate) fn value(&mut self, indent: usize, key: &str, value: impl std::fmt::Display) {
         let width = 48usize.saturating_sub(indent);
         writeln!(self.out, "{:indent$}{key:width$}= {value}", "").expect(TO_A_STRING);
     }
 
-    /// 17 significant digits with an exponent of at least two: ` 1.2345678901234567D+00`.
+    /// Returns a number with 17 significant digits and an exponent of at least two digits:
+    /// ` 1.2345678901234567D+00`.
     pub(crate) fn number(&self, value: f64) -> String {
         let text = format!("{value: >23.16e}");
         let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
@@ -80,7 +81,7 @@ impl<'d> Text<'d> {
         format!("{mantissa}{}{sign}{digits:0>2}", self.dialect.exponent)
     }
 
-    /// An object with its entries other than zero.
+    /// Writes an object with its nonzero entries.
     pub(crate) fn taylor(&mut self, indent: usize, object: &Taylor) {
         let Taylor { name, structure, m0, m1 } = object;
         self.line(indent, name);

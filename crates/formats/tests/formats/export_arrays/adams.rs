@@ -1,4 +1,4 @@
-//! `adams-invariants`: the file is complete by its own conventions, in both dialects.
+//! Format `adams-invariants`: the file is complete by its own conventions, in both dialects.
 
 use flexbody_formats::export::{Points, frames};
 use nalgebra::Matrix3;
@@ -13,7 +13,7 @@ fn numbers(value: &Value, flat: &mut Vec<f64>) {
     }
 }
 
-/// The values of a quantity and its extents; none where the body does not hold it.
+/// Returns the values of a quantity and its extents; `None` if the body does not hold it.
 fn quantity(document: &Value, name: &str) -> Option<(Vec<f64>, Vec<usize>)> {
     let all = document["quantities"].as_array().expect("a list");
     let one = all.iter().find(|one| one["name"] == name).expect("a quantity");
@@ -27,7 +27,7 @@ fn quantity(document: &Value, name: &str) -> Option<(Vec<f64>, Vec<usize>)> {
     Some((values, shape))
 }
 
-/// I7 - sum_j (I8_j + I8_j') q_j - sum_jk I9_jk q_j q_k against I0 + W1 Q + Q'W2 Q.
+/// Compares I7 - sum_j (I8_j + I8_j') q_j - sum_jk I9_jk q_j q_k with I0 + W1 Q + Q'W2 Q.
 #[test]
 fn the_inertia_of_a_deformed_body_follows_by_the_formula_of_the_file() {
     let mut random = Random(5);
@@ -104,7 +104,7 @@ fn the_other_invariants_are_those_of_the_body_bit_by_bit() {
     }
 }
 
-/// A heading, and rows of these numbers.
+/// Asserts that a heading and rows of these numbers follow.
 fn follows<'a>(lines: &mut impl Iterator<Item = &'a str>, heading: &str, columns: usize, values: &[f64]) {
     assert_eq!(lines.next(), Some(heading));
     for row in values.chunks(columns) {

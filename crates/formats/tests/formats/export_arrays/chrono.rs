@@ -1,5 +1,5 @@
-//! `chrono`: K, M and damping for boundary and internal nodes, and the gravity that Chrono makes of them. The test
-//! reduces the files as `ChModalAssembly` does and loads them as its automatic gravity does.
+//! Format `chrono`: K, M and damping for boundary and internal nodes, and the gravity that Chrono forms from
+//! them. The test reduces the files like `ChModalAssembly` and loads them with its automatic gravity.
 
 use super::matrices::{Matrices, assert_is_the_body, of_rows, rigid};
 use super::readers::matrix_market;
@@ -18,10 +18,10 @@ use oracle::general::dense;
 use oracle::mesh::{Assembly, Mesh, entries};
 use std::collections::BTreeMap;
 
-/// An export as it lies on disk.
+/// The files of an export.
 struct Files {
     remark: String,
-    /// Places of the boundary nodes, a row each.
+    /// Positions of the boundary nodes, one per row.
     origins: DMatrix<f64>,
     matrices: BTreeMap<String, DMatrix<f64>>,
 }
@@ -46,18 +46,18 @@ impl Files {
         Self { remark, origins, matrices: done.beside.iter().map(file).collect() }
     }
 
-    /// The number behind these words of the remark.
+    /// Returns the number after these words of the remark.
     fn stated(&self, before: &str, after: &str) -> usize {
         let (_, rest) = self.remark.split_once(before).expect("its words");
         rest.split_once(after).map_or(rest, |(number, _)| number).parse().expect("a number")
     }
 }
 
-/// An assembly after `DoModalReduction` with Craig-Bampton and without static correction: boundary coordinates, then
-/// modes with a mass of one.
+/// An assembly after `DoModalReduction` with Craig-Bampton and without static correction: boundary
+/// coordinates, then modes of unit mass.
 struct Reduced {
     n_boundary: usize,
-    /// Full coordinates for the reduced ones.
+    /// Transformation from reduced to full coordinates.
     basis: DMatrix<f64>,
     full_mass: DMatrix<f64>,
     mass: DMatrix<f64>,
@@ -72,11 +72,11 @@ impl Reduced {
         let ni = m.nrows() - nb;
         assert_eq!((ni % 6, ni / 6), (0, files.stated("then ", " internal nodes")));
         let inner = |a: &DMatrix<f64>| a.view((nb, nb), (ni, ni)).into_owned();
-        // The eigensolvers of Chrono take fewer modes than coordinates, and a positive mass.
+        // The eigensolvers of Chrono require fewer modes than coordinates, and a positive definite mass.
         assert!(n_modes < ni && inner(m).cholesky().is_some());
         let held = inner(k).cholesky().expect("internal nodes are held by the boundary");
         let static_modes = -held.solve(&k.view((nb, 0), (ni, nb)).into_owned());
-        // Fixed-interface modes by the largest 1 / lambda: the lowest come first.
+        // Fixed-interface modes by decreasing 1 / lambda: the lowest come first.
         let l = held.l();
         let half = l.solve_lower_triangular(&inner(m)).expect("regular");
         let inverse = l.solve_lower_triangular(&half.transpose()).expect("regular");
@@ -97,8 +97,8 @@ impl Reduced {
         Self { n_boundary: nb, mass: of(m), stiffness: of(k), full_mass: m.clone(), damping, basis }
     }
 
-    /// Generalised forces of the automatic gravity: M times g on the translations of all nodes, of which Chrono keeps
-    /// the rows of translations.
+    /// Returns the generalised forces of automatic gravity: M times g on the translations of all nodes, of
+    /// which Chrono keeps the rows of translations.
     fn gravity(&self, g: &Vector3<f64>) -> DVector<f64> {
         let on_nodes =
             DVector::from_fn(self.full_mass.nrows(), |i, _| if i % 6 < 3 { g[i % 6] } else { 0.0 });
@@ -107,15 +107,15 @@ impl Reduced {
         self.basis.transpose() * force
     }
 
-    /// Displacements under gravity of a body whose first node is clamped.
+    /// Returns the displacements under gravity of a body with its first node clamped.
     fn hanging(&self, g: &Vector3<f64>) -> DVector<f64> {
         let n = self.stiffness.nrows() - 6;
         let free = self.stiffness.view((6, 6), (n, n)).into_owned();
         free.cholesky().expect("clamped").solve(&self.gravity(g).rows(6, n).into_owned())
     }
 
-    /// Coordinates of the body for the reduced ones: those of the interfaces, then the amplitudes that the
-    /// documentation of the format finds in the internal nodes.
+    /// Returns the transformation from reduced coordinates to coordinates of the body: those of the
+    /// interfaces, then the amplitudes that the internal nodes represent by the documentation of the format.
     fn of_body(&self, n_modes: usize, mass: f64) -> DMatrix<f64> {
         let nb = self.n_boundary;
         DMatrix::from_fn(nb + n_modes, self.basis.ncols(), |i, j| {
@@ -185,7 +185,7 @@ fn automatic_gravity_of_chrono_is_that_of_the_body() {
                 (force.rows(3, 3) - moment.cross(&g)).amax() <= 1e-9 * size * reach,
                 "{name}: torque {g}"
             );
-            // The forces on all coordinates, each beside what it does in rigid motion.
+            // Forces on all coordinates, each compared with its effect in rigid motion.
             let load = DVector::from_fn(rigid.nrows(), |i, _| (0..3).map(|a| rigid[(i, a)] * g[a]).sum());
             let expected = to_body.transpose() * (&own * load);
             let found = reduced.gravity(&g);
@@ -197,7 +197,7 @@ fn automatic_gravity_of_chrono_is_that_of_the_body() {
     }
 }
 
-/// A cantilever of steel of 1 m, in m, kg, s or, with a `per_metre` of 1000, in mm, t, s.
+/// A steel cantilever of 1 m, in m, kg, s or, with `per_metre` = 1000, in mm, t, s.
 struct Cantilever {
     assembly: Assembly,
     size: [f64; 3],
@@ -218,7 +218,7 @@ impl Cantilever {
         Self { assembly, size }
     }
 
-    /// Indices of the nodes at a place along the axis.
+    /// Returns the indices of the nodes at a position along the axis.
     fn section(&self, at: f64) -> Vec<usize> {
         let near = |x: &[f64; 3]| (x[0] - at).abs() < 1e-9 * self.size[0];
         (0..self.assembly.nodes.len()).filter(|&i| near(&self.assembly.nodes[i])).collect()
@@ -235,7 +235,8 @@ impl Cantilever {
         body_of(raw, BasisChoice::CraigBampton(CraigBampton), BodyFrame::Com)
     }
 
-    /// Displacement of the centre of the rigid tip under gravity by the matrices of all nodes, the root clamped.
+    /// Returns the displacement of the centre of the rigid tip under gravity from the matrices of all nodes,
+    /// with the root clamped.
     fn tip(&self, g: &Vector3<f64>) -> Vector3<f64> {
         let [root, tip] = [self.section(0.0), self.section(self.size[0])];
         let nodes = &self.assembly.nodes;

@@ -1,4 +1,4 @@
-//! `json` and `npz` hold every array and every attribute of the flex-body file, bit by bit.
+//! Formats `json` and `npz` hold every array and every attribute of the flex-body file bit by bit.
 
 use flexbody_body::flex_body::{FlexBody, Storage};
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
@@ -9,14 +9,14 @@ use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::io::Read;
 
-/// Shape and bits of an array; integers and floats differ.
+/// Shape and bits of an array; integers and floats are distinct.
 #[derive(Debug, Clone, PartialEq)]
 enum Array {
     Floats(Vec<usize>, Vec<u64>),
     Ints(Vec<usize>, Vec<i64>),
 }
 
-/// Arrays and what is said about them, and attributes of groups, by path.
+/// Arrays with their descriptions, and attributes of groups, by path.
 #[derive(Debug, Default, PartialEq)]
 struct Contents {
     arrays: BTreeMap<String, Array>,
@@ -26,8 +26,8 @@ struct Contents {
 
 const ABOUT: [&str; 3] = ["symbol", "units", "description"];
 
-/// What the flex-body file of the body holds, read by HDF5 alone, and the arrays in it that have 32-bit
-/// floats.
+/// Returns the contents of the flex-body file of the body, read by HDF5 alone, and the names of its arrays of
+/// 32-bit floats.
 fn of_hdf5(body: &FlexBody) -> (Contents, Vec<String>) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("body.flex.h5");
@@ -36,7 +36,7 @@ fn of_hdf5(body: &FlexBody) -> (Contents, Vec<String>) {
     let mut found = Contents::default();
     let mut short = Vec::new();
     walk(&file, "", &mut found, &mut short);
-    // Digests are of the file, not of the body.
+    // Digests belong to the file, not to the body.
     for digest in ["@digests", "@sha256"] {
         assert!(found.attributes.remove(digest).is_some(), "{digest}");
     }
@@ -81,7 +81,7 @@ fn attribute(place: &hdf5::Location, name: &str) -> Value {
     }
 }
 
-/// Attributes and descriptions out of the JSON of either format.
+/// Returns attributes and descriptions from the JSON of either format.
 fn described(document: &Value) -> Contents {
     let object = |value: &Value| -> Map<String, Value> { value.as_object().expect("an object").clone() };
     let mut found = Contents::default();
@@ -115,7 +115,7 @@ fn of_json(text: &[u8]) -> Contents {
     found
 }
 
-/// Nested as the shape says, not otherwise.
+/// Flattens nested arrays and asserts that the nesting agrees with the shape.
 fn flatten(value: &Value, shape: &[usize], flat: &mut Vec<Value>) {
     match shape {
         [] => flat.push(value.clone()),
@@ -127,7 +127,7 @@ fn flatten(value: &Value, shape: &[usize], flat: &mut Vec<Value>) {
     }
 }
 
-/// A strict reader of stored `.npy` members, version 1.0.
+/// Reads stored `.npy` members of version 1.0 strictly.
 fn of_npz(bytes: &[u8]) -> Contents {
     let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes)).expect("an archive");
     let mut found = Contents::default();
@@ -187,7 +187,7 @@ fn assert_whole(name: &str, body: &FlexBody) {
     for (format, read) in [("json", of_json as fn(&[u8]) -> Contents), ("npz", of_npz)] {
         let bytes = file(body, format, None);
         let mut found = read(&bytes);
-        // What follows from rounded arrays is not rounded again as in the file.
+        // Arrays derived from rounded arrays are rounded again in the file only.
         for array in &short {
             let Some(Array::Floats(_, bits)) = found.arrays.get_mut(array) else { panic!("{name}: {array}") };
             bits.iter_mut().for_each(|bits| *bits = f64::from(f64::from_bits(*bits) as f32).to_bits());
@@ -205,7 +205,7 @@ fn every_entry_of_every_fixture_body_is_there_bit_by_bit() {
     }
 }
 
-/// Names with slashes, quotes and control characters, subnormal and huge numbers.
+/// Covers names with slashes, quotes and control characters, and subnormal and huge numbers.
 #[test]
 fn bodies_with_any_names_and_numbers_are_held_too() {
     for seed in 0..40 {
@@ -213,7 +213,7 @@ fn bodies_with_any_names_and_numbers_are_held_too() {
     }
 }
 
-/// Readers in other languages count on the order: that of the file.
+/// Readers in other languages rely on the order of the file.
 #[test]
 fn interfaces_keep_their_order() {
     let (_, body) = bodies().iter().find(|(name, _)| name == "satellite").expect("a fixture");

@@ -1,4 +1,4 @@
-//! What each of the formats says that it cannot hold, and that equal bodies give equal bytes.
+//! Losses reported by each format; equal bodies give equal bytes.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::flex_body::FlexBody;
@@ -11,7 +11,7 @@ fn named(name: &str) -> &'static FlexBody {
     &bodies().iter().find(|(own, _)| own == name).unwrap_or_else(|| panic!("{name}")).1
 }
 
-/// Beginnings of the sentences, all of them, in their order.
+/// Asserts the beginnings of all reported losses in their order.
 fn assert_losses(body: &str, format: &str, beginnings: &[&str]) {
     let told = losses(named(body), format);
     let fits = told.len() == beginnings.len()
@@ -67,7 +67,7 @@ fn a_loss_needs_a_word_and_is_told_either_way() {
     assert_eq!(told.iter().map(|diagnostic| diagnostic.code()).collect::<Vec<Code>>(), [Code::ExportLost; 2]);
 }
 
-/// Bodies that are valid but of no sense are written or refused, in every dialect, and never panic.
+/// Valid but unphysical bodies are written or refused in every dialect, and never cause a panic.
 #[test]
 #[ignore = "slow"]
 fn every_body_in_every_dialect_is_written_or_refused_and_always_the_same() {

@@ -1,4 +1,5 @@
-//! `simscape`: K, M and damping in the motions of the interface frames; bodies that have none there, of `chrono` too.
+//! Format `simscape`: K, M and damping in the motions of the interface frames; refused bodies, for `chrono`
+//! too.
 
 use super::readers::{Variable, mat5};
 use flexbody_base::diagnostic::Code;
@@ -20,7 +21,7 @@ pub(super) fn of_rows(rows: &[Vec<f64>]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), rows.first().map_or(0, Vec::len), |i, j| rows[i][j])
 }
 
-/// Matrices, and texts.
+/// Returns the matrices and the texts of a file.
 fn of_mat5(bytes: &[u8]) -> (Matrices, BTreeMap<String, Vec<String>>) {
     let (mut matrices, mut texts) = (Matrices::new(), BTreeMap::new());
     for (name, variable) in mat5(bytes) {
@@ -46,7 +47,7 @@ fn of_hdf5(bytes: &[u8]) -> (Matrices, BTreeMap<String, Vec<String>>) {
                 matrices.insert(name, DMatrix::from_row_slice(rows, columns, &values));
             }
             _ => {
-                // Octave stops at texts of variable length and of UTF-8.
+                // Octave cannot read texts of variable length or in UTF-8.
                 let kind = dataset.dtype().and_then(|kind| kind.to_descriptor()).expect("a type");
                 assert!(matches!(kind, TypeDescriptor::FixedAscii(_)), "{name}: {kind}");
                 let text = dataset.read_scalar::<FixedAscii<1024>>().expect("a text");
@@ -57,7 +58,7 @@ fn of_hdf5(bytes: &[u8]) -> (Matrices, BTreeMap<String, Vec<String>>) {
     (matrices, texts)
 }
 
-/// Rigid motion about the origin of the body frame in the coordinates of frames at `origins`.
+/// Returns the rigid motions about the origin of the body frame in the coordinates of frames at `origins`.
 pub(super) fn rigid(origins: &DMatrix<f64>, size: usize) -> DMatrix<f64> {
     DMatrix::from_fn(size, 6, |row, column| {
         let (frame, k) = (row / 6, row % 6);
@@ -79,7 +80,7 @@ pub(super) fn rigid(origins: &DMatrix<f64>, size: usize) -> DMatrix<f64> {
     })
 }
 
-/// What K, M and D of a file must be, whatever format it has.
+/// Asserts the required properties of K, M and D of a file of any format.
 pub(super) fn assert_is_the_body(name: &str, body: &FlexBody, matrices: &Matrices) {
     let (k, m, origins) = (&matrices["K"], &matrices["M"], &matrices["P0"]);
     let size = k.nrows();
@@ -103,7 +104,7 @@ pub(super) fn assert_is_the_body(name: &str, body: &FlexBody, matrices: &Matrice
             "{name}: rigid motion {i} is strained"
         );
     }
-    // The modes of the body, as coordinates: B'K B = diag(lambda), B'M B = I, B'D B = D_ff.
+    // The modes of the body in coordinates: B'K B = diag(lambda), B'M B = I, B'D B = D_ff.
     let b = dense(&body.coordinates().expect("jointed").of_modes);
     let (stiffness, mass) = (b.transpose() * k * &b, b.transpose() * m * &b);
     let d = matrices.get("C").map(|c| b.transpose() * c * &b);
@@ -160,7 +161,7 @@ fn simscape_has_the_matrices_of_the_body_under_the_names_of_its_example_in_both_
     }
 }
 
-/// Frames outside ASCII and of different lengths.
+/// Covers names of frames outside ASCII and of different lengths.
 #[test]
 fn names_of_frames_are_kept() {
     let mut raw = raw_fixture("robot_link");

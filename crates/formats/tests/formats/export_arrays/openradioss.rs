@@ -1,5 +1,5 @@
-//! `openradioss`: the data file of /FXBODY, read as `hm_read_fxb.F` does, its energies and forces put
-//! together as the engine does.
+//! Format `openradioss`: the data file of /FXBODY, read like `hm_read_fxb.F`, with energies and forces
+//! assembled like in the engine.
 
 use super::readers::Deck;
 use flexbody_base::diagnostic::Code;
@@ -13,7 +13,7 @@ use oracle::general::raw_fixture;
 use oracle::mesh::entries;
 use oracle::random::Random;
 
-/// Eleven digits, of negative numbers with two-digit exponents.
+/// Relative rounding of eleven digits, the least of all numbers: negative ones with two-digit exponents.
 const DIGITS: f64 = 1e-10;
 
 struct Fxb {
@@ -22,7 +22,7 @@ struct Fxb {
     rotation: Matrix3<f64>,
     highest: f64,
     damping: Option<[f64; 2]>,
-    /// Mode by mode, node by node.
+    /// Rigid modes, node by node.
     rigid: Vec<Vec<Vector6<f64>>>,
     local: Vec<Vec<Vector6<f64>>>,
     mass: Vec<f64>,
@@ -75,31 +75,31 @@ fn read(bytes: &[u8]) -> Fxb {
 }
 
 impl Fxb {
-    /// MC of `FXBMAJP2`: the row-wise rotation matrix times the blocks.
+    /// Returns MC of `FXBMAJP2`: the rotation matrix row by row times the blocks.
     fn mass_at(&self, rotation: &Matrix3<f64>) -> DMatrix<f64> {
         (0..9).map(|i| &self.coupled_mass[i] * rotation[(i / 3, i % 3)]).sum()
     }
 
-    /// RC of `FXBMAJP2`: its transpose times the blocks.
+    /// Returns RC of `FXBMAJP2`: the transposed rotation matrix times the blocks.
     fn stiffness_at(&self, rotation: &Matrix3<f64>) -> DMatrix<f64> {
         (0..9).map(|i| &self.coupled_stiffness[i] * rotation[(i % 3, i / 3)]).sum()
     }
 
-    /// Rates of the rigid modes for the velocity of the origin and a spin, both in space: those of the ends
-    /// of the axes, of their origin, and the spin where there are modes for it.
+    /// Returns the rates of the rigid modes for the velocity of the origin and a spin, both in space:
+    /// velocities of the ends of the axes and of their origin, and the spin if there are modes for it.
     fn rates(&self, rotation: &Matrix3<f64>, velocity: &Vector3<f64>, spin: &Vector3<f64>) -> DVector<f64> {
         let ends = (0..3).map(|axis| velocity + spin.cross(&rotation.column(axis)));
         let sets: Vec<Vector3<f64>> = ends.chain([*velocity, *spin]).collect();
         DVector::from_fn(self.rigid.len(), |l, _| sets[l / 3][l % 3])
     }
 
-    /// `ECIN` of `FXBODVP1`.
+    /// Returns `ECIN` of `FXBODVP1`.
     fn kinetic_energy(&self, rotation: &Matrix3<f64>, rates: &DVector<f64>, qd: &DVector<f64>) -> f64 {
         let local: f64 = self.mass.iter().zip(qd).map(|(m, v)| m * v * v).sum();
         0.5 * rates.dot(&(&self.rigid_mass * rates)) + rates.dot(&(self.mass_at(rotation) * qd)) + 0.5 * local
     }
 
-    /// Velocities of a node, of `FXBODVP2`.
+    /// Returns the velocities of a node as in `FXBODVP2`.
     fn velocity(
         &self,
         node: usize,
@@ -118,7 +118,7 @@ fn matrix(a: &faer::Mat<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
 }
 
-/// A rotation, velocities and rates of the modes: anything in space, in its plane a body of the plane.
+/// Rotation, velocities and modal rates: arbitrary in space, in its plane for a plane body.
 struct Motion {
     rotation: Matrix3<f64>,
     velocity: Vector3<f64>,
@@ -126,7 +126,7 @@ struct Motion {
     qd: DVector<f64>,
 }
 
-/// Every share of the energy has the same size.
+/// Returns a motion in which every part of the energy has the same size.
 fn motion(random: &mut Random, body: &FlexBody) -> Motion {
     let (invariants, nf) = (body.invariants(), body.n_modes());
     let size = invariants.inertia().norm().sqrt();
@@ -159,7 +159,7 @@ fn the_kinetic_energy_of_any_motion_of_the_undeformed_body_is_that_of_the_body()
             let Motion { rotation, velocity, omega, qd } = motion(&mut random, body);
             let rates = fxb.rates(&rotation, &(rotation * velocity), &(rotation * omega));
             let coupling = velocity.dot(&omega.cross(&invariants.first_moment()));
-            // Mass-normalised: what is beside the diagonal is the rounding of the body.
+            // Mass-normalised: entries off the diagonal are the rounding of the body.
             assert!(
                 (&m_ff - DMatrix::identity(qd.len(), qd.len())).amax() <= body.storage().rounding().max(1e-9)
             );
@@ -169,8 +169,8 @@ fn the_kinetic_energy_of_any_motion_of_the_undeformed_body_is_that_of_the_body()
                 + coupling
                 + 0.5 * omega.dot(&(invariants.inertia() * omega))
                 + modes;
-            // The four points are as far from the body as its axes are long: what they add up to is larger
-            // than the energy.
+            // The four points are as far from the body as its axes are long, so that the terms of the sum
+            // exceed the energy.
             let (rates_size, qd_size) = (rates.abs(), qd.abs());
             let parts = rates_size.dot(&(fxb.rigid_mass.abs() * &rates_size))
                 + rates_size.dot(&(fxb.mass_at(&rotation).abs() * &qd_size))
@@ -212,8 +212,8 @@ fn nodes_move_with_the_body_and_its_modes() {
     }
 }
 
-/// Each by itself, whatever its size: half a unit of the eleventh digit, or of the tenth where exponents have
-/// three.
+/// Each number is rounded by itself: half a unit of the eleventh digit, or of the tenth for three-digit
+/// exponents.
 #[test]
 fn every_number_is_rounded_to_its_own_digits() {
     let wild = (0..30).map(|seed| {
@@ -227,7 +227,7 @@ fn every_number_is_rounded_to_its_own_digits() {
         let done = match exported(&body, "openradioss", None) {
             Ok(done) => done,
             Err(error) => {
-                // The products of huge numbers, of bodies of no sense.
+                // Products of huge numbers in random bodies overflow.
                 assert!(
                     error.diagnostics()[0].message().ends_with("the range of double precision"),
                     "{error}"
@@ -250,8 +250,8 @@ fn every_number_is_rounded_to_its_own_digits() {
     assert!((1..20).contains(&refused), "{refused} of 30");
 }
 
-/// A spinning body pulls its modes by -[w1 I, w2 I, w3 I] W1'/2 w: the accelerations of the ends of the axes
-/// make that of the file.
+/// A spinning body loads its modes with -[w1 I, w2 I, w3 I] W1'/2 w; in the file the accelerations of the
+/// ends of the axes give this load.
 #[test]
 fn the_centrifugal_load_of_the_modes_is_that_of_w1() {
     let mut random = Random(3);
@@ -308,8 +308,7 @@ fn stiffness_damping_and_frequency_are_those_of_the_body_and_rigid_motion_strain
     assert_eq!(damped, 6, "the bodies with Rayleigh damping");
 }
 
-/// The oracle that knows no invariants: products of nodal fields with M and K of the model, in model axes at
-/// rest.
+/// Oracle without invariants: products of nodal fields with M and K of the model, in model axes at rest.
 #[test]
 fn products_are_those_of_the_finite_element_matrices() {
     for name in ["cube_hex8", "connecting_rod", "satellite"] {
@@ -355,7 +354,7 @@ fn products_are_those_of_the_finite_element_matrices() {
                     }
                 }
             };
-        // Sums over all nodes round by more than one number does.
+        // Sums over all nodes have more rounding than a single number.
         close(
             &fxb.rigid_mass,
             &rigid.tr_mul(&m_rigid),
@@ -365,7 +364,7 @@ fn products_are_those_of_the_finite_element_matrices() {
         let coupled = |i: usize, j: usize| 1e-9 * of_rigid[i] * of_local[j];
         close(&fxb.mass_at(&rotation), &rigid.tr_mul(&m_local), &coupled, "coupled mass");
         let k_local = times(&raw.stiffness.matrix, &local);
-        // |psi' (K phi - lambda M phi)| <= |psi| |residual|, of vectors.
+        // |psi' (K phi - lambda M phi)| <= |psi| |residual| for vectors.
         let residual: Vec<f64> = (0..local.ncols())
             .map(|j| (k_local.column(j) - m_local.column(j) * body.modes().eigenvalue[j]).norm())
             .collect();

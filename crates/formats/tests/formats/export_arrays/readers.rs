@@ -1,9 +1,9 @@
-//! Strict readers of the layouts, written from their descriptions.
+//! Strict readers of the file formats, written from their descriptions.
 
 use std::collections::BTreeMap;
 use std::str::Lines;
 
-/// A file in fixed columns, without the lines that `FXRLINE` passes over.
+/// A file in fixed columns, without the lines that `FXRLINE` skips.
 pub struct Deck<'a>(Lines<'a>);
 
 impl<'a> Deck<'a> {
@@ -16,7 +16,7 @@ impl<'a> Deck<'a> {
         self.0.find(|line| !line.starts_with(['#', '$']) && !line.trim().is_empty()).expect("a line")
     }
 
-    /// So many columns to a value, no more and no fewer values than asked for.
+    /// Reads values of a fixed width and asserts that their count is exactly the requested one.
     fn fields<T>(
         &mut self,
         count: usize,
@@ -34,12 +34,12 @@ impl<'a> Deck<'a> {
         values
     }
 
-    /// `(nI8)`.
+    /// Reads integers in the format `(nI8)`.
     pub fn integers(&mut self, count: usize, per_line: usize) -> Vec<i64> {
         self.fields(count, per_line, 8, |field| field.parse().expect("an integer"))
     }
 
-    /// `(5F16.0)`.
+    /// Reads numbers in the format `(5F16.0)`.
     pub fn numbers(&mut self, count: usize) -> Vec<f64> {
         self.fields(count, 5, 16, fortran)
     }
@@ -49,8 +49,8 @@ impl<'a> Deck<'a> {
     }
 }
 
-/// Input of Fortran's F editing: a decimal point, and an exponent that is a signed integer, with or without a
-/// letter.
+/// Parses a number in the F format of Fortran: with a decimal point, and an exponent that is a signed integer
+/// with or without a letter.
 fn fortran(field: &str) -> f64 {
     assert!(field.contains('.'), "`{field}`");
     let after = field.find('.').expect("just found");
@@ -63,7 +63,8 @@ fn fortran(field: &str) -> f64 {
     }
 }
 
-/// A matrix in Matrix Market coordinate format, all entries stored, none twice: rows by rows.
+/// Returns a matrix in Matrix Market coordinate format, row by row; all entries are stored and none is
+/// repeated.
 pub fn matrix_market(bytes: &[u8]) -> Vec<Vec<f64>> {
     let text = std::str::from_utf8(bytes).expect("ASCII");
     let mut lines = text.lines();
@@ -87,12 +88,12 @@ pub fn matrix_market(bytes: &[u8]) -> Vec<Vec<f64>> {
 /// A variable of a MAT-file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Variable {
-    /// Rows by rows.
+    /// Row by row.
     Matrix(Vec<Vec<f64>>),
     Text(Vec<String>),
 }
 
-/// Variables of a MAT-file of version 5, little-endian, in their order.
+/// Returns the variables of a little-endian MAT-file of version 5 in their order.
 pub fn mat5(bytes: &[u8]) -> Vec<(String, Variable)> {
     assert!(bytes.starts_with(b"MATLAB 5.0 MAT-file"));
     assert_eq!(&bytes[116..128], b"\0\0\0\0\0\0\0\0\x00\x01IM");
@@ -116,7 +117,7 @@ pub fn mat5(bytes: &[u8]) -> Vec<(String, Variable)> {
         let name = String::from_utf8(name.to_vec()).expect("ASCII");
         let (kind, data) = element(&mut variable);
         assert!(variable.is_empty(), "{name}");
-        // Column by column.
+        // The data are stored column by column.
         let value = match (class, kind) {
             (6, 9) => {
                 assert_eq!(data.len(), 8 * rows * columns, "{name}");
@@ -144,7 +145,7 @@ pub fn mat5(bytes: &[u8]) -> Vec<(String, Variable)> {
     found
 }
 
-/// Type and data of the next element; what fills it up to eight bytes is zero.
+/// Returns type and data of the next element; its padding to eight bytes must be zero.
 fn element<'a>(rest: &mut &'a [u8]) -> (u32, &'a [u8]) {
     let word = |at: usize| u32::from_le_bytes(rest[at..at + 4].try_into().expect("four"));
     let (kind, start, length) = if word(0) >> 16 == 0 {
