@@ -129,7 +129,7 @@ pub mod dynamics {
 pub use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 pub use flexbody_base::error::{Error, ExitCode, Result};
 
-/// What `src/main.rs` and the command of the Python package run. No part of the interface.
+/// Entry points of `src/main.rs` and of the command of the Python package; not part of the public interface.
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod program {

@@ -1,4 +1,4 @@
-//! What the program asks of its process: limits that give errors instead of signals, and an end without
+//! The settings of the process: limits that give errors instead of signals, and an end without
 //! memory.
 #![allow(unsafe_code)] // an allocator, and calls of the C library that set limits of a process
 

@@ -51,10 +51,10 @@ fn doc_comments_are_whole_statements() {
     for path in sources() {
         let text = fs::read_to_string(&path).expect("a source");
         for (line, said) in openings(&text) {
-            let begins = |opening: &&str| {
-                said.strip_prefix(**opening).is_some_and(|rest| rest.starts_with([' ', ',', ':']))
+            let begins = |opening: &str| {
+                said.strip_prefix(opening).is_some_and(|rest| rest.starts_with([' ', ',', ':']))
             };
-            if OPENINGS.iter().any(|opening| begins(&opening)) {
+            if OPENINGS.iter().any(|opening| begins(opening)) {
                 wrong.push(format!("{}:{line}: {said}", path.display()));
             }
         }
@@ -66,7 +66,9 @@ fn doc_comments_are_whole_statements() {
 #[test]
 fn phrases_that_readers_stumbled_over_stay_out() {
     let mut wrong = Vec::new();
-    for path in sources().into_iter().filter(|path| !path.components().any(|part| part.as_os_str() == "oracle")) {
+    for path in
+        sources().into_iter().filter(|path| !path.components().any(|part| part.as_os_str() == "oracle"))
+    {
         let text = fs::read_to_string(&path).expect("a source");
         let shipped = text.split("#[cfg(test)]").next().unwrap_or_default();
         for (at, line) in shipped.lines().enumerate() {

@@ -16,6 +16,7 @@ mod interruption;
 mod jointed;
 mod json_output;
 mod kept_in_files;
+mod language;
 mod licences;
 mod limits;
 mod models;

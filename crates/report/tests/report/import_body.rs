@@ -314,7 +314,7 @@ fn a_file_that_breaks_an_identity_is_told_to_be_wrong() {
         .expect_err("a hundredth of the inertia of the modes");
     let told = error.to_string();
     assert!(error.has(Code::ForeignUnsound) && told.contains("the file states a body that breaks"), "{told}");
-    assert!(told.contains("write it anew") && !told.contains("report the model"), "{told}");
+    assert!(told.contains("write the file again") && !told.contains("report the model"), "{told}");
 }
 
 #[test]
