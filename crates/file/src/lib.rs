@@ -10,7 +10,6 @@
 
 #[cfg(feature = "hdf5")]
 mod assemble;
-#[cfg(feature = "hdf5")]
 mod contents;
 #[cfg(feature = "hdf5")]
 mod derived;
@@ -38,7 +37,6 @@ mod value;
 #[cfg(feature = "hdf5")]
 mod write;
 
-#[cfg(feature = "hdf5")]
 pub use contents::{NamedArray, NamedAttributes, Numbers, contents};
 pub use document::{format_markdown, format_schema};
 pub use flexbody_base::output::OutputSlot;

@@ -8,7 +8,6 @@
     clippy::unwrap_used
 )]
 
-#[cfg(feature = "hdf5")]
 pub mod reference;
 pub mod response;
 pub mod selection;
