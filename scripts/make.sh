@@ -3,7 +3,7 @@
 #
 #   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/codes.md, docs/format.md, schemas
 #   ./scripts/make.sh pages [NAME]     pages with measurements: accuracy, cutoff, python, seeds, stability, trade, performance, verdicts
-#   ./scripts/make.sh fixtures [NAME]  fixtures: models, general, frames, broken, foreign, jobs, modes, open, ... (fixtures/make/make_NAME.py)
+#   ./scripts/make.sh fixtures NAME    fixtures: models, general, frames, broken, foreign, jobs, modes, open, ... (fixtures/make/make_NAME.py; its head says what it needs)
 #   ./scripts/make.sh site             the documentation as a site
 #   ./scripts/make.sh wheel            the Python package
 #   ./scripts/make.sh release          the program of a release, tested
@@ -50,12 +50,8 @@ pages)
     esac
     ;;
 fixtures)
-    if [ -n "$name" ]; then
-        python3 "fixtures/make/make_$name.py" "${@:3}"
-    else
-        python3 fixtures/make_input_fixtures.py
-        for script in fixtures/make/make_*.py; do python3 "$script"; done
-    fi
+    [ -n "$name" ] || usage
+    python3 "fixtures/make/make_$name.py" "${@:3}"
     ;;
 site) ./scripts/site.sh ;;
 wheel) ./scripts/wheel.sh "${@:2}" ;;

@@ -3,7 +3,7 @@
 use super::arguments::ExportArguments;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::refuse_replacing;
-use super::resources::memory_left;
+use super::resources::context;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
@@ -77,9 +77,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
 fn inertia_in_scene(body: &FlexBody, path: &Path) -> Result<Option<InertiaInScene>> {
     let mut largest: Option<InertiaInScene> = None;
     for scene in LoadCases::read(path, None)?.iter() {
-        let Some(share) =
-            inertia_share(body, scene, &Context { memory: memory_left(None), ..Context::QUIET })?
-        else {
+        let Some(share) = inertia_share(body, scene, &context(None, true, Context::QUIET.watch))? else {
             continue;
         };
         if largest.as_ref().is_none_or(|known| known.share < share) {

@@ -15,7 +15,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
 use flexbody_input::LoadSource;
-use flexbody_linalg::context::{Context, Event};
+use flexbody_linalg::context::{Event, Watch};
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{LoadCases, Point, Scene};
 use flexbody_report::{Format, ResponseFacts, RunData, response_csv};
@@ -40,8 +40,7 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     refuse_replacing_read(outputs(arguments))?;
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let (model, body, diagnostics) = if is_model {
-        let (model, body, diagnostics) =
-            model_and_body(arguments, asked, &context(None, arguments.allow_long, &watch))?;
+        let (model, body, diagnostics) = model_and_body(arguments, asked, &watch)?;
         (Some(model), body, diagnostics)
     } else {
         let (body, notes) = flexbody_file::read_with_notes(&arguments.model)?;
@@ -103,7 +102,7 @@ fn refuse_contradictions(arguments: &ResponseArguments, is_model: bool) -> Resul
 fn model_and_body(
     arguments: &ResponseArguments,
     asked: Option<Vec<LoadSource>>,
-    context: &Context<'_>,
+    watch: Watch<'_>,
 ) -> Result<(FeModel, FlexBody, Vec<Diagnostic>)> {
     let (files, checked) = read_checked(&arguments.model, &arguments.job, outputs(arguments))?;
     let (model, mut diagnostics) = (checked.model, checked.diagnostics);
@@ -125,7 +124,8 @@ fn model_and_body(
         lumped: Vec::new(),
         ..ConvertSettings::default()
     };
-    let made = convert(&model, &settings, context)?;
+    // Created after the model was read, which takes memory too.
+    let made = convert(&model, &settings, &context(None, arguments.allow_long, watch))?;
     diagnostics.extend(made.diagnostics);
     Ok((model, made.body, diagnostics))
 }

@@ -13,7 +13,7 @@ use flexbody_body::basis::{BasisKind, ModeSettings};
 use flexbody_body::convert::ConvertSettings;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::context::{Context, Event};
+use flexbody_linalg::context::{Event, Watch};
 use flexbody_model::CheckedModel;
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, SelectionFacts};
@@ -35,7 +35,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     refuse_replacing_read(arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
     let (body, lacks, mut diagnostics) = if is_model {
-        converted(arguments, &cases, &context(None, arguments.allow_long, &watch))?
+        converted(arguments, &cases, &watch)?
     } else {
         refuse_modes(arguments)?;
         let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
@@ -63,7 +63,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
 fn converted(
     arguments: &SelectArguments,
     cases: &LoadCases,
-    context: &Context<'_>,
+    watch: Watch<'_>,
 ) -> Result<(FlexBody, Vec<Vec<ReferenceError>>, Vec<Diagnostic>)> {
     let (files, checked) = read_checked(&arguments.body, &arguments.job, arguments.report.iter())?;
     let CheckedModel { model, mut diagnostics, .. } = checked;
@@ -76,8 +76,10 @@ fn converted(
         ..ConvertSettings::default()
     };
     let tailoring = Tailoring { settings, by_band: arguments.modes.is_none(), of_motion: false };
+    // Created after the model was read, which takes memory too.
+    let context = context(None, arguments.allow_long, watch);
     let Enriched { made, rounds } =
-        tailoring.convert(&model, cases, context).map_err(|error| error.in_file(&arguments.scene))?;
+        tailoring.convert(&model, cases, &context).map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(made.diagnostics);
     Ok((made.body, rounds, diagnostics))
 }

@@ -4,13 +4,13 @@ use super::arguments::TradeArguments;
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
-use super::resources::{context, memory_left, use_threads};
+use super::resources::{context, use_threads};
 use super::watcher::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::basis::ModeSettings;
-use flexbody_linalg::context::{Context, Event};
+use flexbody_linalg::context::Event;
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, TradeFacts, trade_csv};
 use flexbody_study::reference::ReferenceError;
@@ -35,14 +35,15 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     refuse_replacing(series.map(|file| &file.path), outputs())?;
     refuse_replacing_read(outputs())?;
     let watch = |event: Event<'_>| watcher.hear(event);
-    let context = context(None, arguments.allow_long, &watch);
+    // Created again for each part: the model and the bodies take memory too.
+    let limits = || context(None, arguments.allow_long, &watch);
     let mut diagnostics = Vec::new();
     let (model, sources, lacks) = if is_model {
         let (_, checked) = read_checked(&arguments.body, &arguments.job, outputs())?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
         let wanted = WantedBodies { modes, fine: arguments.reference == ReferenceChoice::Fine };
-        let made = conversions(&checked.model, &cases, wanted, &context)
+        let made = conversions(&checked.model, &cases, wanted, &limits())
             .map_err(|error| error.in_file(&arguments.scene))?;
         diagnostics.extend(made.diagnostics);
         (Some(checked.model), made.sources, made.lacks)
@@ -54,9 +55,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceChoice::Nodal);
     let reserved = reserved(&lacks, nodal.is_some());
     let settings = TradeSettings { repeat: arguments.repeat.into(), reserved: &reserved };
-    // The conversions take memory too: update the limit.
-    let context = Context { memory: memory_left(None), ..context };
-    let study = trade(&sources, &cases, nodal, &settings, &context)
+    let study = trade(&sources, &cases, nodal, &settings, &limits())
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(study.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };

@@ -2,8 +2,7 @@
 //! number of eigenvalues below sigma (M positive semidefinite).
 
 use super::failure::EigenFailure;
-use super::problem::EigenProblem;
-use super::problem::Task;
+use super::problem::{EigenProblem, Task};
 use faer::ColRef;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{Analysis, Indefinite, Inertia};

@@ -7,9 +7,8 @@
 use super::attempt::{Attempt, Goal};
 use super::failure::EigenFailure;
 use super::lanczos::{Iteration, Outcome, columns_per_step};
-use super::needs::{Needs, Unusable, basis_columns, factor_needs, peaks, resident, vector_bytes};
-use super::problem::EigenProblem;
-use super::problem::Task;
+use super::needs::{Needs, Unusable, basis_columns, factor_needs, resident, vector_bytes};
+use super::problem::{EigenProblem, Task};
 use super::refine::{FoundModes, refine};
 use super::settings::{Accuracy, FactorChoice, Precision};
 use super::shift::{factorise, with_suited_shift};
@@ -18,11 +17,6 @@ use flexbody_linalg::{Analysis, Cholesky, Indefinite, Solve};
 
 /// Lanczos with a factor in double precision.
 pub(super) struct DoublePrecision;
-
-/// Returns true when double precision is allowed, and fits the limits of memory and time.
-pub(super) fn is_double_in_reach(task: &Task<'_>, wanted: usize) -> bool {
-    factor_needs(task, wanted, Precision::Double).is_ok()
-}
 
 impl Attempt for DoublePrecision {
     fn needs(&self, task: &Task<'_>, wanted: usize) -> Result<Needs, Unusable> {
@@ -75,7 +69,7 @@ impl Attempt for SecondShift {
         // The first factor is released before the second one is computed. It is computed again if the modes need
         // refinement.
         let vectors = vector_bytes(task.problem, wanted, Precision::Double);
-        let bytes = needs.bytes.max(resident(8 * peaks(task.analysis).kept_inertia + vectors));
+        let bytes = needs.bytes.max(resident(8 * task.peaks.kept_inertia + vectors));
         if bytes > task.context.available() { Err(Unusable::Unsuited) } else { Ok(Needs { bytes, ..needs }) }
     }
 
@@ -111,7 +105,7 @@ fn from_midway(
     if iteration.is_complete() {
         return find_refined(task, iteration, &first, goal);
     }
-    let in_vain = || EigenFailure::NotConverged { converged: 0, wanted: goal.wanted };
+    let not_converged = || EigenFailure::NotConverged { converged: 0, wanted: goal.wanted };
     let midway = iteration.look_midway()?;
     let tau = first.shift();
     drop(first);
@@ -126,14 +120,14 @@ fn from_midway(
     };
     // From here on every failure may be due to the second shift.
     let Ok(Outcome::Reached(FoundModes { mut refined, next, finite, .. })) = found else {
-        return Err(in_vain());
+        return Err(not_converged());
     };
     drop(iteration);
     if refined.excess(goal.tolerance) > 1.0 {
         refined = refine(problem, &again()?, refined, goal.tolerance, context)?;
     }
     if refined.excess(goal.tolerance) > 1.0 {
-        return Err(in_vain());
+        return Err(not_converged());
     }
     Ok(Outcome::Reached(FoundModes { refined, next, tau, finite }))
 }

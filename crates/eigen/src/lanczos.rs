@@ -74,7 +74,7 @@ fn better_shift(
     context: &Context<'_>,
 ) -> Result<Option<f64>, EigenFailure> {
     let tau = factor.shift();
-    let ritz = descending(krylov)?;
+    let ritz = projected_pairs(krylov)?;
     if ritz.values.last().is_none_or(|theta| theta.recip() - tau > SMALLEST_PART * tau) {
         return Ok(None);
     }
@@ -116,7 +116,7 @@ fn zero_energy(
     while krylov.room() >= BLOCK && !krylov.exhausted() {
         krylov.step(factor);
     }
-    let ritz = descending(&krylov)?;
+    let ritz = projected_pairs(&krylov)?;
     let (lambda, vectors) = best(&krylov, &ritz, krylov.projected() / 2, tau);
     let noise = energy_noise(problem.pencil.stiffness(), vectors.as_ref(), problem.input_error);
     let count = lambda.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_FACTOR * **n).count().max(1);
@@ -402,7 +402,7 @@ impl<'a> Iteration<'a> {
         let tau = self.tau;
         let (below, settled) = self.first.as_ref().map_or((0, 0), |first| (first.below, first.modes.ncols()));
         let size = krylov.projected();
-        let found = descending(krylov)?;
+        let found = projected_pairs(krylov)?;
         let is_negative = |theta: &f64| *theta < -1e-8 * found.values[size - 1].abs();
         if below == 0 && found.values.first().is_some_and(is_negative) {
             return Err(EigenFailure::MassIndefinite);
@@ -511,7 +511,7 @@ fn settled(eigenvalues: &[f64], converged: usize) -> usize {
 }
 
 /// Returns the eigenpairs of the projected operator, theta ascending.
-fn descending(krylov: &Krylov<'_>) -> Result<SymmetricEigen, EigenFailure> {
+fn projected_pairs(krylov: &Krylov<'_>) -> Result<SymmetricEigen, EigenFailure> {
     symmetric_eigen(krylov.t()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })
 }
 

@@ -5,7 +5,6 @@ use super::failure::EigenFailure;
 use super::problem::{EigenProblem, Task};
 use super::refine::TOGETHER;
 use super::settings::{Accuracy, FactorChoice, Precision};
-use flexbody_linalg::{Analysis, Peaks};
 
 /// Memory and time of an attempt.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,8 +64,8 @@ const PACE: f64 = 4e9;
 
 /// Returns the needs of a search with a factor of this precision.
 pub(super) fn factor_needs(task: &Task<'_>, wanted: usize, precision: Precision) -> Result<Needs, Unusable> {
-    let Task { problem, analysis, .. } = task;
-    let (n, peaks) = (problem.pencil.n(), peaks(analysis));
+    let Task { problem, analysis, peaks, .. } = task;
+    let n = problem.pencil.n();
     let size = precision.bytes();
     let found = (size * peaks.cholesky).max(size * peaks.factor + vector_bytes(problem, wanted, precision));
     let needs = Needs {
@@ -84,12 +83,7 @@ pub(super) fn with_bounds(task: &Task<'_>, wanted: usize, bytes: u64) -> u64 {
         return bytes;
     }
     let entries = task.problem.pencil.stiffness().as_csc().nnz() as u64;
-    bytes.max(count_bytes(task.problem, &peaks(task.analysis), wanted)) + 12 * entries
-}
-
-/// Returns the largest numbers of entries that factorisations hold with the current number of threads.
-pub(super) fn peaks(analysis: &Analysis) -> Peaks {
-    analysis.peaks(rayon::current_num_threads())
+    bytes.max(count_bytes(task, wanted)) + 12 * entries
 }
 
 /// Returns the number of columns of the Krylov basis. Measured: five for each wanted mode.
@@ -142,18 +136,18 @@ pub(super) fn resident(bytes: u64) -> u64 {
 }
 
 /// Returns the bytes of an inertia count in double precision, with the modes and their products.
-fn count_bytes(problem: &EigenProblem<'_>, peaks: &Peaks, modes: usize) -> u64 {
-    8 * (peaks.inertia + (3 * modes * problem.pencil.n()) as u64)
+fn count_bytes(task: &Task<'_>, modes: usize) -> u64 {
+    8 * (task.peaks.inertia + (3 * modes * task.problem.pencil.n()) as u64)
 }
 
 /// Returns the bytes by which the process grows for an inertia count in double precision beside `found` modes.
-pub(super) fn resident_for_count(problem: &EigenProblem<'_>, analysis: &Analysis, found: usize) -> u64 {
-    resident(count_bytes(problem, &peaks(analysis), found))
+pub(super) fn resident_for_count(task: &Task<'_>, found: usize) -> u64 {
+    resident(count_bytes(task, found))
 }
 
 /// Returns the bytes of a count in single precision, with the vectors that measure its rounding.
-fn single_count_bytes(problem: &EigenProblem<'_>, peaks: &Peaks, modes: usize) -> u64 {
-    4 * peaks.kept_inertia + 8 * ((3 * modes + PROBE_VECTORS) * problem.pencil.n()) as u64
+fn single_count_bytes(task: &Task<'_>, modes: usize) -> u64 {
+    4 * task.peaks.kept_inertia + 8 * ((3 * modes + PROBE_VECTORS) * task.problem.pencil.n()) as u64
 }
 
 /// Number of vectors in use while the rounding of a count in single precision is measured.
@@ -186,10 +180,9 @@ impl CountPlan {
 
     /// Plans a count beside `modes` modes for any accuracy.
     pub(super) fn new(task: &Task<'_>, modes: usize) -> Self {
-        let Task { problem, settings, analysis, context } = task;
-        let (peaks, available) = (peaks(analysis), context.available());
-        let (single, double) =
-            (single_count_bytes(problem, &peaks, modes), count_bytes(problem, &peaks, modes));
+        let Task { settings, analysis, .. } = task;
+        let available = task.context.available();
+        let (single, double) = (single_count_bytes(task, modes), count_bytes(task, modes));
         let fits = |bytes: u64| resident(bytes) <= available;
         let double_fits = fits(double);
         let pays = match settings.factor {

@@ -5,7 +5,7 @@ use super::settings::EigenSettings;
 use faer::{Mat, MatRef};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{
-    Analysis, Cholesky, EliminationOrder, Pencil, Solve, gram, subtract_combination, uniform,
+    Analysis, Cholesky, EliminationOrder, Peaks, Pencil, Solve, gram, subtract_combination, uniform,
 };
 use std::sync::Arc;
 
@@ -97,10 +97,22 @@ pub(super) struct Task<'a> {
     pub problem: &'a EigenProblem<'a>,
     pub settings: &'a EigenSettings,
     pub analysis: &'a Analysis,
+    /// Largest numbers of entries that factorisations hold with the current number of threads.
+    pub peaks: Peaks,
     pub context: &'a Context<'a>,
 }
 
-impl Task<'_> {
+impl<'a> Task<'a> {
+    pub(super) fn new(
+        problem: &'a EigenProblem<'a>,
+        settings: &'a EigenSettings,
+        analysis: &'a Analysis,
+        context: &'a Context<'a>,
+    ) -> Self {
+        let peaks = analysis.peaks(rayon::current_num_threads());
+        Self { problem, settings, analysis, peaks, context }
+    }
+
     /// Returns an upper bound of the number of flexible modes: the number of rows without the rigid modes.
     pub(super) fn flexible_rows(&self) -> usize {
         self.problem.pencil.n() - self.problem.rigid.ncols()

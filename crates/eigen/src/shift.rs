@@ -2,8 +2,7 @@
 
 use super::failure::EigenFailure;
 use super::lanczos::Outcome;
-use super::problem::EigenProblem;
-use super::problem::Task;
+use super::problem::{EigenProblem, Task};
 use super::refine::FoundModes;
 use faer::Mat;
 use flexbody_linalg::context::Context;

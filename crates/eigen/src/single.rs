@@ -7,7 +7,7 @@
 
 use super::attempt::{Attempt, Goal};
 use super::correction::{Correction, Corrector};
-use super::double::is_double_in_reach;
+use super::double::DoublePrecision;
 use super::failure::EigenFailure;
 use super::lanczos::{Iteration, Outcome};
 use super::needs::{Needs, Unusable, factor_needs};
@@ -35,7 +35,7 @@ impl Attempt for SinglePrecision {
             _ if settings.accuracy == Accuracy::Certified => false,
             FactorChoice::Always(precision) => precision == Precision::Single,
             FactorChoice::Auto => {
-                task.analysis.flops() > settings.single_pays || !is_double_in_reach(task, wanted)
+                task.analysis.flops() > settings.single_pays || DoublePrecision.needs(task, wanted).is_err()
             }
         };
         if pays { factor_needs(task, wanted, Precision::Single) } else { Err(Unusable::Unsuited) }

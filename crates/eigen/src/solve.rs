@@ -7,8 +7,7 @@ use super::completeness::{Completeness, Counting, NEAR, Proof, count, size_along
 use super::failure::EigenFailure;
 use super::needs::{CountPlan, gigabytes};
 use super::plan::{Plan, PlannedAttempt, Way};
-use super::problem::EigenProblem;
-use super::problem::Task;
+use super::problem::{EigenProblem, Task};
 use super::refine::{FoundModes, Refined};
 use super::settings::{Accuracy, EigenSettings, Wanted, keeps};
 use super::solution::{EigenSolution, EigenvalueBounds};
@@ -39,7 +38,7 @@ pub fn solve(
     context: &Context<'_>,
 ) -> Result<EigenSolution, EigenFailure> {
     let analysis = analyse(problem, context)?;
-    let task = Task { problem, settings, analysis: &analysis, context };
+    let task = Task::new(problem, settings, &analysis, context);
     let wanted = count_wanted(&task)?;
     let mut plan = Plan::new(&task, wanted)?;
     let (found, completeness) = find_all(&task, &mut plan, wanted)?;
@@ -59,7 +58,7 @@ pub fn plan(
     context: &Context<'_>,
 ) -> Result<Plan, EigenFailure> {
     let analysis = analyse(problem, context)?;
-    let task = Task { problem, settings, analysis: &analysis, context };
+    let task = Task::new(problem, settings, &analysis, context);
     let wanted = match settings.wanted {
         Wanted::Lowest(count) => count.min(task.flexible_rows()),
         Wanted::Below(_) => EigenSettings::DEFAULT_COUNT,

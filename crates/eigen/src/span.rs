@@ -6,15 +6,14 @@ use super::canonical::{CLUSTER_GAP, canonical_basis, clusters};
 use super::completeness::{Completeness, Proof, count_below};
 use super::failure::EigenFailure;
 use super::needs::{factor_needs, gigabytes, resident_for_count};
-use super::problem::EigenProblem;
-use super::problem::Task;
+use super::problem::{EigenProblem, Task};
 use super::refine::Refined;
 use super::settings::{Accuracy, EigenSettings, Precision, Wanted, keeps};
 use super::solution::EigenSolution;
 use super::zero_energy::check_zero_energy;
 use faer::Mat;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::{Analysis, is_positive_semidefinite};
+use flexbody_linalg::is_positive_semidefinite;
 
 /// Distances of the count's shift from the last eigenvector, relative to its eigenvalue. The second is used if the
 /// count with the first is too large, since the additional modes may lie beyond the given ones.
@@ -46,22 +45,22 @@ pub fn modes_of_span(
         problem.analysis().ok_or(EigenFailure::TooLarge)
     });
     let analysis = analysis.transpose()?;
-    let completeness = match &analysis {
-        Some(analysis) => count(problem, analysis, &modes.eigenvalues[..exact], context)?,
+    let task = analysis.as_deref().map(|analysis| Task::new(problem, settings, analysis, context));
+    let completeness = match &task {
+        Some(task) => count(task, &modes.eigenvalues[..exact])?,
         None => uncounted(&modes, exact, settings.accuracy),
     };
     let mut bounds = None;
     if settings.accuracy == Accuracy::Certified && !modes.eigenvalues.is_empty() {
-        let analysis = certifiable(&modes, exact, &completeness, analysis.as_deref())
+        let task = certifiable(&modes, exact, &completeness, task.as_ref())
             .map_err(|why| EigenFailure::NotCertified { why })?;
         context.phase("bounds");
-        let task = Task { problem, settings, analysis, context };
         let wanted = modes.eigenvalues.len();
-        if let Err(unusable) = factor_needs(&task, wanted, Precision::Double) {
-            unusable.failure(&task, wanted).map_or(Ok(()), Err)?;
+        if let Err(unusable) = factor_needs(task, wanted, Precision::Double) {
+            unusable.failure(task, wanted).map_or(Ok(()), Err)?;
         }
         let (vectors, high) = (modes.vectors.as_ref(), completeness.shift);
-        let found = enclose(&task, vectors, &modes.eigenvalues, high, CLUSTER_GAP)?;
+        let found = enclose(task, vectors, &modes.eigenvalues, high, CLUSTER_GAP)?;
         found.clamp(&mut modes.eigenvalues);
         bounds = Some(found);
     }
@@ -126,29 +125,25 @@ fn uncounted(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness 
     Completeness { proof: Proof::NotProved, shift, negative_pivots: None, modes_below: given, remark }
 }
 
-/// Returns the analysis for the bounds, or the reason why there can be no bounds.
-fn certifiable<'a>(
+/// Returns the task for the bounds, or the reason why there can be no bounds.
+fn certifiable<'t>(
     modes: &Refined,
     exact: usize,
     completeness: &Completeness,
-    analysis: Option<&'a Analysis>,
-) -> Result<&'a Analysis, &'static str> {
+    task: Option<&'t Task<'t>>,
+) -> Result<&'t Task<'t>, &'static str> {
     if exact < modes.eigenvalues.len() {
         return Err("not every mode of the subspace is an eigenvector to a K-residual of 1e-12");
     }
     if completeness.proof == Proof::NotProved {
         return Err("modes are missing in the subspace");
     }
-    Ok(analysis.expect("a count needs the analysis"))
+    Ok(task.expect("a count needs the task"))
 }
 
 /// Counts the modes below a shift just above the last of `eigenvalues`, all of which belong to eigenvectors.
-fn count(
-    problem: &EigenProblem<'_>,
-    analysis: &Analysis,
-    eigenvalues: &[f64],
-    context: &Context<'_>,
-) -> Result<Completeness, EigenFailure> {
+fn count(task: &Task<'_>, eigenvalues: &[f64]) -> Result<Completeness, EigenFailure> {
+    let Task { problem, analysis, context, .. } = *task;
     let (rigid, found) = (problem.rigid.ncols(), eigenvalues.len());
     let last = *eigenvalues.last().expect("counted only where there is one");
     let outcome = |shift: f64, negative_pivots: Option<usize>, remark: String| Completeness {
@@ -158,7 +153,7 @@ fn count(
         modes_below: found,
         remark,
     };
-    let needed = resident_for_count(problem, analysis, found);
+    let needed = resident_for_count(task, found);
     if needed > context.available() {
         let (needed, available) = (gigabytes(needed), gigabytes(context.available()));
         let remark = format!("the count needs {needed} of memory, {available} are available");

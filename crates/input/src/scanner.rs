@@ -9,7 +9,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 pub(crate) struct Line<'a> {
     /// Number of the line, from 1.
     pub number: usize,
-    /// Text of the line without its end and leading blanks.
+    /// Text of the line without its end and trailing blanks.
     pub text: &'a [u8],
 }
 

@@ -100,11 +100,6 @@ impl<'a> Context<'a> {
         Self { watch: Context::QUIET.watch, ..*self }
     }
 
-    /// Returns this context without limits of memory and time.
-    pub fn unlimited(&self) -> Self {
-        Self { memory: None, longest: None, ..*self }
-    }
-
     /// Calls `add` with the counts, if there is a counter.
     pub fn count(&self, add: impl FnOnce(&mut Work)) {
         if let Some(WorkCounter(work)) = self.counter {

@@ -1,21 +1,13 @@
 //! Pencils without trustworthy modes are refused with the reason, by every method.
 
-use super::grid::{Grid, matrix};
+use super::grid::{Grid, entries, matrix};
 use faer::Mat;
 use flexbody_eigen::{
     EigenFailure, EigenProblem, EigenSettings, FactorChoice, Method, Precision, Wanted, solve,
     unresisted_motions,
 };
+use flexbody_linalg::Pencil;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::{Pencil, SymmetricMatrix};
-
-fn entries(a: &SymmetricMatrix) -> Vec<(u32, u32, f64)> {
-    let row = |i: usize| {
-        let (columns, values) = a.row(i);
-        columns.iter().zip(values).map(move |(&j, &v)| (i as u32, j, v)).collect::<Vec<_>>()
-    };
-    (0..a.n()).flat_map(row).collect()
-}
 
 /// Returns the failure of each method for changed matrices of a grid.
 fn failures(change: impl Fn(&mut Vec<(u32, u32, f64)>, &mut Vec<(u32, u32, f64)>)) -> [EigenFailure; 2] {

@@ -135,3 +135,12 @@ impl Grid {
 pub fn matrix(n: usize, entries: &[(u32, u32, f64)]) -> SymmetricMatrix {
     SymmetricMatrix::new(CscMatrix::from_triplets(n, n, entries)).expect("symmetric")
 }
+
+/// Returns the entries of a matrix: row, column, value.
+pub fn entries(a: &SymmetricMatrix) -> Vec<(u32, u32, f64)> {
+    let row = |i: usize| {
+        let (columns, values) = a.row(i);
+        columns.iter().zip(values).map(move |(&j, &v)| (i as u32, j, v)).collect::<Vec<_>>()
+    };
+    (0..a.n()).flat_map(row).collect()
+}

@@ -1,6 +1,6 @@
 //! Every method for modes agrees with the closed form, in any units and any order of rows.
 
-use super::grid::{Grid, matrix};
+use super::grid::{Grid, entries, matrix};
 use faer::Mat;
 use flexbody_eigen::{
     Accuracy, EigenProblem, EigenSettings, FactorChoice, Method, Precision, Proof, Wanted, Way, solve,
@@ -70,18 +70,9 @@ fn the_order_of_the_rows_changes_nothing_but_their_places() {
     let n = grid.rows();
     // A fixed permutation: 100 has no common factor with the 527 rows.
     let place = |row: usize| (100 * row + 7) % n;
-    let entries = |a: &flexbody_linalg::SymmetricMatrix| -> Vec<(u32, u32, f64)> {
-        let row = |i: usize| {
-            let (columns, values) = a.row(i);
-            columns
-                .iter()
-                .zip(values)
-                .map(move |(&j, &v)| (place(i) as u32, place(j as usize) as u32, v))
-                .collect::<Vec<_>>()
-        };
-        (0..n).flat_map(row).collect()
-    };
-    let [stiffness, mass] = [&grid.stiffness, &grid.mass].map(|a| matrix(n, &entries(a)));
+    let moved = |(i, j, v): (u32, u32, f64)| (place(i as usize) as u32, place(j as usize) as u32, v);
+    let [stiffness, mass] = [&grid.stiffness, &grid.mass]
+        .map(|a| matrix(n, &entries(a).into_iter().map(moved).collect::<Vec<_>>()));
     let rigid = grid.rigid.clone();
     let problem =
         EigenProblem { pencil: Pencil::new(&stiffness, &mass, 1), rigid: rigid.as_ref(), ..grid.problem() };
