@@ -6,9 +6,10 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::ModeSettings;
 use flexbody_report::{TradeFacts, trade_csv};
+use flexbody_study::recipe::Recipe;
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
-    self, ReferenceChoice, ReferenceKind, Source, TradeSettings, WantedBodies, conversions,
+    self, ReferenceChoice, ReferenceKind, Source, TradeSettings, Varied, WantedBodies, conversions,
 };
 
 /// Settings of a trade study. By default 20 modes of a model, the whole body as the reference, and the median time of 3
@@ -71,9 +72,10 @@ impl Model {
             let made = conversions(&self.checked, &scene.0, wanted, context)?;
             let nodal = (options.reference == ReferenceChoice::Nodal).then_some(&self.checked);
             let reserved = trade::reserved(&made.lacks, nodal.is_some());
-            let settings = TradeSettings { repeat: options.repeat, reserved: &reserved };
+            let settings =
+                TradeSettings { repeat: options.repeat, reserved: &reserved, varied: Some(&made.varied) };
             let study = trade::trade(&made.sources, &scene.0, nodal, &settings, context)?;
-            let diagnostics = [made.diagnostics, study.diagnostics.clone()].concat();
+            let diagnostics = [made.diagnostics, made.varied.diagnostics, study.diagnostics.clone()].concat();
             Ok(Trade { study, sources: made.sources, lacks: made.lacks, diagnostics })
         })
     }
@@ -92,8 +94,9 @@ impl FlexBody {
                 "errors against all nodes, or a finer body, need the matrices: ask the model, not the body";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
-        let sources = vec![Source::new("file", self.0.clone(), None)?];
-        let settings = TradeSettings { repeat: options.repeat, reserved: &[] };
+        let varied = Varied::of_body(&scene.0, self.dimension());
+        let sources = vec![Source::new("file", self.0.clone(), Recipe::File, None)?];
+        let settings = TradeSettings { repeat: options.repeat, reserved: &[], varied: Some(&varied) };
         let study = heard(listener, |context| trade::trade(&sources, &scene.0, None, &settings, context))?;
         let diagnostics = study.diagnostics.clone();
         Ok(Trade { study, sources, lacks: Vec::new(), diagnostics })
@@ -130,12 +133,14 @@ impl Trade {
         row.candidate.body(&self.sources[row.candidate.source]).map(FlexBody)
     }
 
-    /// Returns true if there is a recommended candidate, and the reference is accurate enough.
+    /// Returns true if there is a recommended candidate that holds in the stated variations, and the reference is
+    /// accurate enough.
     pub fn holds(&self) -> bool {
         let nodal = self.study.reference == ReferenceKind::Nodal;
         let is_reference =
             |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
-        self.recommended().is_some() && (nodal || self.lacks.iter().all(is_reference))
+        let is_reference = nodal || self.lacks.iter().all(is_reference);
+        self.recommended().is_some() && is_reference && self.study.holds_in_stated_variations()
     }
 
     /// Returns the report of `flexbody trade`.

@@ -76,6 +76,11 @@ pub enum Command {
         after_help = "Examples:\n  flexbody trade rod.flex.h5 --scene tumble.toml --report trade.html\n  flexbody trade model.toml --modes 20 --scene tumble.toml --reference nodal --csv trade.csv"
     )]
     Trade(TradeArguments),
+    /// Write a body with some of its modes and groups of terms, as a selection or a trade study recommends
+    #[command(
+        after_help = "Example:\n  flexbody reduce rod.flex.h5 --keep-modes 1,3,5-9 --terms W1 -o small.flex.h5"
+    )]
+    Reduce(ReduceArguments),
     /// Compute the frequency response of a body between places, and its difference from the response of all nodes of
     /// its model
     #[command(
@@ -108,6 +113,66 @@ pub enum Command {
     /// Print a page of the manual
     #[command(after_help = "Example:\n  flexbody man convert > flexbody-convert.1")]
     Man(ManArguments),
+}
+
+/// Modes and terms that a command line states instead of a selection.
+#[derive(Debug, Default, Args)]
+pub struct StatedArguments {
+    /// Groups of terms of the body instead of a selection: W1, W2, W3 with commas, none, all, or the groups of a
+    /// guideline of Witteveen and Pichler: I, II, III, IV
+    #[arg(long, value_name = "GROUPS", conflicts_with = "from")]
+    pub terms: Option<String>,
+    /// Numbers of the modes that the body keeps, instead of a selection: 1,3,5-9
+    #[arg(long, value_name = "NUMBERS", conflicts_with = "from")]
+    pub keep_modes: Option<String>,
+    /// With --basis scene: number of shapes of the motion [default: the fewest that suffice]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "from")]
+    pub motion_shapes: Option<u32>,
+    /// With --scene and stated parts: static responses are added until the truncation error of the body is estimated
+    /// to be below a tenth of the tolerances (standard) or a hundredth (fine, as for trade --reference fine)
+    #[arg(long, value_enum, default_value_t = EnrichmentName::Standard, requires = "scene")]
+    pub enrichment: EnrichmentName,
+}
+
+impl StatedArguments {
+    /// Returns true if the command line states modes or terms.
+    pub fn states_any(&self) -> bool {
+        self.terms.is_some() || self.keep_modes.is_some() || self.motion_shapes.is_some()
+    }
+}
+
+/// Extent to which a body is enriched for a scene.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum EnrichmentName {
+    /// Truncation error within a tenth of the tolerances.
+    #[default]
+    Standard,
+    /// Truncation error within a hundredth of the tolerances.
+    Fine,
+}
+
+/// Arguments of `reduce`.
+#[derive(Debug, Args)]
+pub struct ReduceArguments {
+    /// Flex-body file
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// Numbers of the modes to keep: 1,3,5-9 [default: all]
+    #[arg(long, value_name = "NUMBERS")]
+    pub keep_modes: Option<String>,
+    /// Groups of terms to keep: W1, W2, W3 with commas, none, all, or the groups of a guideline of Witteveen and
+    /// Pichler: I, II, III, IV [default: all]
+    #[arg(long, value_name = "GROUPS")]
+    pub terms: Option<String>,
+    /// Floats of shapes and of the inertia of the modes in the file [default: as in BODY]
+    #[arg(long, value_parser = names::storage())]
+    pub storage: Option<Storage>,
+    /// Flex-body file to write
+    #[arg(short, long, value_name = "SMALL.flex.h5")]
+    pub output: PathBuf,
+    /// Options of printing.
+    #[command(flatten)]
+    pub printing: Printing,
 }
 
 /// Arguments of `view`.
@@ -438,6 +503,9 @@ pub struct ConvertArguments {
     /// Load case of the scene, by name [default: all, which one body must serve]
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
+    /// Modes and terms that are stated instead of selected.
+    #[command(flatten)]
+    pub stated: StatedArguments,
     /// Write the body for a scene even if its selection does not hold, or cannot be judged (FB557)
     #[arg(long, requires = "scene")]
     pub allow_unjudged: bool,

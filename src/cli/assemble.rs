@@ -1,6 +1,6 @@
 //! Command `flexbody assemble`: a conversion with modes that a cluster has found.
 
-use super::arguments::{AssembleArguments, ConvertArguments, EngineArguments, JobArguments};
+use super::arguments::{AssembleArguments, ConvertArguments, EngineArguments, JobArguments, StatedArguments};
 use super::convert::run_with;
 use super::elsewhere::Elsewhere;
 use super::outcome::Outcome;
@@ -58,6 +58,7 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         scene: None,
         case: None,
         allow_unjudged: false,
+        stated: StatedArguments::default(),
         report: arguments.report.clone(),
         split: false,
         engine: EngineArguments::default(),

@@ -1,6 +1,6 @@
 //! Command `flexbody convert`.
 
-use super::arguments::{ConvertArguments, EngineName};
+use super::arguments::{ConvertArguments, EngineName, EnrichmentName, StatedArguments};
 use super::elsewhere::Elsewhere;
 use super::import;
 use super::models::of_manifest_or_job;
@@ -16,18 +16,21 @@ use flexbody_base::output::OutputSlot;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{BasisChoice, BasisKind, ImportedShapes, ModeSettings};
 use flexbody_body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, convert};
-use flexbody_body::flex_body::Storage;
+use flexbody_body::flex_body::{Storage, Subset};
 use flexbody_body::invariants::LumpedScheme;
 use flexbody_body::verification::accept;
 use flexbody_eigen::{Accuracy, Method, PlannedAttempt, Wanted};
 use flexbody_input::{
     ImportedColumns, LoadSource, MatrixLocation, ModelFiles, read_imported, read_model, read_nodal_masses,
 };
-use flexbody_linalg::context::Event;
+use flexbody_linalg::context::{Context, Event};
 use flexbody_model::{CheckedModel, FeModel};
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SearchAttempt, SelectionFacts, render};
-use flexbody_study::tailoring::{Tailoring, computed_basis, convert_for, loads_for};
+use flexbody_study::selection::Selection;
+use flexbody_study::tailoring::{
+    StatedParts, Tailoring, computed_basis, convert_for, convert_stated, loads_for,
+};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
@@ -42,6 +45,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
 /// Runs a conversion whose modes are found by this program or elsewhere.
 pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> Result<Outcome> {
     refuse_without_modes(arguments)?;
+    stated_parts(&arguments.stated)?;
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
     // The command line takes precedence over the manifest.
@@ -161,13 +165,7 @@ impl Job<'_> {
             None => basis(arguments, self.loads, model)?,
         };
         let (resident, peak) = (resident_bytes(), peak_memory_bytes());
-        // With a scene, the conversion also selects terms and modes.
-        let (mut conversion, selection) = match arguments.scene.as_ref().zip(self.cases) {
-            Some((path, cases)) => convert_for(model, &self.of_band(settings), cases, &context)
-                .map_err(|error| error.in_file(path))
-                .map(|(conversion, selection)| (conversion, Some(selection))),
-            None => convert(model, &settings, &context).map(|conversion| (conversion, None)),
-        }?;
+        let (mut conversion, selection) = self.made(model, settings, &context)?;
         let selected = selection.as_ref().map(|selection| selection.diagnostics.iter().cloned());
         conversion.diagnostics.extend(selected.into_iter().flatten());
         refuse_unjudged(arguments, selection.as_ref(), &conversion.diagnostics)?;
@@ -208,6 +206,29 @@ impl Job<'_> {
         Ok(Done { slots, outcome })
     }
 
+    /// Returns the body, with the selection of its terms and modes for a scene unless the command line states them.
+    fn made(
+        &self,
+        model: &FeModel,
+        settings: ConvertSettings,
+        context: &Context<'_>,
+    ) -> Result<(Conversion, Option<Selection>)> {
+        let stated = stated_parts(&self.arguments.stated)?;
+        let Some((path, cases)) = self.arguments.scene.as_ref().zip(self.cases) else {
+            let mut conversion = convert(model, &settings, context)?;
+            conversion.body = conversion.body.subset(&stated.unwrap_or_default().subset)?;
+            return Ok((conversion, None));
+        };
+        let tailoring = self.of_band(settings);
+        let made = match stated {
+            Some(stated) => {
+                convert_stated(model, &tailoring, cases, &stated, context).map(|made| (made, None))
+            }
+            None => convert_for(model, &tailoring, cases, context).map(|(made, chosen)| (made, Some(chosen))),
+        };
+        made.map_err(|error| error.in_file(path))
+    }
+
     /// Returns the settings with free modes by the band of the scene, unless their number or highest frequency is
     /// stated.
     fn of_band(&self, settings: ConvertSettings) -> Tailoring {
@@ -239,6 +260,27 @@ impl Job<'_> {
     }
 }
 
+/// Returns the parts of the body that the command line states; `None` if it states none, so that a scene selects them.
+fn stated_parts(arguments: &StatedArguments) -> Result<Option<StatedParts>> {
+    let StatedArguments { terms, keep_modes, motion_shapes, enrichment } = arguments;
+    if !arguments.states_any() {
+        return Ok(None);
+    }
+    Ok(Some(StatedParts {
+        motion_shapes: motion_shapes.map(|count| count as usize),
+        subset: subset(terms.as_deref(), keep_modes.as_deref())?,
+        is_fine: *enrichment == EnrichmentName::Fine,
+    }))
+}
+
+/// Parses the modes and groups of terms that a command line states.
+pub(super) fn subset(terms: Option<&str>, keep_modes: Option<&str>) -> Result<Subset> {
+    Ok(Subset {
+        modes: keep_modes.map(Subset::parse_modes).transpose()?,
+        groups: terms.map(Subset::parse_groups).transpose()?.unwrap_or_default(),
+    })
+}
+
 /// Returns the loads of residual vectors if the command line names none: those of the manifest or, without these, those
 /// of the scene.
 fn residual_vectors(
@@ -254,6 +296,9 @@ fn residual_vectors(
 pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
     let mut sets = Vec::new();
     let mut names: Vec<&str> = text.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
+    if names == ["none"] {
+        return Ok(sets);
+    }
     for text in &names {
         let (name, hertz) = LoadSource::with_frequency(text);
         let loads = match (name, name.strip_prefix("loads=")) {
@@ -296,6 +341,24 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
     let coupled = matches!(basis, BasisKind::CraigBampton | BasisKind::CraigChang);
     let message = match arguments {
         ConvertArguments { scene: None, .. } if basis == BasisKind::Scene => "--basis scene needs --scene",
+        ConvertArguments { stated: StatedArguments { motion_shapes: Some(_), .. }, .. }
+            if basis != BasisKind::Scene =>
+        {
+            "--motion-shapes needs --basis scene"
+        }
+        ConvertArguments { stated: StatedArguments { motion_shapes: None, .. }, .. }
+            if basis == BasisKind::Scene && arguments.stated.states_any() =>
+        {
+            "--basis scene with --terms or --keep-modes needs the number of shapes: --motion-shapes"
+        }
+        ConvertArguments { stated: StatedArguments { enrichment: EnrichmentName::Fine, .. }, .. }
+            if !arguments.stated.states_any() =>
+        {
+            "--enrichment fine needs --terms, --keep-modes or --motion-shapes: a selection takes the standard one"
+        }
+        ConvertArguments { split: true, stated: StatedArguments { keep_modes: Some(_), .. }, .. } => {
+            "--keep-modes takes the modes of one body: --split has several"
+        }
         ConvertArguments { accuracy: Accuracy::Certified, .. } if basis == BasisKind::Scene => {
             "the modes of this basis are no eigenvectors and cannot be certified"
         }

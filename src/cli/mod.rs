@@ -22,6 +22,7 @@ mod output;
 mod places;
 mod prepare;
 mod recipe;
+mod reduce;
 mod resources;
 mod response;
 mod select;

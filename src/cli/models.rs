@@ -8,6 +8,7 @@ use flexbody_input::{
     InterfaceNodes, InterfaceSource, ModelFiles, ModelSource, is_job, read_manifest, read_model,
 };
 use flexbody_model::{CheckedModel, Coupling, FeModel, Reference};
+use flexbody_study::recipe::Origin;
 use std::path::{Path, PathBuf};
 
 /// Returns true if `path`, of a model or of a flex-body file, is that of a model.
@@ -60,7 +61,27 @@ pub(super) fn read_checked<'p>(
     Ok((files, FeModel::from_raw(raw)?))
 }
 
+/// Returns the inputs of a study as the command line named them.
+pub(super) fn origin(path: &Path, job: &JobArguments, scene: &Path, case: &Option<String>) -> Origin {
+    let input = std::iter::once(path.display().to_string()).chain(job.words()).collect();
+    Origin { input, scene: scene.display().to_string(), case: case.clone() }
+}
+
 impl JobArguments {
+    /// Returns the given options as words of a command line.
+    fn words(&self) -> Vec<String> {
+        let dimension = self.dimension.map(|dimension| dimension.to_string());
+        let single = [
+            ("--format", &self.format),
+            ("--matrices", &self.matrices),
+            ("--units", &self.units),
+            ("--dimension", &dimension),
+        ];
+        let single = single.into_iter().filter_map(|(option, value)| Some((option, value.as_ref()?)));
+        let interfaces = self.interface.iter().map(|interface| ("--interface", interface));
+        single.chain(interfaces).flat_map(|(option, value)| [option.to_owned(), value.clone()]).collect()
+    }
+
     /// Returns the first option that is given.
     pub(super) fn first(&self) -> Option<&'static str> {
         let given = [

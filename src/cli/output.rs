@@ -6,7 +6,7 @@ use super::resources::{memory_left, use_threads};
 use super::terminal::{colours_of_stderr, for_terminal};
 use super::{
     assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, prepare, recipe,
-    response, select, simulate, trade, view,
+    reduce, response, select, simulate, trade, view,
 };
 use clap::{CommandFactory, Parser};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
@@ -91,6 +91,7 @@ fn outcome_of(arguments: &Arguments) -> Result<Outcome> {
         Command::Simulate(arguments) => simulate::run(arguments),
         Command::Trade(arguments) => trade::run(arguments),
         Command::Response(arguments) => response::run(arguments),
+        Command::Reduce(arguments) => reduce::run(arguments),
         Command::View(arguments) => view::run(arguments),
         Command::Export(arguments) => export::run(arguments),
         Command::Audit(arguments) => audit::run(arguments),
@@ -114,6 +115,7 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
         Command::Simulate(arguments) => ("simulate", arguments.printing),
         Command::Trade(arguments) => ("trade", arguments.printing),
         Command::Response(arguments) => ("response", arguments.printing),
+        Command::Reduce(arguments) => ("reduce", arguments.printing),
         Command::View(arguments) => ("view", arguments.printing),
         Command::Export(arguments) => ("export", arguments.printing),
         Command::Audit(arguments) => ("audit", arguments.printing),

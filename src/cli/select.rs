@@ -1,7 +1,7 @@
 //! Command `flexbody select`.
 
 use super::arguments::SelectArguments;
-use super::models::{is_model, read_checked};
+use super::models::{is_model, origin, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{context, use_threads};
@@ -17,8 +17,9 @@ use flexbody_linalg::context::{Event, Watch};
 use flexbody_model::CheckedModel;
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, SelectionFacts};
-use flexbody_study::reference::{Enriched, ReferenceError};
-use flexbody_study::selection::select;
+use flexbody_study::recipe::{selected_from_file, selected_from_model};
+use flexbody_study::reference::{Enriched, ReferenceError, varied_errors};
+use flexbody_study::selection::select_judged;
 use flexbody_study::tailoring::{Tailoring, computed_basis, loads_for};
 
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
@@ -34,19 +35,25 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     refuse_replacing(series, arguments.report.iter())?;
     refuse_replacing_read(arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
-    let (body, lacks, mut diagnostics) = if is_model {
+    let Judged { body, lacks, varied_lacks, mut diagnostics } = if is_model {
         converted(arguments, &cases, &watch)?
     } else {
         refuse_modes(arguments)?;
         let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
-        (body, Vec::new(), notes)
+        Judged { body, lacks: Vec::new(), varied_lacks: Vec::new(), diagnostics: notes }
     };
-    let selection = select(&body, &lacks, &cases, &context(None, arguments.allow_long, &watch))
+    let limits = context(None, arguments.allow_long, &watch);
+    let selection = select_judged(&body, &lacks, &varied_lacks, &cases, &limits)
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(selection.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
-    let facts = SelectionFacts::new(&selection, &run);
+    let origin = origin(&arguments.body, &arguments.job, &arguments.scene, &arguments.case);
+    let command = match is_model {
+        true => selected_from_model(&selection, &origin, arguments.modes.map(|modes| modes as usize)),
+        false => selected_from_file(&selection, &origin),
+    };
+    let facts = SelectionFacts::new(&selection, &run).with_command(command);
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(facts.render(format).as_bytes())?;
     }
@@ -59,12 +66,18 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     })
 }
 
+/// Body to select from, with its truncation errors.
+struct Judged {
+    body: FlexBody,
+    /// Truncation errors in each load case; empty if no model is at hand.
+    lacks: Vec<Vec<ReferenceError>>,
+    /// Truncation errors in each variation.
+    varied_lacks: Vec<Vec<ReferenceError>>,
+    diagnostics: Vec<Diagnostic>,
+}
+
 /// Returns the body of a model with everything that the load cases may need, and its truncation errors.
-fn converted(
-    arguments: &SelectArguments,
-    cases: &LoadCases,
-    watch: Watch<'_>,
-) -> Result<(FlexBody, Vec<Vec<ReferenceError>>, Vec<Diagnostic>)> {
+fn converted(arguments: &SelectArguments, cases: &LoadCases, watch: Watch<'_>) -> Result<Judged> {
     let (files, checked) = read_checked(&arguments.body, &arguments.job, arguments.report.iter())?;
     let CheckedModel { model, mut diagnostics, .. } = checked;
     let loads = loads_for(Some(cases), &files.residual_vectors);
@@ -81,7 +94,8 @@ fn converted(
     let Enriched { made, rounds } =
         tailoring.convert(&model, cases, &context).map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(made.diagnostics);
-    Ok((made.body, rounds, diagnostics))
+    let varied_lacks = varied_errors(&model, &made.body, cases, &context)?;
+    Ok(Judged { body: made.body, lacks: rounds, varied_lacks, diagnostics })
 }
 
 fn refuse_modes(arguments: &SelectArguments) -> Result<()> {

@@ -1,7 +1,7 @@
 //! Command `flexbody trade`.
 
 use super::arguments::TradeArguments;
-use super::models::{is_model, read_checked};
+use super::models::{is_model, origin, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{context, use_threads};
@@ -13,9 +13,11 @@ use flexbody_body::basis::ModeSettings;
 use flexbody_linalg::context::Event;
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, TradeFacts, trade_csv};
+use flexbody_study::recipe::Recipe;
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
-    ReferenceChoice, Source, Trade, TradeRow, TradeSettings, WantedBodies, conversions, reserved, trade,
+    ReferenceChoice, Source, Trade, TradeRow, TradeSettings, Varied, WantedBodies, conversions, reserved,
+    trade,
 };
 use std::path::{Path, PathBuf};
 
@@ -27,6 +29,10 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     refuse_contradictions(arguments, is_model)?;
     let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    if let Some(folder) = &arguments.bodies {
+        // A folder that cannot be written to is noticed before the study.
+        flexbody_file::prepare_output(candidate_path(folder, 0))?;
+    }
     let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
@@ -38,7 +44,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     // Created again for each part: the model and the bodies take memory too.
     let limits = || context(None, arguments.allow_long, &watch);
     let mut diagnostics = Vec::new();
-    let (model, sources, lacks) = if is_model {
+    let (model, sources, lacks, varied) = if is_model {
         let (_, checked) = read_checked(&arguments.body, &arguments.job, outputs())?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
@@ -46,21 +52,31 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         let made = conversions(&checked.model, &cases, wanted, &limits())
             .map_err(|error| error.in_file(&arguments.scene))?;
         diagnostics.extend(made.diagnostics);
-        (Some(checked.model), made.sources, made.lacks)
+        diagnostics.extend(made.varied.diagnostics.iter().cloned());
+        (Some(checked.model), made.sources, made.lacks, made.varied)
     } else {
         let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
         diagnostics.extend(notes);
-        (None, vec![Source::new("file", body, None)?], Vec::new())
+        let varied = Varied::of_body(&cases, body.dimension());
+        (None, vec![Source::new("file", body, Recipe::File, None)?], Vec::new(), varied)
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceChoice::Nodal);
     let reserved = reserved(&lacks, nodal.is_some());
-    let settings = TradeSettings { repeat: arguments.repeat.into(), reserved: &reserved };
+    let settings =
+        TradeSettings { repeat: arguments.repeat.into(), reserved: &reserved, varied: Some(&varied) };
     let study = trade(&sources, &cases, nodal, &settings, &limits())
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(study.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
     let facts = TradeFacts::new(&study, &lacks, &run);
+    let recommended = study.recommended.row().map(|row| &study.rows[row].candidate);
+    let origin = origin(&arguments.body, &arguments.job, &arguments.scene, &arguments.case);
+    let command = recommended.and_then(|taken| sources[taken.source].command(taken, &origin));
+    let facts = match command {
+        Some(command) => facts.with_command(command),
+        None => facts,
+    };
 
     if let Some(slot) = &table {
         slot.fill(trade_csv(&study).as_bytes())?;
@@ -79,7 +95,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     OutputSlot::commit_all(table.into_iter().chain(reports).chain(bodies))?;
     let holds = |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
     let is_reference = nodal.is_some() || lacks.iter().all(holds);
-    let passed = study.recommended.row().is_some() && is_reference;
+    let passed = study.recommended.row().is_some() && is_reference && study.holds_in_stated_variations();
     let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })
 }
@@ -93,7 +109,7 @@ fn candidate_bodies(
     sources: &[Source],
 ) -> Result<Vec<OutputSlot>> {
     let measured = study.rows.iter().enumerate().filter(|(_, row)| row.outcome.is_ok());
-    let named = measured.map(|(at, row)| (folder.join(format!("candidate_{:03}.flex.h5", at + 1)), row));
+    let named = measured.map(|(at, row)| (candidate_path(folder, at), row));
     let named: Vec<(PathBuf, &TradeRow)> = named.collect();
     refuse_replacing(taken.iter().copied(), named.iter().map(|(path, _)| path))?;
     let written = named.into_iter().map(|(path, row)| {
@@ -102,6 +118,11 @@ fn candidate_bodies(
         Ok(slot)
     });
     written.collect()
+}
+
+/// Returns the path of the body of a row (from 0).
+fn candidate_path(folder: &Path, row: usize) -> PathBuf {
+    folder.join(format!("candidate_{:03}.flex.h5", row + 1))
 }
 
 /// Refuses options that a flex-body file does not support.

@@ -217,6 +217,7 @@ codes! {
     MotionWithoutBasis = "FB552", Note, Done, "no small number of shapes represents the motion", "nothing to do: the body has the modes of a conversion without --basis scene";
     RateUnsettled = "FB554", Warning, Done, "rate still changes with the step size of the integration", "give a smaller `tolerance` (or a shorter `step`) in [run] until the rate no longer changes";
     SelectionUnjudged = "FB557", Error, CheckFailed, "body does not meet the tolerances of the scene, or this cannot be judged", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body nevertheless";
+    VariationFails = "FB559", Warning, Done, "recommended body does not hold in a variation of the scene", "make the variation a [[case]] of the scene, so that the body is made for it as well; or leave out a [[variation]] that cannot occur";
     CouplingEffect = "FB558", Note, Done, "effect of rigid interfaces that the body and its reference model share", "nothing to do where a stiff part is mounted at the interface; otherwise set coupling = \"averaging\", which lets the interface deform";
     // FB6xx: resources; FB603 stays unused (checkpoints of earlier versions)
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";

@@ -58,6 +58,7 @@ mod trade_nodes;
 #[cfg(feature = "hdf5")]
 mod trade_verdict;
 mod unit_names;
+mod variations;
 #[cfg(feature = "hdf5")]
 mod view;
 

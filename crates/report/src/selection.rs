@@ -9,6 +9,7 @@ use super::run_data::RunData;
 use super::selection_cases::{CaseFacts, cases_table};
 use super::selection_verdict::SelectionVerdict;
 use super::text::{self, Screen};
+use super::variations::{VariationFacts, in_words};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{TermDecision, TermGroup};
@@ -27,6 +28,9 @@ pub struct SelectionFacts<'a> {
     body: &'a str,
     /// The selection in five lines.
     verdict: SelectionVerdict,
+    /// Command that makes exactly the recommended body; `None` if the inputs are not known by name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    command: Option<String>,
     inputs: Vec<InputFacts<'a>>,
     tolerance: PerQuantity<f64>,
     terms: Vec<TermFacts<'a>>,
@@ -42,6 +46,9 @@ pub struct SelectionFacts<'a> {
     /// Facts of each load case, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cases: Vec<CaseFacts<'a>>,
+    /// Errors of the selected model in variations of the scene, which did not choose it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    variations: Vec<VariationFacts<'a>>,
     diagnostics: &'a [Diagnostic],
 }
 
@@ -200,6 +207,7 @@ impl<'a> SelectionFacts<'a> {
             scene: &selection.scene,
             body: &selection.body,
             verdict: SelectionVerdict::new(selection),
+            command: None,
             inputs: selection
                 .inputs
                 .iter()
@@ -221,8 +229,14 @@ impl<'a> SelectionFacts<'a> {
             significance: significance.collect(),
             trials: selection.trials.iter().map(|trial| TrialFacts::new(trial, &selection.cases)).collect(),
             cases: selection.cases.iter().map(CaseFacts::new).collect(),
+            variations: selection.varied.iter().map(VariationFacts::of_selection).collect(),
             diagnostics: &run.diagnostics,
         }
+    }
+
+    /// Adds the command that makes exactly the recommended body.
+    pub fn with_command(self, command: String) -> Self {
+        Self { command: Some(command), ..self }
     }
 
     /// Renders the facts in a format, ending with a line break.
@@ -265,6 +279,8 @@ impl<'a> SelectionFacts<'a> {
         let mut terms = vec![Term::text("Selection", format!("{}: {}", self.scene, self.body))];
         terms.extend([Term::new(asked.0, asked.1), Term::text(label, taken)]);
         terms.extend(rest.map(|(label, line)| Term::new(label, line)));
+        terms.extend(in_words(&self.variations).map(|words| Term::new("Variations", words)));
+        terms.extend(self.command.as_ref().map(|command| Term::new("Command", command.as_str())));
         terms
     }
 

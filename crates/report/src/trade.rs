@@ -4,13 +4,14 @@ use super::Format;
 use super::chart::{Axis, Chart, Mark, Panel, Series};
 use super::csv;
 use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
-use super::errors_in_words::errors_in_words;
+use super::errors_in_words::{errors_in_words, ranges};
 use super::lacks::{LackFacts, reference_in_words};
 use super::numbers::{bytes, counted, duration, significant, times};
 use super::run_data::RunData;
 use super::trade_cases::{TradeCaseFacts, case_facts, cases_table};
 use super::trade_nodes::NodalFacts;
-use super::trade_verdict::verdict_lines;
+use super::trade_verdict::{varied_line, verdict_lines};
+use super::variations::VariationFacts;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::Storage;
@@ -20,6 +21,7 @@ use flexbody_study::trade::{
     CandidateKind, InCase, LumpedMass, Measured, ReferenceKind, Trade, TradeCase, TradeRow,
 };
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Columns of the Pareto front in a text.
 const IN_TEXT: [&str; 7] =
@@ -48,14 +50,24 @@ pub struct TradeFacts<'a> {
     /// Tolerance; with several load cases the smallest of each quantity.
     tolerance: Tolerance,
     allowed_multiplications: Option<usize>,
-    /// The study in five lines.
+    /// The study in five lines, and the command.
     verdict: Vec<VerdictLine>,
+    /// Command that makes exactly the recommended body; `None` if nothing is recommended, or if the inputs are not
+    /// known by name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    command: Option<String>,
     recommended: Option<usize>,
     front: Vec<usize>,
     rows: Vec<RowFacts<'a>>,
     /// Facts of each load case, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cases: Vec<TradeCaseFacts<'a>>,
+    /// Errors of the recommended row in variations of the scene, which its body was not made for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    variations: Vec<VariationFacts<'a>>,
+    /// Row that the scene alone would recommend, if that is another one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    recommended_in_scene: Option<usize>,
     diagnostics: &'a [Diagnostic],
     threads: usize,
     wall_seconds: f64,
@@ -101,6 +113,10 @@ struct MeasuredFacts<'a> {
     case: Option<&'a str>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     by_case: Vec<f64>,
+    /// Largest ratio of error to tolerance in each variation; `None` where the simulation stopped. Empty if the row was
+    /// not judged on variations.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    by_variation: Vec<Option<f64>>,
     multiplications: usize,
     file_bytes: u64,
     /// Number of integration steps; `None` for candidates that are not on the front.
@@ -130,6 +146,12 @@ impl<'a> MeasuredFacts<'a> {
             growth,
             case,
             by_case: ratios.filter(|_| case.is_some()).collect(),
+            by_variation: measured
+                .varied
+                .iter()
+                .flat_map(|own| &own.by_variation)
+                .map(|own| Some((*own)?.worst))
+                .collect(),
             multiplications: measured.multiplications,
             file_bytes: measured.bytes,
             steps: timed.map(|timed| timed.work.steps),
@@ -229,10 +251,17 @@ impl<'a> TradeFacts<'a> {
             tolerance: trade.tolerance,
             allowed_multiplications: trade.allowed,
             verdict: Vec::new(),
+            command: None,
             recommended: trade.recommended.row().map(|row| row + 1),
             front: trade.front.iter().map(|row| row + 1).collect(),
             rows,
             cases: case_facts(trade, lacks),
+            variations: VariationFacts::of_trade(trade),
+            recommended_in_scene: trade
+                .in_scene
+                .row()
+                .filter(|_| trade.in_scene != trade.recommended)
+                .map(|row| row + 1),
             diagnostics: &run.diagnostics,
             threads: run.threads,
             wall_seconds: run.wall_seconds(),
@@ -242,12 +271,35 @@ impl<'a> TradeFacts<'a> {
         let is_nodal = trade.cases.iter().any(|case| case.nodal.is_some());
         let lacking = rounds.last().filter(|own| !is_nodal && !own.is_reference());
         let lines = verdict_lines(trade, &names, &facts.tolerances_in_words(), lacking).into_iter();
-        facts.verdict = lines.map(|(label, text)| VerdictLine { label, text }).collect();
+        let in_variations = varied_line(trade, &facts.variations, &names).map(|text| ("Variations", text));
+        facts.verdict = lines.chain(in_variations).map(|(label, text)| VerdictLine { label, text }).collect();
         facts
     }
 
+    /// Adds the command that makes exactly the recommended body.
+    pub fn with_command(mut self, command: String) -> Self {
+        self.verdict.push(VerdictLine { label: "Command", text: command.clone() });
+        Self { command: Some(command), ..self }
+    }
+
+    /// Returns the names of all rows. Candidates that would read alike have their source and, if that is not enough,
+    /// the numbers of their modes in their names.
     fn names(&self) -> Vec<String> {
-        self.rows.iter().map(RowFacts::in_words).collect()
+        let mut names: Vec<String> = self.rows.iter().map(RowFacts::in_words).collect();
+        let details: [&dyn Fn(&RowFacts<'a>) -> String; 2] =
+            [&|row| format!(", of: {}", row.source), &|row| {
+                format!(", numbers {}", ranges(&row.mode_numbers))
+            }];
+        for detail in details {
+            let mut count = BTreeMap::<String, usize>::new();
+            names.iter().for_each(|name| *count.entry(name.clone()).or_default() += 1);
+            for (name, row) in names.iter_mut().zip(&self.rows) {
+                if count[name.as_str()] > 1 {
+                    name.push_str(&detail(row));
+                }
+            }
+        }
+        names
     }
 
     /// Renders the facts in a format, ending with a line break.

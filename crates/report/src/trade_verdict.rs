@@ -3,6 +3,7 @@
 use super::errors_in_words::errors_in_words;
 use super::lacks::LackFacts;
 use super::numbers::{duration, significant};
+use super::variations::{VariationFacts, in_words};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{InCase, Measured, Recommendation, Trade, TradeRow};
 
@@ -88,6 +89,27 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
         names[at],
         in_case(trade, own)
     )
+}
+
+/// Returns the errors of the recommended row in variations, and a cheaper row that fails there; `None` if no row was
+/// judged.
+pub(super) fn varied_line(
+    trade: &Trade,
+    variations: &[VariationFacts<'_>],
+    names: &[String],
+) -> Option<String> {
+    let words = in_words(variations)?;
+    let cheaper = trade.in_scene.row().filter(|_| trade.in_scene != trade.recommended);
+    let Some((row, varied)) =
+        cheaper.and_then(|row| Some((row, trade.rows[row].outcome.as_ref().ok()?.varied.as_ref()?)))
+    else {
+        return Some(words);
+    };
+    let (name, times) = (&trade.variations[varied.variation].name, significant(varied.worst, 2));
+    Some(format!(
+        "{words}; cheaper, {} holds in the scene and takes {times} times the tolerances where {name}",
+        names[row]
+    ))
 }
 
 /// Returns ` in case braking` if there are several load cases; empty otherwise.

@@ -1,14 +1,16 @@
-//! Conversion of a body for one scene: it computes only the terms that the scene may need, and keeps only those that it
-//! does need.
+//! Conversion of a body for one scene: with the terms and modes that the scene needs, or with those that a
+//! recommendation states.
 
-use crate::reference::{Enriched, Enrichment, Fewest, MOST_LACKING, MotionBodies, ReferenceError, enrich};
-use crate::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select};
+use crate::reference::{
+    Enriched, Enrichment, Fewest, MOST_LACKING, MotionBodies, ReferenceError, enrich, varied_errors,
+};
+use crate::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_judged};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisChoice, BasisKind, CraigBampton, CraigChang, FreeSurface, Loads, UserLoads};
-use flexbody_body::convert::{Condensation, Conversion, ConvertSettings, ModalModel};
-use flexbody_body::flex_body::FlexBody;
+use flexbody_body::convert::{Condensation, Conversion, ConvertSettings, ModalModel, convert};
+use flexbody_body::flex_body::{FlexBody, Subset};
 use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_input::{LoadSource, read_shapes};
 use flexbody_linalg::context::Context;
@@ -26,6 +28,18 @@ pub struct Tailoring {
     pub of_motion: bool,
 }
 
+/// Parts of a body that a user or a recommendation states, instead of a selection.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct StatedParts {
+    /// Number of shapes of the motion that replace the modes, those of most elastic energy; `None` to keep the modes.
+    pub motion_shapes: Option<usize>,
+    /// Modes and groups of terms that the body keeps.
+    pub subset: Subset,
+    /// True if the body is enriched until its truncation error is within a hundredth of the tolerances, instead of a
+    /// tenth.
+    pub is_fine: bool,
+}
+
 impl Tailoring {
     /// Makes a body with everything that any of the load cases may need, and enriches it until its truncation error is
     /// small there.
@@ -38,15 +52,16 @@ impl Tailoring {
         cases: &LoadCases,
         context: &Context<'_>,
     ) -> Result<Enriched<Conversion>> {
-        self.enriched(model, cases, context, |modal| Ok(modal.condense()))
+        self.enriched(model, cases, false, context, |modal| Ok(modal.condense()))
     }
 
     /// Converts with `condense`, with more static responses in each round, until the truncation error of the body is
-    /// small enough.
+    /// small enough: a tenth of the tolerances, or a hundredth if `is_fine`.
     fn enriched(
         &self,
         model: &FeModel,
         cases: &LoadCases,
+        is_fine: bool,
         context: &Context<'_>,
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
     ) -> Result<Enriched<Conversion>> {
@@ -60,7 +75,7 @@ impl Tailoring {
         let Self { settings, .. } = self;
         let grows = settings.modes.accuracy != Accuracy::Certified
             && settings.basis.with_motion(&Mat::new()).is_some();
-        let enrichment = Enrichment { grows, is_fine: false };
+        let enrichment = Enrichment { grows, is_fine };
         enrich(model, cases, enrichment, context, make, |made| &made.body)
     }
 
@@ -69,7 +84,7 @@ impl Tailoring {
     ///
     /// # Errors
     /// The errors of [`trace`](flexbody_motion::scene::trace) and of the conversion.
-    fn of_motion(
+    fn fewest_shapes(
         &self,
         model: &FeModel,
         cases: &LoadCases,
@@ -115,6 +130,25 @@ impl Tailoring {
         let message = "no number of shapes of the motion leaves half of the tolerances to the dropped terms";
         reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
         Ok(Enriched { made: reference, rounds })
+    }
+
+    /// Returns the body of the first `count` shapes of the motions of `reference`.
+    fn of_shapes(
+        &self,
+        model: &FeModel,
+        cases: &LoadCases,
+        reference: &FlexBody,
+        count: usize,
+        context: &Context<'_>,
+    ) -> Result<Conversion> {
+        let bodies = MotionBodies::new(model, reference, cases, context)?;
+        let most = bodies.as_ref().map_or(0, MotionBodies::most);
+        let Some(bodies) = bodies.filter(|_| (1..=most).contains(&count)) else {
+            let message = format!("{count} shapes of the motion are asked for, and the motion has {most}");
+            let help = "give a smaller number, or leave it out: the fewest that suffice are taken";
+            return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+        };
+        convert(model, &self.settings_of_shapes(bodies.basis(count)), context)
     }
 
     /// Returns settings that use all modes of the given shapes.
@@ -232,15 +266,47 @@ pub fn convert_for(
         let terms = rule_out(&modal.body(&linear)?, cases, context)?;
         Ok(modal.condense_kept(linear, terms))
     };
-    let mut enriched = tailoring.enriched(model, cases, context, condense)?;
+    let mut enriched = tailoring.enriched(model, cases, false, context, condense)?;
     if tailoring.of_motion {
-        enriched = tailoring.of_motion(model, cases, enriched, context, condense)?;
+        enriched = tailoring.fewest_shapes(model, cases, enriched, context, condense)?;
     }
     let Enriched { made: mut conversion, rounds } = enriched;
-    let selection = select(&conversion.body, &rounds, cases, context)?;
+    let varied_lacks = varied_errors(model, &conversion.body, cases, context)?;
+    let selection = select_judged(&conversion.body, &rounds, &varied_lacks, cases, context)?;
     let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
-    // Record the scene and its histories as sources of the body.
-    let mut parts = reduced.into_parts();
+    conversion.body = with_sources(reduced, cases)?;
+    Ok((conversion, selection))
+}
+
+/// Converts `model` to a body that is enriched for the load cases and has the `stated` parts, without a selection: the
+/// body that a recommendation of `trade` or `select` names.
+///
+/// # Errors
+/// The errors of [`convert`], [`enrich`] and [`FlexBody::subset`]; FB801 if the motion has fewer shapes than stated.
+pub fn convert_stated(
+    model: &FeModel,
+    tailoring: &Tailoring,
+    cases: &LoadCases,
+    stated: &StatedParts,
+    context: &Context<'_>,
+) -> Result<Conversion> {
+    refuse_frame(tailoring)?;
+    let condense = |modal: &ModalModel<'_>| Ok(modal.condense());
+    let enriched = tailoring.enriched(model, cases, stated.is_fine, context, condense)?;
+    let mut conversion = match stated.motion_shapes {
+        Some(count) => {
+            refuse_without_run(cases)?;
+            tailoring.of_shapes(model, cases, &enriched.made.body, count, context)?
+        }
+        None => enriched.made,
+    };
+    conversion.body = with_sources(conversion.body.subset(&stated.subset)?, cases)?;
+    Ok(conversion)
+}
+
+/// Returns the body with the scene and its histories among its sources.
+fn with_sources(body: FlexBody, cases: &LoadCases) -> Result<FlexBody> {
+    let mut parts = body.into_parts();
     let series = cases.iter().flat_map(|scene| &scene.series).map(|file| &file.source);
     for source in cases.iter().filter_map(|scene| scene.source.as_ref()).chain(series) {
         // Load cases share their scene file, and may share histories.
@@ -248,28 +314,38 @@ pub fn convert_for(
             parts.source.files.push(source.clone());
         }
     }
-    conversion.body = FlexBody::new(parts)?;
-    Ok((conversion, selection))
+    FlexBody::new(parts)
 }
 
 /// Refuses settings and scenes for which a conversion with selection, or a basis made of motion, is not possible.
 fn refuse_unfit(tailoring: &Tailoring, cases: &LoadCases) -> Result<()> {
-    if tailoring.settings.frame.interface().is_some() {
-        let message = "a scene chooses terms and modes of bodies in mean axes, not of one whose frame stands on an interface";
-        let help = "leave --scene out, or use --frame com";
-        return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
-    }
+    refuse_frame(tailoring)?;
     if !tailoring.of_motion {
         return Ok(());
     }
-    let message = if cases.iter().any(|scene| !scene.initial.modes.is_empty()) {
-        "--basis scene: the scene starts modes by their number, which a body made of its motion does not have"
-    } else if cases.iter().any(|scene| scene.carried.is_some()) {
-        "--basis scene: shapes are made of the motion of a free body, and something carries this one"
-    } else if cases.iter().any(|scene| scene.run.duration.is_none()) {
-        "--basis scene: shapes are made of a motion, and the scene has no [run] with a duration"
-    } else {
+    if cases.iter().any(|scene| !scene.initial.modes.is_empty()) {
+        let message = "--basis scene: the scene starts modes by their number, which a body made of its motion does not have";
+        return Err(Diagnostic::new(Code::Usage, message).into());
+    }
+    refuse_without_run(cases)
+}
+
+/// Refuses a body frame that stands on an interface.
+fn refuse_frame(tailoring: &Tailoring) -> Result<()> {
+    if tailoring.settings.frame.interface().is_none() {
         return Ok(());
-    };
-    Err(Diagnostic::new(Code::Usage, message).into())
+    }
+    let message = "a scene chooses terms and modes of bodies in mean axes, not of one whose frame stands on an interface";
+    let help = "leave --scene out, or use --frame com";
+    Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
+}
+
+/// Refuses scenes without a motion to make shapes of.
+fn refuse_without_run(cases: &LoadCases) -> Result<()> {
+    if cases.iter().all(|scene| scene.run.duration.is_some()) {
+        return Ok(());
+    }
+    let message = "--basis scene: shapes are made of a motion, and the scene has no [run] with a duration";
+    let help = "state `duration` under [run] of the scene";
+    Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
 }

@@ -5,6 +5,7 @@ use crate::outputs::{Output, Outputs};
 use crate::subject::{Basis, Subject};
 use flexbody_base::error::Result;
 use flexbody_linalg::context::Context;
+use flexbody_study::recipe::Recipe;
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::selection::{Selection, select};
 use flexbody_study::tailoring::{Tailoring, convert_for};
@@ -76,8 +77,8 @@ pub fn conversion(subject: &Subject) -> Result<Outputs> {
 /// Runs `trade` on a body against the motion of all nodes.
 pub fn trading(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
-    let settings = TradeSettings { repeat: 1, reserved: &[] };
-    let source = Source::new("body", subject.body()?, None)?;
+    let settings = TradeSettings { repeat: 1, reserved: &[], varied: None };
+    let source = Source::new("body", subject.body()?, Recipe::File, None)?;
     let study = trade(&[source], &scenes, Some(&model), &settings, &Context::QUIET)?;
     // Candidates with rounded numbers differ for a rotated body.
     let exact = |row: &&TradeRow| row.candidate.kind() != CandidateKind::Single;

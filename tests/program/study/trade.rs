@@ -11,6 +11,7 @@ use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{Axes, Initial, LoadCases, ModeStart, PerQuantity, Scene, Scheme, simulate};
+use flexbody_study::recipe::Recipe;
 use flexbody_study::reference::PART_OF_FINE;
 use flexbody_study::selection::select;
 use flexbody_study::trade::{
@@ -26,7 +27,7 @@ use oracle::scenes::nothing_happens;
 use serde_json::Value;
 use std::fs;
 
-const QUICK: TradeSettings<'static> = TradeSettings { repeat: 1, reserved: &[] };
+const QUICK: TradeSettings<'static> = TradeSettings { repeat: 1, reserved: &[], varied: None };
 
 /// Returns a free tumble with `spin` radians per unit of time about an axis between the principal axes, over
 /// `turns` turns.
@@ -40,7 +41,7 @@ fn tumble(spin: f64, turns: f64) -> Scene {
 
 fn study(body: FlexBody, scene: &Scene) -> Trade {
     trade(
-        &[Source::new("body", body, None).expect("a body")],
+        &[Source::new("body", body, Recipe::File, None).expect("a body")],
         &scene.clone().into(),
         None,
         &QUICK,
@@ -416,7 +417,7 @@ fn two_cases(body: &FlexBody) -> [Scene; 2] {
 fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
     let body = soft_block(6);
     let scenes = two_cases(&body);
-    let sources = [Source::new("body", body.clone(), None).expect("a body")];
+    let sources = [Source::new("body", body.clone(), Recipe::File, None).expect("a body")];
     let settings = TradeSettings { reserved: &[0.1], ..QUICK };
     let cases = LoadCases::new(scenes.to_vec()).expect("two cases");
     let both = trade(&sources, &cases, None, &settings, &Context::QUIET).expect("a study");

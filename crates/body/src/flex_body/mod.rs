@@ -17,6 +17,7 @@ mod rigid_motion;
 mod rounded;
 mod softening;
 mod storage;
+mod subset;
 mod terms;
 mod validate;
 
@@ -34,4 +35,5 @@ pub use parts::{
 pub use reference_conditions::ReferenceConditions;
 pub use softening::{SOFTENING, axis_in_words};
 pub use storage::Storage;
+pub use subset::Subset;
 pub use terms::TermDecision;

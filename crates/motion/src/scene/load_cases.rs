@@ -1,19 +1,23 @@
 //! Load cases of a scene file.
 
 use super::read_cases::read_cases;
-use super::{Scene, Tolerance};
+use super::{Scene, SceneVariation, Tolerance, Variations};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use std::ops::Deref;
 use std::path::Path;
 
-/// Load cases of one body: one or more scenes, in the order of their file.
+/// Load cases of one body: one or more scenes, in the order of their file, and the variations that a body made for them
+/// is judged on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LoadCases(Vec<Scene>);
+pub struct LoadCases {
+    cases: Vec<Scene>,
+    variations: Variations,
+}
 
 impl From<Scene> for LoadCases {
     fn from(scene: Scene) -> Self {
-        Self(vec![scene])
+        Self { cases: vec![scene], variations: Variations::Without }
     }
 }
 
@@ -21,14 +25,14 @@ impl Deref for LoadCases {
     type Target = [Scene];
 
     fn deref(&self) -> &[Scene] {
-        &self.0
+        &self.cases
     }
 }
 
 impl LoadCases {
     /// Returns the load cases in their order, or `None` for an empty list.
     pub fn new(cases: Vec<Scene>) -> Option<Self> {
-        (!cases.is_empty()).then_some(Self(cases))
+        (!cases.is_empty()).then_some(Self { cases, variations: Variations::Without })
     }
 
     /// Reads the load cases of a scene file: the case with the given name, or all for `None`. A file
@@ -41,11 +45,14 @@ impl LoadCases {
     /// the scene has no case of that name.
     pub fn read(path: impl AsRef<Path>, case: Option<&str>) -> Result<Self> {
         let path = path.as_ref();
-        let mut cases = read_cases(path)?;
-        let Some(name) = case else { return Ok(Self(cases)) };
+        let (cases, variations) = read_cases(path)?;
+        let Some(name) = case else { return Ok(Self { cases, variations }) };
         let names = names(&cases);
         match names.iter().position(|other| *other == name) {
-            Some(at) => Ok(cases.swap_remove(at).into()),
+            Some(at) => {
+                let variations = variations.of_case(at);
+                Ok(Self { cases: vec![cases[at].clone()], variations })
+            }
             None => Err(unknown_case(name, &names).in_file(path).into()),
         }
     }
@@ -61,7 +68,7 @@ impl LoadCases {
         if case.is_none() && !names.is_empty() {
             return Err(ambiguous(&names).in_file(path).into());
         }
-        Ok(cases.0.swap_remove(0))
+        Ok(cases.cases.swap_remove(0))
     }
 
     /// Returns the only load case.
@@ -69,7 +76,7 @@ impl LoadCases {
     /// # Errors
     /// FB219 if there are several.
     pub fn single(&self) -> Result<&Scene> {
-        match &self.0[..] {
+        match &self.cases[..] {
             [scene] => Ok(scene),
             all => Err(ambiguous(&all.iter().map(Scene::short_name).collect::<Vec<_>>()).into()),
         }
@@ -77,13 +84,13 @@ impl LoadCases {
 
     /// Returns the name of the scene that the load cases belong to; for a single load case its full name.
     pub fn name(&self) -> &str {
-        let first = &self.0[0];
+        let first = &self.cases[0];
         first.case.as_ref().filter(|_| self.len() > 1).map_or(&first.name, |case| &case.scene)
     }
 
     /// Returns the name of a load case (from 0) if there are several; `None` for a single scene.
     pub fn case_name(&self, at: usize) -> Option<&str> {
-        (self.len() > 1).then(|| self.0[at].short_name())
+        (self.len() > 1).then(|| self.cases[at].short_name())
     }
 
     /// Adds the name of a load case (from 0) to an error if there are several.
@@ -92,6 +99,32 @@ impl LoadCases {
             Some(name) => error.about(format!("case `{name}`")),
             None => error,
         }
+    }
+
+    /// Returns the variations that a body for these load cases is judged on, for a body of 2 or 3 dimensions: those of
+    /// the scene file, or the standard ones.
+    pub fn variations(&self, dimension: usize) -> Vec<SceneVariation> {
+        match &self.variations {
+            Variations::Without => Vec::new(),
+            Variations::Stated(stated) => stated.clone(),
+            Variations::Standard => {
+                let of_case = |(case, scene): (usize, &Scene)| {
+                    let varied = scene.standard_variations(dimension);
+                    varied.into_iter().map(move |(name, scene)| SceneVariation { name, case, scene })
+                };
+                self.iter().enumerate().flat_map(of_case).collect()
+            }
+        }
+    }
+
+    /// Returns the variations that the scene file states.
+    pub fn stated_variations(&self) -> &Variations {
+        &self.variations
+    }
+
+    /// Returns the load cases without variations.
+    pub fn without_variations(self) -> Self {
+        Self { variations: Variations::Without, ..self }
     }
 
     /// Returns the smallest tolerance of each quantity over all load cases, with the smallest compared

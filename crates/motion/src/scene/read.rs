@@ -19,7 +19,7 @@ use std::ops::Range;
 use toml::de::DeValue;
 
 pub(super) const TOP: &[&str] =
-    &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch", "case"];
+    &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch", "case", "variation"];
 const RUN: &[&str] = &["duration", "outputs", "most_steps", "method", "tolerance", "order", "step", "terms"];
 const INITIAL: &[&str] =
     &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode", "deformation"];
@@ -314,9 +314,14 @@ mod tests {
         let required = required.iter().map(|(name, keys)| (format!("/properties/{name}/properties"), *keys));
         let top = [TOP, &read_requirements::TABLES.map(|(name, _)| name)].concat();
         let of_case = super::super::read_cases::known_keys();
+        let of_variation = super::super::read_variations::known();
         let lists = lists.into_iter().map(|(pointer, keys)| (pointer.to_owned(), keys));
-        let whole = [("/properties", &top[..]), ("/properties/case/items/properties", &of_case)]
-            .map(|(at, keys)| (at.to_owned(), keys));
+        let whole = [
+            ("/properties", &top[..]),
+            ("/properties/case/items/properties", &of_case),
+            ("/properties/variation/items/properties", &of_variation),
+        ]
+        .map(|(at, keys)| (at.to_owned(), keys));
         for (pointer, known) in lists.chain(required).chain(whole) {
             let pointer = &pointer;
             let object = schema.pointer(pointer).and_then(|v| v.as_object()).expect(pointer);

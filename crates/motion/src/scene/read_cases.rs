@@ -2,7 +2,8 @@
 //! replaces them.
 
 use super::read::{TOP, scene};
-use super::{CaseName, Scene, read_requirements};
+use super::read_variations::{variations, without_run};
+use super::{CaseName, Scene, Variations, read_requirements};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::text::walk::{TomlTable, Value, Walk, read_toml};
@@ -19,14 +20,27 @@ const BY_KEY: &[&str] = &["run", "initial", "motion", "attachment", "limits", "t
 const ADDED: &[&str] = &["load", "watch"];
 
 /// Keys that may only appear at the top level, not in a `[[case]]`.
-const ONLY_COMMON: &[&str] = &["case", "cost"];
+const ONLY_COMMON: &[&str] = &["case", "cost", "variation"];
 
-/// Reads the load cases of a scene file in its order, one or more; a file without `[[case]]` is a single scene.
-pub(super) fn read_cases(path: &Path) -> Result<Vec<Scene>> {
+/// Reads the load cases of a scene file in its order, one or more, and their variations; a file without `[[case]]` is a
+/// single scene.
+pub(super) fn read_cases(path: &Path) -> Result<(Vec<Scene>, Variations)> {
     let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     read_toml(path, "scene", Code::SceneSyntax, |walk, top| match top.get("case") {
-        None => Some(vec![scene(walk, top, stem)?]),
-        Some(list) => cases(walk, top, list, stem),
+        None => {
+            let only = vec![scene(walk, top, stem)?];
+            let varied = variations(walk, top, std::slice::from_ref(top), &only)?;
+            refuse_without_run(walk, top, &only);
+            Some((only, varied))
+        }
+        Some(list) => {
+            let all = cases(walk, top, list, stem)?;
+            let tables: Vec<TomlTable<'_>> =
+                tables(walk, list)?.iter().map(|(table, _)| merged(top, table)).collect();
+            let varied = variations(walk, top, &tables, &all)?;
+            refuse_without_run(walk, top, &all);
+            Some((all, varied))
+        }
     })
 }
 
@@ -113,9 +127,10 @@ pub(super) fn known_keys() -> Vec<&'static str> {
 
 /// Returns the table of a case: the `common` table, with the tables of [`BY_KEY`] merged key by key, the
 /// lists of [`ADDED`] extended by the items of the case, and all other keys replaced by those of the case.
-fn merged<'t>(common: &TomlTable<'t>, case: &TomlTable<'t>) -> TomlTable<'t> {
+pub(super) fn merged<'t>(common: &TomlTable<'t>, case: &TomlTable<'t>) -> TomlTable<'t> {
     let mut merged = common.clone();
     merged.remove("case");
+    merged.remove("variation");
     merged.remove("name");
     let known = known_keys();
     for (key, value) in case {
@@ -163,6 +178,15 @@ fn each_once(found: Vec<Vec<Diagnostic>>, names: &[String]) -> Vec<Diagnostic> {
         }
     }
     told
+}
+
+/// Adds a diagnostic if variations are stated and nothing is simulated.
+fn refuse_without_run(walk: &mut Walk<'_>, top: &TomlTable<'_>, cases: &[Scene]) {
+    if let (Some(list), true) = (top.get("variation"), cases.iter().all(|scene| scene.run.duration.is_none()))
+    {
+        let refused = without_run(walk, list.span());
+        walk.found.push(refused);
+    }
 }
 
 /// Adds a diagnostic if only some cases have a duration: a body is chosen by motion or by ranges, not by

@@ -7,7 +7,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::side_by_side;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{LoadCases, Scene};
+use flexbody_motion::scene::{LoadCases, Scene, SceneVariation};
 
 /// Largest ratio of the truncation error to that of the previous round at which another round is made. The value is
 /// close to one because the first responses may leave most of the error from inertia to the next round. A smaller value
@@ -70,12 +70,27 @@ pub fn enrich<B>(
     cases: &LoadCases,
     enrichment: Enrichment,
     context: &Context<'_>,
-    mut make: impl FnMut(&Mat<f64>) -> Result<B>,
+    make: impl FnMut(&Mat<f64>) -> Result<B>,
     body: impl Fn(&B) -> &FlexBody,
 ) -> Result<Enriched<B>> {
     let refuse = |scene: &Scene| scene.requirements.refuse_damping_beside(model, &scene.name);
     cases.iter().try_for_each(refuse)?;
-    let mut loads = Mat::zeros(model.rows().len(), 0);
+    enrich_from(Mat::zeros(model.rows().len(), 0), model, cases, enrichment, context, make, body)
+}
+
+/// Does the work of [`enrich`], starting from a body with the static responses to `loads` (N x k).
+///
+/// # Errors
+/// The errors of `make` and of [`trace`](flexbody_motion::scene::trace).
+pub fn enrich_from<B>(
+    mut loads: Mat<f64>,
+    model: &FeModel,
+    cases: &LoadCases,
+    enrichment: Enrichment,
+    context: &Context<'_>,
+    mut make: impl FnMut(&Mat<f64>) -> Result<B>,
+    body: impl Fn(&B) -> &FlexBody,
+) -> Result<Enriched<B>> {
     let mut made = make(&loads)?;
     let mut asking = vec![Asking::default(); cases.len()];
     let mut poorer = None;
@@ -106,6 +121,29 @@ pub fn enrich<B>(
         poorer = Some(std::mem::replace(&mut made, make(&loads)?));
     }
     Ok(Enriched { made, rounds: asking.into_iter().map(|case| case.rounds).collect() })
+}
+
+/// Returns the estimated truncation errors of `body`, made of `model`, in each variation of the load cases. A list is
+/// empty if nothing can be estimated.
+///
+/// # Errors
+/// The errors of [`trace`](flexbody_motion::scene::trace).
+pub fn varied_errors(
+    model: &FeModel,
+    body: &FlexBody,
+    cases: &LoadCases,
+    context: &Context<'_>,
+) -> Result<Vec<Vec<ReferenceError>>> {
+    let variations = cases.variations(model.dimension());
+    if variations.iter().any(|one| one.scene.run.duration.is_none()) {
+        return Ok(Vec::new());
+    }
+    let error = |one: &SceneVariation| {
+        let estimate = Estimate::new(model, body, &one.scene, PART_OF_REFERENCE, context);
+        let estimate = estimate.map_err(|error| error.about(format!("variation `{}`", one.name)))?;
+        Ok(estimate.map(|own| own.error).into_iter().collect())
+    };
+    variations.iter().map(error).collect()
 }
 
 /// State of a load case during enrichment.

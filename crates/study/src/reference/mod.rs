@@ -17,6 +17,6 @@ mod residual;
 mod resonance;
 mod turning;
 
-pub use enrich::{Enriched, Enrichment, enrich};
+pub use enrich::{Enriched, Enrichment, enrich, enrich_from, varied_errors};
 pub use estimate::{CouplingEffect, MOST_LACKING, PART_OF_FINE, PART_OF_REFERENCE, ReferenceError};
 pub use motion_bodies::{Fewest, MotionBodies};

@@ -66,7 +66,12 @@ impl<'m> MotionBodies<'m> {
         self.shapes.counts()
     }
 
-    /// Returns the basis of the first `count` shapes.
+    /// Returns the number of all shapes.
+    pub fn most(&self) -> usize {
+        self.shapes.most()
+    }
+
+    /// Returns the basis of the first `count` shapes, at most [`MotionBodies::most`].
     pub fn basis(&self, count: usize) -> BasisChoice {
         self.shapes.basis(count)
     }

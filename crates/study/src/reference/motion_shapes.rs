@@ -78,6 +78,11 @@ impl MotionShapes {
         counts
     }
 
+    /// Returns the number of all shapes.
+    pub(super) fn most(&self) -> usize {
+        self.shapes.ncols()
+    }
+
     /// Returns the candidate numbers, then doubled numbers up to all shapes.
     pub(super) fn more_and_more(&self) -> Vec<usize> {
         let (mut counts, most) = (self.counts(), self.shapes.ncols());

@@ -5,13 +5,14 @@ use super::cases::{SLACK_OF_RANGE, together, worst};
 use super::demand::Demand;
 use super::search::{Choice, SelectionSearch, Tried, TriedCase};
 use super::trial::Trial;
+use super::varied::{VariedRuns, VariedSelection};
 use super::warnings::{phase_drifts, resonances};
 use crate::reference::{PART_OF_REFERENCE, ReferenceError};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::TermGroups;
 use flexbody_linalg::context::Context;
-use flexbody_motion::scene::{Measure, Trace};
+use flexbody_motion::scene::{LoadCases, Measure, Trace};
 
 /// Trials and current choice of a selection.
 pub(super) struct Deciding<'s> {
@@ -23,6 +24,8 @@ pub(super) struct Deciding<'s> {
     pub short_of: Vec<Option<(f64, f64)>>,
     /// Measured trial of the chosen model in each load case.
     pub chosen_by_case: Vec<Trial>,
+    /// Errors of the chosen model in variations of the scene.
+    pub varied: Vec<VariedSelection>,
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -46,7 +49,8 @@ impl<'s> Deciding<'s> {
             chosen: None,
         };
         let short_of = vec![None; demands.len()];
-        Self { demands, choice, trials, short_of, chosen_by_case: Vec::new(), diagnostics }
+        let (chosen_by_case, varied) = (Vec::new(), Vec::new());
+        Self { demands, choice, trials, short_of, chosen_by_case, varied, diagnostics }
     }
 
     /// Returns true if all load cases have a duration, so that motion can be measured.
@@ -78,8 +82,14 @@ impl<'s> Deciding<'s> {
         }
     }
 
-    /// Chooses terms and modes by integrated motion. Returns the reason for the modes.
-    pub(super) fn choose_by_motion(&mut self, context: &Context<'_>) -> Result<String> {
+    /// Chooses terms and modes by integrated motion, and judges them on variations of the scene. Returns the reason for
+    /// the modes.
+    pub(super) fn choose_by_motion(
+        &mut self,
+        cases_with_variations: &LoadCases,
+        varied: Option<&VariedRuns<'_>>,
+        context: &Context<'_>,
+    ) -> Result<String> {
         context.phase("reference motion");
         let references = self.reference_motions()?;
         let demands = self.demands;
@@ -92,7 +102,11 @@ impl<'s> Deciding<'s> {
             fixed: fixed.fold(TermGroups::NONE, |fixed, (demand, _)| fixed.or(demand.groups())),
             carried: demands.iter().any(|demand| demand.scene.carried.is_some()),
         };
-        let reason = self.search(&search)?;
+        let mut reason = self.search(&search)?;
+        if let Some(varied) = varied {
+            context.phase("variations");
+            reason = self.judge(&search, varied, cases_with_variations, reason)?;
+        }
         self.measure_choice(&search)?;
         Ok(reason)
     }
@@ -150,6 +164,30 @@ impl<'s> Deciding<'s> {
             _ => "the tolerances of every load case",
         };
         Ok(format!("the fewest whose motion is within {within}"))
+    }
+
+    /// Judges the choice on variations, adds terms and modes until it holds there, and returns the reason for the modes.
+    fn judge(
+        &mut self,
+        search: &SelectionSearch<'_>,
+        varied: &VariedRuns<'_>,
+        cases: &LoadCases,
+        reason: String,
+    ) -> Result<String> {
+        let is_limited = self.demands[0].scene.requirements.multiplications.is_some();
+        let held = self.demands[0].body.groups();
+        let ranked = search.ranked(&mut self.choice);
+        let modes = self.choice.modes.clone();
+        self.choice.keep(modes.clone());
+        self.varied = varied.judge(&mut self.choice, &ranked, held, is_limited, cases)?;
+        self.diagnostics.extend(self.varied.iter().filter_map(VariedSelection::warning));
+        if modes == self.choice.modes {
+            return Ok(reason);
+        }
+        Ok(format!(
+            "{reason}; with {} more, so that variations of the scene hold",
+            self.choice.modes.len() - modes.len()
+        ))
     }
 
     /// Measures the chosen model in every scene, and adds warnings about it.

@@ -19,6 +19,7 @@ mod significance;
 mod situation;
 mod trial;
 mod variation;
+mod varied;
 mod warnings;
 
 pub use basis::{BEYOND_BAND, WantedResponses, largest_eigenvalue};
@@ -28,8 +29,9 @@ pub use decisions::Ground;
 pub use norms::Norms;
 pub use participation::{Participation, participations};
 pub use search::liveliest_modes;
-pub use select::{Selection, rule_out, select};
+pub use select::{Selection, rule_out, select, select_judged};
 pub use significance::{Significance, significances};
 pub use situation::{Input, Situation};
 pub use trial::{ModeShare, Trial, TrialRuns};
 pub use variation::{Rotation, Variation};
+pub use varied::VariedSelection;

@@ -20,8 +20,15 @@ pub(super) struct Choice {
 }
 
 impl Choice {
+    /// Keeps the first `count` modes of the order `ranked`.
+    pub(super) fn keep_most(&mut self, ranked: &[usize], count: usize) {
+        let mut modes = ranked[..count].to_vec();
+        modes.sort_unstable();
+        self.keep(modes);
+    }
+
     /// Sets the kept modes.
-    fn keep(&mut self, modes: Vec<usize>) {
+    pub(super) fn keep(&mut self, modes: Vec<usize>) {
         for (j, share) in self.shares.iter_mut().enumerate() {
             share.kept = modes.binary_search(&j).is_ok();
         }
@@ -128,7 +135,7 @@ impl SelectionSearch<'_> {
     }
 
     /// Returns the modes by descending contribution, and records their shares.
-    fn ranked(&self, choice: &mut Choice) -> Vec<usize> {
+    pub(super) fn ranked(&self, choice: &mut Choice) -> Vec<usize> {
         let mut weight = vec![0.0f64; self.body().n_modes()];
         choice.shares.clear();
         for case in self.cases {

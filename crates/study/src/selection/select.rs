@@ -8,6 +8,7 @@ use super::participation::{Participation, participations};
 use super::significance::{Significance, largest_significances, significances};
 use super::situation::Input;
 use super::trial::{ModeShare, Trial, multiplications};
+use super::varied::{VariedRuns, VariedSelection, varied_stages};
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
@@ -62,18 +63,22 @@ pub struct Selection {
     pub lacks: Vec<ReferenceError>,
     /// Results for each load case; empty for a single scene.
     pub cases: Vec<CaseSelection>,
+    /// Errors of the selected model in variations of the scene, whose motions did not choose it.
+    pub varied: Vec<VariedSelection>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
 
 impl Selection {
     /// Returns true if the requirement holds: the cost, or else the measured errors, relative to a body whose
-    /// truncation error takes at most half of the tolerances. True if nothing was measured.
+    /// truncation error takes at most half of the tolerances, also in every stated variation. True if nothing was
+    /// measured.
     pub fn holds(&self) -> bool {
+        let in_variations = self.varied.iter().all(|one| one.holds() || !one.is_stated);
         let is_reference = self.lacks.last().is_none_or(ReferenceError::is_reference);
         self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
             Some(most) => chosen.multiplications <= most,
-            None => chosen.passed() && is_reference,
+            None => chosen.passed() && is_reference && in_variations,
         })
     }
 }
@@ -121,6 +126,21 @@ pub fn select(
     cases: &LoadCases,
     context: &Context<'_>,
 ) -> Result<Selection> {
+    select_judged(body, lacks, &[], cases, context)
+}
+
+/// Does the work of [`select`] for a body whose truncation errors `varied_lacks` in the variations of the load cases are
+/// known: they reduce the tolerances there. Unknown errors count as zero.
+///
+/// # Errors
+/// The errors of [`select`].
+pub fn select_judged(
+    body: &FlexBody,
+    lacks: &[Vec<ReferenceError>],
+    varied_lacks: &[Vec<ReferenceError>],
+    cases: &LoadCases,
+    context: &Context<'_>,
+) -> Result<Selection> {
     body.require_mean_axes("select")?;
     // Bounds of each load case, in its own frame.
     let stages = stages(body, cases)?;
@@ -133,10 +153,17 @@ pub fn select(
     let mut deciding = Deciding::new(&demands);
     let mode_reason = match deciding.has_run() {
         false => deciding.choose_by_band(),
-        true => deciding.choose_by_motion(context)?,
+        true => {
+            let variations = cases.variations(body.dimension());
+            let stages = varied_stages(body, &variations)?;
+            context.phase("reference motion of the variations");
+            let varied = VariedRuns::new(&variations, &stages, varied_lacks, context)?;
+            let varied = Some(&varied).filter(|_| !variations.is_empty());
+            deciding.choose_by_motion(cases, varied, context)?
+        }
     };
     // State the reasons of the decision.
-    let Deciding { choice, trials, diagnostics, short_of, chosen_by_case, .. } = deciding;
+    let Deciding { choice, trials, diagnostics, short_of, chosen_by_case, varied, .. } = deciding;
     for (demand, short_of) in demands.iter_mut().zip(short_of) {
         demand.short_of = short_of;
     }
@@ -158,6 +185,7 @@ pub fn select(
         frequencies_hz: first.body.frequencies_hz(),
         participations: static_responses(&demands, &choice.modes),
         cases: by_case(&demands, &choice, &trials, &grounds, chosen_by_case),
+        varied,
         terms,
         grounds,
         modes: choice.modes,

@@ -2,7 +2,7 @@
 
 use super::Source;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, Storage, TermDecision, TermGroup, TermGroups};
+use flexbody_body::flex_body::{FlexBody, Storage, Subset, TermGroup, TermGroups};
 
 /// Numbers of modes of the candidates: about three for each doubling of the work.
 const LADDER: [usize; 14] = [1, 2, 4, 6, 10, 15, 20, 30, 40, 60, 80, 120, 160, 240];
@@ -104,6 +104,11 @@ impl Candidate {
         TermGroup::ALL.into_iter().filter(|group| self.groups.has(*group)).map(TermGroup::name).collect()
     }
 
+    /// Returns the modes and groups of the source that the candidate keeps.
+    pub fn subset(&self) -> Subset {
+        Subset { modes: Some(self.modes.clone()), groups: self.groups }
+    }
+
     /// Returns the body of the candidate.
     ///
     /// # Errors
@@ -113,18 +118,7 @@ impl Candidate {
             Some(LumpedMass::Couplings(scheme)) => source.with_lumped_couplings(scheme)?,
             Some(LumpedMass::Whole(_)) | None => source.body().clone(),
         };
-        let all = self.modes.len() == body.n_modes();
-        if !all || self.groups != body.groups() {
-            let decide = |group: TermGroup| TermDecision {
-                group,
-                kept: false,
-                tier: 2,
-                bound: f64::INFINITY,
-                limit: f64::INFINITY,
-                reason: "a candidate of a trade study".to_owned(),
-            };
-            body = body.reduced(&self.modes, self.groups, self.groups.dropped().map(decide).collect())?;
-        }
+        body = body.subset(&self.subset())?;
         Ok(match self.storage {
             Storage::F64 => body,
             Storage::F32 => body.rounded_to_f32()?,

@@ -1,7 +1,8 @@
 //! Bodies that different settings of a conversion make of one model.
 
-use super::Source;
-use crate::reference::{Enriched, Enrichment, MotionBodies, ReferenceError, enrich};
+use super::{Source, Varied};
+use crate::recipe::{ConversionRecipe, Recipe, SceneBasis};
+use crate::reference::{Enriched, Enrichment, MotionBodies, ReferenceError, enrich, enrich_from};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -10,7 +11,7 @@ use flexbody_body::convert::{ConvertSettings, Lumping, convert};
 use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::LoadCases;
+use flexbody_motion::scene::{LoadCases, Scene, SceneVariation, Variations};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::fmt::Write;
@@ -23,6 +24,8 @@ pub struct Conversions {
     /// Truncation errors of the reference and of its versions before enrichment, in each load case; the last belongs to
     /// the reference.
     pub lacks: Vec<Vec<ReferenceError>>,
+    /// Bodies and scenes of the variations.
+    pub varied: Varied,
     /// Diagnostics about the reference.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -52,11 +55,16 @@ pub fn conversions(
     wanted: WantedBodies,
     context: &Context<'_>,
 ) -> Result<Conversions> {
-    let making = Making::new(model, context);
     let WantedBodies { modes, fine } = wanted;
+    let making = Making::new(model, fine, context);
     // Reference body, enriched for the load cases.
-    let finest =
-        Wish { count: modes.saturating_mul(2), residual: true, accuracy: Accuracy::Standard, lumped: None };
+    let finest = Wish {
+        count: modes.saturating_mul(2),
+        residual: true,
+        accuracy: Accuracy::Standard,
+        lumped: None,
+        scene: SceneBasis::Enriched { is_fine: fine },
+    };
     let mut responses = Mat::new();
     let make = |loads: &Mat<f64>| {
         responses.clone_from(loads);
@@ -84,7 +92,7 @@ pub fn conversions(
     // Bodies of shapes of the motion, and bodies of a lumped mass.
     let lacking = |rounds: &Vec<ReferenceError>| rounds.last().map_or(0.0, |own| own.worst);
     let left: Vec<f64> = lacks.iter().map(|rounds| 1.0 - lacking(rounds)).collect();
-    for source in making.make_of_motion(&sources[0], cases, &left)? {
+    for source in making.make_of_motion(&sources[0], &finest, cases, &left)? {
         sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL));
     }
     for lumping in lumpings(model) {
@@ -93,7 +101,8 @@ pub fn conversions(
             Err(reason) => diagnostics.push(reason),
         }
     }
-    Ok(Conversions { sources, lacks, diagnostics })
+    let varied = making.varied(&finest, responses, &sources, cases)?;
+    Ok(Conversions { sources, lacks, varied, diagnostics })
 }
 
 /// Returns warnings about the truncation error of the reference, each with its load case if there are several.
@@ -132,6 +141,8 @@ struct Wish {
     accuracy: Accuracy,
     /// Scheme by which the mass is lumped before the conversion; `None` for the consistent mass.
     lumped: Option<&'static str>,
+    /// Contribution of the scene to the basis.
+    scene: SceneBasis,
 }
 
 impl Wish {
@@ -152,12 +163,13 @@ impl Wish {
 
 /// Returns the settings of the bodies other than the reference, without duplicates.
 fn wishes(modes: usize) -> Vec<Wish> {
-    let other = |accuracy| Wish { count: modes, residual: false, accuracy, lumped: None };
+    let scene = SceneBasis::Without;
+    let other = |accuracy| Wish { count: modes, residual: false, accuracy, lumped: None, scene };
     let mut wishes = vec![other(Accuracy::Fast), other(Accuracy::Certified)];
     for part in [1, 2, 4] {
         let count = (modes / part).max(1);
         for residual in [true, false] {
-            let wish = Wish { count, residual, accuracy: Accuracy::Standard, lumped: None };
+            let wish = Wish { count, residual, accuracy: Accuracy::Standard, lumped: None, scene };
             if !wishes.contains(&wish) {
                 wishes.push(wish);
             }
@@ -171,16 +183,29 @@ struct Making<'m> {
     model: &'m FeModel,
     /// Loads of the residual vectors.
     loads: Vec<Loads>,
+    /// True if the reference stands for the motion of all nodes.
+    is_fine: bool,
     context: Context<'m>,
 }
 
 impl<'m> Making<'m> {
-    fn new(model: &'m FeModel, context: &Context<'m>) -> Self {
+    fn new(model: &'m FeModel, is_fine: bool, context: &Context<'m>) -> Self {
         let mut loads = vec![Loads::Centrifugal];
         if !model.interfaces().is_empty() {
             loads.push(Loads::Interfaces);
         }
-        Self { model, loads, context: *context }
+        Self { model, loads, is_fine, context: *context }
+    }
+
+    /// Returns the conversion that makes the body of a wish.
+    fn recipe(&self, wish: &Wish) -> Recipe {
+        let residual_vectors = match (wish.residual, self.loads.len()) {
+            (false, _) => Vec::new(),
+            (true, 1) => vec!["centrifugal"],
+            (true, _) => vec!["centrifugal", "interfaces"],
+        };
+        let Wish { count: modes, accuracy, scene, .. } = *wish;
+        Recipe::Conversion(ConversionRecipe { modes, residual_vectors, accuracy, scene })
     }
 
     /// Returns the settings of a conversion with `modes` modes and without lumped comparators.
@@ -211,13 +236,52 @@ impl<'m> Making<'m> {
         let start = Instant::now();
         let conversion = convert(self.model, &settings, &self.context)?;
         let seconds = start.elapsed().as_secs_f64();
-        Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
+        let source = Source::new(wish.in_words(), conversion.body, self.recipe(wish), Some(seconds))?;
+        Ok((source, conversion.diagnostics))
+    }
+
+    /// Makes the reference of the variations: the reference of the study, made by `finest` with the static `responses`,
+    /// enriched further for the variations. All sources of the study are related to it.
+    fn varied(
+        &self,
+        finest: &Wish,
+        responses: Mat<f64>,
+        sources: &[Source],
+        cases: &LoadCases,
+    ) -> Result<Varied> {
+        let variations = cases.variations(self.model.dimension());
+        let scenes: Vec<Scene> = variations.iter().map(|one| one.scene.clone()).collect();
+        let has_runs = scenes.iter().all(|scene| scene.run.duration.is_some());
+        let Some(scenes) = LoadCases::new(scenes).filter(|_| has_runs) else {
+            return Ok(Varied::default());
+        };
+        self.context.phase("reference of the variations");
+        let make = |loads: &Mat<f64>| Ok(self.make(finest, loads, Vec::new())?.0);
+        let enrichment = Enrichment { grows: true, is_fine: false };
+        let Enriched { made, rounds: lacks } =
+            enrich_from(responses, self.model, &scenes, enrichment, &self.context, make, Source::body)?;
+        let warning = |(one, rounds): (&SceneVariation, &Vec<ReferenceError>)| {
+            let warning = rounds.last()?.warning(&one.scene, enrichment.enough())?;
+            Some(warning.about(format!("variation `{}`", one.name)))
+        };
+        let are_stated = matches!(cases.stated_variations(), Variations::Stated(_));
+        let diagnostics = variations.iter().zip(&lacks).filter_map(warning).filter(|_| are_stated).collect();
+        let related = |source: &Source| source.clone().beside(made.body(), self.model).expect(OF_THE_MODEL);
+        let related: Vec<Source> = sources.iter().map(related).collect();
+        let sources = std::iter::once(made).chain(related).collect();
+        Ok(Varied { variations, are_stated, sources, lacks, diagnostics })
     }
 
     /// Makes bodies of shapes of the motion of `reference` in `cases`: for all candidate numbers of shapes, and for the
-    /// fewest whose errors are within the parts `left` of the tolerances. Their time includes that of the reference and
+    /// fewest whose errors are within the parts `left` of the tolerances. `finest` made the reference. Their time includes that of the reference and
     /// its motion.
-    fn make_of_motion(&self, reference: &Source, cases: &LoadCases, left: &[f64]) -> Result<Vec<Source>> {
+    fn make_of_motion(
+        &self,
+        reference: &Source,
+        finest: &Wish,
+        cases: &LoadCases,
+        left: &[f64],
+    ) -> Result<Vec<Source>> {
         if cases.iter().any(|scene| scene.run.duration.is_none()) {
             return Ok(Vec::new());
         }
@@ -229,7 +293,7 @@ impl<'m> Making<'m> {
         let mut made = BTreeMap::new();
         let mut make = |count: usize| match made.entry(count) {
             Entry::Occupied(known) => Ok(Source::clone(known.get())),
-            Entry::Vacant(new) => Ok(new.insert(self.of_shapes(&bodies, count, before)?).clone()),
+            Entry::Vacant(new) => Ok(new.insert(self.of_shapes(&bodies, finest, count, before)?).clone()),
         };
         let mut counts = bodies.counts();
         counts.iter().try_for_each(|count| make(*count).map(drop))?;
@@ -239,13 +303,22 @@ impl<'m> Making<'m> {
         Ok(made.into_iter().filter(|(count, _)| counts.contains(count)).map(|(_, own)| own).collect())
     }
 
-    /// Makes the body of the first `count` shapes of a motion that took `before` seconds.
-    fn of_shapes(&self, bodies: &MotionBodies<'_>, count: usize, before: f64) -> Result<Source> {
+    /// Makes the body of the first `count` shapes of a motion of the reference, made by `finest`, that took `before`
+    /// seconds.
+    fn of_shapes(
+        &self,
+        bodies: &MotionBodies<'_>,
+        finest: &Wish,
+        count: usize,
+        before: f64,
+    ) -> Result<Source> {
         let start = Instant::now();
         let settings = ConvertSettings { basis: bodies.basis(count), ..self.settings(usize::MAX) };
         let body = convert(self.model, &settings, &self.context)?.body;
         let name = format!("{count} shape{} of the motion", if count == 1 { "" } else { "s" });
-        Source::new(name, body, Some(before + start.elapsed().as_secs_f64()))
+        let scene = SceneBasis::Shapes { count, is_fine: self.is_fine };
+        let recipe = self.recipe(&Wish { scene, ..finest.clone() });
+        Source::new(name, body, recipe, Some(before + start.elapsed().as_secs_f64()))
     }
 
     /// Makes the body of the model with its whole mass lumped. Returns the reason as a diagnostic if there is no such

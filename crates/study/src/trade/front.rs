@@ -46,6 +46,12 @@ impl Recommendation {
     }
 }
 
+/// Returns the rows (from 0) whose errors are within every tolerance of the scene, ascending in cost.
+pub(super) fn holding(rows: &[TradeRow]) -> Vec<usize> {
+    let holds = |point: &(usize, f64, usize)| rows[point.2].outcome.as_ref().is_ok_and(Measured::holds);
+    points(rows).into_iter().filter(holds).map(|point| point.2).collect()
+}
+
 /// Returns the rows (from 0) of the Pareto front of multiplications per evaluation and the largest ratio of error to
 /// tolerance, ascending in cost. Multiplications represent the time of an evaluation, so that the front does not depend
 /// on the machine and its load.

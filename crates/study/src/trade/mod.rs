@@ -11,6 +11,7 @@ mod settings;
 mod source;
 mod study;
 mod timing;
+mod varied;
 
 pub use candidate::{Candidate, CandidateKind, LumpedMass};
 pub use conversions::{Conversions, WantedBodies, conversions};
@@ -20,3 +21,4 @@ pub use row::{Failed, InCase, Measured, Timed, TradeRow};
 pub use settings::{TradeSettings, reserved};
 pub use source::Source;
 pub use study::{ReferenceChoice, ReferenceKind, Trade, TradeCase, trade};
+pub use varied::{InVariations, TradeVariation, Varied};

@@ -1,6 +1,6 @@
 //! Candidate with its errors, cost and times.
 
-use super::Candidate;
+use super::{Candidate, InVariations};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_motion::integration::Work;
 use flexbody_motion::scene::OutputErrors;
@@ -42,6 +42,8 @@ pub struct Measured {
     pub bytes: u64,
     /// Time to make the source body; `None` if unknown. Unit: s.
     pub preprocessing: Option<f64>,
+    /// Errors in variations of the scene; `None` if the candidate was not judged on any.
+    pub varied: Option<InVariations>,
     /// Times, for candidates that may be chosen: the reference, the front and the recommended one.
     pub timed: Option<Timed>,
 }

@@ -1,5 +1,7 @@
 //! Bodies from which candidates are made.
 
+use super::Candidate;
+use crate::recipe::{Origin, Recipe};
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, LumpedBody, MassStructure};
@@ -17,6 +19,8 @@ pub struct Source {
     lumped: Vec<LumpedBody>,
     /// Scheme by which the mass of the model was lumped before the conversion; `None` for a consistent mass.
     lumped_by: Option<String>,
+    /// Conversion that makes the body.
+    recipe: Recipe,
     /// Time of the conversion; `None` if unknown. Unit: s.
     preprocessing: Option<f64>,
     /// G = Psi'K Psi_r (nf x nr) with the modes Psi_r of the reference; `None` for the reference itself.
@@ -24,17 +28,22 @@ pub struct Source {
 }
 
 impl Source {
-    /// Creates a source from the reference or a single body. `preprocessing` is the time of the conversion, if known.
-    /// Unit: s.
+    /// Creates a source from the reference or a single body, made by `recipe`. `preprocessing` is the time of the
+    /// conversion, if known. Unit: s.
     ///
     /// # Errors
     /// The errors of [`FlexBody::require_mean_axes`] and [`FlexBody::new`].
-    pub fn new(name: impl Into<String>, body: FlexBody, preprocessing: Option<f64>) -> Result<Self> {
+    pub fn new(
+        name: impl Into<String>,
+        body: FlexBody,
+        recipe: Recipe,
+        preprocessing: Option<f64>,
+    ) -> Result<Self> {
         body.require_mean_axes("trade")?;
         let mut parts = body.into_parts();
         let lumped = std::mem::take(&mut parts.lumped);
         let (name, body) = (name.into(), FlexBody::new(parts)?);
-        Ok(Self { name, body, lumped, lumped_by: None, preprocessing, shared: None })
+        Ok(Self { name, body, lumped, lumped_by: None, recipe, preprocessing, shared: None })
     }
 
     /// Marks the source as a body of a model whose mass was lumped by `scheme`.
@@ -65,6 +74,13 @@ impl Source {
     /// Returns the name of the source in reports.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Returns the command that makes the body of `candidate`; `None` for a lumped mass, which serves for comparison.
+    pub fn command(&self, candidate: &Candidate, origin: &Origin) -> Option<String> {
+        let (subset, n_modes) = (candidate.subset(), self.body.n_modes());
+        let is_exact = candidate.lumped.is_none() && self.lumped_by.is_none();
+        is_exact.then(|| self.recipe.command(origin, &subset, n_modes, candidate.storage))
     }
 
     /// Returns the body, without lumped comparators.

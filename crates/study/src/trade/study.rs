@@ -2,9 +2,10 @@
 
 use super::candidate::{first_of, ladder, whole_candidates};
 use super::case::StudyCase;
+use super::varied::Judge;
 use super::{
     Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Source, Timed,
-    TradeRow, TradeSettings, front,
+    TradeRow, TradeSettings, TradeVariation, front, reserved,
 };
 use crate::selection::liveliest_modes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -73,8 +74,12 @@ pub struct Trade {
     pub rows: Vec<TradeRow>,
     /// Rows of the Pareto front, ascending in cost.
     pub front: Vec<usize>,
-    /// Recommended row.
+    /// Recommended row: the cheapest that holds in the scene and in its variations or, without one, in the scene alone.
     pub recommended: Recommendation,
+    /// Row that the scene alone would recommend.
+    pub in_scene: Recommendation,
+    /// Variations that candidates were judged on.
+    pub variations: Vec<TradeVariation>,
     /// Warnings and notes about the motion of the reference.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -99,6 +104,13 @@ pub struct TradeCase {
 }
 
 impl Trade {
+    /// Returns true if the recommended row holds in all variations that the scene file states, or if it states none.
+    pub fn holds_in_stated_variations(&self) -> bool {
+        let recommended = self.recommended.row().and_then(|row| self.rows[row].outcome.as_ref().ok());
+        let is_stated = self.variations.iter().any(|one| one.is_stated);
+        !is_stated || recommended.is_none_or(Measured::holds_in_variations)
+    }
+
     /// Returns the tolerances of a load case (from 0).
     pub fn tolerance(&self, case: usize) -> &Tolerance {
         &self.cases[case].tolerance
@@ -128,9 +140,9 @@ pub fn trade(
         return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
     };
     let studied = |(at, scene): (usize, &Scene)| {
-        let reserved = settings.reserved.get(at).copied().unwrap_or(0.0);
+        let taken = settings.reserved.get(at).copied().unwrap_or(0.0);
         let name = cases.case_name(at).map(str::to_owned);
-        StudyCase::new(sources, scene, name, nodal, reserved, context).map_err(|error| cases.about(at, error))
+        StudyCase::new(sources, scene, name, nodal, taken, context).map_err(|error| cases.about(at, error))
     };
     // One body serves all load cases, so that the strictest limits apply.
     let allowed = cases.iter().filter_map(|scene| scene.requirements.multiplications).min();
@@ -138,8 +150,19 @@ pub fn trade(
     let cases = cases.iter().enumerate().map(studied).collect::<Result<Vec<_>>>()?;
     let measures = cases.iter().map(StudyCase::measure).collect();
     let job = Job { cases: &cases, measures, allowed };
-    let rows = job.rows(settings.repeat, context)?;
-    let recommended = Recommendation::new(&rows, allowed);
+    let mut rows = job.rows(context)?;
+    // Judge the cheapest candidates on motions that their bodies were not made for.
+    let in_scene = Recommendation::new(&rows, allowed);
+    let judge = settings.varied.filter(|varied| !varied.variations.is_empty()).map(|varied| {
+        let names: Vec<Option<String>> = cases.iter().map(|case| case.name.clone()).collect();
+        Judge::new(varied, sources, &names, &reserved(&varied.lacks, false), context)
+    });
+    let judge = judge.transpose()?;
+    let recommended = match &judge {
+        Some(judge) => judge.recommend(&mut rows, in_scene, context)?,
+        None => in_scene,
+    };
+    job.time_what_is_worth_it(&mut rows, recommended, settings.repeat, context)?;
     let seen = |at: usize| TradeCase::new(at, &cases[at], &rows, recommended);
     Ok(Trade {
         scene,
@@ -149,6 +172,8 @@ pub fn trade(
         allowed,
         front: front(&rows),
         recommended,
+        in_scene,
+        variations: judge.as_ref().map_or_else(Vec::new, |judge| judge.variations().to_vec()),
         cases: (0..cases.len()).map(seen).collect(),
         rows,
         diagnostics: cases.iter().flat_map(|case| case.found.iter().cloned()).collect(),
@@ -211,8 +236,8 @@ impl Job<'_> {
         &self.cases[0].sources
     }
 
-    /// Measures every candidate in parallel, then times those that may be chosen, one after the other.
-    fn rows(&self, repeat: usize, context: &Context<'_>) -> Result<Vec<TradeRow>> {
+    /// Measures every candidate in parallel.
+    fn rows(&self, context: &Context<'_>) -> Result<Vec<TradeRow>> {
         let carried = self.cases.iter().any(|case| case.scene.carried.is_some());
         let whole = whole_candidates(self.sources(), carried);
         let mut rows = self.errors(whole, "errors of whole bodies", context)?;
@@ -229,9 +254,8 @@ impl Job<'_> {
         let liveliest = liveliest_modes(&motions.collect::<Vec<_>>())?;
         let some_modes = ladder(self.sources(), &liveliest, carried, worst_of);
         rows.extend(self.errors(some_modes, "errors of fewer modes", context)?);
-        // Refine the number of modes near the tolerance, then measure times.
+        // Refine the number of modes near the tolerance.
         self.refine(&liveliest, &mut rows)?;
-        self.time_what_is_worth_it(&mut rows, repeat, context)?;
         Ok(rows)
     }
 
@@ -277,13 +301,15 @@ impl Job<'_> {
         Ok(())
     }
 
+    /// Times the candidates that may be chosen, one after the other.
     fn time_what_is_worth_it(
         &self,
         rows: &mut [TradeRow],
+        recommended: Recommendation,
         repeat: usize,
         context: &Context<'_>,
     ) -> Result<()> {
-        let recommended = Recommendation::new(rows, self.allowed).row();
+        let recommended = recommended.row();
         let mut worth_it: Vec<usize> = front(rows).into_iter().chain(recommended).chain([0]).collect();
         worth_it.sort_unstable();
         worth_it.dedup();
@@ -358,6 +384,7 @@ impl Job<'_> {
             multiplications,
             bytes,
             preprocessing: self.sources()[candidate.source].preprocessing(),
+            varied: None,
             timed: None,
         })
     }

@@ -6,6 +6,7 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{LoadCases, Recording, Scene, simulate};
+use flexbody_study::recipe::Recipe;
 use flexbody_study::selection::select;
 use flexbody_study::trade::{Source, TradeSettings, trade};
 use nalgebra::Vector3;
@@ -135,9 +136,9 @@ fn selections_and_studies_do_not_know_the_frame() {
         }
     }
     let [_, _, (name, scene), _] = golden();
-    let settings = TradeSettings { repeat: 1, reserved: &[] };
+    let settings = TradeSettings { repeat: 1, reserved: &[], varied: None };
     let studies = bodies.iter().map(|body| {
-        let source = Source::new("body", body.clone(), None).expect("a body");
+        let source = Source::new("body", body.clone(), Recipe::File, None).expect("a body");
         trade(&[source], &scene.clone().into(), None, &settings, &Context::QUIET).expect("a study")
     });
     let studies: Vec<_> = studies.collect();

@@ -1,0 +1,175 @@
+//! Commands that make exactly the body of a recommendation.
+
+use crate::selection::Selection;
+use flexbody_body::flex_body::{Storage, Subset, TermGroups};
+use flexbody_eigen::Accuracy;
+
+/// Inputs of a study as the user named them, from which its commands start.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Origin {
+    /// Model or flex-body file, with the options that read it: words of a command line.
+    pub input: Vec<String>,
+    /// Scene file.
+    pub scene: String,
+    /// Load case of the scene, if only one was studied.
+    pub case: Option<String>,
+}
+
+/// Conversion that makes a body of a study, in terms of the options of `flexbody convert`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Recipe {
+    /// Body of a flex-body file.
+    File,
+    /// Body converted from the model.
+    Conversion(ConversionRecipe),
+}
+
+/// Options of `flexbody convert` that make a body of a study before modes and terms are left out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ConversionRecipe {
+    /// Number of free modes.
+    pub modes: usize,
+    /// Loads of the residual vectors, as `--residual-vectors` takes them; empty for none.
+    pub residual_vectors: Vec<&'static str>,
+    /// Accuracy of the modes.
+    pub accuracy: Accuracy,
+    /// Contribution of the scene to the basis.
+    pub scene: SceneBasis,
+}
+
+/// Contribution of a scene to the basis of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SceneBasis {
+    /// None.
+    Without,
+    /// Static responses to the forces that the motion leaves unbalanced.
+    Enriched {
+        /// True if the truncation error is within a hundredth of the tolerances, instead of a tenth.
+        is_fine: bool,
+    },
+    /// Shapes of the motion of the enriched body.
+    Shapes {
+        /// Number of shapes.
+        count: usize,
+        /// As for the enriched body.
+        is_fine: bool,
+    },
+}
+
+impl Recipe {
+    /// Returns the command that makes the body with the modes and groups of `subset`. `n_modes` is the number of modes
+    /// before any is left out.
+    pub fn command(&self, origin: &Origin, subset: &Subset, n_modes: usize, storage: Storage) -> String {
+        let Self::Conversion(own) = self else {
+            return reduction(origin, subset, n_modes, storage);
+        };
+        let mut words = own.words(origin);
+        words.extend(subset_words(subset, n_modes, own.scene != SceneBasis::Without));
+        convert_command(origin, words, storage)
+    }
+}
+
+impl ConversionRecipe {
+    fn words(&self, origin: &Origin) -> Vec<String> {
+        let loads = if self.residual_vectors.is_empty() { "none" } else { &self.residual_vectors.join(",") };
+        let mut words = text(["--modes", &self.modes.to_string(), "--residual-vectors", loads]);
+        if self.accuracy != Accuracy::default() {
+            words.extend(text(["--accuracy", self.accuracy.name()]));
+        }
+        let is_fine = match self.scene {
+            SceneBasis::Without => return words,
+            SceneBasis::Enriched { is_fine } => is_fine,
+            SceneBasis::Shapes { count, is_fine } => {
+                words.extend(text(["--basis", "scene", "--motion-shapes", &count.to_string()]));
+                is_fine
+            }
+        };
+        words.extend(scene_words(origin));
+        words.extend(is_fine.then(|| text(["--enrichment", "fine"])).into_iter().flatten());
+        words
+    }
+}
+
+/// Returns the command that makes the body of a selection from a model. `modes` is the number of free modes that the
+/// user gave; `None` if the band of the scene decides.
+pub fn selected_from_model(selection: &Selection, origin: &Origin, modes: Option<usize>) -> String {
+    let mut words = scene_words(origin);
+    words.extend(modes.map(|modes| text(["--modes", &modes.to_string()])).into_iter().flatten());
+    words.extend(subset_words(&subset_of(selection), selection.n_modes, true));
+    convert_command(origin, words, Storage::F64)
+}
+
+/// Returns the command that makes the body of a selection from the flex-body file that it was made for.
+pub fn selected_from_file(selection: &Selection, origin: &Origin) -> String {
+    reduction(origin, &subset_of(selection), selection.n_modes, Storage::F64)
+}
+
+fn subset_of(selection: &Selection) -> Subset {
+    Subset { modes: Some(selection.modes.clone()), groups: selection.groups }
+}
+
+fn reduction(origin: &Origin, subset: &Subset, n_modes: usize, storage: Storage) -> String {
+    let options = subset_words(subset, n_modes, false);
+    command("reduce", origin, options.into_iter().chain(storage_words(storage)))
+}
+
+fn convert_command(origin: &Origin, words: Vec<String>, storage: Storage) -> String {
+    command("convert", origin, words.into_iter().chain(storage_words(storage)))
+}
+
+fn command(name: &str, origin: &Origin, options: impl Iterator<Item = String>) -> String {
+    let start = text(["flexbody", name]).into_iter().chain(origin.input.iter().cloned());
+    let words = start.chain(options).chain(text(["-o", "body.flex.h5"]));
+    words.map(|word| shell_word(&word)).collect::<Vec<_>>().join(" ")
+}
+
+fn scene_words(origin: &Origin) -> Vec<String> {
+    let case = origin.case.iter().flat_map(|case| text(["--case", case]));
+    text(["--scene", &origin.scene]).into_iter().chain(case).collect()
+}
+
+/// Returns the options that state the subset. With a scene the terms are always stated, since `convert` would select
+/// them otherwise.
+fn subset_words(subset: &Subset, n_modes: usize, has_scene: bool) -> Vec<String> {
+    let some = subset.modes.as_ref().filter(|modes| modes.len() < n_modes);
+    let mut words: Vec<String> =
+        some.iter().flat_map(|modes| text(["--keep-modes", &Subset::modes_text(modes)])).collect();
+    if has_scene || subset.groups != TermGroups::ALL {
+        words.extend(text(["--terms", &Subset::groups_text(subset.groups)]));
+    }
+    words
+}
+
+fn storage_words(storage: Storage) -> Vec<String> {
+    match storage {
+        Storage::F64 => Vec::new(),
+        Storage::F32 => text(["--storage", storage.name()]),
+    }
+}
+
+fn text<const N: usize>(words: [&str; N]) -> Vec<String> {
+    words.map(str::to_owned).to_vec()
+}
+
+/// Returns a word as a POSIX shell reads it: in single quotes if it has characters with a meaning there.
+fn shell_word(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "_./,=:@%+-".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shell_word;
+
+    #[test]
+    fn words_are_quoted_for_the_shell() {
+        assert_eq!(shell_word("a/b-1.toml"), "a/b-1.toml");
+        assert_eq!(shell_word("my body.h5"), "'my body.h5'");
+        assert_eq!(shell_word("it's"), "'it'\\''s'");
+        assert_eq!(shell_word("$(x)"), "'$(x)'");
+        assert_eq!(shell_word(""), "''");
+    }
+}

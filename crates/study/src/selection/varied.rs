@@ -1,0 +1,155 @@
+//! Judgement of a selection on variations of the scene, whose motions did not choose its terms and modes.
+
+use super::cases::Case;
+use super::demand::OnStage;
+use super::search::Choice;
+use super::trial::Trial;
+use crate::reference::ReferenceError;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::{FlexBody, TermGroups};
+use flexbody_linalg::context::Context;
+use flexbody_motion::scene::{LoadCases, Measure, SceneVariation, Trace, Variations};
+
+/// Factor by which the number of modes grows from trial to trial. A smaller value finds fewer modes and takes more
+/// simulations.
+const GROWTH: f64 = 1.25;
+
+/// Errors of a selected model in a variation of the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VariedSelection {
+    /// Name of the variation.
+    pub name: String,
+    /// Name of the load case that it varies; `None` for a single scene.
+    pub case: Option<String>,
+    /// True if the scene file states the variation, so that the model must hold in it; false for a standard one.
+    pub is_stated: bool,
+    /// The selected model in the variation, measured against the whole body.
+    pub chosen: Trial,
+    /// The model that the scene alone would select; `None` if it is the selected one.
+    pub of_scene: Option<Trial>,
+    /// Truncation errors of the whole body in the variation; empty if no model is at hand.
+    pub lacks: Vec<ReferenceError>,
+}
+
+impl VariedSelection {
+    /// Returns true if the selected model is within the tolerances in the variation, and the whole body is a reference
+    /// there.
+    pub fn holds(&self) -> bool {
+        self.chosen.passed() && self.lacks.last().is_none_or(ReferenceError::is_reference)
+    }
+
+    /// Returns the warning about a model that does not hold; `None` if it does, or if the variation is a standard one.
+    pub(super) fn warning(&self) -> Option<Diagnostic> {
+        if self.holds() || !self.is_stated {
+            return None;
+        }
+        let message = match self.lacks.last().filter(|own| !own.is_reference()) {
+            Some(own) => format!(
+                "the selection cannot be judged in this variation: the body with all its modes differs from the FE model by {:.0} % of the tolerances (estimated)",
+                100.0 * own.worst
+            ),
+            None => format!(
+                "the selected modes and terms are off by {:.3} times the tolerances in this variation",
+                self.chosen.worst
+            ),
+        };
+        Some(Diagnostic::new(Code::VariationFails, message).about(format!("variation `{}`", self.name)))
+    }
+}
+
+/// Variations in which a selection is judged, each with the motion of the whole body.
+pub(super) struct VariedRuns<'v> {
+    variations: &'v [SceneVariation],
+    cases: Vec<Case<'v>>,
+    references: Vec<Trace>,
+    lacks: &'v [Vec<ReferenceError>],
+}
+
+/// Returns the body and every variation in one frame.
+pub(super) fn varied_stages<'s>(
+    body: &'s FlexBody,
+    variations: &'s [SceneVariation],
+) -> Result<Vec<OnStage<'s>>> {
+    let staged = |one: &'s SceneVariation| {
+        OnStage::new(body, &one.scene).map_err(|error| error.about(format!("variation `{}`", one.name)))
+    };
+    variations.iter().map(staged).collect()
+}
+
+impl<'v> VariedRuns<'v> {
+    /// Simulates the whole body in every variation. `lacks` are its truncation errors there.
+    ///
+    /// # Errors
+    /// The errors of [`trace`](flexbody_motion::scene::trace).
+    pub(super) fn new(
+        variations: &'v [SceneVariation],
+        stages: &'v [OnStage<'_>],
+        lacks: &'v [Vec<ReferenceError>],
+        context: &Context<'v>,
+    ) -> Result<Self> {
+        let (mut cases, mut references) = (Vec::new(), Vec::new());
+        for (stage, one) in stages.iter().zip(variations) {
+            let case = Case::new(&stage.body, &stage.scene, context)?;
+            let motion = case.runs().motion(stage.body.groups());
+            references.push(motion.map_err(|error| error.about(format!("variation `{}`", one.name)))?.0);
+            cases.push(case);
+        }
+        Ok(Self { variations, cases, references, lacks })
+    }
+
+    /// Measures a model in every variation.
+    fn measured(&self, modes: &[usize], groups: TermGroups) -> Result<Vec<Trial>> {
+        let trial = |(at, (case, reference)): (usize, (&Case<'v>, &Trace))| {
+            let runs = case.runs();
+            let measure = Measure::new(runs.body, reference);
+            Ok(runs.measured(&measure, modes, groups, self.budget(at))?.0)
+        };
+        self.cases.iter().zip(&self.references).enumerate().map(trial).collect()
+    }
+
+    /// Returns the part of the tolerances that the truncation error of the whole body leaves in a variation.
+    fn budget(&self, at: usize) -> f64 {
+        let own = self.lacks.get(at).and_then(|rounds| rounds.last()).filter(|own| own.is_reference());
+        (1.0 - own.map_or(0.0, |own| own.worst)).max(0.0)
+    }
+
+    /// Judges `choice`. Unless the scene limits the cost, modes in the order `ranked` and groups of `held` are added
+    /// until the model is within the tolerances of every variation. Returns the errors in each variation.
+    pub(super) fn judge(
+        &self,
+        choice: &mut Choice,
+        ranked: &[usize],
+        held: TermGroups,
+        is_limited: bool,
+        cases: &LoadCases,
+    ) -> Result<Vec<VariedSelection>> {
+        let of_scene = self.measured(&choice.modes, choice.groups)?;
+        let mut chosen = of_scene.clone();
+        let passed = |trials: &[Trial]| trials.iter().all(Trial::passed);
+        let mut count = choice.modes.len();
+        while !is_limited && !passed(&chosen) {
+            // All groups with as many modes, then more modes.
+            if choice.groups == held {
+                if count == ranked.len() {
+                    break;
+                }
+                count = ((count as f64 * GROWTH).ceil() as usize).min(ranked.len());
+                choice.keep_most(ranked, count);
+            } else {
+                choice.groups = held;
+            }
+            chosen = self.measured(&choice.modes, choice.groups)?;
+        }
+        let is_changed = chosen != of_scene;
+        let row = |(at, (chosen, before)): (usize, (Trial, Trial))| VariedSelection {
+            name: self.variations[at].name.clone(),
+            case: cases.case_name(self.variations[at].case).map(str::to_owned),
+            is_stated: matches!(cases.stated_variations(), Variations::Stated(_)),
+            chosen,
+            of_scene: is_changed.then_some(before),
+            lacks: self.lacks.get(at).cloned().unwrap_or_default(),
+        };
+        Ok(chosen.into_iter().zip(of_scene).enumerate().map(row).collect())
+    }
+}
