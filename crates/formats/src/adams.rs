@@ -22,7 +22,7 @@ impl ExportFormat for AdamsInvariants {
     }
 
     fn reader(&self) -> &'static str {
-        "people and scripts: I1 to I9 as Adams/Flex numbers them, no MNF"
+        "people and scripts: I1 to I9 in the numbering of Adams/Flex (not an MNF)"
     }
 
     fn dialects(&self) -> &'static [&'static str] {
@@ -71,9 +71,9 @@ const CONVENTIONS: &[&str] = &[
     "About the origin of the body frame, in body axes; s: undeformed position, phi_j: shape of mode j, dm: consistent mass.",
     "a~ is the matrix of the cross product: a~ b = a x b.",
     "Inertia about the origin: I7 - sum_j (I8_j + I8_j') q_j - sum_jk I9_jk q_j q_k.",
-    "I8 has the sign of Adams; that of MBDyn is the opposite one. All others are the same there.",
-    "A quantity without values belongs to a group of the kinetic energy that the body does without; of I8 the antisymmetric part stays.",
-    "MNF files are proprietary to Adams: this is no MNF, and Adams does not read it.",
+    "I8 has the sign of Adams; MBDyn uses the opposite sign. All other invariants are the same in MBDyn.",
+    "A quantity without values belongs to a group of the kinetic energy that the body does not hold; the antisymmetric part of I8 is always written.",
+    "MNF files are proprietary to Adams: this file is not an MNF, and Adams does not read it.",
 ];
 
 /// An invariant or an accompanying quantity.

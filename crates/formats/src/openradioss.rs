@@ -46,7 +46,7 @@ impl ExportFormat for OpenRadioss {
             // The velocities of the program omit the rotation of the deformation (`fxbodvp.F`).
             deformed_inertia: losses::changing_inertia(
                 body,
-                "W1 but for its centrifugal load",
+                "W1 except its centrifugal load",
                 "OpenRadioss takes the inertia of the undeformed body",
             ),
             general_w0: losses::general_w0(body),
@@ -72,14 +72,13 @@ impl ExportFormat for OpenRadioss {
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
         let frames = frames(body, &options.points);
         if let Some(frame) = frames.iter().find(|frame| !(1..=LARGEST).contains(&frame.id)) {
-            let message = format!("openradioss has no place for the node number {}", frame.id);
-            let help = format!("number the nodes from 1 to {LARGEST}, or choose others by --points");
+            let message = format!("openradioss cannot hold node number {}: it has eight columns", frame.id);
+            let help = format!("number the nodes from 1 to {LARGEST}, or choose other nodes with --points");
             return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
         }
         let deck = Deck::of(body, &frames);
         if !deck.finite {
-            let message =
-                "openradioss needs products of the body's numbers that leave the range of double precision";
+            let message = "openradioss needs products of stiffness and inertia, which overflow double precision for this body";
             return Err(Diagnostic::new(Code::ExportLoses, message).with_help("--to-units").into());
         }
         Ok(Exported::single(deck.text.into_bytes()))
@@ -227,7 +226,7 @@ impl Deck {
     fn place(&mut self, body: &FlexBody, which: &str, position: &[f64; 3]) {
         let frame = body.frame();
         let [x, y, z] = (frame.origin + frame.axes * Vector3::from(*position)).into();
-        self.remark(&format!("{which} lies at {x:e} {y:e} {z:e} of the model"));
+        self.remark(&format!("{which} lies at {x:e} {y:e} {z:e} in model axes"));
     }
 
     fn integers<T: std::fmt::Display>(&mut self, values: &[T], per_line: usize) {

@@ -60,8 +60,10 @@ impl ExportFormat for Simscape {
         variables.push(("frames", Mat5Value::Text(names)));
         variables.push(("units", Mat5Value::Text(units.to_vec())));
         let too_large = || {
-            let message = "simscape: a matrix has more than 4 GiB, which a MAT-file of version 5 cannot hold";
-            Diagnostic::new(Code::ExportLoses, message).with_help("--dialect hdf5 has no such limit").into()
+            let message = "simscape cannot hold a matrix of more than 4 GiB in a MAT-file of version 5";
+            Diagnostic::new(Code::ExportLoses, message)
+                .with_help("use --dialect hdf5, which has no such limit")
+                .into()
         };
         mat5(&variables).map(Exported::single).ok_or_else(too_large)
     }

@@ -64,13 +64,15 @@ impl Assembly {
     /// precision.
     pub(super) fn of(given: &InterfaceMatrices<'_>) -> Result<Self> {
         let refuse = |what: &str| {
-            let message = format!("chrono needs the centre of mass of the body: {what}");
-            let help = "convert the model again: flexbody convert --basis craig-bampton";
+            let message = format!(
+                "chrono needs the centre of mass of the body, which its matrices do not determine: {what}"
+            );
+            let help = "convert the model again with flexbody convert --basis craig-bampton";
             Diagnostic::new(Code::ExportLoses, message).with_help(help)
         };
         let extended = Extended::of(given);
         let change = extended.change().ok_or_else(|| {
-            refuse("its coordinates have no mass, or its fixed-interface modes have more than all of it")
+            refuse("its coordinates have no mass, or its fixed-interface modes have more than the total mass")
         })?;
         let in_nodes = |a: &Mat<f64>| {
             let half = combine(change.transpose(), a.as_ref());
@@ -81,7 +83,7 @@ impl Assembly {
         let damping = given.damping.as_ref().map(|damping| in_nodes(&extended.padded(damping)));
         let finite = |a: &Mat<f64>| a.col_iter().all(|column| column.iter().all(|v| v.is_finite()));
         if ![Some(&mass), Some(&stiffness), damping.as_ref()].into_iter().flatten().all(finite) {
-            return Err(refuse("its matrices leave the range of double precision").into());
+            return Err(refuse("they overflow double precision").into());
         }
         Ok(Self { mass, stiffness, damping, n_modes: extended.n_modes })
     }

@@ -20,7 +20,7 @@ pub(crate) fn plane(body: &FlexBody) -> Holding {
     if body.dimension() != 2 {
         return NotApplicable;
     }
-    Lost("that the body moves in its plane z = 0 only: inertia and stiffness out of the plane are missing, hold it there by a joint".to_owned())
+    Lost("the restriction to the plane z = 0: inertia and stiffness out of the plane are missing, so hold the body in its plane with a joint".to_owned())
 }
 
 /// Returns the holding of W0 of a mass that does not commute with rotations, for a format whose first moment
@@ -94,7 +94,7 @@ pub(crate) fn inertia_stiffness(
     options: &ExportOptions,
     holds: impl Fn(&UnitLoad) -> bool,
 ) -> Holding {
-    const WHAT: &str = "the stiffness of inertia of nodes that turn";
+    const WHAT: &str = "the stiffness of inertia of turning nodes";
     let Some(own) = body.inertia_stiffness() else { return NotApplicable };
     let all = own.stiffness.iter().filter(|one| one.matrix.norm_max() > 0.0);
     let lost: Vec<&UnitLoad> = all.map(|one| &one.load).filter(|load| !holds(load)).collect();
@@ -136,5 +136,5 @@ pub(crate) fn changing_inertia(body: &FlexBody, w1: &str, why: &str) -> Holding 
     if lost.is_empty() {
         return NotApplicable;
     }
-    Lost(format!("how the deformation changes the inertia ({}): {why}", lost.join(", ")))
+    Lost(format!("the change of the inertia with the deformation ({}): {why}", lost.join(", ")))
 }

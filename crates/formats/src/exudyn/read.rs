@@ -82,18 +82,18 @@ impl ImportFormat for Exudyn {
         let counted = if arrays.has(NUMBERS) { "" } else { "; nodes count from 0" };
         let mut notes = vec![format!("{n} nodes, {nf} modes{counted}")];
         if general {
-            notes.push("the mass does not commute with rotations, says the file: modal mass and mPsiTildePsiTilde need not agree".to_owned());
+            notes.push("the file states that the mass does not commute with rotations: modal mass and mPsiTildePsiTilde need not agree".to_owned());
         }
         // Parts that a body cannot hold, or that the file lacks.
         let mut lacks = Vec::new();
         let mesh = mesh(&mut arrays, n, &mut lacks)?;
         if arrays.has_members(STRESSES) {
-            lacks.push(format!("`{STRESSES}`: stresses of the modes are not taken"));
+            lacks.push(format!("`{STRESSES}`: stresses of the modes are not converted"));
         }
         let mut inertia = told;
         if lacks_w2(&inertia) {
             inertia.i9 = None;
-            lacks.push("mPsiTildePsiTilde is zero: the body does without W2".to_owned());
+            lacks.push("mPsiTildePsiTilde is zero: the body is converted without W2".to_owned());
         }
         Ok(ImportedFile {
             format: "exudyn",
@@ -226,25 +226,25 @@ impl Given {
                 "mtt_is_mass",
                 "Mtt = totalMass I",
                 self.mtt_missed(),
-                "translations have another mass than the body",
+                "the mass of translations differs from the mass of the body",
             ),
             identity(
                 "chi_tilde_is_chi",
                 "chiUtilde = skew(chiU)",
                 self.chi_missed(told),
-                "the centre of mass stands in the file twice, as two points",
+                "the file states the centre of mass twice, with different coordinates",
             ),
             identity(
                 "phi_tilde_is_phi",
                 "mPhitTPsiTilde_j = skew(mPhitTPsi_j)",
                 self.phi_missed(|axis, mode| 3 * mode + axis),
-                "modes move the centre of mass in two ways",
+                "the two arrays for the motion of the centre of mass by the modes differ",
             ),
             identity(
                 "x_psi_of_x_psi_tilde",
                 "mXRefTildePsi_j = -skew part of mXRefTildePsiTilde_j",
                 redundant.i4_of_i8(),
-                "modes couple to rotation in two ways",
+                "the two arrays for the coupling of modes and rotation differ",
             ),
             identity(
                 "psi_tilde_psi_antisymmetric",
@@ -256,13 +256,13 @@ impl Given {
                 "psi_tilde_psi_tilde_symmetric",
                 "mPsiTildePsiTilde = its transpose",
                 redundant.i9_symmetric(),
-                "the inertia of pairs of modes depends on their order",
+                "the inertia of a pair of modes differs between (j, k) and (k, j)",
             ),
             identity(
                 "psi_tilde_psi_of_psi_tilde_psi_tilde",
                 "mPsiTildePsi_jk = skew part of mPsiTildePsiTilde_jk",
                 redundant.i5_of_i9(),
-                "pairs of modes couple to rotation in two ways",
+                "pairs of the two arrays for the coupling of modes and rotation differ",
             ),
         ];
         if !general && !lacks_w2(told) {

@@ -110,7 +110,7 @@ impl<'n> Redundant<'n> {
     /// file.
     pub(crate) fn lumped(&self, name: &'static str, formula: &'static str, arrays: &str) -> AuditCheck {
         let sizes = match self.mass_of_i9() {
-            Some((least, most)) => format!(", which by {arrays} is {least:.3} to {most:.3} of itself"),
+            Some((least, most)) => format!(" (by {arrays} it is {least:.3} to {most:.3} of this mass)"),
             None => String::new(),
         };
         AuditCheck {
@@ -120,7 +120,7 @@ impl<'n> Redundant<'n> {
             limit: ROUNDING,
             code: Code::AuditLumped,
             meaning: format!(
-                "the inertia of the modes does not give their mass{sizes}: lumped masses beside a consistent modal mass, unless the model has nodes with rotations or constraints"
+                "the inertia of the modes does not give the modal mass{sizes}: lumped masses were mixed with a consistent modal mass, unless the model has nodes with rotations or constraints"
             ),
         }
     }

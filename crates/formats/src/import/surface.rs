@@ -28,6 +28,8 @@ pub(crate) fn surface(
         return None;
     }
     SurfaceMesh::new(triangles, edges, n)
-        .map_err(|problem| lacks.push(format!("`{name}`: {problem}; the body has no surface")))
+        .map_err(|problem| {
+            lacks.push(format!("`{name}`: {problem}; the body is converted without a surface"))
+        })
         .ok()
 }

@@ -46,7 +46,7 @@ impl ExportFormat for Mbdyn {
         let places = frames(body, &options.points);
         let exact = is_exact(options);
         let no_coupling = (!exact).then(|| {
-            "the coupling of rigid motion and modes (record groups 14 to 18), which programs of level 13 refuse: modes vibrate as if the body did not move".to_owned()
+            "the coupling of rigid motion and modes (record groups 14 to 18), which programs of level 13 reject: modes vibrate as if the body did not move".to_owned()
         });
         ExportChecklist {
             rigid_coupling: Holding::held_but_for(no_coupling),
@@ -81,11 +81,11 @@ impl ExportFormat for Mbdyn {
             return Vec::new();
         };
         let mut needs = vec![
-            "MBDyn evaluates geometric stiffness (record group 19) only with `use automatic differentiation` in its control data, and ignores it without a word otherwise".to_owned(),
+            "MBDyn evaluates geometric stiffness (record group 19) only with `use automatic differentiation` in its control data, and otherwise ignores it without a message".to_owned(),
         ];
         if let Some(node) = largest.checked_sub(LOADS_OF_MOTION + 1).map(|index| index / 6 + 1) {
             needs.push(format!(
-                "MBDyn takes geometric stiffness of forces at interfaces only in a joint with {node} or more interface nodes, in the order of the file"
+                "MBDyn reads geometric stiffness of forces at interfaces only in a joint with {node} or more interface nodes, in the order of the file"
             ));
         }
         needs
@@ -94,10 +94,10 @@ impl ExportFormat for Mbdyn {
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
         if !is_exact(options) && !body.conditions().is_mean() {
             let message = format!(
-                "{}: modes of such a body move only with the coupling of record groups 14 to 18, which dialect {LEVEL_13} does not have",
+                "mbdyn cannot hold a body in the frame `{}` in dialect {LEVEL_13}: its modes need the coupling of record groups 14 to 18",
                 body.conditions()
             );
-            let help = format!("use dialect {LEVEL_19}, or a body made with --frame com");
+            let help = format!("use --dialect {LEVEL_19}, or convert the model with --frame com");
             return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
         }
         let places = frames(body, &options.points);

@@ -55,14 +55,14 @@ impl ImportFormat for Mbsim {
         let frames = frames(&mut arrays, nf)?;
         let mut lacks = Vec::new();
         if arrays.has(STRESSES) {
-            lacks.push(format!("`{STRESSES}`: stresses of the modes are not taken"));
+            lacks.push(format!("`{STRESSES}`: stresses of the modes are not converted"));
         }
         let mesh = mesh(&mut arrays, frames.len(), &mut lacks)?;
         let stiffness = arrays.matrix("stiffness matrix", nf, nf)?;
         let inertia = integrals.numbered();
         let mut notes = vec![format!("{} nodes, {nf} modes", frames.len())];
         notes.push(
-            "the modal mass is the sum of the shape function shape function integrals: MBSim knows no other"
+            "the modal mass is the sum of the shape function shape function integrals, as MBSim computes it"
                 .to_owned(),
         );
         Ok(ImportedFile {
@@ -209,14 +209,14 @@ fn checks(
             "position position integral = its transpose",
             asymmetry(&integrals.second),
             Code::AuditIdentity,
-            "MBSim takes one triangle of it",
+            "the matrix is not symmetric, and MBSim reads only one triangle of it",
         ),
         check(
             "shape_shape_symmetric",
             "blocks 11, 22 and 33 of the shape function shape function integral = their transposes",
             (0..3).map(|a| asymmetry(&block(a))).fold(0.0, larger),
             Code::AuditIdentity,
-            "pairs of shape functions have an integral that depends on their order",
+            "the integral of a pair of shape functions differs between (j, k) and (k, j)",
         ),
     ];
     if let Some(damping) = damping {
@@ -225,7 +225,7 @@ fn checks(
             "damping matrix = its transpose",
             asymmetry(damping),
             Code::AuditIdentity,
-            "MBSim takes one triangle of it",
+            "the matrix is not symmetric, and MBSim reads only one triangle of it",
         ));
     }
     // Eigenmodes are orthogonal with respect to their mass.
@@ -235,7 +235,7 @@ fn checks(
             "sum of blocks 11, 22 and 33 diagonal where the stiffness matrix is",
             beside_diagonal(&told.i6),
             Code::AuditLumped,
-            "modes that are orthogonal in stiffness are not so in mass: the integrals come from another mass matrix than the modes, as lumped masses do",
+            "modes that are orthogonal in stiffness are not orthogonal in mass: the integrals and the modes come from different mass matrices, for example lumped and consistent ones",
         ));
     }
     all

@@ -100,10 +100,10 @@ fn other_w2(body: &FlexBody) -> Holding {
     match own {
         Some(_) => losses::lost_beyond_rounding(
             lost,
-            "W2 other than what the modal mass says, which is the sum of the same integrals",
+            "W2 that differs from the one implied by the modal mass, which is the sum of the same integrals",
         ),
         None => Lost(format!(
-            "that the body does without W2: it follows from the integrals whose sum is the modal mass, here up to {lost:.1e} of its Cauchy-Schwarz bound"
+            "the absence of W2: MBSim computes W2 from the integrals whose sum is the modal mass, here up to {lost:.1e} of its Cauchy-Schwarz bound"
         )),
     }
 }

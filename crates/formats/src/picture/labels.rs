@@ -34,7 +34,7 @@ pub(crate) fn named(options: &ExportOptions, extension: &str) -> Option<String> 
     let known = name.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
     let wanted = name.with_extension(extension);
     let wanted = wanted.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    (!known).then(|| format!("viewers know this format by the name of the file: call it {wanted}"))
+    (!known).then(|| format!("viewers recognise this format by the extension of the file: name it {wanted}"))
 }
 
 /// Returns a number with a few digits.

@@ -66,19 +66,19 @@ impl ExportFormat for Vtk {
 
     fn leaves_out(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
         let mut left = vec![
-            "vtk has positions, shapes and interfaces to look at: no mass, stiffness, damping or inertia"
+            "vtk holds positions, shapes and interfaces for pictures, but no mass, stiffness, damping or inertia"
                 .to_owned(),
         ];
         match options.modes {
             Some(modes) if modes < body.n_modes() => {
-                left.push(format!("the first {modes} of {} modes are shown", body.n_modes()));
+                left.push(format!("the first {modes} of {} modes are written", body.n_modes()));
             }
             _ => {}
         }
         if let Some(motion) = &options.motion {
             let played = played(&Drawn::places(body, &options.points), motion);
             if played.len() < motion.time.len() {
-                left.push(format!("{} are shown", played.in_words()));
+                left.push(format!("{} are written", played.in_words()));
             }
         }
         left

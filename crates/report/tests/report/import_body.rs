@@ -313,7 +313,10 @@ fn a_file_that_breaks_an_identity_is_told_to_be_wrong() {
     let error = accept_imported(&imported(&bad).expect("a body"))
         .expect_err("a hundredth of the inertia of the modes");
     let told = error.to_string();
-    assert!(error.has(Code::ForeignUnsound) && told.contains("the file states a body that breaks"), "{told}");
+    assert!(
+        error.has(Code::ForeignUnsound) && told.contains("the numbers of the file violate the identity"),
+        "{told}"
+    );
     assert!(told.contains("write the file again") && !told.contains("report the model"), "{told}");
 }
 

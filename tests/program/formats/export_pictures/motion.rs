@@ -145,7 +145,7 @@ fn long_motions_are_thinned() {
     let played = played(&TUMBLE.replace("outputs = 20", "outputs = 1000"));
     let said =
         done(played.folder.path(), "export body.flex.h5 --to vtk --simulation motion.h5 -o played.pvd");
-    assert!(said.contains("note[FB723]: 250 of 1001 instants are shown"), "{said}");
+    assert!(said.contains("note[FB723]: 250 of 1001 instants are written"), "{said}");
     assert!(!said.contains("FB722"), "{said}");
     let names = fs::read_dir(played.folder.path()).expect("a folder");
     assert_eq!(

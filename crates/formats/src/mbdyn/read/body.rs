@@ -52,11 +52,13 @@ pub(crate) fn body(records: &Records) -> Option<Read> {
     let mut lacks: Vec<String> = Vec::new();
     let missing = missing(records);
     if !missing.is_empty() && !from_masses(records) {
-        lacks
-            .push(format!("the file lacks record groups {}: the body does without them", missing.join(", ")));
+        lacks.push(format!(
+            "the file has no record groups {}: the body is converted without the terms in them",
+            missing.join(", ")
+        ));
     } else if lacks_w2(&inertia) {
         inertia.i9 = None;
-        lacks.push("invariant 9 is zero: the body does without W2".to_owned());
+        lacks.push("invariant 9 is zero: the body is converted without W2".to_owned());
     }
     let (geometric_stiffness, named) = stiffening(records, &mut lacks, square);
     let turns = (0..records.n_nodes)
@@ -166,9 +168,9 @@ fn stiffening(
             Some((kind, component)) => {
                 all.push(GeometricStiffness { load: UnitLoad { kind, component }, matrix: square(values) })
             }
-            None => {
-                lacks.push(format!("stress stiffening with index {index} belongs to no load of the file"))
-            }
+            None => lacks.push(format!(
+                "stress stiffening with index {index} is not converted: no load of the file has this index"
+            )),
         }
     }
     (all, named)

@@ -36,11 +36,11 @@ pub(super) fn digits(listed: &Listed<'_>, arrays: &Arrays, frames: &[FrameArrays
     });
     AuditCheck {
         name: "digits",
-        formula: "half a unit of the last digit beside the largest number of each array",
+        formula: "half a unit of the last digit / largest number of each array",
         value,
         limit: LOST,
         code: Code::AuditDigits,
-        meaning: format!("numbers have {}, which is least for {place}", listed.digits().words()),
+        meaning: format!("numbers have {}; the loss is largest in {place}", listed.digits().words()),
     }
 }
 

@@ -22,13 +22,13 @@ pub(super) fn frame_checks(listed: &Listed<'_>, frames: &[FrameArrays]) -> Vec<A
         identity(
             "origin_m1_is_phi",
             "origin.M1_k = phi_k",
-            "the place of a frame moves in another way than forces there do work",
+            "the motion of the origin of a frame and the work of forces there contradict each other",
             &|frame| Some(origin_missed(frame, nq)),
         ),
         identity(
             "ap_m1_is_psi",
             "AP.M1_k = (psi_k)~",
-            "the axes of a frame turn in another way than torques there do work",
+            "the rotation of the axes of a frame and the work of torques there contradict each other",
             &|frame| axes_missed(frame, nq),
         ),
     ];
@@ -40,7 +40,7 @@ pub(super) fn frame_checks(listed: &Listed<'_>, frames: &[FrameArrays]) -> Vec<A
     for (name, formula, chosen) in stiffening {
         let missed = |frame: &FrameArrays| symmetry_missed(chosen(frame)?, nq);
         if frames.iter().any(|frame| missed(frame).is_some()) {
-            let meaning = "the geometric stiffness of a load at a frame is no symmetric matrix";
+            let meaning = "the geometric stiffness of a load at a frame is not symmetric";
             all.push(identity(name, formula, meaning, &missed));
         }
     }
@@ -136,7 +136,7 @@ fn undeformed_axes(listed: &Listed<'_>, frames: &[FrameArrays]) -> AuditCheck {
         if by > total.by || by.is_nan() {
             total.by = by;
             let how =
-                if axes.determinant() < 0.0 { "a mirror image of the body's" } else { "not orthonormal" };
+                if axes.determinant() < 0.0 { "a mirror image of the body axes" } else { "not orthonormal" };
             what = format!("the undeformed axes of node {} are {how}", listed.label);
         }
     }

@@ -92,7 +92,7 @@ impl Missing {
             found.say("Cr1", 0.0, &[(ge, "Ge is not")]);
         } else if sizes.cr1[1] == 0.0 && ge {
             found.arrays.push("Cr1");
-            found.why.push("Cr1 has nothing that is skew in the modes although Ge is not zero".to_owned());
+            found.why.push("Cr1 is symmetric in the modes although Ge is not zero".to_owned());
         }
         found.say("Oe1", sizes.oe1, &[(bound_e > 0.0 && !declared.without_w2, "Me is not")]);
         found
@@ -115,11 +115,11 @@ impl Missing {
         let why = if self.why.is_empty() { "nothing".to_owned() } else { self.why.join(", ") };
         AuditCheck {
             name: "coupling_is_there",
-            formula: "number of arrays that are zero and may not be",
+            formula: "number of arrays that are zero but must not be",
             value: self.arrays.len() as f64,
             limit: 0.0,
             code: Code::AuditCoupling,
-            meaning: format!("rigid motion and deformation do not act on each other as they must: {why}"),
+            meaning: format!("the coupling of rigid motion and deformation is incomplete: {why}"),
         }
     }
 }

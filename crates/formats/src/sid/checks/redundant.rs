@@ -80,7 +80,7 @@ impl Identities<'_> {
             "mdcm1_is_ct0",
             "mdCM1_k = Ct0_k",
             Code::AuditIdentity,
-            "the first moment moves with the modes in another way than the modes couple to translation",
+            "the change of the first moment with the modes and the coupling of the modes to translation contradict each other",
         ))
     }
 
@@ -101,7 +101,7 @@ impl Identities<'_> {
             "gr_symmetric_is_j1",
             "sym(Gr_k) = J1_k",
             Code::AuditIdentity,
-            "the gyroscopic torque does not belong to the inertia that changes with the modes",
+            "the gyroscopic torque and the change of the inertia with the modes contradict each other",
         ))
     }
 
@@ -115,17 +115,17 @@ impl Identities<'_> {
         let (code, meaning) = if two_masses {
             (
                 Code::AuditLumped,
-                "the gyroscopic torque and the coupling of rotation and modes come from different masses",
+                "the gyroscopic torque and the coupling of rotation and modes come from different mass matrices",
             )
         } else if is_free(self.arrays, self.layout) {
             (
                 Code::AuditIdentity,
-                "Cr0, Ct and mdCM1 are zero as of free modes, but Gr has a skew part: Gr is wrong, or all of the three are missing",
+                "Cr0, Ct and mdCM1 are zero, as for free modes, but Gr has a skew part: Gr is wrong, or all three arrays are missing",
             )
         } else {
             (
                 Code::AuditIdentity,
-                "the gyroscopic torque does not belong to the coupling of rotation and modes",
+                "the gyroscopic torque and the coupling of rotation and modes contradict each other",
             )
         };
         let [_, bound, _] = self.arrays.bounds();
@@ -149,9 +149,9 @@ impl Identities<'_> {
             "Ge(k,l) = Cr1(k,l) - Cr1(l,k), which is 2 Cr1 of a solid",
             Code::AuditIdentity,
             if doubled {
-                "Ge is 2 Cr1 with its part that is symmetric in the modes, as FEMBS writes it: geometric stiffness for angular acceleration, which is in Cr1, is no Coriolis force"
+                "Ge is 2 Cr1 including its part that is symmetric in the modes, as FEMBS writes it: this part is geometric stiffness for angular acceleration and not a Coriolis force"
             } else {
-                "the Coriolis forces among modes do not belong to the coupling of rotation and modes that grows with q"
+                "the Coriolis forces among modes (Ge) and the coupling of rotation and modes linear in q (Cr1) contradict each other"
             },
         ))
     }
@@ -216,13 +216,13 @@ impl Identities<'_> {
             "oe0_is_j1",
             "Oe0(k) = -[J1_11/2, J1_22/2, J1_33/2, J1_12, J1_23, J1_13]_k",
             Code::AuditIdentity,
-            "the constant centrifugal load does not belong to the inertia that changes with the modes",
+            "the constant centrifugal load and the change of the inertia with the modes contradict each other",
         );
         let order = missed(if exchanged { own } else { 0.0 }).check(
             "oe_layout",
             "Oe has its columns in the order 11, 22, 33, 12, 23, 13",
             Code::AuditLayout,
-            "the last two columns of Oe are exchanged",
+            "the last two columns of Oe are swapped",
         );
         vec![identity, order]
     }
@@ -251,7 +251,7 @@ impl Identities<'_> {
             scale,
             "oe1_symmetric",
             "Oe1(k,l) = Oe1(l,k)",
-            "centrifugal forces that grow with q are no gradient of an energy",
+            "the centrifugal forces linear in q are not the gradient of an energy",
         ));
         if size > 0.0 {
             let trace = trace(self.arrays, scale);
@@ -275,7 +275,7 @@ impl Identities<'_> {
             ct.sizes()[1],
             "ct1_symmetric",
             "Ct1(k,l) = Ct1(l,k)",
-            "the geometric stiffness for acceleration is no symmetric matrix",
+            "the geometric stiffness for acceleration is not symmetric",
         ))
     }
 
@@ -320,7 +320,7 @@ fn trace(arrays: &Arrays, scale: f64) -> AuditCheck {
     let ratio = |k: usize| -0.5 * sum(k, k) / arrays.me.m0[(k, k)];
     let worst_mode = (0..nq).max_by(|&a, &b| (ratio(a) - 1.0).abs().total_cmp(&(ratio(b) - 1.0).abs()));
     let facts = worst_mode.map_or_else(String::new, |k| {
-        format!(": of mode {} Oe1 has {:.4} of the modal mass", k + 1, ratio(k))
+        format!(" (for mode {} Oe1 gives {:.4} of the modal mass)", k + 1, ratio(k))
     });
     let rounding = 3.0 * arrays.oe.rounding[1] + 2.0 * arrays.me.rounding[0];
     Missed { by, scale, rounding }.check(
@@ -328,8 +328,7 @@ fn trace(arrays: &Arrays, scale: f64) -> AuditCheck {
         "Oe1_11 + Oe1_22 + Oe1_33 = -2 Me",
         Code::AuditLumped,
         format!(
-            "centrifugal forces and modal mass come from different masses{facts}; lumped masses do that, rotational inertia of \
-             nodes that is left out, or geometric stiffness that the file does not declare"
+            "centrifugal forces and modal mass come from different mass matrices{facts}: possible causes are lumped masses, omitted rotational inertia of nodes, and geometric stiffness that the file does not declare"
         ),
     )
 }

@@ -168,6 +168,6 @@ fn declared<'l>(listed: &'l Listed<'_>) -> (Option<&'l str>, String) {
     } else if listed.has_square_inertia() || listed.modes == ModeIndex::Last {
         (Some("fembeam"), "J is 3 x 3 or m1 has the mode last".to_owned())
     } else {
-        (None, "no name says the dialect".to_owned())
+        (None, "no name in the file tells the dialect".to_owned())
     }
 }
