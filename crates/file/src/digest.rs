@@ -113,7 +113,7 @@ impl DigestWalk<'_> {
         for (name, link) in links.map_err(|e| format!("{path}: {e}"))? {
             let inner = format!("{}/{name}", path.trim_end_matches('/'));
             if link.link_type != LinkType::Hard || depth == DEEPEST || name.contains('\n') {
-                return Err(format!("{inner}: no flex-body file has such an entry"));
+                return Err(format!("{inner}: not an entry of a flex-body file"));
             }
             self.member(group, &name, &inner, depth)?;
         }
@@ -138,7 +138,7 @@ impl DigestWalk<'_> {
                 };
                 self.object(&dataset, path, numbers)
             }
-            _ => Err(format!("{path}: no flex-body file has such an entry")),
+            _ => Err(format!("{path}: not an entry of a flex-body file")),
         }
     }
 

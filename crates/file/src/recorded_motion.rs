@@ -57,17 +57,17 @@ impl RecordedMotion {
     pub fn staged(&self, body: &FlexBody) -> Result<FlexBody> {
         let foreign = |what: String| Err(Diagnostic::new(Code::MotionForeign, what).into());
         if self.body != body.source().name {
-            return foreign(format!("motion of `{}`, the body is `{}`", self.body, body.source().name));
+            return foreign(format!("the motion belongs to the body `{}`, not to `{}`", self.body, body.source().name));
         }
         let staged = match &self.carrier {
             Some(carrier) => body.carried(carrier)?,
             None => body.in_mean_axes()?.into_owned(),
         };
         if self.modes != staged.n_modes() {
-            return foreign(format!("motion of {} modes, the body has {}", self.modes, body.n_modes()));
+            return foreign(format!("the motion has {} modes, the body has {}", self.modes, body.n_modes()));
         }
         if self.time.is_empty() {
-            return foreign("motion without an instant".to_owned());
+            return foreign("the motion has no instant".to_owned());
         }
         Ok(staged)
     }

@@ -101,7 +101,7 @@ impl Scan {
                 self.problems.push(Diagnostic::new(code, message).in_file(&self.file));
             }
             MOST_PROBLEMS => self.problems.push(
-                Diagnostic::new(code, "more problems follow, which are not listed").in_file(&self.file),
+                Diagnostic::new(code, "further problems are not listed").in_file(&self.file),
             ),
             _ => {}
         }
@@ -264,7 +264,7 @@ impl Scan {
             Err(problem) => Some(problem),
         };
         if let Some(differs) = differs {
-            self.add_as(Code::BodyChanged, format!("the content is not what was written; {differs}"));
+            self.add_as(Code::BodyChanged, format!("the content was changed after it was written; {differs}"));
         }
     }
 
@@ -276,7 +276,7 @@ impl Scan {
             match (held.has(group), there) {
                 (true, false) => self.add(format!("{name}: expected {}, found nothing", kind(item))),
                 (false, true) => {
-                    let said = format!("/terms@{} says `{DROPPED}`", group.name());
+                    let said = format!("/terms@{} is `{DROPPED}`", group.name());
                     self.add(format!("{name}: expected nothing, since {said}, found a dataset"));
                 }
                 _ => {}

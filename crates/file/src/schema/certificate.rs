@@ -66,7 +66,7 @@ pub(super) const CERTIFICATE: &[Item] = &[
         "remark",
         Text,
         ONE,
-        "why the proof is missing or what limits it; empty when nothing does",
+        "reason why the proof is missing or limited; empty if it is neither",
         field!(certificate.remark),
     ),
     attribute(
@@ -87,7 +87,7 @@ pub(super) const CERTIFICATE: &[Item] = &[
         "eigenvalue_rounding",
         Float,
         ONE,
-        "what rounding of products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p lambda_q); 0: not known",
+        "bound of the rounding error of any entry of Psi' K Psi, relative to sqrt(lambda_p lambda_q); 0: not known",
         field!(certificate.eigenvalue_rounding),
     )
     .added(4),
@@ -95,7 +95,7 @@ pub(super) const CERTIFICATE: &[Item] = &[
         "inertia_rounding",
         Float,
         ONE,
-        "to what part of their Cauchy-Schwarz bounds the inertia data were known before this file: the digits of a file of another program; 0: to the rounding of 64-bit floats",
+        "error of the inertia data before this file, relative to their Cauchy-Schwarz bounds, from the digits of a file of another program; 0: the rounding of 64-bit floats",
         field!(certificate.inertia_rounding),
     )
     .added(4),

@@ -115,7 +115,7 @@ pub(super) const COORDINATES: &[Item] = &[
         "names",
         Text,
         ONE,
-        "what each of the nc coordinates is, as a JSON array of texts: for every interface in the order of `/interfaces` the translations and rotations of its reference point (in the plane two and one; of a free interface the displacements of its nodes in the order of `/nodes`), along body axes, then the fixed-interface modes",
+        "meaning of each of the nc coordinates, as a JSON array of texts: for every interface in the order of `/interfaces` the translations and rotations of its reference point (in the plane two and one; of a free interface the displacements of its nodes in the order of `/nodes`), along body axes, then the fixed-interface modes",
         both(
             |v| text(serde_json::to_string(&v.coordinates()?.names).expect("strings are valid JSON")),
             |d, read| {

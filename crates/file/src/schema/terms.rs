@@ -53,7 +53,7 @@ macro_rules! of_groups {
                 })
             })),
             $(
-                attribute(concat!($name, "_reason"), Text, ONE, "why, where it was decided", both(
+                attribute(concat!($name, "_reason"), Text, ONE, "reason of the decision; absent: no decision", both(
                     |v| decision(v, TermGroup::$group)?.reason.value(),
                     put!(|d, read| d.decision(TermGroup::$group).reason = Stored::take(read)?),
                 ))
@@ -63,7 +63,7 @@ macro_rules! of_groups {
                     concat!($name, "_tier"),
                     Int,
                     ONE,
-                    "what decided: 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a motion that was integrated",
+                    "tier of the decision: 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a motion that was integrated",
                     both(
                         |v| Some(Value::Int(decision(v, TermGroup::$group)?.tier.into())),
                         |d, read| {
@@ -81,7 +81,7 @@ macro_rules! of_groups {
                     concat!($name, "_bound"),
                     Float,
                     ONE,
-                    "largest error that dropping makes, of what the reason names; absent: none is known",
+                    "largest error from dropping the group, in the quantity that the reason names; absent: not known",
                     both(
                         |v| number(decision(v, TermGroup::$group)?.bound),
                         put!(|d, read| d.decision(TermGroup::$group).bound = Stored::take(read)?),

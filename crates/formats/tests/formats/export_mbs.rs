@@ -481,7 +481,7 @@ fn groups_that_a_body_does_without_are_zero_and_the_rest_stays_consistent() {
         // MBSim takes W2 from the integrals that give the modal mass.
         let (bytes, losses) = written(&reduced, "mbsim", &ExportOptions::default());
         assert_eq!(
-            losses.iter().any(|loss| loss.contains("without W2")),
+            losses.iter().any(|loss| loss.contains("the absence of W2")),
             !groups.w2,
             "{groups:?}: {losses:?}"
         );
