@@ -57,7 +57,11 @@ impl RecordedMotion {
     pub fn staged(&self, body: &FlexBody) -> Result<FlexBody> {
         let foreign = |what: String| Err(Diagnostic::new(Code::MotionForeign, what).into());
         if self.body != body.source().name {
-            return foreign(format!("the motion belongs to the body `{}`, not to `{}`", self.body, body.source().name));
+            return foreign(format!(
+                "the motion belongs to the body `{}`, not to `{}`",
+                self.body,
+                body.source().name
+            ));
         }
         let staged = match &self.carrier {
             Some(carrier) => body.carried(carrier)?,

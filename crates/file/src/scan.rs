@@ -100,9 +100,9 @@ impl Scan {
             len if len < MOST_PROBLEMS => {
                 self.problems.push(Diagnostic::new(code, message).in_file(&self.file));
             }
-            MOST_PROBLEMS => self.problems.push(
-                Diagnostic::new(code, "further problems are not listed").in_file(&self.file),
-            ),
+            MOST_PROBLEMS => self
+                .problems
+                .push(Diagnostic::new(code, "further problems are not listed").in_file(&self.file)),
             _ => {}
         }
     }
@@ -264,7 +264,10 @@ impl Scan {
             Err(problem) => Some(problem),
         };
         if let Some(differs) = differs {
-            self.add_as(Code::BodyChanged, format!("the content was changed after it was written; {differs}"));
+            self.add_as(
+                Code::BodyChanged,
+                format!("the content was changed after it was written; {differs}"),
+            );
         }
     }
 

@@ -573,12 +573,7 @@ fn named<T: Copy>(found: String, all: &[T], name: fn(T) -> &'static str) -> Resu
 /// Groups of the file, in the order in which they are written.
 pub(super) const TABLE: &[SchemaGroup] = &[
     SchemaGroup { path: "/", per: Per::Body, description: "Format and units.", items: &[ROOT] },
-    SchemaGroup {
-        path: "/source",
-        per: Per::Body,
-        description: "Origin of the body.",
-        items: &[SOURCE],
-    },
+    SchemaGroup { path: "/source", per: Per::Body, description: "Origin of the body.", items: &[SOURCE] },
     SchemaGroup { path: "/frame", per: Per::Body, description: "The body frame.", items: &[FRAME] },
     SchemaGroup { path: "/nodes", per: Per::Body, description: "Nodes of the body.", items: &[NODES] },
     SchemaGroup {

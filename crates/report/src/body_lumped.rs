@@ -21,10 +21,11 @@ pub(super) fn lumped<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     let (lumped, own_modes) = (&facts.lumped, &facts.lumped_modes);
     let mut blocks = Vec::new();
     if !lumped.is_empty() {
-        let title =
-            Inline::from("What ").then(word_as("lumped mass", "lumped masses")).then(" would have cost");
+        let title = Inline::from("Errors of ").then(word_as("lumped mass", "lumped masses"));
         blocks.push(Block::Heading(title));
-        blocks.push(Block::Paragraph("The same modes with nodal masses instead of the mass matrix:".into()));
+        blocks.push(Block::Paragraph(
+            "Errors of the same modes with nodal masses instead of the mass matrix:".into(),
+        ));
         blocks.push(Block::List(lumped.iter().map(in_words).collect()));
         blocks.extend(bars(lumped).map(Block::Bars));
         let norms = vec![Block::Table(schemes(lumped)), Block::Table(all_norms(lumped))];
@@ -32,7 +33,7 @@ pub(super) fn lumped<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
         blocks.push(Block::Terms(listed("lumped", lumped, in_text)));
     }
     if !own_modes.is_empty() {
-        blocks.push(heading("Modes from the lumped masses too"));
+        blocks.push(heading("Modes computed with lumped masses"));
         blocks.push(Block::Table(lumped_modes(own_modes)));
         let cautions = own_modes.iter().filter(|own| !own.caution.is_empty());
         blocks.extend(cautions.map(|own| Block::Paragraph(format!("{}: {}", own.scheme, own.caution))));
@@ -103,7 +104,7 @@ fn bars(lumped: &[LumpedFacts]) -> Option<Bars> {
     };
     (!invariants.is_empty()).then(|| Bars {
         description: "Bar chart of the worst relative error of each invariant; the numbers are in the table below.".to_owned(),
-        caption: "Relative errors, the worst norm of each invariant. Logarithmic axis; errors below its left end have no bar.".to_owned(),
+        caption: "Relative errors: the worst norm of each invariant, on a logarithmic axis. Errors below its left end have no bar.".to_owned(),
         axis,
         groups: invariants.iter().map(group).collect(),
     })
@@ -160,7 +161,13 @@ fn lumped_modes(lumped: &[LumpedModesFacts]) -> Table {
         let [value, of] = worst(&own.errors, "");
         cells([own.scheme.clone(), change, significant(own.subspace_cosine, 5), value, of])
     };
-    let heads = ["Scheme", "Worst frequency", "Subspace cosine", "Worst error", "Of, or why not done"];
+    let heads = [
+        "Scheme",
+        "Worst frequency",
+        "Subspace cosine",
+        "Worst error",
+        "Number of modes, or reason why none",
+    ];
     let caption = "Frequencies in ascending order; invariants after alignment of the subspaces";
     Table::new(caption, heads, &[0, 4], lumped.iter().map(row).collect())
 }

@@ -359,7 +359,7 @@ impl ModelFacts {
     /// Returns the number of nodes and rows: `21 nodes, 63 degrees of freedom`.
     pub(crate) fn nodes_in_words(&self) -> String {
         match self.n_dofs {
-            0 => format!("{} nodes or frames; mass as another program condensed it", self.n_nodes),
+            0 => format!("{} nodes or frames; mass condensed by another program", self.n_nodes),
             n_dofs => format!("{} nodes, {n_dofs} degrees of freedom", self.n_nodes),
         }
     }
@@ -368,8 +368,8 @@ impl ModelFacts {
     fn mass_in_words(&self) -> &'static str {
         match MassStructure::from_name(self.mass_structure) {
             Some(MassStructure::RotationInvariant) => "consistent mass",
-            Some(MassStructure::Diagonal) => "DIAGONAL mass: lumped before it came here, exact for that only",
-            Some(MassStructure::General) | None => "mass on rotations of nodes or different by direction",
+            Some(MassStructure::Diagonal) => "DIAGONAL (lumped) mass: results are exact for this mass only",
+            Some(MassStructure::General) | None => "mass on nodal rotations or different along the axes",
         }
     }
 }

@@ -38,7 +38,7 @@ impl LackFacts {
     /// motion also `reaction 1.2 %`.
     pub(crate) fn parts(&self) -> String {
         if let Some(reason) = self.unknown {
-            return format!("an unknown part ({reason})");
+            return format!("an unknown amount ({reason})");
         }
         let attitude = self.errors.attitude.filter(|angle| *angle > 0.0);
         errors_to_digits(&OutputErrors { attitude, ..self.errors }, 2)
@@ -47,8 +47,11 @@ impl LackFacts {
     fn in_words(&self) -> String {
         let (parts, time) = (self.parts(), significant(self.time, 3));
         match self.unknown {
-            Some(_) => format!("{} modes lack {parts} of the FE model", self.modes),
-            None => format!("{} modes lack {parts} of the FE model, most at t = {time}", self.modes),
+            Some(_) => format!("a body of {} modes differs from the FE model by {parts}", self.modes),
+            None => format!(
+                "a body of {} modes differs from the FE model by {parts}, most at t = {time}",
+                self.modes
+            ),
         }
     }
 }
@@ -57,8 +60,8 @@ impl LackFacts {
 /// is the error before enrichment.
 pub(super) fn reference_in_words(lacks: &[LackFacts]) -> String {
     match lacks {
-        [] => "the modes of the body; what these lack of an FE model is not known".to_owned(),
+        [] => "the body with all its modes; its difference from an FE model is not known".to_owned(),
         [own] => format!("{} (estimated)", own.in_words()),
-        [first, .., own] => format!("{} (estimated; {} at first)", own.in_words(), first.in_words()),
+        [first, .., own] => format!("{} (estimated; before enrichment {})", own.in_words(), first.in_words()),
     }
 }

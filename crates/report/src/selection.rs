@@ -235,18 +235,18 @@ impl<'a> SelectionFacts<'a> {
         let verdict = if term.kept { "keep" } else { "drop" };
         if term.limit > 0.0 {
             let (bound, limit) = (significant(term.bound, 3), significant(term.limit, 3));
-            let reach = if term.kept { "without it" } else { "at most" };
+            let reach = if term.kept { "error without it" } else { "error at most" };
             let budget = match term.budget {
                 budget if budget < 1.0 => {
                     format!(
-                        " ({} % of the tolerance: the rest is for modes left out and the error of the body)",
+                        " ({} % of the tolerance; the rest is reserved for dropped modes and the error of the body)",
                         significant(100.0 * budget, 2)
                     )
                 }
                 _ => String::new(),
             };
             format!(
-                "{verdict} (tier {}): {}: {reach} {bound}, allowed {limit}{budget}",
+                "{verdict} (tier {}): {}: {reach} {bound}, tolerance {limit}{budget}",
                 term.tier, term.reason
             )
         } else {
@@ -272,7 +272,7 @@ impl<'a> SelectionFacts<'a> {
         let [_, (label, taken), ..] = self.verdict.lines();
         let state = if self.verdict.holds { State::Good } else { State::Open };
         let mut blocks = vec![
-            Block::Verdict { state, head: format!("{label} {taken}."), rest: String::new() },
+            Block::Verdict { state, head: format!("{label}: {taken}."), rest: String::new() },
             Block::Terms(self.head()),
             Block::Gap,
             Block::Line("Details".to_owned()),
@@ -294,7 +294,7 @@ impl<'a> SelectionFacts<'a> {
                 .in_text("Inputs", format!("{} {value}: {}", input.name, input.source))
         };
         let inputs = self.inputs.iter().map(input);
-        let inputs = inputs.chain([Term::new("Tolerances", tolerances).short("Allowed")]).collect();
+        let inputs = inputs.chain([Term::new("Tolerances", tolerances).short("Tolerances")]).collect();
         blocks.extend([heading("Inputs"), Block::Terms(inputs)]);
         blocks.extend([heading("Sizes of the terms"), Block::Table(self.sizes())]);
         blocks.extend([heading("Trials"), Block::Table(self.trials())]);
@@ -305,7 +305,7 @@ impl<'a> SelectionFacts<'a> {
             blocks.extend([heading("Static responses"), Block::Table(self.responses())]);
         }
         blocks.push(Block::Diagnostics(self.diagnostics));
-        let (name, kind) = (self.scene, "Terms and modes that a scene needs");
+        let (name, kind) = (self.scene, "Selection of terms and modes");
         Document { name, kind, generator: &self.generator, blocks }
     }
 
@@ -324,7 +324,7 @@ impl<'a> SelectionFacts<'a> {
         if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
             terms.push(Term::new(
                 "Errors",
-                format!("{}, measured against everything", errors_in_words(errors)),
+                format!("{}, compared with the body with all its terms and modes", errors_in_words(errors)),
             ));
             terms.push(Term::new("Reference", reference_in_words(&self.reference)));
         }
@@ -338,7 +338,7 @@ impl<'a> SelectionFacts<'a> {
             let numbers = [Some(one.tier_0), one.tier_1, one.tier_1.map(|own| one.tier_0 / own)];
             words.into_iter().chain(cells(numbers.map(known))).collect()
         };
-        let caption = "Bounds at the largest amplitude and angular velocity. Tier 0 follows from I0 and the frequencies, tier 1 has the norms of the invariants; slack is their ratio.";
+        let caption = "Bounds at the largest amplitude and angular velocity. Tier 0 follows from I0 and the frequencies, tier 1 uses the norms of the invariants; slack is the ratio of both.";
         Table::new(caption, heads, &[1, 2, 3, 4], self.significance.iter().map(row).collect())
     }
 
@@ -381,7 +381,7 @@ impl<'a> SelectionFacts<'a> {
             std::iter::once(one.load.into()).chain(cells(lacks)).collect()
         };
         let heads = ["Load", "Selected modes, %", "Body, %", "Body without residual vectors, %"];
-        let caption = "What modes lack of the static response, in the norm of K: the selected of that of the body, and the body of that of the model.";
+        let caption = "Errors of static responses, in the norm of K: of the selected modes relative to the body, and of the body relative to the model.";
         Table::new(caption, heads, &[], self.modes.static_responses.iter().map(row).collect())
     }
 
@@ -398,7 +398,7 @@ impl<'a> SelectionFacts<'a> {
         };
         let heads = ["Mode", "Amplitude", "Deflection, %", "Stress, %", "Verdict"];
         let caption = format!(
-            "Largest amplitude of the modes that do most, and what each does alone relative to all together ({} of {}).",
+            "Modes with the largest contributions ({} of {}): largest amplitude, and deflection and stress of the mode alone relative to all modes together.",
             shares.len(),
             self.modes.of
         );

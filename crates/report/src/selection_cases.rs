@@ -64,10 +64,10 @@ impl<'a> CaseFacts<'a> {
         };
         match &self.errors {
             Some(errors) => {
-                let beyond = if self.passed { "" } else { ", too much" };
+                let beyond = if self.passed { "" } else { ", exceeded" };
                 let errors = errors_in_words(errors);
                 format!(
-                    "{}: {errors}: {} of what is allowed{beyond}; {binds}",
+                    "{}: {errors}: {} of the tolerance{beyond}; {binds}",
                     self.name,
                     part_in_words(self.worst)
                 )
@@ -80,8 +80,7 @@ impl<'a> CaseFacts<'a> {
 /// Returns the table of the errors of the selected model in every load case, and of the effect of each case
 /// on the selection.
 pub(super) fn cases_table(cases: &[CaseFacts<'_>]) -> Table {
-    let heads =
-        ["Load case", "Errors", "Of what is allowed", "Decides", "The body lacks of the model (estimated)"];
+    let heads = ["Load case", "Errors", "Error / tolerance", "Decides", "Error of the body (estimated)"];
     let row = |case: &CaseFacts<'_>| {
         let errors = case.errors.as_ref().map_or_else(|| "not measured".to_owned(), errors_in_words);
         cells([
@@ -92,6 +91,6 @@ pub(super) fn cases_table(cases: &[CaseFacts<'_>]) -> Table {
             case.lacks_in_words(),
         ])
     };
-    let caption = "The selected model, measured against everything in each load case. A case decides a group or the number of modes where the model without it is furthest beyond what is allowed.";
+    let caption = "The selected model in each load case, compared with the body with all its terms and modes. A case decides a group or the number of modes if it is the case in which the model without them exceeds the tolerances most.";
     Table::new(caption, heads, &[1, 3, 4], cases.iter().map(row).collect())
 }

@@ -1,8 +1,8 @@
 //! Verdict of a selection in five lines: request, recommendation, reason, error, savings.
 
-use super::errors_in_words::{error_in_words, errors_in_words, ranges};
+use super::errors_in_words::{error_in_words, errors_in_words, groups_in_words, ranges};
 use super::lacks::LackFacts;
-use super::numbers::{counted, significant};
+use super::numbers::{counted, frequency, significant};
 use flexbody_body::flex_body::TermGroup;
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::selection::{Ground, Selection};
@@ -34,18 +34,22 @@ impl SelectionVerdict {
 
     /// Returns the lines with their labels.
     pub(crate) fn lines(&self) -> [(&'static str, &str); 5] {
-        let take = if self.holds { "Take" } else { "Best found" };
-        let lines = [&self.asked, &self.take, &self.why, &self.error, &self.saves].map(String::as_str);
-        let [asked, taken, why, error, saves] = lines;
-        [("Asked", asked), (take, taken), ("Why", why), ("Error", error), ("Saves", saves)]
+        let found = if self.holds { "Recommended" } else { "Best found" };
+        [
+            ("Asked", self.asked.as_str()),
+            (found, self.take.as_str()),
+            ("Why", self.why.as_str()),
+            ("Error", self.error.as_str()),
+            ("Saves", self.saves.as_str()),
+        ]
     }
 }
 
 /// Returns the physical meaning of a group of terms.
 fn meaning(group: TermGroup) -> &'static str {
     match group {
-        TermGroup::W1 => "centrifugal load, and inertia that follows the deflection",
-        TermGroup::W2 => "centrifugal softening, and inertia of second order",
+        TermGroup::W1 => "centrifugal load, and inertia linear in the deflection",
+        TermGroup::W2 => "centrifugal softening, and inertia quadratic in the deflection",
         TermGroup::W3 => "Coriolis and Euler forces on the modes",
     }
 }
@@ -53,7 +57,7 @@ fn meaning(group: TermGroup) -> &'static str {
 fn asked(selection: &Selection) -> String {
     if let Some(most) = selection.most_multiplications {
         return format!(
-            "{}{}: the most accurate of at most {most} multiplications per evaluation",
+            "{}{}: the smallest error with at most {most} multiplications per evaluation",
             selection.scene,
             cases_in_words(selection)
         );
@@ -72,7 +76,7 @@ fn cases_in_words(selection: &Selection) -> String {
     let least = if selection.cases.iter().all(|case| case.tolerance == first.tolerance) {
         ""
     } else {
-        ", the least of theirs"
+        "; the smallest tolerances of all cases"
     };
     format!(" in each of {} load cases ({}){least}", names.len(), names.join(", "))
 }
@@ -85,20 +89,19 @@ fn in_case(case: Option<usize>, selection: &Selection) -> String {
 
 fn take(selection: &Selection) -> String {
     let numbers: Vec<usize> = selection.modes.iter().map(|j| j + 1).collect();
-    let frequency = |j: Option<&usize>| significant(j.map_or(0.0, |&j| selection.frequencies_hz[j]), 3);
-    let which = if numbers.len() == selection.n_modes {
-        "all".to_owned()
-    } else {
-        format!("of {}: {}", selection.n_modes, ranges(&numbers))
-    };
-    let (first, last) = (frequency(selection.modes.first()), frequency(selection.modes.last()));
+    let hertz = |j: Option<&usize>| j.map_or(0.0, |&j| selection.frequencies_hz[j]);
+    let last = frequency(hertz(selection.modes.last()), 3);
     let held: Vec<&str> = held_groups(selection).map(TermGroup::name).collect();
-    let groups = if held.is_empty() {
-        "the inertia of the undeformed body alone".to_owned()
-    } else {
-        format!("the inertia terms {}", held.join(", "))
-    };
-    format!("{} ({which}; {first} to {last} Hz) and {groups}", counted(numbers.len(), "mode"))
+    let groups = groups_in_words(&held);
+    if numbers.len() == selection.n_modes {
+        return format!("all {} (up to {last}) with {groups}", counted(numbers.len(), "mode"));
+    }
+    format!(
+        "{} of {} ({}; up to {last}) with {groups}",
+        numbers.len(),
+        counted(selection.n_modes, "mode"),
+        ranges(&numbers)
+    )
 }
 
 fn held_groups(selection: &Selection) -> impl Iterator<Item = TermGroup> {
@@ -127,17 +130,20 @@ fn reason(kept: bool, ground: Option<Ground>, groups: &[TermGroup]) -> String {
         groups.iter().map(|group| format!("{} ({})", group.name(), meaning(*group))).collect();
     let names = names.join(" and ");
     let Some(Ground { output, error, tier, .. }) = ground else {
-        let known = if kept { "stays: nothing shows that it may go" } else { "is not in the body" };
-        return format!("{names} {known}");
+        return if kept {
+            format!("keep {names}: no bound or run shows that it can be dropped")
+        } else {
+            format!("{names} is not in the body")
+        };
     };
     let error = error_in_words(output, error, 2);
     match (kept, tier) {
-        (true, 2) => format!("without {names} the {output} is off by {error}"),
-        (true, _) => format!("without {names} the {output} may be off by {error}"),
-        (false, 2) => format!("without {names} it is off by {error} in {output}"),
+        (true, 2) => format!("without {names} the error in {output} is {error}"),
+        (true, _) => format!("without {names} the error in {output} may reach {error}"),
+        (false, 2) => format!("dropping {names} makes an error of {error} in {output}"),
         (false, _) => {
             format!(
-                "without {names} it is off by no more than {error} in {output}, which needs no simulation"
+                "dropping {names} makes an error of at most {error} in {output} (a bound, without simulation)"
             )
         }
     }
@@ -147,10 +153,9 @@ fn error(selection: &Selection) -> String {
     let own = selection.lacks.last();
     let lacks = match own {
         Some(own) => {
-            let much =
-                if ReferenceError::is_reference(own) { "" } else { ", too much to be measured against" };
+            let much = if ReferenceError::is_reference(own) { "" } else { ", too much for a reference" };
             format!(
-                "; the body with all its modes lacks {} of the FE model (estimated){much}",
+                "; the body with all its modes differs from the FE model by {} (estimated){much}",
                 LackFacts::new(own).parts()
             )
         }
@@ -159,7 +164,7 @@ fn error(selection: &Selection) -> String {
     match selection.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
         Some(errors) => {
             let case = in_case(selection.chosen.as_ref().and_then(|chosen| chosen.case), selection);
-            let worst = if case.is_empty() { "" } else { ", where it is worst" };
+            let worst = if case.is_empty() { "" } else { ", the worst case" };
             format!("{}, measured over the run{case}{worst}{lacks}", errors_in_words(errors))
         }
         None => format!("nothing was simulated{lacks}"),

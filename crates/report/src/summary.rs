@@ -9,7 +9,7 @@ use super::facts::{InterfaceFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::lumped_effect::scheme_in_words;
-use super::numbers::{bytes, coordinates, counted, duration, significant, triple};
+use super::numbers::{bytes, coordinates, counted, duration, frequency, frequency_range, triple};
 use super::text::{self, Screen};
 use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::MassStructure;
@@ -44,7 +44,7 @@ fn body(facts: &Facts<'_>) -> Vec<Term> {
     let size = entry(warned_if(is_lumped || !plane.is_empty()), "model", size + plane, 3);
     let mut items = vec![entry(tone, "body", title, 2), size];
     if model.approximation.is_some() {
-        let remark = "W1, W2 and W3 keep a part of the mass along the axes of the body; the rest is exact";
+        let remark = "W1, W2 and W3 take a part of the mass as fixed to the axes of the body; everything else is exact";
         items.push(entry(Tone::Warning, "approximate", remark, 2));
     }
     items.extend(model.storage_in_words().map(|rounded| entry(Tone::Warning, "storage", rounded, 2)));
@@ -69,7 +69,7 @@ fn mass_properties(facts: &Facts<'_>) -> Vec<Term> {
     let (body, units) = (&facts.body, &facts.model.units);
     let centre = coordinates(&body.centre_of_mass, body.size(), &units.length());
     let inertia = triple(&body.principal_inertia, &units.inertia());
-    let mass = format!("{} {} at {centre} (model axes)", significant(body.mass, 6), units.mass());
+    let mass = format!("{} at {centre} (model axes)", units.mass_of(body.mass, 6));
     let mut items = vec![
         entry(Tone::Plain, "mass", mass, 2),
         entry(Tone::Plain, "inertia", format!("{inertia} (principal)"), 2),
@@ -82,8 +82,8 @@ fn modes(facts: &Facts<'_>) -> Vec<Term> {
     let (modes, completeness) = (&facts.modes, &facts.completeness);
     let range = match modes.frequency_hz.as_slice() {
         [] => String::new(),
-        [only] => format!(", {} Hz", significant(*only, 5)),
-        [first, .., last] => format!(", {} to {} Hz", significant(*first, 5), significant(*last, 5)),
+        [only] => format!(", {}", frequency(*only, 5)),
+        [first, .., last] => format!(", {}", frequency_range([*first, *last], 5)),
     };
     let reduced = modes.craig_bampton.as_ref();
     let origins = modes.origins();

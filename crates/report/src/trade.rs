@@ -4,9 +4,9 @@ use super::Format;
 use super::chart::{Axis, Chart, Mark, Panel, Series};
 use super::csv;
 use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
-use super::errors_in_words::errors_in_words;
+use super::errors_in_words::{errors_in_words, ranges};
 use super::lacks::{LackFacts, reference_in_words};
-use super::numbers::{bytes, counted, duration, significant, times};
+use super::numbers::{TIME_UNITS, bytes, counted, duration, engineering, significant, times};
 use super::run_data::RunData;
 use super::trade_cases::{TradeCaseFacts, case_facts, cases_table};
 use super::trade_nodes::NodalFacts;
@@ -23,7 +23,7 @@ use serde::Serialize;
 
 /// Columns of the Pareto front in a text.
 const IN_TEXT: [&str; 7] =
-    ["No.", "What", "Multiplications", "Evaluation", "Simulation", "File", "Error / tolerance"];
+    ["No.", "Candidate", "Multiplications", "Evaluation", "Simulation", "File", "Error / tolerance"];
 
 /// Smallest error over tolerance on the plot; smaller errors are drawn at this value. A smaller value adds
 /// decades to the axis.
@@ -184,12 +184,12 @@ impl<'a> RowFacts<'a> {
         }
     }
 
-    /// Returns the composition of the candidate: `6 modes, W1`.
+    /// Returns the composition of the candidate: `6 modes, W1`, or `5 modes (1, 3-4, 7, 9), W1` if these are not
+    /// the lowest modes.
     fn in_words(&self) -> String {
-        let mut words = format!("{}, {}", counted(self.modes, "mode"), self.groups_in_words());
-        if !self.lowest() {
-            words.push_str(", not the lowest");
-        }
+        let numbers =
+            if self.lowest() { String::new() } else { format!(" ({})", ranges(&self.mode_numbers)) };
+        let mut words = format!("{}{numbers}, {}", counted(self.modes, "mode"), self.groups_in_words());
         if let (Some(scheme), Some(part)) = (self.lumped, self.lumped_part) {
             words.push_str(&format!(", {scheme} {part}"));
         }
@@ -200,7 +200,7 @@ impl<'a> RowFacts<'a> {
     }
 
     fn groups_in_words(&self) -> String {
-        if self.groups.is_empty() { "no group".to_owned() } else { self.groups.join(" ") }
+        if self.groups.is_empty() { "I0 only".to_owned() } else { self.groups.join(" ") }
     }
 
     /// Returns true if the candidate has all modes up to its last.
@@ -282,16 +282,18 @@ impl<'a> TradeFacts<'a> {
         let names = self.names();
         let cases = self.cases.iter().map(|case| Term::text("Load cases", case.in_words(&names)));
         blocks.push(Block::Terms(cases.collect()));
-        blocks.extend([heading("What is compared"), Block::Terms(self.compared())]);
+        blocks.extend([heading("Comparison"), Block::Terms(self.compared())]);
         if !self.cases.is_empty() {
             blocks.extend([heading("Load cases"), Block::Table(cases_table(&self.cases, &names))]);
         }
         blocks.push(heading("Error against cost"));
         blocks.extend(self.chart().map(Block::Chart));
-        let front = self.table("No other candidate is as cheap and as accurate", &self.shown());
+        let front =
+            self.table("Candidates for which no other is both cheaper and more accurate", &self.shown());
         let front = Block::Table(front.in_text(|head| IN_TEXT.contains(&head)));
         blocks.extend([Block::Gap, heading("Pareto front"), front, Block::Gap]);
-        let all = self.table("In the order in which they were tried", &self.rows.iter().collect::<Vec<_>>());
+        let all = self
+            .table("All candidates in the order of their simulation", &self.rows.iter().collect::<Vec<_>>());
         blocks.extend([heading("All candidates"), Block::Table(all), Block::Terms(self.work())]);
         blocks.push(Block::Diagnostics(self.diagnostics));
         Document { name: self.scene, kind: "Trade study", generator: &self.generator, blocks }
@@ -300,7 +302,7 @@ impl<'a> TradeFacts<'a> {
     /// Returns the verdict. A page omits the recommendation here because its head already shows it.
     fn verdict<'b>(&self) -> Vec<Block<'b>> {
         let count = counted(self.rows.len(), "candidate");
-        let title = format!("{}: {}, {count} against {}", self.scene, self.body, self.against());
+        let title = format!("{}: {}, {count} compared with {}", self.scene, self.body, self.against());
         let mut terms = vec![Term::text("Trade", title)];
         terms.extend(self.verdict.iter().enumerate().map(|(i, line)| match i {
             1 => Term::text(line.label, line.text.as_str()),
@@ -340,7 +342,7 @@ impl<'a> TradeFacts<'a> {
     /// Returns the number of failures and the times, at the end of a text.
     fn work(&self) -> Vec<Term> {
         let failed = self.rows.iter().filter(|row| row.failed.is_some()).count();
-        let why = format!("{}: --json and --report say why", counted(failed, "candidate"));
+        let why = format!("{}: see --json or --report for the reasons", counted(failed, "candidate"));
         let failed = (failed > 0).then(|| Term::text("Failed", why));
         failed.into_iter().chain([Term::text("Time", self.time_in_words())]).collect()
     }
@@ -370,7 +372,7 @@ impl<'a> TradeFacts<'a> {
         let front = self.front.iter().filter_map(|&number| point(number)).collect();
         let ring = self.recommended.and_then(point).into_iter().collect();
         let allowed = x.ends().map(|cost| [cost, 1.0]).to_vec();
-        series.insert(0, Series::new("what is allowed", Mark::Line, 1, allowed));
+        series.insert(0, Series::new("tolerance", Mark::Line, 1, allowed));
         series.extend(
             most.map(|most| Series::new("", Mark::Line, 1, y.ends().map(|error| [most, error]).to_vec())),
         );
@@ -383,10 +385,10 @@ impl<'a> TradeFacts<'a> {
     fn table(&self, caption: &str, rows: &[&RowFacts<'a>]) -> Table {
         // A body read from a file is the only source, and the time of its preprocessing is unknown.
         let several = self.rows.iter().any(|row| row.source != self.rows[0].source);
-        let mut heads = vec!["No.", "What"];
-        heads.extend(several.then_some("Of"));
-        heads.extend(["To (Hz)", "Multiplications", "Evaluation", "Simulation", "Steps", "File"]);
-        heads.extend(several.then_some("Made in"));
+        let mut heads = vec!["No.", "Candidate"];
+        heads.extend(several.then_some("Basis"));
+        heads.extend(["Up to (Hz)", "Multiplications", "Evaluation", "Simulation", "Steps", "File"]);
+        heads.extend(several.then_some("Preprocessing"));
         heads.extend(["Attitude (rad)", "Deflection", "Stress", "Reaction", "Error / tolerance"]);
         heads.extend((!self.cases.is_empty()).then_some("Worst case"));
         let row = |row: &&RowFacts<'a>| {
@@ -418,13 +420,9 @@ fn worst_lacks(lacks: &[Vec<ReferenceError>]) -> &[ReferenceError] {
     worst.map_or(&[], Vec::as_slice)
 }
 
-/// Returns a short time in ns or us.
+/// Returns the time of an evaluation with a fitting prefix.
 fn short(seconds: f64) -> String {
-    if seconds < 1e-6 {
-        format!("{} ns", significant(1e9 * seconds, 3))
-    } else {
-        format!("{} us", significant(1e6 * seconds, 3))
-    }
+    engineering(seconds, 3, TIME_UNITS)
 }
 
 /// Returns the study as comma-separated values with one row per candidate; numbers round-trip.

@@ -64,25 +64,30 @@ impl TradeCaseFacts<'_> {
     /// Returns the effect of the case on the decision: `rules out 12 cheaper candidates, 3 of them alone`.
     fn decides(&self) -> String {
         match self.ruled_out {
-            0 => "rules out nothing cheaper".to_owned(),
+            0 => "rules out no cheaper candidate".to_owned(),
             count => {
                 let count = counted(count, "cheaper candidate");
-                format!("rules out {count}, {} of them alone", self.ruled_out_alone)
+                format!("rules out {count}, {} of them by this case alone", self.ruled_out_alone)
             }
         }
     }
 
     fn alone(&self, names: &[String]) -> String {
-        self.alone.map_or_else(|| "nothing".to_owned(), |row| names[row - 1].clone())
+        self.alone.map_or_else(|| "no candidate".to_owned(), |row| names[row - 1].clone())
     }
 
     /// Returns the case in words: `braking: stress 1.2 %: 60 % of what is allowed; rules out ...; alone it
     /// takes 6 modes, W1`.
     pub(crate) fn in_words(&self, names: &[String]) -> String {
         let errors = self.errors.as_ref().map_or_else(String::new, |errors| {
-            format!("{}: {} of what is allowed; ", errors_in_words(errors), part_in_words(self.worst))
+            format!("{}: {} of the tolerance; ", errors_in_words(errors), part_in_words(self.worst))
         });
-        format!("{}: {errors}{}; alone it takes {}", self.name, self.decides(), self.alone(names))
+        format!(
+            "{}: {errors}{}; recommended for this case alone: {}",
+            self.name,
+            self.decides(),
+            self.alone(names)
+        )
     }
 }
 
@@ -92,10 +97,10 @@ pub(super) fn cases_table(cases: &[TradeCaseFacts<'_>], names: &[String]) -> Tab
     let heads = [
         "Load case",
         "Errors",
-        "Of what is allowed",
+        "Error / tolerance",
         "Decides",
-        "Takes alone",
-        "The reference lacks (estimated)",
+        "Recommended alone",
+        "Error of the reference (estimated)",
     ];
     let row = |case: &TradeCaseFacts<'_>| {
         let errors = case.errors.as_ref().map_or_else(|| "not measured".to_owned(), errors_in_words);
@@ -109,6 +114,6 @@ pub(super) fn cases_table(cases: &[TradeCaseFacts<'_>], names: &[String]) -> Tab
             lacks,
         ])
     };
-    let caption = "The recommended candidate in each load case. A case rules out the cheaper candidates whose errors are beyond its tolerances; what it takes alone is the cheapest candidate that is within them.";
+    let caption = "The recommended candidate in each load case. A case rules out the cheaper candidates whose errors exceed its tolerances; the candidate recommended for it alone is the cheapest one within them.";
     Table::new(caption, heads, &[1, 3, 4, 5], cases.iter().map(row).collect())
 }
