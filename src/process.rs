@@ -72,8 +72,7 @@ fn out_of_memory(size: usize) -> ! {
     // The text is shorter than the line.
     let _ = writeln!(
         line,
-        "error[FB601]: not enough memory: another {size} bytes are not to be had\n  help: raise the limits of memory, ask for \
-         fewer modes, use fewer threads (--threads), or a larger machine"
+        "error[FB601]: not enough memory: {size} more bytes are not available\n  help: compute fewer modes, use fewer threads (--threads), raise the limits of memory, or use a larger machine"
     );
     tell(&line.bytes[..line.len]);
     end(ExitCode::Resources)

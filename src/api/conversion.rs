@@ -123,7 +123,7 @@ impl Model {
     /// The errors of [`Model::convert`]; FB605 if the listener stops it.
     pub fn convert_heard(&self, options: &ConvertOptions, listener: Listener<'_>) -> Result<Conversion> {
         if options.basis == Basis::Scene {
-            let message = "a basis made for a scene needs one: `convert_for`";
+            let message = "a basis made for a scene needs the scene: use `convert_for`";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
         let settings = options.settings(self, None)?;

@@ -88,8 +88,7 @@ impl FlexBody {
     /// does not match the body; FB540 if its motion cannot be integrated; FB605 if the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
         if options.reference != ReferenceChoice::Full {
-            let message =
-                "errors against all nodes, or a finer body, need the matrices: ask the model, not the body";
+            let message = "errors relative to all nodes or to a finer body need the matrices: call the function of the model";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
         let sources = vec![Source::new("file", self.0.clone(), None)?];
@@ -124,7 +123,8 @@ impl Trade {
     /// FB801 if there is no such candidate; FB703 if lumped masses give no valid body.
     pub fn body(&self, candidate: usize) -> Result<FlexBody> {
         let Some(row) = self.study.rows.get(candidate) else {
-            let message = format!("there is no candidate {candidate} of {}", self.candidates());
+            let message =
+                format!("candidate {candidate} does not exist: the study has {}", self.candidates());
             return Err(Diagnostic::new(Code::Usage, message).into());
         };
         row.candidate.body(&self.sources[row.candidate.source]).map(FlexBody)

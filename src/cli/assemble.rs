@@ -20,7 +20,8 @@ pub(super) fn run(arguments: &AssembleArguments) -> Result<Outcome> {
 /// Returns the corresponding arguments of `convert`.
 fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<ConvertArguments> {
     let model = arguments.model.clone().or_else(|| prepared.model.path.clone()).ok_or_else(|| {
-        Diagnostic::new(Code::Usage, "the folder does not say where its model is").with_help("give --model")
+        Diagnostic::new(Code::Usage, "the folder does not state the path of its model")
+            .with_help("give the path with --model")
     })?;
     let hertz = |lambda: f64| lambda.sqrt() / std::f64::consts::TAU * prepared.hertz;
     let modes = prepared.wanted.modes.and_then(|count| u32::try_from(count).ok());

@@ -136,7 +136,7 @@ fn parse(list: &BatchList, body: &BatchBody) -> Result<(Vec<String>, Box<Convert
     let program = std::iter::once("flexbody".to_owned());
     match Arguments::try_parse_from(program.chain(words.clone())).map(|parsed| parsed.command) {
         Ok(Command::Convert(converted)) => Ok((words, converted)),
-        Ok(_) => Err(refused(body, "its options are those of another command")),
+        Ok(_) => Err(refused(body, "its options belong to another command")),
         Err(error) => {
             let text = error.render().to_string();
             let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
@@ -152,9 +152,9 @@ fn refuse_programs(body: &BatchBody, converted: &ConvertArguments) -> Result<()>
     match named.iter().find(|(_, is_named)| *is_named) {
         None => Ok(()),
         Some((option, _)) => {
-            let message = format!("{}: {option} names a program to start", body.output.display());
+            let message = format!("{}: {option} would start a program", body.output.display());
             let help =
-                "set FLEXBODY_MPIEXEC and FLEXBODY_PYTHON, or allow it by flexbody batch --allow-programs";
+                "set FLEXBODY_MPIEXEC and FLEXBODY_PYTHON, or allow it with flexbody batch --allow-programs";
             Err(Diagnostic::new(Code::BatchSyntax, message).with_help(help).into())
         }
     }

@@ -261,9 +261,9 @@ pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
             ("interfaces", _) => LoadSource::Interfaces,
             (_, Some(path)) if !path.is_empty() => LoadSource::File(MatrixLocation::parse(path)),
             _ => {
-                let message = format!("`{text}` is no set of loads for residual vectors");
+                let message = format!("`{text}` is not a set of loads for residual vectors");
                 return Err(Diagnostic::new(Code::Usage, message)
-                    .with_help("centrifugal, interfaces, loads=FILE, each with @HZ for the responses at a frequency, or several of them with commas")
+                    .with_help("give centrifugal, interfaces or loads=FILE, separated by commas; append @HZ for the responses at a frequency")
                     .into());
             }
         };
@@ -279,9 +279,10 @@ pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
 
 fn refuse_without_modes(arguments: &ConvertArguments) -> Result<()> {
     if arguments.modes == Some(0) && arguments.basis != BasisKind::CraigBampton {
-        let message = "--modes 0 leaves a body no modes: only --basis craig-bampton has static shapes that can do without";
+        let message =
+            "--modes 0 leaves the body without modes: only --basis craig-bampton has static shapes besides";
         return Err(Diagnostic::new(Code::Usage, message)
-            .with_help("give at least 1, or --basis craig-bampton for static condensation")
+            .with_help("give --modes 1 or more, or --basis craig-bampton for static condensation")
             .into());
     }
     Ok(())
@@ -297,33 +298,35 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
     let message = match arguments {
         ConvertArguments { scene: None, .. } if basis == BasisKind::Scene => "--basis scene needs --scene",
         ConvertArguments { accuracy: Accuracy::Certified, .. } if basis == BasisKind::Scene => {
-            "the modes of this basis are no eigenvectors and cannot be certified"
+            "the modes of this basis are not eigenvectors and cannot be certified"
         }
         ConvertArguments { shapes: Some(_), .. } if basis != BasisKind::Imported => {
             "--shapes needs --basis imported"
         }
         ConvertArguments { storage: Storage::F32, accuracy: Accuracy::Certified, .. } => {
-            "--storage f32 rounds what --accuracy certified guarantees: take --storage f64"
+            "--storage f32 rounds the numbers that --accuracy certified guarantees: use --storage f64"
         }
         _ if slepc && basis != BasisKind::Free => "--engine slepc finds free modes: it needs --basis free",
         _ if slepc && residual => "residual vectors need the factor of --engine built-in",
-        ConvertArguments { scene: Some(_), .. } if slepc => "--scene chooses modes of --engine built-in",
-        ConvertArguments { split: true, .. } if slepc => "--engine slepc takes one body: --split has several",
+        ConvertArguments { scene: Some(_), .. } if slepc => "--scene needs --engine built-in",
+        ConvertArguments { split: true, .. } if slepc => {
+            "--engine slepc converts a single body: leave --split out"
+        }
         ConvertArguments { accuracy: Accuracy::Certified, .. } if slepc => {
             "--accuracy certified needs --engine built-in"
         }
         _ if residual && !searches_free_modes => "residual vectors need --basis free or craig-chang",
         ConvertArguments { split: true, .. } if loads.iter().any(|set| set.file().is_some()) => {
-            "--split: the rows of nodal loads are those of all bodies together"
+            "--split cannot be used with nodal loads, whose rows belong to all bodies together"
         }
         ConvertArguments { lumped_modes: true, .. } if residual => {
             "--lumped-modes compares free-surface modes, not residual vectors"
         }
         ConvertArguments { accuracy: Accuracy::Certified, .. } if residual => {
-            "residual vectors are no eigenvectors and cannot be certified"
+            "residual vectors are not eigenvectors and cannot be certified"
         }
         ConvertArguments { accuracy: Accuracy::Certified, .. } if coupled => {
-            "the modes of this basis are no eigenvectors and cannot be certified"
+            "the modes of this basis are not eigenvectors and cannot be certified"
         }
         ConvertArguments { lumped_modes: true, .. } if basis != BasisKind::Free => {
             "--lumped-modes compares free-surface modes: it needs --basis free"
@@ -404,7 +407,10 @@ fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
             arguments.job.units.as_deref(),
         )
         .map(|files| ModelFiles { dimension: arguments.job.dimension.unwrap_or(files.dimension), ..files }),
-        _ => Err(Diagnostic::new(Code::Usage, "give a manifest, or --stiffness, --mass and --nodes").into()),
+        _ => {
+            Err(Diagnostic::new(Code::Usage, "give a manifest, a job, or --stiffness, --mass and --nodes")
+                .into())
+        }
     }
 }
 

@@ -103,9 +103,9 @@ fn points(text: &str) -> Result<Points> {
     };
     let numbers: Option<Vec<i64>> = numbers.split(',').map(|number| number.trim().parse().ok()).collect();
     numbers.map(points).ok_or_else(|| {
-        let message = format!("`{text}` names no points of the body");
+        let message = format!("`{text}` is not a set of points of the body");
         Diagnostic::new(Code::Usage, message)
-            .with_help("nodes, interfaces, node numbers with commas, or `interfaces,17,23`")
+            .with_help("give nodes, interfaces, node numbers with commas, or both as in interfaces,17,23")
             .into()
     })
 }

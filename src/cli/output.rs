@@ -127,7 +127,7 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
 /// Reports an internal error.
 pub(super) fn tell_bug(arguments: &Arguments) -> ExitCode {
     let (name, printing) = command_of(arguments);
-    let message = "the program stopped at a contradiction of its own";
+    let message = "internal error: the program stopped";
     finish(Some(name), printing, Err(Diagnostic::new(Code::Internal, message).into()))
 }
 

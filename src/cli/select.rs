@@ -86,7 +86,7 @@ fn converted(
 
 fn refuse_modes(arguments: &SelectArguments) -> Result<()> {
     if arguments.modes.is_some() {
-        let message = "--modes is for a model: a file has the modes that it has";
+        let message = "--modes applies to a model: the modes of a body file are fixed";
         return Err(Diagnostic::new(Code::Usage, message).into());
     }
     Ok(())

@@ -113,7 +113,7 @@ fn ended_by(signal: c_int) -> ! {
     let left = if is_alone {
         "no unfinished file is left"
     } else {
-        "a program that this one had started was killed; the next run removes its unfinished files"
+        "a program started by flexbody was killed; the next run removes its unfinished files"
     };
     let is_interruption = INTERRUPTIONS.contains(&signal);
     let what = if is_interruption { "interrupted".to_owned() } else { format!("ended by signal {signal}") };

@@ -112,9 +112,9 @@ fn refuse_contradictions(arguments: &TradeArguments, is_model: bool) -> Result<(
             "--reference nodal needs the matrices: give the model"
         }
         TradeArguments { reference: ReferenceChoice::Fine, .. } => {
-            "--reference fine is made of the matrices: give the model"
+            "--reference fine needs the matrices: give the model"
         }
-        TradeArguments { modes: Some(_), .. } => "--modes is for conversions: give the model",
+        TradeArguments { modes: Some(_), .. } => "--modes applies to a model: give the model",
         _ => return Ok(()),
     };
     Err(Diagnostic::new(Code::Usage, message).into())

@@ -80,8 +80,7 @@ impl Tailoring {
         let Enriched { made: mut reference, rounds } = whole;
         let own = || rounds.iter().map(|rounds| rounds.last());
         if own().flatten().any(|own| !own.is_reference()) {
-            let message =
-                "the body whose motion shapes would be made of lacks more than half of the tolerances itself";
+            let message = "the error of the body whose motion would give the shapes is itself more than half of the tolerances";
             reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
             return Ok(Enriched { made: reference, rounds });
         }
@@ -112,7 +111,7 @@ impl Tailoring {
             });
             return Ok(Enriched { rounds: own.collect(), made });
         }
-        let message = "no number of shapes of the motion leaves half of the tolerances to the dropped terms";
+        let message = "with any number of shapes the motion takes more than half of the tolerances, which are needed for dropped terms";
         reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
         Ok(Enriched { made: reference, rounds })
     }
@@ -186,7 +185,7 @@ pub fn computed_basis(kind: BasisKind, loads: &[LoadSource], model: &FeModel) ->
         }
         BasisKind::Imported => {
             let message = "imported shapes are not computed from the model";
-            let help = "read them from a file: flexbody convert --basis imported --shapes FILE";
+            let help = "read them from a file with flexbody convert --basis imported --shapes FILE";
             Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
         }
     }
@@ -255,7 +254,7 @@ pub fn convert_for(
 /// Refuses settings and scenes for which a conversion with selection, or a basis made of motion, is not possible.
 fn refuse_unfit(tailoring: &Tailoring, cases: &LoadCases) -> Result<()> {
     if tailoring.settings.frame.interface().is_some() {
-        let message = "a scene chooses terms and modes of bodies in mean axes, not of one whose frame stands on an interface";
+        let message = "a scene can select terms and modes only for a body in mean axes, not for one whose frame is fixed to an interface";
         let help = "leave --scene out, or use --frame com";
         return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
     }
@@ -263,11 +262,11 @@ fn refuse_unfit(tailoring: &Tailoring, cases: &LoadCases) -> Result<()> {
         return Ok(());
     }
     let message = if cases.iter().any(|scene| !scene.initial.modes.is_empty()) {
-        "--basis scene: the scene starts modes by their number, which a body made of its motion does not have"
+        "--basis scene: the scene starts modes by their number, and a body made of the motion has no such modes"
     } else if cases.iter().any(|scene| scene.carried.is_some()) {
-        "--basis scene: shapes are made of the motion of a free body, and something carries this one"
+        "--basis scene needs the motion of a free body, but [carried] prescribes the motion"
     } else if cases.iter().any(|scene| scene.run.duration.is_none()) {
-        "--basis scene: shapes are made of a motion, and the scene has no [run] with a duration"
+        "--basis scene needs a motion, but the scene has no `duration` in [run]"
     } else {
         return Ok(());
     };

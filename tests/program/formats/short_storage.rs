@@ -196,5 +196,5 @@ fn the_program_writes_what_check_accepts() {
     assert_eq!(code, Some(0), "{text}");
     let certified = ["convert", model, "-o", &body, "--accuracy", "certified", "--storage", "f32"];
     let (code, _, stderr) = run(&certified);
-    assert!(code == Some(2) && String::from_utf8_lossy(&stderr).contains("take --storage f64"));
+    assert!(code == Some(2) && String::from_utf8_lossy(&stderr).contains("use --storage f64"));
 }

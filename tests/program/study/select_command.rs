@@ -96,7 +96,7 @@ fn a_cost_that_nothing_meets_is_a_check_that_fails() {
     let run = flexbody(place, &["select", "whole.flex.h5", "--scene", "scene.toml"]);
     assert_eq!(run.status.code(), Some(1));
     let text = String::from_utf8_lossy(&run.stdout);
-    assert!(text.contains("no model takes 5 multiplications") && text.contains("\nBest found  "), "{text}");
+    assert!(text.contains("no model needs 5 multiplications") && text.contains("\nBest found  "), "{text}");
     prepare(place, "[cost]\nmultiplications = 900\n");
     let run = flexbody(place, &["select", "whole.flex.h5", "--scene", "scene.toml", "--json"]);
     assert!(run.status.success());
@@ -117,8 +117,8 @@ fn a_body_for_a_scene_is_written_where_the_selection_holds_and_only_there() {
     let dear = format!("{scene}[cost]\nmultiplications = 5\n");
     for (manifest, scene, holds, said) in [
         (&bracket, scene.as_str(), true, ""),
-        (&bracket, dear.as_str(), false, "do not hold what the scene asks for"),
-        (&cube, tight, false, "nothing can be said of the selection"),
+        (&bracket, dear.as_str(), false, "do not meet the tolerances of the scene"),
+        (&cube, tight, false, "the selection cannot be judged"),
     ] {
         fs::write(place.join("scene.toml"), scene).expect("written");
         let of_scene = |command: &str, rest: &[&str]| {
@@ -156,7 +156,10 @@ fn contradictions_are_refused() {
     let place = folder.path();
     let manifest = prepare(place, "");
     for (words, said) in [
-        (&["select", "whole.flex.h5", "--scene", "scene.toml", "--modes", "3"][..], "--modes is for a model"),
+        (
+            &["select", "whole.flex.h5", "--scene", "scene.toml", "--modes", "3"][..],
+            "--modes applies to a model",
+        ),
         (&["select", "whole.flex.h5", "--scene", "scene.toml", "--report", "scene.toml"], "scene.toml"),
         (&["convert", &manifest, "--scene", "none.toml", "-o", "x.flex.h5"], "does not exist"),
     ] {

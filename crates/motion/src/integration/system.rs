@@ -106,10 +106,13 @@ impl std::fmt::Display for Failure {
             Self::Rates { reason } => f.write_str(reason),
             Self::NotFinite { time } => write!(f, "the state is no longer finite after t = {time:e}"),
             Self::StepTooSmall { time } => {
-                write!(f, "no step that time can resolve meets the tolerance at t = {time:e}")
+                write!(
+                    f,
+                    "the step that meets the tolerance at t = {time:e} is too small for the resolution of time"
+                )
             }
             Self::NotConverged { time, step } => {
-                write!(f, "the equations of the implicit step of {step:e} from t = {time:e} were not solved")
+                write!(f, "the equations of the implicit step of {step:e} from t = {time:e} did not converge")
             }
         }
     }

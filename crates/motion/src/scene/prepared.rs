@@ -70,7 +70,7 @@ impl<'a> Prepared<'a> {
     /// FB212 if the scene does not fit the body; FB550 and FB551 before any work.
     pub(super) fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
         let Some(duration) = scene.run.duration else {
-            let diagnostic = Diagnostic::new(Code::SceneBody, "the scene does not say how long it lasts");
+            let diagnostic = Diagnostic::new(Code::SceneBody, "the scene has no `duration`");
             return Err(diagnostic.with_help("give `duration` in [run]").into());
         };
         let (forces, watched) = SceneForces::new(body, scene)?;
@@ -202,16 +202,16 @@ fn stopped(scene: &Scene, method: &Method, stop: Stop) -> Error {
     match stop {
         Stop::Memory { time } => {
             let message = format!(
-                "the motion of `{}` fills the memory after {steps} steps, at t = {time:e}",
+                "the recorded motion of `{}` exceeds the memory after {steps} steps, at t = {time:e}",
                 scene.name
             );
             Diagnostic::new(Code::MemoryShort, message)
-                .with_help("simulate a shorter `duration`, or fewer modes")
+                .with_help("simulate a shorter `duration` or fewer modes")
                 .into()
         }
         Stop::Steps { time } => {
             let message = format!(
-                "the run of `{}` took the {steps} steps that are allowed until t = {time:e}",
+                "the run of `{}` reached only t = {time:e} within the {steps} steps that are allowed",
                 scene.name
             );
             Diagnostic::new(Code::RunTooLong, message).into()
@@ -219,8 +219,8 @@ fn stopped(scene: &Scene, method: &Method, stop: Stop) -> Error {
         Stop::Failed(failure) => {
             let message = format!("simulation of `{}` stopped after {steps} steps: {failure}", scene.name);
             let help = match failure {
-                Failure::NotConverged { .. } => "take a shorter step, or the adaptive method",
-                _ => "the motion may leave the range of the model: look at spin, loads and dropped terms",
+                Failure::NotConverged { .. } => "give a shorter `step`, or use method = \"adaptive\"",
+                _ => "check spin, loads and dropped terms: the motion may leave the range of the model",
             };
             Diagnostic::new(Code::SimulationStopped, message).with_help(help).into()
         }

@@ -115,7 +115,7 @@ fn scheme(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option
         if table.contains_key("method") { walk.string(table, "method")? } else { "adaptive".to_owned() };
     let mut refuse = |keys: &[&str]| {
         for key in keys.iter().filter_map(|key| table.get(*key)) {
-            walk.wrong(key.span(), format!("method `{method}` has no such setting"));
+            walk.wrong(key.span(), format!("method `{method}` does not have this setting"));
         }
     };
     match method.as_str() {
@@ -245,7 +245,7 @@ fn load(walk: &mut Walk<'_>, files: &HistoryFiles, table: &TomlTable, span: Rang
         walk.wrong(span.clone(), "load has neither `force` nor `torque`".to_owned());
     }
     if has("history") && !has("force") && !has("torque") && (has("force_from") || has("torque_from")) {
-        let message = "`history` is given, but there is no `force` or `torque` that it is a factor of: columns have theirs";
+        let message = "`history` has no effect: it is a factor of `force` or `torque`, and the load has only columns of a file";
         walk.complain(Code::SceneContradicts, span.clone(), message.to_owned());
     }
     let mut part = |key: &str, key_of_columns: &str| match (table.get(key), table.get(key_of_columns)) {

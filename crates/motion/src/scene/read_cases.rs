@@ -92,13 +92,13 @@ fn names(walk: &mut Walk<'_>, tables: &[(&TomlTable<'_>, Range<usize>)]) -> Vec<
         let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         if !name.chars().all(is_plain) {
             let message = format!(
-                "`name` of [[case]] is `{name}`, expected letters, digits, `_` and `-`: files are named by it"
+                "`name` of [[case]] is `{name}`, expected only letters, digits, `_` and `-` (file names contain it)"
             );
             walk.wrong(value.span(), message);
         }
         // Names become file names, and some file systems ignore case.
         if !name.is_empty() && names.iter().any(|other| other.eq_ignore_ascii_case(&name)) {
-            walk.complain(Code::SceneContradicts, value.span(), format!("case `{name}` is there twice"));
+            walk.complain(Code::SceneContradicts, value.span(), format!("case `{name}` occurs twice"));
         }
         names.push(name);
     }
@@ -173,7 +173,7 @@ fn refuse_some_without_run(walk: &mut Walk<'_>, scenes: &[Scene], names: &[Strin
     }
     for ((scene, name), span) in scenes.iter().zip(names).zip(spans) {
         if scene.run.duration.is_none() {
-            let message = format!("case `{name}` does not say how long it lasts, and others do");
+            let message = format!("case `{name}` has no `duration`, but other cases have one");
             let diagnostic = walk.at(Code::SceneContradicts, span.clone(), message);
             walk.found.push(diagnostic.with_help("give `duration` in [run] of the scene or of every case"));
         }

@@ -180,7 +180,7 @@ fn not_negative(
     components: Vector3<f64>,
 ) -> Option<Vector3<f64>> {
     if components.iter().any(|component| *component < 0.0) {
-        walk.wrong(value.span(), format!("`{key}` is a magnitude and cannot be negative"));
+        walk.wrong(value.span(), format!("`{key}` is negative, but it is a magnitude"));
         return None;
     }
     Some(components)
@@ -225,7 +225,7 @@ fn limits(walk: &mut Walk<'_>, table: &TomlTable, span: &std::ops::Range<usize>)
         let number = mode_number(walk, table, &span, "[[limits.mode]]");
         let amplitude = finite(walk, table, "amplitude", &span).filter(|amplitude| *amplitude >= 0.0);
         if amplitude.is_none() && table.contains_key("amplitude") {
-            walk.wrong(span, "`amplitude` is a magnitude and cannot be negative".to_owned());
+            walk.wrong(span, "`amplitude` is negative, but it is a magnitude".to_owned());
         }
         Some((number?, amplitude?))
     });
@@ -233,7 +233,7 @@ fn limits(walk: &mut Walk<'_>, table: &TomlTable, span: &std::ops::Range<usize>)
         (Some(limit), Some(modes)) => Some((limit, modes)),
         (None, None) => None,
         _ => {
-            walk.wrong(span.clone(), "`stress` and `mode_stress` need each other".to_owned());
+            walk.wrong(span.clone(), "`stress` and `mode_stress` must be given together".to_owned());
             return None;
         }
     };

@@ -103,7 +103,7 @@ fn change(inertia: &Matrix3<f64>, recording: &Recording, finer: &Recording) -> O
     let [x, y, z] = axis.map(|c| if c.abs() < 5e-4 { 0.0 } else { c }).into();
     let ratio = eigen.eigenvalues.max() / eigen.eigenvalues.min();
     let message = format!(
-        "the angular velocity about the axis of least inertia ({x:.3}, {y:.3}, {z:.3}) is not settled: at time {:.4e} it is {:.4e}, with finer steps {:.4e}; inertias differ by a factor of {ratio:.1e}",
+        "the angular velocity about the axis of least inertia ({x:.3}, {y:.3}, {z:.3}) depends on the step: at time {:.4e} it is {:.4e}, with finer steps {:.4e}; the inertias differ by a factor of {ratio:.1e}",
         recording.time[at], coarse[at], fine[at]
     );
     Some(Diagnostic::new(Code::RateUnsettled, message))

@@ -143,7 +143,7 @@ pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Ve
     let deflection = extremes.deflection;
     if deflection.value > LINEAR_RANGE {
         let message = format!(
-            "a node is deflected by {:.0} % of the largest extent of the body at t = {} {unit}: modes are those of small deformation",
+            "a node is deflected by {:.0} % of the largest extent of the body at t = {} {unit}, but the modes hold for small deformations",
             100.0 * deflection.value,
             rounded(deflection.time)
         );
@@ -170,7 +170,7 @@ fn softening(body: &FlexBody, extremes: &Extremes) -> Option<Diagnostic> {
     let (part, omega) = extremes.spins.iter().filter_map(part).max_by(|a, b| a.0.total_cmp(&b.0))?;
     (part > SOFTENING).then(|| {
         let message = format!(
-            "spin about {} reaches {} rad/{}: without geometric stiffness it takes {:.2} % of the stiffness of some motion",
+            "the spin about {} reaches {} rad/{}: without geometric stiffness it removes {:.2} % of the stiffness of some motion",
             axis_in_words(&omega),
             rounded(omega.norm()),
             body.units().time.name(),

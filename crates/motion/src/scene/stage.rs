@@ -53,7 +53,7 @@ impl<'a> Stage<'a> {
                 found.extend(body.softened(&carrier));
                 if body.loses_geometric_stiffness() {
                     let message = format!(
-                        "geometric stiffness of the body does not act while {carrier} carries it: the stress comes from the reaction there"
+                        "the geometric stiffness of the body is not used while {carrier} carries it, because the stress comes from the reaction at the carrier"
                     );
                     found.push(Diagnostic::new(Code::CarriedGeometricStiffness, message));
                 }
@@ -77,7 +77,7 @@ fn refuse_numbered_modes(body: &FlexBody, scene: &Scene) -> Result<()> {
         return Ok(());
     }
     let message = format!(
-        "{}: without a carrier the body is simulated in mean axes, where the mode numbers of [initial] mean other modes",
+        "{}: without a carrier the body is simulated in mean axes, in which the mode numbers of [initial] refer to other modes",
         body.conditions()
     );
     let help = "convert with --frame com, or start from the static equilibrium of a load";
@@ -175,12 +175,13 @@ fn start_with_the_motion(scene: &mut Scene, axes: &Matrix3<f64>) {
 fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
     let motion = &scene.requirements.motion;
     let mut found = Vec::new();
-    let mut refuse = |what: &str, key: &str| {
-        let message = format!("{what} is beyond `{key}` of [motion]");
-        found.push(Diagnostic::new(Code::SceneContradicts, message).with_help(
-            "[motion] has the largest rotation that the body ever has, that of the scene included",
-        ));
-    };
+    let mut refuse =
+        |what: &str, key: &str| {
+            let message = format!("{what} is beyond `{key}` of [motion]");
+            found.push(Diagnostic::new(Code::SceneContradicts, message).with_help(
+                "raise the value in [motion]: it must cover the rotation that the scene prescribes",
+            ));
+        };
     let given = scene.spin.as_ref().map(|spin| (&spin.velocity, spin.axes, "[spin]"));
     let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
     let carried = carried.map(|spin| (&spin.velocity, spin.axes, "[carried.spin]"));
@@ -268,24 +269,24 @@ fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
             None => diagnostic,
         });
     };
-    let leave = Some("leave it out, or give it its size");
+    let leave = Some("remove it, or give it a value");
     let end = scene.run.duration.unwrap_or(f64::INFINITY);
     for load in &scene.loads {
         let place = &load.at;
         if load.force.is_zero_until(end) && load.torque.is_zero_until(end) {
-            tell(format!("the load at {place} is zero all the time"), leave);
+            tell(format!("the load at {place} is zero during the whole run"), leave);
         } else if scene.carried.as_ref().is_some_and(|carried| carried.by == *place) {
             let message = format!(
-                "the load at {place} bends nothing: {place} is carried, and the reaction takes the load"
+                "the load at {place} deforms nothing: {place} is carried, and the reaction takes the load"
             );
-            tell(message, Some("load another place of the body, or let nothing carry this one"));
+            tell(message, Some("move the load to another place, or remove [carried]"));
         }
     }
     let Some(gravity) = &scene.gravity else { return found };
     if *gravity == Vector3::zeros() {
         tell("`gravity` is zero".to_owned(), leave);
     } else if scene.spin.as_ref().is_some_and(|spin| spin.hold) && is_uncoupled(body) {
-        let message = "`gravity` bends nothing: [spin] holds the body at its centre of mass and mean axes, that is by all of its mass";
+        let message = "`gravity` deforms nothing: [spin] holds the body by its centre of mass and mean axes, so that all of its mass is supported";
         tell(message.to_owned(), None);
     }
     found

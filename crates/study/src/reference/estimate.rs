@@ -31,7 +31,7 @@ pub const MOST_LACKING: f64 = 0.5;
 const PART_OF_RESPONSES: f64 = 0.1;
 
 /// Reason given if following the motion would take too many instants.
-const TOO_MUCH: &str = "its motion has too many periods or breaks to follow them all";
+const TOO_MUCH: &str = "its motion has too many periods or breakpoints to follow";
 
 /// Part of the tolerances, as a root of the elastic energy, below which a resonance of a truncated mode is ignored.
 const PART_OF_RESONANCE: f64 = 0.05;
@@ -83,7 +83,7 @@ impl CouplingEffect {
             .filter_map(|(name, error)| Some(format!("{name} {}", percent(error?))))
             .collect();
         let message = format!(
-            "the body is compared with the model under the same coupling: {} rigid. Against the model whose interfaces deform its errors are {}",
+            "the body is compared with the model under the same coupling: {} rigid. Compared with the model whose interfaces deform, its errors are {}",
             match names.as_slice() {
                 [one] => format!("interface {one} is"),
                 all => format!("interfaces {} are", all.join(", ")),
@@ -119,7 +119,7 @@ impl ReferenceError {
         }
         if let Some(reason) = self.unknown {
             let message = format!(
-                "what the body of {} modes that everything is measured against lacks of the model is not known: {reason}",
+                "the error of the reference body of {} modes relative to the model is not known: {reason}",
                 self.modes
             );
             return Some(
@@ -127,7 +127,7 @@ impl ReferenceError {
             );
         }
         let message = format!(
-            "the body of {} modes that everything is measured against lacks {:.0} % of the tolerances itself, most at t = {:.2e}",
+            "the error of the reference body of {} modes relative to the model is itself {:.0} % of the tolerances, largest at t = {:.2e}",
             self.modes,
             100.0 * self.worst,
             self.time
@@ -136,7 +136,7 @@ impl ReferenceError {
         let begins_with_shock = scene.acting().any(|history| history.at(0.0).0.norm() != 0.0);
         Some(match begins_with_shock && !scene.initial.settled {
             true => warning.with_help(
-                "loads that act at time 0 begin with a shock: start with [initial] deformation = \"static\", or with loads that begin at zero",
+                "start with deformation = \"static\" in [initial], or with loads that begin at zero: loads that act at time 0 begin with a shock",
             ),
             false => warning,
         })

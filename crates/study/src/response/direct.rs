@@ -68,7 +68,7 @@ impl<'m> DirectSolver<'m> {
     ) -> Result<Self> {
         let pencil = model.pencil();
         let ordering =
-            || Diagnostic::new(Code::MemoryShort, "the ordering of the equations runs out of memory");
+            || Diagnostic::new(Code::MemoryShort, "the memory does not suffice to order the equations");
         let analysis = Analysis::new(&pencil).ok_or_else(ordering)?;
         let rigid = model.rigid_modes()?;
         let [mut loads, measured] = [loads, measured].map(|columns| model.restrict(columns.clone()));
@@ -103,7 +103,7 @@ impl<'m> DirectSolver<'m> {
                 "solving the equations of all {n} rows at {solves} frequencies takes about {:.1} hours on one processor",
                 seconds / 3600.0
             );
-            let help = "ask for fewer --solves, or say --allow-long";
+            let help = "give fewer --solves, or add --allow-long";
             return Err(Diagnostic::new(Code::WorkLong, message).with_help(help).into());
         }
         Ok(())
@@ -184,7 +184,7 @@ fn damped_columns(u: &Mat<f64>, c: &Mat<f64>) -> Option<(Mat<f64>, Mat<f64>)> {
 
 fn inaccurate(omega: f64, residual: f64) -> flexbody_base::error::Error {
     let message = format!(
-        "the equations of all nodes at {omega:.6e} rad per time are solved with a relative error of {residual:.1e} only"
+        "the equations of all nodes at {omega:.6e} rad per unit of time are solved only with a relative error of {residual:.1e}"
     );
     Diagnostic::new(Code::FactorizationFailed, message).into()
 }

@@ -301,11 +301,11 @@ fn nodal_modes<'m>(
     to: &[Place],
 ) -> Result<NodalModes<'m>> {
     let foreign = |why: &str| {
-        let message = format!("the body was not made of this model: {why}");
+        let message = format!("the body was not made from this model: {why}");
         let help = "give the model that the body was converted from";
         Diagnostic::new(Code::BodyIncomparable, message).with_help(help)
     };
-    let vectors = body.vectors_of(model).ok_or_else(|| foreign("it has other rows"))?;
+    let vectors = body.vectors_of(model).ok_or_else(|| foreign("its matrix rows differ"))?;
     let pencil = model.pencil();
     // Modes of this model have modal mass 1 and modal stiffness lambda.
     let (inertial, elastic) = (pencil.apply_mass(vectors.as_ref()), pencil.apply_stiffness(vectors.as_ref()));

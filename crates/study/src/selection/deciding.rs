@@ -74,7 +74,7 @@ impl<'s> Deciding<'s> {
             Some(band) => {
                 format!("free modes up to {BEYOND_BAND} times the highest frequency of interest, {band}")
             }
-            None => "the scene has neither a duration nor a band: all".to_owned(),
+            None => "all modes, because the scene has neither a duration nor a band".to_owned(),
         }
     }
 
@@ -138,8 +138,8 @@ impl<'s> Deciding<'s> {
         let (choice, trials) = (&mut self.choice, &mut self.trials);
         if let Some(most) = self.demands[0].scene.requirements.multiplications {
             return Ok(match search.within_cost(most, choice, trials)? {
-                true => format!("the most accurate of at most {most} multiplications"),
-                false => format!("no model takes {most} multiplications or fewer: everything is kept"),
+                true => format!("the smallest error with at most {most} multiplications"),
+                false => format!("no model needs {most} multiplications or fewer: everything is kept"),
             });
         }
         search.terms(choice, trials)?;
@@ -149,7 +149,7 @@ impl<'s> Deciding<'s> {
             1 => "the tolerances",
             _ => "the tolerances of every load case",
         };
-        Ok(format!("the fewest whose motion is within {within}"))
+        Ok(format!("the fewest modes whose motion is within {within}"))
     }
 
     /// Measures the chosen model in every scene, and adds warnings about it.

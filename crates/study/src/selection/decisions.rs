@@ -43,7 +43,10 @@ impl Deliberation<'_> {
         let kept = self.choice.groups.has(group);
         if !body.invariants().groups().has(group) {
             let earlier = body.terms().iter().find(|decision| decision.group == group).cloned();
-            return (earlier.unwrap_or_else(|| undecided(group, false, "the body does not hold it")), None);
+            return (
+                earlier.unwrap_or_else(|| undecided(group, false, "the body does not have this group")),
+                None,
+            );
         }
         let basis = if kept { self.last_without(group) } else { self.first_that_passed(group) };
         let (mut decided, ground) = match basis {
@@ -51,13 +54,13 @@ impl Deliberation<'_> {
                 let rotation = &demand_of(trial, self.demands).situation.spin;
                 (decision(group, kept, trial, self.demands, rotation), ground(trial, self.demands))
             }
-            None => (undecided(group, kept, "nothing shows that it may be dropped"), None),
+            None => (undecided(group, kept, "no bound or run shows that it can be dropped"), None),
         };
         let short = self.demands.iter().find_map(|demand| Some((demand, demand.short_of?)));
         if let Some((demand, (reached, allowed))) = short.filter(|_| kept) {
             let of = demand.name.map_or_else(String::new, |name| format!(" of case `{name}`"));
             decided.reason = format!(
-                "{}; the run{of} turns with {reached:.3e} only where the scene allows {allowed:.3e}, so nothing was measured",
+                "{}; the run{of} reaches an angular velocity of only {reached:.3e}, the scene allows {allowed:.3e}, so that no run could decide",
                 decided.reason
             );
         }

@@ -164,7 +164,7 @@ fn turning_of_run(
             [(rate.largest, source.clone()), (rate.rate, source)]
         }
         (None, Some(_)) => {
-            let source = "[carried], which does not turn".to_owned();
+            let source = "[carried], which does not rotate".to_owned();
             [(0.0, source.clone()), (0.0, source)]
         }
         (None, None) => {
@@ -269,14 +269,14 @@ fn given_rotation(
             jerk: f64::INFINITY,
             duration,
         }),
-        _ => Err("its rotation is not given: neither [spin] nor a stiff attachment".to_owned()),
+        _ => Err("its rotation is not given: the scene has neither [spin] nor a stiff attachment".to_owned()),
     }
 }
 
 /// Returns an error with the reason if bounds do not hold for the body and the scene.
 fn refuse_beyond_bounds(body: &FlexBody, scene: &Scene) -> Result<(), String> {
     let reason = if scene.carried.is_some() {
-        "the body is carried: its frame moves its modes"
+        "the body is carried, so that the motion of its frame excites its modes"
     } else if body.invariants().general().is_some() {
         "the mass matrix does not commute with rotations"
     } else if body.inertia_stiffness().is_some() || !body.geometric_stiffness().is_empty() {

@@ -225,7 +225,7 @@ impl TrialRuns<'_> {
     ) -> std::result::Result<OutputErrors, String> {
         let driven = self.situation.driven.as_ref().map_err(String::clone)?;
         let dropped = kept.complement();
-        let softened = || "the spin may take the stiffness of some motion".to_owned();
+        let softened = || "the spin may make the stiffness of some motion zero or negative".to_owned();
         let mut first_order = None;
         // Load of the dropped terms on the error, along the run or at the largest possible motion.
         let (own, residual, defect) = match run {

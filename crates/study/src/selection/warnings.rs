@@ -13,7 +13,7 @@ const NEAR: f64 = 0.1;
 /// Returns the warning that the errors of the selected model grow `growth` times faster than its motion.
 pub(super) fn phase_drifts(growth: f64) -> Diagnostic {
     let message = format!(
-        "errors of the selected model grow {growth:.1} times more than the motion from the first half of the run to the second"
+        "from the first half of the run to the second, the errors of the selected model grow {growth:.1} times more than the motion"
     );
     Diagnostic::new(Code::PhaseDrifts, message)
 }
@@ -46,7 +46,7 @@ pub(super) fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[u
             }
             if let Some(rate) = rates.iter().find(near) {
                 let message = format!(
-                    "mode {} of frequency {:.4e} is dropped, and the load at {} drives it at {:.4e} (oscillations per time)",
+                    "mode {} of frequency {:.4e} is dropped, but the load at {} excites it at {:.4e} (oscillations per unit of time)",
                     j + 1,
                     lambda.sqrt() / TAU,
                     load.at,

@@ -111,7 +111,7 @@ fn warnings(cases: &LoadCases, lacks: &[Vec<ReferenceError>], enough: f64) -> Ve
 /// Part of the remaining tolerances that bodies of the fewest shapes may take. The rest is for dropped terms.
 const SHARE_OF_SHAPES: f64 = 0.9;
 
-const OF_THE_MODEL: &str = "bodies that were made of the model";
+const OF_THE_MODEL: &str = "bodies that were made from the model";
 
 /// Returns schemes that lump the whole mass of `model`. Empty if the mass is lumped already, or if rows without a
 /// position carry mass that belongs to no node.
@@ -259,7 +259,7 @@ impl<'m> Making<'m> {
         let masses = lumping.masses(self.model)?;
         let scheme = masses.scheme().name();
         let no_body = |why: String| {
-            let message = format!("no candidate whose whole mass is lumped by {scheme}: {why}");
+            let message = format!("no candidate has its whole mass lumped by {scheme}: {why}");
             Ok(Err(Diagnostic::new(Code::LumpedWithoutBody, message)))
         };
         if masses.negative() > 0 {

@@ -125,7 +125,7 @@ pub fn trade(
     context: &Context<'_>,
 ) -> Result<Trade> {
     let Some(source) = sources.first() else {
-        return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
+        return Err(Diagnostic::new(Code::Usage, "no candidate can be compared").into());
     };
     let studied = |(at, scene): (usize, &Scene)| {
         let reserved = settings.reserved.get(at).copied().unwrap_or(0.0);

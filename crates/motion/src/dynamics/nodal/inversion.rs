@@ -19,7 +19,7 @@ const MOST_ITERATIONS: usize = 200;
 
 /// Failure for nodes turned so far that their mass is not positive definite.
 const TURNED: Failure =
-    Failure::Rates { reason: "the nodes are turned so far that their mass is not positive definite" };
+    Failure::Rates { reason: "the nodes are rotated so far that their mass matrix is not positive definite" };
 
 /// B'C' at the displacements and its transpose, factored.
 #[derive(Debug, Clone)]

@@ -107,6 +107,6 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
             }
             before = size;
         }
-        Err(lost("what acts on the deformed body leads away from it"))
+        Err(lost("the iteration diverges under the forces on the deformed body"))
     }
 }

@@ -158,10 +158,10 @@ impl Effort {
             return Ok(());
         };
         let message = format!(
-            "--reference nodal: the motion of {} rows over a time of {:.3e} takes about {seconds:.1e} s at the least ({:.1e} entries in a factor), {longest:.0} s are allowed",
+            "--reference nodal: the motion of {} rows over a time of {:.3e} needs at least about {seconds:.1e} s ({:.1e} entries in a factor), {longest:.0} s are allowed",
             self.rows, self.duration, self.entries
         );
-        let help = "take --reference fine, a shorter `duration`, method = \"conserving\" with a longer `step`, or say --allow-long";
+        let help = "use --reference fine, a shorter `duration` or method = \"conserving\" with a longer `step`, or add --allow-long";
         Err(Diagnostic::new(Code::WorkLong, message).with_help(help).into())
     }
 
@@ -180,7 +180,7 @@ impl Effort {
             Way::Implicit { .. } => (2.0, FACTORS * self.entries),
         };
         let needed = DOUBLE * runs * instants * self.rows + factors;
-        let help = "take --reference fine, or simulate a shorter `duration`";
+        let help = "use --reference fine, or simulate a shorter `duration`";
         refuse_beyond(memory, needed, "the motion of all nodes", help)
     }
 

@@ -53,7 +53,7 @@ impl<'m> NodalReference<'m> {
         let stiffened =
             body.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_)));
         if stiffened && scene.run.terms.geometric_stiffness && scene.carried.is_none() {
-            let what = "the equations of all nodes have no geometric stiffness, which the model has";
+            let what = "the model has geometric stiffness, which the equations of all nodes do not support";
             return Err(refused(what));
         }
         for place in scene.loads.iter().map(|load| &load.at).chain(&scene.watched) {
@@ -143,10 +143,10 @@ impl<'m> NodalReference<'m> {
     pub fn warning(&self) -> Option<Diagnostic> {
         let error = self.error.filter(|error| error.is_nan() || *error > WORTH_A_WORD)?;
         let message = format!(
-            "steps of twice the length change the motion of all nodes by {:.0} % of the tolerances",
+            "doubling the step changes the motion of all nodes by {:.0} % of the tolerances",
             100.0 * error
         );
-        let help = "say --allow-long, so that the steps may be halved again, or start loads from zero";
+        let help = "add --allow-long, so that the step may be halved again, or start loads from zero";
         Some(Diagnostic::new(Code::ReferenceLacks, message).with_help(help))
     }
 

@@ -32,7 +32,7 @@ pub(super) struct Staged<'a> {
 /// Returns the error for a scene that the nodal equations do not support.
 pub(super) fn refused(what: impl std::fmt::Display) -> Error {
     let diagnostic = Diagnostic::new(Code::Usage, format!("--reference nodal: {what}"));
-    diagnostic.with_help("take --reference full").into()
+    diagnostic.with_help("use --reference full").into()
 }
 
 /// Returns the error for an integration of `scene` that failed.
@@ -73,8 +73,8 @@ impl<'a> Staged<'a> {
             motion,
         };
         // Initial state: that of the modal motion, or the static deformation of the model.
-        let modes =
-            NodalModes::new(&staged.equations, body).ok_or_else(|| refused("the body has other rows"))?;
+        let modes = NodalModes::new(&staged.equations, body)
+            .ok_or_else(|| refused("the matrix rows of the body and the model differ"))?;
         let mut start = modes.lift(&motion.start);
         if scene.initial.settled {
             let softest = body.modes().eigenvalue[0];
