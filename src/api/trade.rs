@@ -52,7 +52,7 @@ pub struct Trade {
     study: trade::Trade,
     sources: Vec<Source>,
     /// Truncation errors of the reference in each load case.
-    lacks: Vec<Vec<ReferenceError>>,
+    reference_errors: Vec<Vec<ReferenceError>>,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -70,11 +70,11 @@ impl Model {
             let wanted = WantedBodies { modes: options.modes, fine };
             let made = conversions(&self.checked, &scene.0, wanted, context)?;
             let nodal = (options.reference == ReferenceChoice::Nodal).then_some(&self.checked);
-            let reserved = trade::reserved(&made.lacks, nodal.is_some());
+            let reserved = trade::reserved(&made.reference_errors, nodal.is_some());
             let settings = TradeSettings { repeat: options.repeat, reserved: &reserved };
             let study = trade::trade(&made.sources, &scene.0, nodal, &settings, context)?;
             let diagnostics = [made.diagnostics, study.diagnostics.clone()].concat();
-            Ok(Trade { study, sources: made.sources, lacks: made.lacks, diagnostics })
+            Ok(Trade { study, sources: made.sources, reference_errors: made.reference_errors, diagnostics })
         })
     }
 }
@@ -95,7 +95,7 @@ impl FlexBody {
         let settings = TradeSettings { repeat: options.repeat, reserved: &[] };
         let study = heard(listener, |context| trade::trade(&sources, &scene.0, None, &settings, context))?;
         let diagnostics = study.diagnostics.clone();
-        Ok(Trade { study, sources, lacks: Vec::new(), diagnostics })
+        Ok(Trade { study, sources, reference_errors: Vec::new(), diagnostics })
     }
 }
 
@@ -135,13 +135,13 @@ impl Trade {
         let nodal = self.study.reference == ReferenceKind::Nodal;
         let is_reference =
             |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
-        self.recommended().is_some() && (nodal || self.lacks.iter().all(is_reference))
+        self.recommended().is_some() && (nodal || self.reference_errors.iter().all(is_reference))
     }
 
     /// Returns the report of `flexbody trade`.
     pub fn report(&self, format: ReportFormat) -> String {
         let run = report::run(&self.diagnostics);
-        TradeFacts::new(&self.study, &self.lacks, &run).render(format.inner())
+        TradeFacts::new(&self.study, &self.reference_errors, &run).render(format.inner())
     }
 
     /// Returns the table of `flexbody trade --csv`: one line per candidate.

@@ -2,7 +2,7 @@
 
 use super::arguments::{AssembleArguments, ConvertArguments, EngineArguments, JobArguments};
 use super::convert::run_with;
-use super::elsewhere::Elsewhere;
+use super::mode_source::ModeSource;
 use super::outcome::Outcome;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -14,7 +14,7 @@ pub(super) fn run(arguments: &AssembleArguments) -> Result<Outcome> {
     let prepared = read_prepared(&arguments.folder)?;
     let converted = as_conversion(arguments, &prepared)?;
     let (folder, prove) = (arguments.folder.clone(), arguments.prove);
-    run_with(&converted, &Elsewhere::Cluster { folder, prepared: Box::new(prepared), prove })
+    run_with(&converted, &ModeSource::Cluster { folder, prepared: Box::new(prepared), prove })
 }
 
 /// Returns the corresponding arguments of `convert`.

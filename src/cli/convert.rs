@@ -1,8 +1,8 @@
 //! Command `flexbody convert`.
 
 use super::arguments::{ConvertArguments, EngineName};
-use super::elsewhere::Elsewhere;
 use super::import;
+use super::mode_source::ModeSource;
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{BodyOutputs, Reserved, format_of, refuse_replacing, refuse_replacing_read};
@@ -33,20 +33,20 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
         return import::run(arguments, from);
     }
-    let elsewhere = Elsewhere::of(arguments);
-    let outcome = run_with(arguments, &elsewhere)?;
-    elsewhere.tidy();
+    let mode_source = ModeSource::of(arguments);
+    let outcome = run_with(arguments, &mode_source)?;
+    mode_source.tidy();
     Ok(outcome)
 }
 
 /// Runs a conversion whose modes are found by this program or elsewhere.
-pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> Result<Outcome> {
+pub(super) fn run_with(arguments: &ConvertArguments, mode_source: &ModeSource) -> Result<Outcome> {
     refuse_without_modes(arguments)?;
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
     // The command line takes precedence over the manifest.
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
-    let keep_in = elsewhere.keeps_in(&arguments.output);
+    let keep_in = mode_source.keeps_in(&arguments.output);
     let files = ModelFiles { keep_in, ..model_files(arguments)? };
     let read = |path| LoadCases::read(path, arguments.case.as_deref());
     let cases = arguments.scene.as_deref().map(read).transpose()?;
@@ -65,7 +65,8 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     // Check before the work: files that a deck includes or assigns are known now.
     refuse_replacing_read(places.all())?;
     watcher.hear(Event::Phase("checks"));
-    let job = Job { arguments, lumped: &lumped, loads: &loads, formats: &formats, cases, elsewhere, threads };
+    let job =
+        Job { arguments, lumped: &lumped, loads: &loads, formats: &formats, cases, mode_source, threads };
     if !arguments.split {
         let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
         OutputSlot::commit_all(done.slots)?;
@@ -81,13 +82,19 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     for places in &all[1..] {
         slots.push(places.reserve()?);
     }
-    let (mut finished, mut told) = (Vec::<Done>::new(), Vec::<Diagnostic>::new());
+    let (mut finished, mut diagnostics) = (Vec::<Done>::new(), Vec::<Diagnostic>::new());
     for ((checked, places), reserved) in bodies.into_iter().zip(&all).zip(slots) {
         let watcher = if finished.is_empty() { &watcher } else { &self::watcher(arguments, "start") };
         let done = job.convert(checked, places, reserved, watcher)?;
         // Diagnostics of the common matrices are reported once.
-        let new = done.outcome.diagnostics.iter().filter(|d| !told.contains(*d)).cloned().collect::<Vec<_>>();
-        told.extend(new);
+        let new = done
+            .outcome
+            .diagnostics
+            .iter()
+            .filter(|d| !diagnostics.contains(*d))
+            .cloned()
+            .collect::<Vec<_>>();
+        diagnostics.extend(new);
         finished.push(done);
     }
     // No file appears before everything is done.
@@ -97,7 +104,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let texts: Vec<String> = outcomes.iter().map(|outcome| outcome.text.clone()).collect();
     let reports: Vec<&str> = outcomes.iter().map(|outcome| outcome.json.trim_end()).collect();
     let json = format!("{{\n\"bodies\": [\n{}\n]\n}}", reports.join(",\n"));
-    Ok(Outcome { text: texts.join("\n"), json, diagnostics: told, passed: true })
+    Ok(Outcome { text: texts.join("\n"), json, diagnostics, passed: true })
 }
 
 fn watcher(arguments: &ConvertArguments, first: &str) -> Watcher {
@@ -112,7 +119,7 @@ struct Job<'a> {
     formats: &'a [Format],
     /// Load cases of the scene; `None` without a scene.
     cases: Option<&'a LoadCases>,
-    elsewhere: &'a Elsewhere,
+    mode_source: &'a ModeSource,
     threads: usize,
 }
 
@@ -156,7 +163,7 @@ impl Job<'_> {
         let mut settings = self.settings(model, BasisChoice::default());
         let watch = |event: Event<'_>| watcher.hear(event);
         let context = context(arguments.memory_limit, arguments.allow_long, &watch);
-        settings.basis = match self.elsewhere.modes(model, &settings.modes, &context)? {
+        settings.basis = match self.mode_source.modes(model, &settings.modes, &context)? {
             Some(found) => found,
             None => basis(arguments, self.loads, model)?,
         };

@@ -17,6 +17,6 @@ pub(super) fn run(arguments: &RecipeArguments) -> Result<Outcome> {
     let steps = recipe.steps.iter();
     let steps: Vec<_> =
         steps.map(|step| serde_json::json!({ "place": step.place, "lines": step.lines })).collect();
-    let told = serde_json::json!({ "program": recipe.program, "steps": steps, "mind": recipe.mind });
-    Ok(Outcome { text, json: format!("{told:#}"), diagnostics: Vec::new(), passed: true })
+    let json = serde_json::json!({ "program": recipe.program, "steps": steps, "mind": recipe.mind });
+    Ok(Outcome { text, json: format!("{json:#}"), diagnostics: Vec::new(), passed: true })
 }

@@ -34,14 +34,14 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     refuse_replacing(series, arguments.report.iter())?;
     refuse_replacing_read(arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
-    let (body, lacks, mut diagnostics) = if is_model {
+    let (body, reference_errors, mut diagnostics) = if is_model {
         converted(arguments, &cases, &watch)?
     } else {
         refuse_modes(arguments)?;
         let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
         (body, Vec::new(), notes)
     };
-    let selection = select(&body, &lacks, &cases, &context(None, arguments.allow_long, &watch))
+    let selection = select(&body, &reference_errors, &cases, &context(None, arguments.allow_long, &watch))
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(selection.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };

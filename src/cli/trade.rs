@@ -38,7 +38,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     // Created again for each part: the model and the bodies take memory too.
     let limits = || context(None, arguments.allow_long, &watch);
     let mut diagnostics = Vec::new();
-    let (model, sources, lacks) = if is_model {
+    let (model, sources, reference_errors) = if is_model {
         let (_, checked) = read_checked(&arguments.body, &arguments.job, outputs())?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
@@ -46,21 +46,21 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         let made = conversions(&checked.model, &cases, wanted, &limits())
             .map_err(|error| error.in_file(&arguments.scene))?;
         diagnostics.extend(made.diagnostics);
-        (Some(checked.model), made.sources, made.lacks)
+        (Some(checked.model), made.sources, made.reference_errors)
     } else {
         let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
         diagnostics.extend(notes);
         (None, vec![Source::new("file", body, None)?], Vec::new())
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceChoice::Nodal);
-    let reserved = reserved(&lacks, nodal.is_some());
+    let reserved = reserved(&reference_errors, nodal.is_some());
     let settings = TradeSettings { repeat: arguments.repeat.into(), reserved: &reserved };
     let study = trade(&sources, &cases, nodal, &settings, &limits())
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(study.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
-    let facts = TradeFacts::new(&study, &lacks, &run);
+    let facts = TradeFacts::new(&study, &reference_errors, &run);
 
     if let Some(slot) = &table {
         slot.fill(trade_csv(&study).as_bytes())?;
@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     // No file appears before everything is done.
     OutputSlot::commit_all(table.into_iter().chain(reports).chain(bodies))?;
     let holds = |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
-    let is_reference = nodal.is_some() || lacks.iter().all(holds);
+    let is_reference = nodal.is_some() || reference_errors.iter().all(holds);
     let passed = study.recommended.row().is_some() && is_reference;
     let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })

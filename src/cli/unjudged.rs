@@ -20,11 +20,11 @@ pub(super) fn refuse_unjudged(
     if arguments.allow_unjudged {
         return Ok(());
     }
-    let message = match selection.lacks.last().filter(|lacks| !ReferenceError::is_reference(lacks)) {
-        Some(lacks) => format!(
+    let message = match selection.reference_errors.last().filter(|own| !ReferenceError::is_reference(own)) {
+        Some(own) => format!(
             "no file was written: the error of the reference body of {} modes is {:.0} % of the tolerances, more than half, so that the selection cannot be judged",
-            lacks.modes,
-            100.0 * lacks.worst
+            own.modes,
+            100.0 * own.worst
         ),
         None => "no file was written: the selected modes and terms do not meet the tolerances of the scene"
             .to_owned(),

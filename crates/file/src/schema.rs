@@ -4,7 +4,7 @@ use super::draft::node_indices;
 use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, Triangles};
 use super::item::ItemKind::{Floats, Indices, Int, Ints, Text};
 use super::item::Origin::{ConstantInt, ConstantText, Primary};
-use super::item::{Access, Item, ItemKind, Origin, Per, SchemaGroup, Together, both, field, put, written};
+use super::item::{Access, EntrySet, Item, ItemKind, Origin, Per, SchemaGroup, both, field, put, written};
 use super::value::{Stored, Units, Value, indices, json_list, shape_rows, text};
 use certificate::{CERTIFICATE, CERTIFIED, CRAIG_BAMPTON, INVARIANT_DIGITS};
 use flexbody_base::provenance;
@@ -200,9 +200,9 @@ fn both_or_none(entries: &[(String, bool)]) -> String {
     format!("{} and {}: expected both or none, found one", entries[0].0, entries[1].0)
 }
 
-static BODY_NUMBER: Together = Together { problem: both_or_none };
-static INTERNAL_ROWS: Together = Together { problem: both_or_none };
-static INERTIA: Together = Together {
+static BODY_NUMBER: EntrySet = EntrySet { problem: both_or_none };
+static INTERNAL_ROWS: EntrySet = EntrySet { problem: both_or_none };
+static INERTIA: EntrySet = EntrySet {
     problem: |entries| {
         let names: Vec<&str> = entries.iter().map(|(name, _)| name.as_str()).collect();
         format!("{}: expected all or none, found some", names.join(", "))

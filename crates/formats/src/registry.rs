@@ -51,7 +51,7 @@ pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
 /// # Errors
 /// [`Usage`](Code::Usage) for options that the format does not have, or nodes that the body does not have;
 /// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss` is true; the errors of
-/// [`RecordedMotion::staged`](flexbody_file::RecordedMotion::staged) and of [`ExportFormat::write`].
+/// [`RecordedMotion::body_in_frame`](flexbody_file::RecordedMotion::body_in_frame) and of [`ExportFormat::write`].
 pub fn export(
     body: &FlexBody,
     format: &dyn ExportFormat,
@@ -61,7 +61,7 @@ pub fn export(
     check_options(body, format, options)?;
     // A picture of a motion shows the body in the frame of the motion.
     let body = match &options.motion {
-        Some(motion) => Cow::Owned(motion.staged(body)?),
+        Some(motion) => Cow::Owned(motion.body_in_frame(body)?),
         None => Cow::Borrowed(body),
     };
     let body = body.as_ref();

@@ -38,22 +38,22 @@ pub struct BatchRow {
 
 impl BatchRow {
     /// Fills the row from the JSON output of a conversion.
-    pub fn read(&mut self, told: &Value) {
-        let results = &told["results"];
+    pub fn read(&mut self, json: &Value) {
+        let results = &json["results"];
         let frequencies: Vec<f64> = results["modes"]["frequency_hz"]
             .as_array()
             .into_iter()
             .flatten()
             .filter_map(Value::as_f64)
             .collect();
-        self.warnings = told["warnings"].as_u64().unwrap_or(0);
+        self.warnings = json["warnings"].as_u64().unwrap_or(0);
         self.n_dofs = results["model"]["n_dofs"].as_u64();
         self.modes = results["modes"]["count"].as_u64();
         self.frequencies_hz =
             frequencies.first().zip(frequencies.last()).map(|(first, last)| [*first, *last]);
         self.complete = results["completeness"]["sentence"].as_str().map(str::to_owned);
         self.peak_memory_bytes = results["run"]["peak_memory_bytes"].as_u64();
-        let first = told["diagnostics"].as_array().into_iter().flatten().find(|d| d["severity"] == "error");
+        let first = json["diagnostics"].as_array().into_iter().flatten().find(|d| d["severity"] == "error");
         self.error = first.map(|d| {
             let word = |key: &str| d[key].as_str().unwrap_or_default().to_owned();
             format!("{} {}", word("code"), word("message"))

@@ -80,10 +80,14 @@ fn errors(errors: &Errors) -> String {
         return "not compared".to_owned();
     }
     // NaN, an unknown error, is listed too.
-    let told = errors.worst_by_invariant.iter().filter(|n| n.value.is_nan() || n.value > NEGLIGIBLE);
+    let listed_norms = errors.worst_by_invariant.iter().filter(|n| n.value.is_nan() || n.value > NEGLIGIBLE);
     let text = |n: &ErrorNorm| format!("{} {}", n.invariant.replace('_', " "), percent(n.value));
-    let told: Vec<String> = told.map(|n| text(n).replace(' ', KEEP)).collect();
-    if told.is_empty() { "no error above 1e-9".to_owned() } else { format!("errors {}", told.join(", ")) }
+    let listed_norms: Vec<String> = listed_norms.map(|n| text(n).replace(' ', KEEP)).collect();
+    if listed_norms.is_empty() {
+        "no error above 1e-9".to_owned()
+    } else {
+        format!("errors {}", listed_norms.join(", "))
+    }
 }
 
 /// Returns bars with the worst norm of each invariant for each scheme; `None` if there are no errors to draw.

@@ -55,7 +55,7 @@ fn in_short(facts: &Facts<'_>) -> Vec<Term> {
     let modes = &facts.modes;
     let accuracy = facts.run.as_ref().map(|run| run.accuracy.as_str()).filter(|name| !name.is_empty());
     let accuracy = accuracy.map_or(String::new(), |name| format!(", {name} accuracy"));
-    let residual = significant(modes.worst_residual, 2) + modes.whose_residual();
+    let residual = significant(modes.worst_residual, 2) + modes.residual_remark();
     let mut items = vec![
         Term::text("modes", format!("{} flexible, worst residual {residual}{accuracy}", modes.count)),
         Term::text("frequency", first_and_last(&modes.frequency_hz)),
@@ -230,7 +230,7 @@ fn proof(facts: &Facts<'_>) -> Vec<Term> {
         Term::page(word_as("completeness", "Negative pivots"), format!("{count} of K − σM{held} at {shift}"))
     };
     let residual =
-        format!("{} of |Kψ| + |λMψ|{}", significant(modes.worst_residual, 3), modes.whose_residual());
+        format!("{} of |Kψ| + |λMψ|{}", significant(modes.worst_residual, 3), modes.residual_remark());
     let mut items = match &modes.craig_bampton {
         Some(own) => vec![
             Term::page("Coordinates", own.made_of()),

@@ -143,7 +143,7 @@ fn interfaces<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     let (size, unit) = (facts.body.size(), facts.model.units.length());
     let row = |own: &InterfaceFacts| {
         let words = own.in_words(size, &unit);
-        let words = if own.breaks_its_word() { Span::Warning(words) } else { Span::Plain(words) };
+        let words = if own.deforms_although_rigid() { Span::Warning(words) } else { Span::Plain(words) };
         vec![own.name.as_str().into(), words.into()]
     };
     let caption = format!("{}, in the order of the file", counted(interfaces.len(), "interface"));

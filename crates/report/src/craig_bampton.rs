@@ -6,7 +6,7 @@ use flexbody_body::flex_body::{FixedInterface, FlexBody};
 use serde::Serialize;
 
 /// Largest relative error of a frequency that counts as accurate.
-const RIGHT: f64 = 0.01;
+const ACCURATE_FREQUENCY_ERROR: f64 = 0.01;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct CraigBamptonFacts {
@@ -65,7 +65,7 @@ impl CraigBamptonFacts {
             free_lower_hz: fixed.free_lower.iter().map(|l| (*l > 0.0).then(|| hertz(*l))).collect(),
             too_high: (0..nf).map(|j| fixed.excess(j, theta[j])).collect(),
             too_high_at_most: (0..nf).map(|j| fixed.largest_excess(j, theta[j])).collect(),
-            within_one_percent: fixed.holding(theta, RIGHT),
+            within_one_percent: fixed.holding(theta, ACCURATE_FREQUENCY_ERROR),
             rigid_interfaces: body.has_rigid_interfaces(),
         })
     }

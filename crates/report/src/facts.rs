@@ -140,7 +140,7 @@ impl InterfaceFacts {
     }
 
     /// Returns true if the interface deforms although it was declared rigid.
-    pub(crate) fn breaks_its_word(&self) -> bool {
+    pub(crate) fn deforms_although_rigid(&self) -> bool {
         self.coupling == Some(Coupling::Rigid.name()) && self.deformation.is_some_and(|part| part > RIGID)
     }
 
@@ -385,7 +385,7 @@ impl ModeFacts {
     }
 
     /// Returns the kind of modes that the worst residual refers to; empty for all modes.
-    pub(crate) fn whose_residual(&self) -> &'static str {
+    pub(crate) fn residual_remark(&self) -> &'static str {
         if self.craig_bampton.is_some() {
             " of the fixed-interface modes"
         } else if self.provenance.iter().any(|origin| is_static(origin)) {

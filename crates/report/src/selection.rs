@@ -3,8 +3,8 @@
 use super::Format;
 use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
 use super::errors_in_words::{errors_in_words, ranges};
-use super::lacks::{LackFacts, reference_in_words};
 use super::numbers::significant;
+use super::reference_error::{ReferenceErrorFacts, reference_in_words};
 use super::run_data::RunData;
 use super::selection_cases::{CaseFacts, cases_table};
 use super::selection_verdict::SelectionVerdict;
@@ -13,7 +13,7 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{TermDecision, TermGroup};
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
-use flexbody_study::selection::{CaseSelection, Ground, Participation, Selection, Trial};
+use flexbody_study::selection::{CaseSelection, DecisiveError, Participation, Selection, Trial};
 use serde::Serialize;
 
 /// Number of modes that a summary lists.
@@ -36,7 +36,7 @@ pub struct SelectionFacts<'a> {
     multiplications_before: usize,
     /// Errors of the body, and of its versions before enrichment, relative to the model; empty if only a body
     /// file is available.
-    reference: Vec<LackFacts>,
+    reference: Vec<ReferenceErrorFacts>,
     significance: Vec<SignificanceFacts>,
     trials: Vec<TrialFacts<'a>>,
     /// Facts of each load case, if there are several.
@@ -80,9 +80,11 @@ struct ModesFacts<'a> {
 struct ResponseFacts<'a> {
     load: &'a str,
     /// Error of the selected modes relative to the response of the body.
-    selected_lack: f64,
+    #[serde(rename = "selected_lack")]
+    selected_error: f64,
     /// Error of the modes of the body relative to the response of the model.
-    body_lacks: Option<f64>,
+    #[serde(rename = "body_lacks")]
+    body_error: Option<f64>,
     /// Error of the modes of the body without its residual vectors.
     without_residual_vectors: Option<f64>,
 }
@@ -130,8 +132,8 @@ impl<'a> ResponseFacts<'a> {
     fn new(participation: &'a Participation) -> Self {
         Self {
             load: &participation.load,
-            selected_lack: participation.selected,
-            body_lacks: participation.body.map(|(after, _)| after),
+            selected_error: participation.selected,
+            body_error: participation.body.map(|(after, _)| after),
             without_residual_vectors: participation.body.map(|(_, before)| before),
         }
     }
@@ -169,13 +171,13 @@ impl<'a> TrialFacts<'a> {
 impl<'a> SelectionFacts<'a> {
     /// Collects the facts of `selection` and of the run that made it.
     pub fn new(selection: &'a Selection, run: &'a RunData) -> Self {
-        let term = |(decision, ground): (&'a TermDecision, &Option<Ground>)| TermFacts {
+        let term = |(decision, decisive_error): (&'a TermDecision, &Option<DecisiveError>)| TermFacts {
             group: decision.group.name(),
             kept: decision.kept,
             tier: decision.tier,
             bound: decision.bound,
             limit: decision.limit,
-            budget: ground.map_or(1.0, |ground| ground.budget),
+            budget: decisive_error.map_or(1.0, |decisive_error| decisive_error.budget),
             slack: decision.limit / decision.bound,
             reason: &decision.reason,
         };
@@ -206,7 +208,7 @@ impl<'a> SelectionFacts<'a> {
                 .map(|input| InputFacts { name: input.name, value: input.value, source: &input.source })
                 .collect(),
             tolerance: selection.tolerance,
-            terms: selection.terms.iter().zip(&selection.grounds).map(term).collect(),
+            terms: selection.terms.iter().zip(&selection.decisive_errors).map(term).collect(),
             guideline: selection.guideline,
             modes: ModesFacts {
                 of: selection.n_modes,
@@ -217,7 +219,7 @@ impl<'a> SelectionFacts<'a> {
             },
             chosen: selection.chosen.as_ref().map(|trial| TrialFacts::new(trial, &selection.cases)),
             multiplications_before: selection.multiplications,
-            reference: selection.lacks.iter().map(LackFacts::new).collect(),
+            reference: selection.reference_errors.iter().map(ReferenceErrorFacts::new).collect(),
             significance: significance.collect(),
             trials: selection.trials.iter().map(|trial| TrialFacts::new(trial, &selection.cases)).collect(),
             cases: selection.cases.iter().map(CaseFacts::new).collect(),
@@ -377,8 +379,8 @@ impl<'a> SelectionFacts<'a> {
             value.map_or_else(|| "not recorded".to_owned(), |v| significant(100.0 * v, 3))
         };
         let row = |one: &ResponseFacts<'_>| {
-            let lacks = [Some(one.selected_lack), one.body_lacks, one.without_residual_vectors].map(part);
-            std::iter::once(one.load.into()).chain(cells(lacks)).collect()
+            let errors = [Some(one.selected_error), one.body_error, one.without_residual_vectors].map(part);
+            std::iter::once(one.load.into()).chain(cells(errors)).collect()
         };
         let heads = ["Load", "Selected modes, %", "Body, %", "Body without residual vectors, %"];
         let caption = "Errors of static responses, in the norm of K: of the selected modes relative to the body, and of the body relative to the model.";

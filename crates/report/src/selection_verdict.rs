@@ -1,11 +1,11 @@
 //! Verdict of a selection in five lines: request, recommendation, reason, error, savings.
 
 use super::errors_in_words::{error_in_words, errors_in_words, groups_in_words, ranges};
-use super::lacks::LackFacts;
 use super::numbers::{counted, frequency, significant};
+use super::reference_error::ReferenceErrorFacts;
 use flexbody_body::flex_body::TermGroup;
 use flexbody_study::reference::ReferenceError;
-use flexbody_study::selection::{Ground, Selection};
+use flexbody_study::selection::{DecisiveError, Selection};
 use serde::Serialize;
 
 /// The five lines of the verdict.
@@ -110,26 +110,26 @@ fn held_groups(selection: &Selection) -> impl Iterator<Item = TermGroup> {
 
 /// Returns the reasons of the decisions; groups with the same reason and error share a sentence.
 fn why(selection: &Selection) -> String {
-    let mut reasons: Vec<(bool, Option<Ground>, Vec<TermGroup>)> = Vec::new();
-    for (term, ground) in selection.terms.iter().zip(&selection.grounds) {
-        match reasons.iter_mut().find(|one| one.0 == term.kept && one.1 == *ground) {
+    let mut reasons: Vec<(bool, Option<DecisiveError>, Vec<TermGroup>)> = Vec::new();
+    for (term, decisive_error) in selection.terms.iter().zip(&selection.decisive_errors) {
+        match reasons.iter_mut().find(|one| one.0 == term.kept && one.1 == *decisive_error) {
             Some(known) => known.2.push(term.group),
-            None => reasons.push((term.kept, *ground, vec![term.group])),
+            None => reasons.push((term.kept, *decisive_error, vec![term.group])),
         }
     }
     reasons.sort_by_key(|reason| !reason.0);
-    let parts = reasons.iter().map(|(kept, ground, groups)| {
-        let case = in_case(ground.and_then(|ground| ground.case), selection);
-        reason(*kept, *ground, groups) + &case
+    let parts = reasons.iter().map(|(kept, decisive_error, groups)| {
+        let case = in_case(decisive_error.and_then(|decisive_error| decisive_error.case), selection);
+        reason(*kept, *decisive_error, groups) + &case
     });
     parts.collect::<Vec<_>>().join("; ")
 }
 
-fn reason(kept: bool, ground: Option<Ground>, groups: &[TermGroup]) -> String {
+fn reason(kept: bool, decisive_error: Option<DecisiveError>, groups: &[TermGroup]) -> String {
     let names: Vec<String> =
         groups.iter().map(|group| format!("{} ({})", group.name(), meaning(*group))).collect();
     let names = names.join(" and ");
-    let Some(Ground { output, error, tier, .. }) = ground else {
+    let Some(DecisiveError { output, error, tier, .. }) = decisive_error else {
         return if kept {
             format!("keep {names}: no bound or run shows that it can be dropped")
         } else {
@@ -150,13 +150,13 @@ fn reason(kept: bool, ground: Option<Ground>, groups: &[TermGroup]) -> String {
 }
 
 fn error(selection: &Selection) -> String {
-    let own = selection.lacks.last();
-    let lacks = match own {
+    let own = selection.reference_errors.last();
+    let reference_errors = match own {
         Some(own) => {
             let much = if ReferenceError::is_reference(own) { "" } else { ", too much for a reference" };
             format!(
                 "; the body with all its modes differs from the FE model by {} (estimated){much}",
-                LackFacts::new(own).parts()
+                ReferenceErrorFacts::new(own).parts()
             )
         }
         None => String::new(),
@@ -165,9 +165,9 @@ fn error(selection: &Selection) -> String {
         Some(errors) => {
             let case = in_case(selection.chosen.as_ref().and_then(|chosen| chosen.case), selection);
             let worst = if case.is_empty() { "" } else { ", the worst case" };
-            format!("{}, measured over the run{case}{worst}{lacks}", errors_in_words(errors))
+            format!("{}, measured over the run{case}{worst}{reference_errors}", errors_in_words(errors))
         }
-        None => format!("nothing was simulated{lacks}"),
+        None => format!("nothing was simulated{reference_errors}"),
     }
 }
 

@@ -5,8 +5,8 @@ use super::chart::{Axis, Chart, Mark, Panel, Series};
 use super::csv;
 use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
 use super::errors_in_words::{errors_in_words, ranges};
-use super::lacks::{LackFacts, reference_in_words};
 use super::numbers::{TIME_UNITS, bytes, counted, duration, engineering, significant, times};
+use super::reference_error::{ReferenceErrorFacts, reference_in_words};
 use super::run_data::RunData;
 use super::trade_cases::{TradeCaseFacts, case_facts, cases_table};
 use super::trade_nodes::NodalFacts;
@@ -44,7 +44,8 @@ pub struct TradeFacts<'a> {
     nodal: Option<NodalFacts>,
     /// Errors of the body of row 1, and of its versions before enrichment, relative to the model; empty if
     /// only a body file is available. With several load cases those of the case with the largest error.
-    reference_lacks: Vec<LackFacts>,
+    #[serde(rename = "reference_lacks")]
+    reference_errors: Vec<ReferenceErrorFacts>,
     /// Tolerance; with several load cases the smallest of each quantity.
     tolerance: Tolerance,
     allowed_multiplications: Option<usize>,
@@ -121,7 +122,7 @@ struct Seconds {
 impl<'a> MeasuredFacts<'a> {
     fn new(measured: &Measured, cases: &'a [TradeCase]) -> Self {
         let timed = measured.timed.as_ref();
-        let InCase { errors, worst, growth } = *measured.deciding();
+        let InCase { errors, worst, growth } = *measured.decisive_case();
         let case = cases[measured.case].name.as_deref();
         let ratios = measured.by_case.iter().map(|own| own.worst);
         Self {
@@ -210,12 +211,12 @@ impl<'a> RowFacts<'a> {
 }
 
 impl<'a> TradeFacts<'a> {
-    /// Collects the facts of a study and of the run that made it. `lacks` holds the errors of the reference
+    /// Collects the facts of a study and of the run that made it. `reference_errors` holds the errors of the reference
     /// relative to the model for each load case.
-    pub fn new(trade: &'a Trade, lacks: &[Vec<ReferenceError>], run: &'a RunData) -> Self {
+    pub fn new(trade: &'a Trade, reference_errors: &[Vec<ReferenceError>], run: &'a RunData) -> Self {
         let row = |(at, row): (usize, &'a TradeRow)| RowFacts::new(at + 1, row, &trade.cases);
         let rows: Vec<RowFacts<'a>> = trade.rows.iter().enumerate().map(row).collect();
-        let rounds = worst_lacks(lacks);
+        let rounds = worst_reference_errors(reference_errors);
         let mut facts = Self {
             format: "flexbody-trade",
             format_major: 2,
@@ -225,14 +226,14 @@ impl<'a> TradeFacts<'a> {
             body: &trade.body,
             reference: trade.reference,
             nodal: trade.cases[0].nodal.as_ref().map(NodalFacts::new),
-            reference_lacks: rounds.iter().map(LackFacts::new).collect(),
+            reference_errors: rounds.iter().map(ReferenceErrorFacts::new).collect(),
             tolerance: trade.tolerance,
             allowed_multiplications: trade.allowed,
             verdict: Vec::new(),
             recommended: trade.recommended.row().map(|row| row + 1),
             front: trade.front.iter().map(|row| row + 1).collect(),
             rows,
-            cases: case_facts(trade, lacks),
+            cases: case_facts(trade, reference_errors),
             diagnostics: &run.diagnostics,
             threads: run.threads,
             wall_seconds: run.wall_seconds(),
@@ -240,8 +241,8 @@ impl<'a> TradeFacts<'a> {
         };
         let names = facts.names();
         let is_nodal = trade.cases.iter().any(|case| case.nodal.is_some());
-        let lacking = rounds.last().filter(|own| !is_nodal && !own.is_reference());
-        let lines = verdict_lines(trade, &names, &facts.tolerances_in_words(), lacking).into_iter();
+        let reference_error = rounds.last().filter(|own| !is_nodal && !own.is_reference());
+        let lines = verdict_lines(trade, &names, &facts.tolerances_in_words(), reference_error).into_iter();
         facts.verdict = lines.map(|(label, text)| VerdictLine { label, text }).collect();
         facts
     }
@@ -327,7 +328,7 @@ impl<'a> TradeFacts<'a> {
         vec![
             Term::page("Body", self.body),
             reference,
-            Term::new("Whole body", reference_in_words(&self.reference_lacks)),
+            Term::new("Whole body", reference_in_words(&self.reference_errors)),
             Term::page("Tolerances", self.tolerances_in_words()),
             Term::page("Candidates", candidates),
             Term::page("Cost", "multiplications of one evaluation of the equations of motion"),
@@ -413,10 +414,10 @@ impl<'a> TradeFacts<'a> {
 }
 
 /// Returns the errors of the reference in the load case with the largest last error.
-fn worst_lacks(lacks: &[Vec<ReferenceError>]) -> &[ReferenceError] {
+fn worst_reference_errors(reference_errors: &[Vec<ReferenceError>]) -> &[ReferenceError] {
     let last = |rounds: &&Vec<ReferenceError>| rounds.last().map_or(-1.0, |own| own.worst);
     // `max_by` returns the last of equal elements, so that the reversed order selects the first.
-    let worst = lacks.iter().rev().max_by(|a, b| last(a).total_cmp(&last(b)));
+    let worst = reference_errors.iter().rev().max_by(|a, b| last(a).total_cmp(&last(b)));
     worst.map_or(&[], Vec::as_slice)
 }
 

@@ -3,8 +3,8 @@
 
 use super::document::{Table, cells};
 use super::errors_in_words::{errors_in_words, part_in_words};
-use super::lacks::LackFacts;
 use super::numbers::counted;
+use super::reference_error::ReferenceErrorFacts;
 use super::trade_nodes::NodalFacts;
 use flexbody_motion::scene::{OutputErrors, Tolerance};
 use flexbody_study::reference::ReferenceError;
@@ -34,15 +34,19 @@ pub(super) struct TradeCaseFacts<'a> {
     nodal: Option<NodalFacts>,
     /// Errors of the body of row 1, and of its versions before enrichment, relative to the model in this
     /// case.
-    reference_lacks: Vec<LackFacts>,
+    #[serde(rename = "reference_lacks")]
+    reference_errors: Vec<ReferenceErrorFacts>,
 }
 
 /// Returns the load cases of a study; empty for a single scene.
-pub(super) fn case_facts<'a>(trade: &'a Trade, lacks: &[Vec<ReferenceError>]) -> Vec<TradeCaseFacts<'a>> {
+pub(super) fn case_facts<'a>(
+    trade: &'a Trade,
+    reference_errors: &[Vec<ReferenceError>],
+) -> Vec<TradeCaseFacts<'a>> {
     let taken = trade.recommended.row().and_then(|row| trade.rows[row].outcome.as_ref().ok());
     let of = |(at, case): (usize, &'a flexbody_study::trade::TradeCase)| {
         let own: Option<&InCase> = taken.map(|measured| &measured.by_case[at]);
-        let rounds = lacks.get(at).map_or(&[][..], Vec::as_slice);
+        let rounds = reference_errors.get(at).map_or(&[][..], Vec::as_slice);
         Some(TradeCaseFacts {
             name: case.name.as_deref()?,
             tolerance: case.tolerance,
@@ -54,7 +58,7 @@ pub(super) fn case_facts<'a>(trade: &'a Trade, lacks: &[Vec<ReferenceError>]) ->
             ruled_out: case.ruled_out,
             ruled_out_alone: case.ruled_out_alone,
             nodal: case.nodal.as_ref().map(NodalFacts::new),
-            reference_lacks: rounds.iter().map(LackFacts::new).collect(),
+            reference_errors: rounds.iter().map(ReferenceErrorFacts::new).collect(),
         })
     };
     trade.cases.iter().enumerate().filter_map(of).collect()
@@ -104,14 +108,15 @@ pub(super) fn cases_table(cases: &[TradeCaseFacts<'_>], names: &[String]) -> Tab
     ];
     let row = |case: &TradeCaseFacts<'_>| {
         let errors = case.errors.as_ref().map_or_else(|| "not measured".to_owned(), errors_in_words);
-        let lacks = case.reference_lacks.last().map_or_else(|| "not known".to_owned(), LackFacts::parts);
+        let reference_errors =
+            case.reference_errors.last().map_or_else(|| "not known".to_owned(), ReferenceErrorFacts::parts);
         cells([
             case.name.to_owned(),
             errors,
             part_in_words(case.worst),
             case.decides(),
             case.alone(names),
-            lacks,
+            reference_errors,
         ])
     };
     let caption = "The recommended candidate in each load case. A case rules out the cheaper candidates whose errors exceed its tolerances; the candidate recommended for it alone is the cheapest one within them.";

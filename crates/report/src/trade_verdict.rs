@@ -1,19 +1,19 @@
 //! Verdict of a trade study in five lines: request, recommendation, reason, error, savings.
 
 use super::errors_in_words::{errors_in_words, groups_in_words, ranges};
-use super::lacks::LackFacts;
 use super::numbers::{counted, duration, frequency, significant};
+use super::reference_error::ReferenceErrorFacts;
 use flexbody_body::flex_body::Storage;
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{InCase, Measured, Recommendation, Trade, TradeRow};
 
 /// Returns the five lines with their labels. `names` are the names of the rows, `tolerances` the tolerances
-/// of the scene in words, `lacking` the error of a reference that deviates too much from its model.
+/// of the scene in words, `reference_error` the error of a reference that deviates too much from its model.
 pub(super) fn verdict_lines(
     trade: &Trade,
     names: &[String],
     tolerances: &str,
-    lacking: Option<&ReferenceError>,
+    reference_error: Option<&ReferenceError>,
 ) -> Vec<(&'static str, String)> {
     let asked = format!("{}: {}", trade.scene, asked(trade, tolerances));
     let Some(at) = trade.recommended.row() else {
@@ -26,7 +26,7 @@ pub(super) fn verdict_lines(
         ("Asked", asked),
         ("Recommended", recommended(row, has_several_sources(trade))),
         ("Why", why(trade, names, measured)),
-        ("Error", error(trade, measured, lacking)),
+        ("Error", error(trade, measured, reference_error)),
         ("Saves", whole.map_or_else(String::new, |whole| saves(whole, measured))),
     ]
 }
@@ -103,7 +103,7 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
     });
     let Some((at, own)) = cheaper else { return first };
     let case = &trade.cases[own.case];
-    let (output, error, allowed) = own.deciding().errors.decisive(&case.tolerance);
+    let (output, error, allowed) = own.decisive_case().errors.decisive(&case.tolerance);
     let part = error / allowed;
     let times = significant(part, 2);
     let reference = if part <= 1.0 && case.reserved > 0.0 {
@@ -127,8 +127,8 @@ fn in_case(trade: &Trade, measured: &Measured) -> String {
     name.map_or_else(String::new, |name| format!(" in case {name}"))
 }
 
-fn error(trade: &Trade, measured: &Measured, lacking: Option<&ReferenceError>) -> String {
-    let InCase { errors, worst, growth } = measured.deciding();
+fn error(trade: &Trade, measured: &Measured, reference_error: Option<&ReferenceError>) -> String {
+    let InCase { errors, worst, growth } = measured.decisive_case();
     let growth = growth.map_or_else(String::new, |growth| {
         format!(
             "; the error grows with time: from the first to the second half of the run {} times more than the motion",
@@ -137,11 +137,11 @@ fn error(trade: &Trade, measured: &Measured, lacking: Option<&ReferenceError>) -
     });
     let worst = significant(100.0 * worst, 2);
     let case = in_case(trade, measured);
-    let lacking = lacking.map_or_else(String::new, |own| {
-        let parts = LackFacts::new(own).parts();
+    let reference_error = reference_error.map_or_else(String::new, |own| {
+        let parts = ReferenceErrorFacts::new(own).parts();
         format!("; the reference itself differs from the FE model by {parts} (estimated), too much for a reference")
     });
-    format!("{}: {worst} % of the tolerance{case}{growth}{lacking}", errors_in_words(errors))
+    format!("{}: {worst} % of the tolerance{case}{growth}{reference_error}", errors_in_words(errors))
 }
 
 fn saves(whole: &Measured, own: &Measured) -> String {

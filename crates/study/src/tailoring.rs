@@ -1,7 +1,9 @@
 //! Conversion of a body for one scene: it computes only the terms that the scene may need, and keeps only those that it
 //! does need.
 
-use crate::reference::{Enriched, Enrichment, Fewest, MOST_LACKING, MotionBodies, ReferenceError, enrich};
+use crate::reference::{
+    Enriched, Enrichment, FewestShapes, MAX_REFERENCE_ERROR, MotionBodies, ReferenceError, enrich,
+};
 use crate::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -85,7 +87,7 @@ impl Tailoring {
             return Ok(Enriched { made: reference, rounds });
         }
         // The shapes may take what the truncation error of the whole body leaves.
-        let lacks: Vec<f64> = own().map(|own| own.map_or(0.0, |own| own.worst)).collect();
+        let reference_errors: Vec<f64> = own().map(|own| own.map_or(0.0, |own| own.worst)).collect();
         let bodies = MotionBodies::new(model, &reference.body, cases, context)?;
         let make = |bodies: &MotionBodies<'_>, count: usize| -> Result<Conversion> {
             let settings = self.settings_of_shapes(bodies.basis(count));
@@ -93,22 +95,24 @@ impl Tailoring {
             let condensed = condense(&modal)?;
             modal.finish(condensed, context)
         };
-        let most: Vec<f64> = lacks.iter().map(|lacks| MOST_LACKING - lacks).collect();
+        let most: Vec<f64> = reference_errors.iter().map(|error| MAX_REFERENCE_ERROR - error).collect();
         let fewest = bodies
             .as_ref()
             .map(|bodies| bodies.fewest(&most, |count| make(bodies, count), |made| &made.body));
-        if let Some(Fewest { made, errors, worst, .. }) = fewest.transpose()?.flatten() {
+        if let Some(FewestShapes { made, errors, worst, .. }) = fewest.transpose()?.flatten() {
             let modes = made.body.n_modes();
-            let own = errors.into_iter().zip(worst).zip(lacks).map(|((errors, worst), lacks)| {
-                vec![ReferenceError {
-                    modes,
-                    errors,
-                    worst: lacks + worst,
-                    time: 0.0,
-                    unknown: None,
-                    coupling: None,
-                }]
-            });
+            let own = errors.into_iter().zip(worst).zip(reference_errors).map(
+                |((errors, worst), reference_error)| {
+                    vec![ReferenceError {
+                        modes,
+                        errors,
+                        worst: reference_error + worst,
+                        time: 0.0,
+                        unknown: None,
+                        coupling: None,
+                    }]
+                },
+            );
             return Ok(Enriched { rounds: own.collect(), made });
         }
         let message = "with any number of shapes the motion takes more than half of the tolerances, which are needed for dropped terms";

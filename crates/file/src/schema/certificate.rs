@@ -2,17 +2,17 @@
 
 use super::super::item::Item;
 use super::super::item::ItemKind::{Float, Int, Text};
-use super::super::item::{Together, both, field, written};
+use super::super::item::{EntrySet, both, field, written};
 use super::super::value::{Stored, Value};
 use super::{ONE, PER_TIME2, attribute};
 
 /// Entries that accuracy `certified` adds.
-pub(super) static CERTIFIED: Together =
-    Together { problem: |entries| missing(entries, "accuracy `certified`") };
+pub(super) static CERTIFIED: EntrySet =
+    EntrySet { problem: |entries| missing(entries, "accuracy `certified`") };
 
 /// Entries of a Craig-Bampton body.
-pub(super) static CRAIG_BAMPTON: Together =
-    Together { problem: |entries| missing(entries, "a Craig-Bampton body") };
+pub(super) static CRAIG_BAMPTON: EntrySet =
+    EntrySet { problem: |entries| missing(entries, "a Craig-Bampton body") };
 
 /// Returns the message about the first missing entry.
 fn missing(entries: &[(String, bool)], of: &str) -> String {

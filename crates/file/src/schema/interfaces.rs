@@ -3,7 +3,7 @@
 use super::super::item::Extent::{Coordinates, Fixed, InterfaceNodes, Modes};
 use super::super::item::Item;
 use super::super::item::ItemKind::{Floats, Ints, Text};
-use super::super::item::{Together, both, field, put, written};
+use super::super::item::{EntrySet, both, field, put, written};
 use super::named;
 use super::{LENGTH, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, attribute, dataset};
 use crate::value::{Stored, Units, Value, matrix, shape_rows, text};
@@ -100,7 +100,7 @@ pub(super) const INTERFACES: &[Item] = &[
     .derived("shape"),
 ];
 
-static COORDINATES_TOGETHER: Together = Together {
+static COORDINATES_TOGETHER: EntrySet = EntrySet {
     problem: |entries| {
         let count = entries.iter().filter(|(_, there)| *there).count();
         format!(

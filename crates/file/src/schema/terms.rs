@@ -2,7 +2,7 @@
 
 use super::super::item::Item;
 use super::super::item::ItemKind::{Float, Int, Text};
-use super::super::item::{Together, both, put, written};
+use super::super::item::{EntrySet, both, put, written};
 use super::super::value::{Stored, Value, View, text};
 use super::{ONE, attribute};
 use flexbody_body::flex_body::{TermDecision, TermGroup};
@@ -25,7 +25,7 @@ fn number(value: f64) -> Option<Value> {
 }
 
 /// Sets of entries of the decision about each group: reason and tier are required, bounds and limits optional.
-static DECISIONS: [Together; 3] = [const { Together { problem: reason_and_tier } }; 3];
+static DECISIONS: [EntrySet; 3] = [const { EntrySet { problem: reason_and_tier } }; 3];
 
 fn reason_and_tier(entries: &[(String, bool)]) -> String {
     let first = entries.iter().find(|(_, there)| *there).map_or("", |(name, _)| name);

@@ -36,7 +36,7 @@ const FILL_FREQUENCY: f64 = 2.0;
 
 /// Share of the mass that is added to the rest mass, so that the basis is complete even if the modes move all
 /// of the mass.
-const REST_SHARE: f64 = 0.01;
+const REST_MASS_SHARE: f64 = 0.01;
 
 /// Matrices of boundary nodes and internal nodes, six coordinates each.
 pub(super) struct Assembly {
@@ -118,7 +118,7 @@ impl Extended {
         let modal = momentum.subcols(n_boundary, n_modes);
         let of_modes = combine(modal, modal.transpose());
         // Mass that moves in no mode, R'(M_BB - M_Bf M_fB) R, plus a share of the total mass.
-        let rest = (1.0 + REST_SHARE) * total - Matrix3::from_fn(|a, b| of_modes[(a, b)]);
+        let rest = (1.0 + REST_MASS_SHARE) * total - Matrix3::from_fn(|a, b| of_modes[(a, b)]);
         let mut extended = Self {
             n_boundary,
             n_modes,
@@ -148,7 +148,7 @@ impl Extended {
         let of_modes = combine(modal, given.mass.as_ref().submatrix(nb, 0, nf, nb));
         for a in 0..3 {
             for j in 0..nb {
-                let coupling = (1.0 + REST_SHARE) * self.momentum[(a, j)] - of_modes[(a, j)];
+                let coupling = (1.0 + REST_MASS_SHARE) * self.momentum[(a, j)] - of_modes[(a, j)];
                 (mass[(first + a, j)], mass[(j, first + a)]) = (coupling, coupling);
             }
             for b in 0..3 {

@@ -13,7 +13,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// Part of the stiffness of a motion from which the stiffness of inertia is reported. A larger value reports
 /// it for faster motions only.
-const PART: f64 = 0.01;
+const MIN_REPORTED_STIFFNESS: f64 = 0.01;
 
 /// Returns the holding of the restriction to a plane, for a format in space.
 pub(crate) fn plane(body: &FlexBody) -> Holding {
@@ -30,8 +30,8 @@ pub(crate) fn general_w0(body: &FlexBody) -> Holding {
     let bound = CauchySchwarz::of(invariants);
     let nf = body.n_modes();
     // Without the information in M, W0 follows from C1.
-    let (own, told) = (invariants.w0(), invariants.as_solid().w0());
-    let lost = largest(&own, &told, |_, column| bound.c1(column % nf));
+    let (stated, implied) = (invariants.w0(), invariants.as_solid().w0());
+    let lost = largest(&stated, &implied, |_, column| bound.c1(column % nf));
     lost_beyond_rounding(lost, "W0 other than -C1~ (how modes move the coupling of translation and rotation)")
 }
 
@@ -95,8 +95,8 @@ pub(crate) fn inertia_stiffness(
     holds: impl Fn(&UnitLoad) -> bool,
 ) -> Holding {
     const WHAT: &str = "the stiffness of inertia of turning nodes";
-    let Some(own) = body.inertia_stiffness() else { return NotApplicable };
-    let all = own.stiffness.iter().filter(|one| one.matrix.norm_max() > 0.0);
+    let Some(inertia) = body.inertia_stiffness() else { return NotApplicable };
+    let all = inertia.stiffness.iter().filter(|one| one.matrix.norm_max() > 0.0);
     let lost: Vec<&UnitLoad> = all.map(|one| &one.load).filter(|load| !holds(load)).collect();
     if lost.is_empty() {
         return Held;
@@ -107,7 +107,7 @@ pub(crate) fn inertia_stiffness(
             "{WHAT}: at most {percent:.2} % of the stiffness of a motion in the scene `{scene}`"
         ));
     }
-    let Some(rates) = body.inertia_rates(PART) else { return NotApplicable };
+    let Some(rates) = body.inertia_rates(MIN_REPORTED_STIFFNESS) else { return NotApplicable };
     let rates = rates.in_words(body.units(), |kind| lost.iter().any(|load| load.kind == *kind));
     Lost(format!("{WHAT}, which reaches 1 % of the stiffness of a motion at {rates}"))
 }

@@ -190,9 +190,9 @@ impl<'b> DrawnScene<'b> {
             vertices.points.iter().map(one).collect::<Result<Vec<_>>>()
         };
         // Undeformed positions relative to the frame origin, in metres.
-        let told: Vec<[f64; 3]> =
+        let places: Vec<[f64; 3]> =
             positions.iter().map(|x| ((Vector3::from(*x) - self.origin) * self.metres).into()).collect();
-        let position = binary.vertices(&at_vertices(&told)?);
+        let position = binary.vertices(&at_vertices(&places)?);
         // One morph target per mode: displacements at weight one.
         let mut targets = Vec::new();
         for j in 0..self.names.len() {

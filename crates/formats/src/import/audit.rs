@@ -65,8 +65,8 @@ pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
         notes.push("further checks were skipped: they need finite numbers and a positive mass".to_owned());
     } else {
         // For a mass that does not commute with rotations no file states W0, which this identity needs.
-        let told = |check: &IdentityCheck| check.name != "velocity_gram_psd";
-        checks.extend(identities_of_any_body.into_iter().filter(told).map(of_identity));
+        let is_reported = |check: &IdentityCheck| check.name != "velocity_gram_psd";
+        checks.extend(identities_of_any_body.into_iter().filter(is_reported).map(of_identity));
         checks.push(turns(body));
         checks.push(deform(&invariants));
         checks.extend(modal_checks(&invariants));

@@ -55,8 +55,8 @@ pub fn import_body(
 ) -> Result<Imported> {
     refuse_unsound(file)?;
     let given = &file.body;
-    let lacking = |lack: &String| Diagnostic::new(Code::ForeignDropped, lack.clone());
-    let mut diagnostics: Vec<Diagnostic> = given.lacks.iter().map(lacking).collect();
+    let omitted = |omission: &String| Diagnostic::new(Code::ForeignDropped, omission.clone());
+    let mut diagnostics: Vec<Diagnostic> = given.omissions.iter().map(omitted).collect();
     // Mass-normalise the modes and remove rigid motions, unless the modes are kept.
     let mut coordinates = ModalCoordinates::new(given)?;
     if let Some((change, note)) = normalising(&coordinates.invariants)? {

@@ -10,7 +10,7 @@ use flexbody_linalg::larger;
 
 /// Largest relative rounding of a number that is not reported as lost digits. A larger value accepts files
 /// with fewer digits.
-const LOST: f64 = 1e-8;
+const MAX_DIGIT_ROUNDING: f64 = 1e-8;
 
 /// Number of last-digit roundings that an identity may accumulate. A smaller value reports rounding as
 /// contradictions.
@@ -42,7 +42,7 @@ fn digits(records: &Records) -> AuditCheck {
         name: "digits",
         formula: "half a unit of the last digit of numbers of size one",
         value: records.rounding(),
-        limit: LOST,
+        limit: MAX_DIGIT_ROUNDING,
         code: Code::AuditDigits,
         meaning: format!("numbers are written with {}", records.digits.words()),
     }
@@ -111,15 +111,15 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
         meaning: format!("{} of {n} lumped masses are negative", lumped.negative),
     };
     // Differences between the sums over the masses and groups 9 and 12.
-    let (own, sums) = (&read.body.inertia.i6, &lumped.told.i6);
+    let (own, sums) = (&read.body.inertia.i6, &lumped.numbered.i6);
     let size = |j: usize, k: usize| (own[(j, j)] * own[(k, k)]).abs().sqrt();
     let modal = (0..nf)
         .flat_map(|j| (0..nf).map(move |k| (j, k)))
         .map(|(j, k)| relative((own[(j, k)] - sums[(j, k)]).abs(), size(j, k)))
         .fold(0.0, larger);
-    let total = relative((read.body.inertia.i1 - lumped.told.i1).abs(), read.body.inertia.i1.abs());
+    let total = relative((read.body.inertia.i1 - lumped.numbered.i1).abs(), read.body.inertia.i1.abs());
     let tensor =
-        relative((read.body.inertia.i7 - lumped.told.i7).abs().max(), read.body.inertia.i7.abs().max());
+        relative((read.body.inertia.i7 - lumped.numbered.i7).abs().max(), read.body.inertia.i7.abs().max());
     let consistent = AuditCheck {
         name: "lumped_masses_carry_modes",
         formula: "record groups 9 and 12 = sums over the masses of record group 11",

@@ -102,16 +102,16 @@ impl ExportFormat for Mbdyn {
         }
         let places = frames(body, &options.points);
         let mut file = File(head(body));
-        let told = inertia(body);
+        let numbered = inertia(body);
         file.nodes(&places, body.n_modes());
-        file.matrix(9, "MODAL MASS MATRIX", &told.i6);
+        file.matrix(9, "MODAL MASS MATRIX", &numbered.i6);
         file.matrix(10, "MODAL STIFFNESS MATRIX", body.invariants().modal_stiffness());
-        file.rigid(&told);
+        file.rigid(&numbered);
         if losses::is_damped(body) {
             file.matrix(13, "MODAL DAMPING MATRIX", &body.damping());
         }
         if is_exact(options) {
-            file.coupling(&told);
+            file.coupling(&numbered);
             file.stress_stiffness(body, &places);
         }
         file.0.push_str("**\n** END OF FILE\n");
@@ -245,36 +245,37 @@ impl File {
     }
 
     /// Writes mass, centre of mass and the inertia about it.
-    fn rigid(&mut self, told: &Numbered) {
-        let center = told.i2 / told.i1;
-        let steiner = (Matrix3::identity() * center.norm_squared() - center * center.transpose()) * told.i1;
-        let inertia = told.i7 - steiner;
+    fn rigid(&mut self, numbered: &Numbered) {
+        let center = numbered.i2 / numbered.i1;
+        let steiner =
+            (Matrix3::identity() * center.norm_squared() - center * center.transpose()) * numbered.i1;
+        let inertia = numbered.i7 - steiner;
         self.group(12, "GLOBAL INERTIA");
-        self.row([told.i1]);
+        self.row([numbered.i1]);
         self.row(center.iter().copied());
         for i in 0..3 {
             self.row(inertia.row(i).iter().copied());
         }
     }
 
-    fn coupling(&mut self, told: &Numbered) {
-        let nf = told.i8.len();
-        self.matrix(14, "INVARIANT 3", &told.i3);
-        self.matrix(15, "INVARIANT 4", &told.i4);
+    fn coupling(&mut self, numbered: &Numbered) {
+        let nf = numbered.i8.len();
+        self.matrix(14, "INVARIANT 3", &numbered.i3);
+        self.matrix(15, "INVARIANT 4", &numbered.i4);
         self.group(16, "INVARIANT 8");
         for a in 0..3 {
-            self.row(told.i8.iter().flat_map(|i8| i8.row(a).iter().copied().collect::<Vec<_>>()));
+            self.row(numbered.i8.iter().flat_map(|i8| i8.row(a).iter().copied().collect::<Vec<_>>()));
         }
         self.group(17, "INVARIANT 5");
         for a in 0..3 {
             let pairs = (0..nf).flat_map(|j| (0..nf).map(move |k| (j, k)));
-            self.row(pairs.map(|(j, k)| told.i5.as_ref().map_or(0.0, |i5| i5[(a * nf + j, k)])));
+            self.row(pairs.map(|(j, k)| numbered.i5.as_ref().map_or(0.0, |i5| i5[(a * nf + j, k)])));
         }
         self.group(18, "INVARIANT 9");
         for a in 0..3 {
             let columns = (0..nf).flat_map(|j| (0..3 * nf).map(move |column| (j, column / 3, column % 3)));
             let entry = |(j, k, b): (usize, usize, usize)| {
-                told.i9.as_ref().map_or(0.0, |i9| i9[(a * nf + j, b * nf + k)])
+                numbered.i9.as_ref().map_or(0.0, |i9| i9[(a * nf + j, b * nf + k)])
             };
             self.row(columns.map(entry));
         }

@@ -53,11 +53,11 @@ impl ImportFormat for Mbsim {
         let integrals = Integrals::read(&mut arrays, nf)?;
         let damping = arrays.has(DAMPING).then(|| arrays.matrix(DAMPING, nf, nf)).transpose()?;
         let frames = frames(&mut arrays, nf)?;
-        let mut lacks = Vec::new();
+        let mut omissions = Vec::new();
         if arrays.has(STRESSES) {
-            lacks.push(format!("`{STRESSES}`: stresses of the modes are not converted"));
+            omissions.push(format!("`{STRESSES}`: stresses of the modes are not converted"));
         }
-        let mesh = mesh(&mut arrays, frames.len(), &mut lacks)?;
+        let mesh = mesh(&mut arrays, frames.len(), &mut omissions)?;
         let stiffness = arrays.matrix("stiffness matrix", nf, nf)?;
         let inertia = integrals.numbered();
         let mut notes = vec![format!("{} nodes, {nf} modes", frames.len())];
@@ -80,7 +80,7 @@ impl ImportFormat for Mbsim {
                 geometric_stiffness: Vec::new(),
                 frames,
                 mesh,
-                lacks,
+                omissions,
             },
         })
     }
@@ -178,18 +178,18 @@ fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ImportedFrame>> {
 }
 
 /// Returns the surface from lines and faces of OpenMBV: node indices from 0, each line or face ended by -1.
-fn mesh(arrays: &mut Hdf5Arrays, n: usize, lacks: &mut Vec<String>) -> Result<Option<SurfaceMesh>> {
+fn mesh(arrays: &mut Hdf5Arrays, n: usize, omissions: &mut Vec<String>) -> Result<Option<SurfaceMesh>> {
     if !arrays.has(INDICES) {
         return Ok(None);
     }
     let indices = arrays.integers(INDICES)?;
     let polygons: Vec<Vec<i64>> = indices.split(|index| *index == -1).map(<[i64]>::to_vec).collect();
-    Ok(surface(INDICES, &polygons, n, lacks))
+    Ok(surface(INDICES, &polygons, n, omissions))
 }
 
 fn checks(
     integrals: &Integrals,
-    told: &Numbered,
+    numbered: &Numbered,
     stiffness: &Mat<f64>,
     damping: Option<&Mat<f64>>,
 ) -> Vec<AuditCheck> {
@@ -233,7 +233,7 @@ fn checks(
         all.push(check(
             "modal_mass_diagonal",
             "sum of blocks 11, 22 and 33 diagonal where the stiffness matrix is",
-            beside_diagonal(&told.i6),
+            beside_diagonal(&numbered.i6),
             Code::AuditLumped,
             "modes that are orthogonal in stiffness are not orthogonal in mass: the integrals and the modes come from different mass matrices, for example lumped and consistent ones",
         ));

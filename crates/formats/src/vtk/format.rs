@@ -15,7 +15,7 @@ pub(crate) struct Vtk;
 
 /// Largest number of files of a motion, and largest size of all of them in bytes; a longer motion is thinned.
 const MOST_FILES: usize = 250;
-const ROOM: usize = 500_000_000;
+const MAX_BYTES: usize = 500_000_000;
 
 impl ExportFormat for Vtk {
     fn name(&self) -> &'static str {
@@ -119,7 +119,7 @@ fn with_modes(mut grid: Grid, body: &FlexBody, drawn: &Drawn<'_>, modes: usize) 
 fn played<'m>(drawn: &Drawn<'_>, motion: &'m RecordedMotion) -> Played<'m> {
     let (cells, interfaces) = (drawn.triangles().len() + drawn.edges().len(), drawn.interfaces().len());
     let bytes = drawn.len() * (3 * 8 + 3 * 8 + 8 + interfaces) + cells * (3 * 8 + 8 + 1);
-    Played::new(motion, MOST_FILES.min(ROOM / bytes.max(1)))
+    Played::new(motion, MOST_FILES.min(MAX_BYTES / bytes.max(1)))
 }
 
 /// Returns one mesh for each output time, and the list that ParaView opens.

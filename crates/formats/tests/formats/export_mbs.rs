@@ -464,7 +464,7 @@ fn groups_that_a_body_does_without_are_zero_and_the_rest_stays_consistent() {
             let found = read(&bytes, format);
             let wrong: Vec<_> = found.checks.iter().filter(|c| !c.passed()).map(|c| c.name).collect();
             assert!(wrong.is_empty(), "{format} {groups:?}: {wrong:?}");
-            assert_eq!(found.body.lacks.is_empty(), groups.w2, "{format} {groups:?}");
+            assert_eq!(found.body.omissions.is_empty(), groups.w2, "{format} {groups:?}");
             same(
                 reduced.invariants(),
                 &told(&found).with_groups(groups),

@@ -39,7 +39,7 @@ pub trait System {
         _h: f64,
         _modes: &[StageMode],
         _scales: &[f64],
-        _lacks: &mut [Vec<f64>],
+        _residuals: &mut [Vec<f64>],
     ) -> Result<Option<f64>, Failure> {
         Ok(None)
     }

@@ -1,6 +1,6 @@
 //! Largest values of all quantities over a continuous motion.
 
-use super::lively::{LivelyNodes, longest_of_all};
+use super::active_nodes::{ActiveNodes, longest_of_all};
 use super::peak::Peak;
 use crate::dynamics::{Balance, BodyPoint};
 use flexbody_body::flex_body::FlexBody;
@@ -53,10 +53,10 @@ pub struct Drift {
 pub(super) struct Survey<'b> {
     body: &'b FlexBody,
     watched: &'b [BodyPoint],
-    nodes: LivelyNodes,
+    nodes: ActiveNodes,
     /// Deflection among `nodes`, and the time of its largest value.
     deflection: Peak,
-    bulges: Bulges,
+    largest_deformations: LargestDeformations,
     paths: Vec<Peak>,
     amplitudes: Vec<Peak>,
     /// Roots of the energies, which grow like displacements.
@@ -74,9 +74,9 @@ impl<'b> Survey<'b> {
         Self {
             body,
             watched,
-            nodes: LivelyNodes::of_modes(body),
+            nodes: ActiveNodes::of_modes(body),
             deflection: Peak::default(),
-            bulges: Bulges::default(),
+            largest_deformations: LargestDeformations::default(),
             paths: vec![Peak::default(); watched.len()],
             amplitudes: vec![Peak::default(); body.n_modes()],
             elastic: Peak::default(),
@@ -93,7 +93,7 @@ impl<'b> Survey<'b> {
     pub(super) fn see_shape(&mut self, time: f64, q: &[f64], elastic: f64) {
         let deflection = self.nodes.longest(q);
         self.deflection.see(time, deflection);
-        self.bulges.see(time, deflection, q);
+        self.largest_deformations.see(time, deflection, q);
         self.elastic.see(time, elastic.max(0.0).sqrt());
         for (peak, point) in self.paths.iter_mut().zip(self.watched) {
             peak.see(time, point.deflection(q).norm());
@@ -122,7 +122,7 @@ impl<'b> Survey<'b> {
     /// * `size`: mass and radius of gyration of the body.
     /// * `least_energy`: energy below which energies count as rounding.
     pub(super) fn extremes(self, size: (f64, f64), least_energy: f64) -> Extremes {
-        let deflection = self.bulges.largest(self.body, self.deflection.value);
+        let deflection = self.largest_deformations.largest(self.body, self.deflection.value);
         let internal = self.internal.value.powi(2);
         Extremes {
             deflection,
@@ -169,7 +169,7 @@ const KEPT: usize = 16;
 /// Deformations with the largest deflections among the nodes that the modes move most. Another node may
 /// deflect more then, or at another of these times.
 #[derive(Debug, Clone, Default)]
-struct Bulges {
+struct LargestDeformations {
     /// Time, deflection and modal coordinates; the largest deflection first.
     kept: Vec<(f64, f64, Vec<f64>)>,
     /// Last deformation.
@@ -178,7 +178,7 @@ struct Bulges {
     grows: bool,
 }
 
-impl Bulges {
+impl LargestDeformations {
     fn see(&mut self, time: f64, deflection: f64, q: &[f64]) {
         if deflection < self.last.1 {
             self.keep_last();

@@ -8,7 +8,7 @@ use super::{Scene, Scheme};
 use crate::dynamics::{
     BodyPoint, Configuration, EquationsOfMotion, Motion, Orientation, RotationVector, Surroundings,
 };
-use crate::integration::{Explicit, Failure, Gauss, Method, Sight, System, Work, integrate_closely};
+use crate::integration::{Explicit, Failure, Gauss, Method, ObserverEvent, System, Work, integrate_closely};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::FlexBody;
@@ -92,20 +92,20 @@ impl<'a> Prepared<'a> {
     pub(super) fn survey(
         &self,
         survey: &mut Survey<'_>,
-        sight: Sight,
+        event: ObserverEvent,
         time: f64,
         state: &[f64],
         motion: &mut Motion<'_>,
     ) -> std::result::Result<Option<Reaction>, Failure> {
         let (_, q) = motion.shape(state);
         survey.see_shape(time, q, self.equations.elastic_energy(q));
-        if sight == Sight::Within && !self.scene.prescribes() {
+        if event == ObserverEvent::Within && !self.scene.prescribes() {
             return Ok(None);
         }
         let now = motion.evaluate(time, state)?;
         let reaction = now.reaction();
         survey.see_reaction(time, &reaction);
-        if sight != Sight::Within {
+        if event != ObserverEvent::Within {
             survey.see_balance(time, &now.balance(), &now.configuration().omega);
         }
         Ok(self.scene.prescribes().then_some(reaction))
@@ -121,7 +121,7 @@ impl<'a> Prepared<'a> {
         &self,
         instants: &[f64],
         parts: usize,
-        mut show: impl FnMut(Sight, f64, &[f64], &mut Motion<'_>) -> std::result::Result<(), E>,
+        mut show: impl FnMut(ObserverEvent, f64, &[f64], &mut Motion<'_>) -> std::result::Result<(), E>,
     ) -> Result<Finished> {
         let (mut motion, mut state) = Motion::new(&self.equations, &self.forces, &self.start);
         let mut observer = Motion::new(&self.equations, &self.forces, &self.start).0;
@@ -136,11 +136,11 @@ impl<'a> Prepared<'a> {
             },
         };
         let mut steps = 0;
-        let observe = |sight: Sight, time: f64, state: &[f64]| {
-            steps += u64::from(sight == Sight::End);
+        let observe = |event: ObserverEvent, time: f64, state: &[f64]| {
+            steps += u64::from(event == ObserverEvent::End);
             match steps > self.scene.run.most_steps {
                 true => Err(Stop::Steps { time }),
-                false => show(sight, time, state, &mut observer).map_err(Into::into),
+                false => show(event, time, state, &mut observer).map_err(Into::into),
             }
         };
         let breaks = self.scene.breaks();

@@ -14,7 +14,7 @@ use std::ops::Range;
 pub(super) const ATTITUDE: &[&str] = &["file", "time", "columns", "time_scale", "time_zero"];
 
 /// Keys of the three ways to give a rotation.
-const WAYS: [&str; 3] = ["rate", "angular_velocity_from", "attitude_from"];
+const ROTATION_KEYS: [&str; 3] = ["rate", "angular_velocity_from", "attitude_from"];
 
 /// Largest deviation of the length of Euler parameters from one: the rounding of two decimals.
 const LENGTH: f64 = 0.01;
@@ -42,7 +42,7 @@ pub(super) fn turning(
     span: Range<usize>,
     place: &str,
 ) -> Option<Turning> {
-    let given: Vec<&str> = WAYS.into_iter().filter(|key| table.contains_key(*key)).collect();
+    let given: Vec<&str> = ROTATION_KEYS.into_iter().filter(|key| table.contains_key(*key)).collect();
     let ways = "`rate`, `angular_velocity_from` and `attitude_from`";
     let &[way] = &given[..] else {
         let message = match given.is_empty() {

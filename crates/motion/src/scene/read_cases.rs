@@ -152,17 +152,17 @@ fn joined<'t>(name: &str, common: &Value<'t>, case: &Value<'t>) -> Value<'t> {
 /// Returns findings about common keys once, and all others with the name of their case.
 fn each_once(found: Vec<Vec<Diagnostic>>, names: &[String]) -> Vec<Diagnostic> {
     let is_common = |one: &Diagnostic| found.iter().all(|own| own.contains(one));
-    let mut told = Vec::new();
+    let mut distinct = Vec::new();
     for (at, (own, name)) in found.iter().zip(names).enumerate() {
         for one in own {
             match is_common(one) {
-                true if at == 0 => told.push(one.clone()),
+                true if at == 0 => distinct.push(one.clone()),
                 true => {}
-                false => told.push(one.clone().about(format!("case `{name}`"))),
+                false => distinct.push(one.clone().about(format!("case `{name}`"))),
             }
         }
     }
-    told
+    distinct
 }
 
 /// Adds a diagnostic if only some cases have a duration: a body is chosen by motion or by ranges, not by

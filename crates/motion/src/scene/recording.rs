@@ -39,7 +39,7 @@ pub struct Recording {
 
 /// Frame of a recording, and the conditions that the body is exposed to.
 ///
-/// The frame of a recording is that of the scene ([`Stage`](super::Stage)). Its axes are those of the model
+/// The frame of a recording is that of the scene ([`FramedScene`](super::FramedScene)). Its axes are those of the model
 /// and turn with the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
@@ -91,11 +91,11 @@ pub struct Resolution {
 impl Resolution {
     /// Default of the smallest deflection, relative to the largest extent of the body: 10 micrometres per
     /// metre.
-    const LEAST: f64 = 1e-5;
+    const SMALLEST_DEFLECTION: f64 = 1e-5;
 
     /// Creates the resolution for `body`; `least` is the smallest deflection, if given.
     pub fn new(body: &FlexBody, least: Option<f64>) -> Self {
-        let deflection = least.unwrap_or(Self::LEAST * body.extent());
+        let deflection = least.unwrap_or(Self::SMALLEST_DEFLECTION * body.extent());
         let modes = &body.modes().eigenvalue;
         let root_energy =
             |(j, lambda): (usize, &f64)| (0.5 * lambda).sqrt() * deflection / body.largest_displacement(j);

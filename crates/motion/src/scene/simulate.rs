@@ -3,9 +3,9 @@
 use super::conditions::MeanAxes;
 use super::extremes::Survey;
 use super::prepared::{PARTS, Prepared, damped};
-use super::{Extremes, Path, Recording, Scene, Setting, Stage};
+use super::{Extremes, FramedScene, Path, Recording, Scene, Setting};
 use crate::dynamics::{BodyPoint, Evaluation, Motion};
-use crate::integration::{Failure, Sight, Work};
+use crate::integration::{Failure, ObserverEvent, Work};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
@@ -40,19 +40,19 @@ pub fn simulate(
     scene: &Scene,
     context: &Context<'_>,
 ) -> Result<(Recording, Vec<Diagnostic>)> {
-    let stage = Stage::new(body, scene)?;
-    let body = &*damped(&stage.body, &stage.scene)?;
-    let scene = &*stage.scene;
+    let framed = FramedScene::new(body, scene)?;
+    let body = &*damped(&framed.body, &framed.scene)?;
+    let scene = &*framed.scene;
     let run = Prepared::new(body, scene)?;
     refuse_too_much(body, scene, context)?;
     let outputs = scene.run.outputs;
     let time: Vec<f64> = (0..=outputs).map(|i| run.duration * (i as f64 / outputs as f64)).collect();
     let mut recorder = Recorder::new(body, scene, &run, time.len());
     let mut survey = Survey::new(body, &run.watched);
-    let record = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
-        if sight != Sight::Instant {
+    let record = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
+        if event != ObserverEvent::Instant {
             context.fraction(time / run.duration);
-            return run.survey(&mut survey, sight, time, state, motion).map(|_| ());
+            return run.survey(&mut survey, event, time, state, motion).map(|_| ());
         }
         recorder.record(time, state, motion)
     };
@@ -60,7 +60,7 @@ pub fn simulate(
     let mut recording = recorder.recording;
     recording.work = finished.work;
     recording.extremes = survey.extremes(finished.size, finished.least_energy);
-    let found = [stage.found, remarks(body, scene, &recording.extremes)].concat();
+    let found = [framed.found, remarks(body, scene, &recording.extremes)].concat();
     Ok((recording, found))
 }
 

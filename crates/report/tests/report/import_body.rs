@@ -52,7 +52,7 @@ fn file_with(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Impo
             modal_damping: body.modes().modal_damping.clone(),
             geometric_stiffness: body.geometric_stiffness().to_vec(),
             frames: (0..body.n_nodes()).map(frame).collect(),
-            lacks: Vec::new(),
+            omissions: Vec::new(),
         },
     }
 }
@@ -325,7 +325,7 @@ fn groups_that_a_file_lacks_are_dropped_and_named() {
     let (_, body) = block(3);
     let mut without = file_with(&body, &body.modes().shape, body.invariants());
     without.body.inertia.i9 = None;
-    without.body.lacks = vec!["inertia that is quadratic in the modes".to_owned()];
+    without.body.omissions = vec!["inertia that is quadratic in the modes".to_owned()];
     let Imported { body: taken, diagnostics } = imported(&without).expect("a body");
     assert_eq!(diagnostics[0].code(), Code::ForeignDropped);
     let (w1, w2, w3) = (taken.invariants().w1(), taken.invariants().w2(), taken.invariants().w3());

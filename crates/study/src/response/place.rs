@@ -126,10 +126,10 @@ impl Place {
         let directions = self.directions_of(d);
         for direction in &directions {
             if direction.column(d).is_none() {
-                return Err(self.lacks(*direction, "the body lies in a plane"));
+                return Err(self.without_direction(*direction, "the body lies in a plane"));
             }
             if direction.turns() && rotation.is_none() {
-                return Err(self.lacks(*direction, "its nodes do not determine a rotation"));
+                return Err(self.without_direction(*direction, "its nodes do not determine a rotation"));
             }
         }
         let modal = Mat::from_fn(nf, directions.len(), |j, at| {
@@ -197,13 +197,14 @@ impl Place {
         for direction in self.directions_of(d) {
             let column = direction.column(d).filter(|&column| column < all.ncols());
             let load = column.map(|column| all.as_ref().col(column)).filter(|load| load.norm_max() > 0.0);
-            let load = load.ok_or_else(|| self.lacks(direction, "its nodes do not determine a rotation"))?;
+            let load = load
+                .ok_or_else(|| self.without_direction(direction, "its nodes do not determine a rotation"))?;
             columns.resize_with(all.nrows(), columns.ncols() + 1, |i, _| load[i]);
         }
         Ok(columns)
     }
 
-    fn lacks(&self, direction: Direction, why: &str) -> flexbody_base::error::Error {
+    fn without_direction(&self, direction: Direction, why: &str) -> flexbody_base::error::Error {
         let message = format!("{} has no direction {}: {why}", self.point, direction.name());
         Diagnostic::new(Code::PlaceUnknown, message).with_help("leave the direction out").into()
     }

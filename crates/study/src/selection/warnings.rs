@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 /// Relative distance from a mode's frequency within which a load is resonant. Three half widths of the resonance count
 /// if these are larger.
-const NEAR: f64 = 0.1;
+const RESONANCE_DISTANCE: f64 = 0.1;
 
 /// Returns the warning that the errors of the selected model grow `growth` times faster than its motion.
 pub(super) fn phase_drifts(growth: f64) -> Diagnostic {
@@ -38,7 +38,7 @@ pub(super) fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[u
             let moved =
                 modal.column(j).norm() * load.force.main_direction().map_or(0.0, |along| along.norm());
             let near = |rate: &&f64| {
-                let width = NEAR.max(3.0 * body.modes().damping_ratio[j]);
+                let width = RESONANCE_DISTANCE.max(3.0 * body.modes().damping_ratio[j]);
                 (*rate / lambda.sqrt() - 1.0).abs() < width
             };
             if moved == 0.0 || modes.binary_search(&j).is_ok() {

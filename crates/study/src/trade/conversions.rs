@@ -22,7 +22,7 @@ pub struct Conversions {
     pub sources: Vec<Source>,
     /// Truncation errors of the reference and of its versions before enrichment, in each load case; the last belongs to
     /// the reference.
-    pub lacks: Vec<Vec<ReferenceError>>,
+    pub reference_errors: Vec<Vec<ReferenceError>>,
     /// Diagnostics about the reference.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -52,27 +52,31 @@ pub fn conversions(
     wanted: WantedBodies,
     context: &Context<'_>,
 ) -> Result<Conversions> {
-    let making = Making::new(model, context);
+    let conversion = ConversionContext::new(model, context);
     let WantedBodies { modes, fine } = wanted;
     // Reference body, enriched for the load cases.
-    let finest =
-        Wish { count: modes.saturating_mul(2), residual: true, accuracy: Accuracy::Standard, lumped: None };
+    let finest = BodySettings {
+        count: modes.saturating_mul(2),
+        residual: true,
+        accuracy: Accuracy::Standard,
+        lumped: None,
+    };
     let mut responses = Mat::new();
     let make = |loads: &Mat<f64>| {
         responses.clone_from(loads);
-        making.make(&finest, loads, ConvertSettings::default().lumped)
+        conversion.make(&finest, loads, ConvertSettings::default().lumped)
     };
     let enrichment = Enrichment { grows: true, is_fine: fine };
     let enriched = enrich(model, cases, enrichment, context, make, |(made, _)| made.body())?;
-    let Enriched { made: (reference, mut diagnostics), rounds: lacks } = enriched;
-    diagnostics.extend(warnings(cases, &lacks, enrichment.enough()));
+    let Enriched { made: (reference, mut diagnostics), rounds: reference_errors } = enriched;
+    diagnostics.extend(warnings(cases, &reference_errors, enrichment.enough()));
     let mut sources = vec![reference];
     // Bodies with fewer modes or other accuracy.
-    for wish in wishes(modes) {
-        let source = match making.make(&wish, &Mat::new(), Vec::new()) {
+    for settings in all_settings(modes) {
+        let source = match conversion.make(&settings, &Mat::new(), Vec::new()) {
             Ok((source, _)) => source,
             Err(error)
-                if wish.accuracy == Accuracy::Certified && error.first_error().code() == Code::Usage =>
+                if settings.accuracy == Accuracy::Certified && error.first_error().code() == Code::Usage =>
             {
                 continue;
             }
@@ -82,22 +86,22 @@ pub fn conversions(
         sources.push(beside.expect(OF_THE_MODEL));
     }
     // Bodies of shapes of the motion, and bodies of a lumped mass.
-    let lacking = |rounds: &Vec<ReferenceError>| rounds.last().map_or(0.0, |own| own.worst);
-    let left: Vec<f64> = lacks.iter().map(|rounds| 1.0 - lacking(rounds)).collect();
-    for source in making.make_of_motion(&sources[0], cases, &left)? {
+    let reference_error = |rounds: &Vec<ReferenceError>| rounds.last().map_or(0.0, |own| own.worst);
+    let left: Vec<f64> = reference_errors.iter().map(|rounds| 1.0 - reference_error(rounds)).collect();
+    for source in conversion.make_of_motion(&sources[0], cases, &left)? {
         sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL));
     }
     for lumping in lumpings(model) {
-        match making.make_lumped(&finest, &responses, &lumping)? {
+        match conversion.make_lumped(&finest, &responses, &lumping)? {
             Ok(source) => sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL)),
             Err(reason) => diagnostics.push(reason),
         }
     }
-    Ok(Conversions { sources, lacks, diagnostics })
+    Ok(Conversions { sources, reference_errors, diagnostics })
 }
 
 /// Returns warnings about the truncation error of the reference, each with its load case if there are several.
-fn warnings(cases: &LoadCases, lacks: &[Vec<ReferenceError>], enough: f64) -> Vec<Diagnostic> {
+fn warnings(cases: &LoadCases, reference_errors: &[Vec<ReferenceError>], enough: f64) -> Vec<Diagnostic> {
     let of = |(at, rounds): (usize, &Vec<ReferenceError>)| {
         let warning = rounds.last()?.warning(&cases[at], enough)?;
         Some(match cases.case_name(at) {
@@ -105,11 +109,11 @@ fn warnings(cases: &LoadCases, lacks: &[Vec<ReferenceError>], enough: f64) -> Ve
             None => warning,
         })
     };
-    lacks.iter().enumerate().filter_map(of).collect()
+    reference_errors.iter().enumerate().filter_map(of).collect()
 }
 
 /// Part of the remaining tolerances that bodies of the fewest shapes may take. The rest is for dropped terms.
-const SHARE_OF_SHAPES: f64 = 0.9;
+const PART_OF_SHAPES: f64 = 0.9;
 
 const OF_THE_MODEL: &str = "bodies that were made from the model";
 
@@ -124,7 +128,7 @@ fn lumpings(model: &FeModel) -> Vec<Lumping> {
 
 /// Settings of a body of the study.
 #[derive(Clone, PartialEq)]
-struct Wish {
+struct BodySettings {
     /// Number of free modes.
     count: usize,
     /// True if the body has residual vectors.
@@ -134,7 +138,7 @@ struct Wish {
     lumped: Option<&'static str>,
 }
 
-impl Wish {
+impl BodySettings {
     fn in_words(&self) -> String {
         let mut name = format!("{} free mode{}", self.count, if self.count == 1 { "" } else { "s" });
         if self.residual {
@@ -151,30 +155,30 @@ impl Wish {
 }
 
 /// Returns the settings of the bodies other than the reference, without duplicates.
-fn wishes(modes: usize) -> Vec<Wish> {
-    let other = |accuracy| Wish { count: modes, residual: false, accuracy, lumped: None };
-    let mut wishes = vec![other(Accuracy::Fast), other(Accuracy::Certified)];
+fn all_settings(modes: usize) -> Vec<BodySettings> {
+    let other = |accuracy| BodySettings { count: modes, residual: false, accuracy, lumped: None };
+    let mut all = vec![other(Accuracy::Fast), other(Accuracy::Certified)];
     for part in [1, 2, 4] {
         let count = (modes / part).max(1);
         for residual in [true, false] {
-            let wish = Wish { count, residual, accuracy: Accuracy::Standard, lumped: None };
-            if !wishes.contains(&wish) {
-                wishes.push(wish);
+            let settings = BodySettings { count, residual, accuracy: Accuracy::Standard, lumped: None };
+            if !all.contains(&settings) {
+                all.push(settings);
             }
         }
     }
-    wishes
+    all
 }
 
 /// Common data of all conversions of a study.
-struct Making<'m> {
+struct ConversionContext<'m> {
     model: &'m FeModel,
     /// Loads of the residual vectors.
     loads: Vec<Loads>,
     context: Context<'m>,
 }
 
-impl<'m> Making<'m> {
+impl<'m> ConversionContext<'m> {
     fn new(model: &'m FeModel, context: &Context<'m>) -> Self {
         let mut loads = vec![Loads::Centrifugal];
         if !model.interfaces().is_empty() {
@@ -195,15 +199,15 @@ impl<'m> Making<'m> {
     /// Converts the model, with the static responses to `motion` in the basis, and measures the time.
     fn make(
         &self,
-        wish: &Wish,
+        body: &BodySettings,
         motion: &Mat<f64>,
         lumped: Vec<Lumping>,
     ) -> Result<(Source, Vec<Diagnostic>)> {
-        let residual_vectors = if wish.residual { self.loads.clone() } else { Vec::new() };
+        let residual_vectors = if body.residual { self.loads.clone() } else { Vec::new() };
         let basis = BasisChoice::Free(FreeSurface { residual_vectors });
-        let own = self.settings(wish.count);
+        let own = self.settings(body.count);
         let settings = ConvertSettings {
-            modes: ModeSettings { accuracy: wish.accuracy, ..own.modes },
+            modes: ModeSettings { accuracy: body.accuracy, ..own.modes },
             basis: basis.with_motion(motion).expect("free modes take responses"),
             lumped,
             ..own
@@ -211,7 +215,7 @@ impl<'m> Making<'m> {
         let start = Instant::now();
         let conversion = convert(self.model, &settings, &self.context)?;
         let seconds = start.elapsed().as_secs_f64();
-        Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
+        Ok((Source::new(body.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
     }
 
     /// Makes bodies of shapes of the motion of `reference` in `cases`: for all candidate numbers of shapes, and for the
@@ -233,7 +237,7 @@ impl<'m> Making<'m> {
         };
         let mut counts = bodies.counts();
         counts.iter().try_for_each(|count| make(*count).map(drop))?;
-        let most: Vec<f64> = left.iter().map(|left| SHARE_OF_SHAPES * left).collect();
+        let most: Vec<f64> = left.iter().map(|left| PART_OF_SHAPES * left).collect();
         let fewest = bodies.fewest(&most, make, Source::body)?;
         counts.extend(fewest.map(|own| own.count));
         Ok(made.into_iter().filter(|(count, _)| counts.contains(count)).map(|(_, own)| own).collect())
@@ -252,7 +256,7 @@ impl<'m> Making<'m> {
     /// body.
     fn make_lumped(
         &self,
-        wish: &Wish,
+        settings: &BodySettings,
         motion: &Mat<f64>,
         lumping: &Lumping,
     ) -> Result<std::result::Result<Source, Diagnostic>> {
@@ -266,8 +270,8 @@ impl<'m> Making<'m> {
             return no_body(format!("{} nodal masses are negative", masses.negative()));
         }
         let lumped = self.model.with_nodal_masses(masses.masses());
-        let name = Wish { lumped: Some(scheme), ..wish.clone() };
-        let own = Making { model: &lumped, loads: self.loads.clone(), ..*self };
+        let name = BodySettings { lumped: Some(scheme), ..settings.clone() };
+        let own = ConversionContext { model: &lumped, loads: self.loads.clone(), ..*self };
         match own.make(&name, motion, Vec::new()) {
             Ok((source, _)) => Ok(Ok(source.of_lumped_mass(scheme))),
             Err(error) => no_body(error.first_error().message().to_owned()),

@@ -5,7 +5,7 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, LumpedBody, MassStructure};
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::Configuration;
-use flexbody_motion::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Scene, Stage, Trace};
+use flexbody_motion::scene::{ErrorHistory, FramedScene, Measure, ModeStart, OtherModes, Scene, Trace};
 use nalgebra::DVector;
 
 /// Body, and the coupling of its modes to those of the reference.
@@ -52,12 +52,12 @@ impl Source {
     /// Returns the source with its bodies in the frame of a scene.
     ///
     /// # Errors
-    /// The errors of [`Stage::new`].
-    pub(super) fn staged(&self, scene: &Scene) -> Result<Self> {
+    /// The errors of [`FramedScene::new`].
+    pub(super) fn in_frame_of(&self, scene: &Scene) -> Result<Self> {
         let mut parts = self.body.clone().into_parts();
         parts.lumped = self.lumped.clone();
         let whole = FlexBody::new(parts)?;
-        let mut parts = Stage::new(&whole, scene)?.body.into_owned().into_parts();
+        let mut parts = FramedScene::new(&whole, scene)?.body.into_owned().into_parts();
         let lumped = std::mem::take(&mut parts.lumped);
         Ok(Self { body: FlexBody::new(parts)?, lumped, ..self.clone() })
     }

@@ -6,7 +6,7 @@ use super::{
     Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Source, Timed,
     TradeRow, TradeSettings, front,
 };
-use crate::selection::liveliest_modes;
+use crate::selection::most_excited_modes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::{FlexBody, Storage, TermGroups};
@@ -226,18 +226,18 @@ impl Job<'_> {
             measured.map_or(f64::INFINITY, Measured::worst)
         };
         let motions = self.cases.iter().map(|case| (case.sources[0].body(), &case.scene, &case.motion));
-        let liveliest = liveliest_modes(&motions.collect::<Vec<_>>())?;
-        let some_modes = ladder(self.sources(), &liveliest, carried, worst_of);
+        let most_excited = most_excited_modes(&motions.collect::<Vec<_>>())?;
+        let some_modes = ladder(self.sources(), &most_excited, carried, worst_of);
         rows.extend(self.errors(some_modes, "errors of fewer modes", context)?);
         // Refine the number of modes near the tolerance, then measure times.
-        self.refine(&liveliest, &mut rows)?;
+        self.refine(&most_excited, &mut rows)?;
         self.time_what_is_worth_it(&mut rows, repeat, context)?;
         Ok(rows)
     }
 
     /// Bisects the number of modes between the cheapest candidate that holds and the largest smaller one that does not,
     /// as a selection does.
-    fn refine(&self, liveliest: &[usize], rows: &mut Vec<TradeRow>) -> Result<()> {
+    fn refine(&self, most_excited: &[usize], rows: &mut Vec<TradeRow>) -> Result<()> {
         if self.allowed.is_some() {
             return Ok(());
         }
@@ -251,9 +251,9 @@ impl Job<'_> {
         let Some((_, best)) = enough.min_by_key(|own| own.0) else { return Ok(()) };
         let best = best.clone();
         let count = best.modes.len();
-        let lowest: Vec<usize> = (0..liveliest.len()).collect();
+        let lowest: Vec<usize> = (0..most_excited.len()).collect();
         let by_frequency = count < lowest.len() && best.modes == lowest[..count];
-        let order = if by_frequency { &lowest[..] } else { liveliest };
+        let order = if by_frequency { &lowest[..] } else { most_excited };
         if first_of(order, count) != best.modes {
             return Ok(());
         }

@@ -44,7 +44,7 @@ fn played(scene: &str) -> Played {
     done(folder.path(), "simulate body.flex.h5 --scene scene.toml -o motion.h5");
     let motion = read_simulation(folder.path().join("motion.h5")).expect("a motion");
     let body = flexbody_file::read(folder.path().join("body.flex.h5")).expect("a body");
-    let body = motion.staged(&body).expect("its motion");
+    let body = motion.body_in_frame(&body).expect("its motion");
     Played { folder, body, motion }
 }
 

@@ -1,6 +1,6 @@
 //! Identities between the arrays of the frames.
 
-use super::missed::{Missed, largest_entry};
+use super::missed::{Violation, largest_entry};
 use crate::import::AuditCheck;
 use crate::sid::read::arrays::{Array, FrameArrays};
 use crate::sid::read::parse::Listed;
@@ -14,7 +14,7 @@ pub(super) fn frame_checks(listed: &Listed<'_>, frames: &[FrameArrays]) -> Vec<A
         return Vec::new();
     }
     let nq = listed.nq;
-    let identity = |name, formula, meaning: &str, missed: &dyn Fn(&FrameArrays) -> Option<Missed>| {
+    let identity = |name, formula, meaning: &str, missed: &dyn Fn(&FrameArrays) -> Option<Violation>| {
         over_all_frames(listed, frames, missed).check(name, formula, meaning)
     };
     let mut all = vec![
@@ -62,16 +62,16 @@ fn number_of_frames(listed: &Listed<'_>, frames: &[FrameArrays]) -> AuditCheck {
 
 /// Worst value of an identity over all frames, with the label of that frame.
 struct WorstFrame<'l> {
-    missed: Missed,
+    missed: Violation,
     label: Option<&'l str>,
 }
 
 fn over_all_frames<'l>(
     listed: &'l Listed<'_>,
     frames: &[FrameArrays],
-    missed: &dyn Fn(&FrameArrays) -> Option<Missed>,
+    missed: &dyn Fn(&FrameArrays) -> Option<Violation>,
 ) -> WorstFrame<'l> {
-    let (mut total, mut label) = (Missed { by: 0.0, scale: 0.0, rounding: 0.0 }, None);
+    let (mut total, mut label) = (Violation { by: 0.0, scale: 0.0, rounding: 0.0 }, None);
     for (frame, listed) in frames.iter().zip(&listed.frames) {
         let Some(own) = missed(frame) else { continue };
         if own.by > total.by || own.by.is_nan() {
@@ -91,22 +91,22 @@ impl WorstFrame<'_> {
 }
 
 /// Returns the difference of origin.M1 and phi.
-fn origin_missed(frame: &FrameArrays, nq: usize) -> Missed {
-    Missed {
+fn origin_missed(frame: &FrameArrays, nq: usize) -> Violation {
+    Violation {
         by: largest_entry(3, nq, |a, k| frame.origin.linear(k, a, 0) - frame.phi.m0[(a, k)]),
         scale: frame.origin.sizes()[1].max(frame.phi.sizes()[0]),
         rounding: frame.origin.rounding[1] + frame.phi.rounding[0],
     }
 }
 
-/// Returns the difference of AP.M1 and the skew matrices of psi; `None` if the frame lacks one of them.
-fn axes_missed(frame: &FrameArrays, nq: usize) -> Option<Missed> {
+/// Returns the difference of AP.M1 and the skew matrices of psi; `None` if the frame omissions one of them.
+fn axes_missed(frame: &FrameArrays, nq: usize) -> Option<Violation> {
     let (psi, ap) = (frame.psi.as_ref()?, frame.ap.as_ref()?);
     let missed_by_mode = |k: usize| {
         let skew = Vector3::from_fn(|a, _| psi.m0[(a, k)]).cross_matrix();
         largest_entry(3, 3, |i, j| ap.linear(k, i, j) - skew[(i, j)])
     };
-    Some(Missed {
+    Some(Violation {
         by: (0..nq).map(missed_by_mode).fold(0.0, larger),
         scale: psi.sizes()[0].max(ap.sizes()[1]),
         rounding: psi.rounding[0] + ap.rounding[1],
@@ -114,10 +114,10 @@ fn axes_missed(frame: &FrameArrays, nq: usize) -> Option<Missed> {
 }
 
 /// Returns the asymmetry of M1 of phi or psi in its modes; `None` without M1.
-fn symmetry_missed(array: &Array, nq: usize) -> Option<Missed> {
+fn symmetry_missed(array: &Array, nq: usize) -> Option<Violation> {
     array.m1.as_ref()?;
     let missed_along = |a: usize| largest_entry(nq, nq, |k, l| array.linear(l, a, k) - array.linear(k, a, l));
-    Some(Missed {
+    Some(Violation {
         by: (0..3).map(missed_along).fold(0.0, larger),
         scale: array.sizes()[1],
         rounding: 2.0 * array.rounding[1],
@@ -126,7 +126,7 @@ fn symmetry_missed(array: &Array, nq: usize) -> Option<Missed> {
 
 /// Checks that the undeformed axes of every frame are a rotation. A mirrored frame belongs to another body.
 fn undeformed_axes(listed: &Listed<'_>, frames: &[FrameArrays]) -> AuditCheck {
-    let (mut total, mut what) = (Missed { by: 0.0, scale: 1.0, rounding: 0.0 }, String::new());
+    let (mut total, mut what) = (Violation { by: 0.0, scale: 1.0, rounding: 0.0 }, String::new());
     for (frame, listed) in frames.iter().zip(&listed.frames) {
         let Some(ap) = &frame.ap else { continue };
         let axes = Matrix3::from_fn(|i, j| ap.m0[(i, j)]);

@@ -3,7 +3,7 @@
 use super::digits::digits;
 use super::frames::frame_checks;
 use super::frequencies::frequencies;
-use super::missed::{Missed, largest_entry};
+use super::missed::{Violation, largest_entry};
 use super::missing::{Missing, is_free};
 use crate::import::AuditCheck;
 use crate::sid::read::arrays::{Array, Arrays, FrameArrays, PAIRS, largest};
@@ -71,7 +71,7 @@ impl Identities<'_> {
         }
         let (moment, ct) = (&self.arrays.first_moment, &self.arrays.ct);
         let [bound, ..] = self.arrays.bounds();
-        let missed = Missed {
+        let missed = Violation {
             by: largest_entry(self.arrays.nq, 3, |k, a| moment.linear(k, a, 0) - ct.m0[(k, a)]),
             scale: scale(bound, &[moment.sizes()[1], ct.sizes()[0]]),
             rounding: moment.rounding[1] + ct.rounding[0],
@@ -92,7 +92,7 @@ impl Identities<'_> {
         let (gr, inertia) = (&self.arrays.gr, &self.arrays.inertia);
         let [_, bound, _] = self.arrays.bounds();
         let [even, _] = self.layout.gr.gr_misfit(self.arrays);
-        let missed = Missed {
+        let missed = Violation {
             by: even,
             scale: scale(bound, &[gr.sizes()[0], inertia.sizes()[1]]),
             rounding: gr.rounding[0] + inertia.rounding[1],
@@ -130,7 +130,7 @@ impl Identities<'_> {
         };
         let [_, bound, _] = self.arrays.bounds();
         let [_, odd] = self.layout.gr.gr_misfit(self.arrays);
-        let missed = Missed {
+        let missed = Violation {
             by: odd,
             scale: scale(bound, &[gr.sizes()[0], cr.sizes()[0]]),
             rounding: gr.rounding[0] + cr.rounding[0],
@@ -156,10 +156,10 @@ impl Identities<'_> {
         ))
     }
 
-    fn missed_of_ge(&self, by: f64) -> Missed {
+    fn missed_of_ge(&self, by: f64) -> Violation {
         let (ge, cr) = (&self.arrays.ge, &self.arrays.cr);
         let [.., bound] = self.arrays.bounds();
-        Missed {
+        Violation {
             by,
             scale: scale(bound, &[ge.sizes()[0], cr.sizes()[1]]),
             rounding: ge.rounding[0] + 2.0 * cr.rounding[1],
@@ -185,7 +185,7 @@ impl Identities<'_> {
         let ge_by = if ge == own.ge { 0.0 } else { ge.ge_misfit(arrays) };
         let gr_scale = scale(bound, &[arrays.gr.sizes()[0]]);
         vec![
-            Missed { by: gr_by, scale: gr_scale, rounding: arrays.gr.rounding[0] }.check(
+            Violation { by: gr_by, scale: gr_scale, rounding: arrays.gr.rounding[0] }.check(
                 "gr_layout",
                 "Gr in the order of columns of the dialect gives J1 and Cr0",
                 Code::AuditLayout,
@@ -210,7 +210,7 @@ impl Identities<'_> {
         let scale = scale(bound, &[oe.sizes()[0], inertia.sizes()[1]]);
         let (own, other) = (self.oe0_misfit(false), self.oe0_misfit(true));
         let rounding = oe.rounding[0] + inertia.rounding[1];
-        let missed = |by: f64| Missed { by, scale, rounding };
+        let missed = |by: f64| Violation { by, scale, rounding };
         let exchanged = other < 0.1 * own && missed(other).passes();
         let identity = missed(if exchanged { other } else { own }).check(
             "oe0_is_j1",
@@ -281,7 +281,7 @@ impl Identities<'_> {
 
     fn damping(&self) -> AuditCheck {
         let (de, nq) = (&self.arrays.de.m0, self.arrays.nq);
-        let missed = Missed {
+        let missed = Violation {
             by: largest_entry(nq, nq, |i, j| de[(i, j)] - de[(j, i)]),
             scale: largest(de),
             rounding: 2.0 * self.arrays.de.rounding[0],
@@ -309,7 +309,12 @@ fn symmetric_in_modes(
     let missed_in_column =
         |c: usize| largest_entry(nq, nq, |k, l| array.linear(l, k, c) - array.linear(k, l, c));
     let by = (0..array.m0.ncols()).map(missed_in_column).fold(0.0, larger);
-    Missed { by, scale, rounding: 2.0 * array.rounding[1] }.check(name, formula, Code::AuditIdentity, meaning)
+    Violation { by, scale, rounding: 2.0 * array.rounding[1] }.check(
+        name,
+        formula,
+        Code::AuditIdentity,
+        meaning,
+    )
 }
 
 /// Compares the trace of Oe1 with Me.
@@ -323,7 +328,7 @@ fn trace(arrays: &Arrays, scale: f64) -> AuditCheck {
         format!(" (for mode {} Oe1 gives {:.4} of the modal mass)", k + 1, ratio(k))
     });
     let rounding = 3.0 * arrays.oe.rounding[1] + 2.0 * arrays.me.rounding[0];
-    Missed { by, scale, rounding }.check(
+    Violation { by, scale, rounding }.check(
         "oe1_is_me",
         "Oe1_11 + Oe1_22 + Oe1_33 = -2 Me",
         Code::AuditLumped,

@@ -95,7 +95,7 @@ pub(crate) fn body(
         geometric_stiffness: stiffness,
         frames,
         mesh: None,
-        lacks: lacks(arrays),
+        omissions: omissions(arrays),
     };
     (body, notes)
 }
@@ -120,15 +120,15 @@ fn numbered(arrays: &Arrays, i5: Option<Mat<f64>>, i9: Option<Mat<f64>>) -> Numb
 }
 
 /// Returns the data of the file that a flexible body cannot hold.
-fn lacks(arrays: &Arrays) -> Vec<String> {
-    let mut lacks = Vec::new();
+fn omissions(arrays: &Arrays) -> Vec<String> {
+    let mut omissions = Vec::new();
     if largest(&arrays.ksigma.m0) > 0.0 {
-        lacks.push("ksigma: forces of initial stress on the modes are not converted".to_owned());
+        omissions.push("ksigma: forces of initial stress on the modes are not converted".to_owned());
     }
     if arrays.gr.m1.is_some() {
-        lacks.push("Gr1 is ignored: it follows from the other arrays".to_owned());
+        omissions.push("Gr1 is ignored: it follows from the other arrays".to_owned());
     }
-    lacks
+    omissions
 }
 
 /// Terms separated from arrays that hold kinetic energy and geometric stiffness together.

@@ -107,7 +107,7 @@ impl NodalEvaluation<'_> {
         add_motion(&body.conditions, 1.0, &lambda, &mut self.w_rate);
         add_motion(&body.answered, 1.0, &lambda, udd);
         body.add_frame(-1.0, &nu, &self.u, udd);
-        body.massless.project(body.stiffness(), udd, &mut self.room);
+        body.massless.project(body.stiffness(), udd, &mut self.workspace);
         let taken = body.onto_frame(&self.u, &self.w_rate) - wanted;
         drive.reaction = Vector6::from_fn(|k, _| if drive.given[k] { taken[k] } else { 0.0 });
         self.drive = Some(drive);

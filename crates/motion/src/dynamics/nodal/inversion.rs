@@ -3,7 +3,7 @@
 use super::drive::LOST;
 use super::equations::NodalEquations;
 use super::kinetics::Kinetics;
-use super::massless::Room;
+use super::massless::Workspace;
 use super::motions::{add_motion, sums};
 use crate::dynamics::kernels::{add_scaled, dot};
 use crate::integration::Failure;
@@ -15,10 +15,10 @@ const SOLVED: f64 = 1e-15;
 
 /// Limit of the iterations. Their number grows with the rotations of the nodes, to 30 at rotations of 0.3.
 /// Beyond the limit the evaluation fails.
-const MOST_ITERATIONS: usize = 200;
+const MAX_ITERATIONS: usize = 200;
 
 /// Failure for nodes turned so far that their mass is not positive definite.
-const TURNED: Failure =
+const MASS_NOT_DEFINITE: Failure =
     Failure::Rates { reason: "the nodes are rotated so far that their mass matrix is not positive definite" };
 
 /// B'C' at the displacements and its transpose, factored.
@@ -60,7 +60,7 @@ pub(super) struct TurnedMass<'e> {
     direction: Vec<f64>,
     product: Vec<f64>,
     scratch: Vec<f64>,
-    room: Room,
+    workspace: Workspace,
 }
 
 /// Prescribed components of (V, omega), or of their rates.
@@ -127,7 +127,7 @@ impl<'e> TurnedMass<'e> {
             direction: zeros(),
             product: zeros(),
             scratch: zeros(),
-            room: body.massless.room(),
+            workspace: body.massless.workspace(),
         })
     }
 
@@ -158,7 +158,7 @@ impl<'e> TurnedMass<'e> {
             return;
         }
         self.scratch.fill(0.0);
-        self.body.massless.add_static(x, &mut self.scratch, &mut self.room);
+        self.body.massless.add_static(x, &mut self.scratch, &mut self.workspace);
         multiply_vector(self.body.stiffness(), 1, &self.scratch, &mut self.rates);
         x.iter_mut().zip(&self.rates).for_each(|(x, taken)| *x -= taken);
     }
@@ -169,7 +169,7 @@ impl<'e> TurnedMass<'e> {
         self.rates.copy_from_slice(v);
         self.body.add_frame(-1.0, &nu, &self.u, &mut self.rates);
         if self.restricts {
-            self.body.massless.project(self.body.stiffness(), &mut self.rates, &mut self.room);
+            self.body.massless.project(self.body.stiffness(), &mut self.rates, &mut self.workspace);
         }
         let momenta = self.kinetics.momenta(&nu, &self.rates, w);
         self.restrict(w);
@@ -230,13 +230,13 @@ impl<'e> TurnedMass<'e> {
         let mut square = dot(&self.residual, &self.preconditioned);
         let enough = SOLVED * SOLVED * square.max(energy);
         self.direction.copy_from_slice(&self.preconditioned);
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             if square <= enough {
                 return Ok(());
             }
             let curvature = self.curvature()?;
             if curvature.is_nan() || curvature <= 0.0 {
-                return Err(TURNED);
+                return Err(MASS_NOT_DEFINITE);
             }
             let step = square / curvature;
             add_scaled(step, &self.direction, x);
@@ -247,7 +247,7 @@ impl<'e> TurnedMass<'e> {
             self.direction.iter_mut().zip(&self.preconditioned).for_each(|(p, z)| *p = z + part * *p);
             square = next;
         }
-        Err(TURNED)
+        Err(MASS_NOT_DEFINITE)
     }
 
     /// Computes the product of the mass with the direction; returns its inner product with the direction.

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// Errors of a body relative to its model.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct LackFacts {
+pub(super) struct ReferenceErrorFacts {
     modes: usize,
     /// Errors by quantity. The attitude error is zero if the rotation is prescribed; the reaction error is
     /// `None` without prescribed motion.
@@ -21,14 +21,14 @@ pub(super) struct LackFacts {
     unknown: Option<&'static str>,
 }
 
-impl LackFacts {
-    pub(crate) fn new(lack: &ReferenceError) -> Self {
-        let (modes, time, unknown) = (lack.modes, lack.time, lack.unknown);
+impl ReferenceErrorFacts {
+    pub(crate) fn new(reference: &ReferenceError) -> Self {
+        let (modes, time, unknown) = (reference.modes, reference.time, reference.unknown);
         let known = |value: f64| unknown.is_none().then_some(value);
         Self {
             modes,
-            errors: lack.errors.map(|error| error.and_then(known)),
-            worst: known(lack.worst),
+            errors: reference.errors.map(|error| error.and_then(known)),
+            worst: known(reference.worst),
             time,
             unknown,
         }
@@ -56,10 +56,10 @@ impl LackFacts {
     }
 }
 
-/// Returns the error of the reference of all measured errors in words: the last of `lacks`. The first entry
+/// Returns the error of the reference of all measured errors in words: the last of `rounds`. The first entry
 /// is the error before enrichment.
-pub(super) fn reference_in_words(lacks: &[LackFacts]) -> String {
-    match lacks {
+pub(super) fn reference_in_words(rounds: &[ReferenceErrorFacts]) -> String {
+    match rounds {
         [] => "the body with all its modes; its difference from an FE model is not known".to_owned(),
         [own] => format!("{} (estimated)", own.in_words()),
         [first, .., own] => format!("{} (estimated; before enrichment {})", own.in_words(), first.in_words()),

@@ -14,7 +14,7 @@ use std::borrow::Cow;
 
 /// Distance of the centre of mass from the origin, relative to the extent of the body, below which both
 /// coincide.
-const AT_ORIGIN: f64 = 1e-10;
+const ORIGIN_TOLERANCE: f64 = 1e-10;
 
 /// Relative excess of a prescribed rotation over the limits of the scene that counts as rounding.
 const ROUNDING: f64 = 1e-6;
@@ -24,7 +24,7 @@ pub(super) const UNCOUPLED: f64 = 1e-8;
 
 /// Body in the frame of a scene, the scene, and diagnostics about both.
 #[derive(Debug, Clone)]
-pub struct Stage<'a> {
+pub struct FramedScene<'a> {
     /// Body in the frame of the scene.
     pub body: Cow<'a, FlexBody>,
     /// Scene with all vectors along the axes of this frame or of the world.
@@ -33,7 +33,7 @@ pub struct Stage<'a> {
     pub found: Vec<Diagnostic>,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> FramedScene<'a> {
     /// Transforms `body` and `scene` to one frame. A scene that is resolved already, and the body that it
     /// was resolved for, do not change.
     ///
@@ -45,7 +45,7 @@ impl<'a> Stage<'a> {
             return Ok(Self { body: Cow::Borrowed(body), scene: Cow::Borrowed(scene), found: Vec::new() });
         }
         refuse_beyond_range(scene, &body.frame().axes)?;
-        let (staged, mut found) = match &scene.carried {
+        let (framed_body, mut found) = match &scene.carried {
             Some(carried) => {
                 let carrier = carrier(&carried.by);
                 let own = body.carried(&carrier)?;
@@ -64,9 +64,9 @@ impl<'a> Stage<'a> {
                 (centred(body)?, Vec::new())
             }
         };
-        let resolved = resolved(scene, &body.frame().axes, &staged.frame().origin);
-        found.extend(idle(&staged, &resolved));
-        Ok(Self { body: staged, scene: Cow::Owned(resolved), found })
+        let resolved = resolved(scene, &body.frame().axes, &framed_body.frame().origin);
+        found.extend(idle(&framed_body, &resolved));
+        Ok(Self { body: framed_body, scene: Cow::Owned(resolved), found })
     }
 }
 
@@ -97,7 +97,7 @@ fn centred(body: &FlexBody) -> Result<Cow<'_, FlexBody>> {
     let mean = body.in_mean_axes()?;
     let invariants = mean.invariants();
     let centre = invariants.first_moment() / invariants.mass();
-    let shift = if centre.norm() <= AT_ORIGIN * body.extent() { Vector3::zeros() } else { centre };
+    let shift = if centre.norm() <= ORIGIN_TOLERANCE * body.extent() { Vector3::zeros() } else { centre };
     if shift == Vector3::zeros() && mean.frame().axes == Matrix3::identity() {
         return Ok(mean);
     }

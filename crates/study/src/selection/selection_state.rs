@@ -3,7 +3,7 @@
 use super::basis::BEYOND_BAND;
 use super::cases::{SLACK_OF_RANGE, together, worst};
 use super::demand::Demand;
-use super::search::{Choice, SelectionSearch, Tried, TriedCase};
+use super::search::{Choice, SelectionSearch, TestScene, TestedCase};
 use super::trial::Trial;
 use super::warnings::{phase_drifts, resonances};
 use crate::reference::{PART_OF_REFERENCE, ReferenceError};
@@ -14,7 +14,7 @@ use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{Measure, Trace};
 
 /// Trials and current choice of a selection.
-pub(super) struct Deciding<'s> {
+pub(super) struct SelectionState<'s> {
     demands: &'s [Demand<'s>],
     pub choice: Choice,
     pub trials: Vec<Trial>,
@@ -26,15 +26,16 @@ pub(super) struct Deciding<'s> {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-impl<'s> Deciding<'s> {
+impl<'s> SelectionState<'s> {
     /// Starts with all modes, and with the groups that bounds leave open in at least one load case.
     pub(super) fn new(demands: &'s [Demand<'s>]) -> Self {
         let mut diagnostics = Vec::new();
         let mut trials = Vec::new();
         for (at, demand) in demands.iter().enumerate() {
             diagnostics.extend(demand.found.iter().cloned().map(|said| demand.about(said)));
-            let warning = demand.lacks.last().and_then(|own| own.warning(demand.scene, PART_OF_REFERENCE));
-            let remark = demand.lacks.last().and_then(ReferenceError::coupling_remark);
+            let warning =
+                demand.reference_errors.last().and_then(|own| own.warning(demand.scene, PART_OF_REFERENCE));
+            let remark = demand.reference_errors.last().and_then(ReferenceError::coupling_remark);
             diagnostics.extend(remark.into_iter().chain(warning).map(|said| demand.about(said)));
             let case = (demands.len() > 1).then_some(at);
             trials.extend(demand.bounds.iter().map(|trial| Trial { case, ..trial.clone() }));
@@ -84,7 +85,8 @@ impl<'s> Deciding<'s> {
         let references = self.reference_motions()?;
         let demands = self.demands;
         let both = demands.iter().zip(&references);
-        let cases: Vec<TriedCase<'_>> = both.map(|(demand, motions)| Self::tried(demand, motions)).collect();
+        let cases: Vec<TestedCase<'_>> =
+            both.map(|(demand, motions)| Self::tested_case(demand, motions)).collect();
         context.phase("trials");
         let fixed = demands.iter().zip(&self.short_of).filter(|(_, short)| short.is_some());
         let search = SelectionSearch {
@@ -97,11 +99,14 @@ impl<'s> Deciding<'s> {
         Ok(reason)
     }
 
-    fn tried<'t>(demand: &'t Demand<'t>, references: &'t [Trace]) -> TriedCase<'t> {
-        let tried = demand.cases.iter().zip(references);
-        TriedCase {
-            tried: tried
-                .map(|(case, trace)| Tried { runs: case.runs(), measure: Measure::new(demand.body, trace) })
+    fn tested_case<'t>(demand: &'t Demand<'t>, references: &'t [Trace]) -> TestedCase<'t> {
+        let scenes = demand.cases.iter().zip(references);
+        TestedCase {
+            scenes: scenes
+                .map(|(case, trace)| TestScene {
+                    runs: case.runs(),
+                    measure: Measure::new(demand.body, trace),
+                })
                 .collect(),
             budget: demand.budget(),
         }
@@ -157,7 +162,7 @@ impl<'s> Deciding<'s> {
         for (demand, case) in self.demands.iter().zip(search.cases) {
             let mut chosen = Vec::new();
             let mut growth = None;
-            for Tried { runs, measure } in &case.tried {
+            for TestScene { runs, measure } in &case.scenes {
                 let (modes, groups) = (&self.choice.modes, self.choice.groups);
                 let (trial, history) = runs.measured(measure, modes, groups, case.budget)?;
                 let own = history.and_then(|history| history.growth(measure.trace(), demand.tolerance()));
