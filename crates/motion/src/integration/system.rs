@@ -24,8 +24,8 @@ pub trait System {
         &[]
     }
 
-    /// Filters the residuals `lacks` of the stages of an implicit step of length h by a stiff linear part J
-    /// of the system that is solved as a whole: replaces them by (I - h A kron J)^-1 `lacks`, with the
+    /// Filters the `residuals` of the stages of an implicit step of length h by a stiff linear part J
+    /// of the system that is solved as a whole: replaces them by (I - h A kron J)^-1 `residuals`, with the
     /// matrix A of the method given by its eigenvalues. The default does nothing.
     ///
     /// Returns the root mean square of the corrections over the stages, relative to the motion, in a norm

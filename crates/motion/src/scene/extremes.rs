@@ -27,7 +27,7 @@ pub struct Extremes {
     /// Largest angular velocity |omega|.
     pub spin: f64,
     /// Largest components |omega_k| of the angular velocity along the body axes.
-    pub spin_about: Vector3<f64>,
+    pub spin_body: Vector3<f64>,
     /// Largest angular velocities about distinct axes, body axes.
     pub spins: Vec<Vector3<f64>>,
     /// Largest force and torque of the prescribed motion; zero without.
@@ -63,7 +63,7 @@ pub(super) struct Survey<'b> {
     elastic: Peak,
     internal: Peak,
     spin: Peak,
-    spin_about: [Peak; 3],
+    spin_body: [Peak; 3],
     spins: Spins,
     reaction: [Peak; 2],
     differences: Differences,
@@ -82,7 +82,7 @@ impl<'b> Survey<'b> {
             elastic: Peak::default(),
             internal: Peak::default(),
             spin: Peak::default(),
-            spin_about: [Peak::default(); 3],
+            spin_body: [Peak::default(); 3],
             spins: Spins::default(),
             reaction: [Peak::default(); 2],
             differences: Differences::default(),
@@ -112,7 +112,7 @@ impl<'b> Survey<'b> {
         let internal = balance.kinetic - balance.flight + balance.elastic;
         self.internal.see(time, internal.max(0.0).sqrt());
         self.spin.see(time, omega.norm());
-        self.spin_about.iter_mut().zip(omega.iter()).for_each(|(peak, w)| peak.see(time, w.abs()));
+        self.spin_body.iter_mut().zip(omega.iter()).for_each(|(peak, w)| peak.see(time, w.abs()));
         self.spins.see(omega);
         self.differences.see(balance);
     }
@@ -131,7 +131,7 @@ impl<'b> Survey<'b> {
             elastic: self.elastic.value.powi(2),
             internal,
             spin: self.spin.value,
-            spin_about: Vector3::from(self.spin_about.map(|peak| peak.value)),
+            spin_body: Vector3::from(self.spin_body.map(|peak| peak.value)),
             spins: self.spins.0,
             reaction: (self.reaction[0].value, self.reaction[1].value),
             drift: self.differences.drift(internal, size, least_energy),

@@ -73,12 +73,14 @@ impl<'a> Prepared<'a> {
             let diagnostic = Diagnostic::new(Code::SceneBody, "the scene has no `duration`");
             return Err(diagnostic.with_help("give `duration` in [run]").into());
         };
+        // Equations and loads, and the state at time zero, in static equilibrium if the scene asks for it.
         let (forces, watched) = SceneForces::new(body, scene)?;
         let equations = EquationsOfMotion::new(body, scene.run.terms);
         let mut start = start(body, scene, &forces);
         if scene.initial.settled {
             settle(body, scene, &equations, &forces, &mut start)?;
         }
+        // Integration scheme, refused if the run needs more steps than allowed.
         let (scheme, effort) = Effort::plan(body, scene, duration)?;
         effort.refuse_too_much(scene)?;
         Ok(Self { scene, forces, watched, equations, start, duration, scheme, body })
@@ -97,6 +99,7 @@ impl<'a> Prepared<'a> {
         state: &[f64],
         motion: &mut Motion<'_>,
     ) -> std::result::Result<Option<Reaction>, Failure> {
+        // The shape is cheap; the equations of motion are evaluated within a step only for reactions.
         let (_, q) = motion.shape(state);
         survey.see_shape(time, q, self.equations.elastic_energy(q));
         if event == ObserverEvent::Within && !self.scene.prescribes() {
@@ -125,6 +128,7 @@ impl<'a> Prepared<'a> {
     ) -> Result<Finished> {
         let (mut motion, mut state) = Motion::new(&self.equations, &self.forces, &self.start);
         let mut observer = Motion::new(&self.equations, &self.forces, &self.start).0;
+        // The observer has an evaluation of its own, so that observation does not change the steps.
         let mut method = match self.scheme {
             Scheme::Adaptive { tolerance } => {
                 let longest = longest_step(self.scene, self.duration);
@@ -135,6 +139,7 @@ impl<'a> Prepared<'a> {
                 step: step.unwrap_or(self.duration),
             },
         };
+        // Every observed state passes the limit of the number of steps.
         let mut steps = 0;
         let observe = |event: ObserverEvent, time: f64, state: &[f64]| {
             steps += u64::from(event == ObserverEvent::End);
@@ -181,11 +186,13 @@ pub fn damped_once<'b, 's>(
 fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configuration {
     let initial = &scene.initial;
     let (mut q, mut qd) = (vec![0.0; body.n_modes()], vec![0.0; body.n_modes()]);
+    // Modal coordinates from the initial values of modes by number.
     for start in &initial.modes {
         (q[start.mode], qd[start.mode]) = (start.amplitude, start.rate);
     }
     let attitude = RotationVector(initial.rotation);
     let axes = attitude.axes();
+    // A prescribed motion replaces the initial velocities.
     let prescribed = forces.prescribed(0.0, &axes).0;
     Configuration {
         origin: initial.origin,

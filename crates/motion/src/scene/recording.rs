@@ -49,13 +49,13 @@ pub struct Setting {
     /// reference point of the carrier.
     pub origin: Vector3<f64>,
     /// Gravity at the start, axes of the model.
-    pub gravity: Option<Vector3<f64>>,
+    pub gravity_model: Option<Vector3<f64>>,
     /// Eigenvalues of the carried body; empty without a carrier. Unit: 1/time^2.
     pub eigenvalues: Vec<f64>,
 }
 
 impl Setting {
-    /// Creates the setting of a body on its stage.
+    /// Creates the setting of a body in its framed scene.
     pub(super) fn new(body: &FlexBody, scene: &Scene) -> Self {
         let start = RotationVector(scene.initial.rotation).axes();
         let carrier = scene.carried.as_ref().map(|carried| carried.by.to_string());
@@ -63,7 +63,7 @@ impl Setting {
         Self {
             carrier,
             origin: body.frame().origin,
-            gravity: scene.gravity.map(|gravity| start.tr_mul(&gravity)),
+            gravity_model: scene.gravity.map(|gravity| start.tr_mul(&gravity)),
             eigenvalues: eigenvalues.unwrap_or_default(),
         }
     }

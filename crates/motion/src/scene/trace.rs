@@ -75,6 +75,7 @@ pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(T
     let body = &*damped(&framed.body, &framed.scene)?;
     let scene = &*framed.scene;
     let run = Prepared::new(body, scene)?;
+    // Samples at steps and within them until the memory is full; the extremes are surveyed there too.
     let bytes = Trace::bytes_of_instant(body.n_modes(), run.watched.len());
     let most = context.memory.map_or(f64::INFINITY, |memory| memory as f64 / bytes);
     let mut tracer = Tracer::new(&run);
@@ -92,6 +93,7 @@ pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(T
         Ok(())
     };
     let finished = run.integrate(&[0.0, run.duration], PARTS, look)?;
+    // Remarks about motions beyond the range of the model.
     let extremes = survey.extremes(finished.size, finished.least_energy);
     let found = [framed.found, remarks(body, scene, &extremes)].concat();
     Ok((tracer.finish(finished, extremes), found))

@@ -48,6 +48,7 @@ impl DecisionInput<'_> {
                 None,
             );
         }
+        // A kept group rests on the last trial without it, a dropped one on the first trial that passed.
         let basis = if kept { self.last_without(group) } else { self.first_that_passed(group) };
         let (mut decided, decisive_error) = match basis {
             Some(trial) => {
@@ -56,6 +57,7 @@ impl DecisionInput<'_> {
             }
             None => (undecided(group, kept, "no bound or run shows that it can be dropped"), None),
         };
+        // A run slower than the allowed rotation cannot decide about a kept group.
         let short = self.demands.iter().find_map(|demand| Some((demand, demand.short_of?)));
         if let Some((demand, (reached, allowed))) = short.filter(|_| kept) {
             let of = demand.name.map_or_else(String::new, |name| format!(" of case `{name}`"));

@@ -115,6 +115,7 @@ impl Source {
         if own.initial.modes.is_empty() {
             return own;
         }
+        // Solve L q = G q_r for displacements and rates, and start every mode with its part.
         let stiffness = body.invariants().symmetric_stiffness().cholesky();
         let part = |q: &[f64]| {
             let product = |&mode: &usize| q.iter().enumerate().map(|(j, q)| shared[(mode, j)] * q).sum();

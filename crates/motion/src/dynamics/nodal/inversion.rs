@@ -165,6 +165,7 @@ impl<'e> TurnedMass<'e> {
 
     /// Computes w = T'dT/du' of v and returns (p, h).
     pub(super) fn momenta(&mut self, v: &[f64], w: &mut [f64]) -> Result<Vector6<f64>, Failure> {
+        // Split v into the frame motion and the deformation rates in static equilibrium.
         let nu = self.frame_of(v)?;
         self.rates.copy_from_slice(v);
         self.body.add_frame(-1.0, &nu, &self.u, &mut self.rates);
@@ -199,9 +200,11 @@ impl<'e> TurnedMass<'e> {
         components: [bool; 6],
         motion: &Vector6<f64>,
     ) -> Result<(), Failure> {
+        // Start from the rigid motion with the prescribed components, whose momentum leaves the residual.
         let given = self.given(components)?;
         self.residual.copy_from_slice(x);
         x.fill(0.0);
+        // x = B motion.
         self.body.add_frame(1.0, motion, &self.u, x);
         let mut product = std::mem::take(&mut self.product);
         let multiplied = self.multiply(x, &mut product);
@@ -213,6 +216,7 @@ impl<'e> TurnedMass<'e> {
     }
 
     fn given(&self, components: [bool; 6]) -> Result<Constraint, Failure> {
+        // N'M^-1 N of the prescribed components; the free ones get the identity, so that the inverse exists.
         let multipliers = self.conditions.plain.solve(&Matrix6::identity()).ok_or(LOST)?;
         let mut answer = multipliers.transpose() * self.body.answer * multipliers;
         for (k, _) in components.iter().enumerate().filter(|(_, given)| !**given) {
@@ -234,6 +238,7 @@ impl<'e> TurnedMass<'e> {
             if square <= enough {
                 return Ok(());
             }
+            // Step of least energy along the search direction.
             let curvature = self.curvature()?;
             if curvature.is_nan() || curvature <= 0.0 {
                 return Err(MASS_NOT_DEFINITE);
@@ -242,6 +247,7 @@ impl<'e> TurnedMass<'e> {
             add_scaled(step, &self.direction, x);
             add_scaled(-step, &self.product, &mut self.residual);
             self.precondition(given)?;
+            // Next direction, conjugate to the previous one.
             let next = dot(&self.residual, &self.preconditioned);
             let part = next / square;
             self.direction.iter_mut().zip(&self.preconditioned).for_each(|(p, z)| *p = z + part * *p);
@@ -263,12 +269,14 @@ impl<'e> TurnedMass<'e> {
     /// Computes the residual times M^-1 without motion in the prescribed components. Forces on these
     /// components are removed from both, and rounding on massless motions from the residual.
     fn precondition(&mut self, given: Option<&Constraint>) -> Result<(), Failure> {
+        // Residual without rounding on massless motions, times M^-1.
         let mut residual = std::mem::take(&mut self.residual);
         self.restrict(&mut residual);
         self.residual = residual;
         self.preconditioned.copy_from_slice(&self.residual);
         self.body.solve(&mut self.preconditioned, &mut self.scratch);
         let Some(given) = given else { return Ok(()) };
+        // Remove the motion of the prescribed components with the forces that hold them.
         let nu = self.frame_of(&self.preconditioned)?;
         let moved = Vector6::from_fn(|k, _| if given.components[k] { nu[k] } else { 0.0 });
         let mu = given.multipliers * (given.answer * moved);

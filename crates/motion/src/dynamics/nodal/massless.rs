@@ -69,6 +69,7 @@ impl Massless {
     pub(super) fn new(model: &FeModel, factor: &SparseLdl) -> Result<Self, NodalError> {
         let (pencil, stiffness) = (model.pencil(), model.stiffness());
         let (n, block) = (pencil.n(), pencil.block());
+        // Empty rows of M are solved with their own factor; the other null vectors start from null pivots.
         let mut massless = Self::of_empty_rows(model)?;
         let starts: Vec<usize> = factor
             .null_rows()
@@ -84,11 +85,13 @@ impl Massless {
         let (mut scratch, mut workspace) = (vec![0.0; n], massless.workspace());
         let diagonal = pencil.mass_diagonal();
         for ((&start, z), kz) in starts.iter().zip(vectors.chunks_mut(n)).zip(weighted.chunks_mut(n)) {
+            // A null vector of M from one null pivot.
             z[start] = 1.0;
             factor.solve_in_place(block, z, &mut scratch);
             // Scale to unit size, so that the products below work in any units.
             let size = z.iter().fold(0.0f64, |m, z| m.max(z.abs()));
             z.iter_mut().for_each(|z| *z /= size);
+            // M z must be zero; then z is moved to static equilibrium with the empty rows.
             multiply_vector(pencil.mass(), block, z, &mut scratch);
             refuse_mass(&scratch, z, &diagonal)?;
             massless.project(stiffness, z, &mut workspace);
@@ -137,6 +140,7 @@ impl Massless {
     /// Computes x <- T x, T = I - Z (Z'K Z)^-1 Z'K, which moves massless motions to static equilibrium.
     pub(super) fn project(&self, stiffness: &SymmetricMatrix, x: &mut [f64], workspace: &mut Workspace) {
         if let Some(own) = &self.own {
+            // Displacements of the empty rows that balance the elastic forces of the other rows.
             self.rows.iter().for_each(|&row| x[row] = 0.0);
             for (force, &row) in workspace.own.iter_mut().zip(&self.rows) {
                 let (columns, values) = stiffness.row(row);
@@ -146,6 +150,7 @@ impl Massless {
             self.rows.iter().zip(&workspace.own).for_each(|(&row, value)| x[row] = *value);
         }
         let Some(factor) = &self.factor else { return };
+        // Coefficients -(Z'K Z)^-1 Z'K x of the null vectors.
         for (c, kz) in workspace.coefficients.iter_mut().zip(self.weighted.chunks(x.len())) {
             *c = -kz.iter().zip(&*x).map(|(kz, x)| kz * x).sum::<f64>();
         }

@@ -75,7 +75,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
     /// Returns the prescribed velocities of the frame at a state, and their rates.
     fn given(&self, time: f64, state: &[f64]) -> (Prescribed, Prescribed) {
         let Some(drive) = &self.drive else {
-            return (Prescribed::DEFORMATION_AT_REST, Prescribed::DEFORMATION_AT_REST);
+            return (Prescribed::NOTHING, Prescribed::NOTHING);
         };
         let axes = attitude(state).normalised().axes() * self.evaluation.equations.frame.axes;
         drive(time, &axes)
@@ -109,7 +109,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         let (_, rates) = self.given(time, state);
         self.evaluate(time, state)?;
         match rates {
-            Prescribed::DEFORMATION_AT_REST => self.evaluation.accelerations(udd),
+            Prescribed::NOTHING => self.evaluation.accelerations(udd),
             _ => self.evaluation.driven_accelerations(&rates, udd),
         }
     }
