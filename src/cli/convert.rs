@@ -206,9 +206,12 @@ impl Job<'_> {
         let nothing = RunData::default();
         let decided = selection.as_ref().map(|selection| SelectionFacts::new(selection, &nothing));
         let text = body_text(&facts, arguments.verbose, arguments.printing)
-            + &decided.map_or_else(String::new, |decided| match arguments.verbose {
-                true => format!("\n{}", decided.render(Format::Text)),
-                false => format!("\n{}", decided.summary()),
+            + &decided.map_or_else(String::new, |decided| {
+                if arguments.verbose {
+                    format!("\n{}", decided.render(Format::Text))
+                } else {
+                    format!("\n{}", decided.summary())
+                }
             });
         let outcome = Outcome { text, json: render(&facts, Format::Json), diagnostics, passed: true };
         let slots = std::iter::once(reserved.body).chain(reserved.reports).collect();

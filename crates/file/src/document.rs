@@ -213,9 +213,12 @@ fn of_group(held: TermGroup) -> Value {
     let within = |path: &str, part: &str, inner: Value| {
         path.split('/').filter(|name| !name.is_empty()).rev().fold(
             json!({ "properties": { part: inner } }),
-            |inner, name| match name.starts_with('<') {
-                true => json!({ "properties": { "groups": { "additionalProperties": inner } } }),
-                false => json!({ "properties": { "groups": { "properties": { name: inner } } } }),
+            |inner, name| {
+                if name.starts_with('<') {
+                    json!({ "properties": { "groups": { "additionalProperties": inner } } })
+                } else {
+                    json!({ "properties": { "groups": { "properties": { name: inner } } } })
+                }
             },
         )
     };

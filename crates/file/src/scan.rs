@@ -185,12 +185,13 @@ impl Scan {
         match item.kind {
             ItemKind::Floats(shape) => {
                 let stored = &mut self.stored;
-                let values = match item.is_short(self.storage) {
-                    false => dataset::<f64>(place, item.name, shape, sizes, stored)?
-                        .inspect(|read| self.hash(name, read)),
-                    true => dataset::<f32>(place, item.name, shape, sizes, stored)?
+                let values = if item.is_short(self.storage) {
+                    dataset::<f32>(place, item.name, shape, sizes, stored)?
                         .inspect(|read| self.hash(name, read))
-                        .map(|(values, dims)| (values.into_iter().map(f64::from).collect(), dims)),
+                        .map(|(values, dims)| (values.into_iter().map(f64::from).collect(), dims))
+                } else {
+                    dataset::<f64>(place, item.name, shape, sizes, stored)?
+                        .inspect(|read| self.hash(name, read))
                 };
                 let Some((values, dims)) = values else { return Ok(None) };
                 match values.iter().position(|v| !v.is_finite()) {

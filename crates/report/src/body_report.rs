@@ -142,16 +142,20 @@ fn interfaces<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     }
     let (size, unit) = (facts.body.size(), facts.model.units.length());
     let row = |own: &InterfaceFacts| {
-        let words = own.in_words(size, &unit);
-        let words = if own.deforms_although_rigid() { Span::Warning(words) } else { Span::Plain(words) };
-        vec![own.name.as_str().into(), words.into()]
+        let motion = own.motion_in_words().unwrap_or_else(|| "not known".to_owned());
+        let motion = if own.deforms_although_rigid() { Span::Warning(motion) } else { Span::Plain(motion) };
+        let point = own.reference_model.map_or_else(|| "none".to_owned(), |x| coordinates(&x, size, &unit));
+        let mut row: Vec<Inline> = vec![own.name.as_str().into()];
+        row.extend(cells([own.n_nodes.to_string(), own.coupling.unwrap_or("not stated").to_owned(), point]));
+        row.push(motion.into());
+        row
     };
     let caption = format!("{}, in the order of the file", counted(interfaces.len(), "interface"));
-    let heads = ["Name", "Nodes, coupling, reference point (model axes)"];
+    let heads = ["Name", "Nodes", "Coupling", "Reference point (model axes)", "Motion in the modes"];
     let rows = interfaces.iter().map(row).collect();
     vec![
         heading(word_as("interface", "Interfaces")),
-        Block::Table(Table::new(caption, heads, &[0, 1], rows)),
+        Block::Table(Table::new(caption, heads, &[0, 2, 3, 4], rows)),
         Block::Terms(listed("interface", interfaces, |own| {
             format!("{}: {}", own.name, own.in_words(size, &unit))
         })),

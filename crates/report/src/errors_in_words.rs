@@ -62,7 +62,8 @@ mod tests {
 
     #[test]
     fn groups_are_listed_with_an_and() {
-        let lists = [&[][..], &["W1"][..], &["W1", "W3"][..], &["W1", "W2", "W3"][..]];
+        let none: &[&str] = &[];
+        let lists = [none, &["W1"][..], &["W1", "W3"][..], &["W1", "W2", "W3"][..]];
         let expected = ["the inertia of the undeformed body only", "W1", "W1 and W3", "W1, W2 and W3"];
         assert_eq!(lists.map(super::groups_in_words), expected);
     }

@@ -157,12 +157,17 @@ impl InterfaceFacts {
     pub(crate) fn in_words(&self, size: f64, unit: &str) -> String {
         let place = self.place_in_words(size, unit);
         let coupling = self.coupling.map_or(String::new(), |name| format!(", {name}"));
-        let deforms = match self.deformation {
-            Some(part) if part > RIGID => format!(", deforms by up to {} of its motion", percent(part)),
-            Some(_) => ", moves as a rigid body".to_owned(),
-            None => String::new(),
-        };
-        format!("{}{coupling}{place}{deforms}", counted(self.n_nodes, "node"))
+        let motion = self.motion_in_words().map_or_else(String::new, |motion| format!(", {motion}"));
+        format!("{}{coupling}{place}{motion}", counted(self.n_nodes, "node"))
+    }
+
+    /// Returns the motion of the interface in the modes: `deforms by up to 12 % of its motion`, or `moves as a
+    /// rigid body`; `None` without a reference point.
+    pub(crate) fn motion_in_words(&self) -> Option<String> {
+        Some(match self.deformation? {
+            part if part > RIGID => format!("deforms by up to {} of its motion", percent(part)),
+            _ => "moves as a rigid body".to_owned(),
+        })
     }
 }
 

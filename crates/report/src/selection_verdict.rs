@@ -108,19 +108,29 @@ fn held_groups(selection: &Selection) -> impl Iterator<Item = TermGroup> {
     TermGroup::ALL.into_iter().filter(|group| selection.groups.has(*group))
 }
 
+/// Decision about groups with the same reason.
+struct CommonDecision {
+    kept: bool,
+    error: Option<DecisiveError>,
+    groups: Vec<TermGroup>,
+}
+
 /// Returns the reasons of the decisions; groups with the same reason and error share a sentence.
 fn why(selection: &Selection) -> String {
-    let mut reasons: Vec<(bool, Option<DecisiveError>, Vec<TermGroup>)> = Vec::new();
-    for (term, decisive_error) in selection.terms.iter().zip(&selection.decisive_errors) {
-        match reasons.iter_mut().find(|one| one.0 == term.kept && one.1 == *decisive_error) {
-            Some(known) => known.2.push(term.group),
-            None => reasons.push((term.kept, *decisive_error, vec![term.group])),
+    let mut decisions: Vec<CommonDecision> = Vec::new();
+    for (term, error) in selection.terms.iter().zip(&selection.decisive_errors) {
+        match decisions.iter_mut().find(|one| one.kept == term.kept && one.error == *error) {
+            Some(known) => known.groups.push(term.group),
+            None => {
+                let groups = vec![term.group];
+                decisions.push(CommonDecision { kept: term.kept, error: *error, groups });
+            }
         }
     }
-    reasons.sort_by_key(|reason| !reason.0);
-    let parts = reasons.iter().map(|(kept, decisive_error, groups)| {
-        let case = in_case(decisive_error.and_then(|decisive_error| decisive_error.case), selection);
-        reason(*kept, *decisive_error, groups) + &case
+    decisions.sort_by_key(|decision| !decision.kept);
+    let parts = decisions.iter().map(|decision| {
+        let case = decision.error.and_then(|error| error.case);
+        reason(decision.kept, decision.error, &decision.groups) + &in_case(case, selection)
     });
     parts.collect::<Vec<_>>().join("; ")
 }

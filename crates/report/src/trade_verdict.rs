@@ -79,7 +79,7 @@ fn recommended(row: &TradeRow, names_source: bool) -> String {
     if let Some(lumped) = &candidate.lumped {
         words.push_str(&format!(", {} {}", lumped.scheme(), lumped.part()));
     }
-    if candidate.storage == Storage::F32 {
+    if candidate.storage.name() == Storage::F32.name() {
         words.push_str(", stored as 32-bit floats");
     }
     if names_source {

@@ -47,9 +47,10 @@ macro_rules! of_groups {
                 written(|v| held(v, TermGroup::$group)),
             ),)*
             attribute("reason", Text, ONE, "why", written(|v| {
-                text(match v.body.terms.is_empty() {
-                    true => "no scene was given: every term is kept",
-                    false => "every group that was decided about has its own",
+                text(if v.body.terms.is_empty() {
+                    "no scene was given: every term is kept"
+                } else {
+                    "every group that was decided about has its own"
                 })
             })),
             $(

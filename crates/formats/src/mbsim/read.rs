@@ -157,9 +157,10 @@ fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ImportedFrame>> {
             arrays.refuse(POSITIONS, &format!("expected three numbers per node, found {}", positions.len()))
         );
     }
-    let labels: Vec<String> = match arrays.has(NUMBERS) {
-        true => arrays.integers(NUMBERS)?.iter().map(i64::to_string).collect(),
-        false => (1..=n).map(|number| number.to_string()).collect(),
+    let labels: Vec<String> = if arrays.has(NUMBERS) {
+        arrays.integers(NUMBERS)?.iter().map(i64::to_string).collect()
+    } else {
+        (1..=n).map(|number| number.to_string()).collect()
     };
     if labels.len() != n {
         return Err(arrays.refuse(NUMBERS, &format!("expected {n} numbers, found {}", labels.len())));

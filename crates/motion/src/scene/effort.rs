@@ -68,9 +68,10 @@ impl Effort {
                 Ok((Scheme::Conserving { order, step: Some(step) }, Self { steps: duration / step, because }))
             }
             Scheme::Conserving { order, step: None } => {
-                let (fastest, because) = match fastest_load > fastest_mode {
-                    true => (fastest_load, load_in_words),
-                    false => (fastest_mode, mode_in_words),
+                let (fastest, because) = if fastest_load > fastest_mode {
+                    (fastest_load, load_in_words)
+                } else {
+                    (fastest_mode, mode_in_words)
                 };
                 let step = (1.0 / (STEPS_PER_PERIOD * fastest)).min(duration);
                 Ok((Scheme::Conserving { order, step: Some(step) }, Self { steps: duration / step, because }))

@@ -143,9 +143,10 @@ impl<'a> Prepared<'a> {
         let mut steps = 0;
         let observe = |event: ObserverEvent, time: f64, state: &[f64]| {
             steps += u64::from(event == ObserverEvent::End);
-            match steps > self.scene.run.most_steps {
-                true => Err(Stop::Steps { time }),
-                false => show(event, time, state, &mut observer).map_err(Into::into),
+            if steps > self.scene.run.most_steps {
+                Err(Stop::Steps { time })
+            } else {
+                show(event, time, state, &mut observer).map_err(Into::into)
             }
         };
         let breaks = self.scene.breaks();

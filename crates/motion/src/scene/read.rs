@@ -84,9 +84,10 @@ pub(super) fn scene(walk: &mut Walk<'_>, top: &TomlTable, stem: String) -> Optio
 
 fn run(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<Run> {
     walk.known_keys(table, "[run]", RUN);
-    let duration = match table.contains_key("duration") {
-        true => positive(walk, table, "duration", &span).map(Some),
-        false => Some(None),
+    let duration = if table.contains_key("duration") {
+        positive(walk, table, "duration", &span).map(Some)
+    } else {
+        Some(None)
     };
     let mut count = |key: &str, default: i64, most: i64| match table.get(key) {
         None => Some(default),
@@ -136,10 +137,8 @@ fn scheme(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option
 }
 
 fn adaptive(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option<Scheme> {
-    let tolerance = match table.contains_key("tolerance") {
-        true => positive(walk, table, "tolerance", span)?,
-        false => TOLERANCE,
-    };
+    let tolerance =
+        if table.contains_key("tolerance") { positive(walk, table, "tolerance", span)? } else { TOLERANCE };
     if !TOLERANCES.contains(&tolerance) {
         let message =
             format!("`tolerance` is {tolerance}, expected {} to {}", TOLERANCES.start, TOLERANCES.end);
@@ -160,10 +159,7 @@ fn conserving(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Op
             }
         },
     };
-    let step = match table.contains_key("step") {
-        true => Some(positive(walk, table, "step", span)?),
-        false => None,
-    };
+    let step = if table.contains_key("step") { Some(positive(walk, table, "step", span)?) } else { None };
     Some(Scheme::Conserving { order, step })
 }
 

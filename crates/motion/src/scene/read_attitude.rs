@@ -45,9 +45,10 @@ pub(super) fn turning(
     let given: Vec<&str> = ROTATION_KEYS.into_iter().filter(|key| table.contains_key(*key)).collect();
     let ways = "`rate`, `angular_velocity_from` and `attitude_from`";
     let &[way] = &given[..] else {
-        let message = match given.is_empty() {
-            true => format!("key `rate` is missing in {place}"),
-            false => format!("{place} has more than one of {ways}"),
+        let message = if given.is_empty() {
+            format!("key `rate` is missing in {place}")
+        } else {
+            format!("{place} has more than one of {ways}")
         };
         let wrong = walk.at(Code::SceneSyntax, span, message);
         walk.found.push(wrong.with_help(format!("give one of {ways}")));

@@ -82,11 +82,10 @@ fn translation(
         .flat_map(|(along, columns, drive)| [(along, false, drive), (columns, true, drive)]);
     let given: Vec<_> = all.filter(|(key, ..)| table.contains_key(*key)).collect();
     let [(key, has_columns, drive)] = given[..] else {
-        let message = match given.is_empty() {
-            true => "[carried.translation] has none of `displacement`, `velocity` and `acceleration`",
-            false => {
-                "[carried.translation] has more than one of `displacement`, `velocity` and `acceleration`"
-            }
+        let message = if given.is_empty() {
+            "[carried.translation] has none of `displacement`, `velocity` and `acceleration`"
+        } else {
+            "[carried.translation] has more than one of `displacement`, `velocity` and `acceleration`"
         };
         walk.wrong(span, message.to_owned());
         return None;

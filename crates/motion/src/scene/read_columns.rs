@@ -147,9 +147,10 @@ impl ColumnOptions {
             if table.contains_key(key) { finite(walk, table, key, span) } else { Some(default) }
         };
         let (scale, time_zero) = (or("scale", 1.0), or("time_zero", 0.0));
-        let time_scale = match table.contains_key("time_scale") {
-            true => positive(walk, table, "time_scale", span),
-            false => Some(1.0),
+        let time_scale = if table.contains_key("time_scale") {
+            positive(walk, table, "time_scale", span)
+        } else {
+            Some(1.0)
         };
         let interpolation = interpolation(walk, table, default);
         let held = one_of(walk, table, "outside", &[("hold", true)], false);

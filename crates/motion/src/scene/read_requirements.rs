@@ -67,9 +67,10 @@ impl Section<'_, '_> {
 
     /// Reads an optional positive number.
     fn optional(&mut self, key: &str) -> Option<Option<f64>> {
-        match self.table.contains_key(key) {
-            true => positive(self.walk, self.table, key, &self.span).map(Some),
-            false => Some(None),
+        if self.table.contains_key(key) {
+            positive(self.walk, self.table, key, &self.span).map(Some)
+        } else {
+            Some(None)
         }
     }
 
@@ -200,9 +201,8 @@ fn kind(walk: &mut Walk<'_>, table: &TomlTable) -> Option<AttachmentKind> {
 }
 
 fn limits(walk: &mut Walk<'_>, table: &TomlTable, span: &std::ops::Range<usize>) -> Option<Limits> {
-    let mut optional = |key: &str| match table.contains_key(key) {
-        true => positive(walk, table, key, span).map(Some),
-        false => Some(None),
+    let mut optional = |key: &str| {
+        if table.contains_key(key) { positive(walk, table, key, span).map(Some) } else { Some(None) }
     };
     let (deflection, stress) = (optional("deflection"), optional("stress"));
     let mode_stress: Option<Option<Vec<f64>>> = match table.get("mode_stress") {

@@ -134,11 +134,12 @@ impl ReferenceError {
         );
         let warning = Diagnostic::new(Code::ReferenceLacks, message);
         let begins_with_shock = scene.acting().any(|history| history.at(0.0).0.norm() != 0.0);
-        Some(match begins_with_shock && !scene.initial.settled {
-            true => warning.with_help(
+        Some(if begins_with_shock && !scene.initial.settled {
+            warning.with_help(
                 "start with deformation = \"static\" in [initial], or with loads that begin at zero: loads that act at time 0 begin with a shock",
-            ),
-            false => warning,
+            )
+        } else {
+            warning
         })
     }
 }

@@ -131,9 +131,10 @@ pub fn select(
     }
     // By simulation if every case has a duration, else by the frequency band.
     let mut selection_state = SelectionState::new(&demands);
-    let mode_reason = match selection_state.has_run() {
-        false => selection_state.choose_by_band(),
-        true => selection_state.choose_by_motion(context)?,
+    let mode_reason = if selection_state.has_run() {
+        selection_state.choose_by_motion(context)?
+    } else {
+        selection_state.choose_by_band()
     };
     // State the reasons of the decision.
     let SelectionState { choice, trials, diagnostics, short_of, chosen_by_case, .. } = selection_state;

@@ -142,9 +142,10 @@ impl<'s> SelectionState<'s> {
     fn search(&mut self, search: &SelectionSearch<'_>) -> Result<String> {
         let (choice, trials) = (&mut self.choice, &mut self.trials);
         if let Some(most) = self.demands[0].scene.requirements.multiplications {
-            return Ok(match search.within_cost(most, choice, trials)? {
-                true => format!("the smallest error with at most {most} multiplications"),
-                false => format!("no model needs {most} multiplications or fewer: everything is kept"),
+            return Ok(if search.within_cost(most, choice, trials)? {
+                format!("the smallest error with at most {most} multiplications")
+            } else {
+                format!("no model needs {most} multiplications or fewer: everything is kept")
             });
         }
         search.terms(choice, trials)?;

@@ -86,9 +86,10 @@ impl Situation {
         let amplitude = Input {
             name: "modal amplitude",
             value: mode_amplitudes.iter().map(|q| q * q).sum::<f64>().sqrt(),
-            source: match named.is_empty() {
-                true => "default: deflections of 10 % of the extent of the body".to_owned(),
-                false => format!("[limits] {}", named.join(", ")),
+            source: if named.is_empty() {
+                "default: deflections of 10 % of the extent of the body".to_owned()
+            } else {
+                format!("[limits] {}", named.join(", "))
             },
         };
         let driven = driven(body, scene, points, &spin, &acceleration, duration.value);
@@ -174,9 +175,10 @@ fn turning_of_run(
             let principal = inertia.symmetric_eigenvalues();
             let (least, most) = (principal.min(), principal.max());
             let spin = (start.norm() + torque * duration) / least;
-            let source = match scene.loads.is_empty() {
-                true => "[initial] angular_velocity, of a rigid body",
-                false => "[initial] angular_velocity and [[load]], of a rigid body",
+            let source = if scene.loads.is_empty() {
+                "[initial] angular_velocity, of a rigid body"
+            } else {
+                "[initial] angular_velocity and [[load]], of a rigid body"
             };
             // |omega x I omega| is at most (I_max - I_min) |omega|^2.
             let acceleration = ((most - least) * spin * spin + torque) / least;

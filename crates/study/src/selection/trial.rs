@@ -335,9 +335,10 @@ impl TrialRuns<'_> {
         });
         let extremes = &trace.extremes;
         let energy = extremes.elastic.sqrt();
-        let deflection = match extremes.watched.is_empty() {
-            true => extremes.deflection.value * self.body.extent(),
-            false => extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max),
+        let deflection = if extremes.watched.is_empty() {
+            extremes.deflection.value * self.body.extent()
+        } else {
+            extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max)
         };
         let share = |j: usize| {
             let amplitude = extremes.amplitudes[j];

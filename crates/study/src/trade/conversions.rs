@@ -120,9 +120,10 @@ const OF_THE_MODEL: &str = "bodies that were made from the model";
 /// Returns schemes that lump the whole mass of `model`. Empty if the mass is lumped already, or if rows without a
 /// position carry mass that belongs to no node.
 fn lumpings(model: &FeModel) -> Vec<Lumping> {
-    match model.has_diagonal_mass() || model.rows().vectors() > 0 {
-        true => Vec::new(),
-        false => ConvertSettings::default().lumped,
+    if model.has_diagonal_mass() || model.rows().vectors() > 0 {
+        Vec::new()
+    } else {
+        ConvertSettings::default().lumped
     }
 }
 

@@ -92,9 +92,10 @@ impl Given {
         x: &mut [f64],
     ) -> Result<Vector6<f64>, Failure> {
         turned.complete(&self.or_own(momenta, own), x)?;
-        match self.components.contains(&true) {
-            true => turned.solve_given(x, self.components, &self.motion)?,
-            false => turned.solve(x)?,
+        if self.components.contains(&true) {
+            turned.solve_given(x, self.components, &self.motion)?
+        } else {
+            turned.solve(x)?
         }
         turned.frame_of(x)
     }

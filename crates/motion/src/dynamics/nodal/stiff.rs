@@ -93,9 +93,10 @@ impl<'m> Stiff<'m> {
         self.factors.clear();
         for mode in modes {
             let z = mode.value * h;
-            let factor = match mode.paired {
-                true => factored(&self.sum(z), self.equations).map(StepFactor::Complex),
-                false => factored(&self.sum(z.re), self.equations).map(StepFactor::Real),
+            let factor = if mode.paired {
+                factored(&self.sum(z), self.equations).map(StepFactor::Complex)
+            } else {
+                factored(&self.sum(z.re), self.equations).map(StepFactor::Real)
             };
             self.factors.push(factor.ok_or(SINGULAR)?);
         }

@@ -141,9 +141,10 @@ impl Effort {
                 let for_loads = 1.0 / (20.0 * fastest_history(scene, self.duration));
                 let step = (FIRST_ANGLE / highest_rate).min(for_loads).min(self.duration);
                 let (explicit, implicit) = (self.explicit(), self.implicit(ORDER, step, MIN_STEP_RUNS));
-                match explicit <= MAX_EXPLICIT_SECONDS.max(implicit) {
-                    true => (Way::Explicit, explicit),
-                    false => (Way::Implicit { order: ORDER, step, given: false }, implicit),
+                if explicit <= MAX_EXPLICIT_SECONDS.max(implicit) {
+                    (Way::Explicit, explicit)
+                } else {
+                    (Way::Implicit { order: ORDER, step, given: false }, implicit)
                 }
             }
         }

@@ -90,10 +90,7 @@ impl<'a> NodalSetup<'a> {
         let motion = NodalMotion::new(&self.equations, |time, evaluation: &mut NodalEvaluation<'s>| {
             self.act(time, evaluation);
         });
-        match self.scene.prescribes() {
-            true => motion.driven(|time, axes| self.driving.at(time, axes)),
-            false => motion,
-        }
+        if self.scene.prescribes() { motion.driven(|time, axes| self.driving.at(time, axes)) } else { motion }
     }
 
     fn act(&self, time: f64, evaluation: &mut NodalEvaluation<'_>) {
