@@ -143,7 +143,8 @@ fn reason(kept: bool, decisive_error: Option<DecisiveError>, groups: &[TermGroup
         return if kept {
             format!("keep {names}: no bound or run shows that it can be dropped")
         } else {
-            format!("{names} is not in the body")
+            let are = if groups.len() == 1 { "is" } else { "are" };
+            format!("{names} {are} not in the body")
         };
     };
     let error = error_in_words(output, error, 2);

@@ -114,7 +114,7 @@ impl Text {
         }
         let [of_label, of_text] = codes(term.tone);
         for (i, line) in lines.iter().enumerate() {
-            let label = format!("{:LABEL$}", if i == 0 { label } else { "" });
+            let label = format!("{:LABEL_COLUMNS$}", if i == 0 { label } else { "" });
             let line = line.replace(KEEP, " ");
             self.painted(of_label, if line.is_empty() { label.trim_end() } else { &label });
             self.painted(of_text, line.trim_end());
