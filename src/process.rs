@@ -95,7 +95,7 @@ impl Write for Line {
 
 #[cfg(unix)]
 fn write_stderr(text: &[u8]) {
-    // SAFETY: the bytes are there for as long as the call lasts. Nobody is left to tell when it fails.
+    // SAFETY: the bytes are there for as long as the call lasts. A failure cannot be reported.
     let _ = unsafe { libc::write(2, text.as_ptr().cast(), text.len()) };
 }
 
