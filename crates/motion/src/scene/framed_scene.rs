@@ -38,7 +38,7 @@ impl<'a> FramedScene<'a> {
     /// was resolved for, do not change.
     ///
     /// # Errors
-    /// FB212 and FB214 if the body lacks the carrier of the scene; FB213 for a prescribed motion beyond the
+    /// FB212 and FB214 if the body does not have the carrier of the scene; FB213 for a prescribed motion beyond the
     /// limits of the scene.
     pub fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
         if scene.resolved {

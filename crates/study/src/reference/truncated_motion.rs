@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 /// phase, little of a vibration's peak is missed.
 const EVALUATED_INSTANTS: usize = 480;
 
-/// Displacements X y(t) of all rows that the body's own motion lacks, with X = [Psi, E]: the modes, which are moved by
+/// Truncated displacements X y(t) of all rows, with X = [Psi, E]: the modes, which are moved by
 /// the truncated part, and the static responses outside the modes.
 pub(super) struct TruncatedMotion<'a> {
     view: &'a NodalView<'a>,
