@@ -15,7 +15,7 @@ use flexbody_motion::dynamics::{
 use flexbody_motion::integration::System;
 use nalgebra::{DVector, Vector3};
 use oracle::equations::State;
-use oracle::flexible::{fixture, lively_state, oracle};
+use oracle::flexible::{fixture, moving_state, oracle};
 use oracle::general::{quasi_velocities, raw_fixture};
 use oracle::random::Random;
 use std::time::Instant;
@@ -65,7 +65,7 @@ fn main() {
         for name in ["bracket_hex20", "shell_folded"] {
             let body = fixture(name, nf, BodyFrame::Principal);
             let mut random = Random(1);
-            let states: Vec<State> = (0..16).map(|_| lively_state(&mut random, &body)).collect();
+            let states: Vec<State> = (0..16).map(|_| moving_state(&mut random, &body)).collect();
             let velocities: Vec<DVector<f64>> = states.iter().map(quasi_velocities).collect();
             let oracle = oracle(&body);
             let dense = best_seconds(|i| {
@@ -97,7 +97,7 @@ fn main() {
         let equations = EquationsOfMotion::new(&body, Terms::ALL);
         let n = equations.n_velocities();
         let mut evaluation = Evaluation::new(&equations);
-        let state = lively_state(&mut Random(2), &body);
+        let state = moving_state(&mut Random(2), &body);
         evaluation.set(state.q.as_slice(), quasi_velocities(&state).as_slice());
         let (acceleration, mut by_q, mut by_nu) = (vec![0.1; n], vec![0.0; n * nf], vec![0.0; n * n]);
         let jacobian = best_seconds(|_| evaluation.jacobian(&acceleration, &mut by_q, &mut by_nu));

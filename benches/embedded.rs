@@ -9,7 +9,7 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_formats::export::{ExportOptions, Points};
 use flexbody_formats::find_format;
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
-use oracle::flexible::{fixture, lively_state};
+use oracle::flexible::{fixture, moving_state};
 use oracle::general::quasi_velocities;
 use oracle::random::Random;
 use std::process::Command;
@@ -53,7 +53,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// States as tests/embedded/evaluation.c takes them, no forces applied.
 fn states(body: &FlexBody) -> Vec<Vec<f64>> {
     let mut random = Random(1);
-    let own = (0..STATES).map(|_| lively_state(&mut random, body));
+    let own = (0..STATES).map(|_| moving_state(&mut random, body));
     own.map(|state| {
         let (q, nu) = (state.q.as_slice(), quasi_velocities(&state));
         [q, nu.as_slice(), &vec![0.0; nu.len() + 9]].concat()

@@ -20,7 +20,7 @@ fn main() -> std::process::ExitCode {
         // A panic ends the process.
         Ok(worker) => worker.join().unwrap_or(ExitCode::Bug),
         Err(error) => {
-            let message = format!("not enough memory: no thread can be started: {error}");
+            let message = format!("not enough memory to start the threads: {error}");
             let _ = writeln!(std::io::stderr(), "{}", Diagnostic::new(Code::MemoryShort, message));
             ExitCode::Resources
         }

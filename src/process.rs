@@ -72,10 +72,9 @@ fn out_of_memory(size: usize) -> ! {
     // The text is shorter than the line.
     let _ = writeln!(
         line,
-        "error[FB601]: not enough memory: another {size} bytes are not to be had\n  help: raise the limits of memory, ask for \
-         fewer modes, use fewer threads (--threads), or a larger machine"
+        "error[FB601]: not enough memory: {size} more bytes are not available\n  help: compute fewer modes, use fewer threads (--threads), raise the limits of memory, or use a larger machine"
     );
-    tell(&line.bytes[..line.len]);
+    write_stderr(&line.bytes[..line.len]);
     end(ExitCode::Resources)
 }
 
@@ -87,21 +86,21 @@ struct Line {
 
 impl Write for Line {
     fn write_str(&mut self, text: &str) -> std::fmt::Result {
-        let room = self.bytes.get_mut(self.len..self.len + text.len()).ok_or(std::fmt::Error)?;
-        room.copy_from_slice(text.as_bytes());
+        let rest = self.bytes.get_mut(self.len..self.len + text.len()).ok_or(std::fmt::Error)?;
+        rest.copy_from_slice(text.as_bytes());
         self.len += text.len();
         Ok(())
     }
 }
 
 #[cfg(unix)]
-fn tell(text: &[u8]) {
-    // SAFETY: the bytes are there for as long as the call lasts. Nobody is left to tell when it fails.
+fn write_stderr(text: &[u8]) {
+    // SAFETY: the bytes are there for as long as the call lasts. A failure cannot be reported.
     let _ = unsafe { libc::write(2, text.as_ptr().cast(), text.len()) };
 }
 
 #[cfg(not(unix))]
-fn tell(text: &[u8]) {
+fn write_stderr(text: &[u8]) {
     let _ = std::io::Write::write_all(&mut std::io::stderr(), text);
 }
 

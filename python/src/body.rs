@@ -354,13 +354,13 @@ impl Body {
     /// file.
     fn select(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Selection> {
         let (scene, body) = (Scene::whole(py, scene)?, Arc::clone(&self.inner));
-        Selection::told(py, run(py, move |listener| body.select_heard(&scene, listener))?)
+        Selection::told(py, run(py, move |listener| body.select_with_progress(&scene, listener))?)
     }
 
     /// Simulates the body in a scene: a Scene, or the path of a scene file without load cases.
     fn simulate(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Motion> {
         let (scene, body) = (Scene::one(py, scene)?, Arc::clone(&self.inner));
-        Motion::told(py, run(py, move |listener| body.simulate_heard(&scene, listener))?)
+        Motion::told(py, run(py, move |listener| body.simulate_with_progress(&scene, listener))?)
     }
 
     /// Measures accuracy against cost in a scene for reduced versions of this body. `Model.trade` compares conversions.

@@ -261,13 +261,13 @@ impl Model {
         let model = Arc::clone(&self.inner);
         let (body, mut found): (flexbody::FlexBody, Vec<Diagnostic>) = match scene {
             None => {
-                let made = run(py, move |listener| model.convert_heard(&options, listener))?;
+                let made = run(py, move |listener| model.convert_with_progress(&options, listener))?;
                 (made.body, made.diagnostics)
             }
             Some(scene) => {
                 let scene = Scene::whole(py, scene)?;
                 let (made, selection) =
-                    run(py, move |listener| model.convert_for_heard(&scene, &options, listener))?;
+                    run(py, move |listener| model.convert_for_with_progress(&scene, &options, listener))?;
                 (made.body, [made.diagnostics, selection.diagnostics().to_vec()].concat())
             }
         };

@@ -1,7 +1,7 @@
 //! Flexible bodies.
 
 use super::matrix::shown;
-use super::progress::{Listener, NOBODY, heard};
+use super::progress::{Listener, NO_LISTENER, heard};
 use super::{Matrix, Motion, Scene, Selection};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -84,10 +84,10 @@ impl FlexBody {
     fn export_as(&self, format: &str, path: &Path, options: ExportOptions) -> Result<Vec<Diagnostic>> {
         let options = ExportOptions { name: Some(path.to_owned()), ..options };
         let format = find_format(format)?;
-        let (exported, mut told) = export(&self.0, format, &options, true)?;
-        told.extend(interface_compliance(&self.0).filter(|_| !format.is_picture()));
+        let (exported, mut diagnostics) = export(&self.0, format, &options, true)?;
+        diagnostics.extend(interface_compliance(&self.0).filter(|_| !format.is_picture()));
         OutputSlot::commit_all(exported.fill(OutputSlot::prepare(path)?)?)?;
-        Ok(told)
+        Ok(diagnostics)
     }
 
     /// Returns the formats of [`FlexBody::export`]: the name of each, and the programs that read it.
@@ -227,14 +227,14 @@ impl FlexBody {
     /// # Errors
     /// FB212 if the scene does not match the body; FB540 if its motion cannot be integrated.
     pub fn select(&self, scene: &Scene) -> Result<Selection> {
-        self.select_heard(scene, NOBODY)
+        self.select_with_progress(scene, NO_LISTENER)
     }
 
     /// Does the work of [`FlexBody::select`] with a listener, which may stop it.
     ///
     /// # Errors
     /// The errors of [`FlexBody::select`]; FB605 if the listener stops it.
-    pub fn select_heard(&self, scene: &Scene, listener: Listener<'_>) -> Result<Selection> {
+    pub fn select_with_progress(&self, scene: &Scene, listener: Listener<'_>) -> Result<Selection> {
         heard(listener, |context| select(&self.0, &[], &scene.0, context)).map(Selection)
     }
 
@@ -292,14 +292,14 @@ impl FlexBody {
     /// FB219 if the scene has several load cases; FB212 if it does not match the body; FB540 if the integration fails;
     /// FB550 if it takes more steps than allowed.
     pub fn simulate(&self, scene: &Scene) -> Result<Motion> {
-        self.simulate_heard(scene, NOBODY)
+        self.simulate_with_progress(scene, NO_LISTENER)
     }
 
     /// Does the work of [`FlexBody::simulate`] with a listener, which may stop it.
     ///
     /// # Errors
     /// The errors of [`FlexBody::simulate`]; FB605 if the listener stops it.
-    pub fn simulate_heard(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
+    pub fn simulate_with_progress(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
         let scene = scene.0.single()?;
         let (recording, diagnostics) = heard(listener, |context| {
             context.phase("simulation");

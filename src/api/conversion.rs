@@ -1,6 +1,6 @@
 //! Conversion of a model to a body.
 
-use super::progress::{Listener, NOBODY, heard};
+use super::progress::{Listener, NO_LISTENER, heard};
 use super::{Basis, FlexBody, Model, Scene, Selection};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -114,16 +114,20 @@ impl Model {
     /// none, FB514 if the damping feeds energy into them, FB601 if the memory is insufficient; FB714 if an identity
     /// does not hold.
     pub fn convert(&self, options: &ConvertOptions) -> Result<Conversion> {
-        self.convert_heard(options, NOBODY)
+        self.convert_with_progress(options, NO_LISTENER)
     }
 
     /// Does the work of [`Model::convert`] with a listener, which may stop it.
     ///
     /// # Errors
     /// The errors of [`Model::convert`]; FB605 if the listener stops it.
-    pub fn convert_heard(&self, options: &ConvertOptions, listener: Listener<'_>) -> Result<Conversion> {
+    pub fn convert_with_progress(
+        &self,
+        options: &ConvertOptions,
+        listener: Listener<'_>,
+    ) -> Result<Conversion> {
         if options.basis == Basis::Scene {
-            let message = "a basis made for a scene needs one: `convert_for`";
+            let message = "a basis made for a scene needs the scene: use `convert_for`";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
         let settings = options.settings(self, None)?;
@@ -137,14 +141,14 @@ impl Model {
     /// # Errors
     /// The errors of [`Model::convert`]; FB212 if the scene does not match the body.
     pub fn convert_for(&self, scene: &Scene, options: &ConvertOptions) -> Result<(Conversion, Selection)> {
-        self.convert_for_heard(scene, options, NOBODY)
+        self.convert_for_with_progress(scene, options, NO_LISTENER)
     }
 
     /// Does the work of [`Model::convert_for`] with a listener, which may stop it.
     ///
     /// # Errors
     /// The errors of [`Model::convert_for`]; FB605 if the listener stops it.
-    pub fn convert_for_heard(
+    pub fn convert_for_with_progress(
         &self,
         scene: &Scene,
         options: &ConvertOptions,

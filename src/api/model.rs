@@ -31,14 +31,14 @@ impl SparseMatrix {
         if col_ptr.len() != n + 1 || col_ptr[0] != 0 || col_ptr.windows(2).any(|pair| pair[0] > pair[1]) {
             return refuse(
                 Code::MatrixCount,
-                format!("{} pointers are no ascending ones of {n} columns", col_ptr.len()),
+                format!("{} column pointers are not ascending or do not fit {n} columns", col_ptr.len()),
             );
         }
         if row_idx.len() != values.len() || col_ptr[n] != values.len() {
             let (rows, numbers) = (row_idx.len(), values.len());
             return refuse(
                 Code::MatrixCount,
-                format!("{rows} rows and {numbers} values for {} entries", col_ptr[n]),
+                format!("{rows} row indices and {numbers} values, expected {} of each", col_ptr[n]),
             );
         }
         check_size(n as u64, n as u64, values.len() as u64)?;
@@ -49,11 +49,14 @@ impl SparseMatrix {
             if let Some(row) = row_idx[entries.clone()].iter().find(|row| **row >= n) {
                 return refuse(
                     Code::MatrixIndex,
-                    format!("column {column} has an entry in row {row} of {n}"),
+                    format!("column {column} has an entry in row {row}, but the matrix has {n} rows"),
                 );
             }
             if row_idx[entries.clone()].windows(2).any(|pair| pair[0] >= pair[1]) {
-                return refuse(Code::MatrixIndex, format!("the rows of column {column} do not ascend"));
+                return refuse(
+                    Code::MatrixIndex,
+                    format!("the row indices of column {column} are not ascending"),
+                );
             }
             triplets.extend(entries.map(|k| (row_idx[k] as u32, column as u32, values[k])));
         }

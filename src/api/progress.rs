@@ -24,7 +24,7 @@ pub enum Progress<'a> {
 pub type Listener<'a> = &'a (dyn Fn(Progress<'_>) -> ControlFlow<()> + Sync);
 
 /// Ignores all reports and lets everything continue.
-pub(super) const NOBODY: Listener<'static> = &|_| ControlFlow::Continue(());
+pub(super) const NO_LISTENER: Listener<'static> = &|_| ControlFlow::Continue(());
 
 /// Panic payload that unwinds a computation stopped by its listener.
 struct Stopped;

@@ -53,7 +53,7 @@ pub struct Trade {
     study: trade::Trade,
     sources: Vec<Source>,
     /// Truncation errors of the reference in each load case.
-    lacks: Vec<Vec<ReferenceError>>,
+    reference_errors: Vec<Vec<ReferenceError>>,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -71,12 +71,12 @@ impl Model {
             let wanted = WantedBodies { modes: options.modes, fine };
             let made = conversions(&self.checked, &scene.0, wanted, context)?;
             let nodal = (options.reference == ReferenceChoice::Nodal).then_some(&self.checked);
-            let reserved = trade::reserved(&made.lacks, nodal.is_some());
+            let reserved = trade::reserved(&made.reference_errors, nodal.is_some());
             let settings =
                 TradeSettings { repeat: options.repeat, reserved: &reserved, varied: Some(&made.varied) };
             let study = trade::trade(&made.sources, &scene.0, nodal, &settings, context)?;
             let diagnostics = [made.diagnostics, made.varied.diagnostics, study.diagnostics.clone()].concat();
-            Ok(Trade { study, sources: made.sources, lacks: made.lacks, diagnostics })
+            Ok(Trade { study, sources: made.sources, reference_errors: made.reference_errors, diagnostics })
         })
     }
 }
@@ -90,8 +90,7 @@ impl FlexBody {
     /// does not match the body; FB540 if its motion cannot be integrated; FB605 if the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
         if options.reference != ReferenceChoice::Full {
-            let message =
-                "errors against all nodes, or a finer body, need the matrices: ask the model, not the body";
+            let message = "errors relative to all nodes or to a finer body need the matrices: call the function of the model";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
         let varied = Varied::of_body(&scene.0, self.dimension());
@@ -99,7 +98,7 @@ impl FlexBody {
         let settings = TradeSettings { repeat: options.repeat, reserved: &[], varied: Some(&varied) };
         let study = heard(listener, |context| trade::trade(&sources, &scene.0, None, &settings, context))?;
         let diagnostics = study.diagnostics.clone();
-        Ok(Trade { study, sources, lacks: Vec::new(), diagnostics })
+        Ok(Trade { study, sources, reference_errors: Vec::new(), diagnostics })
     }
 }
 
@@ -127,7 +126,8 @@ impl Trade {
     /// FB801 if there is no such candidate; FB703 if lumped masses give no valid body.
     pub fn body(&self, candidate: usize) -> Result<FlexBody> {
         let Some(row) = self.study.rows.get(candidate) else {
-            let message = format!("there is no candidate {candidate} of {}", self.candidates());
+            let message =
+                format!("candidate {candidate} does not exist: the study has {}", self.candidates());
             return Err(Diagnostic::new(Code::Usage, message).into());
         };
         row.candidate.body(&self.sources[row.candidate.source]).map(FlexBody)
@@ -139,14 +139,14 @@ impl Trade {
         let nodal = self.study.reference == ReferenceKind::Nodal;
         let is_reference =
             |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
-        let is_reference = nodal || self.lacks.iter().all(is_reference);
+        let is_reference = nodal || self.reference_errors.iter().all(is_reference);
         self.recommended().is_some() && is_reference && self.study.holds_in_stated_variations()
     }
 
     /// Returns the report of `flexbody trade`.
     pub fn report(&self, format: ReportFormat) -> String {
         let run = report::run(&self.diagnostics);
-        TradeFacts::new(&self.study, &self.lacks, &run).render(format.inner())
+        TradeFacts::new(&self.study, &self.reference_errors, &run).render(format.inner())
     }
 
     /// Returns the table of `flexbody trade --csv`: one line per candidate.

@@ -26,7 +26,7 @@ use std::path::PathBuf;
 #[command(
     after_help = "Exit codes: 0 done; 1 a check or tolerance failed; 2 bad input or usage; 3 no trustworthy \
     numerical result; 4 not enough memory or disk, or an output that may not be written; 70 internal error; 130 interrupted (SIGINT, SIGTERM, SIGHUP). Other signals: 128 + number. \
-    With 0 all outputs are in their places, with 2 to 130 and after signals none is, and no unfinished file is left. Codes of all messages: docs/codes.md."
+    With 0 all output files are written; with 2 to 130 and after signals none is, and no unfinished file is left. Codes of all messages: docs/codes.md."
 )]
 pub struct Arguments {
     /// Command to run.
@@ -635,6 +635,6 @@ fn memory_size(text: &str) -> Result<u64, String> {
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err("a positive number is expected".to_owned()),
+        _ => Err("expected a positive number".to_owned()),
     }
 }

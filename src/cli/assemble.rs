@@ -2,7 +2,7 @@
 
 use super::arguments::{AssembleArguments, ConvertArguments, EngineArguments, JobArguments, StatedArguments};
 use super::convert::run_with;
-use super::elsewhere::Elsewhere;
+use super::mode_source::ModeSource;
 use super::outcome::Outcome;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -14,13 +14,14 @@ pub(super) fn run(arguments: &AssembleArguments) -> Result<Outcome> {
     let prepared = read_prepared(&arguments.folder)?;
     let converted = as_conversion(arguments, &prepared)?;
     let (folder, prove) = (arguments.folder.clone(), arguments.prove);
-    run_with(&converted, &Elsewhere::Cluster { folder, prepared: Box::new(prepared), prove })
+    run_with(&converted, &ModeSource::Cluster { folder, prepared: Box::new(prepared), prove })
 }
 
 /// Returns the corresponding arguments of `convert`.
 fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<ConvertArguments> {
     let model = arguments.model.clone().or_else(|| prepared.model.path.clone()).ok_or_else(|| {
-        Diagnostic::new(Code::Usage, "the folder does not say where its model is").with_help("give --model")
+        Diagnostic::new(Code::Usage, "the folder does not state the path of its model")
+            .with_help("give the path with --model")
     })?;
     let hertz = |lambda: f64| lambda.sqrt() / std::f64::consts::TAU * prepared.hertz;
     let modes = prepared.wanted.modes.and_then(|count| u32::try_from(count).ok());

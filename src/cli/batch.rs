@@ -136,7 +136,7 @@ fn parse(list: &BatchList, body: &BatchBody) -> Result<(Vec<String>, Box<Convert
     let program = std::iter::once("flexbody".to_owned());
     match Arguments::try_parse_from(program.chain(words.clone())).map(|parsed| parsed.command) {
         Ok(Command::Convert(converted)) => Ok((words, converted)),
-        Ok(_) => Err(refused(body, "its options are those of another command")),
+        Ok(_) => Err(refused(body, "its options belong to another command")),
         Err(error) => {
             let text = error.render().to_string();
             let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
@@ -152,9 +152,9 @@ fn refuse_programs(body: &BatchBody, converted: &ConvertArguments) -> Result<()>
     match named.iter().find(|(_, is_named)| *is_named) {
         None => Ok(()),
         Some((option, _)) => {
-            let message = format!("{}: {option} names a program to start", body.output.display());
+            let message = format!("{}: {option} would start a program", body.output.display());
             let help =
-                "set FLEXBODY_MPIEXEC and FLEXBODY_PYTHON, or allow it by flexbody batch --allow-programs";
+                "set FLEXBODY_MPIEXEC and FLEXBODY_PYTHON, or allow it with flexbody batch --allow-programs";
             Err(Diagnostic::new(Code::BatchSyntax, message).with_help(help).into())
         }
     }
@@ -211,13 +211,13 @@ fn fail(row: &mut BatchRow, error: &Error) {
 }
 
 /// Result of a conversion that has ended.
-struct Ended {
+struct FinishedConversion {
     index: usize,
     need: u64,
     output: PathBuf,
     inputs: String,
     exit_code: i32,
-    told: Value,
+    json: Value,
     seconds: f64,
 }
 
@@ -231,7 +231,7 @@ fn work(
     let program = std::env::current_exe().map_err(|e| {
         Error::from(Diagnostic::new(Code::MemoryShort, format!("this program cannot be started again: {e}")))
     })?;
-    let (ended, of) = mpsc::channel::<Ended>();
+    let (ended, of) = mpsc::channel::<FinishedConversion>();
     std::thread::scope(|scope| {
         let mut running: Vec<u64> = Vec::new();
         loop {
@@ -257,11 +257,11 @@ fn work(
             let Ok(done) = of.recv() else { return Ok(()) };
             running.iter().position(|need| *need == done.need).map(|at| running.swap_remove(at));
             let row = &mut rows[done.index];
-            row.read(&done.told);
+            row.read(&done.json);
             (row.exit_code, row.seconds) = (done.exit_code, done.seconds);
             if done.exit_code == 0 {
                 row.state = "done";
-                ledger.add(&done.output, done.inputs, done.told)?;
+                ledger.add(&done.output, done.inputs, done.json)?;
             } else if row.error.is_none() {
                 row.error = Some(format!("its process ended with code {}", done.exit_code));
             }
@@ -270,7 +270,7 @@ fn work(
 }
 
 /// Runs one conversion as a separate process, so that one that ends for lack of memory does not end the others.
-fn convert(program: &std::path::Path, index: usize, body: Body, limit: u64) -> Ended {
+fn convert(program: &std::path::Path, index: usize, body: Body, limit: u64) -> FinishedConversion {
     let Body { words, output, inputs, need } = body;
     let begun = Instant::now();
     let mut process = Process::new(program);
@@ -279,12 +279,20 @@ fn convert(program: &std::path::Path, index: usize, body: Body, limit: u64) -> E
         process.args(["--memory-limit", &limit.to_string()]);
     }
     let ended = children::output(&mut process);
-    let (exit_code, told) = match ended {
+    let (exit_code, json) = match ended {
         Ok(ended) => {
-            let told = serde_json::from_slice(&ended.stdout).unwrap_or(Value::Null);
-            (ended.status.code().unwrap_or(-1), told)
+            let json = serde_json::from_slice(&ended.stdout).unwrap_or(Value::Null);
+            (ended.status.code().unwrap_or(-1), json)
         }
         Err(_) => (-1, Value::Null),
     };
-    Ended { index, need, output, inputs, exit_code, told, seconds: begun.elapsed().as_secs_f64() }
+    FinishedConversion {
+        index,
+        need,
+        output,
+        inputs,
+        exit_code,
+        json,
+        seconds: begun.elapsed().as_secs_f64(),
+    }
 }

@@ -14,7 +14,7 @@ use flexbody_report::{dropped_text, identities_json, identities_text};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
     if let (None, Some(option)) = (&arguments.against, arguments.job.first()) {
-        let message = format!("{option} says something of the job of --against, which is missing");
+        let message = format!("{option} describes the job of --against, but --against is missing");
         return Err(Diagnostic::new(Code::Usage, message).into());
     }
     let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
@@ -39,7 +39,7 @@ fn model_of(body: &FlexBody, raw: RawModel) -> Result<FeModel> {
     let count = bodies.len();
     let found = bodies.into_iter().map(|checked| checked.model).find(|model| model.number() == Some(number));
     found.ok_or_else(|| {
-        let message = format!("the file holds {number}, the model has {count}");
+        let message = format!("the file states body {number}, but the matrices of the model hold {count}");
         Diagnostic::new(Code::BodyIncomparable, message).into()
     })
 }

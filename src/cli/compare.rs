@@ -50,7 +50,7 @@ fn format_of(path: &Path) -> Result<ComparisonFormat> {
     ComparisonFormat::from_path(path).ok_or_else(|| {
         let message = format!("report {} has no known extension", path.display());
         Diagnostic::new(Code::Usage, message)
-            .with_help("name it .html, .json, .txt, .md (Markdown) or .xml (JUnit)")
+            .with_help("give it the extension .html, .json, .txt, .md (Markdown) or .xml (JUnit)")
             .into()
     })
 }

@@ -23,8 +23,8 @@ pub(super) fn man(arguments: &ManArguments) -> Result<Outcome> {
         None => clap_mangen::Man::new(program),
         Some(name) => {
             let found = program.find_subcommand(name).ok_or_else(|| {
-                let message = format!("`{name}` is no command");
-                Diagnostic::new(Code::Usage, message).with_help("flexbody --help lists the commands")
+                let message = format!("`{name}` is not a command");
+                Diagnostic::new(Code::Usage, message).with_help("list the commands with flexbody --help")
             })?;
             clap_mangen::Man::new(found.clone())
         }

@@ -1,8 +1,8 @@
 //! Command `flexbody convert`.
 
 use super::arguments::{ConvertArguments, EngineName, EnrichmentName, StatedArguments};
-use super::elsewhere::Elsewhere;
 use super::import;
+use super::mode_source::ModeSource;
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{BodyOutputs, Reserved, format_of, refuse_replacing, refuse_replacing_read};
@@ -36,21 +36,21 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
         return import::run(arguments, from);
     }
-    let elsewhere = Elsewhere::of(arguments);
-    let outcome = run_with(arguments, &elsewhere)?;
-    elsewhere.tidy();
+    let mode_source = ModeSource::of(arguments);
+    let outcome = run_with(arguments, &mode_source)?;
+    mode_source.tidy();
     Ok(outcome)
 }
 
 /// Runs a conversion whose modes are found by this program or elsewhere.
-pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> Result<Outcome> {
+pub(super) fn run_with(arguments: &ConvertArguments, mode_source: &ModeSource) -> Result<Outcome> {
     refuse_without_modes(arguments)?;
     stated_parts(&arguments.stated)?;
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
     // The command line takes precedence over the manifest.
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
-    let keep_in = elsewhere.keeps_in(&arguments.output);
+    let keep_in = mode_source.keeps_in(&arguments.output);
     let files = ModelFiles { keep_in, ..model_files(arguments)? };
     let read = |path| LoadCases::read(path, arguments.case.as_deref());
     let cases = arguments.scene.as_deref().map(read).transpose()?;
@@ -69,7 +69,8 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     // Check before the work: files that a deck includes or assigns are known now.
     refuse_replacing_read(places.all())?;
     watcher.hear(Event::Phase("checks"));
-    let job = Job { arguments, lumped: &lumped, loads: &loads, formats: &formats, cases, elsewhere, threads };
+    let job =
+        Job { arguments, lumped: &lumped, loads: &loads, formats: &formats, cases, mode_source, threads };
     if !arguments.split {
         let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
         OutputSlot::commit_all(done.slots)?;
@@ -85,13 +86,19 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     for places in &all[1..] {
         slots.push(places.reserve()?);
     }
-    let (mut finished, mut told) = (Vec::<Done>::new(), Vec::<Diagnostic>::new());
+    let (mut finished, mut diagnostics) = (Vec::<Done>::new(), Vec::<Diagnostic>::new());
     for ((checked, places), reserved) in bodies.into_iter().zip(&all).zip(slots) {
         let watcher = if finished.is_empty() { &watcher } else { &self::watcher(arguments, "start") };
         let done = job.convert(checked, places, reserved, watcher)?;
         // Diagnostics of the common matrices are reported once.
-        let new = done.outcome.diagnostics.iter().filter(|d| !told.contains(*d)).cloned().collect::<Vec<_>>();
-        told.extend(new);
+        let new = done
+            .outcome
+            .diagnostics
+            .iter()
+            .filter(|d| !diagnostics.contains(*d))
+            .cloned()
+            .collect::<Vec<_>>();
+        diagnostics.extend(new);
         finished.push(done);
     }
     // No file appears before everything is done.
@@ -101,7 +108,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let texts: Vec<String> = outcomes.iter().map(|outcome| outcome.text.clone()).collect();
     let reports: Vec<&str> = outcomes.iter().map(|outcome| outcome.json.trim_end()).collect();
     let json = format!("{{\n\"bodies\": [\n{}\n]\n}}", reports.join(",\n"));
-    Ok(Outcome { text: texts.join("\n"), json, diagnostics: told, passed: true })
+    Ok(Outcome { text: texts.join("\n"), json, diagnostics, passed: true })
 }
 
 fn watcher(arguments: &ConvertArguments, first: &str) -> Watcher {
@@ -116,7 +123,7 @@ struct Job<'a> {
     formats: &'a [Format],
     /// Load cases of the scene; `None` without a scene.
     cases: Option<&'a LoadCases>,
-    elsewhere: &'a Elsewhere,
+    mode_source: &'a ModeSource,
     threads: usize,
 }
 
@@ -160,7 +167,7 @@ impl Job<'_> {
         let mut settings = self.settings(model, BasisChoice::default());
         let watch = |event: Event<'_>| watcher.hear(event);
         let context = context(arguments.memory_limit, arguments.allow_long, &watch);
-        settings.basis = match self.elsewhere.modes(model, &settings.modes, &context)? {
+        settings.basis = match self.mode_source.modes(model, &settings.modes, &context)? {
             Some(found) => found,
             None => basis(arguments, self.loads, model)?,
         };
@@ -197,9 +204,12 @@ impl Job<'_> {
         let nothing = RunData::default();
         let decided = selection.as_ref().map(|selection| SelectionFacts::new(selection, &nothing));
         let text = body_text(&facts, arguments.verbose, arguments.printing)
-            + &decided.map_or_else(String::new, |decided| match arguments.verbose {
-                true => format!("\n{}", decided.render(Format::Text)),
-                false => format!("\n{}", decided.summary()),
+            + &decided.map_or_else(String::new, |decided| {
+                if arguments.verbose {
+                    format!("\n{}", decided.render(Format::Text))
+                } else {
+                    format!("\n{}", decided.summary())
+                }
             });
         let outcome = Outcome { text, json: render(&facts, Format::Json), diagnostics, passed: true };
         let slots = std::iter::once(reserved.body).chain(reserved.reports).collect();
@@ -306,9 +316,9 @@ pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
             ("interfaces", _) => LoadSource::Interfaces,
             (_, Some(path)) if !path.is_empty() => LoadSource::File(MatrixLocation::parse(path)),
             _ => {
-                let message = format!("`{text}` is no set of loads for residual vectors");
+                let message = format!("`{text}` is not a set of loads for residual vectors");
                 return Err(Diagnostic::new(Code::Usage, message)
-                    .with_help("centrifugal, interfaces, loads=FILE, each with @HZ for the responses at a frequency, or several of them with commas")
+                    .with_help("give centrifugal, interfaces or loads=FILE, separated by commas; append @HZ for the responses at a frequency")
                     .into());
             }
         };
@@ -324,9 +334,10 @@ pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
 
 fn refuse_without_modes(arguments: &ConvertArguments) -> Result<()> {
     if arguments.modes == Some(0) && arguments.basis != BasisKind::CraigBampton {
-        let message = "--modes 0 leaves a body no modes: only --basis craig-bampton has static shapes that can do without";
+        let message =
+            "--modes 0 leaves the body without modes: only --basis craig-bampton has static shapes besides";
         return Err(Diagnostic::new(Code::Usage, message)
-            .with_help("give at least 1, or --basis craig-bampton for static condensation")
+            .with_help("give --modes 1 or more, or --basis craig-bampton for static condensation")
             .into());
     }
     Ok(())
@@ -360,33 +371,35 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
             "--keep-modes takes the modes of one body: --split has several"
         }
         ConvertArguments { accuracy: Accuracy::Certified, .. } if basis == BasisKind::Scene => {
-            "the modes of this basis are no eigenvectors and cannot be certified"
+            "the modes of this basis are not eigenvectors and cannot be certified"
         }
         ConvertArguments { shapes: Some(_), .. } if basis != BasisKind::Imported => {
             "--shapes needs --basis imported"
         }
         ConvertArguments { storage: Storage::F32, accuracy: Accuracy::Certified, .. } => {
-            "--storage f32 rounds what --accuracy certified guarantees: take --storage f64"
+            "--storage f32 rounds the numbers that --accuracy certified guarantees: use --storage f64"
         }
         _ if slepc && basis != BasisKind::Free => "--engine slepc finds free modes: it needs --basis free",
         _ if slepc && residual => "residual vectors need the factor of --engine built-in",
-        ConvertArguments { scene: Some(_), .. } if slepc => "--scene chooses modes of --engine built-in",
-        ConvertArguments { split: true, .. } if slepc => "--engine slepc takes one body: --split has several",
+        ConvertArguments { scene: Some(_), .. } if slepc => "--scene needs --engine built-in",
+        ConvertArguments { split: true, .. } if slepc => {
+            "--engine slepc converts a single body: leave --split out"
+        }
         ConvertArguments { accuracy: Accuracy::Certified, .. } if slepc => {
             "--accuracy certified needs --engine built-in"
         }
         _ if residual && !searches_free_modes => "residual vectors need --basis free or craig-chang",
         ConvertArguments { split: true, .. } if loads.iter().any(|set| set.file().is_some()) => {
-            "--split: the rows of nodal loads are those of all bodies together"
+            "--split cannot be used with nodal loads, whose rows belong to all bodies together"
         }
         ConvertArguments { lumped_modes: true, .. } if residual => {
             "--lumped-modes compares free-surface modes, not residual vectors"
         }
         ConvertArguments { accuracy: Accuracy::Certified, .. } if residual => {
-            "residual vectors are no eigenvectors and cannot be certified"
+            "residual vectors are not eigenvectors and cannot be certified"
         }
         ConvertArguments { accuracy: Accuracy::Certified, .. } if coupled => {
-            "the modes of this basis are no eigenvectors and cannot be certified"
+            "the modes of this basis are not eigenvectors and cannot be certified"
         }
         ConvertArguments { lumped_modes: true, .. } if basis != BasisKind::Free => {
             "--lumped-modes compares free-surface modes: it needs --basis free"
@@ -467,7 +480,10 @@ fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
             arguments.job.units.as_deref(),
         )
         .map(|files| ModelFiles { dimension: arguments.job.dimension.unwrap_or(files.dimension), ..files }),
-        _ => Err(Diagnostic::new(Code::Usage, "give a manifest, or --stiffness, --mass and --nodes").into()),
+        _ => {
+            Err(Diagnostic::new(Code::Usage, "give a manifest, a job, or --stiffness, --mass and --nodes")
+                .into())
+        }
     }
 }
 

@@ -56,7 +56,7 @@ impl Findings {
             ("HDF5", format!("{}, {}", self.hdf5, self.hdf5_from)),
             ("processors", format!("{}, instructions {}", self.processors, self.instructions)),
             ("threads", self.threads.to_string()),
-            ("memory", gigabytes(self.memory_left_bytes, "not told by the system")),
+            ("memory", gigabytes(self.memory_left_bytes, "not reported by the system")),
             ("limit", gigabytes(self.address_space_limit_bytes, "none on address space")),
             ("temporary", format!("{}{writable}", self.temporary_folder)),
         ];

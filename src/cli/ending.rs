@@ -2,7 +2,7 @@
 
 use super::arguments::Arguments;
 use super::exit::end;
-use super::output::tell_bug;
+use super::output::report_internal_error;
 #[cfg(unix)]
 use super::signals;
 use flexbody_base::error::ExitCode;
@@ -32,7 +32,7 @@ fn panicked(panic: &PanicHookInfo<'_>, print: &dyn Fn(&PanicHookInfo<'_>), argum
     }
     print(panic);
     abandon_unfinished_soon();
-    end(tell_bug(arguments))
+    end(report_internal_error(arguments))
 }
 
 /// Ends the process at Ctrl-C.

@@ -63,9 +63,9 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let files: serde_json::Value = written.iter().map(file).collect();
     let json = serde_json::json!({ "format": format.name(), "files": files });
     // One line per file, or a summary for many files.
-    let told = if written.len() > MOST_LINES { 1 } else { written.len() };
-    let (told, others) = written.split_at(told);
-    let mut text: String = told.iter().map(line).collect();
+    let listed = if written.len() > MOST_LINES { 1 } else { written.len() };
+    let (listed, others) = written.split_at(listed);
+    let mut text: String = listed.iter().map(line).collect();
     if let Some((first, _)) = others.first() {
         let size: usize = others.iter().map(|(_, size)| size).sum();
         text += &format!("{} and others, {} files, {size} bytes\n", first.display(), others.len());
@@ -103,9 +103,9 @@ fn points(text: &str) -> Result<Points> {
     };
     let numbers: Option<Vec<i64>> = numbers.split(',').map(|number| number.trim().parse().ok()).collect();
     numbers.map(points).ok_or_else(|| {
-        let message = format!("`{text}` names no points of the body");
+        let message = format!("`{text}` is not a set of points of the body");
         Diagnostic::new(Code::Usage, message)
-            .with_help("nodes, interfaces, node numbers with commas, or `interfaces,17,23`")
+            .with_help("give nodes, interfaces, node numbers with commas, or both as in interfaces,17,23")
             .into()
     })
 }

@@ -18,7 +18,7 @@ use flexbody_report::{Facts, Format, RunData, render};
 pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     let format = find_import_format(from)?;
     let Some(path) = &arguments.model else {
-        let message = format!("--from {from} needs the file to convert");
+        let message = format!("--from {from} needs the path of the file to convert");
         return Err(Diagnostic::new(Code::Usage, message).into());
     };
     let units = arguments.job.units.as_deref().map(parse_units).transpose()?.unwrap_or_default();

@@ -21,7 +21,10 @@ pub(super) fn is_model(path: &Path, job: &JobArguments) -> Result<bool> {
     }
     match job.first() {
         Some(option) => {
-            let message = format!("{option} is for jobs, and {} is no job that is read", path.display());
+            let message = format!(
+                "{option} applies to the jobs of FE programs, and {} is not a known job",
+                path.display()
+            );
             Err(Diagnostic::new(Code::Usage, message)
                 .with_help("a flex-body file states its own units and interfaces")
                 .into())
@@ -103,18 +106,20 @@ fn is_manifest(path: &Path) -> bool {
 /// Refuses options that a manifest states itself.
 fn refuse_for_manifest(job: &JobArguments) -> Result<()> {
     let message = match job {
-        JobArguments { format: Some(_), .. } => "--format is for jobs: a manifest says `program` in [files]",
+        JobArguments { format: Some(_), .. } => {
+            "--format applies to jobs; set `program` in [files] of the manifest instead"
+        }
         JobArguments { matrices: Some(_), .. } => {
-            "--matrices is for jobs: a manifest says `matrices` in [files]"
+            "--matrices applies to jobs; set `matrices` in [files] of the manifest instead"
         }
         JobArguments { units: Some(_), .. } => {
-            "--units are for --stiffness, --from and jobs: a manifest states its own"
+            "--units applies to --stiffness, --from and jobs; set the units in the manifest instead"
         }
         JobArguments { dimension: Some(_), .. } => {
-            "--dimension is for --stiffness and jobs: a manifest says `dimension` in [model]"
+            "--dimension applies to --stiffness and jobs; set `dimension` in [model] of the manifest instead"
         }
         JobArguments { interface, .. } if !interface.is_empty() => {
-            "--interface is for jobs: a manifest has [[interface]]"
+            "--interface applies to jobs; add [[interface]] to the manifest instead"
         }
         _ => return Ok(()),
     };
@@ -148,15 +153,16 @@ fn interface_source(text: &str) -> Result<InterfaceSource> {
         let point = point(last).ok_or_else(|| {
             let help =
                 "write the point as X/Y/Z in model axes and the unit of length of the nodes".to_owned();
-            refused(format!("`{last}` is no point"), help)
+            refused(format!("`{last}` is not a point"), help)
         })?;
         (names, reference) = (before, Reference::Point(point));
     }
     let mut coupling = None;
     if let Some((before, last)) = names.rsplit_once(',') {
         let known = Coupling::from_name(last.trim());
-        let help = || format!("couplings: {}", Coupling::ALL.map(Coupling::name).join(", "));
-        coupling = Some(known.ok_or_else(|| refused(format!("`{}` is no coupling", last.trim()), help()))?);
+        let help = || format!("use one of the couplings {}", Coupling::ALL.map(Coupling::name).join(", "));
+        coupling =
+            Some(known.ok_or_else(|| refused(format!("`{}` is not a coupling", last.trim()), help()))?);
         names = before;
     }
     let (name, set) = names.split_once('=').unwrap_or((names, names));

@@ -28,6 +28,6 @@ pub(super) fn refuse_warnings(printing: Printing, diagnostics: &[Diagnostic]) ->
         return Ok(());
     }
     codes.dedup();
-    let message = format!("nothing is written: --deny-warnings, and there is {}", codes.join(", "));
+    let message = format!("no file was written because of --deny-warnings and {}", codes.join(", "));
     Err(Error::from(Diagnostic::new(Code::WarningsDenied, message)).after(diagnostics.to_vec()))
 }

@@ -127,9 +127,9 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
 }
 
 /// Reports an internal error.
-pub(super) fn tell_bug(arguments: &Arguments) -> ExitCode {
+pub(super) fn report_internal_error(arguments: &Arguments) -> ExitCode {
     let (name, printing) = command_of(arguments);
-    let message = "the program stopped at a contradiction of its own";
+    let message = "internal error: the program stopped";
     finish(Some(name), printing, Err(Diagnostic::new(Code::Internal, message).into()))
 }
 
@@ -142,7 +142,7 @@ fn finish(command: Option<&str>, printing: Printing, outcome: Result<Outcome>) -
         }
         Err(error) => (None, error.diagnostics().to_vec(), error.exit_code(), None),
     };
-    tell(printing, &diagnostics);
+    print_diagnostics(printing, &diagnostics);
     let printed = match text {
         _ if printing.json => print(&output_json(command, code, &diagnostics, results.as_deref())),
         Some(text) if !printing.quiet => print(&for_terminal(&text)),
@@ -153,7 +153,7 @@ fn finish(command: Option<&str>, printing: Printing, outcome: Result<Outcome>) -
         Err(error) => {
             let message = format!("the results cannot be printed: {error}");
             let unprinted = Diagnostic::new(Code::OutputUnwritable, message);
-            tell(Printing { json: false, ..printing }, &[unprinted]);
+            print_diagnostics(Printing { json: false, ..printing }, &[unprinted]);
             // A failure of the work itself determines the exit code.
             if code == ExitCode::Done { ExitCode::Resources } else { code }
         }
@@ -162,29 +162,29 @@ fn finish(command: Option<&str>, printing: Printing, outcome: Result<Outcome>) -
 
 /// Prints diagnostics to stderr: all of them, or errors only if quiet. Prints none with `--json`, whose output contains
 /// them.
-fn tell(printing: Printing, diagnostics: &[Diagnostic]) {
+fn print_diagnostics(printing: Printing, diagnostics: &[Diagnostic]) {
     if printing.json {
         return;
     }
     let coloured = colours_of_stderr();
     let mut stderr = std::io::stderr().lock();
     for diagnostic in diagnostics.iter().filter(|d| !printing.quiet || d.severity() == Severity::Error) {
-        let told = diagnostic.to_string();
-        let told = if coloured { painted(diagnostic.severity(), &told) } else { told };
+        let text = diagnostic.to_string();
+        let text = if coloured { painted(diagnostic.severity(), &text) } else { text };
         // An error of a closed stderr cannot be reported.
-        let _ = writeln!(stderr, "{told}");
+        let _ = writeln!(stderr, "{text}");
     }
 }
 
 /// Returns a diagnostic with its severity and code in colour.
-fn painted(severity: Severity, told: &str) -> String {
+fn painted(severity: Severity, text: &str) -> String {
     let colour = match severity {
         Severity::Error => "1;31",
         Severity::Warning => "1;33",
         Severity::Note => "36",
     };
-    told.split_once(": ")
-        .map_or_else(|| told.to_owned(), |(head, rest)| format!("\u{1b}[{colour}m{head}\u{1b}[0m: {rest}"))
+    text.split_once(": ")
+        .map_or_else(|| text.to_owned(), |(head, rest)| format!("\u{1b}[{colour}m{head}\u{1b}[0m: {rest}"))
 }
 
 /// Prints to stdout. A closed pipe (`| head`) is not an error.

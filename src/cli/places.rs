@@ -44,7 +44,7 @@ impl BodyOutputs {
 pub(super) fn format_of(path: &Path) -> Result<Format> {
     Format::from_path(path).ok_or_else(|| {
         let message = format!("report {} has no known extension", path.display());
-        Diagnostic::new(Code::Usage, message).with_help("name it .html, .json or .txt").into()
+        Diagnostic::new(Code::Usage, message).with_help("give it the extension .html, .json or .txt").into()
     })
 }
 

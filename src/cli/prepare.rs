@@ -1,7 +1,7 @@
 //! Command `flexbody prepare`.
 
 use super::arguments::PrepareArguments;
-use super::elsewhere::{folder_around, in_made_folder};
+use super::mode_source::{folder_around, in_made_folder};
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -14,13 +14,15 @@ use flexbody_model::{CheckedModel, FeModel};
 
 pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
     if arguments.accuracy == Accuracy::Certified {
-        return Err(usage("modes of a cluster cannot be certified: take --accuracy standard"));
+        return Err(usage("modes of a cluster cannot be certified: use --accuracy standard"));
     }
     let mut files = of_manifest_or_job(&arguments.model, &arguments.job)?;
     files.allow_implausible |= arguments.allow_implausible;
     files.keep_in = Some(folder_around(&arguments.output));
     if !files.residual_vectors.is_empty() {
-        return Err(usage("the manifest asks for residual vectors, which need the factor of this program"));
+        return Err(usage(
+            "the manifest requests residual vectors, which need the built-in solver: remove them from [basis]",
+        ));
     }
     let CheckedModel { model, diagnostics, .. } = FeModel::from_raw(read_model(&files)?)?;
     refuse_warnings(arguments.printing, &diagnostics)?;

@@ -9,7 +9,7 @@ use flexbody_input::RECIPES;
 pub(super) fn run(arguments: &RecipeArguments) -> Result<Outcome> {
     let recipe = RECIPES.iter().find(|recipe| recipe.program == arguments.program);
     let Some(recipe) = recipe else {
-        let message = format!("there is no recipe for `{}`", arguments.program);
+        let message = format!("`{}` has no recipe", arguments.program);
         return Err(Diagnostic::new(Code::Usage, message).into());
     };
     let steps = recipe.steps.iter().map(|step| format!("{}:\n\n{}\n\n", step.place, step.lines));
@@ -17,6 +17,6 @@ pub(super) fn run(arguments: &RecipeArguments) -> Result<Outcome> {
     let steps = recipe.steps.iter();
     let steps: Vec<_> =
         steps.map(|step| serde_json::json!({ "place": step.place, "lines": step.lines })).collect();
-    let told = serde_json::json!({ "program": recipe.program, "steps": steps, "mind": recipe.mind });
-    Ok(Outcome { text, json: format!("{told:#}"), diagnostics: Vec::new(), passed: true })
+    let json = serde_json::json!({ "program": recipe.program, "steps": steps, "mind": recipe.mind });
+    Ok(Outcome { text, json: format!("{json:#}"), diagnostics: Vec::new(), passed: true })
 }

@@ -54,9 +54,9 @@ fn start(wanted: usize) {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let started = (0..wanted).map_while(|number| {
-            let (work, told) = mpsc::channel::<rayon::ThreadBuilder>();
+            let (work, receiver) = mpsc::channel::<rayon::ThreadBuilder>();
             let worker = std::thread::Builder::new().name(format!("worker {number}")).stack_size(STACK);
-            worker.spawn(move || told.recv().map(rayon::ThreadBuilder::run)).ok().map(|_| work)
+            worker.spawn(move || receiver.recv().map(rayon::ThreadBuilder::run)).ok().map(|_| work)
         });
         let started: Vec<_> = started.collect();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(started.len().max(1));

@@ -79,16 +79,16 @@ fn refuse_contradictions(arguments: &ResponseArguments, is_model: bool) -> Resul
         arguments.modes.is_some() || arguments.basis.is_some() || arguments.residual_vectors.is_some();
     let message = match arguments {
         ResponseArguments { body: Some(_), .. } if !is_model => {
-            "the model comes first, as a manifest (.toml) or a job, and then the body that was made of it"
+            "give the model first (a manifest or a job), then the body that was made from it"
         }
         _ if converts && !(is_model && arguments.body.is_none()) => {
-            "--modes, --basis and --residual-vectors are for a model without a body: a file has the modes that it has"
+            "--modes, --basis and --residual-vectors apply to a model without a body: the modes of a body file are fixed"
         }
         ResponseArguments { basis: Some(BasisKind::Scene), .. } => {
-            "a basis made for a scene is for convert: convert the model, and give the body beside it"
+            "--basis scene works only in convert: convert the model first, then give the body after the model"
         }
         ResponseArguments { basis: Some(BasisKind::Imported), .. } => {
-            "imported shapes are for convert: convert the model, and give the body beside it"
+            "--basis imported works only in convert: convert the model first, then give the body after the model"
         }
         ResponseArguments { basis: Some(BasisKind::CraigBampton), residual_vectors: Some(_), .. } => {
             "residual vectors need --basis free or craig-chang"
@@ -138,7 +138,7 @@ fn settings(
 ) -> Result<ResponseSettings> {
     let of_scene = scene.and_then(|scene| Band::new(0.0, scene.requirements.band? * body.units().hertz()));
     let band = arguments.band.or(of_scene).ok_or_else(|| {
-        Diagnostic::new(Code::Usage, "nothing says which frequencies are looked at")
+        Diagnostic::new(Code::Usage, "no frequency band is given")
             .with_help("give --band 0..2000, or a --scene with a [band]")
     })?;
     Ok(ResponseSettings {
@@ -168,8 +168,8 @@ fn places(arguments: &ResponseArguments, scene: Option<&Scene>) -> Result<[Vec<P
         });
         if once.is_empty() {
             let message = match option {
-                "from" => "nothing says where forces act",
-                _ => "nothing says where displacements are read",
+                "from" => "no place of forces is given",
+                _ => "no place of displacements is given",
             };
             let help = format!("give --{option} INTERFACE or --{option} NODE, or a --scene with [[{key}]]");
             return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());

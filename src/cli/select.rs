@@ -35,15 +35,15 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     refuse_replacing(series, arguments.report.iter())?;
     refuse_replacing_read(arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
-    let Judged { body, lacks, varied_lacks, mut diagnostics } = if is_model {
+    let Judged { body, reference_errors, varied_reference_errors, mut diagnostics } = if is_model {
         converted(arguments, &cases, &watch)?
     } else {
         refuse_modes(arguments)?;
         let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
-        Judged { body, lacks: Vec::new(), varied_lacks: Vec::new(), diagnostics: notes }
+        Judged { body, reference_errors: Vec::new(), varied_reference_errors: Vec::new(), diagnostics: notes }
     };
     let limits = context(None, arguments.allow_long, &watch);
-    let selection = select_judged(&body, &lacks, &varied_lacks, &cases, &limits)
+    let selection = select_judged(&body, &reference_errors, &varied_reference_errors, &cases, &limits)
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(selection.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
@@ -70,9 +70,9 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
 struct Judged {
     body: FlexBody,
     /// Truncation errors in each load case; empty if no model is at hand.
-    lacks: Vec<Vec<ReferenceError>>,
+    reference_errors: Vec<Vec<ReferenceError>>,
     /// Truncation errors in each variation.
-    varied_lacks: Vec<Vec<ReferenceError>>,
+    varied_reference_errors: Vec<Vec<ReferenceError>>,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -94,13 +94,13 @@ fn converted(arguments: &SelectArguments, cases: &LoadCases, watch: Watch<'_>) -
     let Enriched { made, rounds } =
         tailoring.convert(&model, cases, &context).map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(made.diagnostics);
-    let varied_lacks = varied_errors(&model, &made.body, cases, &context)?;
-    Ok(Judged { body: made.body, lacks: rounds, varied_lacks, diagnostics })
+    let varied_reference_errors = varied_errors(&model, &made.body, cases, &context)?;
+    Ok(Judged { body: made.body, reference_errors: rounds, varied_reference_errors, diagnostics })
 }
 
 fn refuse_modes(arguments: &SelectArguments) -> Result<()> {
     if arguments.modes.is_some() {
-        let message = "--modes is for a model: a file has the modes that it has";
+        let message = "--modes applies to a model: the modes of a body file are fixed";
         return Err(Diagnostic::new(Code::Usage, message).into());
     }
     Ok(())

@@ -16,7 +16,7 @@ use std::sync::{OnceLock, mpsc};
 use std::time::Duration;
 
 /// Time that child processes have to end before they are killed.
-const PATIENCE: Duration = Duration::from_secs(10);
+const CHILD_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Signals of an interruption: exit code 130.
 const INTERRUPTIONS: [c_int; 3] = [libc::SIGINT, libc::SIGTERM, libc::SIGHUP];
@@ -113,7 +113,7 @@ fn ended_by(signal: c_int) -> ! {
     let left = if is_alone {
         "no unfinished file is left"
     } else {
-        "a program that this one had started was killed; the next run removes its unfinished files"
+        "a program started by flexbody was killed; the next run removes its unfinished files"
     };
     let is_interruption = INTERRUPTIONS.contains(&signal);
     let what = if is_interruption { "interrupted".to_owned() } else { format!("ended by signal {signal}") };
@@ -121,14 +121,14 @@ fn ended_by(signal: c_int) -> ! {
     if is_interruption {
         end(ExitCode::Interrupted);
     }
-    as_by_default(signal)
+    raise_with_default_action(signal)
 }
 
 /// Ends the child processes and waits for them. Returns false if one of them had to be killed.
 fn end_children(signal: c_int) -> bool {
     let known = if is_ignored(libc::SIGTERM) { signal } else { libc::SIGTERM };
     send(known, &children::close());
-    let left = children::wait_for_all(PATIENCE);
+    let left = children::wait_for_all(CHILD_TIMEOUT);
     send(libc::SIGKILL, &left);
     left.is_empty()
 }
@@ -150,7 +150,7 @@ fn by_default(signal: c_int) {
 }
 
 /// Performs the default action of this signal, which ends the process.
-fn as_by_default(signal: c_int) -> ! {
+fn raise_with_default_action(signal: c_int) -> ! {
     by_default(signal);
     // SAFETY: unblocks a signal for this thread, and raises it.
     unsafe {

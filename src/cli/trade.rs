@@ -44,7 +44,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     // Created again for each part: the model and the bodies take memory too.
     let limits = || context(None, arguments.allow_long, &watch);
     let mut diagnostics = Vec::new();
-    let (model, sources, lacks, varied) = if is_model {
+    let (model, sources, reference_errors, varied) = if is_model {
         let (_, checked) = read_checked(&arguments.body, &arguments.job, outputs())?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
             .map_err(|error| error.in_file(&arguments.scene))?;
         diagnostics.extend(made.diagnostics);
         diagnostics.extend(made.varied.diagnostics.iter().cloned());
-        (Some(checked.model), made.sources, made.lacks, made.varied)
+        (Some(checked.model), made.sources, made.reference_errors, made.varied)
     } else {
         let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
         diagnostics.extend(notes);
@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         (None, vec![Source::new("file", body, Recipe::File, None)?], Vec::new(), varied)
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceChoice::Nodal);
-    let reserved = reserved(&lacks, nodal.is_some());
+    let reserved = reserved(&reference_errors, nodal.is_some());
     let settings =
         TradeSettings { repeat: arguments.repeat.into(), reserved: &reserved, varied: Some(&varied) };
     let study = trade(&sources, &cases, nodal, &settings, &limits())
@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     diagnostics.extend(study.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
-    let facts = TradeFacts::new(&study, &lacks, &run);
+    let facts = TradeFacts::new(&study, &reference_errors, &run);
     let recommended = study.recommended.row().map(|row| &study.rows[row].candidate);
     let origin = origin(&arguments.body, &arguments.job, &arguments.scene, &arguments.case);
     let command = recommended.and_then(|taken| sources[taken.source].command(taken, &origin));
@@ -94,7 +94,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     // No file appears before everything is done.
     OutputSlot::commit_all(table.into_iter().chain(reports).chain(bodies))?;
     let holds = |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
-    let is_reference = nodal.is_some() || lacks.iter().all(holds);
+    let is_reference = nodal.is_some() || reference_errors.iter().all(holds);
     let passed = study.recommended.row().is_some() && is_reference && study.holds_in_stated_variations();
     let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })
@@ -133,9 +133,9 @@ fn refuse_contradictions(arguments: &TradeArguments, is_model: bool) -> Result<(
             "--reference nodal needs the matrices: give the model"
         }
         TradeArguments { reference: ReferenceChoice::Fine, .. } => {
-            "--reference fine is made of the matrices: give the model"
+            "--reference fine needs the matrices: give the model"
         }
-        TradeArguments { modes: Some(_), .. } => "--modes is for conversions: give the model",
+        TradeArguments { modes: Some(_), .. } => "--modes applies to a model: give the model",
         _ => return Ok(()),
     };
     Err(Diagnostic::new(Code::Usage, message).into())

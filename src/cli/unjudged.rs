@@ -20,15 +20,14 @@ pub(super) fn refuse_unjudged(
     if arguments.allow_unjudged {
         return Ok(());
     }
-    let message = match selection.lacks.last().filter(|lacks| !ReferenceError::is_reference(lacks)) {
-        Some(lacks) => format!(
-            "nothing is written: the body of {} modes that errors are measured against lacks {:.0} % of the tolerances, more than half, so that nothing can be said of the selection",
-            lacks.modes,
-            100.0 * lacks.worst
+    let message = match selection.reference_errors.last().filter(|own| !ReferenceError::is_reference(own)) {
+        Some(own) => format!(
+            "no file was written: the error of the reference body of {} modes is {:.0} % of the tolerances, more than half, so that the selection cannot be judged",
+            own.modes,
+            100.0 * own.worst
         ),
-        None => {
-            "nothing is written: the selected modes and terms do not hold what the scene asks for".to_owned()
-        }
+        None => "no file was written: the selected modes and terms do not meet the tolerances of the scene"
+            .to_owned(),
     };
     let refused = Error::from(Diagnostic::new(Code::SelectionUnjudged, message));
     Err(refused.after(found.to_vec()))

@@ -41,7 +41,7 @@ fn a_listener_hears_the_phases_and_stops_the_work_anywhere() {
         }
         ControlFlow::Continue(())
     };
-    let whole = model.convert_heard(&options, &listen).expect("a body").body;
+    let whole = model.convert_with_progress(&options, &listen).expect("a body").body;
     let (phases, events) = (phases.into_inner().expect("no panic"), events.into_inner());
     for name in ["factorisation", "modes", "invariants"] {
         assert!(phases.iter().any(|phase| phase == name), "{name} in {phases:?}");
@@ -52,7 +52,7 @@ fn a_listener_hears_the_phases_and_stops_the_work_anywhere() {
             before if before < last => ControlFlow::Continue(()),
             _ => ControlFlow::Break(()),
         };
-        let error = model.convert_heard(&options, &stop).expect_err("stopped");
+        let error = model.convert_with_progress(&options, &stop).expect_err("stopped");
         assert!(error.has(Code::Stopped) && error.exit_code() == ExitCode::Interrupted, "{last}: {error}");
         assert_eq!(heard.into_inner(), last + 1, "nothing is heard after the end");
     }
@@ -65,10 +65,10 @@ fn every_long_work_can_be_stopped() {
     let stop = |_: Progress<'_>| ControlFlow::Break(());
     let options = ConvertOptions::default().modes(6);
     let outcomes = [
-        body.simulate_heard(&scene, &stop).map(|_| ()),
-        body.select_heard(&scene, &stop).map(|_| ()),
+        body.simulate_with_progress(&scene, &stop).map(|_| ()),
+        body.select_with_progress(&scene, &stop).map(|_| ()),
         body.trade(&scene, &TradeOptions::default(), &stop).map(|_| ()),
-        bracket().convert_for_heard(&scene, &options, &stop).map(|_| ()),
+        bracket().convert_for_with_progress(&scene, &options, &stop).map(|_| ()),
     ];
     for (at, outcome) in outcomes.into_iter().enumerate() {
         assert!(outcome.is_err_and(|error| error.has(Code::Stopped)), "{at}");

@@ -1,7 +1,7 @@
 //! Assembles the parts of a body from the values of a file, row by row of the table.
 
 use super::draft::Draft;
-use super::item::{Extent, Item, Membership, Origin, Per, SchemaGroup, Together};
+use super::item::{EntrySet, Extent, Item, Membership, Origin, Per, SchemaGroup};
 use super::names::place;
 use super::scan::{Scan, key};
 use super::schema::TABLE;
@@ -61,7 +61,7 @@ fn put(scan: &mut Scan, draft: &mut Draft, path: &str, item: &Item) {
 
 /// Entries of a file that must occur together.
 struct FoundSet {
-    set: &'static Together,
+    set: &'static EntrySet,
     /// Keys of the entries; true for each that the file holds.
     entries: Vec<(String, bool)>,
     /// True if an entry is missing that the set requires.

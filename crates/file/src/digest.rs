@@ -10,12 +10,12 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 
 /// Depth of groups above which a file is refused: no format version has deeper ones.
-const DEEPEST: usize = 8;
+const MAX_DEPTH: usize = 8;
 /// Number of entries above which a file is refused. Groups may contain themselves, so that even a small file can have
 /// endlessly many paths.
-const MOST_ENTRIES: usize = 100_000;
+const MAX_ENTRIES: usize = 100_000;
 /// Largest number of entries named in a message.
-const MOST_NAMED: usize = 6;
+const MAX_NAMED: usize = 6;
 /// Number of elements that are converted to bytes at a time.
 const BLOCK: usize = 1 << 13;
 
@@ -112,8 +112,8 @@ impl DigestWalk<'_> {
         let links = group.links(IndexType::Name, IterationOrder::Native);
         for (name, link) in links.map_err(|e| format!("{path}: {e}"))? {
             let inner = format!("{}/{name}", path.trim_end_matches('/'));
-            if link.link_type != LinkType::Hard || depth == DEEPEST || name.contains('\n') {
-                return Err(format!("{inner}: no flex-body file has such an entry"));
+            if link.link_type != LinkType::Hard || depth == MAX_DEPTH || name.contains('\n') {
+                return Err(format!("{inner}: not an entry of a flex-body file"));
             }
             self.member(group, &name, &inner, depth)?;
         }
@@ -138,7 +138,7 @@ impl DigestWalk<'_> {
                 };
                 self.object(&dataset, path, numbers)
             }
-            _ => Err(format!("{path}: no flex-body file has such an entry")),
+            _ => Err(format!("{path}: not an entry of a flex-body file")),
         }
     }
 
@@ -157,8 +157,8 @@ impl DigestWalk<'_> {
             add(&mut fingerprint, name, &record);
         }
         self.found.insert(path.to_owned(), fingerprint.hex());
-        if self.found.len() > MOST_ENTRIES {
-            return Err(format!("{path}: more than {MOST_ENTRIES} entries"));
+        if self.found.len() > MAX_ENTRIES {
+            return Err(format!("{path}: more than {MAX_ENTRIES} entries"));
         }
         Ok(())
     }
@@ -181,12 +181,12 @@ pub(super) fn difference(found: &Digests, list: &str, whole: &str) -> Option<Str
         ("added", found.keys().filter(is_new).map(String::as_str).collect()),
         ("removed", stated.keys().filter(|path| !found.contains_key(**path)).copied().collect()),
     ];
-    let told = parts.iter().filter(|(_, paths)| !paths.is_empty()).map(|(what, paths)| {
-        let more = match paths.len().saturating_sub(MOST_NAMED) {
+    let differences = parts.iter().filter(|(_, paths)| !paths.is_empty()).map(|(what, paths)| {
+        let more = match paths.len().saturating_sub(MAX_NAMED) {
             0 => String::new(),
             more => format!(" and {more} more"),
         };
-        format!("{what}: {}{more}", paths[..paths.len().min(MOST_NAMED)].join(", "))
+        format!("{what}: {}{more}", paths[..paths.len().min(MAX_NAMED)].join(", "))
     });
-    Some(told.collect::<Vec<_>>().join("; "))
+    Some(differences.collect::<Vec<_>>().join("; "))
 }

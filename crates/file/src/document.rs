@@ -40,8 +40,8 @@ psi = h5read('body.flex.h5', '/modes/shape', [1 1 1], [3 Inf 1])';  % first mode
 
 const RULES: &str = "\
 A reader refuses a newer `format_major` and names the `generator`; a newer `format_minor` only adds entries, which older
-readers ignore. A body that lacks groups of the kinetic energy (`/terms`, since 1.3) lacks datasets that readers up to 1.2 require: these
-refuse it by the names of the datasets. Names that are data (lumping schemes, interfaces, loads) are percent-encoded where they hold `/`, `%`, control
+readers ignore. A body without some groups of the kinetic energy (`/terms`, since 1.3) has no datasets for them, which readers up to 1.2 require: these
+readers reject the file and name the datasets. Names that are data (lumping schemes, interfaces, loads) are percent-encoded where they hold `/`, `%`, control
 characters or a leading dot, and keep their order by HDF5 creation order. Nothing in the file depends on the clock, on the
 number of threads or on its path: equal bodies are equal bytes.
 ";
@@ -213,9 +213,12 @@ fn of_group(held: TermGroup) -> Value {
     let within = |path: &str, part: &str, inner: Value| {
         path.split('/').filter(|name| !name.is_empty()).rev().fold(
             json!({ "properties": { part: inner } }),
-            |inner, name| match name.starts_with('<') {
-                true => json!({ "properties": { "groups": { "additionalProperties": inner } } }),
-                false => json!({ "properties": { "groups": { "properties": { name: inner } } } }),
+            |inner, name| {
+                if name.starts_with('<') {
+                    json!({ "properties": { "groups": { "additionalProperties": inner } } })
+                } else {
+                    json!({ "properties": { "groups": { "properties": { name: inner } } } })
+                }
             },
         )
     };

@@ -245,9 +245,10 @@ impl InvariantEntries {
     fn finish(self, nf: usize, plane: bool, groups: TermGroups) -> Invariants {
         let block = |k: usize, l: usize| 3 * k + l;
         let w3 = self.w3.filter(|_| groups.w3);
-        let ibar = match groups.w1 {
-            true => [0, 1, 2].map(|k| [0, 1, 2].map(|l| self.ibar[block(k, l) * nf..][..nf].to_vec())),
-            false => ibar_of_c2(&self.c2),
+        let ibar = if groups.w1 {
+            [0, 1, 2].map(|k| [0, 1, 2].map(|l| self.ibar[block(k, l) * nf..][..nf].to_vec()))
+        } else {
+            ibar_of_c2(&self.c2)
         };
         let s = match (groups.w2, &self.w0) {
             (true, _) => {

@@ -110,7 +110,7 @@ pub(super) use field;
 
 /// A set of entries that a file holds completely or not at all. `problem` makes the message for a file with some of
 /// them from their keys, in the order of the table, each with true if the file holds the entry.
-pub(super) struct Together {
+pub(super) struct EntrySet {
     #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // called by the reader only
     pub problem: fn(&[(String, bool)]) -> String,
 }
@@ -119,7 +119,7 @@ pub(super) struct Together {
 #[derive(Clone, Copy)]
 #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // checked by the reader only
 pub(super) struct Membership {
-    pub set: &'static Together,
+    pub set: &'static EntrySet,
     /// True if the set requires the entry. False if the entry requires the set, but not the reverse.
     pub required: bool,
 }
@@ -200,13 +200,13 @@ impl Item {
     }
 
     /// Makes the entry a required member of a set of entries that belong together.
-    pub(crate) const fn with(mut self, set: &'static Together) -> Self {
+    pub(crate) const fn with(mut self, set: &'static EntrySet) -> Self {
         self.together = Some(Membership { set, required: true });
         self
     }
 
     /// Makes the entry an optional companion of a set of entries that belong together.
-    pub(crate) const fn beside(mut self, set: &'static Together) -> Self {
+    pub(crate) const fn beside(mut self, set: &'static EntrySet) -> Self {
         self.together = Some(Membership { set, required: false });
         self
     }

@@ -54,22 +54,26 @@ impl RecordedMotion {
     ///
     /// # Errors
     /// FB735 for the motion of another body; the errors of [`FlexBody::carried`].
-    pub fn staged(&self, body: &FlexBody) -> Result<FlexBody> {
+    pub fn body_in_frame(&self, body: &FlexBody) -> Result<FlexBody> {
         let foreign = |what: String| Err(Diagnostic::new(Code::MotionForeign, what).into());
         if self.body != body.source().name {
-            return foreign(format!("motion of `{}`, the body is `{}`", self.body, body.source().name));
+            return foreign(format!(
+                "the motion belongs to the body `{}`, not to `{}`",
+                self.body,
+                body.source().name
+            ));
         }
-        let staged = match &self.carrier {
+        let body_in_frame = match &self.carrier {
             Some(carrier) => body.carried(carrier)?,
             None => body.in_mean_axes()?.into_owned(),
         };
-        if self.modes != staged.n_modes() {
-            return foreign(format!("motion of {} modes, the body has {}", self.modes, body.n_modes()));
+        if self.modes != body_in_frame.n_modes() {
+            return foreign(format!("the motion has {} modes, the body has {}", self.modes, body.n_modes()));
         }
         if self.time.is_empty() {
-            return foreign("motion without an instant".to_owned());
+            return foreign("the motion has no instant".to_owned());
         }
-        Ok(staged)
+        Ok(body_in_frame)
     }
 
     /// Returns the indices of at most `most` instants (two at least) at equal steps, including the first and the last.

@@ -100,9 +100,9 @@ impl Scan {
             len if len < MOST_PROBLEMS => {
                 self.problems.push(Diagnostic::new(code, message).in_file(&self.file));
             }
-            MOST_PROBLEMS => self.problems.push(
-                Diagnostic::new(code, "more problems follow, which are not listed").in_file(&self.file),
-            ),
+            MOST_PROBLEMS => self
+                .problems
+                .push(Diagnostic::new(code, "further problems are not listed").in_file(&self.file)),
             _ => {}
         }
     }
@@ -185,12 +185,13 @@ impl Scan {
         match item.kind {
             ItemKind::Floats(shape) => {
                 let stored = &mut self.stored;
-                let values = match item.is_short(self.storage) {
-                    false => dataset::<f64>(place, item.name, shape, sizes, stored)?
-                        .inspect(|read| self.hash(name, read)),
-                    true => dataset::<f32>(place, item.name, shape, sizes, stored)?
+                let values = if item.is_short(self.storage) {
+                    dataset::<f32>(place, item.name, shape, sizes, stored)?
                         .inspect(|read| self.hash(name, read))
-                        .map(|(values, dims)| (values.into_iter().map(f64::from).collect(), dims)),
+                        .map(|(values, dims)| (values.into_iter().map(f64::from).collect(), dims))
+                } else {
+                    dataset::<f64>(place, item.name, shape, sizes, stored)?
+                        .inspect(|read| self.hash(name, read))
                 };
                 let Some((values, dims)) = values else { return Ok(None) };
                 match values.iter().position(|v| !v.is_finite()) {
@@ -264,7 +265,10 @@ impl Scan {
             Err(problem) => Some(problem),
         };
         if let Some(differs) = differs {
-            self.add_as(Code::BodyChanged, format!("the content is not what was written; {differs}"));
+            self.add_as(
+                Code::BodyChanged,
+                format!("the content was changed after it was written; {differs}"),
+            );
         }
     }
 
@@ -276,7 +280,7 @@ impl Scan {
             match (held.has(group), there) {
                 (true, false) => self.add(format!("{name}: expected {}, found nothing", kind(item))),
                 (false, true) => {
-                    let said = format!("/terms@{} says `{DROPPED}`", group.name());
+                    let said = format!("/terms@{} is `{DROPPED}`", group.name());
                     self.add(format!("{name}: expected nothing, since {said}, found a dataset"));
                 }
                 _ => {}

@@ -4,7 +4,7 @@ use super::draft::node_indices;
 use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, Triangles};
 use super::item::ItemKind::{Floats, Indices, Int, Ints, Text};
 use super::item::Origin::{ConstantInt, ConstantText, Primary};
-use super::item::{Access, Item, ItemKind, Origin, Per, SchemaGroup, Together, both, field, put, written};
+use super::item::{Access, EntrySet, Item, ItemKind, Origin, Per, SchemaGroup, both, field, put, written};
 use super::value::{Stored, Units, Value, indices, json_list, shape_rows, text};
 use certificate::{CERTIFICATE, CERTIFIED, CRAIG_BAMPTON, INVARIANT_DIGITS};
 use flexbody_base::provenance;
@@ -200,9 +200,9 @@ fn both_or_none(entries: &[(String, bool)]) -> String {
     format!("{} and {}: expected both or none, found one", entries[0].0, entries[1].0)
 }
 
-static BODY_NUMBER: Together = Together { problem: both_or_none };
-static INTERNAL_ROWS: Together = Together { problem: both_or_none };
-static INERTIA: Together = Together {
+static BODY_NUMBER: EntrySet = EntrySet { problem: both_or_none };
+static INTERNAL_ROWS: EntrySet = EntrySet { problem: both_or_none };
+static INERTIA: EntrySet = EntrySet {
     problem: |entries| {
         let names: Vec<&str> = entries.iter().map(|(name, _)| name.as_str()).collect();
         format!("{}: expected all or none, found some", names.join(", "))
@@ -249,7 +249,7 @@ const SOURCE: &[Item] = &[
         "approximation",
         Text,
         ONE,
-        "what stays approximate for the mass structure `general`; absent: nothing, the invariants are those of the matrices",
+        "approximation in the invariants for the mass structure `general`; absent: none, the invariants are exact for the matrices",
         field!(source.approximation),
     )
     .added(2),
@@ -270,7 +270,7 @@ const FRAME: &[Item] = &[
         "reference_conditions",
         Text,
         ONE,
-        "what ties the frame to the deformed body: `interface NAME`: its reference point is the origin and rests in every mode; `not stated`: the modes do, as in the file of another program that the body comes from; absent: `mean axes`, C1 = C2 = 0",
+        "reference conditions, which tie the frame to the deformed body: `interface NAME`: its reference point is the origin and rests in every mode; `not stated`: the modes imply the conditions, as in a file of another program; absent: `mean axes`, C1 = C2 = 0",
         both(
             |v| text((!v.body.conditions.is_mean()).then(|| v.body.conditions.text())?),
             |d, read| {
@@ -409,7 +409,7 @@ const MODES: &[Item] = &[
         "truncation",
         Text,
         ONE,
-        "JSON array with the `load` of every residual vector and of every interface, and what the modes lack of the static response to it, in the norm of K, `before` (free modes alone) and `after`; absent: not known",
+        "JSON array with the `load` of every residual vector and of every interface, and the part of the static response to it that the modes cannot represent, in the norm of K, `before` (free modes alone) and `after`; absent: not known",
         both(
             |v| json_list(&v.body.modes.truncation),
             put!(|d, read| d.body.modes.truncation = read.json("a JSON array of loads")?),
@@ -420,7 +420,7 @@ const MODES: &[Item] = &[
         "provenance",
         Text,
         ONE,
-        "where each mode comes from, as a JSON array of nf texts; absent: not known",
+        "origin of each mode, as a JSON array of nf texts; absent: not known",
         both(
             |v| json_list(&v.body.modes.provenance),
             put!(|d, read| d.body.modes.provenance = read.json("a JSON array of texts")?),
@@ -573,12 +573,7 @@ fn named<T: Copy>(found: String, all: &[T], name: fn(T) -> &'static str) -> Resu
 /// Groups of the file, in the order in which they are written.
 pub(super) const TABLE: &[SchemaGroup] = &[
     SchemaGroup { path: "/", per: Per::Body, description: "Format and units.", items: &[ROOT] },
-    SchemaGroup {
-        path: "/source",
-        per: Per::Body,
-        description: "Where the body came from.",
-        items: &[SOURCE],
-    },
+    SchemaGroup { path: "/source", per: Per::Body, description: "Origin of the body.", items: &[SOURCE] },
     SchemaGroup { path: "/frame", per: Per::Body, description: "The body frame.", items: &[FRAME] },
     SchemaGroup { path: "/nodes", per: Per::Body, description: "Nodes of the body.", items: &[NODES] },
     SchemaGroup {
@@ -590,7 +585,7 @@ pub(super) const TABLE: &[SchemaGroup] = &[
     SchemaGroup {
         path: "/modes",
         per: Per::Body,
-        description: "Mode shapes and what is known of each mode.",
+        description: "Mode shapes and the properties of each mode.",
         items: &[MODES],
     },
     SchemaGroup {
@@ -614,19 +609,19 @@ pub(super) const TABLE: &[SchemaGroup] = &[
     SchemaGroup {
         path: "/certificate",
         per: Per::Body,
-        description: "What was proved about the modes, and the digits of the input.",
+        description: "Proofs about the modes, and the digits of the input.",
         items: &[CERTIFICATE, INVARIANT_DIGITS],
     },
     SchemaGroup {
         path: "/terms",
         per: Per::Body,
-        description: "Which groups of the kinetic energy the body holds, and why. A solver leaves out what is dropped, in all places.",
+        description: "Groups of the kinetic energy that the body holds or drops, with the reasons. A solver omits a dropped group in all equations.",
         items: &[TERMS],
     },
     SchemaGroup {
         path: "/interfaces/<name>",
         per: Per::Interface,
-        description: "Named node sets, what they are coupled to, and the modes there.",
+        description: "Named node sets, their couplings, and the modes at them.",
         items: &[INTERFACES],
     },
     SchemaGroup {

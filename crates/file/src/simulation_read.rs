@@ -50,7 +50,7 @@ impl RecordingReader {
         let attitudes = vectors("/frame", "attitude", 4, instants)?;
         let origin_in_model = vectors("/frame", "origin_in_model", 3, 1)?;
         if time.windows(2).any(|pair| pair[0] > pair[1]) {
-            return Err("time: expected instants that ascend".to_owned());
+            return Err("time: expected ascending instants".to_owned());
         }
         Ok(RecordedMotion {
             scene: hdf5_file::text(&root, "scene")?.unwrap_or_default(),
@@ -81,7 +81,7 @@ impl RecordingReader {
         let described = origin.map(|origin| hdf5_file::text(&origin, "description")).transpose()?.flatten();
         match described {
             Some(text) if text.starts_with("reference point") => {
-                Err("the body is carried, and the file does not say by what: simulate again".to_owned())
+                Err("the body is carried, but the file does not state by which interface or node: run flexbody simulate again".to_owned())
             }
             _ => Ok(None),
         }

@@ -11,11 +11,11 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 
 /// Depth of groups above which members are left out: no format version has deeper groups.
-const DEEPEST: usize = 8;
+const MAX_DEPTH: usize = 8;
 
 /// Number of members above which a file is refused. Groups may contain themselves, so that even a small file can have
 /// endlessly many paths.
-const MOST_MEMBERS: usize = 20_000;
+const MAX_MEMBERS: usize = 20_000;
 
 /// Returns groups, datasets (type, shape and descriptive attributes) and attributes of a file, including entries
 /// unknown to this version. `schemas/flexbody-file.schema.json` describes the result.
@@ -26,7 +26,7 @@ const MOST_MEMBERS: usize = 20_000;
 pub fn structure(path: impl AsRef<Path>) -> Result<Value> {
     let path = path.as_ref();
     let (file, _) = open_checked(path)?;
-    file.as_group().and_then(|root| group(&root, 0, &mut { MOST_MEMBERS })).map_err(|e| {
+    file.as_group().and_then(|root| group(&root, 0, &mut { MAX_MEMBERS })).map_err(|e| {
         Error::from(Diagnostic::new(Code::BodySchema, format!("the file is damaged: {e}")).in_file(path))
     })
 }
@@ -34,10 +34,10 @@ pub fn structure(path: impl AsRef<Path>) -> Result<Value> {
 fn group(place: &hdf5::Group, depth: usize, left: &mut usize) -> hdf5::Result<Value> {
     let (mut groups, mut datasets) = (Map::new(), Map::new());
     for (name, link) in place.links(hdf5::IndexType::Name, hdf5::IterationOrder::Increasing)? {
-        if link.link_type != LinkType::Hard || depth > DEEPEST {
+        if link.link_type != LinkType::Hard || depth > MAX_DEPTH {
             continue;
         }
-        *left = left.checked_sub(1).ok_or_else(|| format!("more than {MOST_MEMBERS} members"))?;
+        *left = left.checked_sub(1).ok_or_else(|| format!("more than {MAX_MEMBERS} members"))?;
         match place.loc_type_by_name(&name)? {
             LocationType::Group => {
                 groups.insert(name.clone(), group(&place.group(&name)?, depth + 1, left)?);

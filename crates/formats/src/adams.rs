@@ -22,7 +22,7 @@ impl ExportFormat for AdamsInvariants {
     }
 
     fn reader(&self) -> &'static str {
-        "people and scripts: I1 to I9 as Adams/Flex numbers them, no MNF"
+        "people and scripts: I1 to I9 in the numbering of Adams/Flex (not an MNF)"
     }
 
     fn dialects(&self) -> &'static [&'static str] {
@@ -71,9 +71,9 @@ const CONVENTIONS: &[&str] = &[
     "About the origin of the body frame, in body axes; s: undeformed position, phi_j: shape of mode j, dm: consistent mass.",
     "a~ is the matrix of the cross product: a~ b = a x b.",
     "Inertia about the origin: I7 - sum_j (I8_j + I8_j') q_j - sum_jk I9_jk q_j q_k.",
-    "I8 has the sign of Adams; that of MBDyn is the opposite one. All others are the same there.",
-    "A quantity without values belongs to a group of the kinetic energy that the body does without; of I8 the antisymmetric part stays.",
-    "MNF files are proprietary to Adams: this is no MNF, and Adams does not read it.",
+    "I8 has the sign of Adams; MBDyn uses the opposite sign. All other invariants are the same in MBDyn.",
+    "A quantity without values belongs to a group of the kinetic energy that the body does not hold; the antisymmetric part of I8 is always written.",
+    "MNF files are proprietary to Adams: this file is not an MNF, and Adams does not read it.",
 ];
 
 /// An invariant or an accompanying quantity.
@@ -90,20 +90,20 @@ struct Quantity {
 /// Returns I1 to I9, then stiffness and damping of the modes.
 fn quantities(body: &FlexBody) -> Vec<Quantity> {
     let nf = body.n_modes();
-    let told = body.invariants().numbered();
+    let numbered = body.invariants().numbered();
     let rows = |a: &Mat<f64>| -> Vec<f64> { a.row_iter().flat_map(|row| row.iter().copied()).collect() };
     let triples = || (0..nf).flat_map(|j| [0, 1, 2].map(|a| (j, a)));
-    let i5 = told
+    let i5 = numbered
         .i5
         .as_ref()
         .map(|i5| triples().flat_map(|(j, a)| (0..nf).map(move |k| i5[(a * nf + j, k)])).collect());
-    let i8 = triples().flat_map(|(j, a)| [0, 1, 2].map(|b| -told.i8[j][(a, b)])).collect();
-    let i9 = told.i9.as_ref().map(|i9| {
+    let i8 = triples().flat_map(|(j, a)| [0, 1, 2].map(|b| -numbered.i8[j][(a, b)])).collect();
+    let i9 = numbered.i9.as_ref().map(|i9| {
         let block =
             |j: usize, k: usize| (0..9).map(move |place| i9[(place / 3 * nf + j, place % 3 * nf + k)]);
         (0..nf).flat_map(|j| (0..nf).flat_map(move |k| block(j, k))).collect()
     });
-    let i7: Vec<f64> = told.i7.transpose().iter().copied().collect();
+    let i7: Vec<f64> = numbered.i7.transpose().iter().copied().collect();
     let damping = losses::is_damped(body).then(|| rows(&body.damping()));
     let stiffness = rows(body.invariants().modal_stiffness());
     let one = |name, title, formula, units, shape: &[usize], values| Quantity {
@@ -115,15 +115,15 @@ fn quantities(body: &FlexBody) -> Vec<Quantity> {
         values,
     };
     vec![
-        one("I1", "mass", "int dm", "mass", &[1], Some(vec![told.i1])),
-        one("I2", "first moment", "int s dm", "mass length", &[3], Some(told.i2.as_slice().to_vec())),
+        one("I1", "mass", "int dm", "mass", &[1], Some(vec![numbered.i1])),
+        one("I2", "first moment", "int s dm", "mass length", &[3], Some(numbered.i2.as_slice().to_vec())),
         one(
             "I3",
             "momentum of the modes, column j",
             "int phi_j dm",
             "mass^(1/2)",
             &[3, nf],
-            Some(rows(&told.i3)),
+            Some(rows(&numbered.i3)),
         ),
         one(
             "I4",
@@ -131,10 +131,10 @@ fn quantities(body: &FlexBody) -> Vec<Quantity> {
             "int s~ phi_j dm",
             "mass^(1/2) length",
             &[3, nf],
-            Some(rows(&told.i4)),
+            Some(rows(&numbered.i4)),
         ),
         one("I5", "for each mode j, column k", "int phi_j~ phi_k dm", "1", &[nf, 3, nf], i5),
-        one("I6", "mass of the modes", "int phi_j' phi_k dm", "1", &[nf, nf], Some(rows(&told.i6))),
+        one("I6", "mass of the modes", "int phi_j' phi_k dm", "1", &[nf, nf], Some(rows(&numbered.i6))),
         one("I7", "inertia of the undeformed body", "int s~' s~ dm", "mass length^2", &[3, 3], Some(i7)),
         one("I8", "for each mode j", "int s~ phi_j~ dm", "mass^(1/2) length", &[nf, 3, 3], Some(i8)),
         one("I9", "for each pair of modes j, k", "int phi_j~ phi_k~ dm", "1", &[nf, nf, 3, 3], i9),
@@ -176,24 +176,24 @@ fn text(body: &FlexBody, quantities: &[Quantity], frames: &[ExportFrame]) -> Str
     let mut out =
         String::from("# The nine inertia invariants, numbering and signs of Adams/Flex, version 1\n");
     for line in CONVENTIONS {
-        say(&mut out, format_args!("# {line}"));
+        write_line(&mut out, format_args!("# {line}"));
     }
     let units = body.units();
     let (length, mass, time) = (units.length.name(), units.mass.name(), units.time.name());
-    say(&mut out, format_args!("# units: length {length}, mass {mass}, time {time}"));
+    write_line(&mut out, format_args!("# units: length {length}, mass {mass}, time {time}"));
     for one in quantities {
         let shape: Vec<String> = one.shape.iter().map(ToString::to_string).collect();
         let Quantity { name, title, formula, units, .. } = one;
-        say(&mut out, format_args!("\n# {title}: {formula}, in {units}"));
+        write_line(&mut out, format_args!("\n# {title}: {formula}, in {units}"));
         match &one.values {
-            None => say(&mut out, format_args!("{name} none")),
+            None => write_line(&mut out, format_args!("{name} none")),
             Some(values) => {
-                say(&mut out, format_args!("{name} {}", shape.join(" ")));
+                write_line(&mut out, format_args!("{name} {}", shape.join(" ")));
                 lines(&mut out, values, one.shape.last().copied().unwrap_or(1));
             }
         }
     }
-    say(
+    write_line(
         &mut out,
         format_args!(
             "\n# node number, position; displacement and, where it is known, rotation of each mode (rows x, y, z)"
@@ -201,14 +201,14 @@ fn text(body: &FlexBody, quantities: &[Quantity], frames: &[ExportFrame]) -> Str
     );
     for frame in frames {
         if let Some(name) = &frame.name {
-            say(&mut out, format_args!("# {}", name.escape_default()));
+            write_line(&mut out, format_args!("# {}", name.escape_default()));
         }
         let [x, y, z] = frame.position;
-        say(&mut out, format_args!("frame {} {x:e} {y:e} {z:e}", frame.id));
+        write_line(&mut out, format_args!("frame {} {x:e} {y:e} {z:e}", frame.id));
         for (kind, rows) in [("translation", Some(&frame.translation)), ("rotation", frame.rotation.as_ref())]
         {
             if let Some(rows) = rows {
-                say(&mut out, format_args!("{kind} 3 {}", rows.ncols()));
+                write_line(&mut out, format_args!("{kind} 3 {}", rows.ncols()));
                 let values: Vec<f64> = rows.row_iter().flat_map(|row| row.iter().copied()).collect();
                 lines(&mut out, &values, rows.ncols());
             }
@@ -221,10 +221,10 @@ fn text(body: &FlexBody, quantities: &[Quantity], frames: &[ExportFrame]) -> Str
 fn lines(out: &mut String, values: &[f64], columns: usize) {
     for row in values.chunks(columns) {
         let row: Vec<String> = row.iter().map(|v| format!("{v:e}")).collect();
-        say(out, format_args!("{}", row.join(" ")));
+        write_line(out, format_args!("{}", row.join(" ")));
     }
 }
 
-fn say(out: &mut String, line: std::fmt::Arguments<'_>) {
+fn write_line(out: &mut String, line: std::fmt::Arguments<'_>) {
     writeln!(out, "{line}").expect("writing to a String cannot fail");
 }

@@ -46,7 +46,7 @@ impl ExportFormat for OpenRadioss {
             // The velocities of the program omit the rotation of the deformation (`fxbodvp.F`).
             deformed_inertia: losses::changing_inertia(
                 body,
-                "W1 but for its centrifugal load",
+                "W1 except its centrifugal load",
                 "OpenRadioss takes the inertia of the undeformed body",
             ),
             general_w0: losses::general_w0(body),
@@ -72,14 +72,13 @@ impl ExportFormat for OpenRadioss {
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
         let frames = frames(body, &options.points);
         if let Some(frame) = frames.iter().find(|frame| !(1..=LARGEST).contains(&frame.id)) {
-            let message = format!("openradioss has no place for the node number {}", frame.id);
-            let help = format!("number the nodes from 1 to {LARGEST}, or choose others by --points");
+            let message = format!("openradioss cannot hold node number {}: it has eight columns", frame.id);
+            let help = format!("number the nodes from 1 to {LARGEST}, or choose other nodes with --points");
             return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
         }
         let deck = Deck::of(body, &frames);
         if !deck.finite {
-            let message =
-                "openradioss needs products of the body's numbers that leave the range of double precision";
+            let message = "openradioss needs products of stiffness and inertia, which overflow double precision for this body";
             return Err(Diagnostic::new(Code::ExportLoses, message).with_help("--to-units").into());
         }
         Ok(Exported::single(deck.text.into_bytes()))
@@ -103,9 +102,9 @@ fn rayleigh(body: &FlexBody) -> Option<[f64; 2]> {
     let beta = if slope.is_finite() { slope } else { 0.0 };
     let alpha = d[(0, 0)] - beta * lambda[0];
     let size = |j: usize| (alpha.abs() + beta.abs() * lambda[j]).sqrt();
-    let told = |i: usize, j: usize| if i == j { alpha + beta * lambda[j] } else { 0.0 };
-    let is_told = |i: usize, j: usize| (d[(i, j)] - told(i, j)).abs() <= ROUNDING * size(i) * size(j);
-    (0..=last).all(|i| (0..=last).all(|j| is_told(i, j))).then_some([alpha, beta])
+    let fitted = |i: usize, j: usize| if i == j { alpha + beta * lambda[j] } else { 0.0 };
+    let is_fitted = |i: usize, j: usize| (d[(i, j)] - fitted(i, j)).abs() <= ROUNDING * size(i) * size(j);
+    (0..=last).all(|i| (0..=last).all(|j| is_fitted(i, j))).then_some([alpha, beta])
 }
 
 /// Text of the file under construction.
@@ -192,10 +191,10 @@ impl Deck {
             |l: usize, r: usize| if l % 3 == r % 3 && l.max(r) < 12 { scalar(l / 3, r / 3) } else { 0.0 };
         self.remark("mass of the rigid modes, upper triangle");
         self.numbers((0..rigid).flat_map(|l| (l..rigid).map(move |r| (l, r))).map(|(l, r)| pair(l, r)));
-        let ibar_told = invariants.ibar_or_half_c2();
+        let ibar_stored = invariants.ibar_or_half_c2();
         let ibar = |set: usize, axis: usize, j: usize| match set {
-            3 => invariants.c1()[(axis, j)] - (0..3).map(|k| ibar_told[k][axis][j]).sum::<f64>(),
-            _ => ibar_told[set][axis][j],
+            3 => invariants.c1()[(axis, j)] - (0..3).map(|k| ibar_stored[k][axis][j]).sum::<f64>(),
+            _ => ibar_stored[set][axis][j],
         };
         // Product of rigid mode l along e_a with E_ab psi_j: component b of the mode.
         for (a, b) in (0..3).flat_map(|a| [0, 1, 2].map(|b| (a, b))) {
@@ -206,7 +205,7 @@ impl Deck {
         // By K psi_j = lambda_j M psi_j. A rigid motion causes no strain, so that the antisymmetric part and
         // C1 are rounding.
         let strained = |set: usize, axis: usize, j: usize| {
-            let symmetric_along = |k: usize| 0.5 * (ibar_told[k][axis][j] + ibar_told[axis][k][j]);
+            let symmetric_along = |k: usize| 0.5 * (ibar_stored[k][axis][j] + ibar_stored[axis][k][j]);
             let symmetric =
                 if set == 3 { -(0..3).map(symmetric_along).sum::<f64>() } else { symmetric_along(set) };
             invariants.modal_stiffness()[(j, j)] * symmetric
@@ -227,7 +226,7 @@ impl Deck {
     fn place(&mut self, body: &FlexBody, which: &str, position: &[f64; 3]) {
         let frame = body.frame();
         let [x, y, z] = (frame.origin + frame.axes * Vector3::from(*position)).into();
-        self.remark(&format!("{which} lies at {x:e} {y:e} {z:e} of the model"));
+        self.remark(&format!("{which} lies at {x:e} {y:e} {z:e} in model axes"));
     }
 
     fn integers<T: std::fmt::Display>(&mut self, values: &[T], per_line: usize) {

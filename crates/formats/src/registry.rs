@@ -40,7 +40,7 @@ pub const FORMATS: &[&dyn ExportFormat] = &[
 pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
     FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
         let names: Vec<&str> = FORMATS.iter().map(|format| format.name()).collect();
-        let message = format!("`{name}` is no export format");
+        let message = format!("`{name}` is not an export format");
         Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
     })
 }
@@ -51,7 +51,7 @@ pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
 /// # Errors
 /// [`Usage`](Code::Usage) for options that the format does not have, or nodes that the body does not have;
 /// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss` is true; the errors of
-/// [`RecordedMotion::staged`](flexbody_file::RecordedMotion::staged) and of [`ExportFormat::write`].
+/// [`RecordedMotion::body_in_frame`](flexbody_file::RecordedMotion::body_in_frame) and of [`ExportFormat::write`].
 pub fn export(
     body: &FlexBody,
     format: &dyn ExportFormat,
@@ -61,7 +61,7 @@ pub fn export(
     check_options(body, format, options)?;
     // A picture of a motion shows the body in the frame of the motion.
     let body = match &options.motion {
-        Some(motion) => Cow::Owned(motion.staged(body)?),
+        Some(motion) => Cow::Owned(motion.body_in_frame(body)?),
         None => Cow::Borrowed(body),
     };
     let body = body.as_ref();
@@ -91,25 +91,32 @@ fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOpt
         && !format.dialects().contains(&dialect.as_str())
     {
         let known = format.dialects().join(", ");
-        let help = if known.is_empty() { format!("{name} has no dialects") } else { known };
-        return refuse(format!("`{dialect}` is no dialect of {name}"), help);
+        let help =
+            if known.is_empty() { format!("leave --dialect out: {name} has no dialects") } else { known };
+        return refuse(format!("`{dialect}` is not a dialect of {name}"), help);
     }
     if options.points != Points::Usual && !format.has_points() {
-        return refuse(format!("{name} has all nodes or none"), "leave --points out".to_owned());
+        return refuse(
+            format!("{name} writes all nodes or none: --points does not apply"),
+            "leave --points out".to_owned(),
+        );
     }
     if (options.modes.is_some() || options.motion.is_some()) && !format.is_picture() {
-        let help = "leave --modes and --simulation out, or take vtk or gltf".to_owned();
-        return refuse(format!("{name} has all modes of the body, and no motion"), help);
+        let help = "leave --modes and --simulation out, or export to vtk or gltf".to_owned();
+        return refuse(format!("{name} always writes all modes of the body, and never a motion"), help);
     }
     if let Some(modes) = options.modes.filter(|modes| *modes > body.n_modes()) {
-        let help = format!("--modes {} at the most", body.n_modes());
+        let help = format!("give --modes {} or less", body.n_modes());
         return refuse(format!("the body has {} modes, not {modes}", body.n_modes()), help);
     }
     if options.points.of_interfaces() && body.interfaces().is_empty() {
-        return refuse("the body has no interfaces".to_owned(), "--points nodes, or node numbers".to_owned());
+        return refuse(
+            "the body has no interfaces".to_owned(),
+            "give --points nodes, or node numbers".to_owned(),
+        );
     }
     if let Some(id) = options.points.named().iter().find(|&id| !body.nodes().ids.contains(id)) {
-        let help = "flexbody inspect names the nodes".to_owned();
+        let help = "list the nodes with flexbody inspect".to_owned();
         return refuse(format!("the body has no node {id}"), help);
     }
     Ok(())
@@ -132,7 +139,7 @@ pub const IMPORT_FORMATS: &[&dyn ImportFormat] = &[
 pub fn find_import_format(name: &str) -> Result<&'static dyn ImportFormat> {
     IMPORT_FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
         let names: Vec<&str> = IMPORT_FORMATS.iter().map(|format| format.name()).collect();
-        let message = format!("`{name}` is no format that is read");
+        let message = format!("`{name}` is not an import format");
         Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
     })
 }
@@ -144,7 +151,7 @@ pub fn find_import_format(name: &str) -> Result<&'static dyn ImportFormat> {
 pub fn recognise(file: &InputFile) -> Result<&'static dyn ImportFormat> {
     IMPORT_FORMATS.iter().copied().find(|format| format.recognises(file)).ok_or_else(|| {
         let names: Vec<&str> = IMPORT_FORMATS.iter().map(|format| format.name()).collect();
-        let message = format!("the file is of no format that is read: {}", names.join(", "));
+        let message = format!("the format of the file is not recognised: it is none of {}", names.join(", "));
         Diagnostic::new(Code::ForeignUnreadable, message).in_file(file.path()).into()
     })
 }

@@ -34,17 +34,20 @@ impl ExportFormat for Simscape {
     }
 
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
-        let told = InterfaceMatrices::of(body, "simscape")?;
-        let names: Vec<&str> = told.frames.iter().map(|(name, _)| *name).collect();
+        let interface_matrices = InterfaceMatrices::of(body, "simscape")?;
+        let names: Vec<&str> = interface_matrices.frames.iter().map(|(name, _)| *name).collect();
         let (pose, units) = (body.frame(), body.units());
         let units = [units.length.name(), units.mass.name(), units.time.name()];
         let small = [
-            ("P0", Mat::from_fn(told.frames.len(), 3, |i, k| told.frames[i].1[k])),
+            (
+                "P0",
+                Mat::from_fn(interface_matrices.frames.len(), 3, |i, k| interface_matrices.frames[i].1[k]),
+            ),
             ("origin", Mat::from_fn(1, 3, |_, k| pose.origin[k])),
             ("axes", Mat::from_fn(3, 3, |i, j| pose.axes[(i, j)])),
         ];
-        let mut matrices = vec![("K", told.stiffness), ("M", told.mass)];
-        matrices.extend(told.damping.as_ref().map(|damping| ("C", damping)));
+        let mut matrices = vec![("K", interface_matrices.stiffness), ("M", interface_matrices.mass)];
+        matrices.extend(interface_matrices.damping.as_ref().map(|damping| ("C", damping)));
         matrices.extend(small.iter().map(|(name, matrix)| (*name, matrix)));
         if options.dialect.as_deref() == Some(HDF5) {
             let mut root: Vec<_> =
@@ -60,8 +63,10 @@ impl ExportFormat for Simscape {
         variables.push(("frames", Mat5Value::Text(names)));
         variables.push(("units", Mat5Value::Text(units.to_vec())));
         let too_large = || {
-            let message = "simscape: a matrix has more than 4 GiB, which a MAT-file of version 5 cannot hold";
-            Diagnostic::new(Code::ExportLoses, message).with_help("--dialect hdf5 has no such limit").into()
+            let message = "simscape cannot hold a matrix of more than 4 GiB in a MAT-file of version 5";
+            Diagnostic::new(Code::ExportLoses, message)
+                .with_help("use --dialect hdf5, which has no such limit")
+                .into()
         };
         mat5(&variables).map(Exported::single).ok_or_else(too_large)
     }

@@ -108,8 +108,8 @@ impl Random {
     fn mesh(&mut self, n: usize) -> Option<SurfaceMesh> {
         let (triangles, edges) = (self.below(4), self.below(4));
         let mut other = |last: u32, apart: u32| {
-            let room = last - 1 - apart;
-            apart + self.below(room as usize + 1) as u32
+            let width = last - 1 - apart;
+            apart + self.below(width as usize + 1) as u32
         };
         let last = u32::try_from(n).expect("few nodes").checked_sub(1).filter(|last| *last >= 2)?;
         let triangles = (0..triangles).map(|_| [last, 0, other(last, 1)]).collect();

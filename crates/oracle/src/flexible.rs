@@ -199,7 +199,7 @@ pub fn accelerations(
 }
 
 /// Returns a state with spin and modal rates on one time scale, so that no force hides the others.
-pub fn lively_state(random: &mut Random, body: &FlexBody) -> State {
+pub fn moving_state(random: &mut Random, body: &FlexBody) -> State {
     let (nf, inertia) = (body.n_modes(), body.invariants().inertia());
     let size = inertia.norm().sqrt();
     let lambda = &body.modes().eigenvalue;

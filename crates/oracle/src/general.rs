@@ -140,9 +140,10 @@ impl NodalBody {
         let own_mass = dense(mass);
         let turns = rows.iter().enumerate().filter(|(_, row)| row.kind == RowKind::Rotation);
         let couples_by_moment = turns.clone().any(|(i, _)| own_mass.row(i).norm() > 0.0);
-        let (rows, shapes, mass) = match couples_by_moment {
-            true => on_directors(rows, &own_shapes, &own_mass),
-            false => (rows.to_vec(), own_shapes.clone(), own_mass),
+        let (rows, shapes, mass) = if couples_by_moment {
+            on_directors(rows, &own_shapes, &own_mass)
+        } else {
+            (rows.to_vec(), own_shapes.clone(), own_mass)
         };
         let mut vectors = shapes.clone();
         for (i, row) in rows.iter().enumerate() {
@@ -393,16 +394,17 @@ fn on_directors(
         for &second in &nodes {
             // M_tr = -h~ + N: h couples the point to the directors, N to the rotations.
             let own = block((kind, node), (RowKind::Rotation, second));
-            let (moment, symmetric) = match plane {
-                true => (Vector3::new(own[(1, 2)], -own[(0, 2)], 0.0), Matrix3::zeros()),
-                false => (
+            let (moment, symmetric) = if plane {
+                (Vector3::new(own[(1, 2)], -own[(0, 2)], 0.0), Matrix3::zeros())
+            } else {
+                (
                     Vector3::new(
                         own[(1, 2)] - own[(2, 1)],
                         own[(2, 0)] - own[(0, 2)],
                         own[(0, 1)] - own[(1, 0)],
                     ) * 0.5,
                     (own + own.transpose()) * 0.5,
-                ),
+                )
             };
             for k in 0..axes {
                 let i = at[&Row { kind, node, axis: k }];
@@ -420,9 +422,10 @@ fn on_directors(
     for (&node, &second) in nodes.iter().flat_map(|node| nodes.iter().map(move |second| (node, second))) {
         // P = tr(M_rr) / 2 I - M_rr' couples the directors.
         let own = block((RowKind::Rotation, node), (RowKind::Rotation, second));
-        let p = match plane {
-            true => Matrix3::identity() * (0.5 * own[(2, 2)]),
-            false => Matrix3::identity() * (0.5 * own.trace()) - own.transpose(),
+        let p = if plane {
+            Matrix3::identity() * (0.5 * own[(2, 2)])
+        } else {
+            Matrix3::identity() * (0.5 * own.trace()) - own.transpose()
         };
         for (a, b, axis) in
             (0..axes).flat_map(|a| (0..axes).flat_map(move |b| (0..axes).map(move |k| (a, b, k))))

@@ -97,7 +97,7 @@ impl Unreduced {
 
     /// Returns a state of all modes with spin, translation and modal rates on one time scale, so that no force hides
     /// the others.
-    pub fn lively_state(&self, seed: u64, deformation: f64) -> State {
+    pub fn moving_state(&self, seed: u64, deformation: f64) -> State {
         let mut random = Random(seed);
         let (lambda, nf) = (&self.eigenvalues, self.eigenvalues.len());
         let (rate, size) = (lambda[0].sqrt(), self.size);

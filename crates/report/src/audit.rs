@@ -19,12 +19,13 @@ pub fn audit_text(file: &str, audit: &Audit) -> String {
     let Audit { format, dialect, name, mass, n_modes, n_frames, .. } = audit;
     let dialect = if dialect.is_empty() { String::new() } else { format!(", dialect {dialect}") };
     let called = if name.is_empty() { String::new() } else { format!(" `{name}`") };
-    let told = audit.frequencies.iter().take(FREQUENCIES).map(|f| significant(*f, 5)).collect::<Vec<_>>();
+    let frequencies =
+        audit.frequencies.iter().take(FREQUENCIES).map(|f| significant(*f, 5)).collect::<Vec<_>>();
     let more = if audit.frequencies.len() > FREQUENCIES { ", ..." } else { "" };
     let mut lines = vec![
         format!("{file}: {format}{dialect}"),
         format!("body{called}: mass {}, {n_modes} modes, {n_frames} nodes or frames", significant(*mass, 6)),
-        format!("frequencies {}{more} cycles per time unit of the file", told.join(", ")),
+        format!("frequencies {}{more} cycles per time unit of the file", frequencies.join(", ")),
     ];
     lines.extend(audit.notes.iter().map(|note| format!("note: {note}")));
     let rows = audit.checks.iter().map(|c| check_row(c.name, [c.value, c.limit], c.formula, c.passed()));

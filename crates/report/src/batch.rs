@@ -1,7 +1,7 @@
 //! Report on all bodies of a batch: text, JSON and HTML.
 
 use super::document::{Block, Document, Inline, Table, cells, heading};
-use super::numbers::significant;
+use super::numbers::frequency_range;
 use super::render::Format;
 use flexbody_base::provenance::generator;
 use serde::Serialize;
@@ -38,22 +38,22 @@ pub struct BatchRow {
 
 impl BatchRow {
     /// Fills the row from the JSON output of a conversion.
-    pub fn read(&mut self, told: &Value) {
-        let results = &told["results"];
+    pub fn read(&mut self, json: &Value) {
+        let results = &json["results"];
         let frequencies: Vec<f64> = results["modes"]["frequency_hz"]
             .as_array()
             .into_iter()
             .flatten()
             .filter_map(Value::as_f64)
             .collect();
-        self.warnings = told["warnings"].as_u64().unwrap_or(0);
+        self.warnings = json["warnings"].as_u64().unwrap_or(0);
         self.n_dofs = results["model"]["n_dofs"].as_u64();
         self.modes = results["modes"]["count"].as_u64();
         self.frequencies_hz =
             frequencies.first().zip(frequencies.last()).map(|(first, last)| [*first, *last]);
         self.complete = results["completeness"]["sentence"].as_str().map(str::to_owned);
         self.peak_memory_bytes = results["run"]["peak_memory_bytes"].as_u64();
-        let first = told["diagnostics"].as_array().into_iter().flatten().find(|d| d["severity"] == "error");
+        let first = json["diagnostics"].as_array().into_iter().flatten().find(|d| d["severity"] == "error");
         self.error = first.map(|d| {
             let word = |key: &str| d[key].as_str().unwrap_or_default().to_owned();
             format!("{} {}", word("code"), word("message"))
@@ -106,7 +106,7 @@ impl BatchFacts {
     fn document(&self) -> Document<'_> {
         let all = self.bodies.len();
         let (caption, end) = match self.failed {
-            0 => (format!("All {all} bodies are there"), format!("all {all} bodies are there")),
+            0 => (format!("All {all} bodies were converted"), format!("all {all} bodies were converted")),
             failed => {
                 (format!("{failed} of {all} bodies failed"), format!("{failed} of {all} bodies FAILED"))
             }
@@ -116,11 +116,11 @@ impl BatchFacts {
             "State",
             "DOF",
             "Modes",
-            "Hz",
+            "Frequencies",
             "Seconds",
-            "GB set aside",
+            "GB reserved",
             "GB used",
-            "Modes complete, or why not there",
+            "Completeness of the modes, or reason of the failure",
         ];
         let rows = self.bodies.iter().map(BatchRow::cells).collect();
         let last = heads.len() - 1;
@@ -136,13 +136,12 @@ impl BatchRow {
         let none = || "-".to_owned();
         let number = |n: Option<u64>| n.map_or_else(none, |n| n.to_string());
         let gigabytes = |bytes: Option<u64>| bytes.map_or_else(none, |b| format!("{:.2}", b as f64 * 1e-9));
-        let range = |hertz: [f64; 2]| hertz.map(|hertz| significant(hertz, 5)).join(" to ");
         cells([
             self.output.clone(),
             self.state.to_owned(),
             number(self.n_dofs),
             number(self.modes),
-            self.frequencies_hz.map_or_else(none, range),
+            self.frequencies_hz.map_or_else(none, |ends| frequency_range(ends, 5)),
             format!("{:.1}", self.seconds),
             gigabytes(Some(self.memory_estimate_bytes)),
             gigabytes(self.peak_memory_bytes),

@@ -21,10 +21,11 @@ pub(super) fn lumped<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     let (lumped, own_modes) = (&facts.lumped, &facts.lumped_modes);
     let mut blocks = Vec::new();
     if !lumped.is_empty() {
-        let title =
-            Inline::from("What ").then(word_as("lumped mass", "lumped masses")).then(" would have cost");
+        let title = Inline::from("Errors of ").then(word_as("lumped mass", "lumped masses"));
         blocks.push(Block::Heading(title));
-        blocks.push(Block::Paragraph("The same modes with nodal masses instead of the mass matrix:".into()));
+        blocks.push(Block::Paragraph(
+            "Errors of the same modes with nodal masses instead of the mass matrix:".into(),
+        ));
         blocks.push(Block::List(lumped.iter().map(in_words).collect()));
         blocks.extend(bars(lumped).map(Block::Bars));
         let norms = vec![Block::Table(schemes(lumped)), Block::Table(all_norms(lumped))];
@@ -32,7 +33,7 @@ pub(super) fn lumped<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
         blocks.push(Block::Terms(listed("lumped", lumped, in_text)));
     }
     if !own_modes.is_empty() {
-        blocks.push(heading("Modes from the lumped masses too"));
+        blocks.push(heading("Modes computed with lumped masses"));
         blocks.push(Block::Table(lumped_modes(own_modes)));
         let cautions = own_modes.iter().filter(|own| !own.caution.is_empty());
         blocks.extend(cautions.map(|own| Block::Paragraph(format!("{}: {}", own.scheme, own.caution))));
@@ -79,10 +80,14 @@ fn errors(errors: &Errors) -> String {
         return "not compared".to_owned();
     }
     // NaN, an unknown error, is listed too.
-    let told = errors.worst_by_invariant.iter().filter(|n| n.value.is_nan() || n.value > NEGLIGIBLE);
+    let listed_norms = errors.worst_by_invariant.iter().filter(|n| n.value.is_nan() || n.value > NEGLIGIBLE);
     let text = |n: &ErrorNorm| format!("{} {}", n.invariant.replace('_', " "), percent(n.value));
-    let told: Vec<String> = told.map(|n| text(n).replace(' ', KEEP)).collect();
-    if told.is_empty() { "no error above 1e-9".to_owned() } else { format!("errors {}", told.join(", ")) }
+    let listed_norms: Vec<String> = listed_norms.map(|n| text(n).replace(' ', KEEP)).collect();
+    if listed_norms.is_empty() {
+        "no error above 1e-9".to_owned()
+    } else {
+        format!("errors {}", listed_norms.join(", "))
+    }
 }
 
 /// Returns bars with the worst norm of each invariant for each scheme; `None` if there are no errors to draw.
@@ -103,7 +108,7 @@ fn bars(lumped: &[LumpedFacts]) -> Option<Bars> {
     };
     (!invariants.is_empty()).then(|| Bars {
         description: "Bar chart of the worst relative error of each invariant; the numbers are in the table below.".to_owned(),
-        caption: "Relative errors, the worst norm of each invariant. Logarithmic axis; errors below its left end have no bar.".to_owned(),
+        caption: "Relative errors: the worst norm of each invariant, on a logarithmic axis. Errors below its left end have no bar.".to_owned(),
         axis,
         groups: invariants.iter().map(group).collect(),
     })
@@ -160,7 +165,13 @@ fn lumped_modes(lumped: &[LumpedModesFacts]) -> Table {
         let [value, of] = worst(&own.errors, "");
         cells([own.scheme.clone(), change, significant(own.subspace_cosine, 5), value, of])
     };
-    let heads = ["Scheme", "Worst frequency", "Subspace cosine", "Worst error", "Of, or why not done"];
+    let heads = [
+        "Scheme",
+        "Worst frequency",
+        "Subspace cosine",
+        "Worst error",
+        "Number of modes, or reason why none",
+    ];
     let caption = "Frequencies in ascending order; invariants after alignment of the subspaces";
     Table::new(caption, heads, &[0, 4], lumped.iter().map(row).collect())
 }

@@ -7,7 +7,7 @@ use super::facts::{Facts, ModeFacts};
 use super::geometric_stiffness::softening_in_words;
 use super::glossary::{word, word_as};
 use super::guarantee::{GuaranteeFacts, cut};
-use super::numbers::{counted, percent, significant};
+use super::numbers::{counted, frequencies as frequencies_of, frequency, percent, significant};
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::Truncation;
 
@@ -29,7 +29,7 @@ pub(super) fn modes<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
             .iter()
             .map(|g| cells([g.load.clone(), significant(g.relative_norm, 3)]));
         let caption = Inline::from(word_as("geometric stiffness", "Geometric stiffness"))
-            .then(": largest part by which one unit of the load changes the stiffness of a motion");
+            .then(": largest relative change of the stiffness of a motion by one unit of the load");
         blocks.push(Block::Table(Table::new(caption, ["Load (body axes)", "Part"], &[0], rows.collect())));
     }
     if let Some(guarantee) = &facts.guarantee {
@@ -43,11 +43,11 @@ pub(super) fn modes<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
 
 /// Returns the first frequencies and the last: `812.5 812.5 1204 1890.2 2411 3020 ... 4412.5 Hz`.
 pub(super) fn first_and_last(hz: &[f64]) -> String {
-    let shown: Vec<String> = hz.iter().take(FIRST_FREQUENCIES).map(|f| significant(*f, 5)).collect();
-    let last = hz.last().filter(|_| hz.len() > FIRST_FREQUENCIES);
+    let (all, unit) = frequencies_of(hz, 5);
+    let last = all.last().filter(|_| hz.len() > FIRST_FREQUENCIES);
     let dots = if hz.len() > FIRST_FREQUENCIES + 1 { " ..." } else { "" };
-    let last = last.map_or(String::new(), |f| format!("{dots} {}", significant(*f, 5)));
-    format!("{}{last} Hz", shown.join(" "))
+    let last = last.map_or(String::new(), |last| format!("{dots} {last}"));
+    format!("{}{last} {unit}", all[..all.len().min(FIRST_FREQUENCIES)].join(" "))
 }
 
 /// Returns the terms about the modes in a text.
@@ -55,7 +55,7 @@ fn in_short(facts: &Facts<'_>) -> Vec<Term> {
     let modes = &facts.modes;
     let accuracy = facts.run.as_ref().map(|run| run.accuracy.as_str()).filter(|name| !name.is_empty());
     let accuracy = accuracy.map_or(String::new(), |name| format!(", {name} accuracy"));
-    let residual = significant(modes.worst_residual, 2) + modes.whose_residual();
+    let residual = significant(modes.worst_residual, 2) + modes.residual_remark();
     let mut items = vec![
         Term::text("modes", format!("{} flexible, worst residual {residual}{accuracy}", modes.count)),
         Term::text("frequency", first_and_last(&modes.frequency_hz)),
@@ -79,9 +79,7 @@ fn in_short(facts: &Facts<'_>) -> Vec<Term> {
 fn frequencies(facts: &Facts<'_>) -> Table {
     let modes = &facts.modes;
     let caption = match modes.craig_bampton {
-        Some(_) => {
-            "Modes of the reduced body, ascending, and the frequencies of the free body as estimated from what the basis lacks"
-        }
+        Some(_) => "Modes of the reduced body, ascending, with the estimated frequencies of the free body",
         None => "Flexible modes, ascending",
     };
     // Without damping the column would hold zeros only.
@@ -148,7 +146,7 @@ fn origin(provenance: &str) -> Inline {
 /// Returns the table of the fixed-interface modes of a Craig-Bampton body.
 fn held_frequencies<'a>(hz: &[f64]) -> Block<'a> {
     let rows = (1..).zip(hz).map(|(j, hz)| cells([format!("{j}"), significant(*hz, 8)])).collect();
-    let caption = "Fixed-interface modes that the basis has: natural frequencies with all interfaces held";
+    let caption = "Fixed-interface modes of the basis: natural frequencies with all interfaces held";
     Block::Table(Table::new(caption, ["Fixed-interface mode", "Frequency (Hz)"], &[], rows))
 }
 
@@ -168,7 +166,7 @@ fn truncation<'a>(loads: &[Truncation]) -> Vec<Block<'a>> {
         let with = if has_none(t) { "" } else { &with };
         format!("{}: error {} with free modes alone{with}", t.load, significant(t.before, 2))
     });
-    let caption = "Static responses: what the modes lack, in the norm of K";
+    let caption = "Static responses: error of the modes, in the norm of K";
     vec![Block::Table(Table::new(caption, heads, &[0], rows)), Block::Terms(listed)]
 }
 
@@ -228,12 +226,11 @@ fn proof(facts: &Facts<'_>) -> Vec<Term> {
     let (modes, c) = (&facts.modes, &facts.completeness);
     let pivots = |count: Option<usize>, held: &str, shift: Option<f64>| {
         let count = count.map_or_else(|| "not counted".to_owned(), |n| n.to_string());
-        let shift =
-            shift.map_or_else(|| "no frequency".to_owned(), |hz| format!("{} Hz", significant(hz, 6)));
+        let shift = shift.map_or_else(|| "no frequency".to_owned(), |hz| frequency(hz, 6));
         Term::page(word_as("completeness", "Negative pivots"), format!("{count} of K − σM{held} at {shift}"))
     };
     let residual =
-        format!("{} of |Kψ| + |λMψ|{}", significant(modes.worst_residual, 3), modes.whose_residual());
+        format!("{} of |Kψ| + |λMψ|{}", significant(modes.worst_residual, 3), modes.residual_remark());
     let mut items = match &modes.craig_bampton {
         Some(own) => vec![
             Term::page("Coordinates", own.made_of()),

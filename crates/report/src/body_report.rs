@@ -6,7 +6,9 @@ use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, 
 use super::facts::{Facts, InterfaceFacts, ModelFacts, RunFacts};
 use super::glossary::{glossary, word_as};
 use super::heat_map::heat_maps;
-use super::numbers::{bytes, coordinates, counted, duration, sentence, significant, times, triple};
+use super::numbers::{
+    bytes, coordinates, counted, duration, frequency, frequency_range, sentence, significant, times, triple,
+};
 use super::run_data::{Phase, SearchAttempt};
 use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::{FlexBody, MassStructure};
@@ -41,13 +43,17 @@ fn verdict<'a>(facts: &Facts<'_>) -> Block<'a> {
         "given" => State::Given,
         _ => State::Open,
     };
-    let hertz = |hz: Option<&f64>| hz.map_or_else(String::new, |hz| significant(*hz, 5));
-    let (first, last) = (hertz(modes.frequency_hz.first()), hertz(modes.frequency_hz.last()));
+    let range = match modes.frequency_hz.as_slice() {
+        [] => String::new(),
+        [only] => format!(", {}", frequency(*only, 5)),
+        [first, .., last] => format!(", {}", frequency_range([*first, *last], 5)),
+    };
+    let mass = facts.model.units.mass_of(facts.body.mass, 4);
     let free =
         modes.craig_bampton.as_ref().map(|own| format!(" {}.", sentence(&own.holds(&modes.frequency_hz))));
     let rest = format!(
-        "{} flexible modes, {first} to {last} Hz. {}.{}",
-        modes.count,
+        "{mass}; {}{range}. {}.{}",
+        counted(modes.count, "flexible mode"),
         sentence(&completeness.sentence),
         free.unwrap_or_default()
     );
@@ -74,11 +80,15 @@ fn properties(facts: &Facts<'_>) -> Vec<Term> {
     items.extend(model.storage_in_words().map(|rounded| Term::text("storage", rounded)));
     let number = model.body.as_ref().map(|own| format!("body {} of {} in the matrices", own.number, own.of));
     items.extend(number.map(|number| Term::new("Of several", number).short("")));
-    let mass = Span::Strong(format!("{} {}", significant(body.mass, 7), units.mass()));
+    let [mass, exact] =
+        [units.mass_of(body.mass, 7), format!("{} {}", significant(body.mass, 7), units.mass())];
+    // The value in the unit of the model follows if a prefix was chosen.
+    let exact = if mass == exact { String::new() } else { format!(" ({exact})") };
     items.extend([
-        Term::new("Mass", mass).in_text("mass", format!("{} {}", significant(body.mass, 6), units.mass())),
+        Term::new("Mass", Inline::from(Span::Strong(mass)).then(exact.as_str()))
+            .in_text("mass", units.mass_of(body.mass, 6) + &exact),
         Term::new("Centre of mass", quantity(format!("{centre} (model axes)")))
-            .in_text("centre", format!("{centre} (of mass, model axes)")),
+            .in_text("centre", format!("{centre} (centre of mass, model axes)")),
         Term::new(
             word_as("principal moments of inertia", "Principal inertia"),
             quantity(format!("{inertia} (about the centre of mass)")),
@@ -113,7 +123,8 @@ fn extent(body: &FlexBody) -> Option<[f64; 3]> {
 /// Returns a caution for each approximation in the model, the storage and the units.
 fn cautions<'a>(model: &ModelFacts) -> Vec<Block<'a>> {
     let is_lumped = model.mass_structure == MassStructure::Diagonal.name();
-    let lumped = "The mass matrix is diagonal: it was lumped before it came here, and all numbers are exact for that mass only.";
+    let lumped =
+        "The mass matrix of the model is diagonal (lumped): all numbers are exact for this lumped mass only.";
     let assumed = "No units were stated: m, kg, s are assumed.";
     let all = [
         model.approximation.as_ref().map(|remark| format!("Approximation: {remark}.")),
@@ -131,16 +142,20 @@ fn interfaces<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     }
     let (size, unit) = (facts.body.size(), facts.model.units.length());
     let row = |own: &InterfaceFacts| {
-        let words = own.in_words(size, &unit);
-        let words = if own.breaks_its_word() { Span::Warning(words) } else { Span::Plain(words) };
-        vec![own.name.as_str().into(), words.into()]
+        let motion = own.motion_in_words().unwrap_or_else(|| "not known".to_owned());
+        let motion = if own.deforms_although_rigid() { Span::Warning(motion) } else { Span::Plain(motion) };
+        let point = own.reference_model.map_or_else(|| "none".to_owned(), |x| coordinates(&x, size, &unit));
+        let mut row: Vec<Inline> = vec![own.name.as_str().into()];
+        row.extend(cells([own.n_nodes.to_string(), own.coupling.unwrap_or("not stated").to_owned(), point]));
+        row.push(motion.into());
+        row
     };
     let caption = format!("{}, in the order of the file", counted(interfaces.len(), "interface"));
-    let heads = ["Name", "Nodes, coupling, reference point (model axes)"];
+    let heads = ["Name", "Nodes", "Coupling", "Reference point (model axes)", "Motion in the modes"];
     let rows = interfaces.iter().map(row).collect();
     vec![
         heading(word_as("interface", "Interfaces")),
-        Block::Table(Table::new(caption, heads, &[0, 1], rows)),
+        Block::Table(Table::new(caption, heads, &[0, 2, 3, 4], rows)),
         Block::Terms(listed("interface", interfaces, |own| {
             format!("{}: {}", own.name, own.in_words(size, &unit))
         })),

@@ -5,12 +5,12 @@ use std::ops::Range;
 /// Relative gap of eigenvalues below which neighbours are compared as one space. Rounding p of the
 /// eigenproblem rotates two modes with the relative gap g by p/g: with p = 1e-13, modes further apart than
 /// this agree to 1e-8. A smaller value would show rounding of closer modes as a difference.
-const GAP: f64 = 1e-5;
+const CLUSTER_GAP: f64 = 1e-5;
 
 /// Returns true if the eigenvalue `i` (from 1) of `values` (ascending) belongs to the same cluster as its
 /// predecessor.
 pub(super) fn close(values: &[f64], i: usize) -> bool {
-    values[i] - values[i - 1] <= GAP * values[i]
+    values[i] - values[i - 1] <= CLUSTER_GAP * values[i]
 }
 
 /// Returns the ranges of modes that are close to each other in `a` or in `b` (both ascending, of equal

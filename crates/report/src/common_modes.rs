@@ -2,7 +2,7 @@
 
 use super::clusters::close;
 use super::errors_in_words::runs;
-use super::numbers::{counted, significant};
+use super::numbers::{counted, frequency, frequency_range};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -32,7 +32,7 @@ impl CommonModes {
         let (kept, split): (Vec<usize>, Vec<usize>) =
             (0..fewer.len()).partition(|&i| is_whole(more, &partners, partners[i]));
         if kept.is_empty() {
-            let message = "the bodies have no mode in common but parts of a repeated eigenvalue";
+            let message = "the bodies have no mode in common except parts of a repeated eigenvalue";
             return Err(Diagnostic::new(Code::BodyIncomparable, message)
                 .with_help("convert both with all modes of the repeated eigenvalue")
                 .into());
@@ -52,7 +52,7 @@ impl CommonModes {
         }
         if !split.is_empty() {
             notes.push(
-                "modes of a repeated eigenvalue of which one body has a part only are not determined and left out".to_owned(),
+                "modes of a repeated eigenvalue that one body has only in part are not determined and were left out".to_owned(),
             );
         }
         Ok(Self { a: a_modes, b: b_modes, notes })
@@ -110,9 +110,9 @@ fn left_out(body: &FlexBody, compared: &[usize], which: &str) -> Option<String> 
     let (first, last) = (*rest.first()?, *rest.last()?);
     let hertz = body.frequencies_hz();
     let range = if rest.len() == 1 {
-        format!("at {} Hz", significant(hertz[first], 5))
+        format!("at {}", frequency(hertz[first], 5))
     } else {
-        format!("from {} to {} Hz", significant(hertz[first], 5), significant(hertz[last], 5))
+        format!("from {}", frequency_range([hertz[first], hertz[last]], 5))
     };
     Some(format!("not compared: {} of the {which} body, {range}", some_of(&rest, usize::MAX)))
 }

@@ -138,7 +138,7 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     comparison.interfaces(&pair, tolerances.centre_of_mass);
     // Notes on the limits of the comparison.
     if !placed {
-        let note = "a body comes from a file of another program, which does not tell where its frame is in the model: the body frames are taken as the same";
+        let note = "a body comes from a file of another program, which does not state the position of its frame in the model: the body frames are assumed to be the same";
         comparison.notes.push(note.to_owned());
     }
     comparison.say_what_is_dropped(a, b);
@@ -202,7 +202,7 @@ fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
     if !have_the_same_modes(a.conditions(), b.conditions()) {
         let (a, b) = (a.conditions(), b.conditions());
         let message = format!(
-            "the modes are those of other reference conditions: in the first body {a}, in the second {b}"
+            "the modes belong to different reference conditions: {a} in the first body, {b} in the second"
         );
         let help = "convert both with the same --frame";
         problems.push(incomparable(message).with_help(help));
@@ -213,7 +213,7 @@ fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
     }
     if a.n_modes() != b.n_modes() {
         let message = format!("the first body has {} modes, the second {}", a.n_modes(), b.n_modes());
-        let help = "--common compares the modes that both have, and names those that it leaves out";
+        let help = "compare with --common, which uses the modes that both bodies have and names the others";
         problems.push(incomparable(message).with_help(help));
     }
     if problems.is_empty() { Ok(()) } else { Err(Error::new(problems)) }
@@ -334,7 +334,7 @@ impl BodyComparison {
         let may_lack = |body: &FlexBody| !is_placed(body) && !has(body);
         let left_out = may_lack(pair.a) || may_lack(pair.b);
         if left_out && (has(pair.a) || has(pair.b)) {
-            let entry = format!("{name}, of which a body of another program has none ({paths})");
+            let entry = format!("{name}, which a body of another program does not have ({paths})");
             self.not_compared.push(entry);
         }
         left_out
@@ -451,7 +451,7 @@ impl BodyComparison {
     fn norms_only(&mut self, pair: &Pair<'_>, tolerance: f64) {
         let Pair { a, b, in_a, groups, .. } = pair;
         let (na, nb) = (a.n_nodes(), b.n_nodes());
-        let count = if na == nb { format!("{na} with other numbers") } else { format!("{na} and {nb}") };
+        let count = if na == nb { format!("{na} with different numbers") } else { format!("{na} and {nb}") };
         self.notes.push(format!(
             "the bodies have different nodes ({count}): shapes are not compared, invariants only by their norms over groups of modes"
         ));

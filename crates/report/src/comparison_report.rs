@@ -69,7 +69,7 @@ impl ComparisonReport<'_> {
     }
 
     fn title(&self) -> String {
-        format!("{} beside {}", plain(self.b), plain(self.a))
+        format!("{} compared with {}", plain(self.b), plain(self.a))
     }
 
     /// Returns the result of the comparison as a sentence.
@@ -97,7 +97,7 @@ impl ComparisonReport<'_> {
         let rows = self.comparison.rows().iter().map(row).collect();
         let heads = ["Quantity", "Difference", "Tolerance", "", "Relative to"];
         let table = Table::new("Largest differences, without units", heads, &[0, 3, 4], rows);
-        let compared = vec![Term::page("reference", self.a), Term::page("compared with it", self.b)];
+        let compared = vec![Term::page("reference", self.a), Term::page("compared body", self.b)];
         let mut blocks = vec![
             Block::Verdict { state, head: self.verdict(), rest: String::new() },
             Block::Terms(compared),

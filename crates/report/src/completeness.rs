@@ -1,7 +1,7 @@
 //! Completeness of the modes in a sentence that claims no more than the certificate proves.
 
 use super::craig_bampton;
-use super::numbers::{counted, plain, significant};
+use super::numbers::{counted, frequency, plain};
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::{FlexBody, is_static};
 
@@ -86,7 +86,7 @@ fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
         (None, false)
             if body.basis() == Some(BasisKind::Imported) && body.certificate().negative_pivots.is_none() =>
         {
-            (GIVEN, "Shapes as given.")
+            (GIVEN, "Shapes taken as given.")
         }
         (None, false) if counted_elsewhere(body) => {
             (GIVEN, "No mode is missing by the count of another program.")
@@ -111,7 +111,7 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
         };
         return (false, format!("{verdict}: {why}"));
     };
-    let shift = significant(shift_hz.unwrap_or(f64::NAN), 5);
+    let shift = frequency(shift_hz.unwrap_or(f64::NAN), 5);
     // The count must agree with the claim, and the body must hold the claimed modes.
     let below = body.modes().eigenvalue.iter().filter(|&&l| l < c.shift).count();
     let count = c.negative_pivots.map_or("missing".to_owned(), |n| n.to_string());
@@ -120,11 +120,11 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
         return (false, format!("NOT PROVED: {claim} are claimed, but the inertia count is {count}"));
     }
     if below != flexible.min(nf) {
-        let have = format!("the body has {below} of the {flexible} flexible modes below {shift} Hz");
+        let have = format!("the body has {below} of the {flexible} flexible modes below {shift}");
         return (false, format!("NOT PROVED: {have} (inertia count {count})"));
     }
     let proof = format!(
-        "{flexible} flexible + {} below {shift} Hz (inertia count {count})",
+        "{flexible} flexible + {} below {shift} (inertia count {count})",
         counted(c.rigid_modes, "rigid mode")
     );
     // Modes above the count must be static shapes for a complete proof.
@@ -133,14 +133,18 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
         std::cmp::Ordering::Less if nf - flexible == statics => (
             true,
             format!(
-                "proved: {proof}; {} beside them {} no modes",
+                "proved: {proof}; {} {} not modes",
                 counted(statics, "static shape"),
                 if statics == 1 { "is" } else { "are" }
             ),
         ),
-        std::cmp::Ordering::Less => {
-            (false, format!("PROVED IN PART: {proof}; {} above are not", counted(nf - flexible, "mode")))
-        }
+        std::cmp::Ordering::Less => (
+            false,
+            format!(
+                "PROVED IN PART: {proof}; {} above this frequency not proved",
+                counted(nf - flexible, "mode")
+            ),
+        ),
         std::cmp::Ordering::Equal => (true, format!("proved: {proof}")),
         std::cmp::Ordering::Greater => (true, format!("proved: {proof}, the lowest {nf} of them kept")),
     }

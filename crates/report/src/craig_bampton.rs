@@ -1,12 +1,12 @@
 //! Facts of a Craig-Bampton body: its coordinates, their proof of completeness, and the frequency up to which
 //! it represents the free body.
 
-use super::numbers::{counted, percent, significant};
+use super::numbers::{counted, frequency, percent};
 use flexbody_body::flex_body::{FixedInterface, FlexBody};
 use serde::Serialize;
 
 /// Largest relative error of a frequency that counts as accurate.
-const RIGHT: f64 = 0.01;
+const ACCURATE_FREQUENCY_ERROR: f64 = 0.01;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct CraigBamptonFacts {
@@ -65,7 +65,7 @@ impl CraigBamptonFacts {
             free_lower_hz: fixed.free_lower.iter().map(|l| (*l > 0.0).then(|| hertz(*l))).collect(),
             too_high: (0..nf).map(|j| fixed.excess(j, theta[j])).collect(),
             too_high_at_most: (0..nf).map(|j| fixed.largest_excess(j, theta[j])).collect(),
-            within_one_percent: fixed.holding(theta, RIGHT),
+            within_one_percent: fixed.holding(theta, ACCURATE_FREQUENCY_ERROR),
             rigid_interfaces: body.has_rigid_interfaces(),
         })
     }
@@ -79,8 +79,8 @@ impl CraigBamptonFacts {
     /// - 6 rigid-body motions`.
     pub(crate) fn made_of(&self) -> String {
         let asked = match (self.fixed_interface_asked, self.fixed_interface_asked_below_hz) {
-            (Some(count), _) => format!(" ({count} asked for)"),
-            (None, Some(hertz)) => format!(" (all below {} Hz asked for)", significant(hertz, 5)),
+            (Some(count), _) => format!(" ({count} requested)"),
+            (None, Some(hertz)) => format!(" (all below {} requested)", frequency(hertz, 5)),
             (None, None) => String::new(),
         };
         format!(
@@ -97,20 +97,20 @@ impl CraigBamptonFacts {
         let good = self.within_one_percent;
         let kept = if self.rigid_interfaces { " (with the same rigid interfaces)" } else { "" };
         let holds = match good {
-            0 => format!("no frequency is within 1 % of the free body's{kept}"),
-            1 => format!("mode 1 ({} Hz) is within 1 % of the free body's{kept}", significant(hertz[0], 5)),
+            0 => format!("no frequency is within 1 % of that of the free body{kept}"),
+            1 => format!("mode 1 ({}) is within 1 % of the free body{kept}", frequency(hertz[0], 5)),
             _ => format!(
-                "modes 1 to {good} (up to {} Hz) are within 1 % of the free body's{kept}",
-                significant(hertz[good - 1], 5)
+                "modes 1 to {good} (up to {}) are within 1 % of the free body{kept}",
+                frequency(hertz[good - 1], 5)
             ),
         };
         let Some(own) = hertz.get(good) else { return holds };
         let most = self.too_high_at_most[good]
-            .map_or_else(String::new, |most| format!(", {} at most", percent(most)));
+            .map_or_else(String::new, |most| format!(", at most {}", percent(most)));
         format!(
-            "{holds}; mode {} ({} Hz) is too high by about {}{most}",
+            "{holds}; mode {} ({}) is too high by about {}{most}",
             good + 1,
-            significant(*own, 5),
+            frequency(*own, 5),
             percent(self.too_high[good])
         )
     }
@@ -126,22 +126,22 @@ fn fixed_interface_eigenvalues(body: &FlexBody) -> Option<Vec<f64>> {
 
 /// Judges the proof of completeness of the fixed-interface modes of a body.
 pub(super) fn judge(fixed: &FixedInterface, body: &FlexBody) -> (bool, String) {
-    let hertz = |lambda: f64| significant(body.units().frequency_of(lambda.max(0.0)), 5);
+    let hertz = |lambda: f64| frequency(body.units().frequency_of(lambda.max(0.0)), 5);
     let modes = counted(fixed.modes, "fixed-interface mode");
     let Some(count) = fixed.counted else {
         return (false, format!("NOT PROVED: no inertia count was made of the {modes}"));
     };
-    let counted_below = format!("inertia count {count} below {} Hz", hertz(fixed.shift));
+    let counted_below = format!("inertia count {count} below {}", hertz(fixed.shift));
     if !fixed.is_proved() {
         return (false, format!("NOT PROVED: the body has {modes}, but the {counted_below}"));
     }
     let proof = match (fixed.modes, fixed.next) {
         (0, Some(next)) => format!(
-            "static condensation, without fixed-interface modes, of which the first is at {} Hz ({counted_below})",
+            "static condensation, without fixed-interface modes, of which the first is at {} ({counted_below})",
             hertz(next)
         ),
-        (_, Some(next)) => format!("{modes}, of which the next is at {} Hz ({counted_below})", hertz(next)),
-        _ => format!("{modes} below {} Hz (inertia count {count})", hertz(fixed.shift)),
+        (_, Some(next)) => format!("{modes}, of which the next is at {} ({counted_below})", hertz(next)),
+        _ => format!("{modes} below {} (inertia count {count})", hertz(fixed.shift)),
     };
     let whole = (fixed.modes + fixed.interface_motions).saturating_sub(body.certificate().rigid_modes);
     let kept = if body.n_modes() < whole {

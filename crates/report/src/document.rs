@@ -8,9 +8,9 @@ use flexbody_body::flex_body::FlexBody;
 use serde::Serialize;
 
 /// Default maximum of lines of a term in a text.
-const LINES: usize = 4;
+const MAX_LINES: usize = 4;
 /// Number of list entries that a text shows.
-const LISTED: usize = 6;
+const MAX_LISTED: usize = 6;
 
 /// A report.
 pub(crate) struct Document<'a> {
@@ -177,7 +177,7 @@ impl Term {
     pub(crate) fn new(label: impl Into<Inline>, value: impl Into<Inline>) -> Self {
         let (label, value) = (label.into(), value.into());
         let text = Some((label.text(), value.text()));
-        Self { label, value, is_in_page: true, text, tone: Tone::Plain, lines: LINES }
+        Self { label, value, is_in_page: true, text, tone: Tone::Plain, lines: MAX_LINES }
     }
 
     /// Returns a term for pages only.
@@ -209,7 +209,7 @@ impl Term {
 
 /// Returns the first values of a list as terms of a text, and the number of the others.
 pub(crate) fn listed<T>(label: &str, items: &[T], value: impl Fn(&T) -> String) -> Vec<Term> {
-    listed_to(LISTED, label, items, |item| Term::text(label, value(item)))
+    listed_to(MAX_LISTED, label, items, |item| Term::text(label, value(item)))
 }
 
 /// Returns the first `most` terms of a list, and the number of the others.

@@ -38,6 +38,15 @@ pub(super) fn ranges(numbers: &[usize]) -> String {
     runs(numbers).iter().map(run).collect::<Vec<_>>().join(", ")
 }
 
+/// Returns the inertia terms of a model: `W1, W2 and W3`.
+pub(super) fn groups_in_words(names: &[&str]) -> String {
+    match names {
+        [] => "the inertia of the undeformed body only".to_owned(),
+        [only] => (*only).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
 /// Returns a ratio as `60 %`, or `not known`.
 pub(super) fn part_in_words(part: Option<f64>) -> String {
     part.map_or_else(|| "not known".to_owned(), |part| format!("{} %", significant(100.0 * part, 2)))
@@ -49,5 +58,13 @@ mod tests {
     fn runs_of_numbers_are_drawn_together() {
         assert_eq!(super::ranges(&[1, 2, 3, 5, 7, 8]), "1-3, 5, 7-8");
         assert_eq!(super::ranges(&[]), "");
+    }
+
+    #[test]
+    fn groups_are_listed_with_an_and() {
+        let none: &[&str] = &[];
+        let lists = [none, &["W1"][..], &["W1", "W3"][..], &["W1", "W2", "W3"][..]];
+        let expected = ["the inertia of the undeformed body only", "W1", "W1 and W3", "W1, W2 and W3"];
+        assert_eq!(lists.map(super::groups_in_words), expected);
     }
 }

@@ -140,7 +140,7 @@ impl InterfaceFacts {
     }
 
     /// Returns true if the interface deforms although it was declared rigid.
-    pub(crate) fn breaks_its_word(&self) -> bool {
+    pub(crate) fn deforms_although_rigid(&self) -> bool {
         self.coupling == Some(Coupling::Rigid.name()) && self.deformation.is_some_and(|part| part > RIGID)
     }
 
@@ -157,12 +157,17 @@ impl InterfaceFacts {
     pub(crate) fn in_words(&self, size: f64, unit: &str) -> String {
         let place = self.place_in_words(size, unit);
         let coupling = self.coupling.map_or(String::new(), |name| format!(", {name}"));
-        let deforms = match self.deformation {
-            Some(part) if part > RIGID => format!(", deforms by up to {} of its motion", percent(part)),
-            Some(_) => ", moves as a rigid body".to_owned(),
-            None => String::new(),
-        };
-        format!("{}{coupling}{place}{deforms}", counted(self.n_nodes, "node"))
+        let motion = self.motion_in_words().map_or_else(String::new, |motion| format!(", {motion}"));
+        format!("{}{coupling}{place}{motion}", counted(self.n_nodes, "node"))
+    }
+
+    /// Returns the motion of the interface in the modes: `deforms by up to 12 % of its motion`, or `moves as a
+    /// rigid body`; `None` without a reference point.
+    pub(crate) fn motion_in_words(&self) -> Option<String> {
+        Some(match self.deformation? {
+            part if part > RIGID => format!("deforms by up to {} of its motion", percent(part)),
+            _ => "moves as a rigid body".to_owned(),
+        })
     }
 }
 
@@ -359,7 +364,7 @@ impl ModelFacts {
     /// Returns the number of nodes and rows: `21 nodes, 63 degrees of freedom`.
     pub(crate) fn nodes_in_words(&self) -> String {
         match self.n_dofs {
-            0 => format!("{} nodes or frames; mass as another program condensed it", self.n_nodes),
+            0 => format!("{} nodes or frames; mass condensed by another program", self.n_nodes),
             n_dofs => format!("{} nodes, {n_dofs} degrees of freedom", self.n_nodes),
         }
     }
@@ -368,8 +373,8 @@ impl ModelFacts {
     fn mass_in_words(&self) -> &'static str {
         match MassStructure::from_name(self.mass_structure) {
             Some(MassStructure::RotationInvariant) => "consistent mass",
-            Some(MassStructure::Diagonal) => "DIAGONAL mass: lumped before it came here, exact for that only",
-            Some(MassStructure::General) | None => "mass on rotations of nodes or different by direction",
+            Some(MassStructure::Diagonal) => "DIAGONAL (lumped) mass: results are exact for this mass only",
+            Some(MassStructure::General) | None => "mass on nodal rotations or different along the axes",
         }
     }
 }
@@ -385,7 +390,7 @@ impl ModeFacts {
     }
 
     /// Returns the kind of modes that the worst residual refers to; empty for all modes.
-    pub(crate) fn whose_residual(&self) -> &'static str {
+    pub(crate) fn residual_remark(&self) -> &'static str {
         if self.craig_bampton.is_some() {
             " of the fixed-interface modes"
         } else if self.provenance.iter().any(|origin| is_static(origin)) {

@@ -1,6 +1,6 @@
 //! Geometric stiffness of a body, or the centrifugal softening without it.
 
-use super::numbers::significant;
+use super::numbers::{frequencies, significant};
 use flexbody_body::flex_body::{FlexBody, LoadKind};
 use flexbody_body::invariants::relative_norm;
 use nalgebra::Matrix3;
@@ -96,12 +96,12 @@ pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
     let axes = ["x", "y", "z"].into_iter().zip(hertz);
     let known: Vec<(&str, f64)> = axes.filter_map(|(axis, hz)| Some((axis, (*hz)?))).collect();
     if known.is_empty() {
-        return "the centrifugal term softens nothing".to_owned();
+        return "the centrifugal term softens no motion".to_owned();
     }
-    let rates: Vec<String> = known.iter().map(|(_, hz)| significant(*hz, 3)).collect();
+    let (rates, unit) = frequencies(&known.iter().map(|(_, hz)| *hz).collect::<Vec<f64>>(), 3);
     let axes: Vec<&str> = known.iter().map(|(axis, _)| *axis).collect();
     format!(
-        "no geometric stiffness: 1 % softer at {} Hz ({} of the model)",
+        "no geometric stiffness: 1 % softer at {} {unit} ({} of the model)",
         rates.join(", "),
         axes.join(", ")
     )

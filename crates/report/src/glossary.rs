@@ -15,15 +15,15 @@ const WORDS: [(&str, &str); 14] = [
     ("free-surface mode", "A natural mode of the body with nothing held."),
     (
         "completeness",
-        "That no mode is missing between those that were found: the number of negative pivots of K - sigma M counts all modes below the frequency of sigma (Sylvester's law of inertia).",
+        "Proof that no mode is missing among those found: the number of negative pivots of K - sigma M is the number of all modes below the frequency of sigma (Sylvester's law of inertia).",
     ),
     (
         "residual",
-        "How far a mode is from being an eigenvector: |K psi - lambda M psi| relative to |K psi| + |lambda M psi|.",
+        "Error of a mode as an eigenvector: |K psi - lambda M psi| relative to |K psi| + |lambda M psi|.",
     ),
     (
         "residual vector",
-        "What the static response to a load has outside the modes, kept as one more shape of the body. It is no natural mode, and its frequency is no resonance.",
+        "The part of the static response to a load that the modes cannot represent, added to the body as one more shape. It is not a natural mode, and its frequency is not a resonance.",
     ),
     ("fixed-interface mode", "A natural mode with all interfaces held, as Craig-Bampton bodies have them."),
     (
@@ -32,7 +32,7 @@ const WORDS: [(&str, &str); 14] = [
     ),
     (
         "W1",
-        "The invariant (3 x 3 n) by which the inertia follows the deflection to first order: I = I0 + W1 Q + Q' W2 Q.",
+        "The invariant (3 x 3 n) of the change of the inertia with the deflection to first order: I = I0 + W1 Q + Q' W2 Q.",
     ),
     (
         "W2",
@@ -40,7 +40,10 @@ const WORDS: [(&str, &str); 14] = [
     ),
     ("W3", "The invariant (3 n x n) of the Coriolis and Euler forces between the modes."),
     ("lumped mass", "Mass put on the nodes as points, instead of the mass matrix of the elements."),
-    ("geometric stiffness", "What preload, such as the centrifugal force of a spin, adds to the stiffness."),
+    (
+        "geometric stiffness",
+        "The stiffness that a preload adds, for example the centrifugal force of a spin.",
+    ),
     ("I0", "The inertia of the undeformed body about the origin of its frame."),
 ];
 
@@ -60,5 +63,5 @@ pub(super) fn word_as(known: &str, shown: &str) -> Span {
 /// Returns all terms as a list at the end of the page, for readers without a pointer.
 pub(super) fn glossary<'a>() -> [Block<'a>; 2] {
     let terms = WORDS.map(|(word, meaning)| Term::page(word, meaning)).into();
-    [heading("Words"), Block::Fold("What the words of this report mean", vec![Block::Terms(terms)])]
+    [heading("Words"), Block::Fold("Glossary", vec![Block::Terms(terms)])]
 }

@@ -1,6 +1,6 @@
 //! Guarantees of the accuracy `certified` in quotable numbers.
 
-use super::numbers::{counted, significant};
+use super::numbers::{counted, frequency, significant};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::DIGITS;
 use serde::{Serialize, Serializer};
@@ -53,8 +53,8 @@ impl GuaranteeFacts {
         let (digits, mode) = least(self.eigenvalue_digits.iter().copied().zip(1..));
         let rigid = counted(self.negative_pivots_below, "rigid mode");
         format!(
-            "every eigenvalue to {digits} digits or more (mode {mode} worst); only {rigid} below {} Hz (inertia count {})",
-            significant(self.shift_below_hz, 5),
+            "every eigenvalue to {digits} digits or more (mode {mode} worst); only {rigid} below {} (inertia count {})",
+            frequency(self.shift_below_hz, 5),
             self.negative_pivots_below
         )
     }
@@ -65,7 +65,7 @@ impl GuaranteeFacts {
         let (digits, name) = least(self.invariant_digits.iter().map(|&(name, digits)| (digits, name)));
         let shape = self.shape_error.iter().copied().fold(0.0, f64::max);
         format!(
-            "invariants of the stored modes to {digits} digits or more ({name} worst); modes within {} of exact ones",
+            "invariants of the stored modes to {digits} digits or more ({name} worst); modes within {} of the exact modes",
             significant(shape, 2)
         )
     }

@@ -31,7 +31,7 @@ pub(super) fn heat_maps<'a>(body: &FlexBody) -> Vec<Block<'a>> {
         "Each cell is the size of an entry relative to the largest that it could have, on a logarithmic scale: the strongest colour stands for 1, and each of the {STEPS} steps down for a factor of {factor}. Empty cells are smaller than 1e-{DECADES}. Pointing at a cell shows its value.{some}"
     );
     let maps = maps(&body.invariants().with_modes(&modes)).map(Map::drawn).into();
-    vec![heading("How the modes act on the inertia"), Block::Paragraph(reading), Block::Maps(maps)]
+    vec![heading("Effect of the modes on the inertia"), Block::Paragraph(reading), Block::Maps(maps)]
 }
 
 /// A map with a value for each row and each mode.
@@ -66,19 +66,19 @@ fn maps(invariants: &Invariants) -> [Map; 3] {
     [
         Map {
             name: "W1",
-            reading: "How the inertia follows the deflection, to first order. A strong cell says that deflecting this mode changes this moment or product of inertia (body axes), and that spin pushes on the mode in return.",
+            reading: "Change of the inertia with the deflection, to first order. A strong cell means that this mode changes this moment or product of inertia (body axes), and that spin excites the mode in return.",
             is_by_moments: true,
             values: invariants.w1().as_ref().map(w1),
         },
         Map {
             name: "W2",
-            reading: "How two modes change the inertia together, to second order: centrifugal softening. Cells beside the diagonal say which modes a steady spin couples.",
+            reading: "Change of the inertia by two modes together, to second order (centrifugal softening). Cells off the diagonal show which modes a steady spin couples.",
             is_by_moments: false,
             values: invariants.w2().as_ref().map(by_modes),
         },
         Map {
             name: "W3",
-            reading: "Coriolis and Euler forces of one mode on another when the body turns. The diagonal is empty; a pale map says that these forces hardly act between the modes.",
+            reading: "Coriolis and Euler forces of one mode on another when the body turns. The diagonal is empty; a pale map means that these forces hardly act between the modes.",
             is_by_moments: false,
             values: invariants.w3().as_ref().map(by_modes),
         },
@@ -93,7 +93,7 @@ impl Map {
             other => other,
         };
         let Some(values) = self.values else {
-            let left_out = " was left out of this body: nothing is known of it.";
+            let left_out = " is not in this body: its entries are not known.";
             return (Inline::from(name("")).then(left_out), None);
         };
         let strongest = strongest(&values, self.is_by_moments);

@@ -27,7 +27,7 @@ pub(super) fn check_row(name: &str, [value, limit]: [f64; 2], formula: &str, pas
 
 /// Returns the table of checks for a terminal.
 pub(super) fn check_table(kind: &str, rows: Vec<Vec<Inline>>) -> Table {
-    let heads = [kind, "value", "limit", "what must hold", ""];
+    let heads = [kind, "value", "limit", "identity", ""];
     Table::new("", heads, &[0, 3, 4], rows).in_text(|_| true)
 }
 

@@ -5,7 +5,7 @@ use super::chart::{Axis, Chart, Mark, Panel, Scale, Series};
 use super::csv;
 use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
 use super::facts::UnitFacts;
-use super::numbers::{counted, percent, significant, times};
+use super::numbers::{counted, frequency, frequency_range, percent, significant, times};
 use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
@@ -82,14 +82,14 @@ impl CouplingFacts<'_> {
         let effect = self.largest.map_or_else(
             || "the effect of the coupling is not known".to_owned(),
             |at| {
-                let hertz = significant(at.hertz, 4);
                 format!(
-                    "the coupling changes the response of the model by up to {} (at {hertz} Hz)",
-                    percent(at.value)
+                    "the coupling changes the response of the model by up to {} (at {})",
+                    percent(at.value),
+                    frequency(at.hertz, 4)
                 )
             },
         );
-        format!("{which} rigid, in the body and in the model it is compared with; {effect}")
+        format!("{which} rigid, in the body and in the model of the comparison; {effect}")
     }
 }
 
@@ -229,15 +229,15 @@ impl<'a> ResponseFacts<'a> {
 
     /// Returns label and sentence of all facts other than the pairs.
     fn entries(&self) -> Vec<(&'static str, String)> {
-        let [low, high] = self.band_hz.map(|f| significant(f, 5));
+        let band = frequency_range(self.band_hz, 5);
         let mut entries = vec![
-            ("Band", format!("{low} to {high} Hz, {} frequencies", self.frequencies_hz.len())),
+            ("Band", format!("{band}, {} frequencies", self.frequencies_hz.len())),
             ("Modes", self.modes_in_words()),
         ];
         let damping = if self.damped {
-            "that of the modes, in the model the same: D = M Psi C Psi'M"
+            "modal damping, also in the model: D = M Psi C Psi'M"
         } else {
-            "none: peaks have no height, and errors near them say little; --damping gives the modes some"
+            "none: resonance peaks are unbounded, and errors near them mean little; set modal damping with --damping"
         };
         entries.push(("Damping", damping.to_owned()));
         entries.push(("All nodes", self.solved_in_words()));
@@ -250,14 +250,14 @@ impl<'a> ResponseFacts<'a> {
     fn modes_in_words(&self) -> String {
         let own = format!("{}, {} of them in the band", self.modes, self.body_modes_in_band);
         match self.solved {
-            Some(solved) => format!("{own}; the model has {} there", solved.modes_in_band),
+            Some(solved) => format!("{own}; the model has {} in the band", solved.modes_in_band),
             None => own,
         }
     }
 
     fn solved_in_words(&self) -> String {
         self.solved.map_or_else(
-            || "not solved: the error is not known; give the model to have it measured".to_owned(),
+            || "not solved, so that the error is not known: give the model to measure it".to_owned(),
             |solved| {
                 let flops = significant(solved.flops, 2);
                 format!(
@@ -279,7 +279,7 @@ impl<'a> ResponseFacts<'a> {
         let entries = self.entries().into_iter().map(|(label, words)| Term::new(label, words));
         let mut blocks = vec![
             Block::Verdict { state, head: format!("{}.", self.verdict), rest: String::new() },
-            heading("What is compared"),
+            heading("Comparison"),
             Block::Terms(head.into_iter().chain(entries).collect()),
         ];
         if self.solved.is_some() {
@@ -288,8 +288,9 @@ impl<'a> ResponseFacts<'a> {
         blocks.push(heading("Transfer functions"));
         if self.pairs.len() > PLOTTED_PAIRS {
             let all = self.pairs.len();
-            let some =
-                format!("The first {PLOTTED_PAIRS} of {all} pairs of places; the table of --csv has all.");
+            let some = format!(
+                "Plots of the first {PLOTTED_PAIRS} of {all} pairs of places; --csv writes all of them."
+            );
             blocks.push(Block::Paragraph(some));
         }
         blocks.extend(self.pairs.iter().take(PLOTTED_PAIRS).flat_map(|pair| self.plots(pair)));
@@ -313,7 +314,7 @@ impl<'a> ResponseFacts<'a> {
             row
         };
         let caption = format!(
-            "Largest errors and differences at the frequencies that were solved, over all directions of a pair; accurate to where no error, measured or estimated, is above {}",
+            "Largest errors and differences at the frequencies that were solved, over all directions of a pair. A pair is accurate up to the frequency below which no error, measured or estimated, exceeds {}",
             percent(self.tolerance)
         );
         let rows = self.pairs.iter().map(row).collect();
@@ -337,7 +338,7 @@ impl<'a> ResponseFacts<'a> {
         let (some, all) = (shown.len(), pair.functions.len());
         if all > some {
             let words = format!(
-                "{some} of {all} functions of this pair, those with the largest accelerances; the table of --csv has all."
+                "The {some} of {all} functions of this pair with the largest accelerances; --csv writes all of them."
             );
             blocks.push(Block::Quiet(words));
         }
@@ -422,9 +423,9 @@ fn verdict(pairs: &[PairFacts], settings: &ResponseSettings, passed: Option<bool
     let worst = worst.reduce(|most, next| if next.1.value <= most.1.value { most } else { next });
     match (passed, worst) {
         (Some(true), Some((pair, worst))) => format!(
-            "The reduced body answers as all nodes do, within {tolerance}: the largest error in the band is {} at {} Hz{}",
+            "The reduced body agrees with all nodes within {tolerance}: the largest error in the band is {} at {}{}",
             percent(worst.value),
-            significant(worst.hertz, 4),
+            frequency(worst.hertz, 4),
             how(pair)
         ),
         (Some(_), Some((pair, worst))) => {
@@ -432,14 +433,14 @@ fn verdict(pairs: &[PairFacts], settings: &ResponseSettings, passed: Option<bool
                 pairs.iter().filter_map(|pair| pair.errors.as_ref()).map(|e| e.accurate_to_hz.unwrap_or(0.0));
             let accurate_to = ends.fold(f64::INFINITY, f64::min);
             let until = if accurate_to > 0.0 {
-                format!("it is accurate to {tolerance} up to {} Hz only", significant(accurate_to, 4))
+                format!("it is accurate to {tolerance} only up to {}", frequency(accurate_to, 4))
             } else {
                 format!("it is nowhere accurate to {tolerance}")
             };
             format!(
-                "The reduced body does not answer as all nodes do: {until}, and off by {} at {} Hz{}, {}",
+                "The reduced body does not agree with all nodes: {until}; the largest error is {} at {}{}, {}",
                 percent(worst.value),
-                significant(worst.hertz, 4),
+                frequency(worst.hertz, 4),
                 how(pair),
                 pair.name()
             )

@@ -3,8 +3,8 @@
 use super::Format;
 use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
 use super::errors_in_words::{errors_in_words, ranges};
-use super::lacks::{LackFacts, reference_in_words};
 use super::numbers::significant;
+use super::reference_error::{ReferenceErrorFacts, reference_in_words};
 use super::run_data::RunData;
 use super::selection_cases::{CaseFacts, cases_table};
 use super::selection_verdict::SelectionVerdict;
@@ -14,7 +14,7 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{TermDecision, TermGroup};
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
-use flexbody_study::selection::{CaseSelection, Ground, Participation, Selection, Trial};
+use flexbody_study::selection::{CaseSelection, DecisiveError, Participation, Selection, Trial};
 use serde::Serialize;
 
 /// Number of modes that a summary lists.
@@ -40,7 +40,7 @@ pub struct SelectionFacts<'a> {
     multiplications_before: usize,
     /// Errors of the body, and of its versions before enrichment, relative to the model; empty if only a body
     /// file is available.
-    reference: Vec<LackFacts>,
+    reference: Vec<ReferenceErrorFacts>,
     significance: Vec<SignificanceFacts>,
     trials: Vec<TrialFacts<'a>>,
     /// Facts of each load case, if there are several.
@@ -87,9 +87,11 @@ struct ModesFacts<'a> {
 struct ResponseFacts<'a> {
     load: &'a str,
     /// Error of the selected modes relative to the response of the body.
-    selected_lack: f64,
+    #[serde(rename = "selected_lack")]
+    selected_error: f64,
     /// Error of the modes of the body relative to the response of the model.
-    body_lacks: Option<f64>,
+    #[serde(rename = "body_lacks")]
+    body_error: Option<f64>,
     /// Error of the modes of the body without its residual vectors.
     without_residual_vectors: Option<f64>,
 }
@@ -137,8 +139,8 @@ impl<'a> ResponseFacts<'a> {
     fn new(participation: &'a Participation) -> Self {
         Self {
             load: &participation.load,
-            selected_lack: participation.selected,
-            body_lacks: participation.body.map(|(after, _)| after),
+            selected_error: participation.selected,
+            body_error: participation.body.map(|(after, _)| after),
             without_residual_vectors: participation.body.map(|(_, before)| before),
         }
     }
@@ -176,13 +178,13 @@ impl<'a> TrialFacts<'a> {
 impl<'a> SelectionFacts<'a> {
     /// Collects the facts of `selection` and of the run that made it.
     pub fn new(selection: &'a Selection, run: &'a RunData) -> Self {
-        let term = |(decision, ground): (&'a TermDecision, &Option<Ground>)| TermFacts {
+        let term = |(decision, decisive_error): (&'a TermDecision, &Option<DecisiveError>)| TermFacts {
             group: decision.group.name(),
             kept: decision.kept,
             tier: decision.tier,
             bound: decision.bound,
             limit: decision.limit,
-            budget: ground.map_or(1.0, |ground| ground.budget),
+            budget: decisive_error.map_or(1.0, |decisive_error| decisive_error.budget),
             slack: decision.limit / decision.bound,
             reason: &decision.reason,
         };
@@ -214,7 +216,7 @@ impl<'a> SelectionFacts<'a> {
                 .map(|input| InputFacts { name: input.name, value: input.value, source: &input.source })
                 .collect(),
             tolerance: selection.tolerance,
-            terms: selection.terms.iter().zip(&selection.grounds).map(term).collect(),
+            terms: selection.terms.iter().zip(&selection.decisive_errors).map(term).collect(),
             guideline: selection.guideline,
             modes: ModesFacts {
                 of: selection.n_modes,
@@ -225,7 +227,7 @@ impl<'a> SelectionFacts<'a> {
             },
             chosen: selection.chosen.as_ref().map(|trial| TrialFacts::new(trial, &selection.cases)),
             multiplications_before: selection.multiplications,
-            reference: selection.lacks.iter().map(LackFacts::new).collect(),
+            reference: selection.reference_errors.iter().map(ReferenceErrorFacts::new).collect(),
             significance: significance.collect(),
             trials: selection.trials.iter().map(|trial| TrialFacts::new(trial, &selection.cases)).collect(),
             cases: selection.cases.iter().map(CaseFacts::new).collect(),
@@ -249,18 +251,18 @@ impl<'a> SelectionFacts<'a> {
         let verdict = if term.kept { "keep" } else { "drop" };
         if term.limit > 0.0 {
             let (bound, limit) = (significant(term.bound, 3), significant(term.limit, 3));
-            let reach = if term.kept { "without it" } else { "at most" };
+            let reach = if term.kept { "error without it" } else { "error at most" };
             let budget = match term.budget {
                 budget if budget < 1.0 => {
                     format!(
-                        " ({} % of the tolerance: the rest is for modes left out and the error of the body)",
+                        " ({} % of the tolerance; the rest is reserved for dropped modes and the error of the body)",
                         significant(100.0 * budget, 2)
                     )
                 }
                 _ => String::new(),
             };
             format!(
-                "{verdict} (tier {}): {}: {reach} {bound}, allowed {limit}{budget}",
+                "{verdict} (tier {}): {}: {reach} {bound}, tolerance {limit}{budget}",
                 term.tier, term.reason
             )
         } else {
@@ -288,7 +290,7 @@ impl<'a> SelectionFacts<'a> {
         let [_, (label, taken), ..] = self.verdict.lines();
         let state = if self.verdict.holds { State::Good } else { State::Open };
         let mut blocks = vec![
-            Block::Verdict { state, head: format!("{label} {taken}."), rest: String::new() },
+            Block::Verdict { state, head: format!("{label}: {taken}."), rest: String::new() },
             Block::Terms(self.head()),
             Block::Gap,
             Block::Line("Details".to_owned()),
@@ -310,7 +312,7 @@ impl<'a> SelectionFacts<'a> {
                 .in_text("Inputs", format!("{} {value}: {}", input.name, input.source))
         };
         let inputs = self.inputs.iter().map(input);
-        let inputs = inputs.chain([Term::new("Tolerances", tolerances).short("Allowed")]).collect();
+        let inputs = inputs.chain([Term::new("Tolerances", tolerances).short("Tolerances")]).collect();
         blocks.extend([heading("Inputs"), Block::Terms(inputs)]);
         blocks.extend([heading("Sizes of the terms"), Block::Table(self.sizes())]);
         blocks.extend([heading("Trials"), Block::Table(self.trials())]);
@@ -321,7 +323,7 @@ impl<'a> SelectionFacts<'a> {
             blocks.extend([heading("Static responses"), Block::Table(self.responses())]);
         }
         blocks.push(Block::Diagnostics(self.diagnostics));
-        let (name, kind) = (self.scene, "Terms and modes that a scene needs");
+        let (name, kind) = (self.scene, "Selection of terms and modes");
         Document { name, kind, generator: &self.generator, blocks }
     }
 
@@ -340,7 +342,7 @@ impl<'a> SelectionFacts<'a> {
         if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
             terms.push(Term::new(
                 "Errors",
-                format!("{}, measured against everything", errors_in_words(errors)),
+                format!("{}, compared with the body with all its terms and modes", errors_in_words(errors)),
             ));
             terms.push(Term::new("Reference", reference_in_words(&self.reference)));
         }
@@ -354,7 +356,7 @@ impl<'a> SelectionFacts<'a> {
             let numbers = [Some(one.tier_0), one.tier_1, one.tier_1.map(|own| one.tier_0 / own)];
             words.into_iter().chain(cells(numbers.map(known))).collect()
         };
-        let caption = "Bounds at the largest amplitude and angular velocity. Tier 0 follows from I0 and the frequencies, tier 1 has the norms of the invariants; slack is their ratio.";
+        let caption = "Bounds at the largest amplitude and angular velocity. Tier 0 follows from I0 and the frequencies, tier 1 uses the norms of the invariants; slack is the ratio of both.";
         Table::new(caption, heads, &[1, 2, 3, 4], self.significance.iter().map(row).collect())
     }
 
@@ -393,11 +395,11 @@ impl<'a> SelectionFacts<'a> {
             value.map_or_else(|| "not recorded".to_owned(), |v| significant(100.0 * v, 3))
         };
         let row = |one: &ResponseFacts<'_>| {
-            let lacks = [Some(one.selected_lack), one.body_lacks, one.without_residual_vectors].map(part);
-            std::iter::once(one.load.into()).chain(cells(lacks)).collect()
+            let errors = [Some(one.selected_error), one.body_error, one.without_residual_vectors].map(part);
+            std::iter::once(one.load.into()).chain(cells(errors)).collect()
         };
         let heads = ["Load", "Selected modes, %", "Body, %", "Body without residual vectors, %"];
-        let caption = "What modes lack of the static response, in the norm of K: the selected of that of the body, and the body of that of the model.";
+        let caption = "Errors of static responses, in the norm of K: of the selected modes relative to the body, and of the body relative to the model.";
         Table::new(caption, heads, &[], self.modes.static_responses.iter().map(row).collect())
     }
 
@@ -414,7 +416,7 @@ impl<'a> SelectionFacts<'a> {
         };
         let heads = ["Mode", "Amplitude", "Deflection, %", "Stress, %", "Verdict"];
         let caption = format!(
-            "Largest amplitude of the modes that do most, and what each does alone relative to all together ({} of {}).",
+            "Modes with the largest contributions ({} of {}): largest amplitude, and deflection and stress of the mode alone relative to all modes together.",
             shares.len(),
             self.modes.of
         );

@@ -2,7 +2,7 @@
 
 use super::document::{Table, cells};
 use super::errors_in_words::{errors_in_words, part_in_words};
-use super::lacks::LackFacts;
+use super::reference_error::ReferenceErrorFacts;
 use flexbody_body::flex_body::TermGroup;
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::selection::CaseSelection;
@@ -25,7 +25,7 @@ pub(super) struct CaseFacts<'a> {
     /// Parts of the selection that this case decides, because it needs them most: groups, and `modes`.
     binds: Vec<&'static str>,
     /// Errors of the body, and of its versions before enrichment, relative to the model in this case.
-    reference: Vec<LackFacts>,
+    reference: Vec<ReferenceErrorFacts>,
 }
 
 impl<'a> CaseFacts<'a> {
@@ -43,7 +43,7 @@ impl<'a> CaseFacts<'a> {
             budget: chosen.map(|trial| trial.budget),
             passed: chosen.is_none_or(|trial| trial.passed()),
             binds: groups.chain(case.binds_modes.then_some("modes")).collect(),
-            reference: case.lacks.iter().map(LackFacts::new).collect(),
+            reference: case.reference_errors.iter().map(ReferenceErrorFacts::new).collect(),
         }
     }
 
@@ -51,8 +51,8 @@ impl<'a> CaseFacts<'a> {
         if self.binds.is_empty() { "nothing".to_owned() } else { self.binds.join(", ") }
     }
 
-    fn lacks_in_words(&self) -> String {
-        self.reference.last().map_or_else(|| "not known".to_owned(), LackFacts::parts)
+    fn reference_error_in_words(&self) -> String {
+        self.reference.last().map_or_else(|| "not known".to_owned(), ReferenceErrorFacts::parts)
     }
 
     /// Returns the case in words: `braking: stress 1.2 %, 60 % of what is allowed; decides W1, modes`.
@@ -64,10 +64,10 @@ impl<'a> CaseFacts<'a> {
         };
         match &self.errors {
             Some(errors) => {
-                let beyond = if self.passed { "" } else { ", too much" };
+                let beyond = if self.passed { "" } else { ", exceeded" };
                 let errors = errors_in_words(errors);
                 format!(
-                    "{}: {errors}: {} of what is allowed{beyond}; {binds}",
+                    "{}: {errors}: {} of the tolerance{beyond}; {binds}",
                     self.name,
                     part_in_words(self.worst)
                 )
@@ -80,8 +80,7 @@ impl<'a> CaseFacts<'a> {
 /// Returns the table of the errors of the selected model in every load case, and of the effect of each case
 /// on the selection.
 pub(super) fn cases_table(cases: &[CaseFacts<'_>]) -> Table {
-    let heads =
-        ["Load case", "Errors", "Of what is allowed", "Decides", "The body lacks of the model (estimated)"];
+    let heads = ["Load case", "Errors", "Error / tolerance", "Decides", "Error of the body (estimated)"];
     let row = |case: &CaseFacts<'_>| {
         let errors = case.errors.as_ref().map_or_else(|| "not measured".to_owned(), errors_in_words);
         cells([
@@ -89,9 +88,9 @@ pub(super) fn cases_table(cases: &[CaseFacts<'_>]) -> Table {
             errors,
             part_in_words(case.worst),
             case.binds_in_words(),
-            case.lacks_in_words(),
+            case.reference_error_in_words(),
         ])
     };
-    let caption = "The selected model, measured against everything in each load case. A case decides a group or the number of modes where the model without it is furthest beyond what is allowed.";
+    let caption = "The selected model in each load case, compared with the body with all its terms and modes. A case decides a group or the number of modes if it is the case in which the model without them exceeds the tolerances most.";
     Table::new(caption, heads, &[1, 3, 4], cases.iter().map(row).collect())
 }

@@ -1,11 +1,11 @@
 //! Verdict of a selection in five lines: request, recommendation, reason, error, savings.
 
-use super::errors_in_words::{error_in_words, errors_in_words, ranges};
-use super::lacks::LackFacts;
-use super::numbers::{counted, significant};
+use super::errors_in_words::{error_in_words, errors_in_words, groups_in_words, ranges};
+use super::numbers::{counted, frequency, significant};
+use super::reference_error::ReferenceErrorFacts;
 use flexbody_body::flex_body::TermGroup;
 use flexbody_study::reference::ReferenceError;
-use flexbody_study::selection::{Ground, Selection};
+use flexbody_study::selection::{DecisiveError, Selection};
 use serde::Serialize;
 
 /// The five lines of the verdict.
@@ -34,18 +34,22 @@ impl SelectionVerdict {
 
     /// Returns the lines with their labels.
     pub(crate) fn lines(&self) -> [(&'static str, &str); 5] {
-        let take = if self.holds { "Take" } else { "Best found" };
-        let lines = [&self.asked, &self.take, &self.why, &self.error, &self.saves].map(String::as_str);
-        let [asked, taken, why, error, saves] = lines;
-        [("Asked", asked), (take, taken), ("Why", why), ("Error", error), ("Saves", saves)]
+        let found = if self.holds { "Recommended" } else { "Best found" };
+        [
+            ("Asked", self.asked.as_str()),
+            (found, self.take.as_str()),
+            ("Why", self.why.as_str()),
+            ("Error", self.error.as_str()),
+            ("Saves", self.saves.as_str()),
+        ]
     }
 }
 
 /// Returns the physical meaning of a group of terms.
 fn meaning(group: TermGroup) -> &'static str {
     match group {
-        TermGroup::W1 => "centrifugal load, and inertia that follows the deflection",
-        TermGroup::W2 => "centrifugal softening, and inertia of second order",
+        TermGroup::W1 => "centrifugal load, and inertia linear in the deflection",
+        TermGroup::W2 => "centrifugal softening, and inertia quadratic in the deflection",
         TermGroup::W3 => "Coriolis and Euler forces on the modes",
     }
 }
@@ -53,7 +57,7 @@ fn meaning(group: TermGroup) -> &'static str {
 fn asked(selection: &Selection) -> String {
     if let Some(most) = selection.most_multiplications {
         return format!(
-            "{}{}: the most accurate of at most {most} multiplications per evaluation",
+            "{}{}: the smallest error with at most {most} multiplications per evaluation",
             selection.scene,
             cases_in_words(selection)
         );
@@ -72,7 +76,7 @@ fn cases_in_words(selection: &Selection) -> String {
     let least = if selection.cases.iter().all(|case| case.tolerance == first.tolerance) {
         ""
     } else {
-        ", the least of theirs"
+        "; the smallest tolerances of all cases"
     };
     format!(" in each of {} load cases ({}){least}", names.len(), names.join(", "))
 }
@@ -85,73 +89,85 @@ fn in_case(case: Option<usize>, selection: &Selection) -> String {
 
 fn take(selection: &Selection) -> String {
     let numbers: Vec<usize> = selection.modes.iter().map(|j| j + 1).collect();
-    let frequency = |j: Option<&usize>| significant(j.map_or(0.0, |&j| selection.frequencies_hz[j]), 3);
-    let which = if numbers.len() == selection.n_modes {
-        "all".to_owned()
-    } else {
-        format!("of {}: {}", selection.n_modes, ranges(&numbers))
-    };
-    let (first, last) = (frequency(selection.modes.first()), frequency(selection.modes.last()));
+    let hertz = |j: Option<&usize>| j.map_or(0.0, |&j| selection.frequencies_hz[j]);
+    let last = frequency(hertz(selection.modes.last()), 3);
     let held: Vec<&str> = held_groups(selection).map(TermGroup::name).collect();
-    let groups = if held.is_empty() {
-        "the inertia of the undeformed body alone".to_owned()
-    } else {
-        format!("the inertia terms {}", held.join(", "))
-    };
-    format!("{} ({which}; {first} to {last} Hz) and {groups}", counted(numbers.len(), "mode"))
+    let groups = groups_in_words(&held);
+    if numbers.len() == selection.n_modes {
+        return format!("all {} (up to {last}) with {groups}", counted(numbers.len(), "mode"));
+    }
+    format!(
+        "{} of {} ({}; up to {last}) with {groups}",
+        numbers.len(),
+        counted(selection.n_modes, "mode"),
+        ranges(&numbers)
+    )
 }
 
 fn held_groups(selection: &Selection) -> impl Iterator<Item = TermGroup> {
     TermGroup::ALL.into_iter().filter(|group| selection.groups.has(*group))
 }
 
+/// Decision about groups with the same reason.
+struct CommonDecision {
+    kept: bool,
+    error: Option<DecisiveError>,
+    groups: Vec<TermGroup>,
+}
+
 /// Returns the reasons of the decisions; groups with the same reason and error share a sentence.
 fn why(selection: &Selection) -> String {
-    let mut reasons: Vec<(bool, Option<Ground>, Vec<TermGroup>)> = Vec::new();
-    for (term, ground) in selection.terms.iter().zip(&selection.grounds) {
-        match reasons.iter_mut().find(|one| one.0 == term.kept && one.1 == *ground) {
-            Some(known) => known.2.push(term.group),
-            None => reasons.push((term.kept, *ground, vec![term.group])),
+    let mut decisions: Vec<CommonDecision> = Vec::new();
+    for (term, error) in selection.terms.iter().zip(&selection.decisive_errors) {
+        match decisions.iter_mut().find(|one| one.kept == term.kept && one.error == *error) {
+            Some(known) => known.groups.push(term.group),
+            None => {
+                let groups = vec![term.group];
+                decisions.push(CommonDecision { kept: term.kept, error: *error, groups });
+            }
         }
     }
-    reasons.sort_by_key(|reason| !reason.0);
-    let parts = reasons.iter().map(|(kept, ground, groups)| {
-        let case = in_case(ground.and_then(|ground| ground.case), selection);
-        reason(*kept, *ground, groups) + &case
+    decisions.sort_by_key(|decision| !decision.kept);
+    let parts = decisions.iter().map(|decision| {
+        let case = decision.error.and_then(|error| error.case);
+        reason(decision.kept, decision.error, &decision.groups) + &in_case(case, selection)
     });
     parts.collect::<Vec<_>>().join("; ")
 }
 
-fn reason(kept: bool, ground: Option<Ground>, groups: &[TermGroup]) -> String {
+fn reason(kept: bool, decisive_error: Option<DecisiveError>, groups: &[TermGroup]) -> String {
     let names: Vec<String> =
         groups.iter().map(|group| format!("{} ({})", group.name(), meaning(*group))).collect();
     let names = names.join(" and ");
-    let Some(Ground { output, error, tier, .. }) = ground else {
-        let known = if kept { "stays: nothing shows that it may go" } else { "is not in the body" };
-        return format!("{names} {known}");
+    let Some(DecisiveError { output, error, tier, .. }) = decisive_error else {
+        return if kept {
+            format!("keep {names}: no bound or run shows that it can be dropped")
+        } else {
+            let are = if groups.len() == 1 { "is" } else { "are" };
+            format!("{names} {are} not in the body")
+        };
     };
     let error = error_in_words(output, error, 2);
     match (kept, tier) {
-        (true, 2) => format!("without {names} the {output} is off by {error}"),
-        (true, _) => format!("without {names} the {output} may be off by {error}"),
-        (false, 2) => format!("without {names} it is off by {error} in {output}"),
+        (true, 2) => format!("without {names} the error in {output} is {error}"),
+        (true, _) => format!("without {names} the error in {output} may reach {error}"),
+        (false, 2) => format!("dropping {names} makes an error of {error} in {output}"),
         (false, _) => {
             format!(
-                "without {names} it is off by no more than {error} in {output}, which needs no simulation"
+                "dropping {names} makes an error of at most {error} in {output} (a bound, without simulation)"
             )
         }
     }
 }
 
 fn error(selection: &Selection) -> String {
-    let own = selection.lacks.last();
-    let lacks = match own {
+    let own = selection.reference_errors.last();
+    let reference_errors = match own {
         Some(own) => {
-            let much =
-                if ReferenceError::is_reference(own) { "" } else { ", too much to be measured against" };
+            let much = if ReferenceError::is_reference(own) { "" } else { ", too much for a reference" };
             format!(
-                "; the body with all its modes lacks {} of the FE model (estimated){much}",
-                LackFacts::new(own).parts()
+                "; the body with all its modes differs from the FE model by {} (estimated){much}",
+                ReferenceErrorFacts::new(own).parts()
             )
         }
         None => String::new(),
@@ -159,10 +175,10 @@ fn error(selection: &Selection) -> String {
     match selection.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
         Some(errors) => {
             let case = in_case(selection.chosen.as_ref().and_then(|chosen| chosen.case), selection);
-            let worst = if case.is_empty() { "" } else { ", where it is worst" };
-            format!("{}, measured over the run{case}{worst}{lacks}", errors_in_words(errors))
+            let worst = if case.is_empty() { "" } else { ", the worst case" };
+            format!("{}, measured over the run{case}{worst}{reference_errors}", errors_in_words(errors))
         }
-        None => format!("nothing was simulated{lacks}"),
+        None => format!("nothing was simulated{reference_errors}"),
     }
 }
 

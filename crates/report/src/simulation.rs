@@ -5,7 +5,7 @@ use super::chart::{Axis, Chart, Mark, Panel, STYLES, Scale, Series};
 use super::csv;
 use super::document::{Block, Document, State, Term, heading, quantity};
 use super::facts::UnitFacts;
-use super::numbers::{counted, significant, times};
+use super::numbers::{counted, frequencies, significant, times};
 use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
@@ -168,8 +168,8 @@ impl<'a> SimulationFacts<'a> {
             last: energies(recording.balances.last()),
             largest_spin: extremes.spin,
             largest_deflection: extremes.deflection.value,
-            largest_spin_components: extremes.spin_about.into(),
-            gravity: setting.gravity.map(Into::into),
+            largest_spin_components: extremes.spin_body.into(),
+            gravity: setting.gravity_model.map(Into::into),
             carried,
             frame_origin: setting.origin_in_words(),
             reaction,
@@ -193,7 +193,7 @@ impl<'a> SimulationFacts<'a> {
                 format!("adaptive, order {order}, tolerance {tolerance:e}")
             }
             MethodFacts::Conserving { order, step } => {
-                format!("conserving, order {order}, step {} {}", significant(step, 4), self.units.time())
+                format!("conserving, order {order}, step {}", self.units.time_of(step, 4))
             }
         }
     }
@@ -242,10 +242,7 @@ impl<'a> SimulationFacts<'a> {
             words.push(("Reaction", format!("force at most {force}, torque at most {torque}")));
         }
         if let Some(largest) = self.largest_conditions_torque {
-            words.push((
-                "Mean axes",
-                format!("are held by no force and a torque of at most {}", torque(largest)),
-            ));
+            words.push(("Mean axes", format!("need no force and a torque of at most {}", torque(largest))));
         }
         words
     }
@@ -253,10 +250,14 @@ impl<'a> SimulationFacts<'a> {
     fn carried_in_words(&self) -> Option<String> {
         const FIRST: usize = 6;
         let carried = self.carried.as_ref()?;
-        let first: Vec<String> =
-            carried.frequency_hz.iter().take(FIRST).map(|hertz| significant(*hertz, 5)).collect();
+        let (all, unit) = frequencies(&carried.frequency_hz, 5);
+        let first = &all[..all.len().min(FIRST)];
         let more = if carried.frequency_hz.len() > FIRST { " ..." } else { "" };
-        Some(format!("by {}; natural frequencies so {}{more} Hz", carried.by, first.join(" ")))
+        Some(format!(
+            "by {}; natural frequencies of the carried body {}{more} {unit}",
+            carried.by,
+            first.join(" ")
+        ))
     }
 
     fn document(&self) -> Document<'_> {
@@ -284,8 +285,8 @@ impl<'a> SimulationFacts<'a> {
     }
 
     fn body_in_words(&self) -> Term {
-        let (duration, time) = (significant(self.duration, 6), self.units.time());
-        let words = format!("{}, {duration} {time}, {}", self.body, counted(self.instants, "instant"));
+        let duration = self.units.time_of(self.duration, 6);
+        let words = format!("{}, {duration}, {}", self.body, counted(self.instants, "instant"));
         Term::new("Body", words.as_str()).in_text("Simulation", format!("{}: {words}", self.scene))
     }
 
@@ -311,8 +312,8 @@ impl<'a> SimulationFacts<'a> {
         let length = self.units.length();
         terms.extend(self.points.iter().map(|point| {
             let [x, y, z] = point.last_place.map(|v| significant(v, 6));
-            let (name, deflection) = (point.name, significant(point.largest_deflection, 4));
-            let words = format!("ends at {x}, {y}, {z} {length}, deflected by at most {deflection} {length}");
+            let (name, deflection) = (point.name, self.units.length_of(point.largest_deflection, 4));
+            let words = format!("last position {x}, {y}, {z} {length}; largest deflection {deflection}");
             Term::new("Point", format!("{name}: {words}"))
         }));
         terms
@@ -329,18 +330,18 @@ impl<'a> SimulationFacts<'a> {
             values: balances.iter().map(value).collect(),
         };
         let internal = vec![
-            along("kinetic, no flight", &|b| b.kinetic - b.flight),
+            along("kinetic without flight", &|b| b.kinetic - b.flight),
             along("elastic", &|b| b.elastic),
             along("work", &|b| b.work),
         ];
         plot("Energy", units.energy(), internal);
         let first = balances.first().map_or(0.0, |b| b.kinetic + b.elastic);
-        let lost = along("less work", &|b| b.kinetic + b.elastic - first - b.work);
+        let lost = along("energy less work", &|b| b.kinetic + b.elastic - first - b.work);
         plot("Drift of the energy", units.energy(), vec![lost]);
         let omega = components(states.iter().map(|state| state.omega));
         plot("Angular velocity, axes of the model", format!("rad/{}", units.time()), omega);
         let modal = format!("{}^(1/2) {}", units.mass(), units.length());
-        plot("Modal coordinates that move most", modal, self.largest_coordinates());
+        plot("Largest modal coordinates", modal, self.largest_coordinates());
         for path in paths {
             let (deflection, acceleration) = (path.deflection.iter(), path.acceleration.iter());
             let title = format!("Deflection of {}, axes of the model", path.name);

@@ -9,13 +9,13 @@ use super::facts::{InterfaceFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::lumped_effect::scheme_in_words;
-use super::numbers::{bytes, coordinates, counted, duration, significant, triple};
+use super::numbers::{bytes, coordinates, counted, duration, frequency, frequency_range, triple};
 use super::text::{self, Screen};
 use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::MassStructure;
 
 /// Number of list entries that are shown.
-const LISTED: usize = 4;
+const MAX_LISTED: usize = 4;
 
 /// Renders the summary for a screen.
 pub fn summary(facts: &Facts<'_>, screen: Screen) -> String {
@@ -44,14 +44,14 @@ fn body(facts: &Facts<'_>) -> Vec<Term> {
     let size = entry(warned_if(is_lumped || !plane.is_empty()), "model", size + plane, 3);
     let mut items = vec![entry(tone, "body", title, 2), size];
     if model.approximation.is_some() {
-        let remark = "W1, W2 and W3 keep a part of the mass along the axes of the body; the rest is exact";
+        let remark = "W1, W2 and W3 take a part of the mass as fixed to the axes of the body; everything else is exact";
         items.push(entry(Tone::Warning, "approximate", remark, 2));
     }
     items.extend(model.storage_in_words().map(|rounded| entry(Tone::Warning, "storage", rounded, 2)));
     if !model.interfaces.is_empty() {
         let (size, unit) = (facts.body.size(), model.units.length());
         let all: Vec<String> = model.interfaces.iter().map(|one| interface(one, size, &unit)).collect();
-        let bends = model.interfaces.iter().any(InterfaceFacts::breaks_its_word);
+        let bends = model.interfaces.iter().any(InterfaceFacts::deforms_although_rigid);
         items.push(entry(warned_if(bends), "interfaces", all.join("; "), if bends { 6 } else { 4 }));
     }
     items
@@ -60,7 +60,7 @@ fn body(facts: &Facts<'_>) -> Vec<Term> {
 /// Returns an interface in words, `bore: 80 nodes, rigid, at 0, 0, 12.5 mm`; the point is in model axes.
 fn interface(interface: &InterfaceFacts, size: f64, unit: &str) -> String {
     let coupling = interface.coupling.map_or(String::new(), |name| format!(", {name}"));
-    let bends = if interface.breaks_its_word() { " but DEFORMS" } else { "" };
+    let bends = if interface.deforms_although_rigid() { " but DEFORMS" } else { "" };
     let place = interface.place_in_words(size, unit);
     format!("{}: {}{coupling}{bends}{place}", interface.name, counted(interface.n_nodes, "node"))
 }
@@ -69,7 +69,7 @@ fn mass_properties(facts: &Facts<'_>) -> Vec<Term> {
     let (body, units) = (&facts.body, &facts.model.units);
     let centre = coordinates(&body.centre_of_mass, body.size(), &units.length());
     let inertia = triple(&body.principal_inertia, &units.inertia());
-    let mass = format!("{} {} at {centre} (model axes)", significant(body.mass, 6), units.mass());
+    let mass = format!("{} at {centre} (model axes)", units.mass_of(body.mass, 6));
     let mut items = vec![
         entry(Tone::Plain, "mass", mass, 2),
         entry(Tone::Plain, "inertia", format!("{inertia} (principal)"), 2),
@@ -82,8 +82,8 @@ fn modes(facts: &Facts<'_>) -> Vec<Term> {
     let (modes, completeness) = (&facts.modes, &facts.completeness);
     let range = match modes.frequency_hz.as_slice() {
         [] => String::new(),
-        [only] => format!(", {} Hz", significant(*only, 5)),
-        [first, .., last] => format!(", {} to {} Hz", significant(*first, 5), significant(*last, 5)),
+        [only] => format!(", {}", frequency(*only, 5)),
+        [first, .., last] => format!(", {}", frequency_range([*first, *last], 5)),
     };
     let reduced = modes.craig_bampton.as_ref();
     let origins = modes.origins();
@@ -114,18 +114,18 @@ fn modes(facts: &Facts<'_>) -> Vec<Term> {
     );
     items.extend(modes.softening_hz.as_ref().map(|hz| entry(Tone::Plain, "spin", softening_in_words(hz), 2)));
     let dropped: Vec<_> = facts.terms.iter().filter(|term| !term.kept).collect();
-    items.extend(listed_to(LISTED, "left out", &dropped, |term| {
+    items.extend(listed_to(MAX_LISTED, "left out", &dropped, |term| {
         entry(Tone::Warning, "left out", term.in_words(), 3)
     }));
     items
 }
 
 fn lumped(facts: &Facts<'_>) -> Vec<Term> {
-    let mut items = listed_to(LISTED, "lumped", &facts.lumped, |own: &LumpedFacts| {
+    let mut items = listed_to(MAX_LISTED, "lumped", &facts.lumped, |own: &LumpedFacts| {
         let tone = if own.negative_masses > 0 { Tone::Warning } else { Tone::Plain };
         entry(tone, "lumped", format!("{}: {}", scheme_in_words(&own.scheme), own.in_words(false)), 3)
     });
-    items.extend(listed_to(LISTED, "own modes", &facts.lumped_modes, |own: &LumpedModesFacts| {
+    items.extend(listed_to(MAX_LISTED, "own modes", &facts.lumped_modes, |own: &LumpedModesFacts| {
         let words = format!("{}: {}", scheme_in_words(&own.scheme), own.in_words());
         entry(Tone::Plain, "own modes", words, 3)
     }));
@@ -137,7 +137,7 @@ fn diagnostics(facts: &Facts<'_>) -> Vec<Term> {
     let kinds = [(Severity::Error, "errors", Tone::Bad), (Severity::Warning, "warnings", Tone::Warning)];
     let of_kind = |(severity, label, tone): (Severity, &'static str, Tone)| {
         let found: Vec<_> = facts.diagnostics.iter().filter(|d| d.severity() == severity).collect();
-        listed_to(LISTED, label, &found, |d| {
+        listed_to(MAX_LISTED, label, &found, |d| {
             entry(tone, label, format!("{} {}", d.code().id(), d.message()), 3)
         })
     };

@@ -47,7 +47,7 @@ impl TermFacts {
             (false, _) => String::new(),
             (true, false) => format!(", error without it up to {}", significant(decision.bound, 3)),
             (true, true) => format!(
-                ", error without it up to {} of {} allowed",
+                ", error without it up to {}, tolerance {}",
                 significant(decision.bound, 3),
                 significant(decision.limit, 3)
             ),
@@ -58,6 +58,6 @@ impl TermFacts {
 
 /// Returns a note for every group that `body` dropped, since no check covers it.
 pub fn dropped_text(body: &FlexBody) -> String {
-    let note = |group: TermGroup| format!("note: {} was dropped: nothing of it is checked\n", group.name());
+    let note = |group: TermGroup| format!("note: {} was dropped and is not checked\n", group.name());
     body.groups().dropped().map(note).collect()
 }

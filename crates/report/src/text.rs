@@ -5,9 +5,9 @@ use super::numbers::plain;
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 
 /// Default width of a text: columns that every terminal has.
-const WIDTH: usize = 80;
+const DEFAULT_COLUMNS: usize = 80;
 /// Width of the label column in characters.
-const LABEL: usize = 12;
+const LABEL_COLUMNS: usize = 12;
 /// Character that stands for a space at which a line must not break.
 pub(super) const KEEP: &str = "\u{a0}";
 
@@ -39,7 +39,7 @@ impl Screen {
 impl Default for Screen {
     /// Returns the settings for a file, or for a terminal of unknown size.
     fn default() -> Self {
-        Self { is_coloured: false, columns: WIDTH }
+        Self { is_coloured: false, columns: DEFAULT_COLUMNS }
     }
 }
 
@@ -102,8 +102,9 @@ impl Text {
     /// Writes a text under a label. The maximum number of lines of the term holds for lines of the default
     /// width.
     fn entry(&mut self, term: &Term, label: &str, value: &str) {
-        let columns = self.screen.columns - LABEL;
-        let most = term.lines * (WIDTH - LABEL).div_ceil(columns.min(WIDTH - LABEL));
+        let columns = self.screen.columns - LABEL_COLUMNS;
+        let most = term.lines
+            * (DEFAULT_COLUMNS - LABEL_COLUMNS).div_ceil(columns.min(DEFAULT_COLUMNS - LABEL_COLUMNS));
         let mut lines = wrapped(&plain(value), columns);
         if lines.len() > most {
             lines.truncate(most);
@@ -113,7 +114,7 @@ impl Text {
         }
         let [of_label, of_text] = codes(term.tone);
         for (i, line) in lines.iter().enumerate() {
-            let label = format!("{:LABEL$}", if i == 0 { label } else { "" });
+            let label = format!("{:LABEL_COLUMNS$}", if i == 0 { label } else { "" });
             let line = line.replace(KEEP, " ");
             self.painted(of_label, if line.is_empty() { label.trim_end() } else { &label });
             self.painted(of_text, line.trim_end());

@@ -5,8 +5,8 @@ use super::chart::{Axis, Chart, Mark, Panel, Series};
 use super::csv;
 use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
 use super::errors_in_words::{errors_in_words, ranges};
-use super::lacks::{LackFacts, reference_in_words};
-use super::numbers::{bytes, counted, duration, significant, times};
+use super::numbers::{TIME_UNITS, bytes, counted, duration, engineering, significant, times};
+use super::reference_error::{ReferenceErrorFacts, reference_in_words};
 use super::run_data::RunData;
 use super::trade_cases::{TradeCaseFacts, case_facts, cases_table};
 use super::trade_nodes::NodalFacts;
@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 
 /// Columns of the Pareto front in a text.
 const IN_TEXT: [&str; 7] =
-    ["No.", "What", "Multiplications", "Evaluation", "Simulation", "File", "Error / tolerance"];
+    ["No.", "Candidate", "Multiplications", "Evaluation", "Simulation", "File", "Error / tolerance"];
 
 /// Smallest error over tolerance on the plot; smaller errors are drawn at this value. A smaller value adds
 /// decades to the axis.
@@ -46,7 +46,8 @@ pub struct TradeFacts<'a> {
     nodal: Option<NodalFacts>,
     /// Errors of the body of row 1, and of its versions before enrichment, relative to the model; empty if
     /// only a body file is available. With several load cases those of the case with the largest error.
-    reference_lacks: Vec<LackFacts>,
+    #[serde(rename = "reference_lacks")]
+    reference_errors: Vec<ReferenceErrorFacts>,
     /// Tolerance; with several load cases the smallest of each quantity.
     tolerance: Tolerance,
     allowed_multiplications: Option<usize>,
@@ -137,7 +138,7 @@ struct Seconds {
 impl<'a> MeasuredFacts<'a> {
     fn new(measured: &Measured, cases: &'a [TradeCase]) -> Self {
         let timed = measured.timed.as_ref();
-        let InCase { errors, worst, growth } = *measured.deciding();
+        let InCase { errors, worst, growth } = *measured.decisive_case();
         let case = cases[measured.case].name.as_deref();
         let ratios = measured.by_case.iter().map(|own| own.worst);
         Self {
@@ -206,12 +207,12 @@ impl<'a> RowFacts<'a> {
         }
     }
 
-    /// Returns the composition of the candidate: `6 modes, W1`.
+    /// Returns the composition of the candidate: `6 modes, W1`, or `5 modes (1, 3-4, 7, 9), W1` if these are not
+    /// the lowest modes.
     fn in_words(&self) -> String {
-        let mut words = format!("{}, {}", counted(self.modes, "mode"), self.groups_in_words());
-        if !self.lowest() {
-            words.push_str(", not the lowest");
-        }
+        let numbers =
+            if self.lowest() { String::new() } else { format!(" ({})", ranges(&self.mode_numbers)) };
+        let mut words = format!("{}{numbers}, {}", counted(self.modes, "mode"), self.groups_in_words());
         if let (Some(scheme), Some(part)) = (self.lumped, self.lumped_part) {
             words.push_str(&format!(", {scheme} {part}"));
         }
@@ -222,7 +223,7 @@ impl<'a> RowFacts<'a> {
     }
 
     fn groups_in_words(&self) -> String {
-        if self.groups.is_empty() { "no group".to_owned() } else { self.groups.join(" ") }
+        if self.groups.is_empty() { "I0 only".to_owned() } else { self.groups.join(" ") }
     }
 
     /// Returns true if the candidate has all modes up to its last.
@@ -232,12 +233,12 @@ impl<'a> RowFacts<'a> {
 }
 
 impl<'a> TradeFacts<'a> {
-    /// Collects the facts of a study and of the run that made it. `lacks` holds the errors of the reference
+    /// Collects the facts of a study and of the run that made it. `reference_errors` holds the errors of the reference
     /// relative to the model for each load case.
-    pub fn new(trade: &'a Trade, lacks: &[Vec<ReferenceError>], run: &'a RunData) -> Self {
+    pub fn new(trade: &'a Trade, reference_errors: &[Vec<ReferenceError>], run: &'a RunData) -> Self {
         let row = |(at, row): (usize, &'a TradeRow)| RowFacts::new(at + 1, row, &trade.cases);
         let rows: Vec<RowFacts<'a>> = trade.rows.iter().enumerate().map(row).collect();
-        let rounds = worst_lacks(lacks);
+        let rounds = worst_reference_errors(reference_errors);
         let mut facts = Self {
             format: "flexbody-trade",
             format_major: 2,
@@ -247,7 +248,7 @@ impl<'a> TradeFacts<'a> {
             body: &trade.body,
             reference: trade.reference,
             nodal: trade.cases[0].nodal.as_ref().map(NodalFacts::new),
-            reference_lacks: rounds.iter().map(LackFacts::new).collect(),
+            reference_errors: rounds.iter().map(ReferenceErrorFacts::new).collect(),
             tolerance: trade.tolerance,
             allowed_multiplications: trade.allowed,
             verdict: Vec::new(),
@@ -255,7 +256,7 @@ impl<'a> TradeFacts<'a> {
             recommended: trade.recommended.row().map(|row| row + 1),
             front: trade.front.iter().map(|row| row + 1).collect(),
             rows,
-            cases: case_facts(trade, lacks),
+            cases: case_facts(trade, reference_errors),
             variations: VariationFacts::of_trade(trade),
             recommended_in_scene: trade
                 .in_scene
@@ -269,8 +270,8 @@ impl<'a> TradeFacts<'a> {
         };
         let names = facts.names();
         let is_nodal = trade.cases.iter().any(|case| case.nodal.is_some());
-        let lacking = rounds.last().filter(|own| !is_nodal && !own.is_reference());
-        let lines = verdict_lines(trade, &names, &facts.tolerances_in_words(), lacking).into_iter();
+        let reference_error = rounds.last().filter(|own| !is_nodal && !own.is_reference());
+        let lines = verdict_lines(trade, &names, &facts.tolerances_in_words(), reference_error).into_iter();
         let in_variations = varied_line(trade, &facts.variations, &names).map(|text| ("Variations", text));
         facts.verdict = lines.chain(in_variations).map(|(label, text)| VerdictLine { label, text }).collect();
         facts
@@ -334,16 +335,18 @@ impl<'a> TradeFacts<'a> {
         let names = self.names();
         let cases = self.cases.iter().map(|case| Term::text("Load cases", case.in_words(&names)));
         blocks.push(Block::Terms(cases.collect()));
-        blocks.extend([heading("What is compared"), Block::Terms(self.compared())]);
+        blocks.extend([heading("Comparison"), Block::Terms(self.compared())]);
         if !self.cases.is_empty() {
             blocks.extend([heading("Load cases"), Block::Table(cases_table(&self.cases, &names))]);
         }
         blocks.push(heading("Error against cost"));
         blocks.extend(self.chart().map(Block::Chart));
-        let front = self.table("No other candidate is as cheap and as accurate", &self.shown());
+        let front =
+            self.table("Candidates for which no other is both cheaper and more accurate", &self.shown());
         let front = Block::Table(front.in_text(|head| IN_TEXT.contains(&head)));
         blocks.extend([Block::Gap, heading("Pareto front"), front, Block::Gap]);
-        let all = self.table("In the order in which they were tried", &self.rows.iter().collect::<Vec<_>>());
+        let all = self
+            .table("All candidates in the order of their simulation", &self.rows.iter().collect::<Vec<_>>());
         blocks.extend([heading("All candidates"), Block::Table(all), Block::Terms(self.work())]);
         blocks.push(Block::Diagnostics(self.diagnostics));
         Document { name: self.scene, kind: "Trade study", generator: &self.generator, blocks }
@@ -352,7 +355,7 @@ impl<'a> TradeFacts<'a> {
     /// Returns the verdict. A page omits the recommendation here because its head already shows it.
     fn verdict<'b>(&self) -> Vec<Block<'b>> {
         let count = counted(self.rows.len(), "candidate");
-        let title = format!("{}: {}, {count} against {}", self.scene, self.body, self.against());
+        let title = format!("{}: {}, {count} compared with {}", self.scene, self.body, self.against());
         let mut terms = vec![Term::text("Trade", title)];
         terms.extend(self.verdict.iter().enumerate().map(|(i, line)| match i {
             1 => Term::text(line.label, line.text.as_str()),
@@ -377,7 +380,7 @@ impl<'a> TradeFacts<'a> {
         vec![
             Term::page("Body", self.body),
             reference,
-            Term::new("Whole body", reference_in_words(&self.reference_lacks)),
+            Term::new("Whole body", reference_in_words(&self.reference_errors)),
             Term::page("Tolerances", self.tolerances_in_words()),
             Term::page("Candidates", candidates),
             Term::page("Cost", "multiplications of one evaluation of the equations of motion"),
@@ -392,7 +395,7 @@ impl<'a> TradeFacts<'a> {
     /// Returns the number of failures and the times, at the end of a text.
     fn work(&self) -> Vec<Term> {
         let failed = self.rows.iter().filter(|row| row.failed.is_some()).count();
-        let why = format!("{}: --json and --report say why", counted(failed, "candidate"));
+        let why = format!("{}: see --json or --report for the reasons", counted(failed, "candidate"));
         let failed = (failed > 0).then(|| Term::text("Failed", why));
         failed.into_iter().chain([Term::text("Time", self.time_in_words())]).collect()
     }
@@ -422,7 +425,7 @@ impl<'a> TradeFacts<'a> {
         let front = self.front.iter().filter_map(|&number| point(number)).collect();
         let ring = self.recommended.and_then(point).into_iter().collect();
         let allowed = x.ends().map(|cost| [cost, 1.0]).to_vec();
-        series.insert(0, Series::new("what is allowed", Mark::Line, 1, allowed));
+        series.insert(0, Series::new("tolerance", Mark::Line, 1, allowed));
         series.extend(
             most.map(|most| Series::new("", Mark::Line, 1, y.ends().map(|error| [most, error]).to_vec())),
         );
@@ -435,10 +438,10 @@ impl<'a> TradeFacts<'a> {
     fn table(&self, caption: &str, rows: &[&RowFacts<'a>]) -> Table {
         // A body read from a file is the only source, and the time of its preprocessing is unknown.
         let several = self.rows.iter().any(|row| row.source != self.rows[0].source);
-        let mut heads = vec!["No.", "What"];
-        heads.extend(several.then_some("Of"));
-        heads.extend(["To (Hz)", "Multiplications", "Evaluation", "Simulation", "Steps", "File"]);
-        heads.extend(several.then_some("Made in"));
+        let mut heads = vec!["No.", "Candidate"];
+        heads.extend(several.then_some("Basis"));
+        heads.extend(["Up to (Hz)", "Multiplications", "Evaluation", "Simulation", "Steps", "File"]);
+        heads.extend(several.then_some("Preprocessing"));
         heads.extend(["Attitude (rad)", "Deflection", "Stress", "Reaction", "Error / tolerance"]);
         heads.extend((!self.cases.is_empty()).then_some("Worst case"));
         let row = |row: &&RowFacts<'a>| {
@@ -463,20 +466,16 @@ impl<'a> TradeFacts<'a> {
 }
 
 /// Returns the errors of the reference in the load case with the largest last error.
-fn worst_lacks(lacks: &[Vec<ReferenceError>]) -> &[ReferenceError] {
+fn worst_reference_errors(reference_errors: &[Vec<ReferenceError>]) -> &[ReferenceError] {
     let last = |rounds: &&Vec<ReferenceError>| rounds.last().map_or(-1.0, |own| own.worst);
     // `max_by` returns the last of equal elements, so that the reversed order selects the first.
-    let worst = lacks.iter().rev().max_by(|a, b| last(a).total_cmp(&last(b)));
+    let worst = reference_errors.iter().rev().max_by(|a, b| last(a).total_cmp(&last(b)));
     worst.map_or(&[], Vec::as_slice)
 }
 
-/// Returns a short time in ns or us.
+/// Returns the time of an evaluation with a fitting prefix.
 fn short(seconds: f64) -> String {
-    if seconds < 1e-6 {
-        format!("{} ns", significant(1e9 * seconds, 3))
-    } else {
-        format!("{} us", significant(1e6 * seconds, 3))
-    }
+    engineering(seconds, 3, TIME_UNITS)
 }
 
 /// Returns the study as comma-separated values with one row per candidate; numbers round-trip.

@@ -3,8 +3,8 @@
 
 use super::document::{Table, cells};
 use super::errors_in_words::{errors_in_words, part_in_words};
-use super::lacks::LackFacts;
 use super::numbers::counted;
+use super::reference_error::ReferenceErrorFacts;
 use super::trade_nodes::NodalFacts;
 use flexbody_motion::scene::{OutputErrors, Tolerance};
 use flexbody_study::reference::ReferenceError;
@@ -34,15 +34,19 @@ pub(super) struct TradeCaseFacts<'a> {
     nodal: Option<NodalFacts>,
     /// Errors of the body of row 1, and of its versions before enrichment, relative to the model in this
     /// case.
-    reference_lacks: Vec<LackFacts>,
+    #[serde(rename = "reference_lacks")]
+    reference_errors: Vec<ReferenceErrorFacts>,
 }
 
 /// Returns the load cases of a study; empty for a single scene.
-pub(super) fn case_facts<'a>(trade: &'a Trade, lacks: &[Vec<ReferenceError>]) -> Vec<TradeCaseFacts<'a>> {
+pub(super) fn case_facts<'a>(
+    trade: &'a Trade,
+    reference_errors: &[Vec<ReferenceError>],
+) -> Vec<TradeCaseFacts<'a>> {
     let taken = trade.recommended.row().and_then(|row| trade.rows[row].outcome.as_ref().ok());
     let of = |(at, case): (usize, &'a flexbody_study::trade::TradeCase)| {
         let own: Option<&InCase> = taken.map(|measured| &measured.by_case[at]);
-        let rounds = lacks.get(at).map_or(&[][..], Vec::as_slice);
+        let rounds = reference_errors.get(at).map_or(&[][..], Vec::as_slice);
         Some(TradeCaseFacts {
             name: case.name.as_deref()?,
             tolerance: case.tolerance,
@@ -54,7 +58,7 @@ pub(super) fn case_facts<'a>(trade: &'a Trade, lacks: &[Vec<ReferenceError>]) ->
             ruled_out: case.ruled_out,
             ruled_out_alone: case.ruled_out_alone,
             nodal: case.nodal.as_ref().map(NodalFacts::new),
-            reference_lacks: rounds.iter().map(LackFacts::new).collect(),
+            reference_errors: rounds.iter().map(ReferenceErrorFacts::new).collect(),
         })
     };
     trade.cases.iter().enumerate().filter_map(of).collect()
@@ -64,25 +68,30 @@ impl TradeCaseFacts<'_> {
     /// Returns the effect of the case on the decision: `rules out 12 cheaper candidates, 3 of them alone`.
     fn decides(&self) -> String {
         match self.ruled_out {
-            0 => "rules out nothing cheaper".to_owned(),
+            0 => "rules out no cheaper candidate".to_owned(),
             count => {
                 let count = counted(count, "cheaper candidate");
-                format!("rules out {count}, {} of them alone", self.ruled_out_alone)
+                format!("rules out {count}, {} of them by this case alone", self.ruled_out_alone)
             }
         }
     }
 
     fn alone(&self, names: &[String]) -> String {
-        self.alone.map_or_else(|| "nothing".to_owned(), |row| names[row - 1].clone())
+        self.alone.map_or_else(|| "no candidate".to_owned(), |row| names[row - 1].clone())
     }
 
     /// Returns the case in words: `braking: stress 1.2 %: 60 % of what is allowed; rules out ...; alone it
     /// takes 6 modes, W1`.
     pub(crate) fn in_words(&self, names: &[String]) -> String {
         let errors = self.errors.as_ref().map_or_else(String::new, |errors| {
-            format!("{}: {} of what is allowed; ", errors_in_words(errors), part_in_words(self.worst))
+            format!("{}: {} of the tolerance; ", errors_in_words(errors), part_in_words(self.worst))
         });
-        format!("{}: {errors}{}; alone it takes {}", self.name, self.decides(), self.alone(names))
+        format!(
+            "{}: {errors}{}; recommended for this case alone: {}",
+            self.name,
+            self.decides(),
+            self.alone(names)
+        )
     }
 }
 
@@ -92,23 +101,24 @@ pub(super) fn cases_table(cases: &[TradeCaseFacts<'_>], names: &[String]) -> Tab
     let heads = [
         "Load case",
         "Errors",
-        "Of what is allowed",
+        "Error / tolerance",
         "Decides",
-        "Takes alone",
-        "The reference lacks (estimated)",
+        "Recommended alone",
+        "Error of the reference (estimated)",
     ];
     let row = |case: &TradeCaseFacts<'_>| {
         let errors = case.errors.as_ref().map_or_else(|| "not measured".to_owned(), errors_in_words);
-        let lacks = case.reference_lacks.last().map_or_else(|| "not known".to_owned(), LackFacts::parts);
+        let reference_errors =
+            case.reference_errors.last().map_or_else(|| "not known".to_owned(), ReferenceErrorFacts::parts);
         cells([
             case.name.to_owned(),
             errors,
             part_in_words(case.worst),
             case.decides(),
             case.alone(names),
-            lacks,
+            reference_errors,
         ])
     };
-    let caption = "The recommended candidate in each load case. A case rules out the cheaper candidates whose errors are beyond its tolerances; what it takes alone is the cheapest candidate that is within them.";
+    let caption = "The recommended candidate in each load case. A case rules out the cheaper candidates whose errors exceed its tolerances; the candidate recommended for it alone is the cheapest one within them.";
     Table::new(caption, heads, &[1, 3, 4, 5], cases.iter().map(row).collect())
 }

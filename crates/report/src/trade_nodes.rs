@@ -29,7 +29,7 @@ impl NodalFacts {
     pub(crate) fn in_words(&self) -> String {
         let how = match (self.order, self.step, self.tolerance) {
             (Some(order), Some(step), _) => {
-                format!("implicit steps of order {order}, of {} at most", significant(step, 3))
+                format!("implicit steps of order {order}, at most {} long", significant(step, 3))
             }
             (_, _, tolerance) => {
                 format!("explicit steps, tolerance {}", significant(tolerance.unwrap_or(0.0), 2))
@@ -38,7 +38,7 @@ impl NodalFacts {
         let worth = match self.error {
             Some(error) => {
                 let part = significant(100.0 * error, 2);
-                format!("; steps twice as long change it by {part} % of the tolerances")
+                format!("; twice the step changes the motion by {part} % of the tolerances")
             }
             None => String::new(),
         };

@@ -1,19 +1,20 @@
 //! Verdict of a trade study in five lines: request, recommendation, reason, error, savings.
 
-use super::errors_in_words::errors_in_words;
-use super::lacks::LackFacts;
-use super::numbers::{duration, significant};
+use super::errors_in_words::{errors_in_words, groups_in_words, ranges};
+use super::numbers::{counted, duration, frequency, significant};
+use super::reference_error::ReferenceErrorFacts;
 use super::variations::{VariationFacts, in_words};
+use flexbody_body::flex_body::Storage;
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{InCase, Measured, Recommendation, Trade, TradeRow};
 
 /// Returns the five lines with their labels. `names` are the names of the rows, `tolerances` the tolerances
-/// of the scene in words, `lacking` the error of a reference that deviates too much from its model.
+/// of the scene in words, `reference_error` the error of a reference that deviates too much from its model.
 pub(super) fn verdict_lines(
     trade: &Trade,
     names: &[String],
     tolerances: &str,
-    lacking: Option<&ReferenceError>,
+    reference_error: Option<&ReferenceError>,
 ) -> Vec<(&'static str, String)> {
     let asked = format!("{}: {}", trade.scene, asked(trade, tolerances));
     let Some(at) = trade.recommended.row() else {
@@ -24,18 +25,21 @@ pub(super) fn verdict_lines(
     let whole = trade.rows.first().and_then(|row| row.outcome.as_ref().ok());
     vec![
         ("Asked", asked),
-        ("Take", taken(&names[at], row)),
+        ("Recommended", recommended(row, has_several_sources(trade))),
         ("Why", why(trade, names, measured)),
-        ("Error", error(trade, measured, lacking)),
+        ("Error", error(trade, measured, reference_error)),
         ("Saves", whole.map_or_else(String::new, |whole| saves(whole, measured))),
     ]
 }
 
 fn asked(trade: &Trade, tolerances: &str) -> String {
     match trade.allowed {
-        Some(allowed) => format!("the most accurate of at most {allowed} multiplications per evaluation"),
+        Some(allowed) => format!("the smallest error with at most {allowed} multiplications per evaluation"),
         None if trade.cases.len() > 1 => {
-            format!("in {} load cases errors of at most {tolerances} (the least of any)", trade.cases.len())
+            format!(
+                "in each of {} load cases errors of at most {tolerances} (the smallest tolerances of all cases)",
+                trade.cases.len()
+            )
         }
         None => format!("errors of at most {tolerances}"),
     }
@@ -43,22 +47,46 @@ fn asked(trade: &Trade, tolerances: &str) -> String {
 
 fn nothing(trade: &Trade) -> String {
     if trade.allowed.is_some() {
-        return "no candidate is as cheap as allowed".to_owned();
+        return "no candidate needs so few multiplications".to_owned();
     }
     let worst = trade.rows.iter().filter_map(|row| Some(row.outcome.as_ref().ok()?.worst()));
     match worst.fold(f64::INFINITY, f64::min) {
         worst if worst.is_finite() => {
             let worst = significant(worst, 3);
             format!(
-                "no candidate is within the tolerances: the best has {worst} times the error that is allowed"
+                "no candidate is within the tolerances: the smallest error is {worst} times the tolerance"
             )
         }
         _ => "no candidate could be simulated".to_owned(),
     }
 }
 
-fn taken(name: &str, row: &TradeRow) -> String {
-    format!("{} (to {} Hz), of: {}", name, significant(row.last_frequency_hz, 3), row.source)
+fn has_several_sources(trade: &Trade) -> bool {
+    trade.rows.iter().any(|row| row.source != trade.rows[0].source)
+}
+
+/// Returns the recommended candidate in words: `5 modes (1, 3-4, 7, 9; up to 17.1 kHz) with W1, W2 and W3`;
+/// with several sources also the modes that it was made from.
+fn recommended(row: &TradeRow, names_source: bool) -> String {
+    let candidate = &row.candidate;
+    let numbers: Vec<usize> = candidate.modes.iter().map(|mode| mode + 1).collect();
+    let mut words = format!(
+        "{} ({}; up to {}) with {}",
+        counted(numbers.len(), "mode"),
+        ranges(&numbers),
+        frequency(row.last_frequency_hz, 3),
+        groups_in_words(&candidate.group_names())
+    );
+    if let Some(lumped) = &candidate.lumped {
+        words.push_str(&format!(", {} {}", lumped.scheme(), lumped.part()));
+    }
+    if candidate.storage.name() == Storage::F32.name() {
+        words.push_str(", stored as 32-bit floats");
+    }
+    if names_source {
+        words.push_str(&format!(", made from {}", row.source));
+    }
+    words
 }
 
 /// Returns the reason in words; the next cheaper row of the front shows the error of a lower cost.
@@ -66,7 +94,7 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
     let count = trade.rows.len();
     let first = match trade.recommended {
         Recommendation::MostAccurate(_) => {
-            format!("the most accurate of {count} candidates that is as cheap as allowed")
+            format!("the smallest error of the candidates with so few multiplications ({count} compared)")
         }
         _ => format!("the cheapest of {count} candidates with every error within the tolerances"),
     };
@@ -76,16 +104,19 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
     });
     let Some((at, own)) = cheaper else { return first };
     let case = &trade.cases[own.case];
-    let (output, error, allowed) = own.deciding().errors.decisive(&case.tolerance);
+    let (output, error, allowed) = own.decisive_case().errors.decisive(&case.tolerance);
     let part = error / allowed;
     let times = significant(part, 2);
     let reference = if part <= 1.0 && case.reserved > 0.0 {
-        format!(", beside the {} that the reference itself lacks", significant(case.reserved, 2))
+        format!(
+            ", and the error of the reference is another {} times the tolerance",
+            significant(case.reserved, 2)
+        )
     } else {
         String::new()
     };
     format!(
-        "{first}; the next cheaper one, {}, is off in {output} by {times} times what is allowed{}{reference}",
+        "{first}; the next cheaper one, {}, has an error in {output} of {times} times the tolerance{}{reference}",
         names[at],
         in_case(trade, own)
     )
@@ -118,21 +149,21 @@ fn in_case(trade: &Trade, measured: &Measured) -> String {
     name.map_or_else(String::new, |name| format!(" in case {name}"))
 }
 
-fn error(trade: &Trade, measured: &Measured, lacking: Option<&ReferenceError>) -> String {
-    let InCase { errors, worst, growth } = measured.deciding();
+fn error(trade: &Trade, measured: &Measured, reference_error: Option<&ReferenceError>) -> String {
+    let InCase { errors, worst, growth } = measured.decisive_case();
     let growth = growth.map_or_else(String::new, |growth| {
         format!(
-            "; grows with time, {} times more than the motion from the first half to the second",
+            "; the error grows with time: from the first to the second half of the run {} times more than the motion",
             significant(growth, 2)
         )
     });
     let worst = significant(100.0 * worst, 2);
     let case = in_case(trade, measured);
-    let lacking = lacking.map_or_else(String::new, |own| {
-        let parts = LackFacts::new(own).parts();
-        format!("; the reference itself lacks {parts} of the FE model (estimated), too much to be measured against")
+    let reference_error = reference_error.map_or_else(String::new, |own| {
+        let parts = ReferenceErrorFacts::new(own).parts();
+        format!("; the reference itself differs from the FE model by {parts} (estimated), too much for a reference")
     });
-    format!("{}: {worst} % of what is allowed{case}{growth}{lacking}", errors_in_words(errors))
+    format!("{}: {worst} % of the tolerance{case}{growth}{reference_error}", errors_in_words(errors))
 }
 
 fn saves(whole: &Measured, own: &Measured) -> String {
@@ -145,7 +176,7 @@ fn saves(whole: &Measured, own: &Measured) -> String {
     let times = whole.timed.zip(own.timed).map(|(before, after)| (before.integration, after.integration));
     let seconds = times.map_or_else(String::new, |(before, after)| {
         let (own, all) = (duration(after), duration(before));
-        format!("; {own} instead of {all} for {run} in flexbody, {} times less", ratio(before, after))
+        format!("; {own} instead of {all} for {run} in flexbody, {} times faster", ratio(before, after))
     });
     format!("{work} times fewer multiplications per evaluation{seconds}")
 }

@@ -33,7 +33,7 @@ impl<'a> VariationFacts<'a> {
             holds: own.holds(),
             errors: own.chosen.errors,
             worst: Some(own.chosen.worst).filter(|worst| worst.is_finite()),
-            reference: own.lacks.last().map(|lacks| lacks.worst),
+            reference: own.reference_errors.last().map(|reference_errors| reference_errors.worst),
         }
     }
 
@@ -61,7 +61,7 @@ impl<'a> VariationFacts<'a> {
     }
 
     fn is_judged(&self) -> bool {
-        self.holds || self.reference.is_none_or(|part| part <= flexbody_study::reference::MOST_LACKING)
+        self.holds || self.reference.is_none_or(|part| part <= flexbody_study::reference::MAX_REFERENCE_ERROR)
     }
 }
 

@@ -21,7 +21,7 @@ const STYLE: &str = include_str!("view/view.css");
 
 /// Size limit of positions, shapes and mesh in a page, in bytes. With the motion of a simulation and the
 /// script a page stays below 10 MB.
-const ROOM: usize = 7_000_000;
+const MAX_DRAWING_BYTES: usize = 7_000_000;
 
 /// Facts and markup of a page.
 #[derive(Debug, Clone)]
@@ -57,14 +57,14 @@ impl View {
     /// # Errors
     /// FB735 if the motion belongs to another body; the errors of [`FlexBody::carried`].
     pub fn new(body: &FlexBody, triangles: Option<usize>, motion: Option<&RecordedMotion>) -> Result<Self> {
-        let staged = motion.map(|motion| motion.staged(body)).transpose()?;
-        let body = staged.as_ref().unwrap_or(body);
-        let drawing = Drawing::new(body, triangles, ROOM, usize::MAX);
+        let body_in_frame = motion.map(|motion| motion.body_in_frame(body)).transpose()?;
+        let body = body_in_frame.as_ref().unwrap_or(body);
+        let drawing = Drawing::new(body, triangles, MAX_DRAWING_BYTES, usize::MAX);
         let shown = motion.map(|motion| ShownMotion::new(motion, body));
         let mut arrays = drawing.arrays();
         arrays.extend(shown.iter().flat_map(ShownMotion::arrays));
-        let told = terms(body, &drawing, shown.as_ref());
-        let data = ShownBody::new(body, &drawing, told, shown.as_ref());
+        let entries = terms(body, &drawing, shown.as_ref());
+        let data = ShownBody::new(body, &drawing, entries, shown.as_ref());
         let mut facts = ViewFacts {
             model: body.source().name.clone(),
             modes: body.n_modes(),

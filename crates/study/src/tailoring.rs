@@ -2,7 +2,8 @@
 //! recommendation states.
 
 use crate::reference::{
-    Enriched, Enrichment, Fewest, MOST_LACKING, MotionBodies, ReferenceError, enrich, varied_errors,
+    Enriched, Enrichment, FewestShapes, MAX_REFERENCE_ERROR, MotionBodies, ReferenceError, enrich,
+    varied_errors,
 };
 use crate::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_judged};
 use faer::Mat;
@@ -95,13 +96,12 @@ impl Tailoring {
         let Enriched { made: mut reference, rounds } = whole;
         let own = || rounds.iter().map(|rounds| rounds.last());
         if own().flatten().any(|own| !own.is_reference()) {
-            let message =
-                "the body whose motion shapes would be made of lacks more than half of the tolerances itself";
+            let message = "the error of the body whose motion would give the shapes is itself more than half of the tolerances";
             reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
             return Ok(Enriched { made: reference, rounds });
         }
         // The shapes may take what the truncation error of the whole body leaves.
-        let lacks: Vec<f64> = own().map(|own| own.map_or(0.0, |own| own.worst)).collect();
+        let reference_errors: Vec<f64> = own().map(|own| own.map_or(0.0, |own| own.worst)).collect();
         let bodies = MotionBodies::new(model, &reference.body, cases, context)?;
         let make = |bodies: &MotionBodies<'_>, count: usize| -> Result<Conversion> {
             let settings = self.settings_of_shapes(bodies.basis(count));
@@ -109,25 +109,27 @@ impl Tailoring {
             let condensed = condense(&modal)?;
             modal.finish(condensed, context)
         };
-        let most: Vec<f64> = lacks.iter().map(|lacks| MOST_LACKING - lacks).collect();
+        let most: Vec<f64> = reference_errors.iter().map(|error| MAX_REFERENCE_ERROR - error).collect();
         let fewest = bodies
             .as_ref()
             .map(|bodies| bodies.fewest(&most, |count| make(bodies, count), |made| &made.body));
-        if let Some(Fewest { made, errors, worst, .. }) = fewest.transpose()?.flatten() {
+        if let Some(FewestShapes { made, errors, worst, .. }) = fewest.transpose()?.flatten() {
             let modes = made.body.n_modes();
-            let own = errors.into_iter().zip(worst).zip(lacks).map(|((errors, worst), lacks)| {
-                vec![ReferenceError {
-                    modes,
-                    errors,
-                    worst: lacks + worst,
-                    time: 0.0,
-                    unknown: None,
-                    coupling: None,
-                }]
-            });
+            let own = errors.into_iter().zip(worst).zip(reference_errors).map(
+                |((errors, worst), reference_error)| {
+                    vec![ReferenceError {
+                        modes,
+                        errors,
+                        worst: reference_error + worst,
+                        time: 0.0,
+                        unknown: None,
+                        coupling: None,
+                    }]
+                },
+            );
             return Ok(Enriched { rounds: own.collect(), made });
         }
-        let message = "no number of shapes of the motion leaves half of the tolerances to the dropped terms";
+        let message = "with any number of shapes the motion takes more than half of the tolerances, which are needed for dropped terms";
         reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
         Ok(Enriched { made: reference, rounds })
     }
@@ -220,7 +222,7 @@ pub fn computed_basis(kind: BasisKind, loads: &[LoadSource], model: &FeModel) ->
         }
         BasisKind::Imported => {
             let message = "imported shapes are not computed from the model";
-            let help = "read them from a file: flexbody convert --basis imported --shapes FILE";
+            let help = "read them from a file with flexbody convert --basis imported --shapes FILE";
             Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
         }
     }
@@ -271,8 +273,8 @@ pub fn convert_for(
         enriched = tailoring.fewest_shapes(model, cases, enriched, context, condense)?;
     }
     let Enriched { made: mut conversion, rounds } = enriched;
-    let varied_lacks = varied_errors(model, &conversion.body, cases, context)?;
-    let selection = select_judged(&conversion.body, &rounds, &varied_lacks, cases, context)?;
+    let varied_reference_errors = varied_errors(model, &conversion.body, cases, context)?;
+    let selection = select_judged(&conversion.body, &rounds, &varied_reference_errors, cases, context)?;
     let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
     conversion.body = with_sources(reduced, cases)?;
     Ok((conversion, selection))

@@ -103,7 +103,7 @@ pub struct BatchArguments {
     /// Report about all bodies, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Let options of the list name programs to start (--mpiexec, --python); otherwise such a list is refused
+    /// Allow a list whose options start programs (--mpiexec, --python); otherwise such a list is refused
     #[arg(long)]
     pub allow_programs: bool,
     /// Options of printing.

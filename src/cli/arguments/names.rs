@@ -21,7 +21,7 @@ fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
 /// Returns the parser of the bases.
 pub(super) fn basis() -> impl TypedValueParser<Value = BasisKind> {
     one_of(BasisKind::ALL, BasisKind::name, |kind| match kind {
-        BasisKind::Free => "Free-surface modes, computed here",
+        BasisKind::Free => "Free-surface modes, computed by flexbody",
         BasisKind::CraigBampton => {
             "Modes with the interfaces of the manifest held (--modes counts them), and static shapes for unit motions of the interfaces"
         }
@@ -29,10 +29,10 @@ pub(super) fn basis() -> impl TypedValueParser<Value = BasisKind> {
             "Free-surface modes (--modes counts them), and static responses to unit loads at the interfaces"
         }
         BasisKind::Imported => {
-            "Shapes that were computed elsewhere: eigenvectors, static shapes, any mixture of them"
+            "Shapes computed by another program: eigenvectors, static shapes, or a mixture"
         }
         BasisKind::Scene => {
-            "The fewest shapes that the motion of --scene is made of; another motion may need others"
+            "The fewest shapes that represent the motion of --scene; another motion may need others"
         }
     })
 }
@@ -40,7 +40,7 @@ pub(super) fn basis() -> impl TypedValueParser<Value = BasisKind> {
 /// Returns the parser of the accuracies.
 pub(super) fn accuracy() -> impl TypedValueParser<Value = Accuracy> {
     one_of(Accuracy::ALL, Accuracy::name, |accuracy| match accuracy {
-        Accuracy::Fast => "Residual 1e-6, completeness may be not proved",
+        Accuracy::Fast => "Residual 1e-6, completeness possibly not proved",
         Accuracy::Standard => "Residual 1e-9 or the rounding floor, completeness proved",
         Accuracy::Certified => {
             "Residual 1e-12 or the rounding floor, completeness proved from both sides, guaranteed bounds of every eigenvalue and digits of every invariant"
@@ -51,7 +51,7 @@ pub(super) fn accuracy() -> impl TypedValueParser<Value = Accuracy> {
 /// Returns the parser of the precisions of the factor.
 pub(super) fn factor() -> impl TypedValueParser<Value = FactorChoice> {
     one_of(FactorChoice::ALL, FactorChoice::name, |factor| match factor {
-        FactorChoice::Auto => "Whichever fits and is faster",
+        FactorChoice::Auto => "The faster of the two that fits into the memory",
         FactorChoice::Always(Precision::Double) => "Double precision",
         FactorChoice::Always(Precision::Single) => "Single precision, corrected in double",
     })
@@ -80,7 +80,7 @@ pub(super) fn reference() -> impl TypedValueParser<Value = ReferenceChoice> {
     one_of(ReferenceChoice::ALL, ReferenceChoice::name, |reference| match reference {
         ReferenceChoice::Full => "The largest body",
         ReferenceChoice::Fine => {
-            "A body that is enriched until it lacks no more than a hundredth of the tolerances of the motion of all nodes, by the estimate"
+            "A body that is enriched until its estimated error relative to all nodes is at most a hundredth of the tolerances"
         }
         ReferenceChoice::Nodal => "The unreduced equations of all nodes",
     })

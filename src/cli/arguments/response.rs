@@ -78,13 +78,13 @@ fn band(text: &str) -> Result<Band, String> {
     let number = |text: &str| text.trim().parse::<f64>().ok();
     let ends = text.split_once("..").and_then(|(low, high)| Some((number(low)?, number(high)?)));
     let band = ends.and_then(|(low, high)| Band::new(low, high));
-    band.ok_or_else(|| "two frequencies in hertz are expected, the lower one first: 0..2000".to_owned())
+    band.ok_or_else(|| "expected two frequencies in hertz, the lower one first, as in 0..2000".to_owned())
 }
 
 /// Parses a finite number from 0.
 fn damping_ratio(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(ratio) if ratio.is_finite() && ratio >= 0.0 => Ok(ratio),
-        _ => Err("a finite number from 0 is expected (2 % is 0.02, critical damping is 1)".to_owned()),
+        _ => Err("expected a finite number, 0 or larger (2 % is 0.02, critical damping is 1)".to_owned()),
     }
 }

@@ -69,8 +69,8 @@ pub fn conversion(subject: &Subject) -> Result<Outputs> {
     outputs.all.extend(
         told.map(|output| Output { name: format!("conversion: {} {ENRICHED}", output.name), ..output }),
     );
-    let lacks = selection.lacks.last().map(ReferenceError::is_reference);
-    outputs.all.push(facts(&format!("reference {ENRICHED}"), format!("{lacks:?}")));
+    let reference_errors = selection.reference_errors.last().map(ReferenceError::is_reference);
+    outputs.all.push(facts(&format!("reference {ENRICHED}"), format!("{reference_errors:?}")));
     Ok(outputs)
 }
 

@@ -10,7 +10,7 @@ use flexbody_base::error::Result;
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{
-    Axes, Drive, History, Initial, ModeStart, Point, Scene, Stage, VectorHistory, simulate,
+    Axes, Drive, FramedScene, History, Initial, ModeStart, Point, Scene, VectorHistory, simulate,
 };
 use nalgebra::{Matrix3, Vector3};
 use oracle::random::Random;
@@ -161,7 +161,7 @@ pub fn restart(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     next.run.duration = Some(duration - time);
     next.run.outputs -= skipped;
     let axes = state.attitude.axes();
-    let prescribed = Stage::new(&body, scene)?.scene.prescribes();
+    let prescribed = FramedScene::new(&body, scene)?.scene.prescribes();
     let held = scene.carried.is_some() || scene.spin.as_ref().is_some_and(|spin| spin.hold);
     next.initial = Initial {
         origin: state.origin - axes * recording.setting.origin,

@@ -248,7 +248,7 @@ fn the_command_makes_a_body_on_an_interface() {
         assert_eq!(code, Some(0), "{line}: {out}{err}");
     }
     let (code, _, err) = words("compare kept.flex.h5 mean.flex.h5");
-    assert!(code == Some(2) && err.contains("other reference conditions"), "{err}");
+    assert!(code == Some(2) && err.contains("different reference conditions"), "{err}");
     let (code, _, err) = convert(&["--frame", "interface=nobody", "-o", "none.flex.h5"]);
     assert!(code == Some(2) && err.contains("bolt_base, bolt_wall"), "{err}");
     let (code, _, err) = convert(&["--frame", "sideways", "-o", "none.flex.h5"]);

@@ -88,12 +88,12 @@ fn what_a_format_does_not_have_is_refused_by_name() {
     prepare(place);
     for (words, told) in [
         ("--to fmu", "possible values"),
-        ("--to sid --dialect simpack", "`simpack` is no dialect of sid"),
-        ("--to json --dialect double", "`double` is no dialect of json"),
-        ("--to sid --mbdyn-level 13", "`level13` is no dialect of sid"),
-        ("--to json --points nodes", "json has all nodes or none"),
+        ("--to sid --dialect simpack", "`simpack` is not a dialect of sid"),
+        ("--to json --dialect double", "`double` is not a dialect of json"),
+        ("--to sid --mbdyn-level 13", "`level13` is not a dialect of sid"),
+        ("--to json --points nodes", "json writes all nodes or none: --points does not apply"),
         ("--to sid --points 999999", "the body has no node 999999"),
-        ("--to sid --points here", "`here` names no points"),
+        ("--to sid --points here", "`here` is not a set of points"),
         ("--to json --to-units m,kg", "`m,kg`"),
         ("--to json --to-units m,kg,fortnight", "fortnight"),
     ] {

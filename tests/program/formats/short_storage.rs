@@ -14,7 +14,7 @@ use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
 use hdf5_metno as hdf5;
 use oracle::file_bodies::wild_body;
-use oracle::flexible::{lively_state, soft_block};
+use oracle::flexible::{moving_state, soft_block};
 use oracle::general::quasi_velocities;
 use oracle::partial::{combinations, with_groups};
 use oracle::random::Random;
@@ -108,7 +108,7 @@ fn equations_of_rounded_bodies_cost_the_same_and_differ_by_rounding() {
     let (whole, rounded) =
         (EquationsOfMotion::new(&body, Terms::ALL), EquationsOfMotion::new(&short, Terms::ALL));
     assert_eq!(whole.multiplications(), rounded.multiplications(), "m_ff is the identity in both");
-    let state = lively_state(&mut Random(4), &body);
+    let state = moving_state(&mut Random(4), &body);
     let rates = |equations: &EquationsOfMotion| {
         let mut evaluation = Evaluation::new(equations);
         evaluation.set(state.q.as_slice(), quasi_velocities(&state).as_slice());
@@ -196,5 +196,5 @@ fn the_program_writes_what_check_accepts() {
     assert_eq!(code, Some(0), "{text}");
     let certified = ["convert", model, "-o", &body, "--accuracy", "certified", "--storage", "f32"];
     let (code, _, stderr) = run(&certified);
-    assert!(code == Some(2) && String::from_utf8_lossy(&stderr).contains("take --storage f64"));
+    assert!(code == Some(2) && String::from_utf8_lossy(&stderr).contains("use --storage f64"));
 }

@@ -55,7 +55,7 @@ fn any_name_comes_back_from_the_file_and_from_exports() {
         let said = String::from_utf8_lossy(&output.stderr);
         // Formats with matrices in interface motions refuse a body of free modes.
         let refused =
-            output.status.code() == Some(2) && said.contains("needs K and M in the motions of frames");
+            output.status.code() == Some(2) && said.contains("needs K and M in the motions of interfaces");
         assert!(output.status.success() || refused, "{format}: {said}");
     }
     let scene = "[run]\nduration = 1e-3\noutputs = 5\n[[watch]]\ninterface = \"left/right\"\n";

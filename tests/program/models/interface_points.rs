@@ -207,7 +207,7 @@ fn the_point_of_a_set_is_stated_and_told() {
     for (interface, said) in [
         ("end=RIGHT,averaging,1/2", "`1/2` is no point"),
         ("end=RIGHT,averaging,1/2/z", "`1/2/z` is no point"),
-        ("end=RIGHT,glued,1/2/3", "`glued` is no coupling"),
+        ("end=RIGHT,glued,1/2/3", "`glued` is not a coupling"),
         ("end=RIGHT,free,0.2/0/0", "is free, but has a reference point"),
         ("end=RIGHT,averaging,1/2/inf", "is not finite"),
     ] {

@@ -107,13 +107,13 @@ fn residual_vectors_of_the_manifest_are_those_of_the_command_line_which_replaces
 fn residual_vectors_that_cannot_be_are_refused_wherever_they_are_asked_for() {
     let stated = model("[basis]\nloads = \"F.mtx\"\n");
     for (options, said) in [
-        ("--residual-vectors gravity", "`gravity` is no set of loads for residual vectors"),
+        ("--residual-vectors gravity", "`gravity` is not a set of loads for residual vectors"),
         ("--residual-vectors interfaces,interfaces", "loads are named twice"),
         ("--residual-vectors loads=", "`loads=` is no set of loads"),
         ("--basis imported --shapes F.mtx", "residual vectors need --basis free"),
-        ("--accuracy certified", "residual vectors are no eigenvectors and cannot be certified"),
+        ("--accuracy certified", "residual vectors are not eigenvectors and cannot be certified"),
         ("--lumped-modes", "--lumped-modes compares free-surface modes, not residual vectors"),
-        ("--split", "--split: the rows of nodal loads are those of all bodies together"),
+        ("--split", "--split cannot be used with nodal loads, whose rows belong to all bodies together"),
         ("--report F.mtx.txt --residual-vectors loads=F.mtx.txt", "output F.mtx.txt is an input"),
     ] {
         let (code, _, err) = flexbody(stated.path(), &format!("convert model.toml -o b.h5 {options}"));

@@ -210,7 +210,8 @@ fn reports_tell_every_case() {
     assert_eq!(names, ["slow", "fast"]);
     let words = |key: &str| told["verdict"][key].as_str().expect("a sentence");
     assert!(
-        words("asked").starts_with("rod in each of 2 load cases (slow, fast), the least of theirs"),
+        words("asked")
+            .starts_with("rod in each of 2 load cases (slow, fast); the smallest tolerances of all cases"),
         "{told:#}"
     );
     assert!(words("why").contains("in case fast"), "{}", words("why"));
@@ -252,7 +253,7 @@ fn a_trade_study_measures_candidates_in_every_case() {
         assert_eq!(case["worst"], taken["by_case"][at], "{case:#}");
     }
     let text = fs::read_to_string(place.join("t.txt")).expect("a text");
-    assert!(text.contains("Load cases  slow: ") && text.contains("in 2 load cases errors"), "{text}");
+    assert!(text.contains("Load cases  slow: ") && text.contains("in each of 2 load cases"), "{text}");
     let page = fs::read_to_string(place.join("t.html")).expect("a page");
     assert!(page.contains("Load cases") && page.contains("Worst case"));
     let table = fs::read_to_string(place.join("t.csv")).expect("a table");

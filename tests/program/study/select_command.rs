@@ -53,13 +53,15 @@ fn a_selection_is_what_its_schema_says_and_a_body_is_made_of_it() {
     assert!(page.contains("Sizes of the terms") && !page.contains("NaN"), "{page}");
     let text = fs::read_to_string(place.join("s.txt")).expect("a text");
     let (verdict, details) = text.split_once("\nDetails\n").expect("the verdict, then the details");
-    let labels = verdict.lines().filter_map(|line| line.split("  ").next()).filter(|label| !label.is_empty());
-    let expected = ["Selection", "Asked", "Take", "Why", "Error", "Saves"];
+    let labels =
+        verdict.lines().filter_map(|line| line.get(..12)).map(str::trim).filter(|label| !label.is_empty());
+    let expected = ["Selection", "Asked", "Recommended", "Why", "Error", "Saves"];
     assert_eq!(labels.collect::<Vec<_>>(), expected, "{verdict}");
     // The words agree with the numbers; tiers are shown in the details only.
     let words = |key: &str| told["verdict"][key].as_str().expect("a sentence");
     let kept = told["modes"]["kept"].as_array().expect("a list").len();
-    assert!(words("take").starts_with(&format!("{kept} mode")), "{}", words("take"));
+    let counts = [format!("{kept} of "), format!("all {kept} mode")];
+    assert!(counts.iter().any(|count| words("take").starts_with(count)), "{}", words("take"));
     assert!(!verdict.contains("tier") && details.contains("tier"), "{text}");
     for term in told["terms"].as_array().expect("terms") {
         let group = term["group"].as_str().expect("a name");
@@ -94,7 +96,7 @@ fn a_cost_that_nothing_meets_is_a_check_that_fails() {
     let run = flexbody(place, &["select", "whole.flex.h5", "--scene", "scene.toml"]);
     assert_eq!(run.status.code(), Some(1));
     let text = String::from_utf8_lossy(&run.stdout);
-    assert!(text.contains("no model takes 5 multiplications") && text.contains("\nBest found  "), "{text}");
+    assert!(text.contains("no model needs 5 multiplications") && text.contains("\nBest found  "), "{text}");
     prepare(place, "[cost]\nmultiplications = 900\n");
     let run = flexbody(place, &["select", "whole.flex.h5", "--scene", "scene.toml", "--json"]);
     assert!(run.status.success());
@@ -115,8 +117,8 @@ fn a_body_for_a_scene_is_written_where_the_selection_holds_and_only_there() {
     let dear = format!("{scene}[cost]\nmultiplications = 5\n");
     for (manifest, scene, holds, said) in [
         (&bracket, scene.as_str(), true, ""),
-        (&bracket, dear.as_str(), false, "do not hold what the scene asks for"),
-        (&cube, tight, false, "nothing can be said of the selection"),
+        (&bracket, dear.as_str(), false, "do not meet the tolerances of the scene"),
+        (&cube, tight, false, "the selection cannot be judged"),
     ] {
         fs::write(place.join("scene.toml"), scene).expect("written");
         let of_scene = |command: &str, rest: &[&str]| {
@@ -154,7 +156,10 @@ fn contradictions_are_refused() {
     let place = folder.path();
     let manifest = prepare(place, "");
     for (words, said) in [
-        (&["select", "whole.flex.h5", "--scene", "scene.toml", "--modes", "3"][..], "--modes is for a model"),
+        (
+            &["select", "whole.flex.h5", "--scene", "scene.toml", "--modes", "3"][..],
+            "--modes applies to a model",
+        ),
         (&["select", "whole.flex.h5", "--scene", "scene.toml", "--report", "scene.toml"], "scene.toml"),
         (&["convert", &manifest, "--scene", "none.toml", "-o", "x.flex.h5"], "does not exist"),
     ] {

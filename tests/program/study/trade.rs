@@ -146,7 +146,7 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
         .rows
         .iter()
         .find(|row| row.candidate.lumped == Some(LumpedMass::Couplings("diagonal-scaling".to_owned())));
-    let errors = row.expect("a row").outcome.as_ref().expect("a motion").deciding().errors;
+    let errors = row.expect("a row").outcome.as_ref().expect("a motion").decisive_case().errors;
     assert!(stress > 0.01, "a coarse mesh: {stress}");
     assert!((errors.stress.expect("a deformed body") / stress - 1.0).abs() < 2e-3, "{errors:?} {stress}");
     assert!((errors.attitude.expect("an attitude") / attitude - 1.0).abs() < 2e-3, "{errors:?} {attitude}");
@@ -247,10 +247,12 @@ fn a_reference_is_enriched_for_the_scene_and_tells_what_it_lacks() {
     let rate = first_rate(without_scene(&model, 4).sources[0].body());
     let scene = tumble(0.15 * rate, 0.5);
     let made = conversions(&model, &scene.clone().into(), wanted(4), &Context::QUIET).expect("bodies");
-    let [lacks] = &made.lacks[..] else { panic!("one scene: {:?}", made.lacks) };
-    let (first, own) = (&lacks[0], lacks.last().expect("an estimate"));
+    let [reference_errors] = &made.reference_errors[..] else {
+        panic!("one scene: {:?}", made.reference_errors)
+    };
+    let (first, own) = (&reference_errors[0], reference_errors.last().expect("an estimate"));
     assert_eq!(own.modes, made.sources[0].body().n_modes());
-    assert!(first.modes < own.modes && own.worst < 0.7 * first.worst, "{lacks:?}");
+    assert!(first.modes < own.modes && own.worst < 0.7 * first.worst, "{reference_errors:?}");
     // Errors of the reference that matter are reported.
     assert!(made.diagnostics.iter().any(|one| one.code() == Code::ReferenceLacks), "{:?}", made.diagnostics);
 }
@@ -258,8 +260,8 @@ fn a_reference_is_enriched_for_the_scene_and_tells_what_it_lacks() {
 #[test]
 fn conversions_are_measured_against_the_motion_of_all_nodes() {
     let model = model();
-    let Conversions { sources, lacks, .. } = without_scene(&model, 4);
-    assert!(lacks.iter().all(Vec::is_empty));
+    let Conversions { sources, reference_errors, .. } = without_scene(&model, 4);
+    assert!(reference_errors.iter().all(Vec::is_empty));
     assert!(sources.iter().all(|source| source.preprocessing().is_some_and(|seconds| seconds > 0.0)));
     let rate = first_rate(sources[0].body());
     let mut scene = tumble(0.15 * rate, 0.5);
@@ -269,7 +271,7 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
     assert_eq!(found.reference, ReferenceKind::Nodal);
     let stress = |row: &TradeRow| {
         let measured = row.outcome.as_ref().expect("a motion");
-        measured.deciding().errors.stress.expect("a deformed body")
+        measured.decisive_case().errors.stress.expect("a deformed body")
     };
     // Under a sudden spin eight modes with residual vectors are accurate, one mode is not, and no candidate
     // without W1 is.
@@ -307,13 +309,13 @@ fn a_fine_reference_stands_for_the_motion_of_all_nodes() {
     let mut scene = tumble(0.05 * rate, 0.5);
     scene.initial.settled = true;
     scene.run.scheme = Scheme::Adaptive { tolerance: 1e-9 };
-    let lacking = |fine: bool| {
+    let reference_error = |fine: bool| {
         let wanted = WantedBodies { modes: 4, fine };
         let made = conversions(&model, &scene.clone().into(), wanted, &Context::QUIET).expect("bodies");
-        (made.lacks[0].last().expect("an estimate").worst, made.sources)
+        (made.reference_errors[0].last().expect("an estimate").worst, made.sources)
     };
-    let (usual, _) = lacking(false);
-    let (fine, sources) = lacking(true);
+    let (usual, _) = reference_error(false);
+    let (fine, sources) = reference_error(true);
     assert!(fine <= PART_OF_FINE && usual > PART_OF_FINE, "{fine} {usual}");
     // The estimate agrees with the error relative to all nodes, which the study did not use.
     let found =
@@ -362,7 +364,7 @@ fn conserving_scenes_with_damping_are_measured_against_the_nodes() {
     let nodal = found.cases[0].nodal.expect("the nodes are the reference");
     assert_eq!((nodal.rows, nodal.scheme, nodal.error), (model.rows().len(), scene.run.scheme, None));
     let row = |at: usize| found.rows[at].outcome.as_ref().expect("a motion");
-    let first = row(0).deciding();
+    let first = row(0).decisive_case();
     assert!(first.worst > 0.0 && first.errors.stress.expect("deformed") < 0.1, "{:?}", first.errors);
     let full = trade(&sources, &scene.clone().into(), None, &QUICK, &Context::QUIET).expect("a study");
     assert!(full.cases[0].nodal.is_none());
@@ -430,7 +432,7 @@ fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
             // The tested candidates differ between the studies; only common ones are compared.
             let Some(same) = study.rows.iter().find(|one| one.candidate == row.candidate) else { continue };
             let same = same.outcome.as_ref().expect("a motion");
-            assert_eq!((own, measured.multiplications), (same.deciding(), same.multiplications));
+            assert_eq!((own, measured.multiplications), (same.decisive_case(), same.multiplications));
             shared += 1;
         }
         let worst: Vec<f64> = measured.by_case.iter().map(|own| own.worst).collect();
@@ -512,7 +514,7 @@ fn the_program_writes_what_its_schema_says() {
     let rows = facts["rows"].as_array().expect("rows");
     let lines = facts["verdict"].as_array().expect("lines");
     let labels: Vec<&str> = lines.iter().map(|line| line["label"].as_str().expect("a label")).collect();
-    assert_eq!(labels, ["Asked", "Take", "Why", "Error", "Saves"]);
+    assert_eq!(labels, ["Asked", "Recommended", "Why", "Error", "Saves"]);
     // Every measured candidate was written as a body.
     for (at, row) in rows.iter().enumerate() {
         let path = place.join(format!("candidate_{:03}.flex.h5", at + 1));
@@ -529,7 +531,7 @@ fn the_program_writes_what_its_schema_says() {
     let page = fs::read_to_string(place.join("t.html")).expect("a page");
     assert!(page.contains("<svg") && page.contains("recommended") && !page.contains("NaN"));
     let text = fs::read_to_string(place.join("t.txt")).expect("a text");
-    assert!(text.contains("\nTake ") && text.lines().any(|line| line.starts_with('>')), "{text}");
+    assert!(text.contains("\nRecommended ") && text.lines().any(|line| line.starts_with('>')), "{text}");
     let left: Vec<_> = fs::read_dir(place).expect("a folder").collect();
     let bodies = rows.iter().filter(|row| !row["measured"].is_null()).count();
     assert_eq!(left.len(), 2 + 4 + bodies, "{left:?}");
@@ -538,7 +540,7 @@ fn the_program_writes_what_its_schema_says() {
     scene("[cost]\nmultiplications = 1\n");
     let run = with(&[]);
     assert_eq!(run.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&run.stdout).contains("no candidate is as cheap as allowed"));
+    assert!(String::from_utf8_lossy(&run.stdout).contains("no candidate needs so few multiplications"));
     for (more, said) in [
         (&["--reference", "nodal"][..], "give the model"),
         (&["--modes", "3"], "give the model"),

@@ -2,17 +2,17 @@
 
 use super::super::item::Item;
 use super::super::item::ItemKind::{Float, Int, Text};
-use super::super::item::{Together, both, field, written};
+use super::super::item::{EntrySet, both, field, written};
 use super::super::value::{Stored, Value};
 use super::{ONE, PER_TIME2, attribute};
 
 /// Entries that accuracy `certified` adds.
-pub(super) static CERTIFIED: Together =
-    Together { problem: |entries| missing(entries, "accuracy `certified`") };
+pub(super) static CERTIFIED: EntrySet =
+    EntrySet { problem: |entries| missing(entries, "accuracy `certified`") };
 
 /// Entries of a Craig-Bampton body.
-pub(super) static CRAIG_BAMPTON: Together =
-    Together { problem: |entries| missing(entries, "a Craig-Bampton body") };
+pub(super) static CRAIG_BAMPTON: EntrySet =
+    EntrySet { problem: |entries| missing(entries, "a Craig-Bampton body") };
 
 /// Returns the message about the first missing entry.
 fn missing(entries: &[(String, bool)], of: &str) -> String {
@@ -66,7 +66,7 @@ pub(super) const CERTIFICATE: &[Item] = &[
         "remark",
         Text,
         ONE,
-        "why the proof is missing or what limits it; empty when nothing does",
+        "reason why the proof is missing or limited; empty if it is neither",
         field!(certificate.remark),
     ),
     attribute(
@@ -87,7 +87,7 @@ pub(super) const CERTIFICATE: &[Item] = &[
         "eigenvalue_rounding",
         Float,
         ONE,
-        "what rounding of products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p lambda_q); 0: not known",
+        "bound of the rounding error of any entry of Psi' K Psi, relative to sqrt(lambda_p lambda_q); 0: not known",
         field!(certificate.eigenvalue_rounding),
     )
     .added(4),
@@ -95,7 +95,7 @@ pub(super) const CERTIFICATE: &[Item] = &[
         "inertia_rounding",
         Float,
         ONE,
-        "to what part of their Cauchy-Schwarz bounds the inertia data were known before this file: the digits of a file of another program; 0: to the rounding of 64-bit floats",
+        "error of the inertia data before this file, relative to their Cauchy-Schwarz bounds, from the digits of a file of another program; 0: the rounding of 64-bit floats",
         field!(certificate.inertia_rounding),
     )
     .added(4),

@@ -3,7 +3,7 @@
 use super::super::item::Extent::{Coordinates, Fixed, InterfaceNodes, Modes};
 use super::super::item::Item;
 use super::super::item::ItemKind::{Floats, Ints, Text};
-use super::super::item::{Together, both, field, put, written};
+use super::super::item::{EntrySet, both, field, put, written};
 use super::named;
 use super::{LENGTH, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, attribute, dataset};
 use crate::value::{Stored, Units, Value, matrix, shape_rows, text};
@@ -100,7 +100,7 @@ pub(super) const INTERFACES: &[Item] = &[
     .derived("shape"),
 ];
 
-static COORDINATES_TOGETHER: Together = Together {
+static COORDINATES_TOGETHER: EntrySet = EntrySet {
     problem: |entries| {
         let count = entries.iter().filter(|(_, there)| *there).count();
         format!(
@@ -115,7 +115,7 @@ pub(super) const COORDINATES: &[Item] = &[
         "names",
         Text,
         ONE,
-        "what each of the nc coordinates is, as a JSON array of texts: for every interface in the order of `/interfaces` the translations and rotations of its reference point (in the plane two and one; of a free interface the displacements of its nodes in the order of `/nodes`), along body axes, then the fixed-interface modes",
+        "meaning of each of the nc coordinates, as a JSON array of texts: for every interface in the order of `/interfaces` the translations and rotations of its reference point (in the plane two and one; of a free interface the displacements of its nodes in the order of `/nodes`), along body axes, then the fixed-interface modes",
         both(
             |v| text(serde_json::to_string(&v.coordinates()?.names).expect("strings are valid JSON")),
             |d, read| {

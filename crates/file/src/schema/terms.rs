@@ -2,7 +2,7 @@
 
 use super::super::item::Item;
 use super::super::item::ItemKind::{Float, Int, Text};
-use super::super::item::{Together, both, put, written};
+use super::super::item::{EntrySet, both, put, written};
 use super::super::value::{Stored, Value, View, text};
 use super::{ONE, attribute};
 use flexbody_body::flex_body::{TermDecision, TermGroup};
@@ -25,7 +25,7 @@ fn number(value: f64) -> Option<Value> {
 }
 
 /// Sets of entries of the decision about each group: reason and tier are required, bounds and limits optional.
-static DECISIONS: [Together; 3] = [const { Together { problem: reason_and_tier } }; 3];
+static DECISIONS: [EntrySet; 3] = [const { EntrySet { problem: reason_and_tier } }; 3];
 
 fn reason_and_tier(entries: &[(String, bool)]) -> String {
     let first = entries.iter().find(|(_, there)| *there).map_or("", |(name, _)| name);
@@ -47,13 +47,14 @@ macro_rules! of_groups {
                 written(|v| held(v, TermGroup::$group)),
             ),)*
             attribute("reason", Text, ONE, "why", written(|v| {
-                text(match v.body.terms.is_empty() {
-                    true => "no scene was given: every term is kept",
-                    false => "every group that was decided about has its own",
+                text(if v.body.terms.is_empty() {
+                    "no scene was given: every term is kept"
+                } else {
+                    "every group that was decided about has its own"
                 })
             })),
             $(
-                attribute(concat!($name, "_reason"), Text, ONE, "why, where it was decided", both(
+                attribute(concat!($name, "_reason"), Text, ONE, "reason of the decision; absent: no decision", both(
                     |v| decision(v, TermGroup::$group)?.reason.value(),
                     put!(|d, read| d.decision(TermGroup::$group).reason = Stored::take(read)?),
                 ))
@@ -63,7 +64,7 @@ macro_rules! of_groups {
                     concat!($name, "_tier"),
                     Int,
                     ONE,
-                    "what decided: 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a motion that was integrated",
+                    "tier of the decision: 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a motion that was integrated",
                     both(
                         |v| Some(Value::Int(decision(v, TermGroup::$group)?.tier.into())),
                         |d, read| {
@@ -81,7 +82,7 @@ macro_rules! of_groups {
                     concat!($name, "_bound"),
                     Float,
                     ONE,
-                    "largest error that dropping makes, of what the reason names; absent: none is known",
+                    "largest error from dropping the group, in the quantity that the reason names; absent: not known",
                     both(
                         |v| number(decision(v, TermGroup::$group)?.bound),
                         put!(|d, read| d.decision(TermGroup::$group).bound = Stored::take(read)?),

@@ -101,7 +101,7 @@ fn groups_that_contain_themselves_end() {
     }
     file.close().unwrap();
     let error = flexbody_file::read(&path).unwrap_err();
-    assert!(error.to_string().contains("no flex-body file has such an entry"), "{error}");
+    assert!(error.to_string().contains("not an entry of a flex-body file"), "{error}");
     let error = flexbody_file::structure(&path).unwrap_err();
     assert!(error.to_string().contains("more than 20000 members"), "{error}");
 }

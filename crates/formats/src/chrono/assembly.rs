@@ -36,7 +36,7 @@ const FILL_FREQUENCY: f64 = 2.0;
 
 /// Share of the mass that is added to the rest mass, so that the basis is complete even if the modes move all
 /// of the mass.
-const REST_SHARE: f64 = 0.01;
+const REST_MASS_SHARE: f64 = 0.01;
 
 /// Matrices of boundary nodes and internal nodes, six coordinates each.
 pub(super) struct Assembly {
@@ -64,13 +64,15 @@ impl Assembly {
     /// precision.
     pub(super) fn of(given: &InterfaceMatrices<'_>) -> Result<Self> {
         let refuse = |what: &str| {
-            let message = format!("chrono needs the centre of mass of the body: {what}");
-            let help = "convert the model again: flexbody convert --basis craig-bampton";
+            let message = format!(
+                "chrono needs the centre of mass of the body, which its matrices do not determine: {what}"
+            );
+            let help = "convert the model again with flexbody convert --basis craig-bampton";
             Diagnostic::new(Code::ExportLoses, message).with_help(help)
         };
         let extended = Extended::of(given);
         let change = extended.change().ok_or_else(|| {
-            refuse("its coordinates have no mass, or its fixed-interface modes have more than all of it")
+            refuse("its coordinates have no mass, or its fixed-interface modes have more than the total mass")
         })?;
         let in_nodes = |a: &Mat<f64>| {
             let half = combine(change.transpose(), a.as_ref());
@@ -81,7 +83,7 @@ impl Assembly {
         let damping = given.damping.as_ref().map(|damping| in_nodes(&extended.padded(damping)));
         let finite = |a: &Mat<f64>| a.col_iter().all(|column| column.iter().all(|v| v.is_finite()));
         if ![Some(&mass), Some(&stiffness), damping.as_ref()].into_iter().flatten().all(finite) {
-            return Err(refuse("its matrices leave the range of double precision").into());
+            return Err(refuse("they overflow double precision").into());
         }
         Ok(Self { mass, stiffness, damping, n_modes: extended.n_modes })
     }
@@ -116,7 +118,7 @@ impl Extended {
         let modal = momentum.subcols(n_boundary, n_modes);
         let of_modes = combine(modal, modal.transpose());
         // Mass that moves in no mode, R'(M_BB - M_Bf M_fB) R, plus a share of the total mass.
-        let rest = (1.0 + REST_SHARE) * total - Matrix3::from_fn(|a, b| of_modes[(a, b)]);
+        let rest = (1.0 + REST_MASS_SHARE) * total - Matrix3::from_fn(|a, b| of_modes[(a, b)]);
         let mut extended = Self {
             n_boundary,
             n_modes,
@@ -146,7 +148,7 @@ impl Extended {
         let of_modes = combine(modal, given.mass.as_ref().submatrix(nb, 0, nf, nb));
         for a in 0..3 {
             for j in 0..nb {
-                let coupling = (1.0 + REST_SHARE) * self.momentum[(a, j)] - of_modes[(a, j)];
+                let coupling = (1.0 + REST_MASS_SHARE) * self.momentum[(a, j)] - of_modes[(a, j)];
                 (mass[(first + a, j)], mass[(j, first + a)]) = (coupling, coupling);
             }
             for b in 0..3 {

@@ -24,8 +24,7 @@ impl ExportFormat for Chrono {
     fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
         ExportChecklist {
             gravity: Lost(
-                "the point of action of gravity on the deformed body: Chrono divides the weight between its nodes \
-                 as on the undeformed one"
+                "the point of action of gravity on the deformed body: Chrono distributes the weight over the nodes as on the undeformed body"
                     .to_owned(),
             ),
             units: NotApplicable,
@@ -38,8 +37,7 @@ impl ExportFormat for Chrono {
         let modes = Assembly::modes_to_request(given.mass.nrows() - 6 * given.frames.len());
         vec![
             format!(
-                "DoModalReduction must request {modes} modes with SetReductionType(CRAIG_BAMPTON) and \
-                 SetUseStaticCorrection(false): more are none of the body"
+                "DoModalReduction must request {modes} modes with SetReductionType(CRAIG_BAMPTON) and SetUseStaticCorrection(false): the body has no more"
             ),
             "gravity acts with SetModalAutomaticGravity(true) alone, the default: nodes and meshes have no mass \
              of their own"

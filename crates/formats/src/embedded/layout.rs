@@ -29,7 +29,11 @@ pub(crate) const HEADER: &[(&str, HeaderType, &str)] = &[
     ("translations", HeaderType::U32, "T: axes that the body moves along, 3 or, in the plane, 2 (x, y)"),
     ("axes", HeaderType::U32, "A: axes that it turns about, 3 or, in the plane, 1 (z)"),
     ("frames", HeaderType::U32, "n: places of the body"),
-    ("terms", HeaderType::U32, "bit 0: `linear` has W1; bit 1: W2 is held; bit 2: W3 is held; others 0"),
+    (
+        "terms",
+        HeaderType::U32,
+        "bit 0: `linear` has W1; bit 1: W2 is present; bit 2: W3 is present; others 0",
+    ),
     ("length", HeaderType::F64, "unit of length in m"),
     ("mass", HeaderType::F64, "unit of mass in kg"),
     ("time", HeaderType::F64, "unit of time in s"),

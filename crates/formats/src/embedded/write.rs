@@ -98,12 +98,15 @@ fn bytes(
         }));
         append(&mut file, array, precision).map_err(|value| {
             let message = format!("embedded cannot hold {value:e} of `{}` as a 32-bit float", described.name);
-            refused(message, "--dialect double, or other units: --to-units")
+            refused(message, "use --dialect double, or other units with --to-units")
         })?;
         file.resize(file.len().next_multiple_of(ALIGNMENT), 0);
     }
     let size = u32::try_from(file.len()).map_err(|_| {
-        refused(format!("embedded cannot hold {} bytes, 4 GiB at most", file.len()), "fewer --points")
+        refused(
+            format!("embedded cannot hold {} bytes: the largest size is 4 GiB", file.len()),
+            "choose fewer nodes with --points",
+        )
     })?;
 
     // Header entries, whose space was left free.

@@ -129,7 +129,7 @@ pub(crate) fn hdf5_bytes(root: &[Hdf5Entry]) -> Result<Vec<u8>> {
         std::fs::read(slot.temporary()).map_err(|e| e.to_string())
     };
     make_bytes().map_err(|why| {
-        let message = format!("no HDF5 file in the folder for temporary files: {why}");
+        let message = format!("an HDF5 file could not be made in the folder for temporary files: {why}");
         Diagnostic::new(Code::OutputUnwritable, message).into()
     })
 }

@@ -16,12 +16,12 @@ use flexbody_body::invariants::Numbered;
 pub(crate) fn inertia(body: &FlexBody) -> Numbered {
     let invariants = body.invariants();
     let nf = body.n_modes();
-    let mut told = invariants.numbered();
-    if invariants.general().is_none() && told.groups.w2 && told.groups.w3 {
-        return told;
+    let mut numbered = invariants.numbered();
+    if invariants.general().is_none() && numbered.groups.w2 && numbered.groups.w3 {
+        return numbered;
     }
-    let w3 = told.i5.take().unwrap_or_else(|| Mat::zeros(3 * nf, nf));
-    let w2 = told.i9.take().unwrap_or_else(|| Mat::zeros(3 * nf, 3 * nf));
+    let w3 = numbered.i5.take().unwrap_or_else(|| Mat::zeros(3 * nf, nf));
+    let w2 = numbered.i9.take().unwrap_or_else(|| Mat::zeros(3 * nf, 3 * nf));
     let i5 = |c: usize, j: usize, k: usize| 0.5 * (w3[(c * nf + j, k)] - w3[(c * nf + k, j)]);
     let i9 = |row: usize, column: usize| {
         let (a, j, b, k) = (row / nf, row % nf, column / nf, column % nf);
@@ -32,7 +32,7 @@ pub(crate) fn inertia(body: &FlexBody) -> Numbered {
             _ => symmetric + 0.5 * i5(3 - a - b, j, k),
         }
     };
-    told.i9 = Some(Mat::from_fn(3 * nf, 3 * nf, i9));
-    told.i5 = Some(Mat::from_fn(3 * nf, nf, |row, k| i5(row / nf, row % nf, k)));
-    told
+    numbered.i9 = Some(Mat::from_fn(3 * nf, 3 * nf, i9));
+    numbered.i5 = Some(Mat::from_fn(3 * nf, nf, |row, k| i5(row / nf, row % nf, k)));
+    numbered
 }

@@ -31,26 +31,27 @@ impl<'a> InterfaceMatrices<'a> {
     /// [`ExportLoses`](Code::ExportLoses) for any other body.
     pub(crate) fn of(body: &'a FlexBody, format: &str) -> Result<Self> {
         let refuse = |what: String, help: &str| {
-            let message = format!("{format} needs K and M in the motions of frames: {what}");
+            let message =
+                format!("{format} needs K and M in the motions of interfaces with reference points: {what}");
             Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into())
         };
         let Some(coordinates) = body.coordinates() else {
             if !body.conditions().is_mean() {
-                let help = "export the body that --basis craig-bampton with --frame com gives: the matrices hold the motion of every interface";
+                let help = "convert the model with --basis craig-bampton --frame com: its matrices hold the motion of every interface";
                 return refuse(body.conditions().to_string(), help);
             }
             let what = "the body has free modes only".to_owned();
-            return refuse(what, "convert it again: flexbody convert --basis craig-bampton");
+            return refuse(what, "convert the model again with flexbody convert --basis craig-bampton");
         };
         if body.dimension() != 3 {
             return refuse(
-                "those of a plane body have no inertia out of the plane".to_owned(),
-                "export a body in space",
+                "the matrices of a plane body have no inertia out of the plane".to_owned(),
+                "export a body of a model in space",
             );
         }
         if let Some(free) = body.interfaces().iter().find(|interface| interface.reference.is_none()) {
             let help = "couple the interface rigidly or by averaging, and convert the body again";
-            return refuse(format!("the interface `{}` is free and has none", free.name), help);
+            return refuse(format!("interface `{}` is free and has no reference point", free.name), help);
         }
         let frames: Vec<(&str, [f64; 3])> = body
             .interfaces()
@@ -65,8 +66,8 @@ impl<'a> InterfaceMatrices<'a> {
             == 6 * frames.len()
             && names.iter().skip(6 * frames.len()).all(modal);
         if !fits {
-            let what = "the coordinates of the body are not those of its interfaces".to_owned();
-            return refuse(what, "convert it again: flexbody convert --basis craig-bampton");
+            let what = "the coordinates in the file do not match its interfaces".to_owned();
+            return refuse(what, "convert the model again with flexbody convert --basis craig-bampton");
         }
         let damping = losses::is_damped(body).then(|| {
             let weighted = combine(coordinates.mass.as_ref(), coordinates.of_modes.as_ref());
@@ -76,7 +77,7 @@ impl<'a> InterfaceMatrices<'a> {
         });
         let finite = |a: &Mat<f64>| a.col_iter().all(|column| column.iter().all(|v| v.is_finite()));
         if !damping.as_ref().is_none_or(finite) {
-            let what = "their damping leaves the range of double precision".to_owned();
+            let what = "their damping overflows double precision".to_owned();
             return refuse(what, "--to-units");
         }
         Ok(Self { frames, stiffness: &coordinates.stiffness, mass: &coordinates.mass, damping })
@@ -88,7 +89,7 @@ const AXES: [&str; 6] = ["ux", "uy", "uz", "rx", "ry", "rz"];
 /// Returns the holdings of a format with these matrices. The matrices describe the motions of the frames:
 /// nodes and their modes are not in the file.
 pub(crate) fn matrix_checklist(body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
-    let small = "K and M are those of small motions";
+    let small = "K and M hold for small motions only";
     ExportChecklist {
         rigid_coupling: Held,
         // Plane bodies were rejected before.

@@ -13,14 +13,14 @@ const ROUNDING: f64 = 1e-12;
 
 /// Part of the stiffness of a motion from which the stiffness of inertia is reported. A larger value reports
 /// it for faster motions only.
-const PART: f64 = 0.01;
+const MIN_REPORTED_STIFFNESS: f64 = 0.01;
 
 /// Returns the holding of the restriction to a plane, for a format in space.
 pub(crate) fn plane(body: &FlexBody) -> Holding {
     if body.dimension() != 2 {
         return NotApplicable;
     }
-    Lost("that the body moves in its plane z = 0 only: inertia and stiffness out of the plane are missing, hold it there by a joint".to_owned())
+    Lost("the restriction to the plane z = 0: inertia and stiffness out of the plane are missing, so hold the body in its plane with a joint".to_owned())
 }
 
 /// Returns the holding of W0 of a mass that does not commute with rotations, for a format whose first moment
@@ -30,8 +30,8 @@ pub(crate) fn general_w0(body: &FlexBody) -> Holding {
     let bound = CauchySchwarz::of(invariants);
     let nf = body.n_modes();
     // Without the information in M, W0 follows from C1.
-    let (own, told) = (invariants.w0(), invariants.as_solid().w0());
-    let lost = largest(&own, &told, |_, column| bound.c1(column % nf));
+    let (stated, implied) = (invariants.w0(), invariants.as_solid().w0());
+    let lost = largest(&stated, &implied, |_, column| bound.c1(column % nf));
     lost_beyond_rounding(lost, "W0 other than -C1~ (how modes move the coupling of translation and rotation)")
 }
 
@@ -94,9 +94,9 @@ pub(crate) fn inertia_stiffness(
     options: &ExportOptions,
     holds: impl Fn(&UnitLoad) -> bool,
 ) -> Holding {
-    const WHAT: &str = "the stiffness of inertia of nodes that turn";
-    let Some(own) = body.inertia_stiffness() else { return NotApplicable };
-    let all = own.stiffness.iter().filter(|one| one.matrix.norm_max() > 0.0);
+    const WHAT: &str = "the stiffness of inertia of turning nodes";
+    let Some(inertia) = body.inertia_stiffness() else { return NotApplicable };
+    let all = inertia.stiffness.iter().filter(|one| one.matrix.norm_max() > 0.0);
     let lost: Vec<&UnitLoad> = all.map(|one| &one.load).filter(|load| !holds(load)).collect();
     if lost.is_empty() {
         return Held;
@@ -107,7 +107,7 @@ pub(crate) fn inertia_stiffness(
             "{WHAT}: at most {percent:.2} % of the stiffness of a motion in the scene `{scene}`"
         ));
     }
-    let Some(rates) = body.inertia_rates(PART) else { return NotApplicable };
+    let Some(rates) = body.inertia_rates(MIN_REPORTED_STIFFNESS) else { return NotApplicable };
     let rates = rates.in_words(body.units(), |kind| lost.iter().any(|load| load.kind == *kind));
     Lost(format!("{WHAT}, which reaches 1 % of the stiffness of a motion at {rates}"))
 }
@@ -136,5 +136,5 @@ pub(crate) fn changing_inertia(body: &FlexBody, w1: &str, why: &str) -> Holding 
     if lost.is_empty() {
         return NotApplicable;
     }
-    Lost(format!("how the deformation changes the inertia ({}): {why}", lost.join(", ")))
+    Lost(format!("the change of the inertia with the deformation ({}): {why}", lost.join(", ")))
 }

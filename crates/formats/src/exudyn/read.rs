@@ -2,7 +2,7 @@
 //! array belongs to axis a of mode j.
 
 use crate::import::hdf5_arrays::Hdf5Arrays;
-use crate::import::redundant::{ROUNDING, Redundant, in_other_order, lacks_w2, relative};
+use crate::import::redundant::{ROUNDING, Redundant, has_no_w2, in_other_order, relative};
 use crate::import::surface::surface;
 use crate::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use faer::Mat;
@@ -68,9 +68,9 @@ impl ImportFormat for Exudyn {
         }
         // Inertia arrays and their identities.
         let given = Given::read(&mut arrays, nf)?;
-        let told = given.numbered();
+        let numbered = given.numbered();
         let general = arrays.attribute("massMatrixReduced", "mass_structure").as_deref() == Some("general");
-        let checks = given.checks(&told, general);
+        let checks = given.checks(&numbered, general);
         let labels = labels(&mut arrays, n)?;
         let frame = |i: usize| ImportedFrame {
             label: labels[i].to_string(),
@@ -82,18 +82,18 @@ impl ImportFormat for Exudyn {
         let counted = if arrays.has(NUMBERS) { "" } else { "; nodes count from 0" };
         let mut notes = vec![format!("{n} nodes, {nf} modes{counted}")];
         if general {
-            notes.push("the mass does not commute with rotations, says the file: modal mass and mPsiTildePsiTilde need not agree".to_owned());
+            notes.push("the file states that the mass does not commute with rotations: modal mass and mPsiTildePsiTilde need not agree".to_owned());
         }
         // Parts that a body cannot hold, or that the file lacks.
-        let mut lacks = Vec::new();
-        let mesh = mesh(&mut arrays, n, &mut lacks)?;
+        let mut omissions = Vec::new();
+        let mesh = mesh(&mut arrays, n, &mut omissions)?;
         if arrays.has_members(STRESSES) {
-            lacks.push(format!("`{STRESSES}`: stresses of the modes are not taken"));
+            omissions.push(format!("`{STRESSES}`: stresses of the modes are not converted"));
         }
-        let mut inertia = told;
-        if lacks_w2(&inertia) {
+        let mut inertia = numbered;
+        if has_no_w2(&inertia) {
             inertia.i9 = None;
-            lacks.push("mPsiTildePsiTilde is zero: the body does without W2".to_owned());
+            omissions.push("mPsiTildePsiTilde is zero: the body is converted without W2".to_owned());
         }
         Ok(ImportedFile {
             format: "exudyn",
@@ -110,7 +110,7 @@ impl ImportFormat for Exudyn {
                 geometric_stiffness: Vec::new(),
                 frames: (0..n).map(frame).collect(),
                 mesh,
-                lacks,
+                omissions,
             },
         })
     }
@@ -133,7 +133,7 @@ fn labels(arrays: &mut Hdf5Arrays, n: usize) -> Result<Vec<i64>> {
 }
 
 /// Returns the triangles for drawing and contact (k x 3 node indices) as a surface; `None` if there are none.
-fn mesh(arrays: &mut Hdf5Arrays, n: usize, lacks: &mut Vec<String>) -> Result<Option<SurfaceMesh>> {
+fn mesh(arrays: &mut Hdf5Arrays, n: usize, omissions: &mut Vec<String>) -> Result<Option<SurfaceMesh>> {
     if !arrays.has(TRIANGLES) {
         return Ok(None);
     }
@@ -143,7 +143,7 @@ fn mesh(arrays: &mut Hdf5Arrays, n: usize, lacks: &mut Vec<String>) -> Result<Op
         _ => arrays.integers(TRIANGLES)?,
     };
     let triangles: Vec<Vec<i64>> = corners.chunks(3).map(<[i64]>::to_vec).collect();
-    Ok(surface(TRIANGLES, &triangles, n, lacks))
+    Ok(surface(TRIANGLES, &triangles, n, omissions))
 }
 
 /// Arrays of the file.
@@ -211,8 +211,8 @@ impl Given {
         }
     }
 
-    fn checks(&self, told: &Numbered, general: bool) -> Vec<AuditCheck> {
-        let redundant = Redundant::new(told);
+    fn checks(&self, numbered: &Numbered, general: bool) -> Vec<AuditCheck> {
+        let redundant = Redundant::new(numbered);
         let identity = |name, formula, value, meaning: &str| AuditCheck {
             name,
             formula,
@@ -226,25 +226,25 @@ impl Given {
                 "mtt_is_mass",
                 "Mtt = totalMass I",
                 self.mtt_missed(),
-                "translations have another mass than the body",
+                "the mass of translations differs from the mass of the body",
             ),
             identity(
                 "chi_tilde_is_chi",
                 "chiUtilde = skew(chiU)",
-                self.chi_missed(told),
-                "the centre of mass stands in the file twice, as two points",
+                self.chi_missed(numbered),
+                "the file states the centre of mass twice, with different coordinates",
             ),
             identity(
                 "phi_tilde_is_phi",
                 "mPhitTPsiTilde_j = skew(mPhitTPsi_j)",
                 self.phi_missed(|axis, mode| 3 * mode + axis),
-                "modes move the centre of mass in two ways",
+                "the two arrays for the motion of the centre of mass by the modes differ",
             ),
             identity(
                 "x_psi_of_x_psi_tilde",
                 "mXRefTildePsi_j = -skew part of mXRefTildePsiTilde_j",
                 redundant.i4_of_i8(),
-                "modes couple to rotation in two ways",
+                "the two arrays for the coupling of modes and rotation differ",
             ),
             identity(
                 "psi_tilde_psi_antisymmetric",
@@ -256,16 +256,16 @@ impl Given {
                 "psi_tilde_psi_tilde_symmetric",
                 "mPsiTildePsiTilde = its transpose",
                 redundant.i9_symmetric(),
-                "the inertia of pairs of modes depends on their order",
+                "the inertia of a pair of modes differs between (j, k) and (k, j)",
             ),
             identity(
                 "psi_tilde_psi_of_psi_tilde_psi_tilde",
                 "mPsiTildePsi_jk = skew part of mPsiTildePsiTilde_jk",
                 redundant.i5_of_i9(),
-                "pairs of modes couple to rotation in two ways",
+                "pairs of the two arrays for the coupling of modes and rotation differ",
             ),
         ];
-        if !general && !lacks_w2(told) {
+        if !general && !has_no_w2(numbered) {
             checks.push(redundant.lumped(
                 "modal_mass_of_psi_tilde_psi_tilde",
                 "massMatrixReduced = trace of mPsiTildePsiTilde_jk / 2",
@@ -303,11 +303,11 @@ impl Given {
         relative(entries.fold(0.0, larger), self.mass.abs())
     }
 
-    fn chi_missed(&self, told: &Numbered) -> f64 {
+    fn chi_missed(&self, numbered: &Numbered) -> f64 {
         let skew = self.chi.cross_matrix();
         let entries = (0..9).map(|ij| (self.chi_tilde[(ij / 3, ij % 3)] - skew[(ij / 3, ij % 3)]).abs());
         // The scale is the radius of gyration, for a centre of mass at the origin.
-        let gyration = (0.5 * told.i7.trace() / self.mass).abs().sqrt();
+        let gyration = (0.5 * numbered.i7.trace() / self.mass).abs().sqrt();
         relative(entries.fold(0.0, larger), gyration)
     }
 

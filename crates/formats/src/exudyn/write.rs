@@ -71,8 +71,8 @@ impl ExportFormat for Exudyn {
 /// Python type.
 fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     let (n, nf) = (mesh.numbers.len(), body.n_modes());
-    let told = inertia(body);
-    let center = told.i2 / told.i1;
+    let numbered = inertia(body);
+    let center = numbered.i2 / numbered.i1;
     let [info, version] = [vec![nf, n, 3, 4, 7, 7 + nf], vec![1]]
         .map(|counts| counts.into_iter().map(|count| count as i64).collect::<Vec<_>>());
     let text = |text: &str| Hdf5Contents::Text(text.to_owned());
@@ -80,18 +80,18 @@ fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
         array("modeBasis", Hdf5Contents::matrix(&mesh.shape)),
         array("trigList", triangles(body, mesh)),
         Hdf5Contents::Group(Vec::new()).named("postProcessingModes").with("datatype", "dict"),
-        modal_mass(body, &told),
+        modal_mass(body, &numbered),
         array("stiffnessMatrixReduced", Hdf5Contents::matrix(body.invariants().modal_stiffness())),
         array("infoList", Hdf5Contents::Integers(vec![6], info)),
         text("NodeType.RotationEulerParameters").named("rigidBodyNodeType").with("datatype", "str"),
         array("xRef", Hdf5Contents::list(mesh.positions.as_flattened())),
-        array("inertiaLocal", square(&told.i7)),
-        array("Mtt", square(&(Matrix3::identity() * told.i1))),
-        Hdf5Contents::number(told.i1).named("totalMass").with("datatype", "float64"),
+        array("inertiaLocal", square(&numbered.i7)),
+        array("Mtt", square(&(Matrix3::identity() * numbered.i1))),
+        Hdf5Contents::number(numbered.i1).named("totalMass").with("datatype", "float64"),
         array("chiU", Hdf5Contents::list(center.as_slice())),
         array("chiUtilde", square(&center.cross_matrix())),
     ];
-    all.extend(coupling(&told, nf));
+    all.extend(coupling(&numbered, nf));
     all.extend(interfaces::entries(body, mesh));
     all.push(Hdf5Contents::Integers(Vec::new(), version).named("fileVersion").with("datatype", "int"));
     all.push(text("ObjectFFRFreducedOrderInterface").named("type").with("datatype", "str"));
@@ -110,8 +110,8 @@ fn triangles(body: &FlexBody, mesh: &Mesh) -> Hdf5Contents {
 
 /// Returns m_ff. For a mass that does not commute with rotations an attribute states it, because no array
 /// does: m_ff and mPsiTildePsiTilde then need not agree. Exudyn ignores the attribute.
-fn modal_mass(body: &FlexBody, told: &Numbered) -> Hdf5Entry {
-    let entry = array("massMatrixReduced", Hdf5Contents::matrix(&told.i6));
+fn modal_mass(body: &FlexBody, numbered: &Numbered) -> Hdf5Entry {
+    let entry = array("massMatrixReduced", Hdf5Contents::matrix(&numbered.i6));
     match body.invariants().general() {
         Some(_) => entry.with("mass_structure", "general"),
         None => entry,
@@ -120,26 +120,28 @@ fn modal_mass(body: &FlexBody, told: &Numbered) -> Hdf5Entry {
 
 /// Returns the arrays that couple translation, rotation and modes. Row or column 3 j + a belongs to axis a of
 /// mode j.
-fn coupling(told: &Numbered, nf: usize) -> Vec<Hdf5Entry> {
+fn coupling(numbered: &Numbered, nf: usize) -> Vec<Hdf5Entry> {
     let zero = || 0.0;
-    let i5 = |row: usize, k: usize| told.i5.as_ref().map_or_else(zero, |i5| i5[(row % 3 * nf + row / 3, k)]);
+    let i5 =
+        |row: usize, k: usize| numbered.i5.as_ref().map_or_else(zero, |i5| i5[(row % 3 * nf + row / 3, k)]);
     let i9 = |row: usize, column: usize| {
         let at = |index: usize| index % 3 * nf + index / 3;
-        told.i9.as_ref().map_or_else(zero, |i9| i9[(at(row), at(column))])
+        numbered.i9.as_ref().map_or_else(zero, |i9| i9[(at(row), at(column))])
     };
     let skew = |a: usize, column: usize| {
         let j = column / 3;
-        Vector3::new(told.i3[(0, j)], told.i3[(1, j)], told.i3[(2, j)]).cross_matrix()[(a, column % 3)]
+        Vector3::new(numbered.i3[(0, j)], numbered.i3[(1, j)], numbered.i3[(2, j)]).cross_matrix()
+            [(a, column % 3)]
     };
     vec![
         array("mPsiTildePsi", Hdf5Contents::from_fn(3 * nf, nf, |row, k| -i5(row, k))),
         array("mPsiTildePsiTilde", Hdf5Contents::from_fn(3 * nf, 3 * nf, |row, column| -i9(row, column))),
-        array("mPhitTPsi", Hdf5Contents::matrix(&told.i3)),
+        array("mPhitTPsi", Hdf5Contents::matrix(&numbered.i3)),
         array("mPhitTPsiTilde", Hdf5Contents::from_fn(3, 3 * nf, skew)),
-        array("mXRefTildePsi", Hdf5Contents::from_fn(3, nf, |a, j| -told.i4[(a, j)])),
+        array("mXRefTildePsi", Hdf5Contents::from_fn(3, nf, |a, j| -numbered.i4[(a, j)])),
         array(
             "mXRefTildePsiTilde",
-            Hdf5Contents::from_fn(3, 3 * nf, |a, column| told.i8[column / 3][(a, column % 3)]),
+            Hdf5Contents::from_fn(3, 3 * nf, |a, column| numbered.i8[column / 3][(a, column % 3)]),
         ),
     ]
 }

@@ -83,20 +83,20 @@ impl ExportFormat for Gltf {
 
     fn leaves_out(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
         let mut left = vec![
-            "gltf has the surface, its motion and the places of the interfaces to look at, in single precision: no mass, stiffness, damping or inertia, and no numbers of nodes"
+            "gltf holds the surface, its motion and the positions of the interfaces for pictures in single precision, but no mass, stiffness, damping or inertia, and no node numbers"
                 .to_owned(),
         ];
         let (modes, all) = (modes(body, options), body.n_modes());
         if modes < all {
-            left.push(format!("the first {modes} of {all} modes are shown: --modes shows more"));
+            left.push(format!("the first {modes} of {all} modes are written: raise --modes for more"));
         } else if modes > MODES {
-            left.push(format!("{modes} modes are shown: some viewers play {MODES} morph targets only"));
+            left.push(format!("{modes} modes are written: some viewers play {MODES} morph targets only"));
         }
         if let Some(motion) = &options.motion {
             let played = played(motion);
             let seconds = played.duration() * body.units().time.to_si();
             left.push(format!(
-                "the motion of {} s takes {MOTION} s, by {}",
+                "the motion of {} s is played in {MOTION} s with {}",
                 rounded(seconds),
                 played.in_words()
             ));
@@ -179,7 +179,7 @@ impl<'b> DrawnScene<'b> {
         }
         binary
             .file(document)
-            .ok_or_else(|| refused("a file of more than 4 GB: take fewer modes with --modes"))
+            .ok_or_else(|| refused("a file of more than 4 GB: choose fewer modes with --modes"))
     }
 
     fn mesh(&self, binary: &mut Binary, moves: bool) -> Result<Value> {
@@ -190,9 +190,9 @@ impl<'b> DrawnScene<'b> {
             vertices.points.iter().map(one).collect::<Result<Vec<_>>>()
         };
         // Undeformed positions relative to the frame origin, in metres.
-        let told: Vec<[f64; 3]> =
+        let places: Vec<[f64; 3]> =
             positions.iter().map(|x| ((Vector3::from(*x) - self.origin) * self.metres).into()).collect();
-        let position = binary.vertices(&at_vertices(&told)?);
+        let position = binary.vertices(&at_vertices(&places)?);
         // One morph target per mode: displacements at weight one.
         let mut targets = Vec::new();
         for j in 0..self.names.len() {
@@ -296,7 +296,7 @@ fn finite(x: [f32; 3]) -> Result<[f32; 3]> {
     if x.iter().all(|x| x.is_finite()) {
         return Ok(x);
     }
-    Err(refused("lengths beyond 3e38 m, which single precision has not"))
+    Err(refused("lengths beyond 3e38 m, which overflow single precision"))
 }
 
 fn refused(what: &str) -> Error {

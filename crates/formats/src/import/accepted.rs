@@ -15,7 +15,7 @@ pub fn accept_imported(imported: &Imported) -> Result<()> {
     let found: Vec<Diagnostic> = broken
         .map(|check| {
             let message = format!(
-                "the file states a body that breaks `{}` ({}): {:.1e}, where at most {:.1e} is rounding",
+                "the numbers of the file violate the identity `{}` ({}): {:.1e}, and at most {:.1e} is rounding",
                 check.name, check.formula, check.value, check.limit
             );
             Diagnostic::new(Code::ForeignUnsound, message)

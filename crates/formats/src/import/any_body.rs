@@ -25,7 +25,7 @@ pub(crate) const NO_INERTIA: &str = "rotation about an axis through the centre o
 /// Returns the number of principal moments about the centre of mass that are zero up to rounding; NaN if they
 /// cannot be computed.
 pub(crate) fn axes_without_inertia(inertia: &Numbered) -> f64 {
-    const NOTHING: f64 = 1e-12;
+    const ZERO_MOMENT: f64 = 1e-12;
     let centre = inertia.i2 / inertia.i1;
     let steiner = (Matrix3::identity() * centre.norm_squared() - centre * centre.transpose()) * inertia.i1;
     let about_centre = inertia.i7 - steiner;
@@ -35,5 +35,5 @@ pub(crate) fn axes_without_inertia(inertia: &Numbered) -> f64 {
     // The scale of rounding is that of the moments about the origin.
     let size = inertia.i7.amax();
     let moments = (0.5 * (about_centre + about_centre.transpose())).symmetric_eigenvalues();
-    moments.iter().filter(|moment| moment.abs() <= NOTHING * size).count() as f64
+    moments.iter().filter(|moment| moment.abs() <= ZERO_MOMENT * size).count() as f64
 }

@@ -62,11 +62,11 @@ pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
         // Checks that depend on the failed cause would only repeat it.
         checks.retain(|check| check.value.is_finite());
         checks.push(of_identity(cause.clone()));
-        notes.push("checks that need a mass, and numbers, are left out".to_owned());
+        notes.push("further checks were skipped: they need finite numbers and a positive mass".to_owned());
     } else {
         // For a mass that does not commute with rotations no file states W0, which this identity needs.
-        let told = |check: &IdentityCheck| check.name != "velocity_gram_psd";
-        checks.extend(identities_of_any_body.into_iter().filter(told).map(of_identity));
+        let is_reported = |check: &IdentityCheck| check.name != "velocity_gram_psd";
+        checks.extend(identities_of_any_body.into_iter().filter(is_reported).map(of_identity));
         checks.push(turns(body));
         checks.push(deform(&invariants));
         checks.extend(modal_checks(&invariants));
@@ -124,7 +124,7 @@ fn deform(invariants: &Invariants) -> AuditCheck {
         limit: 0.0,
         code: Code::AuditImplausible,
         meaning: format!(
-            "{named}: the frame makes the same motions, and the mass matrix of the free body is singular; convert --from leaves them out"
+            "{named}: the frame performs the same motions, and the mass matrix of the free body is singular; flexbody convert --from removes them"
         ),
     }
 }
@@ -137,7 +137,7 @@ fn is_identity(code: Code) -> bool {
 
 fn of_identity(check: IdentityCheck) -> AuditCheck {
     let (code, meaning) = match check.name {
-        "finite" => (Code::AuditImplausible, "some numbers are missing or no numbers"),
+        "finite" => (Code::AuditImplausible, "some numbers are missing or not finite"),
         "mass_positive" => (Code::AuditImplausible, "the mass is not positive"),
         "second_moment_symmetric" => (Code::AuditImplausible, "the inertia tensor is not symmetric"),
         "second_moment_psd" | "inertia_psd" => (
@@ -154,7 +154,7 @@ fn of_identity(check: IdentityCheck) -> AuditCheck {
         ),
         "scalar_gram_psd" | "s_psd" => (
             Code::AuditIdentity,
-            "a motion has negative kinetic energy: the inertia of the modes does not belong to the rest, as with lumped masses beside a consistent modal mass",
+            "a motion has negative kinetic energy: the inertia of the modes and the other arrays contradict each other, as with lumped masses beside a consistent modal mass",
         ),
         "s_transposed" | "w3_skew" => (
             Code::AuditLayout,
@@ -204,7 +204,7 @@ fn modal_checks(invariants: &Invariants) -> Vec<AuditCheck> {
         "m_ff positive definite",
         f64::from(dense_cholesky(mass).is_none()),
         Code::AuditImplausible,
-        "modes without mass, or that depend on each other",
+        "some modes have no mass or are linearly dependent",
     ));
     let least = symmetric_eigen(stiffness.as_ref()).and_then(|eigen| {
         let largest = eigen.values.last().copied()?.abs();
@@ -215,7 +215,7 @@ fn modal_checks(invariants: &Invariants) -> Vec<AuditCheck> {
         "K_ff positive semidefinite, not zero",
         least.unwrap_or(f64::NAN),
         Code::AuditImplausible,
-        "some deformation takes negative energy, or none takes any: stiffness is missing or has a wrong sign",
+        "some deformation has negative elastic energy, or none has any: stiffness is missing or has the wrong sign",
     ));
     checks
 }
@@ -258,7 +258,7 @@ fn size(body: &ImportedBody) -> Vec<AuditCheck> {
     vec![
         check(
             "gyration_fits",
-            "radius of gyration / extent of the frames, times out of 0.02 to 5",
+            "radius of gyration / extent of the frames, factor outside 0.02 to 5",
             times,
             format!(
                 "the radius of gyration is {gyration:.3e}, the frames extend over {extent:.3e}{}",
@@ -286,12 +286,12 @@ fn kind_of_modes(invariants: &Invariants, frames: &[ImportedFrame]) -> String {
     let at_rest = places_at_rest(frames);
     let places = match &at_rest[..] {
         [] => String::new(),
-        [one] => format!("; the frame stands on node {one}, which moves in no mode"),
+        [one] => format!("; the frame is fixed to node {one}, which moves in no mode"),
         [first, .., last] => {
-            format!("; the frame stands on {} nodes that move in no mode, {first} to {last}", at_rest.len())
+            format!("; the frame is fixed to {} nodes that move in no mode, {first} to {last}", at_rest.len())
         }
     };
-    format!("modes are no mass-normalised free-surface modes (by {by:.1e}){places}")
+    format!("modes are not mass-normalised free-surface modes (relative difference {by:.1e}){places}")
 }
 
 /// Largest displacement of a node at rest, relative to the largest displacement of the mode. A smaller value

@@ -26,7 +26,7 @@ pub struct ImportedBody {
     /// Surface on the places of the body, if the file has one.
     pub mesh: Option<SurfaceMesh>,
     /// Data missing in the file or not usable, as fragments of sentences.
-    pub lacks: Vec<String>,
+    pub omissions: Vec<String>,
 }
 
 /// A node or frame of a file.

@@ -15,7 +15,7 @@ pub(crate) struct Digits {
 
 /// Smallest count of numbers from which a number format is inferred. A smaller value would take the short
 /// exact numbers of a small body written by hand for lost digits.
-const FEW: usize = 20;
+const MIN_NUMBERS: usize = 20;
 
 impl Digits {
     /// Takes a number in its written form into account.
@@ -45,7 +45,7 @@ impl Digits {
 
     /// Returns true if there are too few numbers to infer the digits of the program.
     pub(crate) fn are_few(self) -> bool {
-        self.count < FEW
+        self.count < MIN_NUMBERS
     }
 
     /// Returns the format in words: `6 decimals without exponents`, `7 significant digits`.
@@ -84,6 +84,10 @@ mod tests {
         assert!((scientific.rounding(1.0) - 5e-6).abs() < 1e-18);
         let full = seen_in(&["7", "1e-05", "0.12345678901234567"]);
         assert!(full.rounding(7.0) < 1e-15);
-        assert!(full.are_few() && !seen_in(&["1.5"; FEW]).are_few() && seen_in(&["0.0"; FEW]).are_few());
+        assert!(
+            full.are_few()
+                && !seen_in(&["1.5"; MIN_NUMBERS]).are_few()
+                && seen_in(&["0.0"; MIN_NUMBERS]).are_few()
+        );
     }
 }

@@ -144,7 +144,7 @@ impl Hdf5Arrays {
         let shape = shape.map(|dataset| dataset.shape()).unwrap_or_default();
         match shape[..] {
             [rows, columns] if rows > 0 && columns > 0 => Ok((rows, columns)),
-            _ => Err(self.refuse(name, &format!("expected two extents, found {shape:?}"))),
+            _ => Err(self.refuse(name, &format!("expected a matrix, found extents {shape:?}"))),
         }
     }
 

@@ -55,8 +55,8 @@ pub fn import_body(
 ) -> Result<Imported> {
     refuse_unsound(file)?;
     let given = &file.body;
-    let lacking = |lack: &String| Diagnostic::new(Code::ForeignDropped, lack.clone());
-    let mut diagnostics: Vec<Diagnostic> = given.lacks.iter().map(lacking).collect();
+    let omitted = |omission: &String| Diagnostic::new(Code::ForeignDropped, omission.clone());
+    let mut diagnostics: Vec<Diagnostic> = given.omissions.iter().map(omitted).collect();
     // Mass-normalise the modes and remove rigid motions, unless the modes are kept.
     let mut coordinates = ModalCoordinates::new(given)?;
     if let Some((change, note)) = normalising(&coordinates.invariants)? {
@@ -84,7 +84,7 @@ pub fn import_body(
 /// kept.
 fn normalising(invariants: &Invariants) -> Result<Option<(ModalChange, Diagnostic)>> {
     let refuse = |reason: String| {
-        let help = "flexbody audit says what is wrong with the file; write it again";
+        let help = "run flexbody audit on the file, correct what it finds, and write the file again";
         Diagnostic::new(Code::ForeignIncomplete, reason).with_help(help)
     };
     let beside = beside_normalised(invariants);
@@ -94,9 +94,9 @@ fn normalising(invariants: &Invariants) -> Result<Option<(ModalChange, Diagnosti
     }
     let change = ModalChange::in_own_frame(invariants, 3).map_err(refuse)?;
     let message = match (change.left_out().in_words(), beside) {
-        (Some(rigid), _) => format!("{rigid}: left out, the others are normalised"),
+        (Some(rigid), _) => format!("{rigid}: these modes were removed and the others normalised"),
         (None, by) => format!(
-            "the modes of the file are not mass-normalised with a diagonal stiffness (by {:.1e}): combinations of them that are were taken",
+            "the modes of the file are not mass-normalised with a diagonal stiffness (relative difference {:.1e}): they were replaced by linear combinations that are",
             by.unwrap_or(0.0)
         ),
     };
@@ -123,7 +123,7 @@ fn refuse_unsound(file: &ImportedFile) -> Result<()> {
         return Err(Error::new(file.unsound.iter().map(refused).collect()));
     }
     if file.body.frames.is_empty() {
-        let message = "the file has no node: neither positions nor shapes of the body are known";
+        let message = "the file has no node: positions and mode shapes are missing";
         return Err(Diagnostic::new(Code::ForeignIncomplete, message).into());
     }
     Ok(())
@@ -182,7 +182,7 @@ fn sound_invariants(given: &ImportedBody) -> Result<Invariants> {
         matches!(check.name, "finite" | "mass_positive" | "second_moment_psd" | "inertia_psd")
             && check.value > BROKEN
     }) {
-        let message = format!("inertia is not that of a body: {} does not hold", broken.formula);
+        let message = format!("no body has this inertia: {} does not hold", broken.formula);
         return Err(Diagnostic::new(Code::ForeignIncomplete, message).into());
     }
     if axes_without_inertia(&given.inertia) != 0.0 {
@@ -307,7 +307,8 @@ fn with_own_rounding(body: FlexBody) -> Result<(FlexBody, Option<Diagnostic>)> {
     }
     let mut parts = body.into_parts();
     parts.certificate.inertia_rounding = missed;
-    let message = format!("the inertia data of the file are those of a body to {missed:.1e} of their size");
+    let message =
+        format!("the inertia data of the file agree with each other only to {missed:.1e} of their size");
     Ok((FlexBody::new(parts)?, Some(Diagnostic::new(Code::ForeignRounded, message))))
 }
 
@@ -327,7 +328,7 @@ fn not_in_file(group: TermGroup, format: &str) -> TermDecision {
         tier: 0,
         bound: f64::INFINITY,
         limit: f64::INFINITY,
-        reason: format!("not told by the {format} file"),
+        reason: format!("missing in the {format} file"),
     }
 }
 

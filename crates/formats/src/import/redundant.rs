@@ -15,7 +15,7 @@ pub(crate) const ROUNDING: f64 = 1e-10;
 
 /// The invariants with their bounds.
 pub(crate) struct Redundant<'n> {
-    told: &'n Numbered,
+    numbered: &'n Numbered,
     /// Bound sqrt(int x . x).
     extent: f64,
     /// Bound sqrt(I6_jj) of each mode.
@@ -23,9 +23,9 @@ pub(crate) struct Redundant<'n> {
 }
 
 impl<'n> Redundant<'n> {
-    pub(crate) fn new(told: &'n Numbered) -> Self {
-        let modes = (0..told.i8.len()).map(|j| told.i6[(j, j)].abs().sqrt()).collect();
-        Self { told, extent: (0.5 * told.i7.trace()).abs().sqrt(), modes }
+    pub(crate) fn new(numbered: &'n Numbered) -> Self {
+        let modes = (0..numbered.i8.len()).map(|j| numbered.i6[(j, j)].abs().sqrt()).collect();
+        Self { numbered, extent: (0.5 * numbered.i7.trace()).abs().sqrt(), modes }
     }
 
     fn nf(&self) -> usize {
@@ -39,10 +39,10 @@ impl<'n> Redundant<'n> {
 
     /// Returns the difference of I4_j and the skew part of I8_j.
     pub(crate) fn i4_of_i8(&self) -> f64 {
-        let told = self.told;
+        let numbered = self.numbered;
         let missed = |j: usize| {
             let missed_along = |(a, b, c): (usize, usize, usize)| {
-                told.i4[(c, j)] - (told.i8[j][(a, b)] - told.i8[j][(b, a)])
+                numbered.i4[(c, j)] - (numbered.i8[j][(a, b)] - numbered.i8[j][(b, a)])
             };
             CYCLIC.map(missed_along).into_iter().map(f64::abs).fold(0.0, larger)
         };
@@ -51,7 +51,7 @@ impl<'n> Redundant<'n> {
 
     /// Returns the violation of I5_jk = -I5_kj.
     pub(crate) fn i5_antisymmetric(&self) -> f64 {
-        let Some(i5) = &self.told.i5 else { return 0.0 };
+        let Some(i5) = &self.numbered.i5 else { return 0.0 };
         let nf = self.nf();
         self.of_pairs(|j, k| {
             (0..3).map(|c| (i5[(c * nf + j, k)] + i5[(c * nf + k, j)]).abs()).fold(0.0, larger)
@@ -60,7 +60,7 @@ impl<'n> Redundant<'n> {
 
     /// Returns the difference of I5_jk and the skew part of I9_jk.
     pub(crate) fn i5_of_i9(&self) -> f64 {
-        let (Some(i5), Some(i9)) = (&self.told.i5, &self.told.i9) else { return 0.0 };
+        let (Some(i5), Some(i9)) = (&self.numbered.i5, &self.numbered.i9) else { return 0.0 };
         let nf = self.nf();
         self.of_pairs(|j, k| {
             let at = |a: usize, b: usize| i9[(a * nf + j, b * nf + k)];
@@ -72,7 +72,7 @@ impl<'n> Redundant<'n> {
 
     /// Returns the violation of I9_jk = I9_kj'.
     pub(crate) fn i9_symmetric(&self) -> f64 {
-        let Some(i9) = &self.told.i9 else { return 0.0 };
+        let Some(i9) = &self.numbered.i9 else { return 0.0 };
         let nf = self.nf();
         self.of_pairs(|j, k| {
             let axes = (0..9).map(|ab| (ab / 3, ab % 3));
@@ -84,14 +84,14 @@ impl<'n> Redundant<'n> {
     /// Returns the difference of I6 and half the trace of -I9, which is zero for a mass that commutes with
     /// rotations.
     pub(crate) fn i6_of_i9(&self) -> f64 {
-        let Some(i9) = &self.told.i9 else { return 0.0 };
-        self.of_pairs(|j, k| (self.told.i6[(j, k)] + self.half_trace(i9, j, k)).abs())
+        let Some(i9) = &self.numbered.i9 else { return 0.0 };
+        self.of_pairs(|j, k| (self.numbered.i6[(j, k)] + self.half_trace(i9, j, k)).abs())
     }
 
     /// Returns the smallest and largest eigenvalue of the modal mass implied by I9, relative to I6, for
     /// messages.
     pub(crate) fn mass_of_i9(&self) -> Option<(f64, f64)> {
-        let i9 = self.told.i9.as_ref()?;
+        let i9 = self.numbered.i9.as_ref()?;
         let scaled = |j: usize, k: usize| -self.half_trace(i9, j, k) / (self.modes[j] * self.modes[k]);
         let sum = Mat::from_fn(self.nf(), self.nf(), scaled);
         if (0..self.nf()).any(|j| (0..self.nf()).any(|k| !sum[(j, k)].is_finite())) {
@@ -110,7 +110,7 @@ impl<'n> Redundant<'n> {
     /// file.
     pub(crate) fn lumped(&self, name: &'static str, formula: &'static str, arrays: &str) -> AuditCheck {
         let sizes = match self.mass_of_i9() {
-            Some((least, most)) => format!(", which by {arrays} is {least:.3} to {most:.3} of itself"),
+            Some((least, most)) => format!(" (by {arrays} it is {least:.3} to {most:.3} of this mass)"),
             None => String::new(),
         };
         AuditCheck {
@@ -120,7 +120,7 @@ impl<'n> Redundant<'n> {
             limit: ROUNDING,
             code: Code::AuditLumped,
             meaning: format!(
-                "the inertia of the modes does not give their mass{sizes}: lumped masses beside a consistent modal mass, unless the model has nodes with rotations or constraints"
+                "the inertia of the modes does not give the modal mass{sizes}: lumped masses were mixed with a consistent modal mass, unless the model has nodes with rotations or constraints"
             ),
         }
     }
@@ -142,9 +142,9 @@ pub(crate) fn in_other_order(checks: &mut [AuditCheck], other: &[(&str, f64)], m
 
 /// Returns true if I9 has no part symmetric in its axes although the modes have mass, as for a body without
 /// W2.
-pub(crate) fn lacks_w2(told: &Numbered) -> bool {
-    let nf = told.i8.len();
-    let Some(i9) = &told.i9 else { return true };
+pub(crate) fn has_no_w2(numbered: &Numbered) -> bool {
+    let nf = numbered.i8.len();
+    let Some(i9) = &numbered.i9 else { return true };
     let symmetric = |row: usize, column: usize| {
         let (a, j, b, k) = (row / nf, row % nf, column / nf, column % nf);
         i9[(row, column)] + i9[(b * nf + j, a * nf + k)]

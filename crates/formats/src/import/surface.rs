@@ -3,14 +3,14 @@
 use flexbody_model::SurfaceMesh;
 
 /// Returns polygons and lines of a file as the surface of `n` nodes. Polygons are split into triangles from
-/// their first corner. If indices refer to no node, the surface is dropped and `lacks` states it.
+/// their first corner. If indices refer to no node, the surface is dropped and `omissions` states it.
 ///
 /// * `name`: name of the array in the file.
 pub(crate) fn surface(
     name: &str,
     polygons: &[Vec<i64>],
     n: usize,
-    lacks: &mut Vec<String>,
+    omissions: &mut Vec<String>,
 ) -> Option<SurfaceMesh> {
     let (mut triangles, mut edges) = (Vec::new(), Vec::new());
     let index = |i: i64| u32::try_from(i).unwrap_or(u32::MAX);
@@ -28,6 +28,8 @@ pub(crate) fn surface(
         return None;
     }
     SurfaceMesh::new(triangles, edges, n)
-        .map_err(|problem| lacks.push(format!("`{name}`: {problem}; the body has no surface")))
+        .map_err(|problem| {
+            omissions.push(format!("`{name}`: {problem}; the body is converted without a surface"))
+        })
         .ok()
 }

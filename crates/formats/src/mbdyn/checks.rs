@@ -10,7 +10,7 @@ use flexbody_linalg::larger;
 
 /// Largest relative rounding of a number that is not reported as lost digits. A larger value accepts files
 /// with fewer digits.
-const LOST: f64 = 1e-8;
+const MAX_DIGIT_ROUNDING: f64 = 1e-8;
 
 /// Number of last-digit roundings that an identity may accumulate. A smaller value reports rounding as
 /// contradictions.
@@ -31,7 +31,7 @@ pub(crate) fn checks(records: &Records, read: &Read) -> Vec<AuditCheck> {
             value: asymmetry(damping),
             limit: ROUNDING + TERMS * records.rounding(),
             code: Code::AuditIdentity,
-            meaning: "damping of a mode by another depends on their order".to_owned(),
+            meaning: "the damping of mode j by mode k differs from that of mode k by mode j".to_owned(),
         });
     }
     all
@@ -42,7 +42,7 @@ fn digits(records: &Records) -> AuditCheck {
         name: "digits",
         formula: "half a unit of the last digit of numbers of size one",
         value: records.rounding(),
-        limit: LOST,
+        limit: MAX_DIGIT_ROUNDING,
         code: Code::AuditDigits,
         meaning: format!("numbers are written with {}", records.digits.words()),
     }
@@ -60,12 +60,12 @@ fn surplus(records: &Records) -> AuditCheck {
     let all: Vec<String> = records.skipped.iter().map(in_words).collect();
     AuditCheck {
         name: "no_more_than_the_header_says",
-        formula: "number of words beyond those of the header",
+        formula: "number of words beyond the counts of the header",
         value: records.skipped.iter().map(|(_, surplus)| surplus.words as f64).sum(),
         limit: 0.0,
         code: Code::AuditSurplus,
         meaning: format!(
-            "the file has more than its header says, which MBDyn skips without a word: {}",
+            "the file has more words than its header states, and MBDyn skips them without a message: {}",
             if all.is_empty() { "nothing".to_owned() } else { all.join("; ") }
         ),
     }
@@ -80,7 +80,7 @@ fn coupling(records: &Records) -> AuditCheck {
         limit: 0.0,
         code: Code::AuditCoupling,
         meaning: format!(
-            "record groups {} are missing and no lumped masses are there: modes do not feel the motion of the body, nor the body that of the modes",
+            "record groups {} and lumped masses are missing: the motion of the body does not excite the modes, nor the modes the body",
             missing.join(", ")
         ),
     }
@@ -99,7 +99,7 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
         limit: 0.0,
         code: Code::AuditIdentity,
         meaning:
-            "lumped masses stand beside invariants: MBDyn adds the sums over the masses to the invariants of the file, which then count twice"
+            "the file has both lumped masses and invariants: MBDyn adds the sums over the masses to the invariants of the file, which then count twice"
                 .to_owned(),
     };
     let negative = AuditCheck {
@@ -111,15 +111,15 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
         meaning: format!("{} of {n} lumped masses are negative", lumped.negative),
     };
     // Differences between the sums over the masses and groups 9 and 12.
-    let (own, sums) = (&read.body.inertia.i6, &lumped.told.i6);
+    let (own, sums) = (&read.body.inertia.i6, &lumped.numbered.i6);
     let size = |j: usize, k: usize| (own[(j, j)] * own[(k, k)]).abs().sqrt();
     let modal = (0..nf)
         .flat_map(|j| (0..nf).map(move |k| (j, k)))
         .map(|(j, k)| relative((own[(j, k)] - sums[(j, k)]).abs(), size(j, k)))
         .fold(0.0, larger);
-    let total = relative((read.body.inertia.i1 - lumped.told.i1).abs(), read.body.inertia.i1.abs());
+    let total = relative((read.body.inertia.i1 - lumped.numbered.i1).abs(), read.body.inertia.i1.abs());
     let tensor =
-        relative((read.body.inertia.i7 - lumped.told.i7).abs().max(), read.body.inertia.i7.abs().max());
+        relative((read.body.inertia.i7 - lumped.numbered.i7).abs().max(), read.body.inertia.i7.abs().max());
     let consistent = AuditCheck {
         name: "lumped_masses_carry_modes",
         formula: "record groups 9 and 12 = sums over the masses of record group 11",
@@ -127,7 +127,7 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
         limit: ROUNDING + TERMS * records.rounding(),
         code: Code::AuditLumped,
         meaning: format!(
-            "the coupling of rigid motion and modes comes from {n} lumped masses, which are not the mass matrix of the modes: modal mass differs by {modal:.1e}, mass by {total:.1e}, inertia by {tensor:.1e}"
+            "the coupling of rigid motion and modes comes from {n} lumped masses, but the modes come from another mass matrix: modal mass differs by {modal:.1e}, mass by {total:.1e}, inertia by {tensor:.1e}"
         ),
     };
     vec![twice, negative, consistent]
@@ -151,7 +151,7 @@ fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
             "i4_of_i8",
             "invariant 4 = skew part of invariant 8",
             redundant.i4_of_i8(),
-            "modes couple to rotation in two ways: groups 15 and 16 are about different points, or group 16 is transposed",
+            "groups 15 and 16 state different couplings of modes and rotation: they refer to different points, or group 16 is transposed",
         ),
         identity(
             "i5_antisymmetric",
@@ -163,13 +163,13 @@ fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
             "i9_symmetric",
             "invariant 9_jk = transpose of invariant 9_kj",
             redundant.i9_symmetric(),
-            "the inertia of pairs of modes depends on their order",
+            "the inertia of a pair of modes differs between (j, k) and (k, j)",
         ),
         identity(
             "i5_of_i9",
             "invariant 5_jk = skew part of invariant 9_jk",
             redundant.i5_of_i9(),
-            "pairs of modes couple to rotation in two ways: group 18 is transposed, or one of groups 17 and 18 has the other sign",
+            "groups 17 and 18 state different couplings of pairs of modes to rotation: group 18 is transposed, or one of them has the opposite sign",
         ),
     ];
     if !records.general && read.body.inertia.i9.is_some() {
@@ -196,7 +196,6 @@ fn find_column_order(records: &Records, read: &Read, checks: &mut [AuditCheck]) 
         ("i5_of_i9", redundant.i5_of_i9()),
         ("modal_mass_of_i9", redundant.i6_of_i9()),
     ];
-    let meaning =
-        "groups 14 to 18 stand column by column, as the manual calls them; MBDyn reads them row by row";
+    let meaning = "groups 14 to 18 are stored column by column, as the manual describes them; MBDyn reads them row by row";
     in_other_order(checks, &seen_by, meaning);
 }

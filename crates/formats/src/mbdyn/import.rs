@@ -28,7 +28,7 @@ impl ImportFormat for Mbdyn {
     fn read(&self, file: &InputFile) -> Result<ImportedFile> {
         let records = Records::read(file)?;
         let Some(read) = body(&records) else {
-            let message = "the file lacks mass and inertia: neither record group 12 nor 11 is there";
+            let message = "the file has no mass and inertia: record groups 11 and 12 are both missing";
             return Err(Diagnostic::new(Code::ForeignIncomplete, message).in_file(file.path()).into());
         };
         let newest = (1..=19).rev().find(|group| records.has(*group)).unwrap_or(10);
@@ -51,7 +51,7 @@ fn unsound(records: &Records) -> Vec<String> {
     let sentence = |(group, surplus): &(Option<usize>, Surplus)| {
         let place = group
             .map_or_else(|| "before record group 1".to_owned(), |group| format!("of record group {group}"));
-        format!("line {}: {} words {place} are more than the header says", surplus.line, surplus.words)
+        format!("line {}: {} words {place} exceed the count in the header", surplus.line, surplus.words)
     };
     numbers.map(sentence).collect()
 }
@@ -59,11 +59,13 @@ fn unsound(records: &Records) -> Vec<String> {
 fn notes(records: &Records, newest: usize) -> Vec<String> {
     let mut notes = vec![
         format!("revision {}, {} nodes, {} modes", records.revision, records.n_nodes, records.n_modes),
-        format!("the last record group is {newest}; programs without groups 14 to 19 refuse any above 13"),
+        format!(
+            "the last record group is {newest}; programs that do not know groups 14 to 19 reject files with a group above 13"
+        ),
     ];
     if from_masses(records) {
         notes.push(
-            "invariants are the sums over lumped masses that MBDyn makes; it takes invariant 9 only when the joint says `use invariant 9`"
+            "the invariants are computed from the lumped masses, as MBDyn does; MBDyn uses invariant 9 only if the joint has `use invariant 9`"
                 .to_owned(),
         );
     }
@@ -72,14 +74,15 @@ fn notes(records: &Records, newest: usize) -> Vec<String> {
     }
     if records.general {
         notes.push(
-            "the mass does not commute with rotations, says the file: record groups 9 and 18 need not agree"
+            "the file states that the mass does not commute with rotations: record groups 9 and 18 need not agree"
                 .to_owned(),
         );
     }
     let moves = |group: usize| records.get(group).is_some_and(|values| values.iter().any(|v| *v != 0.0));
     if moves(3) || moves(4) {
         notes.push(
-            "the modes have initial values (record groups 3 and 4), which are no part of a body".to_owned(),
+            "the initial values of the modes (record groups 3 and 4) are not converted: a body has none"
+                .to_owned(),
         );
     }
     if !records.ended {

@@ -46,7 +46,7 @@ impl ExportFormat for Mbdyn {
         let places = frames(body, &options.points);
         let exact = is_exact(options);
         let no_coupling = (!exact).then(|| {
-            "the coupling of rigid motion and modes (record groups 14 to 18), which programs of level 13 refuse: modes vibrate as if the body did not move".to_owned()
+            "the coupling of rigid motion and modes (record groups 14 to 18), which programs of level 13 reject: modes vibrate as if the body did not move".to_owned()
         });
         ExportChecklist {
             rigid_coupling: Holding::held_but_for(no_coupling),
@@ -81,11 +81,11 @@ impl ExportFormat for Mbdyn {
             return Vec::new();
         };
         let mut needs = vec![
-            "MBDyn evaluates geometric stiffness (record group 19) only with `use automatic differentiation` in its control data, and ignores it without a word otherwise".to_owned(),
+            "MBDyn evaluates geometric stiffness (record group 19) only with `use automatic differentiation` in its control data, and otherwise ignores it without a message".to_owned(),
         ];
         if let Some(node) = largest.checked_sub(LOADS_OF_MOTION + 1).map(|index| index / 6 + 1) {
             needs.push(format!(
-                "MBDyn takes geometric stiffness of forces at interfaces only in a joint with {node} or more interface nodes, in the order of the file"
+                "MBDyn reads geometric stiffness of forces at interfaces only in a joint with {node} or more interface nodes, in the order of the file"
             ));
         }
         needs
@@ -94,24 +94,24 @@ impl ExportFormat for Mbdyn {
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
         if !is_exact(options) && !body.conditions().is_mean() {
             let message = format!(
-                "{}: modes of such a body move only with the coupling of record groups 14 to 18, which dialect {LEVEL_13} does not have",
+                "mbdyn cannot hold a body in the frame `{}` in dialect {LEVEL_13}: its modes need the coupling of record groups 14 to 18",
                 body.conditions()
             );
-            let help = format!("use dialect {LEVEL_19}, or a body made with --frame com");
+            let help = format!("use --dialect {LEVEL_19}, or convert the model with --frame com");
             return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
         }
         let places = frames(body, &options.points);
         let mut file = File(head(body));
-        let told = inertia(body);
+        let numbered = inertia(body);
         file.nodes(&places, body.n_modes());
-        file.matrix(9, "MODAL MASS MATRIX", &told.i6);
+        file.matrix(9, "MODAL MASS MATRIX", &numbered.i6);
         file.matrix(10, "MODAL STIFFNESS MATRIX", body.invariants().modal_stiffness());
-        file.rigid(&told);
+        file.rigid(&numbered);
         if losses::is_damped(body) {
             file.matrix(13, "MODAL DAMPING MATRIX", &body.damping());
         }
         if is_exact(options) {
-            file.coupling(&told);
+            file.coupling(&numbered);
             file.stress_stiffness(body, &places);
         }
         file.0.push_str("**\n** END OF FILE\n");
@@ -245,36 +245,37 @@ impl File {
     }
 
     /// Writes mass, centre of mass and the inertia about it.
-    fn rigid(&mut self, told: &Numbered) {
-        let center = told.i2 / told.i1;
-        let steiner = (Matrix3::identity() * center.norm_squared() - center * center.transpose()) * told.i1;
-        let inertia = told.i7 - steiner;
+    fn rigid(&mut self, numbered: &Numbered) {
+        let center = numbered.i2 / numbered.i1;
+        let steiner =
+            (Matrix3::identity() * center.norm_squared() - center * center.transpose()) * numbered.i1;
+        let inertia = numbered.i7 - steiner;
         self.group(12, "GLOBAL INERTIA");
-        self.row([told.i1]);
+        self.row([numbered.i1]);
         self.row(center.iter().copied());
         for i in 0..3 {
             self.row(inertia.row(i).iter().copied());
         }
     }
 
-    fn coupling(&mut self, told: &Numbered) {
-        let nf = told.i8.len();
-        self.matrix(14, "INVARIANT 3", &told.i3);
-        self.matrix(15, "INVARIANT 4", &told.i4);
+    fn coupling(&mut self, numbered: &Numbered) {
+        let nf = numbered.i8.len();
+        self.matrix(14, "INVARIANT 3", &numbered.i3);
+        self.matrix(15, "INVARIANT 4", &numbered.i4);
         self.group(16, "INVARIANT 8");
         for a in 0..3 {
-            self.row(told.i8.iter().flat_map(|i8| i8.row(a).iter().copied().collect::<Vec<_>>()));
+            self.row(numbered.i8.iter().flat_map(|i8| i8.row(a).iter().copied().collect::<Vec<_>>()));
         }
         self.group(17, "INVARIANT 5");
         for a in 0..3 {
             let pairs = (0..nf).flat_map(|j| (0..nf).map(move |k| (j, k)));
-            self.row(pairs.map(|(j, k)| told.i5.as_ref().map_or(0.0, |i5| i5[(a * nf + j, k)])));
+            self.row(pairs.map(|(j, k)| numbered.i5.as_ref().map_or(0.0, |i5| i5[(a * nf + j, k)])));
         }
         self.group(18, "INVARIANT 9");
         for a in 0..3 {
             let columns = (0..nf).flat_map(|j| (0..3 * nf).map(move |column| (j, column / 3, column % 3)));
             let entry = |(j, k, b): (usize, usize, usize)| {
-                told.i9.as_ref().map_or(0.0, |i9| i9[(a * nf + j, b * nf + k)])
+                numbered.i9.as_ref().map_or(0.0, |i9| i9[(a * nf + j, b * nf + k)])
             };
             self.row(columns.map(entry));
         }

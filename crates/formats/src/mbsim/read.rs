@@ -53,16 +53,16 @@ impl ImportFormat for Mbsim {
         let integrals = Integrals::read(&mut arrays, nf)?;
         let damping = arrays.has(DAMPING).then(|| arrays.matrix(DAMPING, nf, nf)).transpose()?;
         let frames = frames(&mut arrays, nf)?;
-        let mut lacks = Vec::new();
+        let mut omissions = Vec::new();
         if arrays.has(STRESSES) {
-            lacks.push(format!("`{STRESSES}`: stresses of the modes are not taken"));
+            omissions.push(format!("`{STRESSES}`: stresses of the modes are not converted"));
         }
-        let mesh = mesh(&mut arrays, frames.len(), &mut lacks)?;
+        let mesh = mesh(&mut arrays, frames.len(), &mut omissions)?;
         let stiffness = arrays.matrix("stiffness matrix", nf, nf)?;
         let inertia = integrals.numbered();
         let mut notes = vec![format!("{} nodes, {nf} modes", frames.len())];
         notes.push(
-            "the modal mass is the sum of the shape function shape function integrals: MBSim knows no other"
+            "the modal mass is the sum of the shape function shape function integrals, as MBSim computes it"
                 .to_owned(),
         );
         Ok(ImportedFile {
@@ -80,7 +80,7 @@ impl ImportFormat for Mbsim {
                 geometric_stiffness: Vec::new(),
                 frames,
                 mesh,
-                lacks,
+                omissions,
             },
         })
     }
@@ -157,9 +157,10 @@ fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ImportedFrame>> {
             arrays.refuse(POSITIONS, &format!("expected three numbers per node, found {}", positions.len()))
         );
     }
-    let labels: Vec<String> = match arrays.has(NUMBERS) {
-        true => arrays.integers(NUMBERS)?.iter().map(i64::to_string).collect(),
-        false => (1..=n).map(|number| number.to_string()).collect(),
+    let labels: Vec<String> = if arrays.has(NUMBERS) {
+        arrays.integers(NUMBERS)?.iter().map(i64::to_string).collect()
+    } else {
+        (1..=n).map(|number| number.to_string()).collect()
     };
     if labels.len() != n {
         return Err(arrays.refuse(NUMBERS, &format!("expected {n} numbers, found {}", labels.len())));
@@ -178,18 +179,18 @@ fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ImportedFrame>> {
 }
 
 /// Returns the surface from lines and faces of OpenMBV: node indices from 0, each line or face ended by -1.
-fn mesh(arrays: &mut Hdf5Arrays, n: usize, lacks: &mut Vec<String>) -> Result<Option<SurfaceMesh>> {
+fn mesh(arrays: &mut Hdf5Arrays, n: usize, omissions: &mut Vec<String>) -> Result<Option<SurfaceMesh>> {
     if !arrays.has(INDICES) {
         return Ok(None);
     }
     let indices = arrays.integers(INDICES)?;
     let polygons: Vec<Vec<i64>> = indices.split(|index| *index == -1).map(<[i64]>::to_vec).collect();
-    Ok(surface(INDICES, &polygons, n, lacks))
+    Ok(surface(INDICES, &polygons, n, omissions))
 }
 
 fn checks(
     integrals: &Integrals,
-    told: &Numbered,
+    numbered: &Numbered,
     stiffness: &Mat<f64>,
     damping: Option<&Mat<f64>>,
 ) -> Vec<AuditCheck> {
@@ -209,14 +210,14 @@ fn checks(
             "position position integral = its transpose",
             asymmetry(&integrals.second),
             Code::AuditIdentity,
-            "MBSim takes one triangle of it",
+            "the matrix is not symmetric, and MBSim reads only one triangle of it",
         ),
         check(
             "shape_shape_symmetric",
             "blocks 11, 22 and 33 of the shape function shape function integral = their transposes",
             (0..3).map(|a| asymmetry(&block(a))).fold(0.0, larger),
             Code::AuditIdentity,
-            "pairs of shape functions have an integral that depends on their order",
+            "the integral of a pair of shape functions differs between (j, k) and (k, j)",
         ),
     ];
     if let Some(damping) = damping {
@@ -225,7 +226,7 @@ fn checks(
             "damping matrix = its transpose",
             asymmetry(damping),
             Code::AuditIdentity,
-            "MBSim takes one triangle of it",
+            "the matrix is not symmetric, and MBSim reads only one triangle of it",
         ));
     }
     // Eigenmodes are orthogonal with respect to their mass.
@@ -233,9 +234,9 @@ fn checks(
         all.push(check(
             "modal_mass_diagonal",
             "sum of blocks 11, 22 and 33 diagonal where the stiffness matrix is",
-            beside_diagonal(&told.i6),
+            beside_diagonal(&numbered.i6),
             Code::AuditLumped,
-            "modes that are orthogonal in stiffness are not so in mass: the integrals come from another mass matrix than the modes, as lumped masses do",
+            "modes that are orthogonal in stiffness are not orthogonal in mass: the integrals and the modes come from different mass matrices, for example lumped and consistent ones",
         ));
     }
     all

@@ -92,18 +92,18 @@ fn other_w2(body: &FlexBody) -> Holding {
     let places = (0..3).flat_map(|a| (0..nf).flat_map(move |j| (0..nf).map(move |k| (a, j, k))));
     let lost = places
         .map(|(a, j, k)| {
-            let told: f64 = (0..3).filter(|b| *b != a).map(|b| written[b][(j, k)]).sum();
+            let numbered: f64 = (0..3).filter(|b| *b != a).map(|b| written[b][(j, k)]).sum();
             let held = own.as_ref().map_or(0.0, |w2| w2[(a * nf + j, a * nf + k)]);
-            (told - held).abs() / bound.s(j, k)
+            (numbered - held).abs() / bound.s(j, k)
         })
         .fold(0.0, f64::max);
     match own {
         Some(_) => losses::lost_beyond_rounding(
             lost,
-            "W2 other than what the modal mass says, which is the sum of the same integrals",
+            "W2 that differs from the one implied by the modal mass, which is the sum of the same integrals",
         ),
         None => Lost(format!(
-            "that the body does without W2: it follows from the integrals whose sum is the modal mass, here up to {lost:.1e} of its Cauchy-Schwarz bound"
+            "the absence of W2: MBSim computes W2 from the integrals whose sum is the modal mass, here up to {lost:.1e} of its Cauchy-Schwarz bound"
         )),
     }
 }
@@ -111,12 +111,12 @@ fn other_w2(body: &FlexBody) -> Holding {
 fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
     let nf = body.n_modes();
     let invariants = body.invariants();
-    let told = inertia(body);
+    let numbered = inertia(body);
     let s_aa = diagonal(body);
     // For a != b, S_ab is at (b, a) of I9.
     let s = |pair: usize, j: usize, k: usize| match PAIRS[pair] {
         (a, b) if a == b => s_aa[a][(j, k)],
-        (a, b) => told.i9.as_ref().map_or(0.0, |i9| i9[(b * nf + j, a * nf + k)]),
+        (a, b) => numbered.i9.as_ref().map_or(0.0, |i9| i9[(b * nf + j, a * nf + k)]),
     };
     let second = invariants.second_moment();
     let positions: Vec<f64> = places.iter().flat_map(|place| place.position).collect();
@@ -125,10 +125,10 @@ fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
         places[row / 3].rotation.as_ref().map_or(0.0, |rotation| rotation[(row % 3, j)])
     };
     let mut all = vec![
-        Hdf5Contents::number(told.i1).named("mass"),
-        Hdf5Contents::list(told.i2.as_slice()).named("position integral"),
+        Hdf5Contents::number(numbered.i1).named("mass"),
+        Hdf5Contents::list(numbered.i2.as_slice()).named("position integral"),
         Hdf5Contents::from_fn(3, 3, |i, j| second[(i, j)]).named("position position integral"),
-        Hdf5Contents::matrix(&told.i3).named("shape function integral"),
+        Hdf5Contents::matrix(&numbered.i3).named("shape function integral"),
         Hdf5Contents::matrix(invariants.modal_stiffness()).named("stiffness matrix"),
         Hdf5Contents::from_fn(9, nf, |row, j| invariants.ibar_or_half_c2()[row / 3][row % 3][j])
             .named("position shape function integral"),

@@ -12,10 +12,7 @@ pub(crate) fn mode_names(body: &FlexBody, count: usize) -> Vec<String> {
     let width = body.n_modes().to_string().len().max(3);
     let name = |(j, hertz): (usize, &f64)| {
         let origin = body.modes().provenance.get(j).map(String::as_str).unwrap_or_default();
-        let what = match is_static(origin) {
-            true => printable(origin),
-            false => format!("{} Hz", rounded(*hertz)),
-        };
+        let what = if is_static(origin) { printable(origin) } else { format!("{} Hz", rounded(*hertz)) };
         format!("mode_{:0width$} ({what})", j + 1)
     };
     body.frequencies_hz().iter().enumerate().take(count).map(name).collect()
@@ -34,7 +31,7 @@ pub(crate) fn named(options: &ExportOptions, extension: &str) -> Option<String> 
     let known = name.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
     let wanted = name.with_extension(extension);
     let wanted = wanted.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    (!known).then(|| format!("viewers know this format by the name of the file: call it {wanted}"))
+    (!known).then(|| format!("viewers recognise this format by the extension of the file: name it {wanted}"))
 }
 
 /// Returns a number with a few digits.

@@ -54,7 +54,8 @@ impl ImportFormat for SidFile {
         let inferred = listed.inferred();
         if !inferred.is_empty() {
             let names = inferred.join(", ");
-            notes.push(format!("{names} have no `structure`: it is taken from the entries that they list"));
+            notes
+                .push(format!("{names} have no `structure`: it is inferred from the entries that they list"));
         }
         Ok(ImportedFile {
             format: "sid",

@@ -15,7 +15,7 @@ pub(crate) struct Vtk;
 
 /// Largest number of files of a motion, and largest size of all of them in bytes; a longer motion is thinned.
 const MOST_FILES: usize = 250;
-const ROOM: usize = 500_000_000;
+const MAX_BYTES: usize = 500_000_000;
 
 impl ExportFormat for Vtk {
     fn name(&self) -> &'static str {
@@ -66,19 +66,19 @@ impl ExportFormat for Vtk {
 
     fn leaves_out(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
         let mut left = vec![
-            "vtk has positions, shapes and interfaces to look at: no mass, stiffness, damping or inertia"
+            "vtk holds positions, shapes and interfaces for pictures, but no mass, stiffness, damping or inertia"
                 .to_owned(),
         ];
         match options.modes {
             Some(modes) if modes < body.n_modes() => {
-                left.push(format!("the first {modes} of {} modes are shown", body.n_modes()));
+                left.push(format!("the first {modes} of {} modes are written", body.n_modes()));
             }
             _ => {}
         }
         if let Some(motion) = &options.motion {
             let played = played(&Drawn::places(body, &options.points), motion);
             if played.len() < motion.time.len() {
-                left.push(format!("{} are shown", played.in_words()));
+                left.push(format!("{} are written", played.in_words()));
             }
         }
         left
@@ -119,7 +119,7 @@ fn with_modes(mut grid: Grid, body: &FlexBody, drawn: &Drawn<'_>, modes: usize) 
 fn played<'m>(drawn: &Drawn<'_>, motion: &'m RecordedMotion) -> Played<'m> {
     let (cells, interfaces) = (drawn.triangles().len() + drawn.edges().len(), drawn.interfaces().len());
     let bytes = drawn.len() * (3 * 8 + 3 * 8 + 8 + interfaces) + cells * (3 * 8 + 8 + 1);
-    Played::new(motion, MOST_FILES.min(ROOM / bytes.max(1)))
+    Played::new(motion, MOST_FILES.min(MAX_BYTES / bytes.max(1)))
 }
 
 /// Returns one mesh for each output time, and the list that ParaView opens.

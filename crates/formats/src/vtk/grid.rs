@@ -66,13 +66,13 @@ impl Grid {
 
     /// Adds a vector at every point.
     pub(super) fn put_vectors(&mut self, name: &str, vectors: &[[f64; 3]]) {
-        let name = self.own_name(name);
+        let name = self.unique_name(name);
         self.point_data += &self.data.vectors(&name, vectors);
         self.vectors.get_or_insert(name);
     }
 
     fn put_marks(&mut self, name: &str, marks: &[u8]) {
-        let name = self.own_name(name);
+        let name = self.unique_name(name);
         self.point_data += &self.data.array(&name, "UInt8", 1, marks.iter().map(|mark| [*mark]));
     }
 
@@ -96,7 +96,7 @@ impl Grid {
     }
 
     /// Returns a name that no other array at the points has: readers keep one array per name.
-    fn own_name(&mut self, wanted: &str) -> String {
+    fn unique_name(&mut self, wanted: &str) -> String {
         let wanted = printable(wanted);
         let mut name = wanted.clone();
         let mut number = 1;

@@ -15,7 +15,7 @@ use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, LoadKind};
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
 use nalgebra::Vector3;
-use oracle::flexible::{body_of, fixture, lively_state, soft_block, stressed};
+use oracle::flexible::{body_of, fixture, moving_state, soft_block, stressed};
 use oracle::partial::{combinations, with_groups};
 use oracle::plane::rectangle;
 use oracle::random::Random;
@@ -134,7 +134,7 @@ impl Compiled {
 
 /// Returns q, nu, applied forces, gravity, a force and a torque of suitable size for the body.
 fn state(random: &mut Random, body: &FlexBody) -> Vec<f64> {
-    let own = lively_state(random, body);
+    let own = moving_state(random, body);
     // Geometric stiffness corrects the inertia to first order only, so that its amplitude is reduced here.
     let amount = if body.geometric_stiffness().is_empty() { 1.0 } else { 0.1 };
     let (mass, size) = (body.invariants().mass(), body.invariants().inertia().norm().sqrt());

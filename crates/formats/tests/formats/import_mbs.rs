@@ -284,12 +284,16 @@ fn errors_name_the_line() {
         assert!(message.contains(words), "{message}");
     };
     let group_9 = line_of("** RECORD GROUP 9,");
-    unreadable(&with_number(&text, 9, 0, |_| f64::NAN), group_9 + 1, "no finite number");
+    unreadable(&with_number(&text, 9, 0, |_| f64::NAN), group_9 + 1, "expected a finite number");
     // A three-digit exponent in Fortran form, which MBDyn reads as two numbers.
     let digits = format!("{:.16e}", numbers(&text, 9)[0]);
     unreadable(&text.replacen(&digits, "1.2345678901-101", 1), group_9 + 1, "letter of the exponent");
     unreadable(&text.replacen("** RECORD GROUP 9,", "** RECORD GROUP 8,", 1), group_9, "twice");
-    unreadable(&text.replacen("** RECORD GROUP 9,", "** RECORD GROUP 20,", 1), group_9, "no such group");
+    unreadable(
+        &text.replacen("** RECORD GROUP 9,", "** RECORD GROUP 20,", 1),
+        group_9,
+        "groups are numbered 1 to 19",
+    );
     let fewer = text.replacen("REV0 18 3", "REV0 18 4", 1);
     assert_ne!(fewer, text);
     assert_eq!(error(&fewer).0, Code::ForeignUnreadable);
@@ -301,7 +305,10 @@ fn errors_name_the_line() {
     let cut: String = text.lines().take(group_9 + 1).map(|line| format!("{line}\n")).collect();
     unreadable(&cut, group_9 + 1, "ends too early");
     let (code, _, message) = error(&without(&text, &[6, 10]));
-    assert_eq!((code, message.as_str()), (Code::ForeignIncomplete, "the file lacks record groups 6, 10"));
+    assert_eq!(
+        (code, message.as_str()),
+        (Code::ForeignIncomplete, "the file has no record groups 6, 10, which are required")
+    );
     assert_eq!(error(&without(&text, &[12])).0, Code::ForeignIncomplete);
     // The header states counts beyond any memory.
     assert_eq!(

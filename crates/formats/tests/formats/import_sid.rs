@@ -122,7 +122,7 @@ fn sound_files_have_no_findings_and_name_their_dialect() {
         assert_eq!(findings(&imported), Vec::<String>::new(), "{name}");
         assert_eq!(imported.dialect, *name);
         assert!(imported.checks.len() >= 15, "{name}: {}", imported.checks.len());
-        assert!(imported.body.lacks.is_empty());
+        assert!(imported.body.omissions.is_empty());
     }
 }
 
@@ -155,7 +155,7 @@ fn files_by_modes_are_embs_also_under_the_earlier_name() {
         assert!(imported.notes[0].contains("m1 has the mode as its middle index"), "{:?}", imported.notes);
         assert_eq!(imported.body.inertia, read(file("fembs")).body.inertia);
     }
-    assert!(read(file("embs")).notes[0].contains("as EMBSlib takes it"));
+    assert!(read(file("embs")).notes[0].contains("as EMBSlib reads it"));
 }
 
 #[test]
@@ -227,7 +227,7 @@ fn every_fault_gives_the_finding_that_names_it() {
             vec!["FB742 ge_layout"],
         ),
         (
-            "the last columns of Oe are exchanged",
+            "the last columns of Oe are swapped",
             |object, key, v| {
                 if object != "Oe" || !entry(key) {
                     return same(key, v);
@@ -388,7 +388,7 @@ fn couplings_that_are_zero_are_told_for_what_they_are() {
         _ => same(key, v),
     });
     assert_eq!(found, ["FB745 coupling_is_there"]);
-    assert!(words.contains("Cr1 has nothing that is skew") && !words.contains("Cr1 is zero"), "{words}");
+    assert!(words.contains("Cr1 is symmetric in the modes") && !words.contains("Cr1 is zero"), "{words}");
     let (_, words) = coupling_of(text, |object, key, v| match object {
         "Cr" if key.starts_with("m1") => None,
         _ => same(key, v),
@@ -449,9 +449,8 @@ fn axes_that_are_no_rotation_are_refused() {
 /// Rotated axes of a frame are valid; a note states that they are not taken over.
 #[test]
 fn turned_axes_of_a_frame_are_noted() {
-    let note = |imported: &ImportedFile| {
-        imported.notes.iter().any(|note| note.contains("axes other than those of the body"))
-    };
+    let note =
+        |imported: &ImportedFile| imported.notes.iter().any(|note| note.contains("the axes of frames (AP)"));
     assert!(!note(&read(file("fembs"))));
     let turned = read(&edited(file("fembs"), |object, key, v| match (object, key) {
         ("AP", "m0(1,1)" | "m0(2,2)") => scaled(key, v, -1.0),
@@ -508,13 +507,13 @@ fn unreadable_files_are_told_with_their_line() {
     for (line, new, said) in [
         (first_entry, "m0( 1, 1) = NaN", "expected a finite number"),
         (first_entry, "m0( 1, 1) = 1.0D+999", "expected a finite number"),
-        (first_entry, "m0( 9, 1) = 1.0", "outside of its 3 x 1"),
+        (first_entry, "m0( 9, 1) = 1.0", "outside its 3 x 1"),
         (first_entry, "m0( 0, 1) = 1.0", "expected a size, an entry"),
         (first_entry, "m0( 1, 99999999999999999999) = 1.0", "expected a size, an entry"),
         (first_entry, "m2( 1, 1, 1) = 1.0", "expected a size, an entry"),
-        (line_of("nelastq"), "nelastq = 4", "first line has 3 modes"),
+        (line_of("nelastq"), "nelastq = 4", "first line states 3 modes"),
         (line_of("nelastq"), "nelastq = -1", "expected a whole number"),
-        (line_of("order"), "order = 2", "of an order above 1"),
+        (line_of("order"), "order = 2", "an order above 1"),
         (line_of("nrow"), "nrow = 4000000000", "expected 3 x 1"),
         (line_of("rframe"), "colour = red", "expected one of its objects"),
         (line_of("part"), "parts", "expected `part`"),
@@ -526,11 +525,11 @@ fn unreadable_files_are_told_with_their_line() {
     }
     let first = text.lines().nth(first_entry - 1).expect("an entry");
     let again = text.replacen(first, &format!("{first}\n{first}"), 1);
-    assert!(try_read(again.as_bytes()).expect_err("twice").to_string().contains("again"));
+    assert!(try_read(again.as_bytes()).expect_err("twice").to_string().contains("is repeated"));
     let half: String = text.lines().take(first_entry).map(|line| format!("{line}\n")).collect();
     assert!(try_read(half.as_bytes()).expect_err("cut").to_string().contains("ends inside of `origin`"));
     let more = format!("{text}\npart\n");
-    assert!(try_read(more.as_bytes()).expect_err("more").to_string().contains("after `end part`"));
+    assert!(try_read(more.as_bytes()).expect_err("more").to_string().contains("follows `end part`"));
     for missing in ["Ke", "Me", "mdCM", "J"] {
         let start = text.find(&format!("           {missing}\n")).expect("an object");
         let end = text.find(&format!("end {missing}\n")).expect("its end") + 5 + missing.len();

@@ -142,7 +142,7 @@ impl Orientation<4> for EulerParameters {
 pub struct RotationVector(pub Vector3<f64>);
 
 /// Angle below which the series of [`RotationVector`] are used: the truncated terms are below rounding.
-const SMALL: f64 = 1.0;
+const SERIES_LIMIT: f64 = 1.0;
 
 /// Number of terms of these series: the next term is below 1e-20 of the first.
 const TERMS: u32 = 10;
@@ -157,7 +157,7 @@ impl RotationVector {
     fn coefficients(&self) -> [f64; 5] {
         let square = self.0.norm_squared();
         let f = square.sqrt();
-        if f < SMALL {
+        if f < SERIES_LIMIT {
             // sum_k (-1)^k f^2k / (2k + shift)! and its derivative over f, sum_k (-1)^k 2k f^(2k-2) / (2k +
             // shift)!.
             let series = |shift: u32| {

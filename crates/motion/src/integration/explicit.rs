@@ -4,12 +4,12 @@ use super::dormand_prince::{A, ALL_STAGES, C, ERROR_3, ERROR_5, INTERPOLATION, S
 use super::{Failure, System, Work};
 
 /// Safety factor: the next step is chosen for an error of this part of the tolerance.
-const SAFETY: f64 = 0.9;
+const STEP_SAFETY_FACTOR: f64 = 0.9;
 
 /// Smallest factor of the step length from one attempt to the next.
-const SHRINK: f64 = 1.0 / 3.0;
+const MIN_STEP_FACTOR: f64 = 1.0 / 3.0;
 /// Largest factor of the step length from one step to the next.
-const GROW: f64 = 6.0;
+const MAX_STEP_FACTOR: f64 = 6.0;
 
 /// Step length, relative to the time, below which a step does not advance the time.
 const SMALLEST: f64 = 16.0 * f64::EPSILON;
@@ -100,7 +100,7 @@ impl Explicit {
             Some(length) => length,
             None => self.first_length(system, time, end - time)?,
         };
-        let mut grow = GROW;
+        let mut grow = MAX_STEP_FACTOR;
         loop {
             // A remainder too short for a step of its own is split between two steps.
             let left = end - time;
@@ -120,7 +120,7 @@ impl Explicit {
                 Err(Failure::Rates { .. }) => f64::INFINITY,
                 Err(failure) => return Err(failure),
             };
-            let factor = (SAFETY * error.powf(-1.0 / 8.0)).clamp(SHRINK, grow);
+            let factor = (STEP_SAFETY_FACTOR * error.powf(-1.0 / 8.0)).clamp(MIN_STEP_FACTOR, grow);
             if error <= 1.0 {
                 self.proposed = Some(if h < length { length.max(h * factor) } else { h * factor });
                 state.copy_from_slice(&self.stage);
@@ -133,7 +133,7 @@ impl Explicit {
             }
             self.work.rejected += 1;
             // NaN shrinks the step too.
-            length = h * if factor < 1.0 { factor } else { SHRINK };
+            length = h * if factor < 1.0 { factor } else { MIN_STEP_FACTOR };
             grow = 1.0;
         }
     }

@@ -169,9 +169,9 @@ impl Gauss {
                 self.work.rates += 1;
                 system.rates(time + self.tableau.nodes[i] * h, &self.stage, &mut self.rates[i])?;
             }
-            self.find_lacks(h);
-            let lacks = &mut self.rates[..self.tableau.stages];
-            let own_size = system.correct_stages(h, &self.modes, &self.scales, lacks)?;
+            self.find_residuals(h);
+            let residuals = &mut self.rates[..self.tableau.stages];
+            let own_size = system.correct_stages(h, &self.modes, &self.scales, residuals)?;
             let in_scales = self.correct(h);
             let size = own_size.unwrap_or(in_scales);
             // Contraction of the corrections; unknown at the first correction.
@@ -223,7 +223,7 @@ impl Gauss {
     }
 
     /// Computes the residual of the increments, h A f - Z, in place of the rates.
-    fn find_lacks(&mut self, h: f64) {
+    fn find_residuals(&mut self, h: f64) {
         for at in 0..self.stage.len() {
             let rates = self.rates.each_ref().map(|rates| rates[at]);
             for i in 0..self.tableau.stages {
@@ -238,14 +238,14 @@ impl Gauss {
         for (oscillator, inverse) in &self.oscillators {
             let (x, p) = (oscillator.coordinate, oscillator.momentum);
             let entry = |rates: &[Vec<f64>; STAGES], at: usize| rates.each_ref().map(|rates| rates[at]);
-            let (lacks, mut lacks_p) = (entry(&self.rates, x), entry(&self.rates, p));
-            for (lacks_p, weights) in lacks_p.iter_mut().zip(&self.tableau.weights) {
-                *lacks_p -= oscillator.stiffness * h * product(weights, &lacks);
+            let (residuals, mut residuals_p) = (entry(&self.rates, x), entry(&self.rates, p));
+            for (residuals_p, weights) in residuals_p.iter_mut().zip(&self.tableau.weights) {
+                *residuals_p -= oscillator.stiffness * h * product(weights, &residuals);
             }
-            let correction: [f64; STAGES] = std::array::from_fn(|i| product(&inverse[i], &lacks_p));
+            let correction: [f64; STAGES] = std::array::from_fn(|i| product(&inverse[i], &residuals_p));
             for i in 0..self.tableau.stages {
                 self.rates[i][p] = correction[i];
-                self.rates[i][x] = lacks[i] + h * product(&self.tableau.weights[i], &correction);
+                self.rates[i][x] = residuals[i] + h * product(&self.tableau.weights[i], &correction);
             }
         }
         let mut sum = 0.0;

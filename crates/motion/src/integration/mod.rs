@@ -11,6 +11,6 @@ mod system;
 pub use explicit::Explicit;
 pub use free_oscillation::free_oscillation;
 pub use gauss::Gauss;
-pub use schedule::{Method, Sight, integrate, integrate_closely};
+pub use schedule::{Method, ObserverEvent, integrate, integrate_closely};
 pub use stages::{STAGES, StageMode};
 pub use system::{Failure, Oscillator, System, Work};

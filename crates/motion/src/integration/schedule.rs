@@ -41,7 +41,7 @@ impl Method {
 
 /// Occasion of a state passed to an observer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sight {
+pub enum ObserverEvent {
     /// Requested output time.
     Instant,
     /// Start of an interval without breaks: the first output time, and the far side of every break.
@@ -73,9 +73,9 @@ pub fn integrate<E: From<Failure>>(
     breaks: &[f64],
     mut observe: impl FnMut(f64, &[f64]) -> Result<(), E>,
 ) -> Result<(), E> {
-    integrate_closely(method, system, state, instants, breaks, 1, |sight, time, state| match sight {
-        Sight::Instant => observe(time, state),
-        Sight::Start | Sight::End | Sight::Within => Ok(()),
+    integrate_closely(method, system, state, instants, breaks, 1, |event, time, state| match event {
+        ObserverEvent::Instant => observe(time, state),
+        ObserverEvent::Start | ObserverEvent::End | ObserverEvent::Within => Ok(()),
     })
 }
 
@@ -96,11 +96,11 @@ pub fn integrate_closely<E: From<Failure>>(
     instants: &[f64],
     breaks: &[f64],
     parts: usize,
-    mut observe: impl FnMut(Sight, f64, &[f64]) -> Result<(), E>,
+    mut observe: impl FnMut(ObserverEvent, f64, &[f64]) -> Result<(), E>,
 ) -> Result<(), E> {
     let (Some(&start), Some(&last)) = (instants.first(), instants.last()) else { return Ok(()) };
-    observe(Sight::Start, start, state)?;
-    observe(Sight::Instant, start, state)?;
+    observe(ObserverEvent::Start, start, state)?;
+    observe(ObserverEvent::Instant, start, state)?;
     let mut wanted = Wanted { rest: &instants[1..] };
     let mut from = start;
     let inner = breaks.iter().filter(|&&at| start < at && at < last).map(|&at| (at, true));
@@ -119,10 +119,10 @@ pub fn integrate_closely<E: From<Failure>>(
             }
         }
         if piece.before < stop {
-            observe(Sight::Start, stop, state)?;
+            observe(ObserverEvent::Start, stop, state)?;
         }
         while let Some(instant) = wanted.next_until(stop) {
-            observe(Sight::Instant, instant, state)?;
+            observe(ObserverEvent::Instant, instant, state)?;
         }
         from = stop;
     }
@@ -173,7 +173,7 @@ fn explicit_piece<E: From<Failure>>(
     piece: SmoothInterval,
     parts: usize,
     wanted: &mut Wanted<'_>,
-    observe: &mut impl FnMut(Sight, f64, &[f64]) -> Result<(), E>,
+    observe: &mut impl FnMut(ObserverEvent, f64, &[f64]) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut within = vec![0.0; state.len()];
     let mut time = piece.from;
@@ -184,14 +184,14 @@ fn explicit_piece<E: From<Failure>>(
             let place = if part < parts { time + (end - time) * (part as f64 / parts as f64) } else { end };
             while let Some(instant) = wanted.next_before(place) {
                 method.interpolate(system, instant, state, &mut within)?;
-                observe(Sight::Instant, instant, &within)?;
+                observe(ObserverEvent::Instant, instant, &within)?;
             }
             if part < parts {
                 method.interpolate(system, place, state, &mut within)?;
-                observe(Sight::Within, place, &within)?;
+                observe(ObserverEvent::Within, place, &within)?;
             }
         }
-        observe(Sight::End, end, state)?;
+        observe(ObserverEvent::End, end, state)?;
         time = end;
     }
     Ok(())
@@ -206,7 +206,7 @@ fn gauss_piece<E: From<Failure>>(
     state: &mut [f64],
     piece: SmoothInterval,
     wanted: &mut Wanted<'_>,
-    observe: &mut impl FnMut(Sight, f64, &[f64]) -> Result<(), E>,
+    observe: &mut impl FnMut(ObserverEvent, f64, &[f64]) -> Result<(), E>,
 ) -> Result<(), E> {
     let span = piece.before - piece.from;
     if span <= 0.0 {
@@ -230,12 +230,12 @@ fn gauss_piece<E: From<Failure>>(
             aside.restart();
             aside.step(system, time, &mut within, instant - time)?;
             finite(&within, time)?;
-            observe(Sight::Instant, instant, &within)?;
+            observe(ObserverEvent::Instant, instant, &within)?;
         }
         while let Some(instant) = wanted.next_before(end) {
-            observe(Sight::Instant, instant, state)?;
+            observe(ObserverEvent::Instant, instant, state)?;
         }
-        observe(Sight::End, end, state)?;
+        observe(ObserverEvent::End, end, state)?;
         time = end;
     }
     Ok(())

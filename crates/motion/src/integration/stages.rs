@@ -61,10 +61,10 @@ fn largest_entry(matrix: &DMatrix<Complex<f64>>) -> (usize, usize) {
 }
 
 /// Imaginary part relative to the real part that counts as rounding.
-const REAL: f64 = 1e-9;
+const IMAGINARY_ROUNDING: f64 = 1e-9;
 
 fn is_paired(value: Complex<f64>) -> bool {
-    value.im.abs() > REAL * value.re.abs()
+    value.im.abs() > IMAGINARY_ROUNDING * value.re.abs()
 }
 
 fn below(value: Complex<f64>) -> bool {

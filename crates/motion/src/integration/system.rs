@@ -24,8 +24,8 @@ pub trait System {
         &[]
     }
 
-    /// Filters the residuals `lacks` of the stages of an implicit step of length h by a stiff linear part J
-    /// of the system that is solved as a whole: replaces them by (I - h A kron J)^-1 `lacks`, with the
+    /// Filters the `residuals` of the stages of an implicit step of length h by a stiff linear part J
+    /// of the system that is solved as a whole: replaces them by (I - h A kron J)^-1 `residuals`, with the
     /// matrix A of the method given by its eigenvalues. The default does nothing.
     ///
     /// Returns the root mean square of the corrections over the stages, relative to the motion, in a norm
@@ -39,7 +39,7 @@ pub trait System {
         _h: f64,
         _modes: &[StageMode],
         _scales: &[f64],
-        _lacks: &mut [Vec<f64>],
+        _residuals: &mut [Vec<f64>],
     ) -> Result<Option<f64>, Failure> {
         Ok(None)
     }
@@ -106,10 +106,13 @@ impl std::fmt::Display for Failure {
             Self::Rates { reason } => f.write_str(reason),
             Self::NotFinite { time } => write!(f, "the state is no longer finite after t = {time:e}"),
             Self::StepTooSmall { time } => {
-                write!(f, "no step that time can resolve meets the tolerance at t = {time:e}")
+                write!(
+                    f,
+                    "the step that meets the tolerance at t = {time:e} is too small for the resolution of time"
+                )
             }
             Self::NotConverged { time, step } => {
-                write!(f, "the equations of the implicit step of {step:e} from t = {time:e} were not solved")
+                write!(f, "the equations of the implicit step of {step:e} from t = {time:e} did not converge")
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Reactions of the reference conditions of a body: the forces that keep its frame in the position that the
 //! conditions define.
 
-use super::stage::{UNCOUPLED, is_uncoupled};
+use super::framed_scene::{UNCOUPLED, is_uncoupled};
 use flexbody_body::flex_body::FlexBody;
 use nalgebra::{DMatrix, DVector, Vector3};
 

@@ -17,13 +17,13 @@ pub(super) fn contradictions(walk: &mut Walk<'_>, top: &TomlTable) {
         _ => None,
     };
     if let (true, Some(value)) = (carried, top.get("spin")) {
-        let message = "[spin] is given, but [carried] prescribes the motion of the body: give [carried.spin]";
+        let message = "[spin] contradicts [carried], which prescribes the motion of the body: give [carried.spin] instead";
         walk.complain(Code::SceneContradicts, value.span(), message.to_owned());
     }
     if let Some(initial) = table_of(top, "initial") {
         let mut refuse = |key: &str, by: Option<&str>| {
             if let (Some(value), Some(by)) = (initial.get(key), by) {
-                let message = format!("`{key}` of [initial] is given, but {by}");
+                let message = format!("`{key}` of [initial] has no effect: {by}");
                 walk.complain(Code::SceneContradicts, value.span(), message);
             }
         };
@@ -32,14 +32,14 @@ pub(super) fn contradictions(walk: &mut Walk<'_>, top: &TomlTable) {
         let has_attitude =
             |table: Option<&TomlTable>| table.is_some_and(|table| table.contains_key("attitude_from"));
         let by_attitude = (has_attitude(spin) || has_attitude(carried_spin))
-            .then_some("`attitude_from` says which attitude the body starts with");
+            .then_some("`attitude_from` prescribes the attitude at the start");
         refuse("rotation", by_attitude);
         refuse("velocity", by.filter(|_| carried).or(holds.then_some("`hold` of [spin] holds the body")));
         if !initial.contains_key("angular_velocity") {
-            refuse("axes", Some("there is no `angular_velocity` along them"));
+            refuse("axes", Some("[initial] has no `angular_velocity` in these axes"));
         }
         if initial.contains_key("mode") {
-            refuse("deformation", Some("[[initial.mode]] says how the body starts"));
+            refuse("deformation", Some("[[initial.mode]] prescribes the deformation at the start"));
         }
         twice(walk, initial.get("mode"), "mode", numbered);
     }
@@ -51,7 +51,7 @@ pub(super) fn contradictions(walk: &mut Walk<'_>, top: &TomlTable) {
     {
         let Some(table) = table_of(top, name) else { continue };
         if let (Some(value), false) = (table.get("axes"), keys.iter().any(|key| is_list(table, key))) {
-            let message = format!("`axes` of [{name}] is given, but there are no components along them");
+            let message = format!("`axes` of [{name}] has no effect: no value in [{name}] has components");
             walk.complain(Code::SceneContradicts, value.span(), message);
         }
     }

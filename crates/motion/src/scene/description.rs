@@ -31,7 +31,7 @@ pub struct Scene {
     pub source: Option<SourceFile>,
     /// Files that histories of the scene were read from.
     pub series: Vec<SeriesFile>,
-    /// True if the vectors are along the axes of a body in its [`Stage`](super::Stage), and the initial
+    /// True if the vectors are along the axes of a body in its [`FramedScene`](super::FramedScene), and the initial
     /// state is that of the frame of this body.
     pub resolved: bool,
     /// Name of this load case, if the scene file has several.
@@ -252,7 +252,7 @@ pub struct Spin {
 
 impl Spin {
     /// Returns angular velocity and acceleration at a time along axes of the model with the given
-    /// `attitude`, for a scene on its [`Stage`](super::Stage).
+    /// `attitude`, for a scene on its [`FramedScene`](super::FramedScene).
     pub fn at(&self, time: f64, attitude: &Matrix3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         turning(&self.velocity, self.axes, time, attitude)
     }

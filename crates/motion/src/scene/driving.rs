@@ -48,7 +48,7 @@ impl<'a> CarriedMotion<'a> {
 
 impl<'a> Driving<'a> {
     /// Collects the prescribed motion of `frame` in `scene`; `frame` belongs to a body in its
-    /// [`Stage`](super::Stage).
+    /// [`FramedScene`](super::FramedScene).
     pub fn new(frame: &Frame, scene: &'a Scene) -> Self {
         Self { spin: scene.spin.as_ref(), carried: CarriedMotion::new(frame, scene) }
     }

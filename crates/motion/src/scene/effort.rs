@@ -43,8 +43,8 @@ impl Effort {
     pub(super) fn plan(body: &FlexBody, scene: &Scene, duration: f64) -> Result<(Scheme, Self)> {
         let fastest_mode = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt() / TAU;
         let fastest_load = fastest_history(scene, duration);
-        let load_in_words = format!("a load or spin oscillates {fastest_load:.3e} times per time");
-        let mode_in_words = format!("the fastest mode oscillates {fastest_mode:.3e} times per time");
+        let load_in_words = format!("a load or spin oscillates {fastest_load:.3e} times per unit of time");
+        let mode_in_words = format!("the fastest mode oscillates {fastest_mode:.3e} times per unit of time");
         match scene.run.scheme {
             Scheme::Adaptive { .. } => {
                 let for_modes = duration * fastest_mode * TAU / STABLE;
@@ -59,18 +59,19 @@ impl Effort {
             Scheme::Conserving { order, step: Some(step) } => {
                 let step = step.min(duration);
                 if step * fastest_load * STEPS_PER_OSCILLATION > 1.0 {
-                    let message = format!("{load_in_words}: steps of {step:e} pass over it");
+                    let message = format!("{load_in_words}: steps of {step:e} cannot resolve it");
                     let longest = 1.0 / (STEPS_PER_PERIOD * fastest_load);
-                    let help = format!("give a `step` of {longest:.3e} or less, or none");
+                    let help = format!("give a `step` of {longest:.3e} or less, or omit `step`");
                     return Err(Diagnostic::new(Code::StepPassesOver, message).with_help(help).into());
                 }
                 let because = format!("steps of {step:e}");
                 Ok((Scheme::Conserving { order, step: Some(step) }, Self { steps: duration / step, because }))
             }
             Scheme::Conserving { order, step: None } => {
-                let (fastest, because) = match fastest_load > fastest_mode {
-                    true => (fastest_load, load_in_words),
-                    false => (fastest_mode, mode_in_words),
+                let (fastest, because) = if fastest_load > fastest_mode {
+                    (fastest_load, load_in_words)
+                } else {
+                    (fastest_mode, mode_in_words)
                 };
                 let step = (1.0 / (STEPS_PER_PERIOD * fastest)).min(duration);
                 Ok((Scheme::Conserving { order, step: Some(step) }, Self { steps: duration / step, because }))
@@ -87,7 +88,7 @@ impl Effort {
             return Ok(());
         }
         let message = format!(
-            "the run of `{}` takes {:.1e} steps at the least, {} are allowed: {}",
+            "the run of `{}` needs at least {:.1e} steps, {} are allowed: {}",
             scene.name, self.steps, scene.run.most_steps, self.because
         );
         Err(Diagnostic::new(Code::RunTooLong, message).into())

@@ -52,7 +52,7 @@ pub(super) fn settle(
         let message = format!("`{}` has no static deformation at time zero: {why}", scene.name);
         Error::from(
             Diagnostic::new(Code::SimulationStopped, message)
-                .with_help("leave `deformation` of [initial] out"),
+                .with_help("remove `deformation` from [initial]"),
         )
     };
     let mut balance = Balance::new(body, equations, forces, start.clone())
@@ -160,7 +160,7 @@ impl<'a> Balance<'a> {
             }
             let derivative = self.derivative(&q, scale)?;
             let Some(step) = derivative.lu().solve(&-&residual) else {
-                return Err("the spin takes the stiffness of some motion".to_owned());
+                return Err("the spin makes the stiffness of some motion zero or negative".to_owned());
             };
             match self.shortened(&q, &step, left)? {
                 Some((moved, rest)) => (q, residual) = (moved, rest),
@@ -168,7 +168,7 @@ impl<'a> Balance<'a> {
                 None => break,
             }
         }
-        Err("what acts on the deformed body leads away from it".to_owned())
+        Err("the iteration diverges under the forces on the deformed body".to_owned())
     }
 
     /// Returns the first of q + step, q + step / 2, ... with a residual smaller than `left`.
@@ -196,6 +196,10 @@ impl<'a> Balance<'a> {
         let relative = Mat::from_fn(relative.nrows(), relative.ncols(), |i, j| relative[(i, j)]);
         let eigenvalues = relative.eigenvalues();
         let stable = eigenvalues.is_ok_and(|values| values.iter().all(|value| value.re > 0.0));
-        if stable { Ok(()) } else { Err("the spin takes the stiffness of some motion".to_owned()) }
+        if stable {
+            Ok(())
+        } else {
+            Err("the spin makes the stiffness of some motion zero or negative".to_owned())
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Error measures: the distance of a motion from a reference motion, in the quantities that have tolerances
 //! in a scene.
 
-use super::lively::{LivelyNodes, along_principal_directions, longest};
+use super::active_nodes::{ActiveNodes, along_principal_directions, longest};
 use super::peak::Peak;
 use super::{Extremes, PerQuantity, Tolerance, Trace};
 use crate::dynamics::EulerParameters;
@@ -23,10 +23,10 @@ const LEAST_BESIDE: f64 = 1e-2;
 
 /// Ratio of the errors in the second half of a run to those in the first, relative to the growth of the
 /// motion, above which the errors are reported as growing.
-const GROWING: f64 = 1.8;
+const MIN_REPORTED_GROWTH: f64 = 1.8;
 
 /// Part of the tolerance below which growing errors are not reported.
-const MATTERS: f64 = 0.1;
+const MIN_GROWING_ERROR: f64 = 0.1;
 
 /// Force and torque.
 type Reaction = (Vector3<f64>, Vector3<f64>);
@@ -82,11 +82,11 @@ impl ErrorHistory {
 
     /// Returns the growth of the errors from the first half of the run to the second, relative to the
     /// growth of `motion`, the reference: about 1 for errors in step with the motion, 2 and more if phases
-    /// drift apart. Returns `None` if the growth is too small to report (`GROWING`), or if the errors of
-    /// the second half are far below their tolerances (`MATTERS`).
+    /// drift apart. Returns `None` if the growth is too small to report (`MIN_REPORTED_GROWTH`), or if the errors of
+    /// the second half are far below their tolerances (`MIN_GROWING_ERROR`).
     pub fn growth(&self, motion: &Trace, tolerance: &Tolerance) -> Option<f64> {
         let growth = |(first, second): (f64, f64), allowed: f64| {
-            (first > 0.0 && second > MATTERS * allowed).then(|| second / first)
+            (first > 0.0 && second > MIN_GROWING_ERROR * allowed).then(|| second / first)
         };
         let energies: Vec<f64> = motion.elastic.iter().map(|energy| not_negative(*energy).sqrt()).collect();
         let motion = growth(self.halves(&energies), 0.0)?;
@@ -98,7 +98,7 @@ impl ErrorHistory {
             self.errors.as_ref().zip(tolerance.errors).map(own);
         let beyond_motion = [deflection, stress].into_iter().flatten().map(|growth| growth / motion.max(1.0));
         let most = beyond_motion.chain(attitude).reduce(f64::max);
-        most.filter(|growth| *growth > GROWING)
+        most.filter(|growth| *growth > MIN_REPORTED_GROWTH)
     }
 
     /// Returns the largest of `values` in the first half of the run, and in the second.
@@ -111,7 +111,7 @@ impl ErrorHistory {
 
 /// Difference of the deformations of two motions, as functions of time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Apart {
+pub struct DeformationDifference {
     /// Elastic energy of the difference.
     pub energy: Vec<f64>,
     /// Largest difference of the deflections of the compared nodes.
@@ -126,7 +126,7 @@ impl ErrorHistory {
     ///
     /// # Panics
     /// When the motions were sampled at different times.
-    pub fn new(reference: &Trace, candidate: &Trace, apart: &Apart) -> Self {
+    pub fn new(reference: &Trace, candidate: &Trace, apart: &DeformationDifference) -> Self {
         assert!(reference.time == candidate.time, "motions that were looked at in the same places");
         let attitudes = reference.attitude.iter().zip(&candidate.attitude);
         let (deflection, scale) = deflections(reference, candidate, apart);
@@ -152,7 +152,7 @@ fn relative(values: Vec<f64>, scale: f64) -> Option<Vec<f64>> {
 
 /// Returns the differences of deflections over time, and the largest deflection of the reference: for the
 /// watched points or, without any, for the nodes compared by `apart`.
-fn deflections(reference: &Trace, candidate: &Trace, apart: &Apart) -> (Vec<f64>, f64) {
+fn deflections(reference: &Trace, candidate: &Trace, apart: &DeformationDifference) -> (Vec<f64>, f64) {
     if reference.deflections.is_empty() {
         return (apart.deflection.clone(), apart.largest_deflection);
     }
@@ -216,7 +216,7 @@ pub struct Measure<'r> {
     trace: &'r Trace,
     /// Nodes to compare if no points are watched.
     nodes: Vec<usize>,
-    rows: LivelyNodes,
+    rows: ActiveNodes,
     largest_deflection: f64,
 }
 
@@ -228,7 +228,7 @@ impl<'r> Measure<'r> {
     pub fn new(body: &'r FlexBody, trace: &'r Trace) -> Self {
         assert!(trace.q.iter().all(|q| q.len() == body.n_modes()), "a motion of the body");
         let nodes = if trace.deflections.is_empty() { along_principal_directions(body) } else { Vec::new() };
-        let rows = LivelyNodes::new(body, &nodes);
+        let rows = ActiveNodes::new(body, &nodes);
         let largest_deflection = Peak::of(&trace.time, trace.q.iter().map(|q| rows.longest(q))).value;
         Self { body, trace, nodes, rows, largest_deflection }
     }
@@ -265,7 +265,7 @@ impl<'r> Measure<'r> {
     /// When the motions were sampled at different times.
     pub fn of_other(&self, candidate: &Trace, modes: &OtherModes<'_>) -> ErrorHistory {
         let (energy, rows) =
-            (self.body.invariants().modal_stiffness(), LivelyNodes::new(modes.body, &self.nodes));
+            (self.body.invariants().modal_stiffness(), ActiveNodes::new(modes.body, &self.nodes));
         let apart = self.apart(candidate, |reference, own| {
             let q = DVector::from_column_slice(own);
             let difference = &modes.map * &q - DVector::from_column_slice(reference);
@@ -277,10 +277,14 @@ impl<'r> Measure<'r> {
         ErrorHistory::new(self.trace, candidate, &apart)
     }
 
-    fn apart(&self, candidate: &Trace, difference: impl Fn(&[f64], &[f64]) -> (f64, f64)) -> Apart {
+    fn apart(
+        &self,
+        candidate: &Trace,
+        difference: impl Fn(&[f64], &[f64]) -> (f64, f64),
+    ) -> DeformationDifference {
         let (energy, deflection) =
             self.trace.q.iter().zip(&candidate.q).map(|(a, b)| difference(a, b)).unzip();
-        Apart { energy, deflection, largest_deflection: self.largest_deflection }
+        DeformationDifference { energy, deflection, largest_deflection: self.largest_deflection }
     }
 }
 

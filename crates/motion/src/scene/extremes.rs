@@ -1,6 +1,6 @@
 //! Largest values of all quantities over a continuous motion.
 
-use super::lively::{LivelyNodes, longest_of_all};
+use super::active_nodes::{ActiveNodes, longest_of_all};
 use super::peak::Peak;
 use crate::dynamics::{Balance, BodyPoint};
 use flexbody_body::flex_body::FlexBody;
@@ -27,7 +27,7 @@ pub struct Extremes {
     /// Largest angular velocity |omega|.
     pub spin: f64,
     /// Largest components |omega_k| of the angular velocity along the body axes.
-    pub spin_about: Vector3<f64>,
+    pub spin_body: Vector3<f64>,
     /// Largest angular velocities about distinct axes, body axes.
     pub spins: Vec<Vector3<f64>>,
     /// Largest force and torque of the prescribed motion; zero without.
@@ -53,17 +53,17 @@ pub struct Drift {
 pub(super) struct Survey<'b> {
     body: &'b FlexBody,
     watched: &'b [BodyPoint],
-    nodes: LivelyNodes,
+    nodes: ActiveNodes,
     /// Deflection among `nodes`, and the time of its largest value.
     deflection: Peak,
-    bulges: Bulges,
+    largest_deformations: LargestDeformations,
     paths: Vec<Peak>,
     amplitudes: Vec<Peak>,
     /// Roots of the energies, which grow like displacements.
     elastic: Peak,
     internal: Peak,
     spin: Peak,
-    spin_about: [Peak; 3],
+    spin_body: [Peak; 3],
     spins: Spins,
     reaction: [Peak; 2],
     differences: Differences,
@@ -74,15 +74,15 @@ impl<'b> Survey<'b> {
         Self {
             body,
             watched,
-            nodes: LivelyNodes::of_modes(body),
+            nodes: ActiveNodes::of_modes(body),
             deflection: Peak::default(),
-            bulges: Bulges::default(),
+            largest_deformations: LargestDeformations::default(),
             paths: vec![Peak::default(); watched.len()],
             amplitudes: vec![Peak::default(); body.n_modes()],
             elastic: Peak::default(),
             internal: Peak::default(),
             spin: Peak::default(),
-            spin_about: [Peak::default(); 3],
+            spin_body: [Peak::default(); 3],
             spins: Spins::default(),
             reaction: [Peak::default(); 2],
             differences: Differences::default(),
@@ -93,7 +93,7 @@ impl<'b> Survey<'b> {
     pub(super) fn see_shape(&mut self, time: f64, q: &[f64], elastic: f64) {
         let deflection = self.nodes.longest(q);
         self.deflection.see(time, deflection);
-        self.bulges.see(time, deflection, q);
+        self.largest_deformations.see(time, deflection, q);
         self.elastic.see(time, elastic.max(0.0).sqrt());
         for (peak, point) in self.paths.iter_mut().zip(self.watched) {
             peak.see(time, point.deflection(q).norm());
@@ -112,7 +112,7 @@ impl<'b> Survey<'b> {
         let internal = balance.kinetic - balance.flight + balance.elastic;
         self.internal.see(time, internal.max(0.0).sqrt());
         self.spin.see(time, omega.norm());
-        self.spin_about.iter_mut().zip(omega.iter()).for_each(|(peak, w)| peak.see(time, w.abs()));
+        self.spin_body.iter_mut().zip(omega.iter()).for_each(|(peak, w)| peak.see(time, w.abs()));
         self.spins.see(omega);
         self.differences.see(balance);
     }
@@ -122,7 +122,7 @@ impl<'b> Survey<'b> {
     /// * `size`: mass and radius of gyration of the body.
     /// * `least_energy`: energy below which energies count as rounding.
     pub(super) fn extremes(self, size: (f64, f64), least_energy: f64) -> Extremes {
-        let deflection = self.bulges.largest(self.body, self.deflection.value);
+        let deflection = self.largest_deformations.largest(self.body, self.deflection.value);
         let internal = self.internal.value.powi(2);
         Extremes {
             deflection,
@@ -131,7 +131,7 @@ impl<'b> Survey<'b> {
             elastic: self.elastic.value.powi(2),
             internal,
             spin: self.spin.value,
-            spin_about: Vector3::from(self.spin_about.map(|peak| peak.value)),
+            spin_body: Vector3::from(self.spin_body.map(|peak| peak.value)),
             spins: self.spins.0,
             reaction: (self.reaction[0].value, self.reaction[1].value),
             drift: self.differences.drift(internal, size, least_energy),
@@ -169,7 +169,7 @@ const KEPT: usize = 16;
 /// Deformations with the largest deflections among the nodes that the modes move most. Another node may
 /// deflect more then, or at another of these times.
 #[derive(Debug, Clone, Default)]
-struct Bulges {
+struct LargestDeformations {
     /// Time, deflection and modal coordinates; the largest deflection first.
     kept: Vec<(f64, f64, Vec<f64>)>,
     /// Last deformation.
@@ -178,7 +178,7 @@ struct Bulges {
     grows: bool,
 }
 
-impl Bulges {
+impl LargestDeformations {
     fn see(&mut self, time: f64, deflection: f64, q: &[f64]) {
         if deflection < self.last.1 {
             self.keep_last();

@@ -1,6 +1,6 @@
 //! Ratio of the stiffness of inertia to the stiffness of a body in a scene.
 
-use super::{Scene, Stage, instants, trace};
+use super::{FramedScene, Scene, instants, trace};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
@@ -15,9 +15,9 @@ use flexbody_linalg::context::Context;
 /// # Errors
 /// The errors of [`simulate`](super::simulate).
 pub fn inertia_share(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<Option<f64>> {
-    let stage = Stage::new(body, scene)?;
-    let Some(inertia) = stage.body.inertia_stiffness() else { return Ok(None) };
-    let stiffness = stage.body.invariants().modal_stiffness();
+    let framed = FramedScene::new(body, scene)?;
+    let Some(inertia) = framed.body.inertia_stiffness() else { return Ok(None) };
+    let stiffness = framed.body.invariants().modal_stiffness();
     let Some(shares) = inertia.shares(stiffness.as_ref()) else { return Ok(None) };
     let (motion, _) = trace(body, scene, &context.unheard())?;
     let seen = instants(body, scene, &motion.time)?;

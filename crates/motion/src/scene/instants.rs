@@ -1,15 +1,15 @@
 //! Complete state of a motion at given times, for evaluations of the equations of all nodes.
 
 use super::prepared::{Prepared, damped};
-use super::{Scene, Stage};
+use super::{FramedScene, Scene};
 use crate::dynamics::Motion;
-use crate::integration::{Failure, Sight};
+use crate::integration::{Failure, ObserverEvent};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use nalgebra::Vector3;
 
 /// State, accelerations and loads of a body at one time. Vectors are along the axes of the frame of the
-/// [`Stage`], about its origin.
+/// [`FramedScene`], about its origin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
     /// Time of the state.
@@ -40,12 +40,12 @@ pub struct Instant {
 /// # Errors
 /// The errors of [`simulate`](super::simulate).
 pub fn instants(body: &FlexBody, scene: &Scene, times: &[f64]) -> Result<Vec<Instant>> {
-    let stage = Stage::new(body, scene)?;
-    let body = &*damped(&stage.body, &stage.scene)?;
-    let run = Prepared::new(body, &stage.scene)?;
+    let framed = FramedScene::new(body, scene)?;
+    let body = &*damped(&framed.body, &framed.scene)?;
+    let run = Prepared::new(body, &framed.scene)?;
     let mut seen = Vec::with_capacity(times.len());
-    let look = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
-        if sight == Sight::Instant {
+    let look = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
+        if event == ObserverEvent::Instant {
             seen.push(see(&run, time, state, motion)?);
         }
         Ok::<(), Failure>(())

@@ -143,15 +143,15 @@ fn names(cases: &[Scene]) -> Vec<&str> {
 }
 
 fn ambiguous(names: &[&str]) -> Diagnostic {
-    let message = format!("the scene has the load cases {}, and one is needed", names.join(", "));
+    let message = format!("the scene has the load cases {}, but only one can be used here", names.join(", "));
     Diagnostic::new(Code::SceneCase, message)
 }
 
 fn unknown_case(name: &str, names: &[&str]) -> Diagnostic {
     if names.is_empty() {
-        let message = format!("there is no case `{name}`: the scene has no cases");
+        let message = format!("the scene has no load case `{name}`: it has no load cases at all");
         return Diagnostic::new(Code::SceneCase, message).with_help("leave --case out");
     }
-    let message = format!("there is no case `{name}`: the scene has {}", names.join(", "));
+    let message = format!("the scene has no load case `{name}`: it has {}", names.join(", "));
     Diagnostic::new(Code::SceneCase, message)
 }

@@ -1,5 +1,6 @@
 //! Scenes: the scene file, and its simulation.
 
+mod active_nodes;
 mod axes;
 mod conditions;
 mod contradictions;
@@ -8,12 +9,12 @@ mod driving;
 mod effort;
 mod equilibrium;
 mod errors;
+mod excited_rate;
 mod extremes;
+mod framed_scene;
 mod history;
 mod inertia_share;
 mod instants;
-mod liveliest;
-mod lively;
 mod load_cases;
 mod nodal_point;
 mod peak;
@@ -33,7 +34,6 @@ mod requirements;
 mod samples;
 mod settled;
 mod simulate;
-mod stage;
 mod surroundings;
 mod trace;
 mod variation;
@@ -46,13 +46,14 @@ pub use description::{
 };
 pub use driving::Driving;
 pub use effort::fastest_history;
-pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};
+pub use errors::{DeformationDifference, ErrorHistory, Measure, OtherModes, OutputErrors};
 pub use errors::{LEAST_REACTION, reaction_errors};
+pub use excited_rate::highest_excited_rate;
 pub use extremes::{Drift, Extremes};
+pub use framed_scene::FramedScene;
 pub use history::History;
 pub use inertia_share::inertia_share;
 pub use instants::{Instant, instants};
-pub use liveliest::liveliest_rate;
 pub use load_cases::LoadCases;
 pub use nodal_point::{find_nodal_point, nodal_point};
 pub use peak::Peak;
@@ -63,7 +64,6 @@ pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, R
 pub use samples::{Interpolation, Sample, Samples, Sizes};
 pub use settled::unsettled_rate;
 pub use simulate::simulate;
-pub use stage::Stage;
 pub use surroundings::{body_point, points_of};
 pub use trace::{Trace, trace, trace_at};
 pub use variation::{Change, SceneVariation, Variations};

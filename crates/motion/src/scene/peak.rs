@@ -1,7 +1,7 @@
 //! Largest value of a smooth function sampled at some times.
 
 /// Ratio of neighbouring intervals above which no parabola is fitted: the samples are at a break.
-const UNEVEN: f64 = 8.0;
+const MAX_INTERVAL_RATIO: f64 = 8.0;
 
 /// Largest value of a function f >= 0 of time sampled at ascending times, and its time.
 ///
@@ -56,7 +56,10 @@ impl Peak {
 /// largest of them.
 fn vertex(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<(f64, f64)> {
     let (before, after) = (b.0 - a.0, c.0 - b.0);
-    let (largest, even) = (b.1 >= a.1 && b.1 >= c.1, before < UNEVEN * after && after < UNEVEN * before);
+    let (largest, even) = (
+        b.1 >= a.1 && b.1 >= c.1,
+        before < MAX_INTERVAL_RATIO * after && after < MAX_INTERVAL_RATIO * before,
+    );
     if !largest || !even {
         return None;
     }

@@ -8,7 +8,7 @@ use super::{Scene, Scheme};
 use crate::dynamics::{
     BodyPoint, Configuration, EquationsOfMotion, Motion, Orientation, RotationVector, Surroundings,
 };
-use crate::integration::{Explicit, Failure, Gauss, Method, Sight, System, Work, integrate_closely};
+use crate::integration::{Explicit, Failure, Gauss, Method, ObserverEvent, System, Work, integrate_closely};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::FlexBody;
@@ -70,15 +70,17 @@ impl<'a> Prepared<'a> {
     /// FB212 if the scene does not fit the body; FB550 and FB551 before any work.
     pub(super) fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
         let Some(duration) = scene.run.duration else {
-            let diagnostic = Diagnostic::new(Code::SceneBody, "the scene does not say how long it lasts");
+            let diagnostic = Diagnostic::new(Code::SceneBody, "the scene has no `duration`");
             return Err(diagnostic.with_help("give `duration` in [run]").into());
         };
+        // Equations and loads, and the state at time zero, in static equilibrium if the scene asks for it.
         let (forces, watched) = SceneForces::new(body, scene)?;
         let equations = EquationsOfMotion::new(body, scene.run.terms);
         let mut start = start(body, scene, &forces);
         if scene.initial.settled {
             settle(body, scene, &equations, &forces, &mut start)?;
         }
+        // Integration scheme, refused if the run needs more steps than allowed.
         let (scheme, effort) = Effort::plan(body, scene, duration)?;
         effort.refuse_too_much(scene)?;
         Ok(Self { scene, forces, watched, equations, start, duration, scheme, body })
@@ -92,20 +94,21 @@ impl<'a> Prepared<'a> {
     pub(super) fn survey(
         &self,
         survey: &mut Survey<'_>,
-        sight: Sight,
+        event: ObserverEvent,
         time: f64,
         state: &[f64],
         motion: &mut Motion<'_>,
     ) -> std::result::Result<Option<Reaction>, Failure> {
+        // The shape is cheap; the equations of motion are evaluated within a step only for reactions.
         let (_, q) = motion.shape(state);
         survey.see_shape(time, q, self.equations.elastic_energy(q));
-        if sight == Sight::Within && !self.scene.prescribes() {
+        if event == ObserverEvent::Within && !self.scene.prescribes() {
             return Ok(None);
         }
         let now = motion.evaluate(time, state)?;
         let reaction = now.reaction();
         survey.see_reaction(time, &reaction);
-        if sight != Sight::Within {
+        if event != ObserverEvent::Within {
             survey.see_balance(time, &now.balance(), &now.configuration().omega);
         }
         Ok(self.scene.prescribes().then_some(reaction))
@@ -121,10 +124,11 @@ impl<'a> Prepared<'a> {
         &self,
         instants: &[f64],
         parts: usize,
-        mut show: impl FnMut(Sight, f64, &[f64], &mut Motion<'_>) -> std::result::Result<(), E>,
+        mut show: impl FnMut(ObserverEvent, f64, &[f64], &mut Motion<'_>) -> std::result::Result<(), E>,
     ) -> Result<Finished> {
         let (mut motion, mut state) = Motion::new(&self.equations, &self.forces, &self.start);
         let mut observer = Motion::new(&self.equations, &self.forces, &self.start).0;
+        // The observer has an evaluation of its own, so that observation does not change the steps.
         let mut method = match self.scheme {
             Scheme::Adaptive { tolerance } => {
                 let longest = longest_step(self.scene, self.duration);
@@ -135,12 +139,14 @@ impl<'a> Prepared<'a> {
                 step: step.unwrap_or(self.duration),
             },
         };
+        // Every observed state passes the limit of the number of steps.
         let mut steps = 0;
-        let observe = |sight: Sight, time: f64, state: &[f64]| {
-            steps += u64::from(sight == Sight::End);
-            match steps > self.scene.run.most_steps {
-                true => Err(Stop::Steps { time }),
-                false => show(sight, time, state, &mut observer).map_err(Into::into),
+        let observe = |event: ObserverEvent, time: f64, state: &[f64]| {
+            steps += u64::from(event == ObserverEvent::End);
+            if steps > self.scene.run.most_steps {
+                Err(Stop::Steps { time })
+            } else {
+                show(event, time, state, &mut observer).map_err(Into::into)
             }
         };
         let breaks = self.scene.breaks();
@@ -181,11 +187,13 @@ pub fn damped_once<'b, 's>(
 fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configuration {
     let initial = &scene.initial;
     let (mut q, mut qd) = (vec![0.0; body.n_modes()], vec![0.0; body.n_modes()]);
+    // Modal coordinates from the initial values of modes by number.
     for start in &initial.modes {
         (q[start.mode], qd[start.mode]) = (start.amplitude, start.rate);
     }
     let attitude = RotationVector(initial.rotation);
     let axes = attitude.axes();
+    // A prescribed motion replaces the initial velocities.
     let prescribed = forces.prescribed(0.0, &axes).0;
     Configuration {
         origin: initial.origin,
@@ -202,16 +210,16 @@ fn stopped(scene: &Scene, method: &Method, stop: Stop) -> Error {
     match stop {
         Stop::Memory { time } => {
             let message = format!(
-                "the motion of `{}` fills the memory after {steps} steps, at t = {time:e}",
+                "the recorded motion of `{}` exceeds the memory after {steps} steps, at t = {time:e}",
                 scene.name
             );
             Diagnostic::new(Code::MemoryShort, message)
-                .with_help("simulate a shorter `duration`, or fewer modes")
+                .with_help("simulate a shorter `duration` or fewer modes")
                 .into()
         }
         Stop::Steps { time } => {
             let message = format!(
-                "the run of `{}` took the {steps} steps that are allowed until t = {time:e}",
+                "the run of `{}` reached only t = {time:e} within the {steps} steps that are allowed",
                 scene.name
             );
             Diagnostic::new(Code::RunTooLong, message).into()
@@ -219,8 +227,8 @@ fn stopped(scene: &Scene, method: &Method, stop: Stop) -> Error {
         Stop::Failed(failure) => {
             let message = format!("simulation of `{}` stopped after {steps} steps: {failure}", scene.name);
             let help = match failure {
-                Failure::NotConverged { .. } => "take a shorter step, or the adaptive method",
-                _ => "the motion may leave the range of the model: look at spin, loads and dropped terms",
+                Failure::NotConverged { .. } => "give a shorter `step`, or use method = \"adaptive\"",
+                _ => "check spin, loads and dropped terms: the motion may leave the range of the model",
             };
             Diagnostic::new(Code::SimulationStopped, message).with_help(help).into()
         }

@@ -84,9 +84,10 @@ pub(super) fn scene(walk: &mut Walk<'_>, top: &TomlTable, stem: String) -> Optio
 
 fn run(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<Run> {
     walk.known_keys(table, "[run]", RUN);
-    let duration = match table.contains_key("duration") {
-        true => positive(walk, table, "duration", &span).map(Some),
-        false => Some(None),
+    let duration = if table.contains_key("duration") {
+        positive(walk, table, "duration", &span).map(Some)
+    } else {
+        Some(None)
     };
     let mut count = |key: &str, default: i64, most: i64| match table.get(key) {
         None => Some(default),
@@ -115,7 +116,7 @@ fn scheme(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option
         if table.contains_key("method") { walk.string(table, "method")? } else { "adaptive".to_owned() };
     let mut refuse = |keys: &[&str]| {
         for key in keys.iter().filter_map(|key| table.get(*key)) {
-            walk.wrong(key.span(), format!("method `{method}` has no such setting"));
+            walk.wrong(key.span(), format!("method `{method}` does not have this setting"));
         }
     };
     match method.as_str() {
@@ -136,10 +137,8 @@ fn scheme(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option
 }
 
 fn adaptive(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option<Scheme> {
-    let tolerance = match table.contains_key("tolerance") {
-        true => positive(walk, table, "tolerance", span)?,
-        false => TOLERANCE,
-    };
+    let tolerance =
+        if table.contains_key("tolerance") { positive(walk, table, "tolerance", span)? } else { TOLERANCE };
     if !TOLERANCES.contains(&tolerance) {
         let message =
             format!("`tolerance` is {tolerance}, expected {} to {}", TOLERANCES.start, TOLERANCES.end);
@@ -160,10 +159,7 @@ fn conserving(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Op
             }
         },
     };
-    let step = match table.contains_key("step") {
-        true => Some(positive(walk, table, "step", span)?),
-        false => None,
-    };
+    let step = if table.contains_key("step") { Some(positive(walk, table, "step", span)?) } else { None };
     Some(Scheme::Conserving { order, step })
 }
 
@@ -245,7 +241,7 @@ fn load(walk: &mut Walk<'_>, files: &HistoryFiles, table: &TomlTable, span: Rang
         walk.wrong(span.clone(), "load has neither `force` nor `torque`".to_owned());
     }
     if has("history") && !has("force") && !has("torque") && (has("force_from") || has("torque_from")) {
-        let message = "`history` is given, but there is no `force` or `torque` that it is a factor of: columns have theirs";
+        let message = "`history` has no effect: it is a factor of `force` or `torque`, and the load has only columns of a file";
         walk.complain(Code::SceneContradicts, span.clone(), message.to_owned());
     }
     let mut part = |key: &str, key_of_columns: &str| match (table.get(key), table.get(key_of_columns)) {

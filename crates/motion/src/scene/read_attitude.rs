@@ -14,7 +14,7 @@ use std::ops::Range;
 pub(super) const ATTITUDE: &[&str] = &["file", "time", "columns", "time_scale", "time_zero"];
 
 /// Keys of the three ways to give a rotation.
-const WAYS: [&str; 3] = ["rate", "angular_velocity_from", "attitude_from"];
+const ROTATION_KEYS: [&str; 3] = ["rate", "angular_velocity_from", "attitude_from"];
 
 /// Largest deviation of the length of Euler parameters from one: the rounding of two decimals.
 const LENGTH: f64 = 0.01;
@@ -42,12 +42,13 @@ pub(super) fn turning(
     span: Range<usize>,
     place: &str,
 ) -> Option<Turning> {
-    let given: Vec<&str> = WAYS.into_iter().filter(|key| table.contains_key(*key)).collect();
+    let given: Vec<&str> = ROTATION_KEYS.into_iter().filter(|key| table.contains_key(*key)).collect();
     let ways = "`rate`, `angular_velocity_from` and `attitude_from`";
     let &[way] = &given[..] else {
-        let message = match given.is_empty() {
-            true => format!("key `rate` is missing in {place}"),
-            false => format!("{place} has more than one of {ways}"),
+        let message = if given.is_empty() {
+            format!("key `rate` is missing in {place}")
+        } else {
+            format!("{place} has more than one of {ways}")
         };
         let wrong = walk.at(Code::SceneSyntax, span, message);
         walk.found.push(wrong.with_help(format!("give one of {ways}")));
@@ -57,7 +58,7 @@ pub(super) fn turning(
     };
     let value = table.get(way)?;
     if way != "rate" && table.contains_key("axis") {
-        let message = format!("`axis` of {place} is given, but `{way}` has all three components");
+        let message = format!("`axis` of {place} has no effect: `{way}` has all three components");
         walk.complain(Code::SceneContradicts, span, message);
         return None;
     }
@@ -112,8 +113,8 @@ impl Attitudes {
             let own = Vector4::from_fn(|k, _| read.columns[k][row]);
             let length = own.norm();
             if (length - 1.0).abs() > LENGTH {
-                let message = format!("Euler parameters have the length {length:.4}, a rotation has 1");
-                let help = "`columns` are the cosine of half the angle and the sine times the three components of the axis";
+                let message = format!("the Euler parameters have the norm {length:.4}, expected 1");
+                let help = "give as `columns` the cosine of half the angle, then the three components of the axis times the sine of half the angle";
                 return Err(wrong(read, line, message, help));
             }
             let mut unit = own / length;
@@ -171,7 +172,7 @@ impl Attitudes {
             let apart = RotationVector::of_axes(&axes(row + 1).tr_mul(&own)).0.norm();
             if apart > LARGEST_LOSS {
                 let message = format!(
-                    "the rows until here are too far apart: the angular velocity through them leads {apart:.1e} radians away from the attitude"
+                    "the rows up to this line are too far apart: the interpolated angular velocity misses the attitude by {apart:.1e} radians"
                 );
                 return Err(wrong(
                     read,

@@ -82,11 +82,10 @@ fn translation(
         .flat_map(|(along, columns, drive)| [(along, false, drive), (columns, true, drive)]);
     let given: Vec<_> = all.filter(|(key, ..)| table.contains_key(*key)).collect();
     let [(key, has_columns, drive)] = given[..] else {
-        let message = match given.is_empty() {
-            true => "[carried.translation] has none of `displacement`, `velocity` and `acceleration`",
-            false => {
-                "[carried.translation] has more than one of `displacement`, `velocity` and `acceleration`"
-            }
+        let message = if given.is_empty() {
+            "[carried.translation] has none of `displacement`, `velocity` and `acceleration`"
+        } else {
+            "[carried.translation] has more than one of `displacement`, `velocity` and `acceleration`"
         };
         walk.wrong(span, message.to_owned());
         return None;
@@ -96,7 +95,7 @@ fn translation(
     let history = if has_columns {
         if let Some(direction) = table.get("direction") {
             let message = format!(
-                "`direction` of [carried.translation] is given, but `{key}` has all three components"
+                "`direction` of [carried.translation] has no effect: `{key}` has all three components"
             );
             walk.complain(Code::SceneContradicts, direction.span(), message);
             return None;
@@ -114,7 +113,7 @@ fn translation(
     };
     if matches!(drive(VectorHistory::nothing()), Drive::Displacement(_)) && !history.is_smooth() {
         let message = format!(
-            "`{key}` has straight lines between points, at which the velocity jumps: give a velocity or an acceleration, a sine or a ramp, or `interpolation` = \"cubic\""
+            "`{key}` is linear between its points, so that the velocity jumps there: give `interpolation` = \"cubic\", a sine or a ramp, or prescribe a velocity or an acceleration"
         );
         walk.wrong(value.span(), message);
         return None;

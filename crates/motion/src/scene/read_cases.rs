@@ -106,13 +106,13 @@ fn names(walk: &mut Walk<'_>, tables: &[(&TomlTable<'_>, Range<usize>)]) -> Vec<
         let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         if !name.chars().all(is_plain) {
             let message = format!(
-                "`name` of [[case]] is `{name}`, expected letters, digits, `_` and `-`: files are named by it"
+                "`name` of [[case]] is `{name}`, expected only letters, digits, `_` and `-` (file names contain it)"
             );
             walk.wrong(value.span(), message);
         }
         // Names become file names, and some file systems ignore case.
         if !name.is_empty() && names.iter().any(|other| other.eq_ignore_ascii_case(&name)) {
-            walk.complain(Code::SceneContradicts, value.span(), format!("case `{name}` is there twice"));
+            walk.complain(Code::SceneContradicts, value.span(), format!("case `{name}` occurs twice"));
         }
         names.push(name);
     }
@@ -167,17 +167,17 @@ fn joined<'t>(name: &str, common: &Value<'t>, case: &Value<'t>) -> Value<'t> {
 /// Returns findings about common keys once, and all others with the name of their case.
 fn each_once(found: Vec<Vec<Diagnostic>>, names: &[String]) -> Vec<Diagnostic> {
     let is_common = |one: &Diagnostic| found.iter().all(|own| own.contains(one));
-    let mut told = Vec::new();
+    let mut distinct = Vec::new();
     for (at, (own, name)) in found.iter().zip(names).enumerate() {
         for one in own {
             match is_common(one) {
-                true if at == 0 => told.push(one.clone()),
+                true if at == 0 => distinct.push(one.clone()),
                 true => {}
-                false => told.push(one.clone().about(format!("case `{name}`"))),
+                false => distinct.push(one.clone().about(format!("case `{name}`"))),
             }
         }
     }
-    told
+    distinct
 }
 
 /// Adds a diagnostic if variations are stated and nothing is simulated.
@@ -197,7 +197,7 @@ fn refuse_some_without_run(walk: &mut Walk<'_>, scenes: &[Scene], names: &[Strin
     }
     for ((scene, name), span) in scenes.iter().zip(names).zip(spans) {
         if scene.run.duration.is_none() {
-            let message = format!("case `{name}` does not say how long it lasts, and others do");
+            let message = format!("case `{name}` has no `duration`, but other cases have one");
             let diagnostic = walk.at(Code::SceneContradicts, span.clone(), message);
             walk.found.push(diagnostic.with_help("give `duration` in [run] of the scene or of every case"));
         }

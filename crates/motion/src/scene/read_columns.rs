@@ -107,12 +107,10 @@ impl HistoryFiles {
             Needed::Until(end) if first > ROUNDING * end || last < end - ROUNDING * end => {
                 (format!("the run goes from 0 to {end}"), Code::SeriesRange.help())
             }
-            Needed::NotSaid => {
-                ("the scene does not say how long it lasts".to_owned(), "give `duration` in [run]")
-            }
+            Needed::NotSaid => ("the scene has no `duration`".to_owned(), "give `duration` in [run]"),
             Needed::Until(_) | Needed::NotKnown => return Some(()),
         };
-        let message = format!("{name} has the times {first} to {last} of the scene, {what}");
+        let message = format!("{name} covers the times {first} to {last} of the scene, but {what}");
         let uncovered = walk.at(Code::SeriesRange, span.clone(), message);
         walk.found.push(uncovered.with_help(help));
         None
@@ -149,9 +147,10 @@ impl ColumnOptions {
             if table.contains_key(key) { finite(walk, table, key, span) } else { Some(default) }
         };
         let (scale, time_zero) = (or("scale", 1.0), or("time_zero", 0.0));
-        let time_scale = match table.contains_key("time_scale") {
-            true => positive(walk, table, "time_scale", span),
-            false => Some(1.0),
+        let time_scale = if table.contains_key("time_scale") {
+            positive(walk, table, "time_scale", span)
+        } else {
+            Some(1.0)
         };
         let interpolation = interpolation(walk, table, default);
         let held = one_of(walk, table, "outside", &[("hold", true)], false);
@@ -205,7 +204,7 @@ fn column(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<ColumnKey> {
         }
     };
     if column.is_none() {
-        walk.wrong(value.span(), format!("`{key}` is neither the name of a column nor its number, from 1"));
+        walk.wrong(value.span(), format!("`{key}` is neither the name nor the number (from 1) of a column"));
     }
     column
 }
@@ -236,7 +235,7 @@ fn series(
     columns.iter_mut().flatten().for_each(|value| *value *= reading.scale);
     let ascend = times.windows(2).all(|pair| pair[0] < pair[1]);
     if !ascend || !times.iter().chain(columns.iter().flatten()).all(|value| value.is_finite()) {
-        let message = "times or values are beyond all numbers with `scale`, `time_scale` and `time_zero`";
+        let message = "times or values overflow after `scale`, `time_scale` and `time_zero` are applied";
         walk.wrong(span.clone(), message.to_owned());
         return None;
     }

@@ -67,9 +67,10 @@ impl Section<'_, '_> {
 
     /// Reads an optional positive number.
     fn optional(&mut self, key: &str) -> Option<Option<f64>> {
-        match self.table.contains_key(key) {
-            true => positive(self.walk, self.table, key, &self.span).map(Some),
-            false => Some(None),
+        if self.table.contains_key(key) {
+            positive(self.walk, self.table, key, &self.span).map(Some)
+        } else {
+            Some(None)
         }
     }
 
@@ -180,7 +181,7 @@ fn not_negative(
     components: Vector3<f64>,
 ) -> Option<Vector3<f64>> {
     if components.iter().any(|component| *component < 0.0) {
-        walk.wrong(value.span(), format!("`{key}` is a magnitude and cannot be negative"));
+        walk.wrong(value.span(), format!("`{key}` is negative, but it is a magnitude"));
         return None;
     }
     Some(components)
@@ -200,9 +201,8 @@ fn kind(walk: &mut Walk<'_>, table: &TomlTable) -> Option<AttachmentKind> {
 }
 
 fn limits(walk: &mut Walk<'_>, table: &TomlTable, span: &std::ops::Range<usize>) -> Option<Limits> {
-    let mut optional = |key: &str| match table.contains_key(key) {
-        true => positive(walk, table, key, span).map(Some),
-        false => Some(None),
+    let mut optional = |key: &str| {
+        if table.contains_key(key) { positive(walk, table, key, span).map(Some) } else { Some(None) }
     };
     let (deflection, stress) = (optional("deflection"), optional("stress"));
     let mode_stress: Option<Option<Vec<f64>>> = match table.get("mode_stress") {
@@ -225,7 +225,7 @@ fn limits(walk: &mut Walk<'_>, table: &TomlTable, span: &std::ops::Range<usize>)
         let number = mode_number(walk, table, &span, "[[limits.mode]]");
         let amplitude = finite(walk, table, "amplitude", &span).filter(|amplitude| *amplitude >= 0.0);
         if amplitude.is_none() && table.contains_key("amplitude") {
-            walk.wrong(span, "`amplitude` is a magnitude and cannot be negative".to_owned());
+            walk.wrong(span, "`amplitude` is negative, but it is a magnitude".to_owned());
         }
         Some((number?, amplitude?))
     });
@@ -233,7 +233,7 @@ fn limits(walk: &mut Walk<'_>, table: &TomlTable, span: &std::ops::Range<usize>)
         (Some(limit), Some(modes)) => Some((limit, modes)),
         (None, None) => None,
         _ => {
-            walk.wrong(span.clone(), "`stress` and `mode_stress` need each other".to_owned());
+            walk.wrong(span.clone(), "`stress` and `mode_stress` must be given together".to_owned());
             return None;
         }
     };

@@ -165,9 +165,7 @@ fn points(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<
         "times are not ascending".to_owned()
     } else if let Some(row) = closer_than_rounding(&times) {
         let [before, time] = [times[row - 1], times[row]];
-        format!(
-            "times {before:?} and {time:?} are the same but for rounding: leave one of the two points out"
-        )
+        format!("times {before:?} and {time:?} differ only by rounding: remove one of the two points")
     } else if interpolation == Interpolation::Cubic && times.len() > 1 {
         return Some(History::samples(times, &values, Interpolation::Cubic, true));
     } else {

@@ -39,7 +39,7 @@ pub struct Recording {
 
 /// Frame of a recording, and the conditions that the body is exposed to.
 ///
-/// The frame of a recording is that of the scene ([`Stage`](super::Stage)). Its axes are those of the model
+/// The frame of a recording is that of the scene ([`FramedScene`](super::FramedScene)). Its axes are those of the model
 /// and turn with the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
@@ -49,13 +49,13 @@ pub struct Setting {
     /// reference point of the carrier.
     pub origin: Vector3<f64>,
     /// Gravity at the start, axes of the model.
-    pub gravity: Option<Vector3<f64>>,
+    pub gravity_model: Option<Vector3<f64>>,
     /// Eigenvalues of the carried body; empty without a carrier. Unit: 1/time^2.
     pub eigenvalues: Vec<f64>,
 }
 
 impl Setting {
-    /// Creates the setting of a body on its stage.
+    /// Creates the setting of a body in its framed scene.
     pub(super) fn new(body: &FlexBody, scene: &Scene) -> Self {
         let start = RotationVector(scene.initial.rotation).axes();
         let carrier = scene.carried.as_ref().map(|carried| carried.by.to_string());
@@ -63,7 +63,7 @@ impl Setting {
         Self {
             carrier,
             origin: body.frame().origin,
-            gravity: scene.gravity.map(|gravity| start.tr_mul(&gravity)),
+            gravity_model: scene.gravity.map(|gravity| start.tr_mul(&gravity)),
             eigenvalues: eigenvalues.unwrap_or_default(),
         }
     }
@@ -91,11 +91,11 @@ pub struct Resolution {
 impl Resolution {
     /// Default of the smallest deflection, relative to the largest extent of the body: 10 micrometres per
     /// metre.
-    const LEAST: f64 = 1e-5;
+    const SMALLEST_DEFLECTION: f64 = 1e-5;
 
     /// Creates the resolution for `body`; `least` is the smallest deflection, if given.
     pub fn new(body: &FlexBody, least: Option<f64>) -> Self {
-        let deflection = least.unwrap_or(Self::LEAST * body.extent());
+        let deflection = least.unwrap_or(Self::SMALLEST_DEFLECTION * body.extent());
         let modes = &body.modes().eigenvalue;
         let root_energy =
             |(j, lambda): (usize, &f64)| (0.5 * lambda).sqrt() * deflection / body.largest_displacement(j);

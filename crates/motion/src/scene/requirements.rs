@@ -57,7 +57,7 @@ impl Requirements {
         match &self.damping {
             Some(ratios) if !self.replaces_damping => {
                 let message =
-                    format!("{by} states the damping ratio {ratios}, and the {of} has damping of its own");
+                    format!("{by} states the damping ratio {ratios}, but the {of} already has damping");
                 Err(Diagnostic::new(Code::SceneDamping, message).into())
             }
             _ => Ok(()),

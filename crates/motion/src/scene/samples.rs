@@ -10,7 +10,7 @@ const PARTS: usize = 8;
 
 /// Total change of a rate, relative to the largest value, below which the change is rounding and no
 /// oscillation.
-const STEADY: f64 = 1e-9;
+const RATE_ROUNDING: f64 = 1e-9;
 
 /// Interpolation between two rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -198,7 +198,7 @@ impl<const N: usize> Samples<N> {
                 second = second.max(sample.second.norm());
             }
         }
-        if rate * end <= STEADY * value { 0.0 } else { second / rate / TAU }
+        if rate * end <= RATE_ROUNDING * value { 0.0 } else { second / rate / TAU }
     }
 
     /// Returns the pieces from time zero to `end`, each with its first and last time since the beginning of

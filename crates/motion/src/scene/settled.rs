@@ -1,6 +1,6 @@
 //! Check of a rotation rate for changes with finer integration steps.
 
-use super::{Recording, Scene, Scheme, Stage, simulate};
+use super::{FramedScene, Recording, Scene, Scheme, simulate};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 /// Largest relative error of a rate due to the error of the momentum, above which the run is repeated with
 /// finer steps. The limit is 1e4 times the error of a needle of 1:1e5, so that few bodies are simulated
 /// twice without need: with the default tolerance those beyond 1:1000.
-const SUSPECT: f64 = 1e-3;
+const MAX_RATE_ERROR: f64 = 1e-3;
 
 /// Error of the momentum per step of the conserving method, relative to the momentum: the method conserves
 /// the whole momentum, but not its component about an axis of the body.
@@ -18,7 +18,7 @@ const CONSERVING_ERROR: f64 = 1e-9;
 
 /// Change of a rate by finer steps, relative to the largest value of this rate, above which a warning
 /// reports it.
-const UNSETTLED: f64 = 1e-2;
+const MAX_RATE_CHANGE: f64 = 1e-2;
 
 /// Rate, relative to the largest rate about any axis, below which changes are not reported: a body that
 /// turns about a perpendicular axis has a rate about this axis that is rounding.
@@ -43,7 +43,7 @@ const FINEST_TOLERANCE: f64 = 1e-13;
 /// * `context`: its memory limits the second recording.
 ///
 /// # Errors
-/// The errors of [`Stage::new`]. If the finer run would take too long, the result is `None`.
+/// The errors of [`FramedScene::new`]. If the finer run would take too long, the result is `None`.
 pub fn unsettled_rate(
     body: &FlexBody,
     scene: &Scene,
@@ -53,8 +53,8 @@ pub fn unsettled_rate(
     if scene.prescribes() {
         return Ok(None);
     }
-    let stage = Stage::new(body, scene)?;
-    let inertia = stage.body.invariants().inertia();
+    let framed = FramedScene::new(body, scene)?;
+    let inertia = framed.body.invariants().inertia();
     let Some(finer) = finer(&inertia, scene, recording.scheme) else { return Ok(None) };
     let Ok((finer, _)) = simulate(body, &finer, &context.unheard()) else { return Ok(None) };
     Ok(change(&inertia, recording, &finer))
@@ -74,7 +74,7 @@ fn finer(inertia: &Matrix3<f64>, scene: &Scene, scheme: Scheme) -> Option<Scene>
             (CONSERVING_ERROR, Scheme::Conserving { order, step: Some(FINER_STEP * step?) })
         }
     };
-    let is_suspect = least > 0.0 && error * most > SUSPECT * least;
+    let is_suspect = least > 0.0 && error * most > MAX_RATE_ERROR * least;
     is_suspect.then(|| {
         let mut finer = scene.clone();
         finer.run.scheme = scheme;
@@ -96,14 +96,14 @@ fn change(inertia: &Matrix3<f64>, recording: &Recording, finer: &Recording) -> O
     let of_all = largest(&mut finer.states.iter().map(|state| state.omega.norm()));
     let differences: Vec<f64> = coarse.iter().zip(&fine).map(|(a, b)| a - b).collect();
     let changed = largest(&mut differences.iter().copied());
-    if changed <= UNSETTLED * of_axis || changed <= SMALL_RATE * of_all {
+    if changed <= MAX_RATE_CHANGE * of_axis || changed <= SMALL_RATE * of_all {
         return None;
     }
     let at = differences.iter().position(|d| d.abs() == changed)?;
     let [x, y, z] = axis.map(|c| if c.abs() < 5e-4 { 0.0 } else { c }).into();
     let ratio = eigen.eigenvalues.max() / eigen.eigenvalues.min();
     let message = format!(
-        "the angular velocity about the axis of least inertia ({x:.3}, {y:.3}, {z:.3}) is not settled: at time {:.4e} it is {:.4e}, with finer steps {:.4e}; inertias differ by a factor of {ratio:.1e}",
+        "the angular velocity about the axis of least inertia ({x:.3}, {y:.3}, {z:.3}) depends on the step: at time {:.4e} it is {:.4e}, with finer steps {:.4e}; the inertias differ by a factor of {ratio:.1e}",
         recording.time[at], coarse[at], fine[at]
     );
     Some(Diagnostic::new(Code::RateUnsettled, message))

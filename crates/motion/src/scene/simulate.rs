@@ -3,9 +3,9 @@
 use super::conditions::MeanAxes;
 use super::extremes::Survey;
 use super::prepared::{PARTS, Prepared, damped};
-use super::{Extremes, Path, Recording, Scene, Setting, Stage};
+use super::{Extremes, FramedScene, Path, Recording, Scene, Setting};
 use crate::dynamics::{BodyPoint, Evaluation, Motion};
-use crate::integration::{Failure, Sight, Work};
+use crate::integration::{Failure, ObserverEvent, Work};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
@@ -40,27 +40,30 @@ pub fn simulate(
     scene: &Scene,
     context: &Context<'_>,
 ) -> Result<(Recording, Vec<Diagnostic>)> {
-    let stage = Stage::new(body, scene)?;
-    let body = &*damped(&stage.body, &stage.scene)?;
-    let scene = &*stage.scene;
+    // Body and scene in one frame, with the damping of the scene, ready to integrate.
+    let framed = FramedScene::new(body, scene)?;
+    let body = &*damped(&framed.body, &framed.scene)?;
+    let scene = &*framed.scene;
     let run = Prepared::new(body, scene)?;
     refuse_too_much(body, scene, context)?;
+    // Record at the output times; survey extremes at every step and at points within the steps.
     let outputs = scene.run.outputs;
     let time: Vec<f64> = (0..=outputs).map(|i| run.duration * (i as f64 / outputs as f64)).collect();
     let mut recorder = Recorder::new(body, scene, &run, time.len());
     let mut survey = Survey::new(body, &run.watched);
-    let record = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
-        if sight != Sight::Instant {
+    let record = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
+        if event != ObserverEvent::Instant {
             context.fraction(time / run.duration);
-            return run.survey(&mut survey, sight, time, state, motion).map(|_| ());
+            return run.survey(&mut survey, event, time, state, motion).map(|_| ());
         }
         recorder.record(time, state, motion)
     };
     let finished = run.integrate(&time, PARTS, record)?;
+    // Add the work and the extremes, and warn of motions beyond the range of the model.
     let mut recording = recorder.recording;
     recording.work = finished.work;
     recording.extremes = survey.extremes(finished.size, finished.least_energy);
-    let found = [stage.found, remarks(body, scene, &recording.extremes)].concat();
+    let found = [framed.found, remarks(body, scene, &recording.extremes)].concat();
     Ok((recording, found))
 }
 
@@ -104,6 +107,7 @@ impl<'r> Recorder<'r> {
         state: &[f64],
         motion: &mut Motion<'_>,
     ) -> std::result::Result<(), Failure> {
+        // State, energies and momenta, with the reaction of a prescribed motion.
         let accelerations = motion.accelerations(time, state)?.to_vec();
         let now = motion.evaluate(time, state)?;
         self.recording.time.push(time);
@@ -112,10 +116,12 @@ impl<'r> Recorder<'r> {
         if let Some(reactions) = &mut self.recording.reactions {
             reactions.push(now.reaction());
         }
+        // Torque that the mean-axis conditions carry.
         if let (Some(torques), Some(conditions)) = (&mut self.recording.conditions, &self.conditions) {
             let evaluation = now.evaluation();
             torques.push(conditions.torque(evaluation.modal_coordinates(), evaluation.modal_velocity()));
         }
+        // Watched points: positions and their rates along world axes, deflections along the axes of the frame.
         for ((path, point), rest) in self.recording.paths.iter_mut().zip(self.watched).zip(&self.rest) {
             let (place, evaluation) = (now.place(), now.evaluation());
             let at = point.place(evaluation);
@@ -143,7 +149,7 @@ pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Ve
     let deflection = extremes.deflection;
     if deflection.value > LINEAR_RANGE {
         let message = format!(
-            "a node is deflected by {:.0} % of the largest extent of the body at t = {} {unit}: modes are those of small deformation",
+            "a node is deflected by {:.0} % of the largest extent of the body at t = {} {unit}, but the modes hold for small deformations",
             100.0 * deflection.value,
             rounded(deflection.time)
         );
@@ -162,15 +168,17 @@ fn softening(body: &FlexBody, extremes: &Extremes) -> Option<Diagnostic> {
     if extremes.spins.is_empty() {
         return None;
     }
+    // A bound for any axis decides most cases without a search.
     let (_, worst) = body.worst_spin()?;
     if worst * extremes.spin.powi(2) <= SOFTENING {
         return None;
     }
+    // The exact softening about each of the axes that occurred.
     let part = |omega: &Vector3<f64>| Some((body.softening(omega)?, *omega));
     let (part, omega) = extremes.spins.iter().filter_map(part).max_by(|a, b| a.0.total_cmp(&b.0))?;
     (part > SOFTENING).then(|| {
         let message = format!(
-            "spin about {} reaches {} rad/{}: without geometric stiffness it takes {:.2} % of the stiffness of some motion",
+            "the spin about {} reaches {} rad/{}: without geometric stiffness it removes {:.2} % of the stiffness of some motion",
             axis_in_words(&omega),
             rounded(omega.norm()),
             body.units().time.name(),

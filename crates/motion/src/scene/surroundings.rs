@@ -26,7 +26,11 @@ impl<'a> SceneForces<'a> {
         let mut wrong = |message: String| found.push(Diagnostic::new(Code::SceneBody, message));
         for start in &scene.initial.modes {
             if start.mode >= body.n_modes() {
-                wrong(format!("mode {} does not exist: the body has {}", start.mode + 1, body.n_modes()));
+                wrong(format!(
+                    "mode {} does not exist: the body has {} modes",
+                    start.mode + 1,
+                    body.n_modes()
+                ));
             }
         }
         if body.dimension() == 2 {
@@ -42,7 +46,7 @@ impl<'a> SceneForces<'a> {
         let loads: Option<Vec<_>> = scene.loads.iter().map(|load| Some((points(&load.at)?, load))).collect();
         for (point, load) in loads.iter().flatten() {
             if !load.torque.is_nothing() && !point.turns() {
-                wrong(format!("no torque can act at {}: it has no orientation", load.at));
+                wrong(format!("a torque cannot act at {}: the place has no orientation", load.at));
             }
         }
         match (watched, loads) {
@@ -79,8 +83,9 @@ pub fn body_point(body: &FlexBody, terms: Terms, place: &Point) -> std::result::
                 let known = if all.is_empty() { "it has none".to_owned() } else { all.join(", ") };
                 format!("the body has no interface `{name}`: {known}")
             })?;
-            BodyPoint::interface(body, interface, terms)
-                .ok_or_else(|| format!("interface `{name}` has no reference point: name a node of it"))
+            BodyPoint::interface(body, interface, terms).ok_or_else(|| {
+                format!("interface `{name}` has no reference point: give one of its nodes instead")
+            })
         }
     }
 }

@@ -3,9 +3,9 @@
 use super::extremes::Survey;
 use super::prepared::{Finished, PARTS, Prepared, Reaction, Stop, damped};
 use super::simulate::remarks;
-use super::{Extremes, Resolution, Scene, Scheme, Stage};
+use super::{Extremes, FramedScene, Resolution, Scene, Scheme};
 use crate::dynamics::{Configuration, EulerParameters, Motion};
-use crate::integration::{Failure, Sight, Work};
+use crate::integration::{Failure, ObserverEvent, Work};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
@@ -71,29 +71,31 @@ impl Trace {
 /// # Errors
 /// The errors of [`simulate`](super::simulate).
 pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(Trace, Vec<Diagnostic>)> {
-    let stage = Stage::new(body, scene)?;
-    let body = &*damped(&stage.body, &stage.scene)?;
-    let scene = &*stage.scene;
+    let framed = FramedScene::new(body, scene)?;
+    let body = &*damped(&framed.body, &framed.scene)?;
+    let scene = &*framed.scene;
     let run = Prepared::new(body, scene)?;
+    // Samples at steps and within them until the memory is full; the extremes are surveyed there too.
     let bytes = Trace::bytes_of_instant(body.n_modes(), run.watched.len());
     let most = context.memory.map_or(f64::INFINITY, |memory| memory as f64 / bytes);
     let mut tracer = Tracer::new(&run);
     let mut survey = Survey::new(body, &run.watched);
-    let look = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
-        if sight == Sight::Instant {
+    let look = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
+        if event == ObserverEvent::Instant {
             return Ok(());
         }
         if tracer.trace.time.len() as f64 >= most {
             return Err(Stop::Memory { time });
         }
         context.fraction(time / run.duration);
-        let reaction = run.survey(&mut survey, sight, time, state, motion)?;
+        let reaction = run.survey(&mut survey, event, time, state, motion)?;
         tracer.see(time, state, motion, reaction);
         Ok(())
     };
     let finished = run.integrate(&[0.0, run.duration], PARTS, look)?;
+    // Remarks about motions beyond the range of the model.
     let extremes = survey.extremes(finished.size, finished.least_energy);
-    let found = [stage.found, remarks(body, scene, &extremes)].concat();
+    let found = [framed.found, remarks(body, scene, &extremes)].concat();
     Ok((tracer.finish(finished, extremes), found))
 }
 
@@ -106,9 +108,9 @@ pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(T
 /// # Errors
 /// The errors of [`simulate`](super::simulate).
 pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64], context: &Context<'_>) -> Result<Trace> {
-    let stage = Stage::new(body, scene)?;
-    let body = &*damped(&stage.body, &stage.scene)?;
-    let run = Prepared::new(body, &stage.scene)?;
+    let framed = FramedScene::new(body, scene)?;
+    let body = &*damped(&framed.body, &framed.scene)?;
+    let run = Prepared::new(body, &framed.scene)?;
     let needed = times.len() as f64 * Trace::bytes_of_instant(body.n_modes(), run.watched.len());
     refuse_beyond(
         context.memory,
@@ -117,9 +119,9 @@ pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64], context: &Context
         "simulate a shorter `duration`",
     )?;
     let mut tracer = Tracer::new(&run);
-    let look = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
-        if sight == Sight::Instant {
-            let prescribes = stage.scene.prescribes();
+    let look = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
+        if event == ObserverEvent::Instant {
+            let prescribes = framed.scene.prescribes();
             let reaction = if prescribes { Some(motion.evaluate(time, state)?.reaction()) } else { None };
             tracer.see(time, state, motion, reaction);
         }

@@ -9,7 +9,7 @@ use flexbody_motion::dynamics::{AngularVelocity, BodyPoint, EquationsOfMotion, E
 use nalgebra::{DMatrix, DVector, Vector3};
 use oracle::equations::{Coriolis, State};
 use oracle::flexible::{
-    accelerations, fixture, invariants_of, lively_state, made_of, oracle, set, stressed, to_first_order,
+    accelerations, fixture, invariants_of, made_of, moving_state, oracle, set, stressed, to_first_order,
 };
 use oracle::general::{
     GeneralBody, NodalBody, Row, RowKind, quasi_velocities, random_body, random_matrix, to_faer,
@@ -100,7 +100,7 @@ fn solids_have_the_terms_of_section_three() {
     for (at, body) in converted.into_iter().chain(random).enumerate() {
         let equations = EquationsOfMotion::new(&body, Terms::ALL);
         let reduced = oracle(&body).reduced;
-        let state = lively_state(&mut Random(40 + at as u64), &body);
+        let state = moving_state(&mut Random(40 + at as u64), &body);
         let mut evaluation = Evaluation::new(&equations);
         set(&mut evaluation, &state);
         let orientation = AngularVelocity { axes: state.axes };
@@ -125,7 +125,7 @@ fn converted_bodies_have_the_terms_of_section_six() {
         // The origin of a free body at its centre of mass has an acceleration of rounding only.
         let body = to_first_order(fixture(name, 10, BodyFrame::Model));
         let (equations, oracle) = (EquationsOfMotion::new(&body, Terms::ALL), oracle(&body));
-        let state = lively_state(&mut Random(7), &body);
+        let state = moving_state(&mut Random(7), &body);
         let mut evaluation = Evaluation::new(&equations);
         set(&mut evaluation, &state);
         assert_quantities(name, &evaluation, &oracle, &state, 1e-12);

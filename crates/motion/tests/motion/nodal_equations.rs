@@ -61,7 +61,7 @@ fn assert_oracle(
     let equations = NodalEquations::new(&body.model, &body.frame, conditions).expect("equations");
     let oracle = body.oracle(shapes);
     for seed in 0..3 {
-        let state = body.lively_state(seed, 0.1);
+        let state = body.moving_state(seed, 0.1);
         let mut evaluation = NodalEvaluation::new(&equations);
         evaluation.set(&equations.state(&configuration(shapes, &state)).expect("a state")).expect("a state");
         let mut errors = Vec::new();
@@ -130,7 +130,7 @@ fn masses_of_low_rank_are_condensed() {
 fn the_axes_of_the_frame_do_not_matter() {
     for name in ["mpc_block", "plane_frame"] {
         let body = Unreduced::fixture(name);
-        let state = body.lively_state(5, 0.1);
+        let state = body.moving_state(5, 0.1);
         let turn = if body.model.dimension() == 2 {
             nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 0.8).into_inner()
         } else {
@@ -492,7 +492,7 @@ fn conditions_of_solids_hold_the_moment_of_elastic_forces() {
             [(ReferenceConditions::MeanAxes, &body.shapes), (ReferenceConditions::Held(held), &shapes)]
         {
             let equations = NodalEquations::new(&body.model, &body.frame, &conditions).expect("equations");
-            let state = body.lively_state(1, 0.2);
+            let state = body.moving_state(1, 0.2);
             let mut evaluation = NodalEvaluation::new(&equations);
             evaluation
                 .set(&equations.state(&configuration(shapes, &state)).expect("a state"))
@@ -588,7 +588,7 @@ fn frames_of_solids_show_the_same_nodes() {
             equations(&ReferenceConditions::MeanAxes),
             equations(&ReferenceConditions::Held(holding(&body.model))),
         );
-        let start = configuration(&body.shapes, &body.lively_state(2, 0.1));
+        let start = configuration(&body.shapes, &body.moving_state(2, 0.1));
         assert!(matches!(held.state(&start), Err(NodalError::ConditionsViolated { .. })), "{name}");
         let changed = held.reframed(&start).expect("another frame");
         let (mut a, mut b) = (NodalEvaluation::new(&mean), NodalEvaluation::new(&held));
@@ -611,6 +611,6 @@ fn frames_of_solids_show_the_same_nodes() {
     let body = Unreduced::fixture("frame_beams");
     let equations =
         NodalEquations::new(&body.model, &body.frame, &ReferenceConditions::MeanAxes).expect("equations");
-    let start = configuration(&body.shapes, &body.lively_state(2, 0.1));
+    let start = configuration(&body.shapes, &body.moving_state(2, 0.1));
     assert_eq!(equations.reframed(&start), Err(NodalError::FrameTied));
 }

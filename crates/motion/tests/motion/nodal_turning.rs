@@ -82,7 +82,7 @@ fn any_mass() -> Unreduced {
 
 /// Returns a state in `shapes` whose largest rotation of a node about an axis is `turn`.
 fn turned_state(body: &Unreduced, shapes: &Mat<f64>, seed: u64, turn: f64) -> State {
-    let mut state = body.lively_state(seed, 0.1);
+    let mut state = body.moving_state(seed, 0.1);
     let u = times(shapes, &state.q);
     let rotations = body.rows.iter().zip(u.iter()).filter(|(row, _)| row.kind == RowKind::Rotation);
     let factor = turn / rotations.fold(0.0f64, |m, (_, u)| m.max(u.abs()));

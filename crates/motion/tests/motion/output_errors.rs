@@ -10,8 +10,8 @@ use flexbody_linalg::{gram, multiply};
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{EulerParameters, Orientation};
 use flexbody_motion::scene::{
-    Axes, History, Initial, Measure, OtherModes, OutputErrors, Resolution, Scene, Spin, Stage, Tolerance,
-    Trace, VectorHistory, trace, trace_at,
+    Axes, FramedScene, History, Initial, Measure, OtherModes, OutputErrors, Resolution, Scene, Spin,
+    Tolerance, Trace, VectorHistory, trace, trace_at,
 };
 use nalgebra::Vector3;
 use oracle::flexible::soft_block;
@@ -168,7 +168,7 @@ fn what_is_too_small_to_count_is_measured_against_the_least_that_counts() {
     let other = changed(&recording, |_, q| q[0] += 1e-20);
     let errors = Measure::new(&body, &recording).of_subset(&other, &[0, 1, 2, 3]).largest();
     // The extent of a body is measured along the axes of the model.
-    let least = Resolution::new(&Stage::new(&body, &at_rest).expect("a stage").body, None);
+    let least = Resolution::new(&FramedScene::new(&body, &at_rest).expect("a stage").body, None);
     let lambda = body.modes().eigenvalue[0];
     let expected = (0.5 * lambda).sqrt() * 1e-20 / least.root_energy;
     assert!((errors.stress.expect("modes") / expected - 1.0).abs() < 1e-12);

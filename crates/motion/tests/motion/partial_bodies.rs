@@ -8,7 +8,7 @@ use flexbody_motion::dynamics::{
     Balance, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Terms,
 };
 use nalgebra::Vector3;
-use oracle::flexible::{body_of, fixture, lively_state, soft_block};
+use oracle::flexible::{body_of, fixture, moving_state, soft_block};
 use oracle::general::quasi_velocities;
 use oracle::motion::{conserving, run};
 use oracle::partial::{combinations, decisions, with_groups};
@@ -127,7 +127,7 @@ fn equations_have_the_terms_that_are_asked_for_and_held() {
             assert_eq!(partial.terms(), masked.terms());
             assert_eq!(partial.multiplications(), masked.multiplications());
             for _ in 0..states {
-                let state = lively_state(&mut random, &body);
+                let state = moving_state(&mut random, &body);
                 let velocities = quasi_velocities(&state);
                 let of = |equations: &EquationsOfMotion| {
                     let mut evaluation = Evaluation::new(equations);

@@ -48,7 +48,7 @@ fn the_rate_of_a_needle_that_changes_with_the_step_is_told() {
     assert!(apart > 0.01 * largest, "{apart:e} {largest:e}");
     let told = told.expect("a warning");
     assert_eq!(told.code(), Code::RateUnsettled);
-    assert!(told.message().contains("is not settled: at time"), "{}", told.message());
+    assert!(told.message().contains("depends on the step: at time"), "{}", told.message());
     assert!(settled.is_none(), "{settled:?}");
 }
 

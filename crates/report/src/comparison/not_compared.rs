@@ -14,7 +14,7 @@ struct Entries {
 
 /// Entries that are never compared: they record the origin and the proofs of a body, or follow from other
 /// entries.
-const NEVER: &[Entries] = &[
+const NEVER_COMPARED: &[Entries] = &[
     Entries { name: "provenance", paths: "/@generator, /@format_minor, /source", has: |_| true },
     Entries {
         name: "proofs and error estimates",
@@ -76,6 +76,7 @@ const WITH_COMMON_NODES: &[Entries] = &[
 /// Returns the entries of `a` or `b` that are not compared, as `name (paths)`.
 pub(super) fn entries(a: &FlexBody, b: &FlexBody, same_nodes: bool) -> Vec<String> {
     let by_nodes = WITH_COMMON_NODES.iter().filter(|_| !same_nodes);
-    let present = NEVER.iter().chain(by_nodes).filter(|entries| (entries.has)(a) || (entries.has)(b));
+    let present =
+        NEVER_COMPARED.iter().chain(by_nodes).filter(|entries| (entries.has)(a) || (entries.has)(b));
     present.map(|Entries { name, paths, .. }| format!("{name} ({paths})")).collect()
 }

@@ -13,7 +13,7 @@ pub(crate) const HALF_STEP: f64 = 0.5 / STEPS;
 const STEPS: f64 = 32767.0;
 
 /// Smallest number of drawn nodes. Fewer nodes show no recognisable shape, however many modes share the page.
-const LEAST: usize = 300;
+const MIN_NODES: usize = 300;
 
 /// Nodes and triangles that a page draws.
 pub(crate) struct Drawing<'b> {
@@ -33,12 +33,12 @@ pub(crate) struct Drawing<'b> {
 
 impl<'b> Drawing<'b> {
     /// Builds the drawing of a body with at most `triangles` triangles or, without a number, as many as
-    /// `room` bytes of text hold together with at most the first `modes` modes.
-    pub(crate) fn new(body: &'b FlexBody, triangles: Option<usize>, room: usize, modes: usize) -> Self {
+    /// `max_bytes` bytes of text hold together with at most the first `modes` modes.
+    pub(crate) fn new(body: &'b FlexBody, triangles: Option<usize>, max_bytes: usize, modes: usize) -> Self {
         let modes = modes.min(body.n_modes());
         // A node needs six bytes for its position and six for each shape, plus two triangles; base64 writes
         // three bytes as four letters.
-        let most = (room / (8 + 8 * modes + 32)).max(LEAST);
+        let most = (max_bytes / (8 + 8 * modes + 32)).max(MIN_NODES);
         let positions = &body.nodes().positions;
         let mesh = body.mesh().and_then(|mesh| mesh.decimated(positions, triangles.unwrap_or(2 * most)));
         let nodes = match &mesh {

@@ -11,7 +11,7 @@ use flexbody_body::flex_body::FlexBody;
 const PANEL: &str = include_str!("panel.html");
 
 /// Size limit of positions, shapes and mesh in a report, in bytes; the report then stays below 4 MB.
-const ROOM: usize = 2_600_000;
+const MAX_DRAWING_BYTES: usize = 2_600_000;
 /// Largest number of modes that a report animates.
 const MODES: usize = 60;
 
@@ -27,7 +27,7 @@ impl Embedded {
     /// Builds the picture; `None` for a body without anything to draw.
     pub(crate) fn of(body: &FlexBody) -> Option<Self> {
         let still = still(body)?;
-        let drawing = Drawing::new(body, None, ROOM, MODES);
+        let drawing = Drawing::new(body, None, MAX_DRAWING_BYTES, MODES);
         let shown = ShownBody::<()>::new(body, &drawing, Vec::new(), None);
         let arrays: String = drawing.arrays().iter().map(script).collect();
         let panel = PANEL.replace("{{STILL}}", &still).replace("{{DRAWN}}", &drawn(body, &drawing));
@@ -44,15 +44,15 @@ impl Embedded {
 
 /// Returns the drawn and the omitted parts in words.
 fn drawn(body: &FlexBody, drawing: &Drawing<'_>) -> String {
-    let mut told = vec![match drawing.kind() {
+    let mut words = vec![match drawing.kind() {
         "points" => "nodes as points, since the file has no surface".to_owned(),
         _ => drawing.in_words(),
     }];
     if drawing.vertices() < body.n_nodes() {
-        told.push(format!("{} of {}", drawing.vertices(), counted(body.n_nodes(), "node")));
+        words.push(format!("{} of {}", drawing.vertices(), counted(body.n_nodes(), "node")));
     }
     if drawing.modes() < body.n_modes() {
-        told.push(format!("the first {} of {}", drawing.modes(), counted(body.n_modes(), "mode")));
+        words.push(format!("the first {} of {}", drawing.modes(), counted(body.n_modes(), "mode")));
     }
-    told.join("; ")
+    words.join("; ")
 }

@@ -3,7 +3,7 @@
 use super::drawing::{Drawing, turned};
 use crate::facts::UnitFacts;
 use crate::mass_properties::{centre_of_mass, inertia_about_com};
-use crate::numbers::{plain, significant};
+use crate::numbers::{frequency, plain};
 use flexbody_base::provenance;
 use flexbody_body::flex_body::{FlexBody, Interface, is_static};
 use flexbody_body::invariants::principal_axes;
@@ -113,12 +113,12 @@ impl<'a, M: Serialize> ShownBody<'a, M> {
 }
 
 fn mode(body: &FlexBody, drawing: &Drawing<'_>, j: usize) -> ShownMode {
-    let hertz = significant(body.frequencies_hz()[j], 5);
+    let hertz = frequency(body.frequencies_hz()[j], 5);
     let origin = body.modes().provenance.get(j).map_or("mode", String::as_str);
     let (label, kind) = if is_static(origin) {
-        (format!("{}: {origin}", j + 1), format!("{origin}; its eigenvalue stands for {hertz} Hz"))
+        (format!("{}: {origin}", j + 1), format!("{origin}; its eigenvalue corresponds to {hertz}"))
     } else {
-        (format!("{}: {hertz} Hz", j + 1), origin.to_owned())
+        (format!("{}: {hertz}", j + 1), origin.to_owned())
     };
     ShownMode {
         label: plain(&label),

@@ -9,25 +9,25 @@ use std::fmt::Write;
 /// Largest number of triangles; more make the page larger.
 const TRIANGLES: usize = 1800;
 /// Size limit for the positions of nodes without a surface, in bytes: some 1500 points.
-const ROOM: usize = 60_000;
+const MAX_DRAWING_BYTES: usize = 60_000;
 /// Size on the page in its own units; the height follows the shape of the part.
 const WIDTH: f64 = 560.0;
-const LEAST_HEIGHT: f64 = 200.0;
-const MOST_HEIGHT: f64 = 460.0;
+const MIN_HEIGHT: f64 = 200.0;
+const MAX_HEIGHT: f64 = 460.0;
 const MARGIN: f64 = 26.0;
 /// Length of the principal axes, relative to the radius of the drawing.
-const AXIS: f64 = 0.75;
+const AXIS_LENGTH: f64 = 0.75;
 /// Grid steps per page unit for the coordinates of surfaces. A larger value gives finer coordinates and a
 /// larger file.
-const FINE: f64 = 5.0;
+const GRID_STEPS_PER_UNIT: f64 = 5.0;
 /// Number of brightness steps of the shading.
-const SHADES: f64 = 14.0;
+const SHADE_COUNT: f64 = 14.0;
 /// Colour of the part in full light (red, green, blue).
-const PART: [f64; 3] = [185.0, 198.0, 214.0];
+const PART_COLOUR: [f64; 3] = [185.0, 198.0, 214.0];
 
 /// Returns the picture; `None` if there is nothing to draw.
 pub(crate) fn still(body: &FlexBody) -> Option<String> {
-    let drawing = Drawing::new(body, Some(TRIANGLES), ROOM, 0);
+    let drawing = Drawing::new(body, Some(TRIANGLES), MAX_DRAWING_BYTES, 0);
     if drawing.vertices() == 0 {
         return None;
     }
@@ -76,7 +76,7 @@ impl Projection {
             height: 0.0,
         };
         // Box around the part and its principal axes, as seen by the viewer.
-        let axes = placed.principal.map(|axis| placed.axis_end(&axis, AXIS * own.radius));
+        let axes = placed.principal.map(|axis| placed.axis_end(&axis, AXIS_LENGTH * own.radius));
         let seen: Vec<Vector3<f64>> = drawing.places().iter().chain(&axes).map(|x| own.turned(x)).collect();
         let bound =
             |k: usize, pick: fn(f64, f64) -> f64, from: f64| seen.iter().map(|p| p[k]).fold(from, pick);
@@ -84,9 +84,9 @@ impl Projection {
         let high = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
         let [wide, tall] = [0, 1].map(|k| high[k] - low[k]);
         // Largest scale at which the box fits the page within its margins.
-        let room = [WIDTH - 2.0 * MARGIN, MOST_HEIGHT - 2.0 * MARGIN];
-        own.scale = (room[0] / wide).min(room[1] / tall);
-        own.height = (own.scale * tall + 2.0 * MARGIN).max(LEAST_HEIGHT);
+        let inner_size = [WIDTH - 2.0 * MARGIN, MAX_HEIGHT - 2.0 * MARGIN];
+        own.scale = (inner_size[0] / wide).min(inner_size[1] / tall);
+        own.height = (own.scale * tall + 2.0 * MARGIN).max(MIN_HEIGHT);
         // Centre the box on the page.
         own.shift = [
             0.5 * (WIDTH - own.scale * (low[0] + high[0])),
@@ -138,7 +138,7 @@ fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
         pieces.push(PaintedPath { depth, paint: Paint::Edge, path: path(view, &ends) });
     }
     pieces.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-    let _ = writeln!(svg, "<g class=\"faces\" transform=\"scale({})\">", 1.0 / FINE);
+    let _ = writeln!(svg, "<g class=\"faces\" transform=\"scale({})\">", 1.0 / GRID_STEPS_PER_UNIT);
     let mut rest = pieces.as_slice();
     while let Some(first) = rest.first() {
         let count = rest.iter().take_while(|piece| piece.paint == first.paint).count();
@@ -146,8 +146,8 @@ fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
         let paths: String = run.iter().map(|piece| piece.path.as_str()).collect();
         let _ = match first.paint {
             Paint::Face(shade) => {
-                let light = f64::from(shade) / SHADES;
-                let [r, g, b] = PART.map(|part| (part * light).round() as u8);
+                let light = f64::from(shade) / SHADE_COUNT;
+                let [r, g, b] = PART_COLOUR.map(|part| (part * light).round() as u8);
                 writeln!(svg, "<path color=\"#{r:02x}{g:02x}{b:02x}\" d=\"{paths}\"/>")
             }
             Paint::Edge => writeln!(svg, "<path class=\"edge\" d=\"{paths}\"/>"),
@@ -162,7 +162,7 @@ fn path(view: &Projection, points: &[Vector3<f64>]) -> String {
     let mut path = String::new();
     let mut before = [0.0; 2];
     for (i, point) in points.iter().enumerate() {
-        let at = view.at(point).map(|x| (FINE * x).round());
+        let at = view.at(point).map(|x| (GRID_STEPS_PER_UNIT * x).round());
         let [x, y] = [0, 1].map(|k| at[k] - before[k]);
         let _ = match i {
             0 => write!(path, "M{x} {y}l"),
@@ -178,7 +178,7 @@ fn path(view: &Projection, points: &[Vector3<f64>]) -> String {
 fn shade([a, b, c]: &[Vector3<f64>; 3]) -> u8 {
     let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
     let light = Vector3::new(0.25, 0.35, 1.0).normalize();
-    ((0.45 + 0.55 * normal.dot(&light).abs()) * SHADES).round() as u8
+    ((0.45 + 0.55 * normal.dot(&light).abs()) * SHADE_COUNT).round() as u8
 }
 
 /// Draws nodes as points in three layers by depth; points at the back are fainter.
@@ -203,7 +203,7 @@ fn points(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
 fn principal_axes(svg: &mut String, placed: &Placed, view: &Projection) {
     let from = view.at(&view.turned(&placed.centre_of_mass));
     for (k, axis) in placed.principal.iter().enumerate() {
-        let end = placed.axis_end(axis, AXIS * view.radius);
+        let end = placed.axis_end(axis, AXIS_LENGTH * view.radius);
         arrow(svg, &format!("a{k}"), &(k + 1).to_string(), from, view.at(&view.turned(&end)));
     }
 }

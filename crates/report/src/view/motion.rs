@@ -7,7 +7,7 @@ use flexbody_file::RecordedMotion;
 use serde::Serialize;
 
 /// Largest count of numbers for all output times of a page; a longer recording is thinned to equal steps.
-const MOST: usize = 400_000;
+const MAX_NUMBERS: usize = 400_000;
 
 /// Output times of a motion.
 #[derive(Debug, Clone, Serialize)]
@@ -37,7 +37,7 @@ impl ShownMotion {
     /// Collects the output times of a motion, or some at equal steps including the first and the last.
     pub(super) fn new(motion: &RecordedMotion, body: &FlexBody) -> Self {
         let written = motion.time.len();
-        let chosen = motion.some_instants(MOST / (8 + motion.modes));
+        let chosen = motion.some_instants(MAX_NUMBERS / (8 + motion.modes));
         let some = |of: &[f64], width: usize| -> Vec<f64> {
             chosen.iter().flat_map(|&i| &of[i * width..(i + 1) * width]).copied().collect()
         };

@@ -22,7 +22,7 @@ fn reports_call_a_healthy_body_healthy() {
         let text = render(&facts, Format::Text);
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         let made_of = format!(
-            "craig-bampton: {count} fixed-interface modes ({count} asked for) + 12 interface motions - 6"
+            "craig-bampton: {count} fixed-interface modes ({count} requested) + 12 interface motions - 6"
         );
         assert!(text.contains(&made_of) && text.contains("of the free body"), "{text}");
         assert!(text.contains("proved:") && !text.contains("NOT PROVED"), "{text}");
@@ -43,7 +43,7 @@ fn reports_call_a_healthy_body_healthy() {
         for (hz, lambda) in held.iter().zip(&expected) {
             close(*hz, lambda.sqrt() / std::f64::consts::TAU, 1e-12, "held");
         }
-        assert_eq!(text.contains(" Hz (fixed-interface modes)"), count > 0, "{text}");
+        assert_eq!(text.contains("Hz (fixed-interface modes)"), count > 0, "{text}");
         assert!(!text.contains("x fixed-interface"), "{text}");
         assert_eq!(own["free_hz"].as_array().expect("a list").len(), body.n_modes());
     }
@@ -52,7 +52,7 @@ fn reports_call_a_healthy_body_healthy() {
     let facts = Facts::new(&attached, &RunData::default());
     let (html, text) = (render(&facts, Format::Html), render(&facts, Format::Text));
     assert!(html.contains("No free mode is missing.") && html.contains("<td>static shape</td>"), "{html}");
-    assert!(text.contains("static shapes beside them are no modes"), "{text}");
+    assert!(text.contains("static shapes are not modes"), "{text}");
     let json: serde_json::Value = serde_json::from_str(&render(&facts, Format::Json)).expect("JSON");
     assert!(json["modes"]["worst_residual"].as_f64().expect("a number") < 1e-8);
 }

@@ -385,7 +385,7 @@ fn rows_that_rounding_alone_tells_apart_are_refused() {
             let error = read(&scene.replace('T', time), &rows(time)).expect_err("close rows");
             let text = error.to_string();
             assert!(error.has(Code::SeriesRow) || error.has(Code::SceneSyntax), "{text}");
-            assert!(text.contains("but for rounding") && text.contains(place), "{place}: {text}");
+            assert!(text.contains("rounding") && text.contains(place), "{place}: {text}");
             assert!(text.contains(time) && text.contains("0.3"), "{text}");
         }
         let sound = read(&scene.replace('T', "0.300000001"), &rows("0.300000001"));

@@ -52,7 +52,7 @@ fn file_with(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Impo
             modal_damping: body.modes().modal_damping.clone(),
             geometric_stiffness: body.geometric_stiffness().to_vec(),
             frames: (0..body.n_nodes()).map(frame).collect(),
-            lacks: Vec::new(),
+            omissions: Vec::new(),
         },
     }
 }
@@ -313,7 +313,10 @@ fn a_file_that_breaks_an_identity_is_told_to_be_wrong() {
     let error = accept_imported(&imported(&bad).expect("a body"))
         .expect_err("a hundredth of the inertia of the modes");
     let told = error.to_string();
-    assert!(error.has(Code::ForeignUnsound) && told.contains("the file states a body that breaks"), "{told}");
+    assert!(
+        error.has(Code::ForeignUnsound) && told.contains("the numbers of the file violate the identity"),
+        "{told}"
+    );
     assert!(told.contains("write the file again") && !told.contains("report the model"), "{told}");
 }
 
@@ -322,7 +325,7 @@ fn groups_that_a_file_lacks_are_dropped_and_named() {
     let (_, body) = block(3);
     let mut without = file_with(&body, &body.modes().shape, body.invariants());
     without.body.inertia.i9 = None;
-    without.body.lacks = vec!["inertia that is quadratic in the modes".to_owned()];
+    without.body.omissions = vec!["inertia that is quadratic in the modes".to_owned()];
     let Imported { body: taken, diagnostics } = imported(&without).expect("a body");
     assert_eq!(diagnostics[0].code(), Code::ForeignDropped);
     let (w1, w2, w3) = (taken.invariants().w1(), taken.invariants().w2(), taken.invariants().w3());

@@ -171,7 +171,7 @@ fn reports_say_what_was_dropped() {
     let partial = with_groups(&body, TermGroups { w2: true, ..TermGroups::NONE });
     let facts = Facts::new(&partial, &RunData::default());
     let text = render(&facts, Format::Text);
-    assert!(text.contains("W1 dropped, error without it up to 0.0001 of 0.001 allowed: a test"), "{text}");
+    assert!(text.contains("W1 dropped, error without it up to 0.0001, tolerance 0.001: a test"), "{text}");
     assert!(text.contains("W2 kept") && text.contains("W3 dropped"), "{text}");
     let json: Value = serde_json::from_str(&render(&facts, Format::Json)).expect("JSON");
     assert_eq!(
@@ -190,13 +190,13 @@ fn reports_say_what_was_dropped() {
     );
     let html = render(&facts, Format::Html);
     assert!(html.contains("W3 dropped"));
-    // Without W2 the report does not claim that the centrifugal term softens nothing.
+    // Without W2 the report does not claim that the centrifugal term softens no motion.
     let without =
         render(&Facts::new(&with_groups(&body, TermGroups::NONE), &RunData::default()), Format::Text);
     assert!(!without.contains("soften"), "{without}");
     assert_eq!(
         dropped_text(&partial),
-        "note: W1 was dropped: nothing of it is checked\nnote: W3 was dropped: nothing of it is checked\n"
+        "note: W1 was dropped and is not checked\nnote: W3 was dropped and is not checked\n"
     );
 }
 

@@ -185,7 +185,7 @@ fn the_summary_keeps_what_the_body_cannot_do() {
     has(&|_| {}, "row sums: 312 NEGATIVE masses, smallest inertia +100 %, W2 31 % off");
     has(&|p| p.certificate.proved_modes = None, "NOT PROVED");
     has(&|p| p.units = flexbody_base::units::UnitSystem::default(), "m, kg, s assumed, none stated");
-    has(&|p| p.source.mass_structure = MassStructure::Diagonal, "DIAGONAL mass");
+    has(&|p| p.source.mass_structure = MassStructure::Diagonal, "DIAGONAL (lumped) mass");
     has(&|p| p.storage = Storage::F32, "rounded to 32-bit floats");
     has(&|p| p.source.number = Some(BodyNumber { number: 1, of: 2 }), "body 1 of 2");
     has(&|p| p.interfaces[0].coupling = Some(Coupling::Rigid), "rigid but DEFORMS");
@@ -279,7 +279,7 @@ fn completeness_claims_only_what_the_certificate_proves() {
     let of = |change: &dyn Fn(&mut Parts)| sentence(&changed(change));
     assert_eq!(
         of(&|_| {}),
-        (true, "proved: 8 flexible + 6 rigid modes below 5000 Hz (inertia count 14)".to_owned())
+        (true, "proved: 8 flexible + 6 rigid modes below 5 kHz (inertia count 14)".to_owned())
     );
     assert_eq!(
         of(&|p| p.certificate.proved_modes = None),
@@ -309,7 +309,9 @@ fn completeness_claims_only_what_the_certificate_proves() {
         p.certificate.shift = p.modes.eigenvalue[6] * 1.001;
     });
     assert!(
-        !proved && why.starts_with("PROVED IN PART: 7 flexible") && why.ends_with("; 1 mode above are not")
+        !proved
+            && why.starts_with("PROVED IN PART: 7 flexible")
+            && why.ends_with("; 1 mode above this frequency not proved")
     );
     let (proved, why) = of(&|p| {
         p.certificate.proved_modes = Some(9);

@@ -305,7 +305,7 @@ fn reports_have_a_test_case_for_every_quantity_and_escape_names() {
     assert_eq!(junit.matches("<failure ").count(), failures.len());
     let counts = format!("tests=\"{}\" failures=\"{}\"", comparison.rows().len(), failures.len());
     assert_eq!(junit.matches(&counts).count(), 2, "{junit}");
-    assert!(junit.contains("&lt;new&gt;.flex.h5 beside a &amp; b.flex.h5"), "{junit}");
+    assert!(junit.contains("&lt;new&gt;.flex.h5 compared with a &amp; b.flex.h5"), "{junit}");
 
     let markdown = written("r.md");
     assert_eq!(

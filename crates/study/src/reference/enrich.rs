@@ -12,7 +12,7 @@ use flexbody_motion::scene::{LoadCases, Scene, SceneVariation};
 /// Largest ratio of the truncation error to that of the previous round at which another round is made. The value is
 /// close to one because the first responses may leave most of the error from inertia to the next round. A smaller value
 /// gives up earlier.
-const WORTH: f64 = 0.9;
+const MAX_ERROR_RATIO: f64 = 0.9;
 
 /// Largest number of enrichment rounds for an ordinary reference.
 const MOST_ROUNDS: usize = 4;
@@ -92,17 +92,17 @@ pub fn enrich_from<B>(
     body: impl Fn(&B) -> &FlexBody,
 ) -> Result<Enriched<B>> {
     let mut made = make(&loads)?;
-    let mut asking = vec![Asking::default(); cases.len()];
+    let mut enrichments = vec![CaseEnrichment::default(); cases.len()];
     let mut poorer = None;
     let (enough, most_rounds) = (enrichment.enough(), enrichment.most_rounds());
     for round in 0..=most_rounds {
-        context.phase("what the body lacks of the model");
+        context.phase("error of the reference");
         let estimate = |scene: &Scene| Estimate::new(model, body(&made), scene, enough, context);
         let estimates = cases.iter().map(estimate).collect::<Result<Vec<_>>>()?;
         if estimates.iter().all(Option::is_none) {
             break;
         }
-        let paid = asking.iter().zip(&estimates).any(|(case, own)| case.was_paid(own.as_ref()));
+        let paid = enrichments.iter().zip(&estimates).any(|(case, own)| case.has_reduced_error(own.as_ref()));
         if let (Some(earlier), false) = (poorer.take(), paid) {
             // A shock excites modes of every frequency: no number of responses suffices.
             made = earlier;
@@ -110,8 +110,8 @@ pub fn enrich_from<B>(
         }
         // Collect the forces that each case asks for.
         let mut wanted = vec![loads];
-        for (case, estimate) in asking.iter_mut().zip(estimates) {
-            wanted.extend(estimate.and_then(|estimate| case.hear(estimate, enough)));
+        for (case, estimate) in enrichments.iter_mut().zip(estimates) {
+            wanted.extend(estimate.and_then(|estimate| case.update(estimate, enough)));
         }
         let is_done = wanted.len() == 1;
         loads = side_by_side(&wanted.iter().map(Mat::as_ref).collect::<Vec<_>>());
@@ -120,7 +120,7 @@ pub fn enrich_from<B>(
         }
         poorer = Some(std::mem::replace(&mut made, make(&loads)?));
     }
-    Ok(Enriched { made, rounds: asking.into_iter().map(|case| case.rounds).collect() })
+    Ok(Enriched { made, rounds: enrichments.into_iter().map(|case| case.rounds).collect() })
 }
 
 /// Returns the estimated truncation errors of `body`, made of `model`, in each variation of the load cases. A list is
@@ -148,7 +148,7 @@ pub fn varied_errors(
 
 /// State of a load case during enrichment.
 #[derive(Debug, Clone, Default)]
-struct Asking {
+struct CaseEnrichment {
     rounds: Vec<ReferenceError>,
     /// True if responses to the motion of this case were added to the last body.
     asked: bool,
@@ -156,24 +156,25 @@ struct Asking {
     gave_up: bool,
 }
 
-impl Asking {
+impl CaseEnrichment {
     /// Returns true if the last body contains forces of this case and its error decreased by enough.
-    fn was_paid(&self, now: Option<&Estimate>) -> bool {
+    fn has_reduced_error(&self, now: Option<&Estimate>) -> bool {
         match (self.rounds.last(), now) {
-            (Some(before), Some(now)) if self.asked => !Self::in_vain(before, &now.error),
+            (Some(before), Some(now)) if self.asked => !Self::is_without_progress(before, &now.error),
             _ => false,
         }
     }
 
-    fn in_vain(before: &ReferenceError, now: &ReferenceError) -> bool {
-        now.worst > WORTH * before.worst
+    fn is_without_progress(before: &ReferenceError, now: &ReferenceError) -> bool {
+        now.worst > MAX_ERROR_RATIO * before.worst
     }
 
     /// Records the estimated error. Returns the forces that this case asks for, if its error exceeds `enough` and
     /// enrichment still helps.
-    fn hear(&mut self, estimate: Estimate, enough: f64) -> Option<Mat<f64>> {
+    fn update(&mut self, estimate: Estimate, enough: f64) -> Option<Mat<f64>> {
         let Estimate { error, missing } = estimate;
-        self.gave_up |= self.asked && self.rounds.last().is_some_and(|before| Self::in_vain(before, &error));
+        self.gave_up |=
+            self.asked && self.rounds.last().is_some_and(|before| Self::is_without_progress(before, &error));
         self.asked = error.worst > enough && missing.ncols() > 0 && !self.gave_up;
         self.rounds.push(error);
         self.asked.then_some(missing)

@@ -1,10 +1,10 @@
 //! Estimate of the truncation error of a body along its motion in a scene.
 
 use super::grid::Grid;
-use super::lack::{Lack, LackErrors, energy_scale};
-use super::missed::Missed;
 use super::residual::NodalView;
-use super::resonance::Question;
+use super::resonance::ResonanceCriteria;
+use super::truncated_motion::{TruncatedMotion, TruncationErrors, energy_scale};
+use super::truncated_responses::TruncatedResponses;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -14,7 +14,7 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::not_negative;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{
-    Instant, OutputErrors, Point, Scene, Stage, Trace, damped_once, instants, nodal_point, trace,
+    FramedScene, Instant, OutputErrors, Point, Scene, Trace, damped_once, instants, nodal_point, trace,
 };
 
 /// Part of the tolerances that the truncation error of a study's reference may take without a warning.
@@ -24,14 +24,14 @@ pub const PART_OF_REFERENCE: f64 = 0.1;
 pub const PART_OF_FINE: f64 = 0.01;
 
 /// Part of the tolerances that the truncation error of a reference may take at most. The candidates get the rest.
-pub const MOST_LACKING: f64 = 0.5;
+pub const MAX_REFERENCE_ERROR: f64 = 0.5;
 
 /// Part of the allowed error. The dominant responses leave an elastic energy whose square root is at most this part. A
 /// smaller value adds more responses in each round.
 const PART_OF_RESPONSES: f64 = 0.1;
 
 /// Reason given if following the motion would take too many instants.
-const TOO_MUCH: &str = "its motion has too many periods or breaks to follow them all";
+const TOO_MANY_INSTANTS: &str = "its motion has too many periods or breakpoints to follow";
 
 /// Part of the tolerances, as a root of the elastic energy, below which a resonance of a truncated mode is ignored.
 const PART_OF_RESONANCE: f64 = 0.05;
@@ -83,7 +83,7 @@ impl CouplingEffect {
             .filter_map(|(name, error)| Some(format!("{name} {}", percent(error?))))
             .collect();
         let message = format!(
-            "the body is compared with the model under the same coupling: {} rigid. Against the model whose interfaces deform its errors are {}",
+            "the body is compared with the model under the same coupling: {} rigid. Compared with the model whose interfaces deform, its errors are {}",
             match names.as_slice() {
                 [one] => format!("interface {one} is"),
                 all => format!("interfaces {} are", all.join(", ")),
@@ -104,7 +104,7 @@ impl ReferenceError {
 
     /// Returns true if other bodies may be measured against this body, within the rest of the tolerances.
     pub fn is_reference(&self) -> bool {
-        self.worst <= MOST_LACKING
+        self.worst <= MAX_REFERENCE_ERROR
     }
 
     /// Returns the remark about rigid interfaces that the body and the compared model have in common.
@@ -119,7 +119,7 @@ impl ReferenceError {
         }
         if let Some(reason) = self.unknown {
             let message = format!(
-                "what the body of {} modes that everything is measured against lacks of the model is not known: {reason}",
+                "the error of the reference body of {} modes relative to the model is not known: {reason}",
                 self.modes
             );
             return Some(
@@ -127,18 +127,19 @@ impl ReferenceError {
             );
         }
         let message = format!(
-            "the body of {} modes that everything is measured against lacks {:.0} % of the tolerances itself, most at t = {:.2e}",
+            "the error of the reference body of {} modes relative to the model is itself {:.0} % of the tolerances, largest at t = {:.2e}",
             self.modes,
             100.0 * self.worst,
             self.time
         );
         let warning = Diagnostic::new(Code::ReferenceLacks, message);
         let begins_with_shock = scene.acting().any(|history| history.at(0.0).0.norm() != 0.0);
-        Some(match begins_with_shock && !scene.initial.settled {
-            true => warning.with_help(
-                "loads that act at time 0 begin with a shock: start with [initial] deformation = \"static\", or with loads that begin at zero",
-            ),
-            false => warning,
+        Some(if begins_with_shock && !scene.initial.settled {
+            warning.with_help(
+                "start with deformation = \"static\" in [initial], or with loads that begin at zero: loads that act at time 0 begin with a shock",
+            )
+        } else {
+            warning
         })
     }
 }
@@ -168,9 +169,9 @@ impl Estimate {
     ) -> Result<Option<Self>> {
         // Bring body, scene and model into one frame, and check that they match.
         let Some(duration) = scene.run.duration else { return Ok(None) };
-        let stage = Stage::new(body, scene)?;
+        let framed = FramedScene::new(body, scene)?;
         let given = scene.requirements.damping.is_some();
-        let (body, scene) = damped_once(stage.body, stage.scene)?;
+        let (body, scene) = damped_once(framed.body, framed.scene)?;
         let (body, scene) = (&*body, &*scene);
         let Some(vectors) = body.vectors_of(model) else { return Ok(None) };
         let coupled = body.coupled_model(model, vectors.as_ref());
@@ -185,14 +186,20 @@ impl Estimate {
         // Simulate the motion and choose the instants at which the residual forces are evaluated.
         let (motion, _) = trace(body, scene, &context.unheard())?;
         let Some(grid) = Grid::new(body, scene, &motion, duration) else {
-            let error = ReferenceError::unknown(body.n_modes(), TOO_MUCH);
+            let error = ReferenceError::unknown(body.n_modes(), TOO_MANY_INSTANTS);
             return Ok(Some(Self { error, missing: Mat::zeros(model.rows().len(), 0) }));
         };
         let mut same_steps = scene.clone();
         same_steps.run.scheme = motion.scheme;
-        let looked_at = instants(body, &same_steps, &grid.times)?;
-        let beside =
-            Beside { body, scene, motion: &motion, grid: &grid, looked_at: &looked_at, watched: &watched };
+        let sampled = instants(body, &same_steps, &grid.times)?;
+        let beside = ModelComparison {
+            body,
+            scene,
+            motion: &motion,
+            grid: &grid,
+            sampled: &sampled,
+            watched: &watched,
+        };
         // Estimate the error under the body's coupling, then against deformable interfaces.
         let mut estimate = beside.estimate(&own, allowed)?;
         let deforms = || view(CoupledModel::uncoupled(model));
@@ -205,38 +212,39 @@ impl Estimate {
 }
 
 /// Motion of a body, compared with that of its model.
-struct Beside<'a> {
+struct ModelComparison<'a> {
     body: &'a FlexBody,
     scene: &'a Scene,
     motion: &'a Trace,
     grid: &'a Grid,
     /// The motion at the instants of the grid.
-    looked_at: &'a [Instant],
+    sampled: &'a [Instant],
     /// Nodal weights of the points whose deflections count.
     watched: &'a [Mat<f64>],
 }
 
-impl Beside<'_> {
+impl ModelComparison<'_> {
     /// Estimates the truncation error of the body against the model of `view`.
     fn estimate(&self, view: &NodalView<'_>, allowed: f64) -> Result<Estimate> {
-        let &Self { body, scene, motion, grid, looked_at, watched } = self;
+        let &Self { body, scene, motion, grid, sampled, watched } = self;
         let tolerance = &scene.requirements.tolerance;
         let least = tolerance.errors.stress.min(tolerance.errors.deflection);
         // A resonance counts above a small part of the tolerances; a free body has no missing mode below the
         // certificate.
-        let question = Question {
+        let criteria = ResonanceCriteria {
             settled: scene.initial.settled,
             negligible: PART_OF_RESONANCE * least * energy_scale(motion),
             complete_below: if view.held.is_some() { 0.0 } else { complete_below(body) },
         };
-        let missed = Missed::new(view, body, looked_at, grid, &question)?;
-        let lack = Lack::new(view, body, &missed, looked_at, grid, scene.initial.settled);
-        let LackErrors { errors, time } = lack.errors(scene, motion, watched);
+        let missed = TruncatedResponses::new(view, body, sampled, grid, &criteria)?;
+        let truncated_motion =
+            TruncatedMotion::new(view, body, &missed, sampled, grid, scene.initial.settled);
+        let TruncationErrors { errors, time } = truncated_motion.errors(scene, motion, watched);
         let worst = errors.worst(tolerance);
         let modes = body.n_modes();
         let error = ReferenceError { modes, worst, time, errors, unknown: None, coupling: None };
         let enough = PART_OF_RESPONSES * allowed * least;
-        let missing = missed.dominant(&lack.of_responses(), enough * energy_scale(motion));
+        let missing = missed.dominant(&truncated_motion.of_responses(), enough * energy_scale(motion));
         Ok(Estimate { error, missing })
     }
 }

@@ -2,12 +2,12 @@
 
 use super::compressed::MOST_FORCES;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_motion::scene::{Scene, Trace, fastest_history, liveliest_rate};
+use flexbody_motion::scene::{Scene, Trace, fastest_history, highest_excited_rate};
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Smallest number of intervals of a motion.
-const LEAST: usize = 120;
+const MIN_INTERVALS: usize = 120;
 
 /// Largest number of amplitudes of modes and forces at all instants together: about 1.5 GB with their rates,
 /// accelerations and derived arrays. A larger value follows longer motions and needs more memory.
@@ -23,10 +23,10 @@ const PER_PERIOD: f64 = 12.0;
 const FEWEST_PER_PERIOD: f64 = 8.0;
 
 /// Smallest number of intervals between two breaks.
-const PER_PIECE: usize = 3;
+const MIN_INTERVALS_PER_PIECE: usize = 3;
 
 /// Modes count if the root of their elastic energy is at least this part of the tolerances.
-const COUNTS: f64 = 0.1;
+const MIN_MODE_SHARE: f64 = 0.1;
 
 /// Stretches between breaks are ignored if they are shorter than this part of the run.
 const SHORTEST: f64 = 1e-9;
@@ -46,21 +46,21 @@ impl Grid {
     /// Builds the grid for the `motion` of a `body`. Returns `None` if too many instants were needed to resolve all
     /// oscillations and all stretches between breaks.
     pub(super) fn new(body: &FlexBody, scene: &Scene, motion: &Trace, duration: f64) -> Option<Self> {
-        let frequency =
-            (liveliest_rate(body, scene, motion, COUNTS) / TAU).max(fastest_history(scene, duration));
+        let frequency = (highest_excited_rate(body, scene, motion, MIN_MODE_SHARE) / TAU)
+            .max(fastest_history(scene, duration));
         let wanted = PER_PERIOD * frequency * duration;
-        let most = (MOST_AMPLITUDES / (body.n_modes() + FORCES)).max(LEAST);
+        let most = (MOST_AMPLITUDES / (body.n_modes() + FORCES)).max(MIN_INTERVALS);
         let stretches = stretches(&scene.breaks(), duration);
         let for_periods = FEWEST_PER_PERIOD / PER_PERIOD * wanted;
-        if for_periods > most as f64 || (PER_PIECE + 1) * stretches.len() > most {
+        if for_periods > most as f64 || (MIN_INTERVALS_PER_PIECE + 1) * stretches.len() > most {
             return None;
         }
         // Distribute the intervals over the stretches by length.
-        let intervals = wanted.clamp(LEAST as f64, most as f64);
+        let intervals = wanted.clamp(MIN_INTERVALS as f64, most as f64);
         let (mut times, mut pieces) = (Vec::new(), Vec::new());
         for (start, end) in stretches {
             let length = end - start;
-            let count = (intervals * length / duration).ceil().max(PER_PIECE as f64) as usize;
+            let count = (intervals * length / duration).ceil().max(MIN_INTERVALS_PER_PIECE as f64) as usize;
             let last = if end < duration { end - BEFORE * length / count as f64 } else { end };
             let first = times.len();
             times.extend((0..count).map(|i| start + length * (i as f64 / count as f64)));
@@ -70,15 +70,19 @@ impl Grid {
         Some(Self { times, pieces })
     }
 
-    /// Returns indices of about [`LEAST`] evenly spaced instants, and of the instants where one of the `histories` (one
+    /// Returns indices of about [`MIN_INTERVALS`] evenly spaced instants, and of the instants where one of the `histories` (one
     /// value per instant) is largest. Short shocks are therefore included.
     pub(super) fn few(&self, histories: impl Iterator<Item = Vec<f64>>) -> Vec<usize> {
-        self.telling(LEAST + 1, histories)
+        self.significant_instants(MIN_INTERVALS + 1, histories)
     }
 
     /// Returns indices of about `count` evenly spaced instants, and of the instants where one of the `histories` is
     /// largest.
-    pub(super) fn telling(&self, count: usize, histories: impl Iterator<Item = Vec<f64>>) -> Vec<usize> {
+    pub(super) fn significant_instants(
+        &self,
+        count: usize,
+        histories: impl Iterator<Item = Vec<f64>>,
+    ) -> Vec<usize> {
         let stride = self.times.len().div_ceil(count);
         let mut all: Vec<usize> = (0..self.times.len()).step_by(stride).collect();
         all.extend(self.times.len().checked_sub(1));

@@ -8,7 +8,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{
-    LoadCases, Measure, OtherModes, OutputErrors, Scene, Stage, Trace, trace, trace_at,
+    FramedScene, LoadCases, Measure, OtherModes, OutputErrors, Scene, Trace, trace, trace_at,
 };
 
 /// Motions of a reference body in load cases, and bodies whose modes are made of the shapes of these motions.
@@ -23,12 +23,12 @@ pub struct MotionBodies<'m> {
 struct Case<'m> {
     scene: &'m Scene,
     /// The reference in the frame of the scene.
-    staged: FlexBody,
+    framed_body: FlexBody,
     motion: Trace,
 }
 
 /// Body with the fewest shapes whose errors are small enough.
-pub struct Fewest<B> {
+pub struct FewestShapes<B> {
     /// Number of shapes.
     pub count: usize,
     /// Result of the closure `make` for this body.
@@ -44,7 +44,7 @@ impl<'m> MotionBodies<'m> {
     /// there are no shapes.
     ///
     /// # Errors
-    /// The errors of [`trace`] and of [`Stage::new`].
+    /// The errors of [`trace`] and of [`FramedScene::new`].
     pub fn new(
         model: &'m FeModel,
         reference: &'m FlexBody,
@@ -53,7 +53,7 @@ impl<'m> MotionBodies<'m> {
     ) -> Result<Option<Self>> {
         let case = |scene: &'m Scene| -> Result<Case<'m>> {
             let (motion, _) = trace(reference, scene, &context.unheard())?;
-            Ok(Case { scene, staged: Stage::new(reference, scene)?.body.into_owned(), motion })
+            Ok(Case { scene, framed_body: FramedScene::new(reference, scene)?.body.into_owned(), motion })
         };
         let cases = cases.iter().map(case).collect::<Result<Vec<_>>>()?;
         let motions: Vec<_> = cases.iter().map(|case| (case.scene, &case.motion)).collect();
@@ -91,21 +91,21 @@ impl<'m> MotionBodies<'m> {
         most: &[f64],
         mut make: impl FnMut(usize) -> Result<B>,
         body: impl Fn(&B) -> &FlexBody,
-    ) -> Result<Option<Fewest<B>>> {
+    ) -> Result<Option<FewestShapes<B>>> {
         let measures: Vec<Measure<'_>> = self.cases.iter().map(Case::measure).collect();
-        let mut tried = |count: usize| -> Result<Option<Fewest<B>>> {
+        let mut attempt = |count: usize| -> Result<Option<FewestShapes<B>>> {
             let made = make(count)?;
             let Some(errors) = self.errors(&measures, body(&made))? else { return Ok(None) };
             let worst =
                 |(case, errors): (&Case<'_>, &OutputErrors)| errors.worst(&case.scene.requirements.tolerance);
             let worst = self.cases.iter().zip(&errors).map(worst).collect();
-            Ok(Some(Fewest { count, made, errors, worst }))
+            Ok(Some(FewestShapes { count, made, errors, worst }))
         };
-        let is_enough = |own: &Fewest<B>| own.worst.iter().zip(most).all(|(worst, most)| worst <= most);
+        let is_enough = |own: &FewestShapes<B>| own.worst.iter().zip(most).all(|(worst, most)| worst <= most);
         let (mut too_few, mut found) = (0, None);
         // Ascend to the first sufficient number, then bisect below it.
         for count in self.shapes.more_and_more() {
-            let Some(own) = tried(count)? else { return Ok(None) };
+            let Some(own) = attempt(count)? else { return Ok(None) };
             if is_enough(&own) {
                 found = Some(own);
                 break;
@@ -115,7 +115,7 @@ impl<'m> MotionBodies<'m> {
         let Some(mut found) = found else { return Ok(None) };
         while too_few + 1 < found.count {
             let count = too_few.midpoint(found.count);
-            match tried(count)?.filter(is_enough) {
+            match attempt(count)?.filter(is_enough) {
                 Some(own) => found = own,
                 None => too_few = count,
             }
@@ -136,7 +136,7 @@ impl<'m> MotionBodies<'m> {
 impl Case<'_> {
     /// Returns the measure for errors relative to the reference motion.
     fn measure(&self) -> Measure<'_> {
-        Measure::new(&self.staged, &self.motion)
+        Measure::new(&self.framed_body, &self.motion)
     }
 
     /// Returns the largest errors of the motion of `body`. `shared` is the stiffness Psi'K Psi_r that couples its modes
@@ -150,13 +150,13 @@ impl Case<'_> {
         if !self.scene.initial.modes.is_empty() {
             return Ok(None);
         }
-        let stage = Stage::new(body, self.scene)?;
-        let Some(modes) = OtherModes::new(&stage.body, &self.staged, shared.as_ref()) else {
+        let framed = FramedScene::new(body, self.scene)?;
+        let Some(modes) = OtherModes::new(&framed.body, &self.framed_body, shared.as_ref()) else {
             return Ok(None);
         };
-        let mut scene = stage.scene.into_owned();
+        let mut scene = framed.scene.into_owned();
         scene.run.scheme = self.motion.scheme;
-        let motion = trace_at(&stage.body, &scene, &self.motion.time, &Context::QUIET)?;
+        let motion = trace_at(&framed.body, &scene, &self.motion.time, &Context::QUIET)?;
         Ok(Some(measure.of_other(&motion, &modes).largest()))
     }
 }

@@ -9,7 +9,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::symmetric_part;
 use flexbody_linalg::{combine, dense_cholesky, gram, larger, side_by_side, solve_upper};
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{Scene, Stage, Trace};
+use flexbody_motion::scene::{FramedScene, Scene, Trace};
 
 /// Parts of the tolerances that the shapes may leave out of the motion; each gives one candidate number of shapes.
 /// Several are needed because the motion of the reduced body may be more or less accurate than the best approximation
@@ -17,7 +17,7 @@ use flexbody_motion::scene::{Scene, Stage, Trace};
 const PARTS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
 
 /// Largest number of shapes.
-const MOST: usize = 120;
+const MAX_SHAPES: usize = 120;
 
 /// Part of the sum of energies for which no shape is made. A larger value gives fewer shapes.
 const LEFT_OUT: f64 = 1e-16;
@@ -41,15 +41,15 @@ impl MotionShapes {
     /// motions, if the body has other rows than the model, or if nothing deforms.
     ///
     /// # Errors
-    /// The errors of [`Stage::new`].
+    /// The errors of [`FramedScene::new`].
     pub(super) fn new(
         model: &FeModel,
         body: &FlexBody,
         motions: &[(&Scene, &Trace)],
     ) -> Result<Option<Self>> {
         let Some((scene, _)) = motions.first() else { return Ok(None) };
-        let stage = Stage::new(body, scene)?;
-        let body = &*stage.body;
+        let framed = FramedScene::new(body, scene)?;
+        let body = &*framed.body;
         let stiffness = symmetric_part(body.invariants().modal_stiffness());
         let (Some(vectors), Some(lower)) = (body.vectors_of(model), dense_cholesky(stiffness)) else {
             return Ok(None);
@@ -61,7 +61,7 @@ impl MotionShapes {
         for (weighted, (_, motion)) in weighted.iter().zip(motions) {
             sum += mean_of_products(weighted, &motion.time);
         }
-        let Some((directions, _)) = principal(sum, LEFT_OUT, MOST) else { return Ok(None) };
+        let Some((directions, _)) = principal(sum, LEFT_OUT, MAX_SHAPES) else { return Ok(None) };
         // Transform back to shapes, and measure the energy that the first r shapes leave out.
         let all = side_by_side(&weighted.iter().map(Mat::as_ref).collect::<Vec<_>>());
         let left = left_out(&all, &directions);

@@ -292,9 +292,10 @@ impl<'m> NodalView<'m> {
         for (i, now) in motion.iter().enumerate() {
             let (linear, angular) = of(now);
             let (linear, angular) = (self.axes * linear, self.axes * angular);
-            let entries = match plane {
-                true => vec![linear.x, linear.y, angular.z],
-                false => linear.iter().chain(&angular).copied().collect(),
+            let entries = if plane {
+                vec![linear.x, linear.y, angular.z]
+            } else {
+                linear.iter().chain(&angular).copied().collect()
             };
             entries.iter().enumerate().for_each(|(k, value)| both[(k, i)] = *value);
         }

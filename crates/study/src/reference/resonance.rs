@@ -9,7 +9,7 @@ use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
 
 /// Largest number of resonances.
-const MOST: usize = 4;
+const MAX_RESONANCES: usize = 4;
 
 /// Largest number of force combinations whose spectrum is computed.
 const MOST_COMBINATIONS: usize = 8;
@@ -30,7 +30,7 @@ const WIDTH: usize = 6;
 const MOST_INSTANTS: usize = 1 << 20;
 
 /// Criteria of a search for resonances.
-pub(super) struct Question {
+pub(super) struct ResonanceCriteria {
     /// True if the motion starts in equilibrium.
     pub settled: bool,
     /// Root of the elastic energy below which a resonance is negligible.
@@ -60,9 +60,9 @@ pub(super) fn resonances(
     grid: &Grid,
     amplitudes: &Mat<f64>,
     energy: &Mat<f64>,
-    question: &Question,
+    criteria: &ResonanceCriteria,
 ) -> Vec<Resonance> {
-    let &Question { settled, negligible, complete_below } = question;
+    let &ResonanceCriteria { settled, negligible, complete_below } = criteria;
     let Some(duration) = grid.times.last().copied().filter(|last| *last > 0.0) else { return Vec::new() };
     let count = (2 * grid.times.len()).next_power_of_two().min(MOST_INSTANTS);
     let step = duration / count as f64;
@@ -89,7 +89,7 @@ pub(super) fn resonances(
         if is_apart && level[line] > PEAK * around(&level, line) {
             chosen.push(line);
         }
-        if chosen.len() == MOST {
+        if chosen.len() == MAX_RESONANCES {
             break;
         }
     }
@@ -192,8 +192,8 @@ mod tests {
         let grid = grid(4000, 10.0);
         let amplitudes = Mat::from_fn(1, grid.times.len(), |_, i| force(grid.times[i]));
         let energy = Mat::full(1, 1, 2.0);
-        let question = Question { settled: false, negligible, complete_below: 0.0 };
-        let all = resonances(&grid, &amplitudes, &energy, &question);
+        let criteria = ResonanceCriteria { settled: false, negligible, complete_below: 0.0 };
+        let all = resonances(&grid, &amplitudes, &energy, &criteria);
         all.into_iter().map(|resonance| resonance.rate / TAU).collect()
     }
 

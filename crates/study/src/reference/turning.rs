@@ -26,9 +26,12 @@ impl Turning {
         let turns = central_turns(view);
         let weighted = view.rows.weigh(turns.as_ref());
         let extended = view.rows.extend(responses);
-        let square = |own: &Mat<f64>| match plane {
-            true => Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, own[(0, 0)])),
-            false => Matrix3::from_fn(|a, b| own[(a, b)]),
+        let square = |own: &Mat<f64>| {
+            if plane {
+                Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, own[(0, 0)]))
+            } else {
+                Matrix3::from_fn(|a, b| own[(a, b)])
+            }
         };
         // J_ab = R_a'M R_b.
         let inertia = square(&gram(turns.as_ref(), weighted.as_ref()));
@@ -107,9 +110,10 @@ impl Turning {
 
     /// Returns the inverse of J; zero if J is singular, as for a body on a line.
     fn inverse(&self) -> Matrix3<f64> {
-        match self.plane {
-            true => Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, self.inertia[(2, 2)].recip())),
-            false => self.inertia.try_inverse().unwrap_or_else(Matrix3::zeros),
+        if self.plane {
+            Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, self.inertia[(2, 2)].recip()))
+        } else {
+            self.inertia.try_inverse().unwrap_or_else(Matrix3::zeros)
         }
     }
 }

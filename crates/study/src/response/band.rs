@@ -1,32 +1,32 @@
 //! Frequencies at which a response is evaluated.
 
 /// Smallest ratio of the ends of a band whose frequencies are spaced by equal ratios.
-const WIDE: f64 = 20.0;
+const MIN_LOGARITHMIC_RATIO: f64 = 20.0;
 
 /// Smallest relative half width of a resonance, used if damping makes it no wider.
 const NARROWEST: f64 = 1e-3;
 
 /// Smallest relative distance from the natural frequency at which the peak of a damped resonance is evaluated: at the
 /// natural frequency itself the undamped dynamic stiffness is singular.
-const BESIDE: f64 = 1e-6;
+const MIN_PEAK_DISTANCE: f64 = 1e-6;
 
 /// Damping ratio above which the peak of a resonance is evaluated. Resonances with less damping are sampled on both
 /// sides of their pole.
-const DAMPED: f64 = 1e-5;
+const MIN_PEAK_DAMPING: f64 = 1e-5;
 
 /// Largest relative distance below the natural frequency at which the peak of a strongly damped resonance is evaluated:
 /// for damping ratios above 0.7 the response has no peak.
-const MOST_SHIFTED: f64 = 0.5;
+const MAX_PEAK_DISTANCE: f64 = 0.5;
 
 /// Relative distance from a natural frequency without damping within which no response is evaluated, since it is
 /// infinite at the frequency itself.
-const POLE: f64 = 1e-4;
+const POLE_DISTANCE: f64 = 1e-4;
 /// Relative distance from a damped natural frequency within which no response is evaluated, since the undamped matrix
 /// is nearly singular there.
-const DAMPED_POLE: f64 = 3e-7;
+const DAMPED_POLE_DISTANCE: f64 = 3e-7;
 
 /// Relative difference below which natural frequencies belong to one cluster.
-const SAME: f64 = 1e-6;
+const CLUSTER_DISTANCE: f64 = 1e-6;
 
 /// Positions around a resonance, in half widths, at which only the modal responses are evaluated.
 const AROUND: [f64; 8] = [-8.0, -4.0, -2.0, -0.5, 0.5, 2.0, 4.0, 8.0];
@@ -79,7 +79,11 @@ impl Band {
 
     /// Returns the spacing: by equal ratios if the band is wide and does not begin at zero.
     pub fn spacing(&self) -> Spacing {
-        if self.low > 0.0 && self.high / self.low >= WIDE { Spacing::Logarithmic } else { Spacing::Linear }
+        if self.low > 0.0 && self.high / self.low >= MIN_LOGARITHMIC_RATIO {
+            Spacing::Logarithmic
+        } else {
+            Spacing::Linear
+        }
     }
 
     /// Returns `count` evenly spaced frequencies up to the end of the band. A free body has no finite response at zero;
@@ -110,7 +114,7 @@ impl Band {
         inside.sort_by(|a, b| a.hertz.total_cmp(&b.hertz));
         // Keep one resonance of each cluster, with the smallest damping ratio.
         inside.dedup_by(|next, kept| {
-            let same = next.hertz <= kept.hertz * (1.0 + SAME);
+            let same = next.hertz <= kept.hertz * (1.0 + CLUSTER_DISTANCE);
             if same {
                 kept.ratio = kept.ratio.min(next.ratio);
             }
@@ -125,8 +129,8 @@ impl Band {
         let solved = close.into_iter().chain(spread).map(|hertz| Frequency { hertz, solved: true });
         let others = around.chain(self.even(points)).map(|hertz| Frequency { hertz, solved: false });
         // Check resonances just outside the band too: a band may end at a resonance.
-        let looked_at = |f: &Frequency| within(f.hertz) && !resonances.iter().any(|r| r.is_pole_at(f.hertz));
-        let mut all: Vec<Frequency> = solved.chain(others).filter(looked_at).collect();
+        let evaluated = |f: &Frequency| within(f.hertz) && !resonances.iter().any(|r| r.is_pole_at(f.hertz));
+        let mut all: Vec<Frequency> = solved.chain(others).filter(evaluated).collect();
         all.sort_by(|a, b| a.hertz.total_cmp(&b.hertz).then(b.solved.cmp(&a.solved)));
         all.dedup_by(|next, kept| next.hertz == kept.hertz);
         all
@@ -141,15 +145,15 @@ impl Resonance {
 
     /// Returns true if the frequency is too close to the resonance to be evaluated.
     fn is_pole_at(&self, hertz: f64) -> bool {
-        let nearest = if self.ratio <= DAMPED { POLE } else { DAMPED_POLE };
+        let nearest = if self.ratio <= MIN_PEAK_DAMPING { POLE_DISTANCE } else { DAMPED_POLE_DISTANCE };
         (hertz / self.hertz - 1.0).abs() < nearest
     }
 
     /// Returns the frequencies of the peak and of both its sides, the most significant first.
-    fn looked_at(&self) -> [f64; 3] {
+    fn evaluated(&self) -> [f64; 3] {
         let side = self.half_width();
-        let peak = if self.ratio > DAMPED {
-            (self.ratio * self.ratio).clamp(BESIDE, MOST_SHIFTED)
+        let peak = if self.ratio > MIN_PEAK_DAMPING {
+            (self.ratio * self.ratio).clamp(MIN_PEAK_DISTANCE, MAX_PEAK_DISTANCE)
         } else {
             0.3 * side
         };
@@ -161,8 +165,8 @@ impl Resonance {
 fn closely(resonances: &[Resonance], most: usize) -> Vec<f64> {
     let of_each = if 3 * resonances.len() <= most { 3 } else { 1 };
     let stride = resonances.len().div_ceil(most.max(1)).max(1);
-    let looked_at = resonances.iter().step_by(stride).flat_map(|r| r.looked_at().into_iter().take(of_each));
-    looked_at.take(most).collect()
+    let evaluated = resonances.iter().step_by(stride).flat_map(|r| r.evaluated().into_iter().take(of_each));
+    evaluated.take(most).collect()
 }
 
 #[cfg(test)]

@@ -14,14 +14,14 @@ use nalgebra::{Complex, DMatrix};
 const GROWTH_LIMIT: f64 = 1e-4;
 
 /// Largest number of iterative refinements of a solution.
-const REFINEMENTS: usize = 4;
+const MAX_REFINEMENTS: usize = 4;
 /// Relative change of a solution at which refinement stops.
-const GOOD: f64 = 1e-11;
+const REFINEMENT_TOLERANCE: f64 = 1e-11;
 /// Largest relative change after the last refinement at which the solution is accepted.
-const ACCEPTED: f64 = 1e-6;
+const MAX_SOLUTION_ERROR: f64 = 1e-6;
 
 /// Floating-point operations per second that estimates of time assume.
-const PACE: f64 = 4e9;
+const FLOPS_PER_SECOND: f64 = 4e9;
 
 /// Frequency response of a free body: H(w) = L'(K + i w D - w^2 M)^-1 B. Matrices, loads and the N rows are those of
 /// the model under the couplings of the body.
@@ -68,7 +68,7 @@ impl<'m> DirectSolver<'m> {
     ) -> Result<Self> {
         let pencil = model.pencil();
         let ordering =
-            || Diagnostic::new(Code::MemoryShort, "the ordering of the equations runs out of memory");
+            || Diagnostic::new(Code::MemoryShort, "the memory does not suffice to order the equations");
         let analysis = Analysis::new(&pencil).ok_or_else(ordering)?;
         let rigid = model.rigid_modes()?;
         let [mut loads, measured] = [loads, measured].map(|columns| model.restrict(columns.clone()));
@@ -97,13 +97,13 @@ impl<'m> DirectSolver<'m> {
             return Err(Diagnostic::new(Code::MemoryShort, message).into());
         }
         let each = 2.0 * self.analysis.flops() + 12.0 * (self.analysis.factor_len() * columns) as f64;
-        let seconds = solves as f64 * each / PACE;
+        let seconds = solves as f64 * each / FLOPS_PER_SECOND;
         if context.longest.is_some_and(|longest| seconds > longest) {
             let message = format!(
                 "solving the equations of all {n} rows at {solves} frequencies takes about {:.1} hours on one processor",
                 seconds / 3600.0
             );
-            let help = "ask for fewer --solves, or say --allow-long";
+            let help = "give fewer --solves, or add --allow-long";
             return Err(Diagnostic::new(Code::WorkLong, message).with_help(help).into());
         }
         Ok(())
@@ -184,7 +184,7 @@ fn damped_columns(u: &Mat<f64>, c: &Mat<f64>) -> Option<(Mat<f64>, Mat<f64>)> {
 
 fn inaccurate(omega: f64, residual: f64) -> flexbody_base::error::Error {
     let message = format!(
-        "the equations of all nodes at {omega:.6e} rad per time are solved with a relative error of {residual:.1e} only"
+        "the equations of all nodes at {omega:.6e} rad per unit of time are solved only with a relative error of {residual:.1e}"
     );
     Diagnostic::new(Code::FactorizationFailed, message).into()
 }
@@ -214,18 +214,18 @@ impl Point<'_, '_> {
         };
         let mut x = self.solved(loads.clone());
         let mut change = f64::INFINITY;
-        for _ in 0..REFINEMENTS {
+        for _ in 0..MAX_REFINEMENTS {
             let mut residual = &loads - self.product(&x);
             self.solver.equilibrate(&mut residual);
             let correction = self.solved(residual);
             change = largest_entry(correction.as_ref()) / largest_entry(x.as_ref()).max(f64::MIN_POSITIVE);
             x += correction;
-            if change <= GOOD {
+            if change <= REFINEMENT_TOLERANCE {
                 break;
             }
         }
         // This condition also rejects NaN.
-        if change <= ACCEPTED { Ok(x) } else { Err(inaccurate(self.omega, change)) }
+        if change <= MAX_SOLUTION_ERROR { Ok(x) } else { Err(inaccurate(self.omega, change)) }
     }
 
     /// Returns (A + i w U C U')^-1 times self-equilibrated columns, without refinement.

@@ -16,10 +16,10 @@ use flexbody_linalg::{
 const EIGENVECTOR: f64 = 1e-6;
 
 /// Smallest part of a load outside rigid motions and modes that gets a static response.
-const LEFT: f64 = 1e-10;
+const MIN_REMAINING_LOAD: f64 = 1e-10;
 
 /// Smallest elastic energy of a direction of the static responses, relative to the largest, that counts as independent.
-const INDEPENDENT: f64 = 1e-9;
+const MIN_ENERGY_RATIO: f64 = 1e-9;
 
 /// A body expressed in the rows of its model.
 pub(super) struct NodalModes<'m> {
@@ -81,7 +81,8 @@ impl NodalModes<'_> {
             subtract_combination(left.as_mut(), products.as_ref(), along.as_ref());
         }
         self.model.without_inner_forces(&mut left);
-        let kept = (0..loads.ncols()).filter(|&j| left.col(j).norm_l2() > LEFT * loads.col(j).norm_l2());
+        let kept = (0..loads.ncols())
+            .filter(|&j| left.col(j).norm_l2() > MIN_REMAINING_LOAD * loads.col(j).norm_l2());
         columns(&left, &kept.collect::<Vec<_>>())
     }
 
@@ -154,7 +155,7 @@ fn orthonormal(vectors: &Mat<f64>, products: &Mat<f64>) -> Option<Mat<f64>> {
     let eigen = symmetric_eigen(symmetric.as_ref())?;
     let largest = eigen.values.last().copied()?;
     let kept: Vec<usize> =
-        (0..eigen.values.len()).filter(|&j| eigen.values[j] > INDEPENDENT * largest).collect();
+        (0..eigen.values.len()).filter(|&j| eigen.values[j] > MIN_ENERGY_RATIO * largest).collect();
     let turned = Mat::from_fn(eigen.values.len(), kept.len(), |i, j| {
         eigen.vectors[(i, kept[j])] / eigen.values[kept[j]].sqrt()
     });

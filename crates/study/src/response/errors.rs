@@ -58,6 +58,7 @@ pub(super) struct Compared<'a> {
 impl PairErrors {
     /// Compares responses at frequencies in ascending order.
     pub(super) fn new(compared: &[Compared<'_>], tolerance: f64) -> Self {
+        // Measured errors where the equations of all nodes were solved, estimates everywhere.
         let measured: Vec<Option<f64>> =
             compared.iter().map(|at| at.full.map(|full| relative(at.reduced, full))).collect();
         let estimated: Vec<f64> = compared.iter().map(|at| relative(at.reduced, at.enriched)).collect();
@@ -65,6 +66,7 @@ impl PairErrors {
             let ratio = norm(at.reduced) / norm(at.full?);
             Some(At { hertz: at.hertz, value: 20.0 * ratio.log10() })
         });
+        // The measured error takes precedence over the estimate.
         let both: Vec<At> = (0..compared.len())
             .map(|i| At { hertz: compared[i].hertz, value: measured[i].unwrap_or(estimated[i]) })
             .collect();

@@ -126,10 +126,10 @@ impl Place {
         let directions = self.directions_of(d);
         for direction in &directions {
             if direction.column(d).is_none() {
-                return Err(self.lacks(*direction, "the body lies in a plane"));
+                return Err(self.without_direction(*direction, "the body lies in a plane"));
             }
             if direction.turns() && rotation.is_none() {
-                return Err(self.lacks(*direction, "nothing there determines a rotation"));
+                return Err(self.without_direction(*direction, "its nodes do not determine a rotation"));
             }
         }
         let modal = Mat::from_fn(nf, directions.len(), |j, at| {
@@ -171,9 +171,8 @@ impl Place {
                         rotation: rows.rotation,
                     }),
                     _ => {
-                        let message =
-                            format!("{} has no reference point: a free one has nodes only", self.point);
-                        let help = "name one of its nodes by its number";
+                        let message = format!("{} has no reference point: its coupling is free", self.point);
+                        let help = "give the number of one of its nodes";
                         Err(Diagnostic::new(Code::PlaceUnknown, message).with_help(help).into())
                     }
                 }
@@ -198,13 +197,14 @@ impl Place {
         for direction in self.directions_of(d) {
             let column = direction.column(d).filter(|&column| column < all.ncols());
             let load = column.map(|column| all.as_ref().col(column)).filter(|load| load.norm_max() > 0.0);
-            let load = load.ok_or_else(|| self.lacks(direction, "nothing there determines a rotation"))?;
+            let load = load
+                .ok_or_else(|| self.without_direction(direction, "its nodes do not determine a rotation"))?;
             columns.resize_with(all.nrows(), columns.ncols() + 1, |i, _| load[i]);
         }
         Ok(columns)
     }
 
-    fn lacks(&self, direction: Direction, why: &str) -> flexbody_base::error::Error {
+    fn without_direction(&self, direction: Direction, why: &str) -> flexbody_base::error::Error {
         let message = format!("{} has no direction {}: {why}", self.point, direction.name());
         Diagnostic::new(Code::PlaceUnknown, message).with_help("leave the direction out").into()
     }
@@ -212,8 +212,8 @@ impl Place {
     fn unknown(&self, body: &FlexBody) -> flexbody_base::error::Error {
         let names: Vec<&str> = body.interfaces().iter().map(|interface| interface.name.as_str()).collect();
         let help = match names.as_slice() {
-            [] => "the body has no interfaces: name a node by its number".to_owned(),
-            names => format!("interfaces: {}; nodes go by their numbers", names.join(", ")),
+            [] => "give the number of a node: the body has no interfaces".to_owned(),
+            names => format!("give the number of a node, or one of the interfaces {}", names.join(", ")),
         };
         Diagnostic::new(Code::PlaceUnknown, format!("the body has no {}", self.point)).with_help(help).into()
     }

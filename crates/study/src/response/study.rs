@@ -169,7 +169,7 @@ pub fn respond(
     let damping = Some(body.damping()).filter(|c| c.norm_max() > 0.0);
     let reduced = reduced_sum(&at_centre, &rows(from)?, &rows(to)?, damping.clone());
     let known = match model {
-        Some(model) => Some(Known::new(model, body, [from, to], damping.as_ref(), context)?),
+        Some(model) => Some(ModelResponse::new(model, body, [from, to], damping.as_ref(), context)?),
         None => None,
     };
     // Frequencies cluster at the resonances of the best sum at hand.
@@ -182,7 +182,7 @@ pub fn respond(
     // Evaluate the curves, then solve the equations of all nodes, also where the estimate is critical.
     let mut curves = Curves::new(&reduced, known.as_ref(), frequencies, body.units());
     if let Some(known) = &known {
-        curves.look_closer(&blocks, settings.tolerance, solves.div_ceil(4));
+        curves.solve_more(&blocks, settings.tolerance, solves.div_ceil(4));
         curves.solve(known, body.units(), context)?;
     }
     let [low, high] = settings.band.ends();
@@ -255,7 +255,7 @@ fn rigid_compliance(body: &FlexBody) -> Matrix6<f64> {
 }
 
 /// Model of the body, with the enriched response that estimates the error.
-struct Known<'m> {
+struct ModelResponse<'m> {
     nodal: NodalModes<'m>,
     /// Response with static responses added to the modes, which estimates the error; `None` if the modes leave no
     /// unbalanced force.
@@ -264,7 +264,7 @@ struct Known<'m> {
     context: Context<'m>,
 }
 
-impl<'m> Known<'m> {
+impl<'m> ModelResponse<'m> {
     fn new(
         model: &'m FeModel,
         body: &FlexBody,
@@ -301,11 +301,11 @@ fn nodal_modes<'m>(
     to: &[Place],
 ) -> Result<NodalModes<'m>> {
     let foreign = |why: &str| {
-        let message = format!("the body was not made of this model: {why}");
+        let message = format!("the body was not made from this model: {why}");
         let help = "give the model that the body was converted from";
         Diagnostic::new(Code::BodyIncomparable, message).with_help(help)
     };
-    let vectors = body.vectors_of(model).ok_or_else(|| foreign("it has other rows"))?;
+    let vectors = body.vectors_of(model).ok_or_else(|| foreign("its matrix rows differ"))?;
     let pencil = model.pencil();
     // Modes of this model have modal mass 1 and modal stiffness lambda.
     let (inertial, elastic) = (pencil.apply_mass(vectors.as_ref()), pencil.apply_stiffness(vectors.as_ref()));
@@ -351,7 +351,7 @@ impl Curves {
     /// Evaluates the modal responses; the equations of all nodes are not solved here.
     fn new(
         reduced: &ModalSum,
-        known: Option<&Known<'_>>,
+        known: Option<&ModelResponse<'_>>,
         frequencies: Vec<Frequency>,
         units: &UnitSystem,
     ) -> Self {
@@ -368,7 +368,7 @@ impl Curves {
 
     /// Marks for solution the frequencies where the estimated error of a block is largest and where it first exceeds
     /// the tolerance, at most `most` of them, so that reported errors are measured there.
-    fn look_closer(&mut self, blocks: &[(&Place, &Place, Block)], tolerance: f64, most: usize) {
+    fn solve_more(&mut self, blocks: &[(&Place, &Place, Block)], tolerance: f64, most: usize) {
         let mut found = Vec::new();
         for errors in blocks.iter().filter_map(|(_, _, block)| self.errors(block, tolerance)) {
             let estimated = &errors.estimated;
@@ -388,7 +388,7 @@ impl Curves {
 
     /// Solves the equations of all nodes, with the couplings of the body and, if these make an interface rigid,
     /// without.
-    fn solve(&mut self, known: &Known<'_>, units: &UnitSystem, context: &Context<'_>) -> Result<()> {
+    fn solve(&mut self, known: &ModelResponse<'_>, units: &UnitSystem, context: &Context<'_>) -> Result<()> {
         context.phase("equations of all nodes");
         let deforming = known.deforming();
         let studies = if deforming.is_some() { 2 } else { 1 };
@@ -434,7 +434,7 @@ impl Curves {
     /// interfaces.
     fn coupling_effect(
         &self,
-        known: &Known<'_>,
+        known: &ModelResponse<'_>,
         blocks: &[(&Place, &Place, Block)],
         tolerance: f64,
     ) -> Option<CouplingEffect> {
@@ -470,7 +470,7 @@ impl Curves {
         Some(CouplingEffect { interfaces, largest })
     }
 
-    fn solved(&self, known: &Known<'_>, low: f64) -> Solved {
+    fn solved(&self, known: &ModelResponse<'_>, low: f64) -> Solved {
         let mut below = self.full.iter().flatten().map(|solution| solution.modes_below);
         let first = below.next().unwrap_or(0);
         let last = below.next_back().unwrap_or(first);

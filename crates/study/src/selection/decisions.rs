@@ -8,7 +8,7 @@ use flexbody_body::flex_body::{TermDecision, TermGroup, TermGroups};
 
 /// Error that decides about a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ground {
+pub struct DecisiveError {
     /// Output whose error is largest relative to its tolerance: attitude, deflection, stress or reaction.
     pub output: &'static str,
     /// Error of that output without the group: of the attitude in radians, else relative. It is a bound, or measured
@@ -26,42 +26,47 @@ pub struct Ground {
 }
 
 /// Input of the decisions: the demands of every load case, the choice, and all trials.
-pub(super) struct Deliberation<'d> {
+pub(super) struct DecisionInput<'d> {
     pub demands: &'d [Demand<'d>],
     pub choice: &'d Choice,
     pub trials: &'d [Trial],
 }
 
-impl Deliberation<'_> {
+impl DecisionInput<'_> {
     /// Returns the decision about every group, and the error behind it if there is one.
-    pub(super) fn decisions(&self) -> Vec<(TermDecision, Option<Ground>)> {
+    pub(super) fn decisions(&self) -> Vec<(TermDecision, Option<DecisiveError>)> {
         TermGroup::ALL.into_iter().map(|group| self.decide(group)).collect()
     }
 
-    fn decide(&self, group: TermGroup) -> (TermDecision, Option<Ground>) {
+    fn decide(&self, group: TermGroup) -> (TermDecision, Option<DecisiveError>) {
         let body = self.demands[0].body;
         let kept = self.choice.groups.has(group);
         if !body.invariants().groups().has(group) {
             let earlier = body.terms().iter().find(|decision| decision.group == group).cloned();
-            return (earlier.unwrap_or_else(|| undecided(group, false, "the body does not hold it")), None);
+            return (
+                earlier.unwrap_or_else(|| undecided(group, false, "the body does not have this group")),
+                None,
+            );
         }
+        // A kept group rests on the last trial without it, a dropped one on the first trial that passed.
         let basis = if kept { self.last_without(group) } else { self.first_that_passed(group) };
-        let (mut decided, ground) = match basis {
+        let (mut decided, decisive_error) = match basis {
             Some(trial) => {
                 let rotation = &demand_of(trial, self.demands).situation.spin;
-                (decision(group, kept, trial, self.demands, rotation), ground(trial, self.demands))
+                (decision(group, kept, trial, self.demands, rotation), decisive_error(trial, self.demands))
             }
-            None => (undecided(group, kept, "nothing shows that it may be dropped"), None),
+            None => (undecided(group, kept, "no bound or run shows that it can be dropped"), None),
         };
+        // A run slower than the allowed rotation cannot decide about a kept group.
         let short = self.demands.iter().find_map(|demand| Some((demand, demand.short_of?)));
         if let Some((demand, (reached, allowed))) = short.filter(|_| kept) {
             let of = demand.name.map_or_else(String::new, |name| format!(" of case `{name}`"));
             decided.reason = format!(
-                "{}; the run{of} turns with {reached:.3e} only where the scene allows {allowed:.3e}, so nothing was measured",
+                "{}; the run{of} reaches an angular velocity of only {reached:.3e}, the scene allows {allowed:.3e}, so that no run could decide",
                 decided.reason
             );
         }
-        (decided, ground)
+        (decided, decisive_error)
     }
 
     /// Returns true if the trial covers all load cases; a bound covers one.
@@ -97,10 +102,10 @@ fn demand_of<'d>(trial: &Trial, demands: &'d [Demand<'d>]) -> &'d Demand<'d> {
 }
 
 /// Returns the error of a trial that is largest relative to its tolerance; `None` if the errors are unknown.
-fn ground(trial: &Trial, demands: &[Demand<'_>]) -> Option<Ground> {
+fn decisive_error(trial: &Trial, demands: &[Demand<'_>]) -> Option<DecisiveError> {
     let errors = trial.errors.as_ref().filter(|_| trial.worst.is_finite())?;
     let (output, error, tolerance) = errors.decisive(demand_of(trial, demands).tolerance());
-    Some(Ground { output, error, tolerance, budget: trial.budget, tier: trial.tier, case: trial.case })
+    Some(DecisiveError { output, error, tolerance, budget: trial.budget, tier: trial.tier, case: trial.case })
 }
 
 /// Returns the decision that follows from `trial`. `rotation` is the rotation that the trial assumes.
@@ -111,15 +116,17 @@ pub(super) fn decision(
     demands: &[Demand<'_>],
     rotation: &Input,
 ) -> TermDecision {
-    let ground = ground(trial, demands);
+    let decisive_error = decisive_error(trial, demands);
     let demand = demand_of(trial, demands);
     let how = match trial.tier {
         2 => "measured over the run",
         1 => "bound with the norms of the invariants",
         _ => "bound from I0 and the frequencies",
     };
-    let reason = match (&ground, trial.remark.as_str()) {
-        (Some(ground), _) => format!("error of {}, {how}; rotation from {}", ground.output, rotation.source),
+    let reason = match (&decisive_error, trial.remark.as_str()) {
+        (Some(decisive_error), _) => {
+            format!("error of {}, {how}; rotation from {}", decisive_error.output, rotation.source)
+        }
         (None, "") => format!("no finite {how}"),
         (None, remark) => remark.to_owned(),
     };
@@ -127,7 +134,7 @@ pub(super) fn decision(
         Some(name) => format!("case `{name}`: {reason}"),
         None => reason,
     };
-    let (bound, limit) = ground.map_or((0.0, 0.0), |one| (one.error, one.tolerance * one.budget));
+    let (bound, limit) = decisive_error.map_or((0.0, 0.0), |one| (one.error, one.tolerance * one.budget));
     TermDecision { group, kept, tier: trial.tier, bound, limit, reason }
 }
 

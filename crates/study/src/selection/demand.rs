@@ -9,21 +9,21 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::BodyPoint;
-use flexbody_motion::scene::{PerQuantity, Scene, Stage, Tolerance, damped_once, points_of};
+use flexbody_motion::scene::{FramedScene, PerQuantity, Scene, Tolerance, damped_once, points_of};
 use std::borrow::Cow;
 
 /// Body and scene in one frame, with the scenes in which models are tested: this scene and, if it allows faster
 /// rotation than its run has, the scene with its rotation scaled to that.
-pub(super) struct OnStage<'s> {
+pub(super) struct FramedTests<'s> {
     pub body: Cow<'s, FlexBody>,
     pub scene: Cow<'s, Scene>,
     found: Vec<Diagnostic>,
     scenes: Vec<Scene>,
 }
 
-impl<'s> OnStage<'s> {
+impl<'s> FramedTests<'s> {
     pub(super) fn new(body: &'s FlexBody, scene: &'s Scene) -> Result<Self> {
-        let Stage { body, scene, found } = Stage::new(body, scene)?;
+        let FramedScene { body, scene, found } = FramedScene::new(body, scene)?;
         let (body, scene) = damped_once(body, scene)?;
         let scenes = scenes(&body, &scene)?;
         Ok(Self { body, scene, found, scenes })
@@ -47,7 +47,7 @@ pub(super) struct Demand<'c> {
     /// Groups that bounds do not rule out; `None` if bounds rule out no group.
     pub by_bounds: Option<TermGroups>,
     /// Truncation errors of the body and of its versions before enrichment.
-    pub lacks: &'c [ReferenceError],
+    pub reference_errors: &'c [ReferenceError],
     /// Largest angular velocity of the runs and the allowed one; `None` if the runs reach the allowed one.
     pub short_of: Option<(f64, f64)>,
 }
@@ -55,15 +55,15 @@ pub(super) struct Demand<'c> {
 impl<'c> Demand<'c> {
     /// Creates the demand of the load case `name`. Bounds use norms of the invariants if `tier_1` is set.
     pub(super) fn new(
-        stage: &'c OnStage<'_>,
+        framed: &'c FramedTests<'_>,
         name: Option<&'c str>,
         context: &Context<'c>,
         tier_1: bool,
     ) -> Result<Self> {
-        let (body, scene) = (&*stage.body, &*stage.scene);
+        let (body, scene) = (&*framed.body, &*framed.scene);
         let (loads, _) = points_of(body, scene)?;
         let cases =
-            stage.scenes.iter().map(|one| Case::new(body, one, context)).collect::<Result<Vec<_>>>()?;
+            framed.scenes.iter().map(|one| Case::new(body, one, context)).collect::<Result<Vec<_>>>()?;
         let bounds = bounded(&cases, tier_1)?;
         Ok(Self {
             name,
@@ -72,10 +72,10 @@ impl<'c> Demand<'c> {
             situation: Situation::new(body, scene, &loads),
             loads,
             cases,
-            found: &stage.found,
+            found: &framed.found,
             by_bounds: bounds.iter().find(|trial| trial.passed()).map(|trial| trial.kept),
             bounds,
-            lacks: &[],
+            reference_errors: &[],
             short_of: None,
         })
     }
@@ -92,8 +92,8 @@ impl<'c> Demand<'c> {
 
     /// Returns the part of the tolerances left after the truncation error of the body and the bounds.
     pub(super) fn budget(&self) -> f64 {
-        let lacking = self.lacks.last().filter(|own| own.is_reference());
-        let left = (1.0 - lacking.map_or(0.0, |own| own.worst)).max(0.0);
+        let reference_error = self.reference_errors.last().filter(|own| own.is_reference());
+        let left = (1.0 - reference_error.map_or(0.0, |own| own.worst)).max(0.0);
         if self.by_bounds.is_none() {
             return left;
         }

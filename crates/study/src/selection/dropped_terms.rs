@@ -293,7 +293,7 @@ fn by_terms(
         let in_energy: Vec<f64> = force.iter().zip(root).map(|(f, root)| f / root).collect();
         found.load.largest = larger(found.load.largest, norm(&in_energy));
         // W3'q changes slowly compared with the spacing of the instants: evaluate it at some of them.
-        if at % COARSE == 0 {
+        if at % COARSE_STRIDE == 0 {
             found.stiff = larger(found.stiff, stiff_at(instant.q));
         }
         match forces.last() {
@@ -358,7 +358,7 @@ impl<'e> Balances<'e> {
 }
 
 /// Stride of the instants at which a product with nf^2 entries is evaluated outside the balance.
-const COARSE: usize = 4;
+const COARSE_STRIDE: usize = 4;
 
 fn norm(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt()

@@ -6,7 +6,7 @@ use flexbody_linalg::larger;
 use flexbody_motion::integration::free_oscillation;
 
 /// Largest deviation of the instants from even spacing, relative to the spacing.
-const UNEVEN: f64 = 1e-6;
+const SPACING_ROUNDING: f64 = 1e-6;
 
 /// Modal coordinates and their rates.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +71,7 @@ impl Oscillators {
     pub(super) fn new(body: &FlexBody, times: &[f64]) -> Option<Self> {
         let (&first, &last) = (times.first()?, times.last()?);
         let step = (last - first) / (times.len() - 1) as f64;
-        let even = times.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() <= UNEVEN * step);
+        let even = times.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() <= SPACING_ROUNDING * step);
         let modes = body.modes();
         let root: Vec<f64> = modes.eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
         let (decay, damping_left) = match &modes.modal_damping {

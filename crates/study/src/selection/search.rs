@@ -57,7 +57,7 @@ fn by_weight(weights: &[f64]) -> Vec<usize> {
 ///
 /// # Errors
 /// FB212 if a scene does not match the body.
-pub fn liveliest_modes(cases: &[(&FlexBody, &Scene, &Trace)]) -> Result<Vec<usize>> {
+pub fn most_excited_modes(cases: &[(&FlexBody, &Scene, &Trace)]) -> Result<Vec<usize>> {
     let mut weight = vec![0.0f64; cases.first().map_or(0, |(body, ..)| body.n_modes())];
     for (body, scene, motion) in cases {
         let case = Case::new(body, scene, &Context::QUIET)?;
@@ -68,14 +68,14 @@ pub fn liveliest_modes(cases: &[(&FlexBody, &Scene, &Trace)]) -> Result<Vec<usiz
 }
 
 /// Scene in which models are tested, with the reference motion.
-pub(super) struct Tried<'s> {
+pub(super) struct TestScene<'s> {
     pub runs: TrialRuns<'s>,
     pub measure: Measure<'s>,
 }
 
 /// Scenes of one load case.
-pub(super) struct TriedCase<'s> {
-    pub tried: Vec<Tried<'s>>,
+pub(super) struct TestedCase<'s> {
+    pub scenes: Vec<TestScene<'s>>,
     /// Remaining part of the tolerances.
     pub budget: f64,
 }
@@ -83,7 +83,7 @@ pub(super) struct TriedCase<'s> {
 /// Search for a model that holds in all load cases.
 pub(super) struct SelectionSearch<'s> {
     /// Load cases, at least one.
-    pub cases: &'s [TriedCase<'s>],
+    pub cases: &'s [TestedCase<'s>],
     /// Groups that must be kept: a run that turns slower than its scene allows cannot show that a term may be dropped.
     pub fixed: TermGroups,
     /// True if the body is carried in a load case; all groups are then kept.
@@ -92,16 +92,16 @@ pub(super) struct SelectionSearch<'s> {
 
 impl SelectionSearch<'_> {
     fn body(&self) -> &FlexBody {
-        self.cases[0].tried[0].runs.body
+        self.cases[0].scenes[0].runs.body
     }
 
     /// Measures a model in all load cases. It may use `part` of the remaining tolerances of each.
     fn measured(&self, modes: &[usize], groups: TermGroups, part: f64) -> Result<Trial> {
-        let in_case = |case: &TriedCase<'_>| -> Result<Trial> {
-            let measured = |Tried { runs, measure }: &Tried<'_>| -> Result<Trial> {
+        let in_case = |case: &TestedCase<'_>| -> Result<Trial> {
+            let measured = |TestScene { runs, measure }: &TestScene<'_>| -> Result<Trial> {
                 Ok(runs.measured(measure, modes, groups, part * case.budget)?.0)
             };
-            Ok(worst(case.tried.iter().map(measured).collect::<Result<Vec<_>>>()?.into_iter()))
+            Ok(worst(case.scenes.iter().map(measured).collect::<Result<Vec<_>>>()?.into_iter()))
         };
         Ok(together(self.cases.iter().map(in_case).collect::<Result<Vec<_>>>()?))
     }
@@ -139,7 +139,7 @@ impl SelectionSearch<'_> {
         let mut weight = vec![0.0f64; self.body().n_modes()];
         choice.shares.clear();
         for case in self.cases {
-            for Tried { runs, measure } in &case.tried {
+            for TestScene { runs, measure } in &case.scenes {
                 let shares = runs.shares(measure.trace());
                 let own = weights(&shares, &runs.scene.requirements.tolerance);
                 weight.iter_mut().zip(own).for_each(|(weight, own)| *weight = weight.max(own));

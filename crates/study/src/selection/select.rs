@@ -1,14 +1,14 @@
 //! Selection of the terms and modes that a body needs in a scene.
 
-use super::by_case::{CaseSelection, by_case, worst_lacks};
-use super::deciding::Deciding;
-use super::decisions::{Deliberation, Ground, decision, guideline};
-use super::demand::{Demand, OnStage};
+use super::by_case::{CaseSelection, by_case, worst_reference_errors};
+use super::decisions::{DecisionInput, DecisiveError, decision, guideline};
+use super::demand::{Demand, FramedTests};
 use super::participation::{Participation, participations};
+use super::selection_state::SelectionState;
 use super::significance::{Significance, largest_significances, significances};
 use super::situation::Input;
 use super::trial::{ModeShare, Trial, multiplications};
-use super::varied::{VariedRuns, VariedSelection, varied_stages};
+use super::varied::{VariedRuns, VariedSelection, framed_variations};
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
@@ -34,7 +34,7 @@ pub struct Selection {
     /// Decision about every group.
     pub terms: Vec<TermDecision>,
     /// Error behind each decision; `None` if no error decided.
-    pub grounds: Vec<Option<Ground>>,
+    pub decisive_errors: Vec<Option<DecisiveError>>,
     /// Groups that are kept.
     pub groups: TermGroups,
     /// Number of modes of the body.
@@ -60,7 +60,7 @@ pub struct Selection {
     /// Truncation errors of the body and of its versions before enrichment; the last belongs to the body itself. Empty
     /// if no model is at hand or nothing can be estimated. For several load cases, those of the case with the largest
     /// last error.
-    pub lacks: Vec<ReferenceError>,
+    pub reference_errors: Vec<ReferenceError>,
     /// Results for each load case; empty for a single scene.
     pub cases: Vec<CaseSelection>,
     /// Errors of the selected model in variations of the scene, whose motions did not choose it.
@@ -75,7 +75,7 @@ impl Selection {
     /// measured.
     pub fn holds(&self) -> bool {
         let in_variations = self.varied.iter().all(|one| one.holds() || !one.is_stated);
-        let is_reference = self.lacks.last().is_none_or(ReferenceError::is_reference);
+        let is_reference = self.reference_errors.last().is_none_or(ReferenceError::is_reference);
         self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
             Some(most) => chosen.multiplications <= most,
             None => chosen.passed() && is_reference && in_variations,
@@ -92,8 +92,8 @@ pub fn rule_out(body: &FlexBody, cases: &LoadCases, context: &Context<'_>) -> Re
     if cases.iter().any(|scene| scene.carried.is_some()) {
         return Ok(Vec::new());
     }
-    let stages = stages(body, cases)?;
-    let demands = demands(&stages, cases, context, false)?;
+    let framed_cases = framed_cases(body, cases)?;
+    let demands = demands(&framed_cases, cases, context, false)?;
     let passed = |(at, demand): (usize, &Demand<'_>)| {
         let trial = demand.bounds.iter().find(|trial| trial.passed())?;
         Some(Trial { case: Some(at), ..trial.clone() })
@@ -115,60 +115,61 @@ pub fn rule_out(body: &FlexBody, cases: &LoadCases, context: &Context<'_>) -> Re
 /// their largest contribution relative to the tolerances of any case. The fewest modes are kept whose motion, with the
 /// kept groups, is within the tolerances.
 ///
-/// * `lacks`: for each load case, the known truncation errors of `body` and of its versions before enrichment; they
+/// * `reference_errors`: for each load case, the known truncation errors of `body` and of its versions before enrichment; they
 ///   reduce the tolerances. Cases beyond its length have unknown errors, which count as zero.
 ///
 /// # Errors
 /// FB212 if a scene does not match the body; the errors of [`simulate`](flexbody_motion::scene::simulate).
 pub fn select(
     body: &FlexBody,
-    lacks: &[Vec<ReferenceError>],
+    reference_errors: &[Vec<ReferenceError>],
     cases: &LoadCases,
     context: &Context<'_>,
 ) -> Result<Selection> {
-    select_judged(body, lacks, &[], cases, context)
+    select_judged(body, reference_errors, &[], cases, context)
 }
 
-/// Does the work of [`select`] for a body whose truncation errors `varied_lacks` in the variations of the load cases are
+/// Does the work of [`select`] for a body whose truncation errors `varied_reference_errors` in the variations of the load cases are
 /// known: they reduce the tolerances there. Unknown errors count as zero.
 ///
 /// # Errors
 /// The errors of [`select`].
 pub fn select_judged(
     body: &FlexBody,
-    lacks: &[Vec<ReferenceError>],
-    varied_lacks: &[Vec<ReferenceError>],
+    reference_errors: &[Vec<ReferenceError>],
+    varied_reference_errors: &[Vec<ReferenceError>],
     cases: &LoadCases,
     context: &Context<'_>,
 ) -> Result<Selection> {
     body.require_mean_axes("select")?;
     // Bounds of each load case, in its own frame.
-    let stages = stages(body, cases)?;
+    let framed_cases = framed_cases(body, cases)?;
     context.phase("bounds");
-    let mut demands = demands(&stages, cases, context, true)?;
-    for (demand, lacks) in demands.iter_mut().zip(lacks) {
-        demand.lacks = lacks;
+    let mut demands = demands(&framed_cases, cases, context, true)?;
+    for (demand, reference_errors) in demands.iter_mut().zip(reference_errors) {
+        demand.reference_errors = reference_errors;
     }
     // By simulation if every case has a duration, else by the frequency band.
-    let mut deciding = Deciding::new(&demands);
-    let mode_reason = match deciding.has_run() {
-        false => deciding.choose_by_band(),
+    let mut selection_state = SelectionState::new(&demands);
+    let mode_reason = match selection_state.has_run() {
+        false => selection_state.choose_by_band(),
         true => {
             let variations = cases.variations(body.dimension());
-            let stages = varied_stages(body, &variations)?;
+            let framed = framed_variations(body, &variations)?;
             context.phase("reference motion of the variations");
-            let varied = VariedRuns::new(&variations, &stages, varied_lacks, context)?;
+            let varied = VariedRuns::new(&variations, &framed, varied_reference_errors, context)?;
             let varied = Some(&varied).filter(|_| !variations.is_empty());
-            deciding.choose_by_motion(cases, varied, context)?
+            selection_state.choose_by_motion(cases, varied, context)?
         }
     };
     // State the reasons of the decision.
-    let Deciding { choice, trials, diagnostics, short_of, chosen_by_case, varied, .. } = deciding;
+    let SelectionState { choice, trials, diagnostics, short_of, chosen_by_case, varied, .. } =
+        selection_state;
     for (demand, short_of) in demands.iter_mut().zip(short_of) {
         demand.short_of = short_of;
     }
-    let decided = Deliberation { demands: &demands, choice: &choice, trials: &trials }.decisions();
-    let (terms, grounds): (Vec<_>, Vec<_>) = decided.into_iter().unzip();
+    let decided = DecisionInput { demands: &demands, choice: &choice, trials: &trials }.decisions();
+    let (terms, decisive_errors): (Vec<_>, Vec<_>) = decided.into_iter().unzip();
     let first = &demands[0];
     Ok(Selection {
         scene: cases.name().to_owned(),
@@ -184,35 +185,35 @@ pub fn select_judged(
         n_modes: first.body.n_modes(),
         frequencies_hz: first.body.frequencies_hz(),
         participations: static_responses(&demands, &choice.modes),
-        cases: by_case(&demands, &choice, &trials, &grounds, chosen_by_case),
+        cases: by_case(&demands, &choice, &trials, &decisive_errors, chosen_by_case),
         varied,
         terms,
-        grounds,
+        decisive_errors,
         modes: choice.modes,
         shares: choice.shares,
         mode_reason,
         chosen: choice.chosen,
         most_multiplications: first.scene.requirements.multiplications,
         trials,
-        lacks: worst_lacks(&demands),
+        reference_errors: worst_reference_errors(&demands),
         diagnostics: once(diagnostics),
     })
 }
 
 /// Brings the body and each load case into one frame.
-fn stages<'s>(body: &'s FlexBody, cases: &'s LoadCases) -> Result<Vec<OnStage<'s>>> {
-    let staged = |(at, scene)| OnStage::new(body, scene).map_err(|error| cases.about(at, error));
-    cases.iter().enumerate().map(staged).collect()
+fn framed_cases<'s>(body: &'s FlexBody, cases: &'s LoadCases) -> Result<Vec<FramedTests<'s>>> {
+    let framed = |(at, scene)| FramedTests::new(body, scene).map_err(|error| cases.about(at, error));
+    cases.iter().enumerate().map(framed).collect()
 }
 
 fn demands<'d>(
-    stages: &'d [OnStage<'_>],
+    framed_cases: &'d [FramedTests<'_>],
     cases: &'d LoadCases,
     context: &Context<'d>,
     tier_1: bool,
 ) -> Result<Vec<Demand<'d>>> {
-    let demand = |(at, stage)| Demand::new(stage, cases.case_name(at), context, tier_1);
-    stages.iter().enumerate().map(demand).collect()
+    let demand = |(at, framed)| Demand::new(framed, cases.case_name(at), context, tier_1);
+    framed_cases.iter().enumerate().map(demand).collect()
 }
 
 /// Returns the input numbers of the decision, marked with their load cases if there are several.

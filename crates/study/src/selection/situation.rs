@@ -86,9 +86,10 @@ impl Situation {
         let amplitude = Input {
             name: "modal amplitude",
             value: mode_amplitudes.iter().map(|q| q * q).sum::<f64>().sqrt(),
-            source: match named.is_empty() {
-                true => "default: deflections of 10 % of the extent of the body".to_owned(),
-                false => format!("[limits] {}", named.join(", ")),
+            source: if named.is_empty() {
+                "default: deflections of 10 % of the extent of the body".to_owned()
+            } else {
+                format!("[limits] {}", named.join(", "))
             },
         };
         let driven = driven(body, scene, points, &spin, &acceleration, duration.value);
@@ -164,7 +165,7 @@ fn turning_of_run(
             [(rate.largest, source.clone()), (rate.rate, source)]
         }
         (None, Some(_)) => {
-            let source = "[carried], which does not turn".to_owned();
+            let source = "[carried], which does not rotate".to_owned();
             [(0.0, source.clone()), (0.0, source)]
         }
         (None, None) => {
@@ -174,9 +175,10 @@ fn turning_of_run(
             let principal = inertia.symmetric_eigenvalues();
             let (least, most) = (principal.min(), principal.max());
             let spin = (start.norm() + torque * duration) / least;
-            let source = match scene.loads.is_empty() {
-                true => "[initial] angular_velocity, of a rigid body",
-                false => "[initial] angular_velocity and [[load]], of a rigid body",
+            let source = if scene.loads.is_empty() {
+                "[initial] angular_velocity, of a rigid body"
+            } else {
+                "[initial] angular_velocity and [[load]], of a rigid body"
             };
             // |omega x I omega| is at most (I_max - I_min) |omega|^2.
             let acceleration = ((most - least) * spin * spin + torque) / least;
@@ -269,14 +271,14 @@ fn given_rotation(
             jerk: f64::INFINITY,
             duration,
         }),
-        _ => Err("its rotation is not given: neither [spin] nor a stiff attachment".to_owned()),
+        _ => Err("its rotation is not given: the scene has neither [spin] nor a stiff attachment".to_owned()),
     }
 }
 
 /// Returns an error with the reason if bounds do not hold for the body and the scene.
 fn refuse_beyond_bounds(body: &FlexBody, scene: &Scene) -> Result<(), String> {
     let reason = if scene.carried.is_some() {
-        "the body is carried: its frame moves its modes"
+        "the body is carried, so that the motion of its frame excites its modes"
     } else if body.invariants().general().is_some() {
         "the mass matrix does not commute with rotations"
     } else if body.inertia_stiffness().is_some() || !body.geometric_stiffness().is_empty() {

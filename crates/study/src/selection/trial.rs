@@ -22,10 +22,10 @@ use std::f64::consts::TAU;
 const INSTANTS_PER_PERIOD: f64 = 20.0;
 
 /// Largest number of instants at which bounds evaluate a motion.
-const MOST_INSTANTS: f64 = 6e4;
+const MAX_INSTANTS: f64 = 6e4;
 
 /// Part of the stress tolerance above which a mode takes part in a motion.
-const TAKES_PART: f64 = 0.01;
+const MIN_MODE_SHARE: f64 = 0.01;
 
 /// Smallest number of instants at which bounds evaluate a motion, and number of samples for the largest rate of a spin.
 const LEAST_INSTANTS: usize = 500;
@@ -63,7 +63,7 @@ impl Trial {
     }
 }
 
-/// Body and scene of the trials, both on their [`Stage`](flexbody_motion::scene::Stage).
+/// Body and scene of the trials, both on their [`FramedScene`](flexbody_motion::scene::FramedScene).
 pub struct TrialRuns<'a> {
     /// Body, with the damping of the scene.
     pub body: &'a FlexBody,
@@ -100,27 +100,27 @@ impl TrialRuns<'_> {
         let mut scene = self.scene.clone();
         let duration = self.situation.duration.value;
         let wanted = |rate: f64| (duration * rate / TAU * INSTANTS_PER_PERIOD).ceil();
-        let followed = wanted(self.fastest(f64::INFINITY)).min(MOST_INSTANTS);
+        let followed = wanted(self.fastest(f64::INFINITY)).min(MAX_INSTANTS);
         // Loads and spin must be followed whether or not modes take part.
-        if followed.is_nan() || wanted(self.fastest(0.0)) > MOST_INSTANTS {
+        if followed.is_nan() || wanted(self.fastest(0.0)) > MAX_INSTANTS {
             return Ok(None);
         }
         scene.run.outputs = (followed as usize).max(LEAST_INSTANTS);
         scene.run.terms = Terms::ALL.held(kept);
         let (motion, _) = simulate(self.body, &scene, &self.context)?;
-        let is_followed = wanted(self.liveliest(&motion)) <= followed.max(LEAST_INSTANTS as f64);
+        let is_followed = wanted(self.highest_excited_rate(&motion)) <= followed.max(LEAST_INSTANTS as f64);
         Ok(is_followed.then_some(motion))
     }
 
     /// Returns the largest circular frequency of the modes that take part in a motion. A mode takes part if its root of
     /// the elastic energy, relative to the largest, exceeds a part of the stress tolerance.
-    fn liveliest(&self, motion: &Recording) -> f64 {
+    fn highest_excited_rate(&self, motion: &Recording) -> f64 {
         let roots: Vec<f64> = self.body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
         let energies = || roots.iter().zip(&motion.extremes.amplitudes).map(|(root, q)| root * q.abs());
         let least =
-            TAKES_PART * self.scene.requirements.tolerance.errors.stress * energies().fold(0.0, f64::max);
-        let lively = roots.iter().zip(energies()).filter(|(_, energy)| *energy > least);
-        lively.map(|(root, _)| *root).fold(0.0, f64::max)
+            MIN_MODE_SHARE * self.scene.requirements.tolerance.errors.stress * energies().fold(0.0, f64::max);
+        let excited = roots.iter().zip(energies()).filter(|(_, energy)| *energy > least);
+        excited.map(|(root, _)| *root).fold(0.0, f64::max)
     }
 
     /// Returns the largest circular frequency in the motion of the body, with its modes up to `highest`. The time
@@ -225,7 +225,7 @@ impl TrialRuns<'_> {
     ) -> std::result::Result<OutputErrors, String> {
         let driven = self.situation.driven.as_ref().map_err(String::clone)?;
         let dropped = kept.complement();
-        let softened = || "the spin may take the stiffness of some motion".to_owned();
+        let softened = || "the spin may make the stiffness of some motion zero or negative".to_owned();
         let mut first_order = None;
         // Load of the dropped terms on the error, along the run or at the largest possible motion.
         let (own, residual, defect) = match run {
@@ -335,9 +335,10 @@ impl TrialRuns<'_> {
         });
         let extremes = &trace.extremes;
         let energy = extremes.elastic.sqrt();
-        let deflection = match extremes.watched.is_empty() {
-            true => extremes.deflection.value * self.body.extent(),
-            false => extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max),
+        let deflection = if extremes.watched.is_empty() {
+            extremes.deflection.value * self.body.extent()
+        } else {
+            extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max)
         };
         let share = |j: usize| {
             let amplitude = extremes.amplitudes[j];

@@ -1,7 +1,7 @@
 //! Judgement of a selection on variations of the scene, whose motions did not choose its terms and modes.
 
 use super::cases::Case;
-use super::demand::OnStage;
+use super::demand::FramedTests;
 use super::search::Choice;
 use super::trial::Trial;
 use crate::reference::ReferenceError;
@@ -29,14 +29,14 @@ pub struct VariedSelection {
     /// The model that the scene alone would select; `None` if it is the selected one.
     pub of_scene: Option<Trial>,
     /// Truncation errors of the whole body in the variation; empty if no model is at hand.
-    pub lacks: Vec<ReferenceError>,
+    pub reference_errors: Vec<ReferenceError>,
 }
 
 impl VariedSelection {
     /// Returns true if the selected model is within the tolerances in the variation, and the whole body is a reference
     /// there.
     pub fn holds(&self) -> bool {
-        self.chosen.passed() && self.lacks.last().is_none_or(ReferenceError::is_reference)
+        self.chosen.passed() && self.reference_errors.last().is_none_or(ReferenceError::is_reference)
     }
 
     /// Returns the warning about a model that does not hold; `None` if it does, or if the variation is a standard one.
@@ -44,7 +44,7 @@ impl VariedSelection {
         if self.holds() || !self.is_stated {
             return None;
         }
-        let message = match self.lacks.last().filter(|own| !own.is_reference()) {
+        let message = match self.reference_errors.last().filter(|own| !own.is_reference()) {
             Some(own) => format!(
                 "the selection cannot be judged in this variation: the body with all its modes differs from the FE model by {:.0} % of the tolerances (estimated)",
                 100.0 * own.worst
@@ -63,39 +63,39 @@ pub(super) struct VariedRuns<'v> {
     variations: &'v [SceneVariation],
     cases: Vec<Case<'v>>,
     references: Vec<Trace>,
-    lacks: &'v [Vec<ReferenceError>],
+    reference_errors: &'v [Vec<ReferenceError>],
 }
 
 /// Returns the body and every variation in one frame.
-pub(super) fn varied_stages<'s>(
+pub(super) fn framed_variations<'s>(
     body: &'s FlexBody,
     variations: &'s [SceneVariation],
-) -> Result<Vec<OnStage<'s>>> {
-    let staged = |one: &'s SceneVariation| {
-        OnStage::new(body, &one.scene).map_err(|error| error.about(format!("variation `{}`", one.name)))
+) -> Result<Vec<FramedTests<'s>>> {
+    let in_frame = |one: &'s SceneVariation| {
+        FramedTests::new(body, &one.scene).map_err(|error| error.about(format!("variation `{}`", one.name)))
     };
-    variations.iter().map(staged).collect()
+    variations.iter().map(in_frame).collect()
 }
 
 impl<'v> VariedRuns<'v> {
-    /// Simulates the whole body in every variation. `lacks` are its truncation errors there.
+    /// Simulates the whole body in every variation. `reference_errors` are its truncation errors there.
     ///
     /// # Errors
     /// The errors of [`trace`](flexbody_motion::scene::trace).
     pub(super) fn new(
         variations: &'v [SceneVariation],
-        stages: &'v [OnStage<'_>],
-        lacks: &'v [Vec<ReferenceError>],
+        framed: &'v [FramedTests<'_>],
+        reference_errors: &'v [Vec<ReferenceError>],
         context: &Context<'v>,
     ) -> Result<Self> {
         let (mut cases, mut references) = (Vec::new(), Vec::new());
-        for (stage, one) in stages.iter().zip(variations) {
-            let case = Case::new(&stage.body, &stage.scene, context)?;
-            let motion = case.runs().motion(stage.body.groups());
+        for (tests, one) in framed.iter().zip(variations) {
+            let case = Case::new(&tests.body, &tests.scene, context)?;
+            let motion = case.runs().motion(tests.body.groups());
             references.push(motion.map_err(|error| error.about(format!("variation `{}`", one.name)))?.0);
             cases.push(case);
         }
-        Ok(Self { variations, cases, references, lacks })
+        Ok(Self { variations, cases, references, reference_errors })
     }
 
     /// Measures a model in every variation.
@@ -110,7 +110,8 @@ impl<'v> VariedRuns<'v> {
 
     /// Returns the part of the tolerances that the truncation error of the whole body leaves in a variation.
     fn budget(&self, at: usize) -> f64 {
-        let own = self.lacks.get(at).and_then(|rounds| rounds.last()).filter(|own| own.is_reference());
+        let own =
+            self.reference_errors.get(at).and_then(|rounds| rounds.last()).filter(|own| own.is_reference());
         (1.0 - own.map_or(0.0, |own| own.worst)).max(0.0)
     }
 
@@ -148,7 +149,7 @@ impl<'v> VariedRuns<'v> {
             is_stated: matches!(cases.stated_variations(), Variations::Stated(_)),
             chosen,
             of_scene: is_changed.then_some(before),
-            lacks: self.lacks.get(at).cloned().unwrap_or_default(),
+            reference_errors: self.reference_errors.get(at).cloned().unwrap_or_default(),
         };
         Ok(chosen.into_iter().zip(of_scene).enumerate().map(row).collect())
     }

@@ -8,12 +8,12 @@ use std::f64::consts::TAU;
 
 /// Relative distance from a mode's frequency within which a load is resonant. Three half widths of the resonance count
 /// if these are larger.
-const NEAR: f64 = 0.1;
+const RESONANCE_DISTANCE: f64 = 0.1;
 
 /// Returns the warning that the errors of the selected model grow `growth` times faster than its motion.
 pub(super) fn phase_drifts(growth: f64) -> Diagnostic {
     let message = format!(
-        "errors of the selected model grow {growth:.1} times more than the motion from the first half of the run to the second"
+        "from the first half of the run to the second, the errors of the selected model grow {growth:.1} times more than the motion"
     );
     Diagnostic::new(Code::PhaseDrifts, message)
 }
@@ -38,7 +38,7 @@ pub(super) fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[u
             let moved =
                 modal.column(j).norm() * load.force.main_direction().map_or(0.0, |along| along.norm());
             let near = |rate: &&f64| {
-                let width = NEAR.max(3.0 * body.modes().damping_ratio[j]);
+                let width = RESONANCE_DISTANCE.max(3.0 * body.modes().damping_ratio[j]);
                 (*rate / lambda.sqrt() - 1.0).abs() < width
             };
             if moved == 0.0 || modes.binary_search(&j).is_ok() {
@@ -46,7 +46,7 @@ pub(super) fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[u
             }
             if let Some(rate) = rates.iter().find(near) {
                 let message = format!(
-                    "mode {} of frequency {:.4e} is dropped, and the load at {} drives it at {:.4e} (oscillations per time)",
+                    "mode {} of frequency {:.4e} is dropped, but the load at {} excites it at {:.4e} (oscillations per unit of time)",
                     j + 1,
                     lambda.sqrt() / TAU,
                     load.at,

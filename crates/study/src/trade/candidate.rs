@@ -131,7 +131,7 @@ const SETS: [TermGroups; 3] =
     [TermGroups::NONE, TermGroups { w1: true, ..TermGroups::NONE }, TermGroups::ALL];
 
 /// Largest error over its tolerance, with all modes, at which a set of groups is combined with fewer modes.
-const HOPELESS: f64 = 10.0;
+const MAX_ERROR_OF_GROUPS: f64 = 10.0;
 /// Error over its tolerance below which more expensive sets of groups are not combined, since they cannot be
 /// distinguished.
 const PERFECT: f64 = 0.01;
@@ -160,12 +160,12 @@ pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candida
     held(all, sources, carried)
 }
 
-/// Returns the candidates with some modes of the reference (the lowest, and the first of `liveliest`) and the sets of
+/// Returns the candidates with some modes of the reference (the lowest, and the first of `most_excited`) and the sets of
 /// groups that are useful. `worst_of` receives a set of groups and returns its largest error over its tolerance with
 /// all modes.
 pub(super) fn ladder(
     sources: &[Source],
-    liveliest: &[usize],
+    most_excited: &[usize],
     carried: bool,
     worst_of: impl Fn(TermGroups) -> f64,
 ) -> Vec<Candidate> {
@@ -174,7 +174,7 @@ pub(super) fn ladder(
     let mut sets = Vec::new();
     for groups in SETS {
         let worst = worst_of(groups.and(body.groups()));
-        sets.extend((worst <= HOPELESS || groups == TermGroups::ALL).then_some(groups));
+        sets.extend((worst <= MAX_ERROR_OF_GROUPS || groups == TermGroups::ALL).then_some(groups));
         if worst <= PERFECT {
             break;
         }
@@ -183,7 +183,7 @@ pub(super) fn ladder(
     let mut all = Vec::new();
     for &count in LADDER.iter().filter(|&&count| count < body.n_modes()).rev() {
         // The lowest modes, and the modes of largest contribution.
-        for modes in [(0..count).collect(), first_of(liveliest, count)] {
+        for modes in [(0..count).collect(), first_of(most_excited, count)] {
             let with =
                 |groups: &TermGroups| Candidate { modes: modes.clone(), groups: *groups, ..whole.clone() };
             all.extend(sets.iter().rev().map(with));

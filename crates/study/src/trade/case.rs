@@ -9,7 +9,7 @@ use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
 use flexbody_motion::integration::Work;
-use flexbody_motion::scene::{Measure, Scene, Stage, Trace, trace, trace_at};
+use flexbody_motion::scene::{FramedScene, Measure, Scene, Trace, trace, trace_at};
 
 /// Scene (a single one or a load case) with the motion of the reference in it.
 pub(super) struct StudyCase<'m> {
@@ -42,10 +42,10 @@ impl<'m> StudyCase<'m> {
         context.phase("reference");
         let whole = sources[0].body();
         nodal.map(|model| NodalReference::refuse(model, whole, scene, context)).transpose()?;
-        let stage = Stage::new(whole, scene)?;
-        let sources = sources.iter().map(|one| one.staged(scene)).collect::<Result<Vec<_>>>()?;
+        let framed = FramedScene::new(whole, scene)?;
+        let sources = sources.iter().map(|one| one.in_frame_of(scene)).collect::<Result<Vec<_>>>()?;
         // The candidates decide about the groups, not the scene.
-        let mut scene = stage.scene.into_owned();
+        let mut scene = framed.scene.into_owned();
         scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
         let (motion, said) = trace(sources[0].body(), &scene, context)?;
         refuse_too_much(&sources, &motion, context.memory)?;
@@ -57,7 +57,7 @@ impl<'m> StudyCase<'m> {
             None => None,
         };
         let warning = nodal.as_ref().and_then(NodalReference::warning);
-        let found = [stage.found, said, Vec::from_iter(warning)].concat();
+        let found = [framed.found, said, Vec::from_iter(warning)].concat();
         let mut own = Self { name, sources, scene, motion, nodal, reserved, found };
         own.found = std::mem::take(&mut own.found).into_iter().map(|said| own.about(said)).collect();
         Ok(own)

@@ -23,7 +23,7 @@ pub struct Conversions {
     pub sources: Vec<Source>,
     /// Truncation errors of the reference and of its versions before enrichment, in each load case; the last belongs to
     /// the reference.
-    pub lacks: Vec<Vec<ReferenceError>>,
+    pub reference_errors: Vec<Vec<ReferenceError>>,
     /// Bodies and scenes of the variations.
     pub varied: Varied,
     /// Diagnostics about the reference.
@@ -56,9 +56,9 @@ pub fn conversions(
     context: &Context<'_>,
 ) -> Result<Conversions> {
     let WantedBodies { modes, fine } = wanted;
-    let making = Making::new(model, fine, context);
+    let conversions = ConversionContext::new(model, fine, context);
     // Reference body, enriched for the load cases.
-    let finest = Wish {
+    let finest = BodySettings {
         count: modes.saturating_mul(2),
         residual: true,
         accuracy: Accuracy::Standard,
@@ -68,19 +68,20 @@ pub fn conversions(
     let mut responses = Mat::new();
     let make = |loads: &Mat<f64>| {
         responses.clone_from(loads);
-        making.make(&finest, loads, ConvertSettings::default().lumped)
+        conversions.make(&finest, loads, ConvertSettings::default().lumped)
     };
     let enrichment = Enrichment { grows: true, is_fine: fine };
     let enriched = enrich(model, cases, enrichment, context, make, |(made, _)| made.body())?;
-    let Enriched { made: (reference, mut diagnostics), rounds: lacks } = enriched;
-    diagnostics.extend(warnings(cases, &lacks, enrichment.enough()));
+    let Enriched { made: (reference, mut diagnostics), rounds: reference_errors } = enriched;
+    diagnostics.extend(warnings(cases, &reference_errors, enrichment.enough()));
     let mut sources = vec![reference];
     // Bodies with fewer modes or other accuracy.
-    for wish in wishes(modes) {
-        let source = match making.make(&wish, &Mat::new(), Vec::new()) {
+    for body_settings in all_settings(modes) {
+        let source = match conversions.make(&body_settings, &Mat::new(), Vec::new()) {
             Ok((source, _)) => source,
             Err(error)
-                if wish.accuracy == Accuracy::Certified && error.first_error().code() == Code::Usage =>
+                if body_settings.accuracy == Accuracy::Certified
+                    && error.first_error().code() == Code::Usage =>
             {
                 continue;
             }
@@ -90,23 +91,23 @@ pub fn conversions(
         sources.push(beside.expect(OF_THE_MODEL));
     }
     // Bodies of shapes of the motion, and bodies of a lumped mass.
-    let lacking = |rounds: &Vec<ReferenceError>| rounds.last().map_or(0.0, |own| own.worst);
-    let left: Vec<f64> = lacks.iter().map(|rounds| 1.0 - lacking(rounds)).collect();
-    for source in making.make_of_motion(&sources[0], &finest, cases, &left)? {
+    let reference_error = |rounds: &Vec<ReferenceError>| rounds.last().map_or(0.0, |own| own.worst);
+    let left: Vec<f64> = reference_errors.iter().map(|rounds| 1.0 - reference_error(rounds)).collect();
+    for source in conversions.make_of_motion(&sources[0], &finest, cases, &left)? {
         sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL));
     }
     for lumping in lumpings(model) {
-        match making.make_lumped(&finest, &responses, &lumping)? {
+        match conversions.make_lumped(&finest, &responses, &lumping)? {
             Ok(source) => sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL)),
             Err(reason) => diagnostics.push(reason),
         }
     }
-    let varied = making.varied(&finest, responses, &sources, cases)?;
-    Ok(Conversions { sources, lacks, varied, diagnostics })
+    let varied = conversions.varied(&finest, responses, &sources, cases)?;
+    Ok(Conversions { sources, reference_errors, varied, diagnostics })
 }
 
 /// Returns warnings about the truncation error of the reference, each with its load case if there are several.
-fn warnings(cases: &LoadCases, lacks: &[Vec<ReferenceError>], enough: f64) -> Vec<Diagnostic> {
+fn warnings(cases: &LoadCases, reference_errors: &[Vec<ReferenceError>], enough: f64) -> Vec<Diagnostic> {
     let of = |(at, rounds): (usize, &Vec<ReferenceError>)| {
         let warning = rounds.last()?.warning(&cases[at], enough)?;
         Some(match cases.case_name(at) {
@@ -114,13 +115,13 @@ fn warnings(cases: &LoadCases, lacks: &[Vec<ReferenceError>], enough: f64) -> Ve
             None => warning,
         })
     };
-    lacks.iter().enumerate().filter_map(of).collect()
+    reference_errors.iter().enumerate().filter_map(of).collect()
 }
 
 /// Part of the remaining tolerances that bodies of the fewest shapes may take. The rest is for dropped terms.
-const SHARE_OF_SHAPES: f64 = 0.9;
+const PART_OF_SHAPES: f64 = 0.9;
 
-const OF_THE_MODEL: &str = "bodies that were made of the model";
+const OF_THE_MODEL: &str = "bodies that were made from the model";
 
 /// Returns schemes that lump the whole mass of `model`. Empty if the mass is lumped already, or if rows without a
 /// position carry mass that belongs to no node.
@@ -133,7 +134,7 @@ fn lumpings(model: &FeModel) -> Vec<Lumping> {
 
 /// Settings of a body of the study.
 #[derive(Clone, PartialEq)]
-struct Wish {
+struct BodySettings {
     /// Number of free modes.
     count: usize,
     /// True if the body has residual vectors.
@@ -145,7 +146,7 @@ struct Wish {
     scene: SceneBasis,
 }
 
-impl Wish {
+impl BodySettings {
     fn in_words(&self) -> String {
         let mut name = format!("{} free mode{}", self.count, if self.count == 1 { "" } else { "s" });
         if self.residual {
@@ -162,24 +163,25 @@ impl Wish {
 }
 
 /// Returns the settings of the bodies other than the reference, without duplicates.
-fn wishes(modes: usize) -> Vec<Wish> {
+fn all_settings(modes: usize) -> Vec<BodySettings> {
     let scene = SceneBasis::Without;
-    let other = |accuracy| Wish { count: modes, residual: false, accuracy, lumped: None, scene };
-    let mut wishes = vec![other(Accuracy::Fast), other(Accuracy::Certified)];
+    let other = |accuracy| BodySettings { count: modes, residual: false, accuracy, lumped: None, scene };
+    let mut all_settings = vec![other(Accuracy::Fast), other(Accuracy::Certified)];
     for part in [1, 2, 4] {
         let count = (modes / part).max(1);
         for residual in [true, false] {
-            let wish = Wish { count, residual, accuracy: Accuracy::Standard, lumped: None, scene };
-            if !wishes.contains(&wish) {
-                wishes.push(wish);
+            let body_settings =
+                BodySettings { count, residual, accuracy: Accuracy::Standard, lumped: None, scene };
+            if !all_settings.contains(&body_settings) {
+                all_settings.push(body_settings);
             }
         }
     }
-    wishes
+    all_settings
 }
 
 /// Common data of all conversions of a study.
-struct Making<'m> {
+struct ConversionContext<'m> {
     model: &'m FeModel,
     /// Loads of the residual vectors.
     loads: Vec<Loads>,
@@ -188,7 +190,7 @@ struct Making<'m> {
     context: Context<'m>,
 }
 
-impl<'m> Making<'m> {
+impl<'m> ConversionContext<'m> {
     fn new(model: &'m FeModel, is_fine: bool, context: &Context<'m>) -> Self {
         let mut loads = vec![Loads::Centrifugal];
         if !model.interfaces().is_empty() {
@@ -197,14 +199,14 @@ impl<'m> Making<'m> {
         Self { model, loads, is_fine, context: *context }
     }
 
-    /// Returns the conversion that makes the body of a wish.
-    fn recipe(&self, wish: &Wish) -> Recipe {
-        let residual_vectors = match (wish.residual, self.loads.len()) {
+    /// Returns the conversion that makes the body of body settings.
+    fn recipe(&self, body_settings: &BodySettings) -> Recipe {
+        let residual_vectors = match (body_settings.residual, self.loads.len()) {
             (false, _) => Vec::new(),
             (true, 1) => vec!["centrifugal"],
             (true, _) => vec!["centrifugal", "interfaces"],
         };
-        let Wish { count: modes, accuracy, scene, .. } = *wish;
+        let BodySettings { count: modes, accuracy, scene, .. } = *body_settings;
         Recipe::Conversion(ConversionRecipe { modes, residual_vectors, accuracy, scene })
     }
 
@@ -220,15 +222,15 @@ impl<'m> Making<'m> {
     /// Converts the model, with the static responses to `motion` in the basis, and measures the time.
     fn make(
         &self,
-        wish: &Wish,
+        body_settings: &BodySettings,
         motion: &Mat<f64>,
         lumped: Vec<Lumping>,
     ) -> Result<(Source, Vec<Diagnostic>)> {
-        let residual_vectors = if wish.residual { self.loads.clone() } else { Vec::new() };
+        let residual_vectors = if body_settings.residual { self.loads.clone() } else { Vec::new() };
         let basis = BasisChoice::Free(FreeSurface { residual_vectors });
-        let own = self.settings(wish.count);
+        let own = self.settings(body_settings.count);
         let settings = ConvertSettings {
-            modes: ModeSettings { accuracy: wish.accuracy, ..own.modes },
+            modes: ModeSettings { accuracy: body_settings.accuracy, ..own.modes },
             basis: basis.with_motion(motion).expect("free modes take responses"),
             lumped,
             ..own
@@ -236,7 +238,12 @@ impl<'m> Making<'m> {
         let start = Instant::now();
         let conversion = convert(self.model, &settings, &self.context)?;
         let seconds = start.elapsed().as_secs_f64();
-        let source = Source::new(wish.in_words(), conversion.body, self.recipe(wish), Some(seconds))?;
+        let source = Source::new(
+            body_settings.in_words(),
+            conversion.body,
+            self.recipe(body_settings),
+            Some(seconds),
+        )?;
         Ok((source, conversion.diagnostics))
     }
 
@@ -244,7 +251,7 @@ impl<'m> Making<'m> {
     /// enriched further for the variations. All sources of the study are related to it.
     fn varied(
         &self,
-        finest: &Wish,
+        finest: &BodySettings,
         responses: Mat<f64>,
         sources: &[Source],
         cases: &LoadCases,
@@ -258,18 +265,19 @@ impl<'m> Making<'m> {
         self.context.phase("reference of the variations");
         let make = |loads: &Mat<f64>| Ok(self.make(finest, loads, Vec::new())?.0);
         let enrichment = Enrichment { grows: true, is_fine: false };
-        let Enriched { made, rounds: lacks } =
+        let Enriched { made, rounds: reference_errors } =
             enrich_from(responses, self.model, &scenes, enrichment, &self.context, make, Source::body)?;
         let warning = |(one, rounds): (&SceneVariation, &Vec<ReferenceError>)| {
             let warning = rounds.last()?.warning(&one.scene, enrichment.enough())?;
             Some(warning.about(format!("variation `{}`", one.name)))
         };
         let are_stated = matches!(cases.stated_variations(), Variations::Stated(_));
-        let diagnostics = variations.iter().zip(&lacks).filter_map(warning).filter(|_| are_stated).collect();
+        let diagnostics =
+            variations.iter().zip(&reference_errors).filter_map(warning).filter(|_| are_stated).collect();
         let related = |source: &Source| source.clone().beside(made.body(), self.model).expect(OF_THE_MODEL);
         let related: Vec<Source> = sources.iter().map(related).collect();
         let sources = std::iter::once(made).chain(related).collect();
-        Ok(Varied { variations, are_stated, sources, lacks, diagnostics })
+        Ok(Varied { variations, are_stated, sources, reference_errors, diagnostics })
     }
 
     /// Makes bodies of shapes of the motion of `reference` in `cases`: for all candidate numbers of shapes, and for the
@@ -278,7 +286,7 @@ impl<'m> Making<'m> {
     fn make_of_motion(
         &self,
         reference: &Source,
-        finest: &Wish,
+        finest: &BodySettings,
         cases: &LoadCases,
         left: &[f64],
     ) -> Result<Vec<Source>> {
@@ -297,7 +305,7 @@ impl<'m> Making<'m> {
         };
         let mut counts = bodies.counts();
         counts.iter().try_for_each(|count| make(*count).map(drop))?;
-        let most: Vec<f64> = left.iter().map(|left| SHARE_OF_SHAPES * left).collect();
+        let most: Vec<f64> = left.iter().map(|left| PART_OF_SHAPES * left).collect();
         let fewest = bodies.fewest(&most, make, Source::body)?;
         counts.extend(fewest.map(|own| own.count));
         Ok(made.into_iter().filter(|(count, _)| counts.contains(count)).map(|(_, own)| own).collect())
@@ -308,7 +316,7 @@ impl<'m> Making<'m> {
     fn of_shapes(
         &self,
         bodies: &MotionBodies<'_>,
-        finest: &Wish,
+        finest: &BodySettings,
         count: usize,
         before: f64,
     ) -> Result<Source> {
@@ -317,7 +325,7 @@ impl<'m> Making<'m> {
         let body = convert(self.model, &settings, &self.context)?.body;
         let name = format!("{count} shape{} of the motion", if count == 1 { "" } else { "s" });
         let scene = SceneBasis::Shapes { count, is_fine: self.is_fine };
-        let recipe = self.recipe(&Wish { scene, ..finest.clone() });
+        let recipe = self.recipe(&BodySettings { scene, ..finest.clone() });
         Source::new(name, body, recipe, Some(before + start.elapsed().as_secs_f64()))
     }
 
@@ -325,22 +333,22 @@ impl<'m> Making<'m> {
     /// body.
     fn make_lumped(
         &self,
-        wish: &Wish,
+        body_settings: &BodySettings,
         motion: &Mat<f64>,
         lumping: &Lumping,
     ) -> Result<std::result::Result<Source, Diagnostic>> {
         let masses = lumping.masses(self.model)?;
         let scheme = masses.scheme().name();
         let no_body = |why: String| {
-            let message = format!("no candidate whose whole mass is lumped by {scheme}: {why}");
+            let message = format!("no candidate has its whole mass lumped by {scheme}: {why}");
             Ok(Err(Diagnostic::new(Code::LumpedWithoutBody, message)))
         };
         if masses.negative() > 0 {
             return no_body(format!("{} nodal masses are negative", masses.negative()));
         }
         let lumped = self.model.with_nodal_masses(masses.masses());
-        let name = Wish { lumped: Some(scheme), ..wish.clone() };
-        let own = Making { model: &lumped, loads: self.loads.clone(), ..*self };
+        let name = BodySettings { lumped: Some(scheme), ..body_settings.clone() };
+        let own = ConversionContext { model: &lumped, loads: self.loads.clone(), ..*self };
         match own.make(&name, motion, Vec::new()) {
             Ok((source, _)) => Ok(Ok(source.of_lumped_mass(scheme))),
             Err(error) => no_body(error.first_error().message().to_owned()),

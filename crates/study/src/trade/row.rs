@@ -55,13 +55,13 @@ impl Measured {
     }
 
     /// Returns the errors in the case with the largest ratio of error to tolerance.
-    pub fn deciding(&self) -> &InCase {
+    pub fn decisive_case(&self) -> &InCase {
         &self.by_case[self.case]
     }
 
     /// Returns the largest ratio of error to tolerance in any case.
     pub fn worst(&self) -> f64 {
-        self.deciding().worst
+        self.decisive_case().worst
     }
 }
 

@@ -17,9 +17,9 @@ pub struct TradeSettings<'s> {
 
 /// Returns the part of the tolerances that the reference takes in each load case, from its enrichment rounds. Zero if
 /// the truncation error is too large for a reference, and for the motion of all nodes (`nodal`).
-pub fn reserved(lacks: &[Vec<ReferenceError>], nodal: bool) -> Vec<f64> {
+pub fn reserved(reference_errors: &[Vec<ReferenceError>], nodal: bool) -> Vec<f64> {
     let of = |rounds: &Vec<ReferenceError>| {
         rounds.last().filter(|own| !nodal && own.is_reference()).map_or(0.0, |own| own.worst)
     };
-    lacks.iter().map(of).collect()
+    reference_errors.iter().map(of).collect()
 }

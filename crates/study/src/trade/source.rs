@@ -7,7 +7,7 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, LumpedBody, MassStructure};
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::Configuration;
-use flexbody_motion::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Scene, Stage, Trace};
+use flexbody_motion::scene::{ErrorHistory, FramedScene, Measure, ModeStart, OtherModes, Scene, Trace};
 use nalgebra::DVector;
 
 /// Body, and the coupling of its modes to those of the reference.
@@ -61,12 +61,12 @@ impl Source {
     /// Returns the source with its bodies in the frame of a scene.
     ///
     /// # Errors
-    /// The errors of [`Stage::new`].
-    pub(super) fn staged(&self, scene: &Scene) -> Result<Self> {
+    /// The errors of [`FramedScene::new`].
+    pub(super) fn in_frame_of(&self, scene: &Scene) -> Result<Self> {
         let mut parts = self.body.clone().into_parts();
         parts.lumped = self.lumped.clone();
         let whole = FlexBody::new(parts)?;
-        let mut parts = Stage::new(&whole, scene)?.body.into_owned().into_parts();
+        let mut parts = FramedScene::new(&whole, scene)?.body.into_owned().into_parts();
         let lumped = std::mem::take(&mut parts.lumped);
         Ok(Self { body: FlexBody::new(parts)?, lumped, ..self.clone() })
     }
@@ -131,6 +131,7 @@ impl Source {
         if own.initial.modes.is_empty() {
             return own;
         }
+        // Solve L q = G q_r for displacements and rates, and start every mode with its part.
         let stiffness = body.invariants().symmetric_stiffness().cholesky();
         let part = |q: &[f64]| {
             let product = |&mode: &usize| q.iter().enumerate().map(|(j, q)| shared[(mode, j)] * q).sum();

@@ -7,7 +7,7 @@ use super::{
     Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Source, Timed,
     TradeRow, TradeSettings, TradeVariation, front, reserved,
 };
-use crate::selection::liveliest_modes;
+use crate::selection::most_excited_modes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::{FlexBody, Storage, TermGroups};
@@ -137,7 +137,7 @@ pub fn trade(
     context: &Context<'_>,
 ) -> Result<Trade> {
     let Some(source) = sources.first() else {
-        return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
+        return Err(Diagnostic::new(Code::Usage, "no candidate can be compared").into());
     };
     let studied = |(at, scene): (usize, &Scene)| {
         let taken = settings.reserved.get(at).copied().unwrap_or(0.0);
@@ -155,7 +155,7 @@ pub fn trade(
     let in_scene = Recommendation::new(&rows, allowed);
     let judge = settings.varied.filter(|varied| !varied.variations.is_empty()).map(|varied| {
         let names: Vec<Option<String>> = cases.iter().map(|case| case.name.clone()).collect();
-        Judge::new(varied, sources, &names, &reserved(&varied.lacks, false), context)
+        Judge::new(varied, sources, &names, &reserved(&varied.reference_errors, false), context)
     });
     let judge = judge.transpose()?;
     let recommended = match &judge {
@@ -251,17 +251,17 @@ impl Job<'_> {
             measured.map_or(f64::INFINITY, Measured::worst)
         };
         let motions = self.cases.iter().map(|case| (case.sources[0].body(), &case.scene, &case.motion));
-        let liveliest = liveliest_modes(&motions.collect::<Vec<_>>())?;
-        let some_modes = ladder(self.sources(), &liveliest, carried, worst_of);
+        let most_excited = most_excited_modes(&motions.collect::<Vec<_>>())?;
+        let some_modes = ladder(self.sources(), &most_excited, carried, worst_of);
         rows.extend(self.errors(some_modes, "errors of fewer modes", context)?);
         // Refine the number of modes near the tolerance.
-        self.refine(&liveliest, &mut rows)?;
+        self.refine(&most_excited, &mut rows)?;
         Ok(rows)
     }
 
     /// Bisects the number of modes between the cheapest candidate that holds and the largest smaller one that does not,
     /// as a selection does.
-    fn refine(&self, liveliest: &[usize], rows: &mut Vec<TradeRow>) -> Result<()> {
+    fn refine(&self, most_excited: &[usize], rows: &mut Vec<TradeRow>) -> Result<()> {
         if self.allowed.is_some() {
             return Ok(());
         }
@@ -275,9 +275,9 @@ impl Job<'_> {
         let Some((_, best)) = enough.min_by_key(|own| own.0) else { return Ok(()) };
         let best = best.clone();
         let count = best.modes.len();
-        let lowest: Vec<usize> = (0..liveliest.len()).collect();
+        let lowest: Vec<usize> = (0..most_excited.len()).collect();
         let by_frequency = count < lowest.len() && best.modes == lowest[..count];
-        let order = if by_frequency { &lowest[..] } else { liveliest };
+        let order = if by_frequency { &lowest[..] } else { most_excited };
         if first_of(order, count) != best.modes {
             return Ok(());
         }

@@ -10,12 +10,12 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 /// Shortest batch of evaluations that is timed. A longer batch reduces the effect of the clock's resolution.
-const BATCH: Duration = Duration::from_micros(400);
+const MIN_BATCH_TIME: Duration = Duration::from_micros(400);
 /// Number of batches, of which the median counts.
-const BATCHES: usize = 15;
+const BATCH_COUNT: usize = 15;
 
 /// Total time of integrations after which they are not repeated: the clock is accurate enough for that.
-const LONG: Duration = Duration::from_secs(2);
+const MAX_REPEATED_TIME: Duration = Duration::from_secs(2);
 
 /// Returns the seconds of one evaluation of the equations of `body` with `terms`: state, inertia forces and
 /// accelerations.
@@ -33,10 +33,10 @@ pub(super) fn evaluation(body: &FlexBody, terms: Terms) -> std::result::Result<f
         Ok(start.elapsed())
     };
     let mut count = 1;
-    while batch(count)? < BATCH && count < u32::MAX / 2 {
+    while batch(count)? < MIN_BATCH_TIME && count < u32::MAX / 2 {
         count *= 2;
     }
-    let mut times = (0..BATCHES).map(|_| batch(count)).collect::<std::result::Result<Vec<_>, _>>()?;
+    let mut times = (0..BATCH_COUNT).map(|_| batch(count)).collect::<std::result::Result<Vec<_>, _>>()?;
     Ok(median(&mut times).as_secs_f64() / f64::from(count))
 }
 
@@ -44,7 +44,7 @@ pub(super) fn evaluation(body: &FlexBody, terms: Terms) -> std::result::Result<f
 /// of fewer if these take long.
 pub(super) fn integration(body: &FlexBody, scene: &Scene, repeat: usize) -> Result<(f64, Work)> {
     let (mut times, mut work) = (Vec::new(), Work::default());
-    while times.len() < repeat.max(1) && times.iter().sum::<Duration>() < LONG {
+    while times.len() < repeat.max(1) && times.iter().sum::<Duration>() < MAX_REPEATED_TIME {
         let start = Instant::now();
         work = simulate(body, scene, &Context::QUIET)?.0.work;
         times.push(start.elapsed());

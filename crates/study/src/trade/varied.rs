@@ -23,7 +23,7 @@ pub struct Varied {
     /// sources of the study serve as they are, as those of a flex-body file do.
     pub sources: Vec<Source>,
     /// Truncation errors of this reference in each variation.
-    pub lacks: Vec<Vec<ReferenceError>>,
+    pub reference_errors: Vec<Vec<ReferenceError>>,
     /// Diagnostics about this reference.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -105,7 +105,7 @@ impl<'j> Judge<'j> {
                 is_stated: varied.are_stated,
                 tolerance: case.scene.requirements.tolerance,
                 reserved,
-                reference: varied.lacks.get(at).and_then(|rounds| rounds.last()).cloned(),
+                reference: varied.reference_errors.get(at).and_then(|rounds| rounds.last()).cloned(),
             });
             cases.push(case);
         }

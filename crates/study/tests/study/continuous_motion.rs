@@ -6,8 +6,8 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
-    Axes, History, Initial, Load, PerQuantity, Point, Recording, Requirements, Run, Scene, Scheme, Stage,
-    VectorHistory, simulate,
+    Axes, FramedScene, History, Initial, Load, PerQuantity, Point, Recording, Requirements, Run, Scene,
+    Scheme, VectorHistory, simulate,
 };
 use flexbody_study::selection::select;
 use nalgebra::Vector3;
@@ -93,7 +93,7 @@ fn a_pulse_between_two_instants_is_seen() {
     };
     let largest = fine.states.iter().map(|state| nodes(&state.q)).fold(0.0, f64::max);
     // The extent of a body is measured along the axes of the model.
-    let staged = Stage::new(&body, &scene(2)).expect("a stage").body.into_owned();
+    let staged = FramedScene::new(&body, &scene(2)).expect("a stage").body.into_owned();
     let largest = largest / staged.extent();
     for recording in [&fine, &coarse] {
         let found = recording.extremes.deflection.value;

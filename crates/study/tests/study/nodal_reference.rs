@@ -9,8 +9,8 @@ use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, Damping, FeModel, NodeSet, RawModel, Reference};
 use flexbody_motion::scene::{
-    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Requirements, Scene,
-    Scheme, Spin, Stage, Trace, VectorHistory, trace, trace_at,
+    Axes, Carried, CarriedSpin, Drive, FramedScene, History, Initial, Load, OutputErrors, Point,
+    Requirements, Scene, Scheme, Spin, Trace, VectorHistory, trace, trace_at,
 };
 use flexbody_study::trade::NodalReference;
 use nalgebra::Vector3;
@@ -199,16 +199,16 @@ impl Size {
 
 /// Returns the motion of a body, and its errors relative to the motion of the nodes of its model.
 fn errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> (Trace, OutputErrors) {
-    let stage = Stage::new(body, scene).expect("a stage");
-    let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET).expect("a motion");
-    let nodal =
-        NodalReference::new(model, &stage.body, &stage.scene, &motion, &Context::QUIET).expect("a reference");
+    let framed = FramedScene::new(body, scene).expect("a stage");
+    let (motion, _) = trace(&framed.body, &framed.scene, &Context::QUIET).expect("a motion");
+    let nodal = NodalReference::new(model, &framed.body, &framed.scene, &motion, &Context::QUIET)
+        .expect("a reference");
     if matches!(scene.run.scheme, Scheme::Conserving { .. }) {
         // Both integrations use the same steps.
         assert_eq!(nodal.time(), motion.time, "the same steps");
     }
-    let own = trace_at(&stage.body, &stage.scene, nodal.time(), &Context::QUIET).expect("a motion");
-    let errors = nodal.errors(&stage.body, &own).expect("of one model").largest();
+    let own = trace_at(&framed.body, &framed.scene, nodal.time(), &Context::QUIET).expect("a motion");
+    let errors = nodal.errors(&framed.body, &own).expect("of one model").largest();
     (motion, errors)
 }
 
@@ -430,13 +430,14 @@ fn implicit_and_explicit_steps_meet_in_one_motion() {
     // The reference is accurate; the collocation of order 4 converges like h^4.
     let exact = scene(Scheme::Adaptive { tolerance: 1e-11 });
     let error = |step: f64| {
-        let stage = Stage::new(&whole, &scene(Scheme::Conserving { order: 4, step: Some(step / size.rate) }))
-            .map(|stage| (stage.body.into_owned(), stage.scene.into_owned()))
-            .expect("a stage");
-        let (motion, _) = trace(&stage.0, &stage.1, &Context::QUIET).expect("a motion");
+        let framed =
+            FramedScene::new(&whole, &scene(Scheme::Conserving { order: 4, step: Some(step / size.rate) }))
+                .map(|framed| (framed.body.into_owned(), framed.scene.into_owned()))
+                .expect("a stage");
+        let (motion, _) = trace(&framed.0, &framed.1, &Context::QUIET).expect("a motion");
         let nodal =
-            NodalReference::new(&model, &stage.0, &stage.1, &motion, &Context::QUIET).expect("a reference");
-        let staged = Stage::new(&whole, &exact).expect("a stage");
+            NodalReference::new(&model, &framed.0, &framed.1, &motion, &Context::QUIET).expect("a reference");
+        let staged = FramedScene::new(&whole, &exact).expect("a stage");
         let own = trace_at(&staged.body, &staged.scene, nodal.time(), &Context::QUIET).expect("a motion");
         nodal.errors(&whole_of(&staged), &own).expect("of one model").largest().stress.expect("deformed")
     };
@@ -445,8 +446,8 @@ fn implicit_and_explicit_steps_meet_in_one_motion() {
     assert!(orders.iter().all(|ratio| (10.0..20.0).contains(ratio)), "{errors:?}");
 }
 
-fn whole_of(stage: &Stage<'_>) -> FlexBody {
-    stage.body.clone().into_owned()
+fn whole_of(framed: &FramedScene<'_>) -> FlexBody {
+    framed.body.clone().into_owned()
 }
 
 #[test]

@@ -14,8 +14,8 @@ use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel, Reference};
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
-    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, PerQuantity, Point, Scene, Spin,
-    Stage, Trace, VectorHistory, trace, trace_at,
+    Axes, Carried, CarriedSpin, Drive, FramedScene, History, Initial, Load, OutputErrors, PerQuantity, Point,
+    Scene, Spin, Trace, VectorHistory, trace, trace_at,
 };
 use flexbody_study::selection::select;
 use flexbody_study::tailoring::Tailoring;
@@ -372,10 +372,10 @@ fn scale_loads(scene: &mut Scene, probe: &FlexBody) {
 
 /// Returns the errors of `body` in `scene` relative to the motion of all nodes.
 fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> Result<OutputErrors> {
-    let stage = Stage::new(body, scene)?;
-    let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET)?;
-    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, &Context::QUIET)?;
-    errors_beside(&nodal, &stage.body, &stage.scene, &motion)
+    let framed = FramedScene::new(body, scene)?;
+    let (motion, _) = trace(&framed.body, &framed.scene, &Context::QUIET)?;
+    let nodal = NodalReference::new(model, &framed.body, &framed.scene, &motion, &Context::QUIET)?;
+    errors_beside(&nodal, &framed.body, &framed.scene, &motion)
 }
 
 fn errors_beside(
@@ -417,17 +417,17 @@ fn outcome(case: &Case) -> Result<Outcome> {
         ));
     }
     let selection = select(made, &enriched.rounds, &cases, &Context::QUIET)?;
-    let stage = Stage::new(made, scene)?;
-    let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET)?;
-    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, &Context::QUIET)?;
+    let framed = FramedScene::new(made, scene)?;
+    let (motion, _) = trace(&framed.body, &framed.scene, &Context::QUIET)?;
+    let nodal = NodalReference::new(model, &framed.body, &framed.scene, &motion, &Context::QUIET)?;
     if rounds.len() > 1 {
-        let found = errors_beside(&nodal, &stage.body, &stage.scene, &motion)?;
+        let found = errors_beside(&nodal, &framed.body, &framed.scene, &motion)?;
         let last = rounds.last().expect("a round");
         effectivity.extend(effectivities(&last.errors, &found, tolerance.errors.stress));
     }
-    let all = stage.body.invariants().groups();
-    let small = stage.body.reduced(&selection.modes, all, Vec::new())?;
-    let mut own = stage.scene.of_modes(&selection.modes);
+    let all = framed.body.invariants().groups();
+    let small = framed.body.reduced(&selection.modes, all, Vec::new())?;
+    let mut own = framed.scene.of_modes(&selection.modes);
     own.run.terms = Terms::ALL.held(selection.groups);
     let errors = errors_beside(&nodal, &small, &own, &motion)?;
     let verdict = (selection.holds(), errors.worst(&tolerance));

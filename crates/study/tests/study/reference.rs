@@ -12,8 +12,8 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::gram;
 use flexbody_model::{Coupling, Damping, FeModel, NodeSet, RawModel};
 use flexbody_motion::scene::{
-    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, LoadCases, Measure, ModeStart, OtherModes,
-    OutputErrors, Point, Scene, Scheme, Spin, Stage, VectorHistory, simulate, trace, trace_at,
+    Axes, Carried, CarriedSpin, Drive, FramedScene, History, Initial, Load, LoadCases, Measure, ModeStart,
+    OtherModes, OutputErrors, Point, Scene, Scheme, Spin, VectorHistory, simulate, trace, trace_at,
 };
 use flexbody_study::reference::{Enriched, Enrichment, PART_OF_REFERENCE, ReferenceError, enrich};
 use flexbody_study::tailoring::{Tailoring, convert_for};
@@ -126,11 +126,11 @@ fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> [f64; 2] {
 
 /// Returns all errors relative to the motion of all nodes.
 fn all_true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> OutputErrors {
-    let stage = Stage::new(body, scene).expect("a stage");
-    let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET).expect("a motion");
-    let nodal =
-        NodalReference::new(model, &stage.body, &stage.scene, &motion, &Context::QUIET).expect("a reference");
-    nodal.errors(&stage.body, &motion).expect("of one model").largest()
+    let framed = FramedScene::new(body, scene).expect("a stage");
+    let (motion, _) = trace(&framed.body, &framed.scene, &Context::QUIET).expect("a motion");
+    let nodal = NodalReference::new(model, &framed.body, &framed.scene, &motion, &Context::QUIET)
+        .expect("a reference");
+    nodal.errors(&framed.body, &motion).expect("of one model").largest()
 }
 
 /// Prescribed motion of the body frame.
@@ -459,12 +459,12 @@ fn what_is_lacking_is_damped_as_the_model_is() {
 
 /// Returns the errors of the motion of `body` relative to that of `whole`, both of one model.
 fn errors_beside(model: &FeModel, whole: &FlexBody, body: &FlexBody, scene: &Scene) -> OutputErrors {
-    let [of_whole, own] = [whole, body].map(|body| Stage::new(body, scene).expect("a stage"));
+    let [of_whole, own] = [whole, body].map(|body| FramedScene::new(body, scene).expect("a stage"));
     let (motion, _) = trace(&of_whole.body, &of_whole.scene, &Context::QUIET).expect("a motion");
     let mut same_steps = own.scene.clone().into_owned();
     same_steps.run.scheme = motion.scheme;
     let moved = trace_at(&own.body, &same_steps, &motion.time, &Context::QUIET).expect("a motion");
-    let [psi, all] = [&own, &of_whole].map(|stage| stage.body.vectors_of(model).expect("of this model"));
+    let [psi, all] = [&own, &of_whole].map(|framed| framed.body.vectors_of(model).expect("of this model"));
     let shared = gram(psi.as_ref(), model.pencil().apply_stiffness(all.as_ref()).as_ref());
     let modes = OtherModes::new(&own.body, &of_whole.body, shared.as_ref()).expect("of one model");
     Measure::new(&of_whole.body, &motion).of_other(&moved, &modes).largest()

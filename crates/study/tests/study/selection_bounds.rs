@@ -4,7 +4,7 @@ use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
 use flexbody_motion::scene::{
-    Axes, Interpolation, Load, Measure, OutputErrors, Point, Recording, Samples, Scene, Stage, Trace,
+    Axes, FramedScene, Interpolation, Load, Measure, OutputErrors, Point, Recording, Samples, Scene, Trace,
     VectorHistory, simulate, trace_at,
 };
 use flexbody_study::selection::{Norms, Situation, TrialRuns};
@@ -109,8 +109,8 @@ impl Broken {
 /// Returns the violated bounds of a scene: of amplitudes and errors, with every set of groups, at both tiers,
 /// a priori and along the motion.
 fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
-    let stage = Stage::new(body, scene).expect("one frame");
-    let (body, scene) = (&*stage.body, &*stage.scene);
+    let framed = FramedScene::new(body, scene).expect("one frame");
+    let (body, scene) = (&*framed.body, &*framed.scene);
     let tested = Tested::new(body, scene);
     let driven = tested.situation.driven.as_ref().expect("bounds");
     let root: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
@@ -367,8 +367,8 @@ fn turning_torque(body: &FlexBody, interface: &str) -> f64 {
 
 /// Returns true if the body can be simulated with every set of groups.
 fn follows(body: &FlexBody, scene: &Scene) -> bool {
-    let stage = Stage::new(body, scene).expect("one frame");
-    let tested = Tested::new(&stage.body, &stage.scene);
+    let framed = FramedScene::new(body, scene).expect("one frame");
+    let tested = Tested::new(&framed.body, &framed.scene);
     combinations().all(|kept| tested.runs().motion(kept).is_ok() && tested.runs().fine_motion(kept).is_ok())
 }
 

@@ -44,7 +44,7 @@ fn played(scene: &str) -> Played {
     done(folder.path(), "simulate body.flex.h5 --scene scene.toml -o motion.h5");
     let motion = read_simulation(folder.path().join("motion.h5")).expect("a motion");
     let body = flexbody_file::read(folder.path().join("body.flex.h5")).expect("a body");
-    let body = motion.staged(&body).expect("its motion");
+    let body = motion.body_in_frame(&body).expect("its motion");
     Played { folder, body, motion }
 }
 
@@ -145,7 +145,7 @@ fn long_motions_are_thinned() {
     let played = played(&TUMBLE.replace("outputs = 20", "outputs = 1000"));
     let said =
         done(played.folder.path(), "export body.flex.h5 --to vtk --simulation motion.h5 -o played.pvd");
-    assert!(said.contains("note[FB723]: 250 of 1001 instants are shown"), "{said}");
+    assert!(said.contains("note[FB723]: 250 of 1001 instants are written"), "{said}");
     assert!(!said.contains("FB722"), "{said}");
     let names = fs::read_dir(played.folder.path()).expect("a folder");
     assert_eq!(

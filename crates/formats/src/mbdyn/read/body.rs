@@ -2,7 +2,7 @@
 
 use super::lumped::{Lumped, lumped};
 use super::records::Records;
-use crate::import::redundant::lacks_w2;
+use crate::import::redundant::has_no_w2;
 use crate::import::{ImportedBody, ImportedFrame};
 use faer::Mat;
 use flexbody_body::flex_body::{GeometricStiffness, LoadKind, UnitLoad};
@@ -37,28 +37,31 @@ pub(crate) fn body(records: &Records) -> Option<Read> {
     let matrix = |group: usize| records.get(group).map(square);
     let lumped = lumped(records);
     let mut inertia = match &lumped {
-        Some(masses) if from_masses(records) => masses.told.clone(),
+        Some(masses) if from_masses(records) => masses.numbered.clone(),
         _ => file(records, Order::Rows),
     };
     // In MBDyn the values of group 12 take precedence.
     match (records.get(12), &lumped) {
         (Some(values), _) => rigid(&mut inertia, values),
         (None, Some(masses)) => {
-            (inertia.i1, inertia.i2, inertia.i7) = (masses.told.i1, masses.told.i2, masses.told.i7);
+            (inertia.i1, inertia.i2, inertia.i7) =
+                (masses.numbered.i1, masses.numbered.i2, masses.numbered.i7);
         }
         (None, None) => return None,
     }
     inertia.i6 = matrix(9)?;
-    let mut lacks: Vec<String> = Vec::new();
+    let mut omissions: Vec<String> = Vec::new();
     let missing = missing(records);
     if !missing.is_empty() && !from_masses(records) {
-        lacks
-            .push(format!("the file lacks record groups {}: the body does without them", missing.join(", ")));
-    } else if lacks_w2(&inertia) {
+        omissions.push(format!(
+            "the file has no record groups {}: the body is converted without the terms in them",
+            missing.join(", ")
+        ));
+    } else if has_no_w2(&inertia) {
         inertia.i9 = None;
-        lacks.push("invariant 9 is zero: the body does without W2".to_owned());
+        omissions.push("invariant 9 is zero: the body is converted without W2".to_owned());
     }
-    let (geometric_stiffness, named) = stiffening(records, &mut lacks, square);
+    let (geometric_stiffness, named) = stiffening(records, &mut omissions, square);
     let turns = (0..records.n_nodes)
         .map(|node| (0..nf).any(|mode| (3..6).any(|component| records.shape(node, component, mode) != 0.0)));
     let frames = turns.enumerate().map(|(node, turns)| frame(records, node, turns, &named)).collect();
@@ -71,7 +74,7 @@ pub(crate) fn body(records: &Records) -> Option<Read> {
         geometric_stiffness,
         frames,
         mesh: None,
-        lacks,
+        omissions,
     };
     Some(Read { body, lumped })
 }
@@ -113,17 +116,23 @@ fn file(records: &Records, order: Order) -> Numbered {
 }
 
 /// Returns the invariants of the file in column order, with the same mass and modal mass.
-pub(crate) fn by_columns(records: &Records, told: &Numbered) -> Numbered {
-    Numbered { i1: told.i1, i2: told.i2, i6: told.i6.clone(), i7: told.i7, ..file(records, Order::Columns) }
+pub(crate) fn by_columns(records: &Records, numbered: &Numbered) -> Numbered {
+    Numbered {
+        i1: numbered.i1,
+        i2: numbered.i2,
+        i6: numbered.i6.clone(),
+        i7: numbered.i7,
+        ..file(records, Order::Columns)
+    }
 }
 
 /// Sets mass, first moment and inertia about the origin from mass, centre of mass and inertia about it.
-fn rigid(told: &mut Numbered, values: &[f64]) {
+fn rigid(numbered: &mut Numbered, values: &[f64]) {
     let center = Vector3::new(values[1], values[2], values[3]);
-    told.i1 = values[0];
-    told.i2 = center * told.i1;
+    numbered.i1 = values[0];
+    numbered.i2 = center * numbered.i1;
     let about_center = Matrix3::from_fn(|i, j| values[4 + 3 * i + j]);
-    told.i7 = about_center - center.cross_matrix() * center.cross_matrix() * told.i1;
+    numbered.i7 = about_center - center.cross_matrix() * center.cross_matrix() * numbered.i1;
 }
 
 fn frame(records: &Records, node: usize, turns: bool, named: &[String]) -> ImportedFrame {
@@ -144,7 +153,7 @@ fn frame(records: &Records, node: usize, turns: bool, named: &[String]) -> Impor
 /// Returns group 19 and the labels of the nodes at which its forces act.
 fn stiffening(
     records: &Records,
-    lacks: &mut Vec<String>,
+    omissions: &mut Vec<String>,
     square: impl Fn(&[f64]) -> Mat<f64>,
 ) -> (Vec<GeometricStiffness<Mat<f64>>>, Vec<String>) {
     let (mut all, mut named) = (Vec::new(), Vec::new());
@@ -166,9 +175,9 @@ fn stiffening(
             Some((kind, component)) => {
                 all.push(GeometricStiffness { load: UnitLoad { kind, component }, matrix: square(values) })
             }
-            None => {
-                lacks.push(format!("stress stiffening with index {index} belongs to no load of the file"))
-            }
+            None => omissions.push(format!(
+                "stress stiffening with index {index} is not converted: no load of the file has this index"
+            )),
         }
     }
     (all, named)

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 /// Invariants of the lumped masses of the nodes, and their negative masses.
 pub(crate) struct Lumped {
     /// Invariants I1 to I9 about the origin; I6 is the modal mass of the lumped masses.
-    pub(crate) told: Numbered,
+    pub(crate) numbered: Numbered,
     /// Number of nodes with a negative mass.
     pub(crate) negative: usize,
     /// Sum of the magnitudes of negative masses divided by the sum of all magnitudes.
@@ -19,7 +19,7 @@ pub(crate) struct Lumped {
 pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
     let diagonal = records.get(11)?;
     let (n, nf) = (records.n_nodes, records.n_modes);
-    let mut told = Numbered {
+    let mut numbered = Numbered {
         i1: 0.0,
         i2: Vector3::zeros(),
         i3: Mat::zeros(3, nf),
@@ -43,23 +43,23 @@ pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
         below += (-mass).max(0.0);
         all += mass.abs();
         // Rigid body: sum m, sum m x, sum J - m x~ x~.
-        told.i1 += mass;
-        told.i2 += x * mass;
-        told.i7 += inertia - x.cross_matrix() * x.cross_matrix() * mass;
+        numbered.i1 += mass;
+        numbered.i2 += x * mass;
+        numbered.i7 += inertia - x.cross_matrix() * x.cross_matrix() * mass;
         for j in 0..nf {
             // Linear in a mode: sum m psi, sum m x~ psi + J theta, -sum m x~ psi~.
             let (psi, turn) = (shape(0, j), shape(3, j));
             let coupled = x.cross(&psi) * mass + inertia * turn;
             for a in 0..3 {
-                told.i3[(a, j)] += mass * psi[a];
-                told.i4[(a, j)] += coupled[a];
+                numbered.i3[(a, j)] += mass * psi[a];
+                numbered.i4[(a, j)] += coupled[a];
             }
-            told.i8[j] -= x.cross_matrix() * psi.cross_matrix() * mass;
+            numbered.i8[j] -= x.cross_matrix() * psi.cross_matrix() * mass;
             for k in 0..nf {
                 // Quadratic: sum m psi_j . psi_k + theta_j . J theta_k, sum m psi_j x psi_k, sum m psi_j~
                 // psi_k~.
                 let other = shape(0, k);
-                told.i6[(j, k)] += psi.dot(&other) * mass + turn.dot(&(inertia * shape(3, k)));
+                numbered.i6[(j, k)] += psi.dot(&other) * mass + turn.dot(&(inertia * shape(3, k)));
                 let (cross, double) = (psi.cross(&other), psi.cross_matrix() * other.cross_matrix());
                 for a in 0..3 {
                     i5[(a * nf + j, k)] += mass * cross[a];
@@ -70,6 +70,6 @@ pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
             }
         }
     }
-    (told.i5, told.i9) = (Some(i5), Some(i9));
-    Some(Lumped { told, negative, negative_share: if all > 0.0 { below / all } else { 0.0 } })
+    (numbered.i5, numbered.i9) = (Some(i5), Some(i9));
+    Some(Lumped { numbered, negative, negative_share: if all > 0.0 { below / all } else { 0.0 } })
 }

@@ -42,7 +42,7 @@ impl Records {
     pub(crate) fn read(file: &InputFile) -> Result<Self> {
         let text = std::str::from_utf8(file.bytes()).map_err(|e| {
             let line = 1 + file.bytes()[..e.valid_up_to()].iter().filter(|byte| **byte == b'\n').count();
-            Words::new(file.path(), "").refuse_at(line, "the file is no text")
+            Words::new(file.path(), "").refuse_at(line, "the file is not UTF-8 text")
         })?;
         let mut words = Words::new(file.path(), text);
         let mut records = Self::default();
@@ -67,7 +67,10 @@ impl Records {
         let missing: Vec<String> =
             REQUIRED.iter().filter(|group| !seen.contains(group)).map(usize::to_string).collect();
         if !missing.is_empty() {
-            return Err(words.incomplete(format!("the file lacks record groups {}", missing.join(", "))));
+            return Err(words.incomplete(format!(
+                "the file has no record groups {}, which are required",
+                missing.join(", ")
+            )));
         }
         records.digits = words.digits;
         Ok(records)
@@ -112,7 +115,9 @@ impl Records {
             }
         }
         self.n_modes = modes.checked_sub(rejected).filter(|modes| *modes > 0).ok_or_else(|| {
-            words.refuse(format!("{WHAT}: {modes} modes, of which {rejected} are rejected"))
+            words.refuse(format!(
+                "{WHAT} leaves no mode: it states {modes} modes, of which {rejected} are rejected"
+            ))
         })?;
         Ok(rejected)
     }
@@ -147,7 +152,11 @@ impl Records {
                     16 => nf.saturating_mul(9),
                     17 => square.saturating_mul(3),
                     18 => square.saturating_mul(9),
-                    _ => return Err(words.refuse_at(line, format!("{what}: there is no such group"))),
+                    _ => {
+                        return Err(
+                            words.refuse_at(line, format!("{what} is unknown: groups are numbered 1 to 19"))
+                        );
+                    }
                 };
                 let values = words.numbers(count, &what)?;
                 self.numbers.insert(group, values);
@@ -208,13 +217,13 @@ fn group_number(title: &str, seen: &[usize]) -> std::result::Result<usize, Strin
     let digits = title.trim_start();
     let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
     let Ok(group) = digits[..end].parse::<usize>() else {
-        return Err("a record group without a number".to_owned());
+        return Err("a record group has no number".to_owned());
     };
     if seen.contains(&group) {
-        return Err(format!("record group {group} stands in the file twice"));
+        return Err(format!("record group {group} occurs twice"));
     }
     if seen.is_empty() && group != 1 {
-        return Err(format!("record group {group} stands before record group 1"));
+        return Err(format!("record group {group} precedes record group 1, which has the counts"));
     }
     Ok(group)
 }

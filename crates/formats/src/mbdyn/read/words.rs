@@ -91,7 +91,7 @@ impl<'t> Words<'t> {
         let could_be_exponent = |part: &str| part.bytes().skip(1).all(|b| b.is_ascii_digit());
         if !touching.is_empty() && !word.contains(['e', 'E']) && could_be_exponent(touching) {
             return Err(self.refuse(format!(
-                "{what}: `{word}{touching}` is no finite number: MBDyn takes it for two, write the letter of the exponent"
+                "{what}: `{word}{touching}` is not a finite number (MBDyn reads it as two numbers): write the letter of the exponent"
             )));
         }
         if !touching.is_empty() {
@@ -104,7 +104,7 @@ impl<'t> Words<'t> {
                 self.digits.see(word);
                 Ok(value)
             }
-            _ => Err(self.refuse(format!("{what}: {word:?} is no finite number"))),
+            _ => Err(self.refuse(format!("{what}: expected a finite number, found {word:?}"))),
         }
     }
 
@@ -121,7 +121,7 @@ impl<'t> Words<'t> {
     /// Returns an integer that is not negative.
     pub(crate) fn count(&mut self, what: &str) -> Result<usize> {
         let word = self.expect(what)?;
-        word.parse().map_err(|_| self.refuse(format!("{what}: {word:?} is no count")))
+        word.parse().map_err(|_| self.refuse(format!("{what}: expected a count, found {word:?}")))
     }
 
     /// Returns the words up to the next comment, which is not consumed; none are expected after a complete

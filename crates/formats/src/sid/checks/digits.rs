@@ -7,7 +7,7 @@ use flexbody_base::diagnostic::Code;
 
 /// Largest relative rounding of an array that is not reported as lost digits. A larger value accepts files
 /// with fewer digits.
-const LOST: f64 = 1e-8;
+const MAX_DIGIT_ROUNDING: f64 = 1e-8;
 
 /// Constant (order 0) or linear (order 1) part of an array, with half a unit of its last digit and its
 /// largest number.
@@ -36,11 +36,11 @@ pub(super) fn digits(listed: &Listed<'_>, arrays: &Arrays, frames: &[FrameArrays
     });
     AuditCheck {
         name: "digits",
-        formula: "half a unit of the last digit beside the largest number of each array",
+        formula: "half a unit of the last digit / largest number of each array",
         value,
-        limit: LOST,
+        limit: MAX_DIGIT_ROUNDING,
         code: Code::AuditDigits,
-        meaning: format!("numbers have {}, which is least for {place}", listed.digits().words()),
+        meaning: format!("numbers have {}; the loss is largest in {place}", listed.digits().words()),
     }
 }
 

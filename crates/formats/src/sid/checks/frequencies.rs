@@ -55,13 +55,19 @@ pub(crate) fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditC
     let all: Vec<(usize, f64, f64)> = listed.mode_texts.iter().filter_map(compared).collect();
     let &(mode, ratio, value) = all.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;
     let known = [
-        (TAU, "2 pi, as of radians per second"),
-        (1.0 / TAU, "1 / (2 pi), as of radians per second"),
-        (1000.0, "1000, as of milliseconds beside seconds"),
-        (0.001, "1/1000, as of milliseconds beside seconds"),
-        (1000f64.sqrt(), "sqrt(1000), as of a mass or length in a unit a thousand times another"),
-        (0.001f64.sqrt(), "1/sqrt(1000), as of a mass or length in a unit a thousand times another"),
-        (60.0, "60, as of revolutions per minute"),
+        (TAU, "2 pi, as if radians per second were meant"),
+        (1.0 / TAU, "1 / (2 pi), as if radians per second were meant"),
+        (1000.0, "1000, as if milliseconds were mixed with seconds"),
+        (0.001, "1/1000, as if milliseconds were mixed with seconds"),
+        (
+            1000f64.sqrt(),
+            "sqrt(1000), as if a mass or length were in a unit 1000 times too large or too small",
+        ),
+        (
+            0.001f64.sqrt(),
+            "1/sqrt(1000), as if a mass or length were in a unit 1000 times too large or too small",
+        ),
+        (60.0, "60, as if revolutions per minute were meant"),
     ];
     let factor = known.iter().find(|(factor, _)| (ratio / factor - 1.0).abs() < FREQUENCY);
     let factor = factor.map_or_else(|| format!("{ratio:.4}"), |(_, words)| (*words).to_owned());
@@ -72,7 +78,7 @@ pub(crate) fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditC
         limit: FREQUENCY,
         code: Code::AuditUnits,
         meaning: format!(
-            "the text of mode {} has another frequency than stiffness and mass, by the factor {factor}",
+            "the frequency in the text of mode {} differs from that of stiffness and mass by the factor {factor}",
             mode + 1
         ),
     })

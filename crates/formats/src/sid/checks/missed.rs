@@ -13,13 +13,13 @@ const ROUNDING: f64 = 1e-10;
 const TERMS: f64 = 10.0;
 
 /// Violation of an identity, with the scale of its terms and half a unit of their last digits.
-pub(super) struct Missed {
+pub(super) struct Violation {
     pub by: f64,
     pub scale: f64,
     pub rounding: f64,
 }
 
-impl Missed {
+impl Violation {
     pub(super) fn check(
         self,
         name: &'static str,

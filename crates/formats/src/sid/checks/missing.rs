@@ -10,7 +10,7 @@ use nalgebra::Matrix3;
 
 /// Largest part of its bound for which an array counts as zero. A larger value reports small arrays as
 /// missing.
-const NOTHING: f64 = 1e-9;
+const ZERO_ARRAY: f64 = 1e-9;
 
 /// Missing arrays, and the contradictions in words.
 pub(crate) struct Missing {
@@ -60,7 +60,7 @@ impl Sizes {
     /// for which Cr0 is zero.
     fn are_free(&self, arrays: &Arrays) -> bool {
         let [bound_t, bound_r, _] = arrays.bounds();
-        self.ct0.max(self.mdcm1) <= NOTHING * bound_t && self.cr0 <= NOTHING * bound_r
+        self.ct0.max(self.mdcm1) <= ZERO_ARRAY * bound_t && self.cr0 <= ZERO_ARRAY * bound_r
     }
 }
 
@@ -74,31 +74,31 @@ impl Missing {
         let mut found = Self { arrays: Vec::new(), why: Vec::new() };
         let sizes = Sizes::of(arrays, layout);
         let [bound_t, bound_r, bound_e] = arrays.bounds();
-        let is = |size: f64, bound: f64| size > NOTHING * bound;
+        let is = |size: f64, bound: f64| size > ZERO_ARRAY * bound;
         let [gr_even, gr_skew] = sizes.gr_parts.map(|part| is(part, bound_r));
         let [j1, cr0, oe0] = [sizes.j1, sizes.cr0, sizes.oe0].map(|size| is(size, bound_r));
 
-        found.say("Ct", sizes.ct0, &[(is(sizes.mdcm1, bound_t), "mdCM1 is not")]);
-        found.say("mdCM1", sizes.mdcm1, &[(is(sizes.ct0, bound_t), "Ct is not")]);
+        found.add_if_missing("Ct", sizes.ct0, &[(is(sizes.mdcm1, bound_t), "mdCM1 is not")]);
+        found.add_if_missing("mdCM1", sizes.mdcm1, &[(is(sizes.ct0, bound_t), "Ct is not")]);
         if !sizes.are_free(arrays) {
-            found.say("Cr0", sizes.cr0, &[(gr_skew, "Gr has a skew part")]);
+            found.add_if_missing("Cr0", sizes.cr0, &[(gr_skew, "Gr has a skew part")]);
         }
-        found.say("Gr", sizes.gr0, &[(j1, "J1 is not"), (cr0, "Cr0 is not")]);
-        found.say("J1", sizes.j1, &[(gr_even, "Gr has a symmetric part"), (oe0, "Oe0 is not")]);
-        found.say("Oe0", sizes.oe0, &[(j1, "J1 is not")]);
-        found.say("Ge", sizes.ge, &[(is(sizes.cr1[1], bound_e), "Cr1 is not")]);
+        found.add_if_missing("Gr", sizes.gr0, &[(j1, "J1 is not"), (cr0, "Cr0 is not")]);
+        found.add_if_missing("J1", sizes.j1, &[(gr_even, "Gr has a symmetric part"), (oe0, "Oe0 is not")]);
+        found.add_if_missing("Oe0", sizes.oe0, &[(j1, "J1 is not")]);
+        found.add_if_missing("Ge", sizes.ge, &[(is(sizes.cr1[1], bound_e), "Cr1 is not")]);
         let ge = is(sizes.ge, bound_e);
         if sizes.cr1[0] == 0.0 {
-            found.say("Cr1", 0.0, &[(ge, "Ge is not")]);
+            found.add_if_missing("Cr1", 0.0, &[(ge, "Ge is not")]);
         } else if sizes.cr1[1] == 0.0 && ge {
             found.arrays.push("Cr1");
-            found.why.push("Cr1 has nothing that is skew in the modes although Ge is not zero".to_owned());
+            found.why.push("Cr1 is symmetric in the modes although Ge is not zero".to_owned());
         }
-        found.say("Oe1", sizes.oe1, &[(bound_e > 0.0 && !declared.without_w2, "Me is not")]);
+        found.add_if_missing("Oe1", sizes.oe1, &[(bound_e > 0.0 && !declared.without_w2, "Me is not")]);
         found
     }
 
-    fn say(&mut self, name: &'static str, size: f64, witnesses: &[(bool, &str)]) {
+    fn add_if_missing(&mut self, name: &'static str, size: f64, witnesses: &[(bool, &str)]) {
         let because: Vec<&str> = witnesses.iter().filter(|(is, _)| *is).map(|(_, why)| *why).collect();
         if size == 0.0 && !because.is_empty() {
             self.arrays.push(name);
@@ -115,11 +115,11 @@ impl Missing {
         let why = if self.why.is_empty() { "nothing".to_owned() } else { self.why.join(", ") };
         AuditCheck {
             name: "coupling_is_there",
-            formula: "number of arrays that are zero and may not be",
+            formula: "number of arrays that are zero but must not be",
             value: self.arrays.len() as f64,
             limit: 0.0,
             code: Code::AuditCoupling,
-            meaning: format!("rigid motion and deformation do not act on each other as they must: {why}"),
+            meaning: format!("the coupling of rigid motion and deformation is incomplete: {why}"),
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::digits::digits;
 use super::frames::frame_checks;
 use super::frequencies::frequencies;
-use super::missed::{Missed, largest_entry};
+use super::missed::{Violation, largest_entry};
 use super::missing::{Missing, is_free};
 use crate::import::AuditCheck;
 use crate::sid::read::arrays::{Array, Arrays, FrameArrays, PAIRS, largest};
@@ -71,7 +71,7 @@ impl Identities<'_> {
         }
         let (moment, ct) = (&self.arrays.first_moment, &self.arrays.ct);
         let [bound, ..] = self.arrays.bounds();
-        let missed = Missed {
+        let missed = Violation {
             by: largest_entry(self.arrays.nq, 3, |k, a| moment.linear(k, a, 0) - ct.m0[(k, a)]),
             scale: scale(bound, &[moment.sizes()[1], ct.sizes()[0]]),
             rounding: moment.rounding[1] + ct.rounding[0],
@@ -80,7 +80,7 @@ impl Identities<'_> {
             "mdcm1_is_ct0",
             "mdCM1_k = Ct0_k",
             Code::AuditIdentity,
-            "the first moment moves with the modes in another way than the modes couple to translation",
+            "the change of the first moment with the modes and the coupling of the modes to translation contradict each other",
         ))
     }
 
@@ -92,7 +92,7 @@ impl Identities<'_> {
         let (gr, inertia) = (&self.arrays.gr, &self.arrays.inertia);
         let [_, bound, _] = self.arrays.bounds();
         let [even, _] = self.layout.gr.gr_misfit(self.arrays);
-        let missed = Missed {
+        let missed = Violation {
             by: even,
             scale: scale(bound, &[gr.sizes()[0], inertia.sizes()[1]]),
             rounding: gr.rounding[0] + inertia.rounding[1],
@@ -101,7 +101,7 @@ impl Identities<'_> {
             "gr_symmetric_is_j1",
             "sym(Gr_k) = J1_k",
             Code::AuditIdentity,
-            "the gyroscopic torque does not belong to the inertia that changes with the modes",
+            "the gyroscopic torque and the change of the inertia with the modes contradict each other",
         ))
     }
 
@@ -115,22 +115,22 @@ impl Identities<'_> {
         let (code, meaning) = if two_masses {
             (
                 Code::AuditLumped,
-                "the gyroscopic torque and the coupling of rotation and modes come from different masses",
+                "the gyroscopic torque and the coupling of rotation and modes come from different mass matrices",
             )
         } else if is_free(self.arrays, self.layout) {
             (
                 Code::AuditIdentity,
-                "Cr0, Ct and mdCM1 are zero as of free modes, but Gr has a skew part: Gr is wrong, or all of the three are missing",
+                "Cr0, Ct and mdCM1 are zero, as for free modes, but Gr has a skew part: Gr is wrong, or all three arrays are missing",
             )
         } else {
             (
                 Code::AuditIdentity,
-                "the gyroscopic torque does not belong to the coupling of rotation and modes",
+                "the gyroscopic torque and the coupling of rotation and modes contradict each other",
             )
         };
         let [_, bound, _] = self.arrays.bounds();
         let [_, odd] = self.layout.gr.gr_misfit(self.arrays);
-        let missed = Missed {
+        let missed = Violation {
             by: odd,
             scale: scale(bound, &[gr.sizes()[0], cr.sizes()[0]]),
             rounding: gr.rounding[0] + cr.rounding[0],
@@ -149,17 +149,17 @@ impl Identities<'_> {
             "Ge(k,l) = Cr1(k,l) - Cr1(l,k), which is 2 Cr1 of a solid",
             Code::AuditIdentity,
             if doubled {
-                "Ge is 2 Cr1 with its part that is symmetric in the modes, as FEMBS writes it: geometric stiffness for angular acceleration, which is in Cr1, is no Coriolis force"
+                "Ge is 2 Cr1 including its part that is symmetric in the modes, as FEMBS writes it: this part is geometric stiffness for angular acceleration and not a Coriolis force"
             } else {
-                "the Coriolis forces among modes do not belong to the coupling of rotation and modes that grows with q"
+                "the Coriolis forces among modes (Ge) and the coupling of rotation and modes linear in q (Cr1) contradict each other"
             },
         ))
     }
 
-    fn missed_of_ge(&self, by: f64) -> Missed {
+    fn missed_of_ge(&self, by: f64) -> Violation {
         let (ge, cr) = (&self.arrays.ge, &self.arrays.cr);
         let [.., bound] = self.arrays.bounds();
-        Missed {
+        Violation {
             by,
             scale: scale(bound, &[ge.sizes()[0], cr.sizes()[1]]),
             rounding: ge.rounding[0] + 2.0 * cr.rounding[1],
@@ -185,7 +185,7 @@ impl Identities<'_> {
         let ge_by = if ge == own.ge { 0.0 } else { ge.ge_misfit(arrays) };
         let gr_scale = scale(bound, &[arrays.gr.sizes()[0]]);
         vec![
-            Missed { by: gr_by, scale: gr_scale, rounding: arrays.gr.rounding[0] }.check(
+            Violation { by: gr_by, scale: gr_scale, rounding: arrays.gr.rounding[0] }.check(
                 "gr_layout",
                 "Gr in the order of columns of the dialect gives J1 and Cr0",
                 Code::AuditLayout,
@@ -210,19 +210,19 @@ impl Identities<'_> {
         let scale = scale(bound, &[oe.sizes()[0], inertia.sizes()[1]]);
         let (own, other) = (self.oe0_misfit(false), self.oe0_misfit(true));
         let rounding = oe.rounding[0] + inertia.rounding[1];
-        let missed = |by: f64| Missed { by, scale, rounding };
+        let missed = |by: f64| Violation { by, scale, rounding };
         let exchanged = other < 0.1 * own && missed(other).passes();
         let identity = missed(if exchanged { other } else { own }).check(
             "oe0_is_j1",
             "Oe0(k) = -[J1_11/2, J1_22/2, J1_33/2, J1_12, J1_23, J1_13]_k",
             Code::AuditIdentity,
-            "the constant centrifugal load does not belong to the inertia that changes with the modes",
+            "the constant centrifugal load and the change of the inertia with the modes contradict each other",
         );
         let order = missed(if exchanged { own } else { 0.0 }).check(
             "oe_layout",
             "Oe has its columns in the order 11, 22, 33, 12, 23, 13",
             Code::AuditLayout,
-            "the last two columns of Oe are exchanged",
+            "the last two columns of Oe are swapped",
         );
         vec![identity, order]
     }
@@ -251,7 +251,7 @@ impl Identities<'_> {
             scale,
             "oe1_symmetric",
             "Oe1(k,l) = Oe1(l,k)",
-            "centrifugal forces that grow with q are no gradient of an energy",
+            "the centrifugal forces linear in q are not the gradient of an energy",
         ));
         if size > 0.0 {
             let trace = trace(self.arrays, scale);
@@ -275,13 +275,13 @@ impl Identities<'_> {
             ct.sizes()[1],
             "ct1_symmetric",
             "Ct1(k,l) = Ct1(l,k)",
-            "the geometric stiffness for acceleration is no symmetric matrix",
+            "the geometric stiffness for acceleration is not symmetric",
         ))
     }
 
     fn damping(&self) -> AuditCheck {
         let (de, nq) = (&self.arrays.de.m0, self.arrays.nq);
-        let missed = Missed {
+        let missed = Violation {
             by: largest_entry(nq, nq, |i, j| de[(i, j)] - de[(j, i)]),
             scale: largest(de),
             rounding: 2.0 * self.arrays.de.rounding[0],
@@ -309,7 +309,12 @@ fn symmetric_in_modes(
     let missed_in_column =
         |c: usize| largest_entry(nq, nq, |k, l| array.linear(l, k, c) - array.linear(k, l, c));
     let by = (0..array.m0.ncols()).map(missed_in_column).fold(0.0, larger);
-    Missed { by, scale, rounding: 2.0 * array.rounding[1] }.check(name, formula, Code::AuditIdentity, meaning)
+    Violation { by, scale, rounding: 2.0 * array.rounding[1] }.check(
+        name,
+        formula,
+        Code::AuditIdentity,
+        meaning,
+    )
 }
 
 /// Compares the trace of Oe1 with Me.
@@ -320,16 +325,15 @@ fn trace(arrays: &Arrays, scale: f64) -> AuditCheck {
     let ratio = |k: usize| -0.5 * sum(k, k) / arrays.me.m0[(k, k)];
     let worst_mode = (0..nq).max_by(|&a, &b| (ratio(a) - 1.0).abs().total_cmp(&(ratio(b) - 1.0).abs()));
     let facts = worst_mode.map_or_else(String::new, |k| {
-        format!(": of mode {} Oe1 has {:.4} of the modal mass", k + 1, ratio(k))
+        format!(" (for mode {} Oe1 gives {:.4} of the modal mass)", k + 1, ratio(k))
     });
     let rounding = 3.0 * arrays.oe.rounding[1] + 2.0 * arrays.me.rounding[0];
-    Missed { by, scale, rounding }.check(
+    Violation { by, scale, rounding }.check(
         "oe1_is_me",
         "Oe1_11 + Oe1_22 + Oe1_33 = -2 Me",
         Code::AuditLumped,
         format!(
-            "centrifugal forces and modal mass come from different masses{facts}; lumped masses do that, rotational inertia of \
-             nodes that is left out, or geometric stiffness that the file does not declare"
+            "centrifugal forces and modal mass come from different mass matrices{facts}: possible causes are lumped masses, omitted rotational inertia of nodes, and geometric stiffness that the file does not declare"
         ),
     )
 }

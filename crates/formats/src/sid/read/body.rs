@@ -78,7 +78,7 @@ pub(crate) fn body(
     terms.accelerated();
     if frames.iter().any(has_own_axes) {
         terms.notes.push(
-            "frames have axes other than those of the body (AP), which a flex-body file does not hold"
+            "the axes of frames (AP) are not converted: a flex-body file has frames with the axes of the body only"
                 .to_owned(),
         );
     }
@@ -95,7 +95,7 @@ pub(crate) fn body(
         geometric_stiffness: stiffness,
         frames,
         mesh: None,
-        lacks: lacks(arrays),
+        omissions: omissions(arrays),
     };
     (body, notes)
 }
@@ -120,15 +120,15 @@ fn numbered(arrays: &Arrays, i5: Option<Mat<f64>>, i9: Option<Mat<f64>>) -> Numb
 }
 
 /// Returns the data of the file that a flexible body cannot hold.
-fn lacks(arrays: &Arrays) -> Vec<String> {
-    let mut lacks = Vec::new();
+fn omissions(arrays: &Arrays) -> Vec<String> {
+    let mut omissions = Vec::new();
     if largest(&arrays.ksigma.m0) > 0.0 {
-        lacks.push("ksigma: forces of initial stress on the modes are not taken".to_owned());
+        omissions.push("ksigma: forces of initial stress on the modes are not converted".to_owned());
     }
     if arrays.gr.m1.is_some() {
-        lacks.push("Gr1: it follows from the other arrays and is not taken".to_owned());
+        omissions.push("Gr1 is ignored: it follows from the other arrays".to_owned());
     }
-    lacks
+    omissions
 }
 
 /// Terms separated from arrays that hold kinetic energy and geometric stiffness together.
@@ -153,7 +153,7 @@ impl Terms<'_> {
         if (0..3).any(|a| largest(&even(a)) > rounding) {
             push(&mut self.stiffness, &LoadKind::AngularAcceleration, (0..3).map(even));
             self.notes.push(
-                "what Cr1 has symmetric in the modes is taken as geometric stiffness for angular acceleration: the equations are the same"
+                "the part of Cr1 that is symmetric in the modes is converted to geometric stiffness for angular acceleration: the equations are the same"
                     .to_owned(),
             );
         }
@@ -174,7 +174,7 @@ impl Terms<'_> {
         let load = |pair| Mat::from_fn(nq, nq, |k, l| oe1(k, l, pair));
         push(&mut self.stiffness, &LoadKind::Spin, (0..6).map(load));
         self.notes.push(
-            "Oe1 is taken as geometric stiffness for spin as a whole, since W2 cannot be told from it: the equations are the same"
+            "Oe1 is converted to geometric stiffness for spin as a whole, since W2 cannot be separated from it: the equations are the same"
                 .to_owned(),
         );
         None
@@ -185,7 +185,7 @@ impl Terms<'_> {
         let Some(m1) = &self.arrays.ct.m1 else { return };
         let along = |a: usize| symmetric_part(self.arrays.nq, |k, l| m1[l][(k, a)]);
         push(&mut self.stiffness, &LoadKind::Acceleration, (0..3).map(along));
-        self.notes.push("Ct1 is taken as geometric stiffness for acceleration".to_owned());
+        self.notes.push("Ct1 is converted to geometric stiffness for acceleration".to_owned());
     }
 }
 

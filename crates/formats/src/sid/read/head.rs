@@ -29,7 +29,7 @@ impl Head {
                     head.comment.push_str(line.text);
                 }
                 (_, head) => {
-                    let message = "first line without the numbers of nodes and modes";
+                    let message = "the first line has no counts of nodes and modes";
                     let first = Self::of_line(line.text);
                     *head = Some(first.ok_or_else(|| lines.unreadable(line.number, message))?);
                 }

@@ -76,14 +76,14 @@ impl Blocks {
 
 /// Largest ratio of the misfits of two layouts for which the smaller one decides. A larger value decides on
 /// less evidence.
-const CLEAR: f64 = 0.1;
+const MAX_MISFIT_RATIO: f64 = 0.1;
 
 /// Returns the layout with the clearly smaller misfit; `None` if both are similar.
 fn fitting(misfit: impl Fn(Blocks) -> f64) -> Option<Blocks> {
     let [component, mode] = Blocks::ALL.map(misfit);
-    if component < CLEAR * mode {
+    if component < MAX_MISFIT_RATIO * mode {
         Some(Blocks::Component)
-    } else if mode < CLEAR * component {
+    } else if mode < MAX_MISFIT_RATIO * component {
         Some(Blocks::Mode)
     } else {
         None
@@ -149,7 +149,7 @@ pub(crate) fn arrays_in_order(listed: &mut Listed<'_>, digits: Digits) -> Arrays
     let usual = Blocks::ALL.map(|blocks| misfit(&arrays, blocks)).into_iter().fold(f64::INFINITY, f64::min);
     listed.modes = ModeIndex::Rows;
     let by_rows = Arrays::new(listed, digits);
-    if misfit(&by_rows, Blocks::Mode) < CLEAR * usual {
+    if misfit(&by_rows, Blocks::Mode) < MAX_MISFIT_RATIO * usual {
         return by_rows;
     }
     listed.modes = ModeIndex::Middle;
@@ -168,6 +168,6 @@ fn declared<'l>(listed: &'l Listed<'_>) -> (Option<&'l str>, String) {
     } else if listed.has_square_inertia() || listed.modes == ModeIndex::Last {
         (Some("fembeam"), "J is 3 x 3 or m1 has the mode last".to_owned())
     } else {
-        (None, "no name says the dialect".to_owned())
+        (None, "no name in the file tells the dialect".to_owned())
     }
 }

@@ -54,7 +54,7 @@ impl<'t> Lines<'t> {
     /// Returns an error if a line that is not blank follows the end.
     pub(crate) fn finish(mut self) -> Result<(), Diagnostic> {
         match self.next("") {
-            Ok(line) => Err(self.unreadable(line.number, "text after `end part`")),
+            Ok(line) => Err(self.unreadable(line.number, "text follows `end part`")),
             Err(_) => Ok(()),
         }
     }

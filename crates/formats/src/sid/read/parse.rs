@@ -78,10 +78,13 @@ impl<'t> Listed<'t> {
         let Head { comment, stated } = Head::read(&mut lines)?;
         let Modal { refmod, frames, objects } = Modal::read(&mut lines)?;
         let incomplete = |message: String| Diagnostic::new(Code::ForeignIncomplete, message).in_file(path);
-        let refmod = refmod.ok_or_else(|| incomplete("no `refmod` with the mass".to_owned()))?;
+        let refmod = refmod
+            .ok_or_else(|| incomplete("the object `refmod`, which has the mass, is missing".to_owned()))?;
         let nq = refmod.nq;
         if let Some((_, modes)) = stated.filter(|(_, modes)| *modes != nq) {
-            return Err(lines.unreadable(1, format!("first line has {modes} modes, `refmod` has {nq}")));
+            return Err(
+                lines.unreadable(1, format!("the first line states {modes} modes, `refmod` states {nq}"))
+            );
         }
         let mut listed = Self {
             comment,
@@ -112,13 +115,13 @@ impl<'t> Listed<'t> {
         let nq = self.nq;
         let entries: usize = self.objects.iter().flatten().map(Taylor::n_entries).sum();
         if nq == 0 || nq > MODES_OF_ANY_FILE.max((64.0 * entries as f64).sqrt() as usize) {
-            return Err(format!("{entries} numbers are no body of {nq} modes"));
+            return Err(format!("the file has only {entries} numbers, too few for {nq} modes"));
         }
         let frame_objects = self.frames.iter().flat_map(|f| f.objects.iter().flatten());
         let numbers: usize = frame_objects.map(Taylor::n_entries).sum();
         let n = self.frames.len();
         if n.saturating_mul(nq) > NUMBERS_OF_ANY_FILE.max(64 * numbers) {
-            return Err(format!("{numbers} numbers are no {n} frames of {nq} modes"));
+            return Err(format!("the file has only {numbers} numbers, too few for {n} frames of {nq} modes"));
         }
         Ok(())
     }
@@ -244,8 +247,7 @@ impl<'t> Modal<'t> {
 
     /// Reads the part of the file that begins with `line`.
     fn read_part(&mut self, lines: &mut Lines<'t>, line: &Line<'t>) -> Result<(), Diagnostic> {
-        let twice =
-            |lines: &Lines<'_>| lines.unreadable(line.number, format!("`{}` is there twice", line.key));
+        let twice = |lines: &Lines<'_>| lines.unreadable(line.number, format!("`{}` occurs twice", line.key));
         match line.key.as_str() {
             "refmod" if self.refmod.is_some() => return Err(twice(lines)),
             "refmod" => self.refmod = Some(Refmod::read(lines)?),
@@ -334,7 +336,7 @@ fn read_frames(lines: &mut Lines<'_>) -> Result<Vec<ListedFrame>, Diagnostic> {
                         return Err(lines.unreadable(line.number, message));
                     };
                     if frame.objects[at].is_some() {
-                        let message = format!("`{key}` is there twice");
+                        let message = format!("`{key}` occurs twice");
                         return Err(lines.unreadable(line.number, message));
                     }
                     frame.objects[at] = Some(Taylor::read(lines, &line)?);

@@ -49,7 +49,7 @@ impl ModeIndex {
         match self {
             Self::Middle => "m1 has the mode as its middle index",
             Self::Last => "m1 has the mode as its last index",
-            Self::Rows => "m1 is counted by rows, as EMBSlib takes it",
+            Self::Rows => "m1 is counted by rows, as EMBSlib reads it",
         }
     }
 
@@ -101,9 +101,9 @@ impl Taylor {
     /// Returns the reason why an object with this `order` and `nqn` cannot be read, if there is one.
     fn wrong(&self, order: usize, nqn: Option<usize>) -> Option<&'static str> {
         if order > 1 || nqn.is_some_and(|nqn| nqn > 0) {
-            Some("is of an order above 1")
+            Some("has an order above 1")
         } else if order == 0 && !self.m1.is_empty() {
-            Some("is of order 0, but has entries `m1`")
+            Some("has order 0, but entries `m1`")
         } else if self.structure > 4 {
             Some("has a `structure` other than 0 to 4")
         } else {
@@ -150,7 +150,7 @@ impl Taylor {
         }
         // Some programs leave nq at 0 if nothing depends on q.
         if self.nq != nq && !(self.nq == 0 && self.m1.is_empty()) {
-            let message = format!("`{name}` has nq = {}, the body {nq} modes", self.nq);
+            let message = format!("`{name}` has nq = {}, expected the {nq} modes of the body", self.nq);
             return Err(lines.unreadable(self.line, message));
         }
         for order in 0..2 {
@@ -176,19 +176,20 @@ impl Taylor {
                 if order == 0 { [index[0], index[1], 0] } else { modes.place(index, self.nrow, nq) };
             if row >= self.nrow || column >= self.ncol || mode >= nq {
                 let message = format!(
-                    "entry of `{name}` outside of its {} x {} numbers for {nq} modes",
+                    "an entry of `{name}` is outside its {} x {} numbers for {nq} modes",
                     self.nrow, self.ncol
                 );
                 return Err(lines.unreadable(line, message));
             }
             if order == 0 && self.structure == 1 && index[0] != column {
-                let message = format!("entry of `{name}` beside the diagonal, its `structure` is 1");
+                let message =
+                    format!("an entry of `{name}` is off the diagonal, but its `structure` is 1 (diagonal)");
                 return Err(lines.unreadable(line, message));
             }
         }
         places.sort_unstable();
         if let Some(pair) = places.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-            let message = format!("entry of `{name}` again, it is in line {} already", pair[0].1);
+            let message = format!("an entry of `{name}` is repeated: it is in line {} already", pair[0].1);
             return Err(lines.unreadable(pair[1].1, message));
         }
         Ok(())

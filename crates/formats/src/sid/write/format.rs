@@ -70,14 +70,14 @@ impl ExportFormat for Sid {
         let mut needs = Vec::new();
         if are_counted(&places, dialect) {
             needs.push(
-                "frames have the numbers of the rows of the table beside the file, not of nodes".to_owned(),
+                "frames have the row numbers of the table beside the file, not the node numbers".to_owned(),
             );
         }
         if *dialect == EMBS {
             let (frames, modes) = (places.len(), body.n_modes());
-            needs.push(format!("EMBS_Body takes numNodes = {frames} and numModes = {modes}"));
+            needs.push(format!("set numNodes = {frames} and numModes = {modes} in EMBS_Body"));
             needs.push(
-                "EMBS_Body needs a frame_ref whose origin is at rest: it counts omega x v of a moving one twice"
+                "EMBS_Body needs a frame_ref whose origin is at rest: for a moving origin it counts omega x v twice"
                     .to_owned(),
             );
         }
@@ -92,11 +92,11 @@ impl ExportFormat for Sid {
             && places.len().max(columns) > count
         {
             let message = format!(
-                "sid cannot hold {} frames and {columns} columns of Gr in dialect {}: its reader takes {count} of each",
+                "sid cannot hold {} frames and {columns} columns of Gr in dialect {}: its reader accepts {count} of each at most",
                 places.len(),
                 dialect.name
             );
-            let help = "choose the frames that joints need with --points";
+            let help = "choose fewer frames with --points";
             return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
         }
         let mut exported = Exported::single(file(body, &places, dialect).into_bytes());
@@ -124,8 +124,7 @@ fn coriolis_of_frame(body: &FlexBody) -> Holding {
     let share = (0..body.n_modes()).map(of_mode).fold(0.0, f64::max);
     Holding::held_but_for((share > ROUNDING).then(|| {
         format!(
-            "the Coriolis force 2 omega x C1 qd on the frame: C1 is up to {share:.1e} of its Cauchy-Schwarz \
-             bound, EMBSlib leaves the force out"
+            "the Coriolis force 2 omega x C1 qd on the frame, which EMBSlib omits: C1 is up to {share:.1e} of its Cauchy-Schwarz bound"
         )
     }))
 }

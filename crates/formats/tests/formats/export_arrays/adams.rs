@@ -13,7 +13,7 @@ fn numbers(value: &Value, flat: &mut Vec<f64>) {
     }
 }
 
-/// Returns the values of a quantity and its extents; `None` if the body does not hold it.
+/// Returns the values of a quantity and its extents; `None` if the body does not have this group.
 fn quantity(document: &Value, name: &str) -> Option<(Vec<f64>, Vec<usize>)> {
     let all = document["quantities"].as_array().expect("a list");
     let one = all.iter().find(|one| one["name"] == name).expect("a quantity");

@@ -22,12 +22,12 @@ fn assert_losses(body: &str, format: &str, beginnings: &[&str]) {
 #[test]
 fn losses_are_those_of_the_format_and_the_body() {
     const SPRUNG: &str = "the geometric stiffness for ";
-    const INERTIA: &str =
-        "how the deformation changes the inertia (W1 but for its centrifugal load, W2, W3): OpenRadioss";
-    const SMALL: &str = "how the deformation changes the inertia (W1, W2, W3): K and M";
-    const TURNS: &str = "the stiffness of inertia of nodes that turn, which reaches 1 % of the stiffness of a motion at a spin";
-    const WEIGHT: &str = "the point of action of gravity on the deformed body: Chrono divides";
-    const PLANE: &str = "that the body moves in its plane z = 0 only";
+    const INERTIA: &str = "the change of the inertia with the deformation (W1 except its centrifugal load, W2, W3): OpenRadioss";
+    const SMALL: &str = "the change of the inertia with the deformation (W1, W2, W3): K and M";
+    const TURNS: &str =
+        "the stiffness of inertia of turning nodes, which reaches 1 % of the stiffness of a motion at a spin";
+    const WEIGHT: &str = "the point of action of gravity on the deformed body: Chrono distributes";
+    const PLANE: &str = "the restriction to the plane z = 0";
     for (name, _) in bodies() {
         assert_losses(name, "json", &[]);
         assert_losses(name, "npz", &[]);
@@ -52,7 +52,7 @@ fn losses_are_those_of_the_format_and_the_body() {
     assert_losses("car_frame, jointed", "chrono", &[SMALL, TURNS, WEIGHT]);
     let partial = |groups: &str| format!("soft block with TermGroups {{ {groups} }}");
     assert_losses(&partial("w1: false, w2: false, w3: false"), "openradioss", &[]);
-    let of_w3 = "how the deformation changes the inertia (W3): OpenRadioss";
+    let of_w3 = "the change of the inertia with the deformation (W3): OpenRadioss";
     assert_losses(&partial("w1: false, w2: false, w3: true"), "openradioss", &[of_w3]);
 }
 

@@ -228,10 +228,7 @@ fn every_number_is_rounded_to_its_own_digits() {
             Ok(done) => done,
             Err(error) => {
                 // Products of huge numbers in random bodies overflow.
-                assert!(
-                    error.diagnostics()[0].message().ends_with("the range of double precision"),
-                    "{error}"
-                );
+                assert!(error.diagnostics()[0].message().contains("overflow double precision"), "{error}");
                 refused += 1;
                 continue;
             }

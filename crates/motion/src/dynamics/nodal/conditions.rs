@@ -61,8 +61,9 @@ fn of_point(model: &FeModel, moving: &[usize], point: &NodalPoint) -> Result<Mot
 /// Returns an error for a condition on a row without mass, which does not constrain the motion.
 fn refuse_massless(model: &FeModel, row: usize) -> Result<(), NodalError> {
     let pencil = model.pencil();
-    match pencil.mass().row(row / pencil.block()).0.is_empty() {
-        true => Err(NodalError::HeldWithoutMass(model.label(row))),
-        false => Ok(()),
+    if pencil.mass().row(row / pencil.block()).0.is_empty() {
+        Err(NodalError::HeldWithoutMass(model.label(row)))
+    } else {
+        Ok(())
     }
 }

@@ -41,21 +41,21 @@ impl ModalDamping {
         Some(Some(Self { weighted: model.pencil().apply_mass(vectors.as_ref()), matrix }))
     }
 
-    pub(super) fn room(&self) -> Amplitudes {
+    pub(super) fn workspace(&self) -> Amplitudes {
         let zeros = || vec![0.0; self.weighted.ncols()];
         Amplitudes { of_modes: zeros(), forces: zeros() }
     }
 
     /// Computes forces += factor D ud.
-    pub(super) fn add(&self, factor: f64, ud: &[f64], forces: &mut [f64], room: &mut Amplitudes) {
-        for (j, amplitude) in room.of_modes.iter_mut().enumerate() {
+    pub(super) fn add(&self, factor: f64, ud: &[f64], forces: &mut [f64], workspace: &mut Amplitudes) {
+        for (j, amplitude) in workspace.of_modes.iter_mut().enumerate() {
             let column = self.weighted.col_as_slice(j);
             *amplitude = factor * column.iter().zip(ud).map(|(w, u)| w * u).sum::<f64>();
         }
-        for (i, force) in room.forces.iter_mut().enumerate() {
-            *force = self.matrix.column(i).iter().zip(&room.of_modes).map(|(g, a)| g * a).sum();
+        for (i, force) in workspace.forces.iter_mut().enumerate() {
+            *force = self.matrix.column(i).iter().zip(&workspace.of_modes).map(|(g, a)| g * a).sum();
         }
-        for (j, force) in room.forces.iter().enumerate().filter(|(_, force)| **force != 0.0) {
+        for (j, force) in workspace.forces.iter().enumerate().filter(|(_, force)| **force != 0.0) {
             let column = self.weighted.col_as_slice(j);
             forces.iter_mut().zip(column).for_each(|(sum, w)| *sum += force * w);
         }

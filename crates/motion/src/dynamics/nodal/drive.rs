@@ -6,7 +6,7 @@ use nalgebra::{Const, LU, Matrix6, SMatrix, SVector, Vector6};
 
 /// Failure for a deformation that is too large for the reference conditions to determine the frame.
 pub(super) const LOST: Failure = Failure::Rates {
-    reason: "the deformation is so large that the reference conditions do not determine the frame",
+    reason: "the deformation is so large that the reference conditions no longer determine the frame",
 };
 
 /// Matrix for the multipliers and the motion of the frame together.

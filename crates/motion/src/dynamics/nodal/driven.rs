@@ -55,12 +55,15 @@ impl NodalEvaluation<'_> {
         }
         let drive = Drive::new(&body.answer, &at_rest, given);
 
+        // vbar = M^-1 w, before the conditions of the frame hold.
         self.vbar.copy_from_slice(&self.w);
         body.solve(&mut self.vbar, &mut self.first);
+        // Right-hand side: missing momenta in the free components, given velocities in the others.
         let missing = momenta - body.onto_frame(&self.u, &self.w);
         let own = body.given(velocities);
         let frame = Vector6::from_fn(|k, _| if given[k] { own[k] } else { missing[k] });
         let conditions = -sums(&body.conditions, &self.vbar);
+        // Multipliers mu and frame motion nu; add C'mu to w and its response to vbar.
         let (mu, nu) = drive.solve(&conditions, &frame)?;
         add_motion(&body.conditions, 1.0, &mu, &mut self.w);
         add_motion(&body.answered, 1.0, &mu, &mut self.vbar);
@@ -93,11 +96,13 @@ impl NodalEvaluation<'_> {
             let given = Given { components: mask(rates), motion: body.given(rates) };
             return self.turned_accelerations(&given, udd);
         }
+        // u'' under the loads, before the conditions of the frame hold.
         let wanted = self.find_forces();
         udd.copy_from_slice(&self.w_rate);
         body.solve(udd, &mut self.first);
         body.add_turned(-1.0, &self.omega, &self.ud, udd);
 
+        // Multipliers and frame accelerations from the missing momentum rates and the given accelerations.
         let missing = wanted - body.onto_frame(&self.u, &self.w_rate);
         let own = body.given(rates);
         let frame = Vector6::from_fn(|k, _| if drive.given[k] { own[k] } else { missing[k] });
@@ -106,8 +111,10 @@ impl NodalEvaluation<'_> {
         self.multipliers = lambda;
         add_motion(&body.conditions, 1.0, &lambda, &mut self.w_rate);
         add_motion(&body.answered, 1.0, &lambda, udd);
+        // u'' without the motion of the frame, massless motions in static equilibrium.
         body.add_frame(-1.0, &nu, &self.u, udd);
-        body.massless.project(body.stiffness(), udd, &mut self.room);
+        body.massless.project(body.stiffness(), udd, &mut self.workspace);
+        // The force of the prescribed motion makes up the difference of the momentum rates.
         let taken = body.onto_frame(&self.u, &self.w_rate) - wanted;
         drive.reaction = Vector6::from_fn(|k, _| if drive.given[k] { taken[k] } else { 0.0 });
         self.drive = Some(drive);

@@ -13,7 +13,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// Smallest ratio of the smallest to the largest singular value of C R for which the conditions fix the
 /// frame.
-const INDEPENDENT: f64 = 1e-8;
+const MIN_SINGULAR_VALUE_RATIO: f64 = 1e-8;
 
 /// Equations of motion of all nodes in a floating frame (theory 6.9 to 6.13; \[ZG19\] eq. 67 to 98 for
 /// solids): nothing is reduced, K and M are the matrices of the model.
@@ -189,7 +189,7 @@ impl<'m> NodalEquations<'m> {
             ReferenceConditions::MeanAxes => true,
             ReferenceConditions::Held(_) | ReferenceConditions::AtRest(_) => {
                 let values = equilibrated(&conditions_rigid, length).singular_values();
-                values.min() > INDEPENDENT * values.max()
+                values.min() > MIN_SINGULAR_VALUE_RATIO * values.max()
             }
         };
         let rigid_part = conditions_rigid.transpose().try_inverse().filter(|_| independent);

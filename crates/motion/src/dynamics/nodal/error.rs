@@ -50,41 +50,41 @@ pub enum NodalError {
 impl std::fmt::Display for NodalError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::DofUnknown(dof) => write!(f, "{dof} is to be held, but is no degree of freedom of the model"),
+            Self::DofUnknown(dof) => write!(f, "{dof} is to be held, but is not a degree of freedom of the model"),
             Self::ConditionCount { expected, found } => write!(
                 f,
-                "{found} degrees of freedom are held; help: hold {expected}, as many as the body has rigid motions"
+                "{found} degrees of freedom are held, expected {expected}; help: hold as many as the body has rigid motions"
             ),
             Self::ConditionsDependent => f.write_str(
-                "the reference conditions leave a rigid motion free; help: hold three of one node, two of another and one of a third",
+                "the reference conditions leave a rigid motion free; help: hold three degrees of freedom of one node, two of a second and one of a third",
             ),
             Self::HeldWithoutMass(dof) => {
-                write!(f, "{dof} is to be held, but carries no mass; help: hold others, or take mean axes")
+                write!(f, "{dof} is to be held, but carries no mass; help: hold another degree of freedom, or use mean axes")
             }
             Self::HeldMassSingular { null_vectors } => write!(
                 f,
-                "degrees of freedom are held, but the mass matrix has {null_vectors} null vectors; help: take mean axes"
+                "degrees of freedom are held, but the mass matrix has {null_vectors} null vectors; help: use mean axes"
             ),
             Self::MassIndefinite => f.write_str(
-                "the mass matrix is indefinite or nearly singular; help: export the consistent mass, or take the reduced equations",
+                "the mass matrix is indefinite or nearly singular; help: export the consistent mass, or use the reduced equations",
             ),
             Self::MasslessUnheld => f.write_str(
-                "the stiffness does not hold all that carries no mass; help: remove these degrees of freedom or give them mass",
+                "some degrees of freedom have neither mass nor stiffness; help: remove them, or give them mass",
             ),
             Self::NullSpaceTooLarge { null_vectors, rows } => write!(
                 f,
-                "the mass matrix of {rows} rows has {null_vectors} null vectors, too many for dense storage; help: take full integration of the mass, or the reduced equations"
+                "the mass matrix of {rows} rows has {null_vectors} null vectors, too many for dense storage; help: integrate the mass fully, or use the reduced equations"
             ),
             Self::DampingOfModes => f.write_str(
-                "damping ratios belong to modes, which these equations know of no body; help: give the body (`of_body`), Rayleigh damping or a damping matrix",
+                "damping ratios need the modes of a body, and none is given; help: give the body (`of_body`), Rayleigh damping or a damping matrix",
             ),
-            Self::OtherBody => f.write_str("the body has other rows than the model, or modes that depend on each other"),
+            Self::OtherBody => f.write_str("the rows of the body and the model differ, or the modes are linearly dependent"),
             Self::FrameTied => f.write_str(
-                "the frame of a body with nodal rotations or rows without a place cannot be changed; help: start without deformation",
+                "the frame of a body with nodal rotations or rows without a position cannot be changed; help: start without deformation",
             ),
             Self::ConditionsViolated { part } => write!(
                 f,
-                "the displacements hold rigid motion, {part:.1e} of the largest of them; help: change the frame (`reframed`), or take less deformation"
+                "the displacements contain rigid motion, {part:.1e} of the largest displacement; help: change the frame (`reframed`), or reduce the deformation"
             ),
         }
     }

@@ -5,7 +5,7 @@ use super::drive::{Drive, LOST};
 use super::equations::NodalEquations;
 use super::inversion::Given;
 use super::inversion::{Conditions, TurnedMass};
-use super::massless::Room;
+use super::massless::Workspace;
 use super::motions::{add_motion, halves, joined, sums};
 use super::state::{ANGULAR, LINEAR, OFFSET, attitude};
 use crate::dynamics::kernels::add_scaled;
@@ -53,7 +53,7 @@ pub struct NodalEvaluation<'e> {
     pub(super) drive: Option<Drive>,
     pub(super) first: Vec<f64>,
     pub(super) second: Vec<f64>,
-    pub(super) room: Room,
+    pub(super) workspace: Workspace,
     amplitudes: Amplitudes,
 }
 
@@ -87,8 +87,11 @@ impl<'e> NodalEvaluation<'e> {
             drive: None,
             first: zeros(),
             second: zeros(),
-            room: equations.massless.room(),
-            amplitudes: equations.modal_damping.as_ref().map_or_else(Amplitudes::default, ModalDamping::room),
+            workspace: equations.massless.workspace(),
+            amplitudes: equations
+                .modal_damping
+                .as_ref()
+                .map_or_else(Amplitudes::default, ModalDamping::workspace),
         }
     }
 
@@ -162,7 +165,7 @@ impl<'e> NodalEvaluation<'e> {
         self.ud.copy_from_slice(&self.vbar);
         body.add_frame(-1.0, nu, &self.u, &mut self.ud);
         if !body.massless.is_empty() {
-            body.massless.project(body.stiffness(), &mut self.ud, &mut self.room);
+            body.massless.project(body.stiffness(), &mut self.ud, &mut self.workspace);
             self.vbar.copy_from_slice(&self.ud);
             body.add_frame(1.0, nu, &self.u, &mut self.vbar);
         }
@@ -248,7 +251,7 @@ impl<'e> NodalEvaluation<'e> {
         }
         // K T = T'K: adding the static response of the massless rows to u transfers their forces to the
         // other rows with one product with K.
-        body.massless.add_static(&self.first, &mut self.second, &mut self.room);
+        body.massless.add_static(&self.first, &mut self.second, &mut self.workspace);
         multiply_vector(body.stiffness(), 1, &self.second, &mut self.w_rate);
         self.w_rate.iter_mut().zip(&self.first).for_each(|(rate, force)| *rate = force - *rate);
     }
@@ -275,7 +278,7 @@ impl<'e> NodalEvaluation<'e> {
         let nu = self.conditions.transposed.solve(&nu).ok_or(LOST)?;
         let (linear, angular) = halves(&nu);
         body.add_frame(-1.0, &nu, &self.u, udd);
-        body.massless.project(body.stiffness(), udd, &mut self.room);
+        body.massless.project(body.stiffness(), udd, &mut self.workspace);
         let to_frame = body.frame.axes.transpose();
         Ok((to_frame * linear, to_frame * angular))
     }

@@ -3,7 +3,7 @@
 use super::drive::LOST;
 use super::equations::NodalEquations;
 use super::kinetics::Kinetics;
-use super::massless::Room;
+use super::massless::Workspace;
 use super::motions::{add_motion, sums};
 use crate::dynamics::kernels::{add_scaled, dot};
 use crate::integration::Failure;
@@ -15,11 +15,11 @@ const SOLVED: f64 = 1e-15;
 
 /// Limit of the iterations. Their number grows with the rotations of the nodes, to 30 at rotations of 0.3.
 /// Beyond the limit the evaluation fails.
-const MOST_ITERATIONS: usize = 200;
+const MAX_ITERATIONS: usize = 200;
 
 /// Failure for nodes turned so far that their mass is not positive definite.
-const TURNED: Failure =
-    Failure::Rates { reason: "the nodes are turned so far that their mass is not positive definite" };
+const MASS_NOT_DEFINITE: Failure =
+    Failure::Rates { reason: "the nodes are rotated so far that their mass matrix is not positive definite" };
 
 /// B'C' at the displacements and its transpose, factored.
 #[derive(Debug, Clone)]
@@ -60,7 +60,7 @@ pub(super) struct TurnedMass<'e> {
     direction: Vec<f64>,
     product: Vec<f64>,
     scratch: Vec<f64>,
-    room: Room,
+    workspace: Workspace,
 }
 
 /// Prescribed components of (V, omega), or of their rates.
@@ -92,9 +92,10 @@ impl Given {
         x: &mut [f64],
     ) -> Result<Vector6<f64>, Failure> {
         turned.complete(&self.or_own(momenta, own), x)?;
-        match self.components.contains(&true) {
-            true => turned.solve_given(x, self.components, &self.motion)?,
-            false => turned.solve(x)?,
+        if self.components.contains(&true) {
+            turned.solve_given(x, self.components, &self.motion)?
+        } else {
+            turned.solve(x)?
         }
         turned.frame_of(x)
     }
@@ -127,7 +128,7 @@ impl<'e> TurnedMass<'e> {
             direction: zeros(),
             product: zeros(),
             scratch: zeros(),
-            room: body.massless.room(),
+            workspace: body.massless.workspace(),
         })
     }
 
@@ -158,18 +159,19 @@ impl<'e> TurnedMass<'e> {
             return;
         }
         self.scratch.fill(0.0);
-        self.body.massless.add_static(x, &mut self.scratch, &mut self.room);
+        self.body.massless.add_static(x, &mut self.scratch, &mut self.workspace);
         multiply_vector(self.body.stiffness(), 1, &self.scratch, &mut self.rates);
         x.iter_mut().zip(&self.rates).for_each(|(x, taken)| *x -= taken);
     }
 
     /// Computes w = T'dT/du' of v and returns (p, h).
     pub(super) fn momenta(&mut self, v: &[f64], w: &mut [f64]) -> Result<Vector6<f64>, Failure> {
+        // Split v into the frame motion and the deformation rates in static equilibrium.
         let nu = self.frame_of(v)?;
         self.rates.copy_from_slice(v);
         self.body.add_frame(-1.0, &nu, &self.u, &mut self.rates);
         if self.restricts {
-            self.body.massless.project(self.body.stiffness(), &mut self.rates, &mut self.room);
+            self.body.massless.project(self.body.stiffness(), &mut self.rates, &mut self.workspace);
         }
         let momenta = self.kinetics.momenta(&nu, &self.rates, w);
         self.restrict(w);
@@ -199,9 +201,11 @@ impl<'e> TurnedMass<'e> {
         components: [bool; 6],
         motion: &Vector6<f64>,
     ) -> Result<(), Failure> {
+        // Start from the rigid motion with the prescribed components, whose momentum leaves the residual.
         let given = self.given(components)?;
         self.residual.copy_from_slice(x);
         x.fill(0.0);
+        // x = B motion.
         self.body.add_frame(1.0, motion, &self.u, x);
         let mut product = std::mem::take(&mut self.product);
         let multiplied = self.multiply(x, &mut product);
@@ -213,6 +217,7 @@ impl<'e> TurnedMass<'e> {
     }
 
     fn given(&self, components: [bool; 6]) -> Result<Constraint, Failure> {
+        // N'M^-1 N of the prescribed components; the free ones get the identity, so that the inverse exists.
         let multipliers = self.conditions.plain.solve(&Matrix6::identity()).ok_or(LOST)?;
         let mut answer = multipliers.transpose() * self.body.answer * multipliers;
         for (k, _) in components.iter().enumerate().filter(|(_, given)| !**given) {
@@ -230,24 +235,26 @@ impl<'e> TurnedMass<'e> {
         let mut square = dot(&self.residual, &self.preconditioned);
         let enough = SOLVED * SOLVED * square.max(energy);
         self.direction.copy_from_slice(&self.preconditioned);
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             if square <= enough {
                 return Ok(());
             }
+            // Step of least energy along the search direction.
             let curvature = self.curvature()?;
             if curvature.is_nan() || curvature <= 0.0 {
-                return Err(TURNED);
+                return Err(MASS_NOT_DEFINITE);
             }
             let step = square / curvature;
             add_scaled(step, &self.direction, x);
             add_scaled(-step, &self.product, &mut self.residual);
             self.precondition(given)?;
+            // Next direction, conjugate to the previous one.
             let next = dot(&self.residual, &self.preconditioned);
             let part = next / square;
             self.direction.iter_mut().zip(&self.preconditioned).for_each(|(p, z)| *p = z + part * *p);
             square = next;
         }
-        Err(TURNED)
+        Err(MASS_NOT_DEFINITE)
     }
 
     /// Computes the product of the mass with the direction; returns its inner product with the direction.
@@ -263,12 +270,14 @@ impl<'e> TurnedMass<'e> {
     /// Computes the residual times M^-1 without motion in the prescribed components. Forces on these
     /// components are removed from both, and rounding on massless motions from the residual.
     fn precondition(&mut self, given: Option<&Constraint>) -> Result<(), Failure> {
+        // Residual without rounding on massless motions, times M^-1.
         let mut residual = std::mem::take(&mut self.residual);
         self.restrict(&mut residual);
         self.residual = residual;
         self.preconditioned.copy_from_slice(&self.residual);
         self.body.solve(&mut self.preconditioned, &mut self.scratch);
         let Some(given) = given else { return Ok(()) };
+        // Remove the motion of the prescribed components with the forces that hold them.
         let nu = self.frame_of(&self.preconditioned)?;
         let moved = Vector6::from_fn(|k, _| if given.components[k] { nu[k] } else { 0.0 });
         let mu = given.multipliers * (given.answer * moved);

@@ -89,15 +89,18 @@ impl TurnedNodes<'_> {
     fn velocities(&self, nu: &Vector6<f64>, ud: &[f64], flow: &mut Flow) {
         let points = self.directors.points;
         let (linear, omega) = halves(nu);
+        // Velocities of the points.
         let of_points = &mut flow.velocities[..points];
         of_points.copy_from_slice(&ud[..points]);
         self.body.add_frame(1.0, nu, &self.u, of_points);
         for place in 0..self.nodes.len() {
+            // Directors turn with the angular velocity of their node.
             let spin = omega + self.nodes[place].spin(&self.directors.turn_of(place, ud));
             for (row, director) in self.directors_of(place) {
                 self.put(&mut flow.velocities, row, &spin.cross(&director));
             }
         }
+        // Rest mass: velocities relative to the translation of its centre.
         let Some(rest) = &self.directors.rest else { return };
         let (of_points, of_rows) = (&flow.velocities[..points], &mut flow.rest_velocities);
         of_rows[..points].copy_from_slice(of_points);
@@ -148,14 +151,17 @@ impl TurnedNodes<'_> {
     fn gather(&self, flow: &Flow, w: &mut [f64]) -> Vector6<f64> {
         let points = self.directors.points;
         w.fill(0.0);
+        // Momenta of the points, and moments of the directors on the rotation rows.
         w[..points].copy_from_slice(&flow.momenta[..points]);
         for (place, rows) in self.directors.rotations.iter().enumerate() {
             let moment = self.nodes[place].onto_rotations(&flow.moments[place]);
             rows.iter().zip(&moment).for_each(|(row, moment)| row.iter().for_each(|&row| w[row] = *moment));
         }
+        // Momentum and angular momentum of the frame.
         let both = self.body.onto_frame(&self.u, &flow.momenta[..points]);
         let (linear, mut angular) = halves(&both);
         angular += flow.moments.iter().sum::<Vector3<f64>>();
+        // Contributions of the rest mass.
         let Some(rest) = &self.directors.rest else { return joined(&linear, &angular) };
         w[..points].iter_mut().zip(&flow.rest_momenta).for_each(|(w, value)| *w += value);
         let (rest_linear, rest_angular) =

@@ -33,7 +33,7 @@ pub(super) struct Massless {
 
 /// Work arrays for the products of [`Massless`].
 #[derive(Debug, Clone)]
-pub(super) struct Room {
+pub(super) struct Workspace {
     own: Vec<f64>,
     scratch: Vec<f64>,
     coefficients: DVector<f64>,
@@ -69,6 +69,7 @@ impl Massless {
     pub(super) fn new(model: &FeModel, factor: &SparseLdl) -> Result<Self, NodalError> {
         let (pencil, stiffness) = (model.pencil(), model.stiffness());
         let (n, block) = (pencil.n(), pencil.block());
+        // Empty rows of M are solved with their own factor; the other null vectors start from null pivots.
         let mut massless = Self::of_empty_rows(model)?;
         let starts: Vec<usize> = factor
             .null_rows()
@@ -81,17 +82,19 @@ impl Massless {
             return Err(NodalError::NullSpaceTooLarge { null_vectors: k, rows: n });
         }
         let (mut vectors, mut weighted) = (vec![0.0; n * k], vec![0.0; n * k]);
-        let (mut scratch, mut room) = (vec![0.0; n], massless.room());
+        let (mut scratch, mut workspace) = (vec![0.0; n], massless.workspace());
         let diagonal = pencil.mass_diagonal();
         for ((&start, z), kz) in starts.iter().zip(vectors.chunks_mut(n)).zip(weighted.chunks_mut(n)) {
+            // A null vector of M from one null pivot.
             z[start] = 1.0;
             factor.solve_in_place(block, z, &mut scratch);
             // Scale to unit size, so that the products below work in any units.
             let size = z.iter().fold(0.0f64, |m, z| m.max(z.abs()));
             z.iter_mut().for_each(|z| *z /= size);
+            // M z must be zero; then z is moved to static equilibrium with the empty rows.
             multiply_vector(pencil.mass(), block, z, &mut scratch);
             refuse_mass(&scratch, z, &diagonal)?;
-            massless.project(stiffness, z, &mut room);
+            massless.project(stiffness, z, &mut workspace);
             multiply_vector(stiffness, 1, z, kz);
         }
         if k > 0 {
@@ -129,48 +132,50 @@ impl Massless {
         self.factor.as_ref().map_or(0, |factor| factor.l_dirty().nrows())
     }
 
-    pub(super) fn room(&self) -> Room {
+    pub(super) fn workspace(&self) -> Workspace {
         let zeros = || vec![0.0; self.rows.len()];
-        Room { own: zeros(), scratch: zeros(), coefficients: DVector::zeros(self.n_vectors()) }
+        Workspace { own: zeros(), scratch: zeros(), coefficients: DVector::zeros(self.n_vectors()) }
     }
 
     /// Computes x <- T x, T = I - Z (Z'K Z)^-1 Z'K, which moves massless motions to static equilibrium.
-    pub(super) fn project(&self, stiffness: &SymmetricMatrix, x: &mut [f64], room: &mut Room) {
+    pub(super) fn project(&self, stiffness: &SymmetricMatrix, x: &mut [f64], workspace: &mut Workspace) {
         if let Some(own) = &self.own {
+            // Displacements of the empty rows that balance the elastic forces of the other rows.
             self.rows.iter().for_each(|&row| x[row] = 0.0);
-            for (force, &row) in room.own.iter_mut().zip(&self.rows) {
+            for (force, &row) in workspace.own.iter_mut().zip(&self.rows) {
                 let (columns, values) = stiffness.row(row);
                 *force = -columns.iter().zip(values).map(|(&j, k)| k * x[j as usize]).sum::<f64>();
             }
-            own.solve_in_place(1, &mut room.own, &mut room.scratch);
-            self.rows.iter().zip(&room.own).for_each(|(&row, value)| x[row] = *value);
+            own.solve_in_place(1, &mut workspace.own, &mut workspace.scratch);
+            self.rows.iter().zip(&workspace.own).for_each(|(&row, value)| x[row] = *value);
         }
         let Some(factor) = &self.factor else { return };
-        for (c, kz) in room.coefficients.iter_mut().zip(self.weighted.chunks(x.len())) {
+        // Coefficients -(Z'K Z)^-1 Z'K x of the null vectors.
+        for (c, kz) in workspace.coefficients.iter_mut().zip(self.weighted.chunks(x.len())) {
             *c = -kz.iter().zip(&*x).map(|(kz, x)| kz * x).sum::<f64>();
         }
-        factor.solve_mut(&mut room.coefficients);
-        self.add_vectors(x, room);
+        factor.solve_mut(&mut workspace.coefficients);
+        self.add_vectors(x, workspace);
     }
 
     /// Computes x <- x + Z (Z'K Z)^-1 Z'b, which adds the static response of massless motions to the forces
     /// b.
-    pub(super) fn add_static(&self, b: &[f64], x: &mut [f64], room: &mut Room) {
+    pub(super) fn add_static(&self, b: &[f64], x: &mut [f64], workspace: &mut Workspace) {
         if let Some(own) = &self.own {
-            room.own.iter_mut().zip(&self.rows).for_each(|(force, &row)| *force = b[row]);
-            own.solve_in_place(1, &mut room.own, &mut room.scratch);
-            self.rows.iter().zip(&room.own).for_each(|(&row, value)| x[row] += value);
+            workspace.own.iter_mut().zip(&self.rows).for_each(|(force, &row)| *force = b[row]);
+            own.solve_in_place(1, &mut workspace.own, &mut workspace.scratch);
+            self.rows.iter().zip(&workspace.own).for_each(|(&row, value)| x[row] += value);
         }
         let Some(factor) = &self.factor else { return };
-        for (c, z) in room.coefficients.iter_mut().zip(self.vectors.chunks(x.len())) {
+        for (c, z) in workspace.coefficients.iter_mut().zip(self.vectors.chunks(x.len())) {
             *c = z.iter().zip(b).map(|(z, b)| z * b).sum();
         }
-        factor.solve_mut(&mut room.coefficients);
-        self.add_vectors(x, room);
+        factor.solve_mut(&mut workspace.coefficients);
+        self.add_vectors(x, workspace);
     }
 
-    fn add_vectors(&self, x: &mut [f64], room: &Room) {
-        for (c, z) in room.coefficients.iter().zip(self.vectors.chunks(x.len())) {
+    fn add_vectors(&self, x: &mut [f64], workspace: &Workspace) {
+        for (c, z) in workspace.coefficients.iter().zip(self.vectors.chunks(x.len())) {
             x.iter_mut().zip(z).for_each(|(x, z)| *x += c * z);
         }
     }

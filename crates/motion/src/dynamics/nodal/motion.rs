@@ -9,7 +9,7 @@ use crate::integration::{Failure, StageMode, System};
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// Deformation, relative to the size of the body, that sets the scale of a body at rest.
-const NOTHING: f64 = 1e-9;
+const DEFORMATION_AT_REST: f64 = 1e-9;
 
 /// System y' = f(t, y) of all nodes, with y as defined by [`NodalEquations::dimension`].
 ///
@@ -74,7 +74,9 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
 
     /// Returns the prescribed velocities of the frame at a state, and their rates.
     fn given(&self, time: f64, state: &[f64]) -> (Prescribed, Prescribed) {
-        let Some(drive) = &self.drive else { return (Prescribed::NOTHING, Prescribed::NOTHING) };
+        let Some(drive) = &self.drive else {
+            return (Prescribed::NOTHING, Prescribed::NOTHING);
+        };
         let axes = attitude(state).normalised().axes() * self.evaluation.equations.frame.axes;
         drive(time, &axes)
     }
@@ -140,7 +142,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
             (w - Vector6::from(*mass_rigid).dot(&drift)).powi(2) / mass
         };
         let kinetic: f64 = w.iter().zip(&body.mass_rigid).zip(&self.mass).map(about_centre).sum();
-        let least: f64 = self.stiffness.iter().sum::<f64>() * (NOTHING * body.length).powi(2);
+        let least: f64 = self.stiffness.iter().sum::<f64>() * (DEFORMATION_AT_REST * body.length).powi(2);
         (0.5 * (kinetic + spin) + body.elastic_energy(u)).max(0.5 * least)
     }
 }
@@ -176,13 +178,13 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> System for NodalMotion<'e, L> 
         h: f64,
         modes: &[StageMode],
         scales: &[f64],
-        lacks: &mut [Vec<f64>],
+        residuals: &mut [Vec<f64>],
     ) -> Result<Option<f64>, Failure> {
-        let energy = self.stiff.correct(h, modes, lacks)?;
+        let energy = self.stiff.correct(h, modes, residuals)?;
         let of_step = 0.5 * scales.len() as f64 * self.stiffness[0] * scales[DISPLACEMENTS].powi(2);
-        let frame = lacks.iter().flat_map(|lack| lack[..DISPLACEMENTS].iter().zip(scales));
-        let frame: f64 = frame.map(|(lack, scale)| (lack / scale).powi(2)).sum();
-        Ok(Some((energy / of_step + frame / (lacks.len() * scales.len()) as f64).sqrt()))
+        let frame = residuals.iter().flat_map(|residual| residual[..DISPLACEMENTS].iter().zip(scales));
+        let frame: f64 = frame.map(|(residual, scale)| (residual / scale).powi(2)).sum();
+        Ok(Some((energy / of_step + frame / (residuals.len() * scales.len()) as f64).sqrt()))
     }
 
     /// Scales the Euler parameters to unit length and enforces C u = 0 and, for a driven body, R'w = 0.

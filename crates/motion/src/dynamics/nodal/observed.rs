@@ -35,7 +35,7 @@ impl NodalEvaluation<'_> {
         }
         self.find_forces();
         self.second.copy_from_slice(&self.u);
-        body.massless.add_static(&self.first, &mut self.second, &mut self.room);
+        body.massless.add_static(&self.first, &mut self.second, &mut self.workspace);
         &self.second
     }
 

@@ -7,10 +7,10 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Limit of the corrections of the frame. Each correction reduces the remaining rigid motion by a factor of
 /// the size of the deformation.
-const MOST_CORRECTIONS: usize = 100;
+const MAX_CORRECTIONS: usize = 100;
 
 /// Remaining rigid motion, relative to the size of the body, that counts as rounding.
-const CLOSE: f64 = 1e-14;
+const RIGID_MOTION_TOLERANCE: f64 = 1e-14;
 
 impl NodalEquations<'_> {
     /// Returns the configuration with equal positions and velocities of all nodes whose displacements
@@ -35,19 +35,19 @@ impl NodalEquations<'_> {
         let (mut shift, mut turn) = (Vector3::zeros(), Rotation3::identity());
         let mut moved = vec![0.0; u.len()];
         let mut left = f64::INFINITY;
-        for _ in 0..MOST_CORRECTIONS {
+        for _ in 0..MAX_CORRECTIONS {
             let places = |i: usize, u| turn.inverse() * (self.positions[i] + u - shift) - self.positions[i];
             self.seen(u, places, &mut moved);
             let part = self.rigid_motion(&moved);
             let (by, about) = (part.fixed_rows::<3>(0).into_owned(), part.fixed_rows::<3>(3).into_owned());
             left = by.amax() / self.length + about.amax();
-            if left <= CLOSE {
+            if left <= RIGID_MOTION_TOLERANCE {
                 break;
             }
             shift += turn * by;
             turn *= Rotation3::new(about);
         }
-        if left.is_nan() || left > CLOSE {
+        if left.is_nan() || left > RIGID_MOTION_TOLERANCE {
             return Err(NodalError::ConditionsViolated { part: left });
         }
         let mut rates = vec![0.0; ud.len()];

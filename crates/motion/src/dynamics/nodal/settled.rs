@@ -8,16 +8,16 @@ use flexbody_linalg::{MatrixSum, SparseLdl, larger};
 use nalgebra::Matrix6;
 
 /// Limit of the number of steps.
-const MOST_STEPS: usize = 300;
+const MAX_STEPS: usize = 300;
 /// Size of a step, relative to the largest displacement, at which the iteration ends.
-const SETTLED: f64 = 1e-12;
+const STEP_TOLERANCE: f64 = 1e-12;
 
 /// Relative size below which steps that no longer shrink are rounding of K u.
 const NEAR_ROUNDING: f64 = 1e-6;
 
 /// Step size that counts as rounding without loads, relative to the extent of the body plus the distance
 /// that it travels while it oscillates by one radian.
-const NOTHING: f64 = 1e-14;
+const STEP_ROUNDING: f64 = 1e-14;
 
 /// Shift of K relative to the square of the first circular frequency. A step of a free body leaves one
 /// tenth of the remaining distance or less.
@@ -85,9 +85,9 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         let (mut step, mut acceleration, mut scratch) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let mut settled = start.clone();
         settled.ud.fill(0.0);
-        let least = NOTHING * (body.length + start.velocity.norm() / softest.sqrt());
+        let least = STEP_ROUNDING * (body.length + start.velocity.norm() / softest.sqrt());
         let mut before = f64::INFINITY;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let state = body
                 .state(&settled)
                 .map_err(|_| lost("the deformation does not fulfil the reference conditions"))?;
@@ -102,11 +102,11 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
             settled.u.iter_mut().zip(&step).for_each(|(u, step)| *u += step);
             // Accept a small step, or one at rounding level that no longer shrinks.
             let (size, largest) = (size(&step), size(&settled.u));
-            if size <= SETTLED * largest || (size <= NEAR_ROUNDING * largest && size > 0.5 * before) {
+            if size <= STEP_TOLERANCE * largest || (size <= NEAR_ROUNDING * largest && size > 0.5 * before) {
                 return Ok(settled);
             }
             before = size;
         }
-        Err(lost("what acts on the deformed body leads away from it"))
+        Err(lost("the iteration diverges under the forces on the deformed body"))
     }
 }

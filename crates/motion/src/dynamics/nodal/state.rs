@@ -61,9 +61,9 @@ impl NodalEquations<'_> {
         let n = self.n_rows();
         assert!(u.len() == n && ud.len() == n, "one entry per row");
         let (mut u, mut vbar) = (u.clone(), ud.clone());
-        let mut room = self.massless.room();
-        self.massless.project(self.stiffness(), &mut u, &mut room);
-        self.massless.project(self.stiffness(), &mut vbar, &mut room);
+        let mut workspace = self.massless.workspace();
+        self.massless.project(self.stiffness(), &mut u, &mut workspace);
+        self.massless.project(self.stiffness(), &mut vbar, &mut workspace);
         let taken = self.take_rigid(&mut u);
         let largest = u.iter().fold(0.0f64, |m, u| m.max(u.abs()));
         let moved = taken.fixed_rows::<3>(0).amax().max(taken.fixed_rows::<3>(3).amax() * self.length);

@@ -65,27 +65,27 @@ impl<'m> Stiff<'m> {
         &mut self,
         h: f64,
         modes: &[StageMode],
-        lacks: &mut [Vec<f64>],
+        residuals: &mut [Vec<f64>],
     ) -> Result<f64, Failure> {
         let n = self.equations.n_rows();
         if self.step != h || self.factors.len() != modes.len() {
-            self.prepare(h, modes, lacks.len())?;
+            self.prepare(h, modes, residuals.len())?;
         }
         self.corrected.iter_mut().for_each(|stage| stage.fill(0.0));
         // Bound the square roots of the energies of the stages by the sum of those of the parts; a
         // conjugate pair counts twice.
         let mut roots = [0.0; STAGES];
         for (at, mode) in modes.iter().enumerate() {
-            self.gather(mode, lacks);
+            self.gather(mode, residuals);
             let root = self.solve(at, mode.value * h).sqrt();
             self.spread(mode);
             let twice = if mode.paired { 2.0 } else { 1.0 };
             roots.iter_mut().zip(&mode.right).for_each(|(sum, right)| *sum += twice * right.norm() * root);
         }
-        for (lack, corrected) in lacks.iter_mut().zip(&self.corrected) {
-            lack[DISPLACEMENTS..][..2 * n].copy_from_slice(corrected);
+        for (residual, corrected) in residuals.iter_mut().zip(&self.corrected) {
+            residual[DISPLACEMENTS..][..2 * n].copy_from_slice(corrected);
         }
-        Ok(roots.iter().map(|root| root * root).sum::<f64>() / lacks.len() as f64)
+        Ok(roots.iter().map(|root| root * root).sum::<f64>() / residuals.len() as f64)
     }
 
     fn prepare(&mut self, h: f64, modes: &[StageMode], stages: usize) -> Result<(), Failure> {
@@ -93,9 +93,10 @@ impl<'m> Stiff<'m> {
         self.factors.clear();
         for mode in modes {
             let z = mode.value * h;
-            let factor = match mode.paired {
-                true => factored(&self.sum(z), self.equations).map(StepFactor::Complex),
-                false => factored(&self.sum(z.re), self.equations).map(StepFactor::Real),
+            let factor = if mode.paired {
+                factored(&self.sum(z), self.equations).map(StepFactor::Complex)
+            } else {
+                factored(&self.sum(z.re), self.equations).map(StepFactor::Real)
             };
             self.factors.push(factor.ok_or(SINGULAR)?);
         }
@@ -127,11 +128,11 @@ impl<'m> Stiff<'m> {
     }
 
     /// Computes the residual for an eigenvalue: real and imaginary part of a, then of b.
-    fn gather(&mut self, mode: &StageMode, lacks: &[Vec<f64>]) {
+    fn gather(&mut self, mode: &StageMode, residuals: &[Vec<f64>]) {
         let n = self.equations.n_rows();
         self.parts.iter_mut().for_each(|part| part.fill(0.0));
-        for (left, lack) in mode.left.iter().zip(lacks) {
-            let (a, b) = lack[DISPLACEMENTS..][..2 * n].split_at(n);
+        for (left, residual) in mode.left.iter().zip(residuals) {
+            let (a, b) = residual[DISPLACEMENTS..][..2 * n].split_at(n);
             let [a_re, a_im, b_re, b_im] = &mut self.parts;
             add(left.re, a, a_re);
             add(left.re, b, b_re);
@@ -213,12 +214,12 @@ fn factored<T: Scalar>(sum: &MatrixSum<'_, T>, equations: &NodalEquations<'_>) -
 }
 
 /// Computes y = D x with the damping of the model; returns true if the model has damping.
-fn damp(equations: &NodalEquations<'_>, x: &[f64], y: &mut [f64], room: &mut [f64]) -> bool {
+fn damp(equations: &NodalEquations<'_>, x: &[f64], y: &mut [f64], workspace: &mut [f64]) -> bool {
     match equations.damping {
         Some(Damping::Rayleigh { alpha, beta }) => {
-            equations.weigh(x, room);
+            equations.weigh(x, workspace);
             multiply_vector(equations.stiffness(), 1, x, y);
-            y.iter_mut().zip(room).for_each(|(y, m)| *y = *beta * *y + alpha * *m);
+            y.iter_mut().zip(workspace).for_each(|(y, m)| *y = *beta * *y + alpha * *m);
             true
         }
         Some(Damping::Matrix(damping)) => {
@@ -230,10 +231,16 @@ fn damp(equations: &NodalEquations<'_>, x: &[f64], y: &mut [f64], room: &mut [f6
 }
 
 /// Computes y = (M + z D) x for a real z.
-fn weigh_damped(equations: &NodalEquations<'_>, z: f64, x: &[f64], y: &mut [f64], room: [&mut Vec<f64>; 2]) {
-    let [damped, room] = room;
+fn weigh_damped(
+    equations: &NodalEquations<'_>,
+    z: f64,
+    x: &[f64],
+    y: &mut [f64],
+    workspace: [&mut Vec<f64>; 2],
+) {
+    let [damped, workspace] = workspace;
     equations.weigh(x, y);
-    if damp(equations, x, damped, room) {
+    if damp(equations, x, damped, workspace) {
         add(z, damped, y);
     }
 }

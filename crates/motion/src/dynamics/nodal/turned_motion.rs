@@ -47,7 +47,7 @@ impl NodalEvaluation<'_> {
         let own = body.onto_frame(&self.u, udd);
         let nu = given.solve(turned, &(wanted - drift), &own, udd)?;
         body.add_frame(-1.0, &nu, &self.u, udd);
-        body.massless.project(body.stiffness(), udd, &mut self.room);
+        body.massless.project(body.stiffness(), udd, &mut self.workspace);
 
         let rates = turned.kinetics.momenta(&nu, udd, &mut self.second);
         turned.restrict(&mut self.second);

@@ -32,7 +32,7 @@ const COMPLEX: f64 = 3.0;
 
 /// Duration of an explicit integration, in seconds, up to which it is preferred even if an implicit one is cheaper,
 /// since its step error is controlled.
-const COMFORTABLE: f64 = 30.0;
+const MAX_EXPLICIT_SECONDS: f64 = 30.0;
 
 /// Angle (rad) of the fastest relevant motion per step in the first implicit integration.
 const FIRST_ANGLE: f64 = 1.5;
@@ -41,11 +41,11 @@ const FIRST_ANGLE: f64 = 1.5;
 pub(super) const ORDER: usize = 6;
 
 /// Largest number of parts that a step is divided into.
-const MOST_PARTS: u32 = 1024;
+const MAX_PARTS: u32 = 1024;
 
 /// Number of steps of the implicit integrations relative to the first one, at least: the first plus one with half the
 /// step, 1 + 2.
-const RUNS: f64 = 3.0;
+const MIN_STEP_RUNS: f64 = 3.0;
 
 /// Properties of a model that determine the work.
 #[derive(Debug, Clone, Copy)]
@@ -124,26 +124,27 @@ impl Effort {
     /// Returns true if implicit steps may be divided into `parts` parts within the time limit.
     pub(super) fn is_allowed(&self, order: usize, step: f64, parts: u32, longest: Option<f64>) -> bool {
         let seconds = self.implicit(order, step, f64::from(parts));
-        parts <= MOST_PARTS && longest.is_none_or(|longest| seconds <= longest)
+        parts <= MAX_PARTS && longest.is_none_or(|longest| seconds <= longest)
     }
 
-    /// Chooses the method of integration for a scene with `scheme`. `liveliest` is the largest circular frequency that
+    /// Chooses the method of integration for a scene with `scheme`. `highest_rate` is the largest circular frequency that
     /// counts. Also returns the estimated seconds.
-    pub(super) fn plan(&self, scene: &Scene, scheme: Scheme, liveliest: f64) -> (Way, f64) {
+    pub(super) fn plan(&self, scene: &Scene, scheme: Scheme, highest_rate: f64) -> (Way, f64) {
         match scheme {
             // Implicit steps solve for the stiff part of a body in mean axes only.
             _ if scene.carried.is_some() => (Way::Explicit, self.explicit()),
             Scheme::Conserving { order, step } => {
-                let step = step.unwrap_or(TAU / (20.0 * liveliest)).min(self.duration);
+                let step = step.unwrap_or(TAU / (20.0 * highest_rate)).min(self.duration);
                 (Way::Implicit { order, step, given: true }, self.implicit(order, step, 1.0))
             }
             Scheme::Adaptive { .. } => {
                 let for_loads = 1.0 / (20.0 * fastest_history(scene, self.duration));
-                let step = (FIRST_ANGLE / liveliest).min(for_loads).min(self.duration);
-                let (explicit, implicit) = (self.explicit(), self.implicit(ORDER, step, RUNS));
-                match explicit <= COMFORTABLE.max(implicit) {
-                    true => (Way::Explicit, explicit),
-                    false => (Way::Implicit { order: ORDER, step, given: false }, implicit),
+                let step = (FIRST_ANGLE / highest_rate).min(for_loads).min(self.duration);
+                let (explicit, implicit) = (self.explicit(), self.implicit(ORDER, step, MIN_STEP_RUNS));
+                if explicit <= MAX_EXPLICIT_SECONDS.max(implicit) {
+                    (Way::Explicit, explicit)
+                } else {
+                    (Way::Implicit { order: ORDER, step, given: false }, implicit)
                 }
             }
         }
@@ -158,10 +159,10 @@ impl Effort {
             return Ok(());
         };
         let message = format!(
-            "--reference nodal: the motion of {} rows over a time of {:.3e} takes about {seconds:.1e} s at the least ({:.1e} entries in a factor), {longest:.0} s are allowed",
+            "--reference nodal: the motion of {} rows over a time of {:.3e} needs at least about {seconds:.1e} s ({:.1e} entries in a factor), {longest:.0} s are allowed",
             self.rows, self.duration, self.entries
         );
-        let help = "take --reference fine, a shorter `duration`, method = \"conserving\" with a longer `step`, or say --allow-long";
+        let help = "use --reference fine, a shorter `duration` or method = \"conserving\" with a longer `step`, or add --allow-long";
         Err(Diagnostic::new(Code::WorkLong, message).with_help(help).into())
     }
 
@@ -180,7 +181,7 @@ impl Effort {
             Way::Implicit { .. } => (2.0, FACTORS * self.entries),
         };
         let needed = DOUBLE * runs * instants * self.rows + factors;
-        let help = "take --reference fine, or simulate a shorter `duration`";
+        let help = "use --reference fine, or simulate a shorter `duration`";
         refuse_beyond(memory, needed, "the motion of all nodes", help)
     }
 

@@ -1,8 +1,8 @@
 //! Motion of all nodes as the reference of a study.
 
 mod effort;
+mod nodal_trace;
 mod reference;
-mod seen;
-mod staged;
+mod setup;
 
 pub use reference::{NodalIntegration, NodalReference};

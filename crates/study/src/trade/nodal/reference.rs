@@ -1,24 +1,24 @@
 //! Motion of all nodes as the reference of a study.
 
 use super::effort::{Effort, ORDER, Way, fastest_mode};
-use super::seen::Seen;
-use super::staged::{Staged, refused};
+use super::nodal_trace::NodalTrace;
+use super::setup::{NodalSetup, refused};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, LoadKind};
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{ErrorHistory, Scene, Scheme, Trace, liveliest_rate, nodal_point};
+use flexbody_motion::scene::{ErrorHistory, Scene, Scheme, Trace, highest_excited_rate, nodal_point};
 
 /// Tolerance of the explicit integration unless the scene states a larger one. Smaller errors of reduced models are not
 /// reported.
 const TOLERANCE: f64 = 1e-8;
 
 /// Part of the tolerances of the scene below which the effect of halving the steps is accepted.
-const PART_OF_STEPS: f64 = 0.01;
+const MAX_STEP_ERROR: f64 = 0.01;
 
 /// Part of the tolerances above which the integration error of the reference causes a warning.
-const WORTH_A_WORD: f64 = 0.1;
+const MAX_SILENT_STEP_ERROR: f64 = 0.1;
 
 /// Integration of the equations of all nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +38,7 @@ pub struct NodalIntegration {
 #[derive(Debug, Clone)]
 pub struct NodalReference<'m> {
     model: &'m FeModel,
-    seen: Seen,
+    seen: NodalTrace,
     largest_deflection: f64,
     error: Option<f64>,
 }
@@ -53,7 +53,7 @@ impl<'m> NodalReference<'m> {
         let stiffened =
             body.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_)));
         if stiffened && scene.run.terms.geometric_stiffness && scene.carried.is_none() {
-            let what = "the equations of all nodes have no geometric stiffness, which the model has";
+            let what = "the model has geometric stiffness, which the equations of all nodes do not support";
             return Err(refused(what));
         }
         for place in scene.loads.iter().map(|load| &load.at).chain(&scene.watched) {
@@ -62,11 +62,11 @@ impl<'m> NodalReference<'m> {
         let effort = Effort::new(model, scene, body.n_modes());
         // The first mode counts at least.
         let first = body.modes().eigenvalue[0].sqrt();
-        let liveliest = match scene.run.scheme {
+        let highest_rate = match scene.run.scheme {
             Scheme::Adaptive { .. } => first,
             Scheme::Conserving { .. } => fastest_mode(body),
         };
-        let (_, seconds) = effort.plan(scene, scene.run.scheme, liveliest);
+        let (_, seconds) = effort.plan(scene, scene.run.scheme, highest_rate);
         effort.refuse_long(seconds, context.longest)
     }
 
@@ -88,17 +88,18 @@ impl<'m> NodalReference<'m> {
     ) -> Result<Self> {
         let effort = Effort::new(model, scene, body.n_modes());
         // Modes of small amplitude do not need steps of their own at first.
-        let liveliest = liveliest_rate(body, scene, motion, 1.0).max(body.modes().eigenvalue[0].sqrt());
-        let (way, seconds) = effort.plan(scene, motion.scheme, liveliest);
+        let highest_rate =
+            highest_excited_rate(body, scene, motion, 1.0).max(body.modes().eigenvalue[0].sqrt());
+        let (way, seconds) = effort.plan(scene, motion.scheme, highest_rate);
         effort.refuse_long(seconds, context.longest)?;
         let instants = match way {
             Way::Explicit => motion.time.len() as f64,
             Way::Implicit { step, .. } => effort.instants(step),
         };
         effort.refuse_large(instants, way, context.memory)?;
-        let staged = Staged::new(model, body, scene, motion)?;
+        let setup = NodalSetup::new(model, body, scene, motion)?;
         let end = motion.time.last().copied().unwrap_or(0.0);
-        let whole = |seen: Seen, error: Option<f64>| {
+        let whole = |seen: NodalTrace, error: Option<f64>| {
             let largest_deflection = seen.largest_deflection(model);
             Ok(Self { model, seen, largest_deflection, error })
         };
@@ -108,15 +109,15 @@ impl<'m> NodalReference<'m> {
                     Scheme::Adaptive { tolerance } => tolerance.max(TOLERANCE),
                     Scheme::Conserving { .. } => TOLERANCE,
                 };
-                whole(staged.explicit(tolerance, &motion.time, context)?, None)
+                whole(setup.explicit(tolerance, &motion.time, context)?, None)
             }
             (Way::Implicit { order, step, given: true }, _) => {
                 let is_allowed = |parts| effort.is_allowed(order, step, parts, context.longest);
-                let in_parts = |parts| staged.implicit(order, step, parts, end, context);
+                let in_parts = |parts| setup.implicit(order, step, parts, end, context);
                 whole(divided(in_parts, is_allowed)?.0, None)
             }
             (Way::Implicit { step, .. }, _) => {
-                let halving = Halving { model, staged: &staged, effort, longest: context.longest, end };
+                let halving = Halving { model, setup: &setup, effort, longest: context.longest, end };
                 let (seen, error) = halving.run(step, context)?;
                 whole(seen, Some(error))
             }
@@ -141,12 +142,12 @@ impl<'m> NodalReference<'m> {
 
     /// Returns a warning if the step error was still large when no further halving was allowed.
     pub fn warning(&self) -> Option<Diagnostic> {
-        let error = self.error.filter(|error| error.is_nan() || *error > WORTH_A_WORD)?;
+        let error = self.error.filter(|error| error.is_nan() || *error > MAX_SILENT_STEP_ERROR)?;
         let message = format!(
-            "steps of twice the length change the motion of all nodes by {:.0} % of the tolerances",
+            "doubling the step changes the motion of all nodes by {:.0} % of the tolerances",
             100.0 * error
         );
-        let help = "say --allow-long, so that the steps may be halved again, or start loads from zero";
+        let help = "add --allow-long, so that the step may be halved again, or start loads from zero";
         Some(Diagnostic::new(Code::ReferenceLacks, message).with_help(help))
     }
 
@@ -157,7 +158,8 @@ impl<'m> NodalReference<'m> {
     /// If the motion was evaluated at other instants.
     pub fn errors(&self, body: &FlexBody, candidate: &Trace) -> Option<ErrorHistory> {
         let vectors = body.vectors_of(self.model)?;
-        let own = |first: usize, count: usize| Seen::of_modes(vectors.as_ref(), candidate, first, count);
+        let own =
+            |first: usize, count: usize| NodalTrace::of_modes(vectors.as_ref(), candidate, first, count);
         Some(self.seen.errors(self.model, candidate, self.largest_deflection, own))
     }
 }
@@ -165,7 +167,7 @@ impl<'m> NodalReference<'m> {
 /// Implicit integration with steps that are halved until the change is small.
 struct Halving<'h, 'm> {
     model: &'m FeModel,
-    staged: &'h Staged<'m>,
+    setup: &'h NodalSetup<'m>,
     effort: Effort,
     longest: Option<f64>,
     end: f64,
@@ -174,21 +176,21 @@ struct Halving<'h, 'm> {
 impl Halving<'_, '_> {
     /// Returns the motion with the shortest steps, at the ends of the first steps of length `step`, and its change
     /// against steps of twice the length, over the tolerances of the scene.
-    fn run(&self, step: f64, context: &Context<'_>) -> Result<(Seen, f64)> {
-        let tolerance = &self.staged.scene.requirements.tolerance;
+    fn run(&self, step: f64, context: &Context<'_>) -> Result<(NodalTrace, f64)> {
+        let tolerance = &self.setup.scene.requirements.tolerance;
         let is_allowed = |parts| self.effort.is_allowed(ORDER, step, parts, self.longest);
-        let in_parts = |parts| self.staged.implicit(ORDER, step, parts, self.end, context);
+        let in_parts = |parts| self.setup.implicit(ORDER, step, parts, self.end, context);
         let (mut coarse, parts) = divided(in_parts, is_allowed)?;
         let mut refinement = 2 * parts;
         loop {
-            let mut fine = self.staged.implicit(ORDER, step, refinement, self.end, context)?;
+            let mut fine = self.setup.implicit(ORDER, step, refinement, self.end, context)?;
             // The instants are equal except for rounding.
             fine.trace.time.clone_from(&coarse.trace.time);
             // Error of the coarser steps, relative to the finer ones.
             let scale = fine.largest_deflection(self.model);
             let own = |first: usize, count: usize| coarse.displacements().subcols(first, count).to_owned();
             let error = fine.errors(self.model, &coarse.trace, scale, own).largest().worst(tolerance);
-            if error <= PART_OF_STEPS || !is_allowed(2 * refinement) {
+            if error <= MAX_STEP_ERROR || !is_allowed(2 * refinement) {
                 return Ok((fine, error));
             }
             coarse = fine;
@@ -200,9 +202,9 @@ impl Halving<'_, '_> {
 /// Returns the motion with the fewest parts per step for which the implicit equations can be solved within the time
 /// limit, and this number of parts. `in_parts` receives the number of parts and integrates.
 fn divided(
-    mut in_parts: impl FnMut(u32) -> Result<Seen>,
+    mut in_parts: impl FnMut(u32) -> Result<NodalTrace>,
     is_allowed: impl Fn(u32) -> bool,
-) -> Result<(Seen, u32)> {
+) -> Result<(NodalTrace, u32)> {
     let mut parts = 1;
     loop {
         match in_parts(parts) {

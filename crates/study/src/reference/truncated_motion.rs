@@ -1,9 +1,9 @@
 //! Truncated part of a motion, and the errors that it causes in the outputs.
 
-use super::answered::{Answer, Lacking, LackingDamping};
 use super::grid::Grid;
-use super::missed::Missed;
 use super::residual::{BLOCK, NodalView};
+use super::truncated_equations::{TruncatedAmplitudes, TruncatedDamping, TruncatedEquations};
+use super::truncated_responses::TruncatedResponses;
 use super::turning::Turning;
 use faer::{Mat, MatRef};
 use flexbody_body::flex_body::FlexBody;
@@ -14,18 +14,18 @@ use nalgebra::Vector3;
 
 /// Number of instants at which nodal displacements and reactions are evaluated. With so many samples at arbitrary
 /// phase, little of a vibration's peak is missed.
-const SHOWN: usize = 480;
+const EVALUATED_INSTANTS: usize = 480;
 
-/// Displacements X y(t) of all rows that the body's own motion lacks, with X = [Psi, E]: the modes, which are moved by
+/// Truncated displacements X y(t) of all rows, with X = [Psi, E]: the modes, which are moved by
 /// the truncated part, and the static responses outside the modes.
-pub(super) struct Lack<'a> {
+pub(super) struct TruncatedMotion<'a> {
     view: &'a NodalView<'a>,
     grid: &'a Grid,
     /// The motion of the body at the instants.
-    looked_at: &'a [Instant],
+    sampled: &'a [Instant],
     /// X (N x (nf + k)).
     columns: Mat<f64>,
-    answer: Answer,
+    answer: TruncatedAmplitudes,
     /// Indices of the instants at which nodal displacements and reactions are evaluated.
     shown: Vec<usize>,
     /// Stiffness K_ff of the modes and E'K E of the responses.
@@ -34,18 +34,18 @@ pub(super) struct Lack<'a> {
 }
 
 /// Largest errors over the instants, and the time of the largest elastic energy.
-pub(super) struct LackErrors {
+pub(super) struct TruncationErrors {
     pub errors: OutputErrors,
     pub time: f64,
 }
 
-impl<'a> Lack<'a> {
+impl<'a> TruncatedMotion<'a> {
     /// Computes the truncated part of the motion of `body`, with the damping of its scene.
     pub(super) fn new(
         view: &'a NodalView<'a>,
         body: &FlexBody,
-        missed: &Missed,
-        looked_at: &'a [Instant],
+        missed: &TruncatedResponses,
+        sampled: &'a [Instant],
         grid: &'a Grid,
         settled: bool,
     ) -> Self {
@@ -55,12 +55,12 @@ impl<'a> Lack<'a> {
         let modal_stiffness = symmetric_part(body.invariants().modal_stiffness());
         let columns = side_by_side(&[view.vectors.as_ref(), missed.responses.as_ref()]);
         // Assemble the equations of modes and responses.
-        let system = Lacking {
+        let system = TruncatedEquations {
             modal_stiffness: modal_stiffness.clone(),
             modal_mass: view.modal_mass.clone(),
             damping: match view.damped_by_model(columns.as_ref()) {
-                Some(damped) => LackingDamping::OfModel(gram(columns.as_ref(), damped.as_ref())),
-                None => LackingDamping::OfModes(view.modal_damping.clone()),
+                Some(damped) => TruncatedDamping::OfModel(gram(columns.as_ref(), damped.as_ref())),
+                None => TruncatedDamping::OfModes(view.modal_damping.clone()),
             },
             shared_mass: gram(view.vectors.as_ref(), weighted.as_ref()),
             stiffness: missed.energy.clone(),
@@ -70,15 +70,18 @@ impl<'a> Lack<'a> {
         // error appears small.
         let is_nothing = (0..k).all(|j| missed.energy[(j, j)] == 0.0) && missed.in_modes.is_all_finite();
         let unknown = || Mat::full(nf + k, grid.times.len(), if is_nothing { 0.0 } else { f64::NAN });
-        let answer = system.answered(&missed.amplitudes, &missed.in_modes, grid, settled);
-        let answer =
-            answer.unwrap_or_else(|| Answer { value: unknown(), rate: unknown(), acceleration: unknown() });
+        let answer = system.amplitudes(&missed.amplitudes, &missed.in_modes, grid, settled);
+        let answer = answer.unwrap_or_else(|| TruncatedAmplitudes {
+            value: unknown(),
+            rate: unknown(),
+            acceleration: unknown(),
+        });
         // Evaluate outputs where any amplitude or acceleration is largest, besides even steps.
         let histories = [&answer.value, &answer.acceleration].into_iter().flat_map(|all| {
             (0..all.nrows()).map(move |row| (0..all.ncols()).map(|i| all[(row, i)]).collect::<Vec<f64>>())
         });
-        let shown = grid.telling(SHOWN, histories);
-        Self { view, grid, looked_at, columns, answer, shown, modal_stiffness, energy: missed.energy.clone() }
+        let shown = grid.significant_instants(EVALUATED_INSTANTS, histories);
+        Self { view, grid, sampled, columns, answer, shown, modal_stiffness, energy: missed.energy.clone() }
     }
 
     /// Returns z (k x m), the amplitudes of the responses.
@@ -88,7 +91,7 @@ impl<'a> Lack<'a> {
     }
 
     /// Computes errors relative to the motion of all nodes, which is the `motion` of the body plus its truncated part.
-    pub(super) fn errors(&self, scene: &Scene, motion: &Trace, watched: &[Mat<f64>]) -> LackErrors {
+    pub(super) fn errors(&self, scene: &Scene, motion: &Trace, watched: &[Mat<f64>]) -> TruncationErrors {
         let (stress, time) = self.stress(motion);
         let free = !scene.prescribes();
         let errors = OutputErrors {
@@ -97,7 +100,7 @@ impl<'a> Lack<'a> {
             stress: Some(stress),
             reaction: if free { None } else { self.reaction(scene, motion) },
         };
-        LackErrors { errors, time }
+        TruncationErrors { errors, time }
     }
 
     /// Returns the largest sqrt(V(X y) / max V), with the elastic energy V, and its time. The responses are
@@ -108,14 +111,14 @@ impl<'a> Lack<'a> {
         let of_responses = quadratics(&self.energy, &self.of_responses());
         let in_modes = y.as_ref().subrows(0, nf).to_owned();
         let of_modes = quadratics(&self.modal_stiffness, &in_modes);
-        let whole = Mat::from_fn(nf, y.ncols(), |j, i| in_modes[(j, i)] + self.looked_at[i].q[j]);
+        let whole = Mat::from_fn(nf, y.ncols(), |j, i| in_modes[(j, i)] + self.sampled[i].q[j]);
         let root = |energy: f64| not_negative(0.5 * energy).sqrt();
-        let lacking = of_modes.iter().zip(&of_responses).map(|(a, b)| root(a + b));
-        let lacking = Peak::of(&self.grid.times, lacking);
+        let truncated = of_modes.iter().zip(&of_responses).map(|(a, b)| root(a + b));
+        let truncated = Peak::of(&self.grid.times, truncated);
         let all = quadratics(&self.modal_stiffness, &whole);
         let roots = all.iter().zip(&of_responses).map(|(a, b)| root(a + b));
         let largest = Peak::of(&self.grid.times, roots).value;
-        (lacking.value / largest.max(motion.resolution.root_energy), lacking.time)
+        (truncated.value / largest.max(motion.resolution.root_energy), truncated.time)
     }
 
     /// Returns the largest displacement X y of the watched points over the largest of Psi q + X y. All nodes count if
@@ -123,9 +126,9 @@ impl<'a> Lack<'a> {
     fn deflection(&self, motion: &Trace, watched: &[Mat<f64>]) -> Option<f64> {
         let (mut missed, mut whole) = (Vec::new(), Vec::new());
         for block in self.shown.chunks(BLOCK) {
-            let lacking = combine(self.columns.as_ref(), columns_at(&self.answer.value, block).as_ref());
-            let u = self.view.displacements(&self.motion_at(block), |now| &now.q) + &lacking;
-            missed.extend(self.longest(&lacking, watched));
+            let truncated = combine(self.columns.as_ref(), columns_at(&self.answer.value, block).as_ref());
+            let u = self.view.displacements(&self.motion_at(block), |now| &now.q) + &truncated;
+            missed.extend(self.longest(&truncated, watched));
             whole.extend(self.longest(&u, watched));
         }
         let times = self.times_shown();
@@ -153,13 +156,13 @@ impl<'a> Lack<'a> {
     /// Returns the largest angle by which the truncated part rotates a free body.
     fn attitude(&self) -> f64 {
         let turning = Turning::new(self.view, &self.columns);
-        Peak::of(&self.grid.times, turning.angles(self.looked_at, &self.answer.value)).value
+        Peak::of(&self.grid.times, turning.angles(self.sampled, &self.answer.value)).value
     }
 
     /// Returns the largest relative difference between the nodal reactions with and without the truncated part.
     fn reaction(&self, scene: &Scene, motion: &Trace) -> Option<f64> {
         let (mut own, mut whole) = (Vec::new(), Vec::new());
-        let Answer { value, rate, acceleration } = &self.answer;
+        let TruncatedAmplitudes { value, rate, acceleration } = &self.answer;
         let holds = scene.carried.is_some() || scene.spin.as_ref().is_some_and(|spin| spin.hold);
         for block in self.shown.chunks(BLOCK) {
             let moving = self.motion_at(block);
@@ -183,7 +186,7 @@ impl<'a> Lack<'a> {
     }
 
     fn motion_at(&self, instants: &[usize]) -> Vec<Instant> {
-        instants.iter().map(|&i| self.looked_at[i].clone()).collect()
+        instants.iter().map(|&i| self.sampled[i].clone()).collect()
     }
 }
 

@@ -1,12 +1,12 @@
 //! Static responses that the body does not contain along its motion, and the selection of the most important ones.
 
-use super::answered::ROUNDING;
 use super::compressed::{Compressed, principal};
 use super::grid::Grid;
 use super::held::Held;
 use super::projected::{Projected, UnbalancedAmplitudes};
 use super::residual::NodalView;
-use super::resonance::{Question, resonances};
+use super::resonance::{ResonanceCriteria, resonances};
+use super::truncated_equations::ROUNDING;
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::basis::{free_static_responses_twice, oscillating_responses};
@@ -23,11 +23,11 @@ const MOST_RESPONSES: usize = 12;
 /// response.
 const INERTIA_LEFT_OUT: f64 = 1e-9;
 /// Largest number of combinations of responses whose inertia forces get a response.
-const MOST_OF_INERTIA: usize = 8;
+const MAX_INERTIA_RESPONSES: usize = 8;
 
 /// Factors applied to a frequency at which a harmonic response is computed. The next factor is used if the frequency
 /// coincides with a natural frequency and the solution fails.
-const NUDGES: [f64; 3] = [1.0, 1.0003, 0.9996];
+const FREQUENCY_FACTORS: [f64; 3] = [1.0, 1.0003, 0.9996];
 
 /// Smallest root of the elastic energy that a response must keep after projection on the known ones, relative to its
 /// full size, to be added.
@@ -36,7 +36,7 @@ const NEW: f64 = 1e-4;
 /// Displacements E outside the modes of a body: static responses to the forces that its motion leaves unbalanced,
 /// responses to the inertia of these (without which each force would have one natural frequency only), and responses at
 /// the frequencies of resonances.
-pub(super) struct Missed {
+pub(super) struct TruncatedResponses {
     /// Forces B (N x k) with E = K^+ B.
     pub forces: Mat<f64>,
     /// Amplitudes c (k x m) of the unbalanced forces B c(t). The rows that belong to inertia and resonances are zero.
@@ -49,7 +49,7 @@ pub(super) struct Missed {
     pub energy: Mat<f64>,
 }
 
-impl Missed {
+impl TruncatedResponses {
     /// Computes the responses for a body along `motion`, given at the instants of `grid`.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl Missed {
         body: &FlexBody,
         motion: &[Instant],
         grid: &Grid,
-        question: &Question,
+        criteria: &ResonanceCriteria,
     ) -> Result<Self> {
         let model = view.model;
         // Compress the unbalanced forces of a few instants, then get amplitudes at all instants.
@@ -74,37 +74,37 @@ impl Missed {
         };
         let forces = compressed.basis;
         // Static responses to the forces, and to the inertia of the first responses.
-        let beside = Beside::new(view, &body.modes().eigenvalue);
+        let projection = ModalProjection::new(view, &body.modes().eigenvalue);
         let (mut responses, mut energy) = (Mat::new(), Mat::new());
         let inertia = |static_responses: &Mat<f64>| {
-            responses = beside.of(static_responses.clone());
-            energy = beside.energy(&responses);
-            beside.inertia(&responses, &energy, &amplitudes)
+            responses = projection.of(static_responses.clone());
+            energy = projection.energy(&responses);
+            projection.inertia(&responses, &energy, &amplitudes)
         };
         let first = body.modes().eigenvalue[0];
         let [_, of_inertia] = free_static_responses_twice(&view.coupled, forces.clone(), inertia, first)?;
         // Harmonic responses at resonances of the forces.
-        let resonances = resonances(grid, &amplitudes, &energy, question);
+        let resonances = resonances(grid, &amplitudes, &energy, criteria);
         let mut missed = Self { forces, amplitudes, in_modes, responses, energy };
-        missed.add(&beside, of_inertia);
+        missed.add(&projection, of_inertia);
         for resonance in resonances {
             let forces = combine(
                 missed.forces.as_ref().subcols(0, resonance.amplitudes.nrows()),
                 resonance.amplitudes.as_ref(),
             );
-            missed.add_resonance(&beside, forces, resonance.rate)?;
+            missed.add_resonance(&projection, forces, resonance.rate)?;
         }
         Ok(missed)
     }
 
     /// Adds the harmonic response of the model to `forces` at the circular frequency `rate`.
-    fn add_resonance(&mut self, beside: &Beside<'_>, forces: Mat<f64>, rate: f64) -> Result<()> {
-        let conditions = beside.view.held.as_ref().map(Held::conditions);
-        for nudge in NUDGES {
+    fn add_resonance(&mut self, projection: &ModalProjection<'_>, forces: Mat<f64>, rate: f64) -> Result<()> {
+        let conditions = projection.view.held.as_ref().map(Held::conditions);
+        for nudge in FREQUENCY_FACTORS {
             let square = (rate * nudge).powi(2);
-            let coupled = &beside.view.coupled;
+            let coupled = &projection.view.coupled;
             if let Some(more) = oscillating_responses(coupled, forces.clone(), conditions, square)? {
-                self.add(beside, more);
+                self.add(projection, more);
                 return Ok(());
             }
         }
@@ -112,15 +112,15 @@ impl Missed {
     }
 
     /// Adds responses to forces whose amplitudes are zero.
-    fn add(&mut self, beside: &Beside<'_>, responses: Mat<f64>) {
-        let more = beside.more(&self.responses, &self.energy, responses);
-        let forces = beside.view.model.pencil().apply_stiffness(more.as_ref());
+    fn add(&mut self, projection: &ModalProjection<'_>, responses: Mat<f64>) {
+        let more = projection.more(&self.responses, &self.energy, responses);
+        let forces = projection.view.model.pencil().apply_stiffness(more.as_ref());
         let mut amplitudes = Mat::zeros(self.amplitudes.nrows() + more.ncols(), self.amplitudes.ncols());
         amplitudes.as_mut().subrows_mut(0, self.amplitudes.nrows()).copy_from(&self.amplitudes);
         self.amplitudes = amplitudes;
         self.forces = side_by_side(&[self.forces.as_ref(), forces.as_ref()]);
         self.responses = side_by_side(&[self.responses.as_ref(), more.as_ref()]);
-        self.energy = beside.energy(&self.responses);
+        self.energy = projection.energy(&self.responses);
     }
 
     /// Returns the fewest forces B y (N x p) whose responses leave, at every instant, at most `enough` of the root of
@@ -175,14 +175,14 @@ fn histories(motion: &[Instant]) -> impl Iterator<Item = Vec<f64>> + '_ {
 }
 
 /// Projection of displacements to the complement of the modes of a body.
-struct Beside<'v> {
+struct ModalProjection<'v> {
     view: &'v NodalView<'v>,
     eigenvalues: &'v [f64],
     /// K Psi.
     stiff: Mat<f64>,
 }
 
-impl<'v> Beside<'v> {
+impl<'v> ModalProjection<'v> {
     fn new(view: &'v NodalView<'v>, eigenvalues: &'v [f64]) -> Self {
         Self { view, eigenvalues, stiff: view.model.pencil().apply_stiffness(view.vectors.as_ref()) }
     }
@@ -218,7 +218,7 @@ impl<'v> Beside<'v> {
         let moving = gram(turned.as_ref(), amplitudes.as_ref());
         let moving = Mat::from_fn(roots.len(), moving.ncols(), |k, i| roots[k] * moving[(k, i)]);
         let covariance = combine(moving.as_ref(), moving.transpose().to_owned().as_ref());
-        let Some((directions, _)) = principal(covariance, INERTIA_LEFT_OUT, MOST_OF_INERTIA) else {
+        let Some((directions, _)) = principal(covariance, INERTIA_LEFT_OUT, MAX_INERTIA_RESPONSES) else {
             return Mat::zeros(responses.nrows(), 0);
         };
         let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);

@@ -14,7 +14,7 @@ use std::borrow::Cow;
 
 /// Distance of the centre of mass from the origin, relative to the extent of the body, below which both
 /// coincide.
-const AT_ORIGIN: f64 = 1e-10;
+const ORIGIN_TOLERANCE: f64 = 1e-10;
 
 /// Relative excess of a prescribed rotation over the limits of the scene that counts as rounding.
 const ROUNDING: f64 = 1e-6;
@@ -24,7 +24,7 @@ pub(super) const UNCOUPLED: f64 = 1e-8;
 
 /// Body in the frame of a scene, the scene, and diagnostics about both.
 #[derive(Debug, Clone)]
-pub struct Stage<'a> {
+pub struct FramedScene<'a> {
     /// Body in the frame of the scene.
     pub body: Cow<'a, FlexBody>,
     /// Scene with all vectors along the axes of this frame or of the world.
@@ -33,19 +33,19 @@ pub struct Stage<'a> {
     pub found: Vec<Diagnostic>,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> FramedScene<'a> {
     /// Transforms `body` and `scene` to one frame. A scene that is resolved already, and the body that it
     /// was resolved for, do not change.
     ///
     /// # Errors
-    /// FB212 and FB214 if the body lacks the carrier of the scene; FB213 for a prescribed motion beyond the
+    /// FB212 and FB214 if the body does not have the carrier of the scene; FB213 for a prescribed motion beyond the
     /// limits of the scene.
     pub fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
         if scene.resolved {
             return Ok(Self { body: Cow::Borrowed(body), scene: Cow::Borrowed(scene), found: Vec::new() });
         }
         refuse_beyond_range(scene, &body.frame().axes)?;
-        let (staged, mut found) = match &scene.carried {
+        let (framed_body, mut found) = match &scene.carried {
             Some(carried) => {
                 let carrier = carrier(&carried.by);
                 let own = body.carried(&carrier)?;
@@ -53,7 +53,7 @@ impl<'a> Stage<'a> {
                 found.extend(body.softened(&carrier));
                 if body.loses_geometric_stiffness() {
                     let message = format!(
-                        "geometric stiffness of the body does not act while {carrier} carries it: the stress comes from the reaction there"
+                        "the geometric stiffness of the body is not used while {carrier} carries it, because the stress comes from the reaction at the carrier"
                     );
                     found.push(Diagnostic::new(Code::CarriedGeometricStiffness, message));
                 }
@@ -64,9 +64,9 @@ impl<'a> Stage<'a> {
                 (centred(body)?, Vec::new())
             }
         };
-        let resolved = resolved(scene, &body.frame().axes, &staged.frame().origin);
-        found.extend(idle(&staged, &resolved));
-        Ok(Self { body: staged, scene: Cow::Owned(resolved), found })
+        let resolved = resolved(scene, &body.frame().axes, &framed_body.frame().origin);
+        found.extend(idle(&framed_body, &resolved));
+        Ok(Self { body: framed_body, scene: Cow::Owned(resolved), found })
     }
 }
 
@@ -77,7 +77,7 @@ fn refuse_numbered_modes(body: &FlexBody, scene: &Scene) -> Result<()> {
         return Ok(());
     }
     let message = format!(
-        "{}: without a carrier the body is simulated in mean axes, where the mode numbers of [initial] mean other modes",
+        "{}: without a carrier the body is simulated in mean axes, in which the mode numbers of [initial] refer to other modes",
         body.conditions()
     );
     let help = "convert with --frame com, or start from the static equilibrium of a load";
@@ -97,7 +97,7 @@ fn centred(body: &FlexBody) -> Result<Cow<'_, FlexBody>> {
     let mean = body.in_mean_axes()?;
     let invariants = mean.invariants();
     let centre = invariants.first_moment() / invariants.mass();
-    let shift = if centre.norm() <= AT_ORIGIN * body.extent() { Vector3::zeros() } else { centre };
+    let shift = if centre.norm() <= ORIGIN_TOLERANCE * body.extent() { Vector3::zeros() } else { centre };
     if shift == Vector3::zeros() && mean.frame().axes == Matrix3::identity() {
         return Ok(mean);
     }
@@ -175,12 +175,13 @@ fn start_with_the_motion(scene: &mut Scene, axes: &Matrix3<f64>) {
 fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
     let motion = &scene.requirements.motion;
     let mut found = Vec::new();
-    let mut refuse = |what: &str, key: &str| {
-        let message = format!("{what} is beyond `{key}` of [motion]");
-        found.push(Diagnostic::new(Code::SceneContradicts, message).with_help(
-            "[motion] has the largest rotation that the body ever has, that of the scene included",
-        ));
-    };
+    let mut refuse =
+        |what: &str, key: &str| {
+            let message = format!("{what} is beyond `{key}` of [motion]");
+            found.push(Diagnostic::new(Code::SceneContradicts, message).with_help(
+                "raise the value in [motion]: it must cover the rotation that the scene prescribes",
+            ));
+        };
     let given = scene.spin.as_ref().map(|spin| (&spin.velocity, spin.axes, "[spin]"));
     let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
     let carried = carried.map(|spin| (&spin.velocity, spin.axes, "[carried.spin]"));
@@ -268,24 +269,24 @@ fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
             None => diagnostic,
         });
     };
-    let leave = Some("leave it out, or give it its size");
+    let leave = Some("remove it, or give it a value");
     let end = scene.run.duration.unwrap_or(f64::INFINITY);
     for load in &scene.loads {
         let place = &load.at;
         if load.force.is_zero_until(end) && load.torque.is_zero_until(end) {
-            tell(format!("the load at {place} is zero all the time"), leave);
+            tell(format!("the load at {place} is zero during the whole run"), leave);
         } else if scene.carried.as_ref().is_some_and(|carried| carried.by == *place) {
             let message = format!(
-                "the load at {place} bends nothing: {place} is carried, and the reaction takes the load"
+                "the load at {place} deforms nothing: {place} is carried, and the reaction takes the load"
             );
-            tell(message, Some("load another place of the body, or let nothing carry this one"));
+            tell(message, Some("move the load to another place, or remove [carried]"));
         }
     }
     let Some(gravity) = &scene.gravity else { return found };
     if *gravity == Vector3::zeros() {
         tell("`gravity` is zero".to_owned(), leave);
     } else if scene.spin.as_ref().is_some_and(|spin| spin.hold) && is_uncoupled(body) {
-        let message = "`gravity` bends nothing: [spin] holds the body at its centre of mass and mean axes, that is by all of its mass";
+        let message = "`gravity` deforms nothing: [spin] holds the body by its centre of mass and mean axes, so that all of its mass is supported";
         tell(message.to_owned(), None);
     }
     found

@@ -3,7 +3,7 @@
 use super::basis::BEYOND_BAND;
 use super::cases::{SLACK_OF_RANGE, together, worst};
 use super::demand::Demand;
-use super::search::{Choice, SelectionSearch, Tried, TriedCase};
+use super::search::{Choice, SelectionSearch, TestScene, TestedCase};
 use super::trial::Trial;
 use super::varied::{VariedRuns, VariedSelection};
 use super::warnings::{phase_drifts, resonances};
@@ -15,7 +15,7 @@ use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{LoadCases, Measure, Trace};
 
 /// Trials and current choice of a selection.
-pub(super) struct Deciding<'s> {
+pub(super) struct SelectionState<'s> {
     demands: &'s [Demand<'s>],
     pub choice: Choice,
     pub trials: Vec<Trial>,
@@ -29,15 +29,16 @@ pub(super) struct Deciding<'s> {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-impl<'s> Deciding<'s> {
+impl<'s> SelectionState<'s> {
     /// Starts with all modes, and with the groups that bounds leave open in at least one load case.
     pub(super) fn new(demands: &'s [Demand<'s>]) -> Self {
         let mut diagnostics = Vec::new();
         let mut trials = Vec::new();
         for (at, demand) in demands.iter().enumerate() {
             diagnostics.extend(demand.found.iter().cloned().map(|said| demand.about(said)));
-            let warning = demand.lacks.last().and_then(|own| own.warning(demand.scene, PART_OF_REFERENCE));
-            let remark = demand.lacks.last().and_then(ReferenceError::coupling_remark);
+            let warning =
+                demand.reference_errors.last().and_then(|own| own.warning(demand.scene, PART_OF_REFERENCE));
+            let remark = demand.reference_errors.last().and_then(ReferenceError::coupling_remark);
             diagnostics.extend(remark.into_iter().chain(warning).map(|said| demand.about(said)));
             let case = (demands.len() > 1).then_some(at);
             trials.extend(demand.bounds.iter().map(|trial| Trial { case, ..trial.clone() }));
@@ -78,7 +79,7 @@ impl<'s> Deciding<'s> {
             Some(band) => {
                 format!("free modes up to {BEYOND_BAND} times the highest frequency of interest, {band}")
             }
-            None => "the scene has neither a duration nor a band: all".to_owned(),
+            None => "all modes, because the scene has neither a duration nor a band".to_owned(),
         }
     }
 
@@ -94,7 +95,8 @@ impl<'s> Deciding<'s> {
         let references = self.reference_motions()?;
         let demands = self.demands;
         let both = demands.iter().zip(&references);
-        let cases: Vec<TriedCase<'_>> = both.map(|(demand, motions)| Self::tried(demand, motions)).collect();
+        let cases: Vec<TestedCase<'_>> =
+            both.map(|(demand, motions)| Self::tested_case(demand, motions)).collect();
         context.phase("trials");
         let fixed = demands.iter().zip(&self.short_of).filter(|(_, short)| short.is_some());
         let search = SelectionSearch {
@@ -111,11 +113,14 @@ impl<'s> Deciding<'s> {
         Ok(reason)
     }
 
-    fn tried<'t>(demand: &'t Demand<'t>, references: &'t [Trace]) -> TriedCase<'t> {
-        let tried = demand.cases.iter().zip(references);
-        TriedCase {
-            tried: tried
-                .map(|(case, trace)| Tried { runs: case.runs(), measure: Measure::new(demand.body, trace) })
+    fn tested_case<'t>(demand: &'t Demand<'t>, references: &'t [Trace]) -> TestedCase<'t> {
+        let scenes = demand.cases.iter().zip(references);
+        TestedCase {
+            scenes: scenes
+                .map(|(case, trace)| TestScene {
+                    runs: case.runs(),
+                    measure: Measure::new(demand.body, trace),
+                })
                 .collect(),
             budget: demand.budget(),
         }
@@ -151,9 +156,10 @@ impl<'s> Deciding<'s> {
     fn search(&mut self, search: &SelectionSearch<'_>) -> Result<String> {
         let (choice, trials) = (&mut self.choice, &mut self.trials);
         if let Some(most) = self.demands[0].scene.requirements.multiplications {
-            return Ok(match search.within_cost(most, choice, trials)? {
-                true => format!("the most accurate of at most {most} multiplications"),
-                false => format!("no model takes {most} multiplications or fewer: everything is kept"),
+            return Ok(if search.within_cost(most, choice, trials)? {
+                format!("the smallest error with at most {most} multiplications")
+            } else {
+                format!("no model needs {most} multiplications or fewer: everything is kept")
             });
         }
         search.terms(choice, trials)?;
@@ -163,7 +169,7 @@ impl<'s> Deciding<'s> {
             1 => "the tolerances",
             _ => "the tolerances of every load case",
         };
-        Ok(format!("the fewest whose motion is within {within}"))
+        Ok(format!("the fewest modes whose motion is within {within}"))
     }
 
     /// Judges the choice on variations, adds terms and modes until it holds there, and returns the reason for the modes.
@@ -195,7 +201,7 @@ impl<'s> Deciding<'s> {
         for (demand, case) in self.demands.iter().zip(search.cases) {
             let mut chosen = Vec::new();
             let mut growth = None;
-            for Tried { runs, measure } in &case.tried {
+            for TestScene { runs, measure } in &case.scenes {
                 let (modes, groups) = (&self.choice.modes, self.choice.groups);
                 let (trial, history) = runs.measured(measure, modes, groups, case.budget)?;
                 let own = history.and_then(|history| history.growth(measure.trace(), demand.tolerance()));

@@ -20,11 +20,11 @@ pub(super) const ROUNDING: f64 = 1e-12;
 /// Equations of motion of the displacements Psi y + E z. Psi are the modes of a body and E static responses that are
 /// K-orthogonal to the modes. The loads are the forces whose static responses are E c(t), and the forces M Psi m_ff^-1
 /// g(t), whose modal forces are g.
-pub(super) struct Lacking {
+pub(super) struct TruncatedEquations {
     /// Stiffness K_ff and mass m_ff of the modes that respond (nf x nf). Both are 0 x 0 if no mode responds.
     pub modal_stiffness: Mat<f64>,
     pub modal_mass: Mat<f64>,
-    pub damping: LackingDamping,
+    pub damping: TruncatedDamping,
     /// Coupling mass Psi'M E of modes and responses (nf x k).
     pub shared_mass: Mat<f64>,
     /// Stiffness E'K E and mass E'M E of the responses (k x k).
@@ -33,7 +33,7 @@ pub(super) struct Lacking {
 }
 
 /// Damping in the equations of all nodes.
-pub(super) enum LackingDamping {
+pub(super) enum TruncatedDamping {
     /// Damping of the modes of the body, D_ff (nf x nf): D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M.
     OfModes(Mat<f64>),
     /// Damping of the model, projected on modes and responses: [Psi, E]'D [Psi, E] (nf + k square).
@@ -42,7 +42,7 @@ pub(super) enum LackingDamping {
 
 /// Amplitudes at all instants, with rates and accelerations. Each matrix is (nf + k) x m: y of the modes, then z of the
 /// responses.
-pub(super) struct Answer {
+pub(super) struct TruncatedAmplitudes {
     pub value: Mat<f64>,
     pub rate: Mat<f64>,
     pub acceleration: Mat<f64>,
@@ -57,7 +57,7 @@ struct Oscillator {
     damping: f64,
 }
 
-impl Lacking {
+impl TruncatedEquations {
     /// Integrates the equations of motion
     ///
     /// ```text
@@ -76,14 +76,14 @@ impl Lacking {
     /// * `settled`: true if the motion starts in equilibrium, z = c; false if it starts from zero.
     ///
     /// Returns `None` if a decomposition fails.
-    pub(super) fn answered(
+    pub(super) fn amplitudes(
         &self,
         amplitudes: &Mat<f64>,
         in_modes: &Mat<f64>,
         grid: &Grid,
         settled: bool,
-    ) -> Option<Answer> {
-        let (shapes, inertias) = self.own_motions()?;
+    ) -> Option<TruncatedAmplitudes> {
+        let (shapes, inertias) = self.eigenmodes()?;
         let seen = self.seen_by_modes(&shapes)?;
         let dampings = self.dampings(&shapes, &seen);
         let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
@@ -103,12 +103,12 @@ impl Lacking {
             }
         }
         let back = |own: Mat<f64>| combine(shapes.as_ref(), own.as_ref());
-        Some(Answer { value: back(value), rate: back(rate), acceleration: back(acceleration) })
+        Some(TruncatedAmplitudes { value: back(value), rate: back(rate), acceleration: back(acceleration) })
     }
 
     /// Returns the eigenmodes, scaled to unit stiffness, in columns, and their inertias (inverse squares of the
     /// circular frequencies).
-    fn own_motions(&self) -> Option<(Mat<f64>, Vec<f64>)> {
+    fn eigenmodes(&self) -> Option<(Mat<f64>, Vec<f64>)> {
         let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
         // A basis of unit stiffness: L'^-1 for the modes (K_ff = L L'), principal directions for the responses.
         let (turned, roots) = principal(self.stiffness.clone(), ROUNDING, usize::MAX)?;
@@ -146,8 +146,8 @@ impl Lacking {
     /// modes.
     fn dampings(&self, shapes: &Mat<f64>, seen: &Mat<f64>) -> Vec<f64> {
         let (damping, parts) = match &self.damping {
-            LackingDamping::OfModes(damping) => (damping, seen),
-            LackingDamping::OfModel(damping) => (damping, shapes),
+            TruncatedDamping::OfModes(damping) => (damping, seen),
+            TruncatedDamping::OfModel(damping) => (damping, shapes),
         };
         let product = combine(damping.as_ref(), parts.as_ref());
         let of = |j: usize| (0..parts.nrows()).map(|i| parts[(i, j)] * product[(i, j)]).sum();
@@ -252,16 +252,16 @@ mod tests {
     }
 
     /// Returns modal forces that are zero.
-    fn none(system: &Lacking, grid: &Grid) -> Mat<f64> {
+    fn none(system: &TruncatedEquations, grid: &Grid) -> Mat<f64> {
         Mat::zeros(system.modal_mass.nrows(), grid.times.len())
     }
 
-    fn alone(stiffness: [f64; 2]) -> Lacking {
+    fn alone(stiffness: [f64; 2]) -> TruncatedEquations {
         let none = || Mat::zeros(0, 0);
-        Lacking {
+        TruncatedEquations {
             modal_stiffness: none(),
             modal_mass: none(),
-            damping: LackingDamping::OfModes(none()),
+            damping: TruncatedDamping::OfModes(none()),
             shared_mass: Mat::zeros(0, 2),
             stiffness: Mat::from_fn(2, 2, |i, j| if i == j { stiffness[i] } else { 0.0 }),
             mass: Mat::identity(2, 2),
@@ -274,8 +274,8 @@ mod tests {
         let system = alone([4.0, 2500.0]);
         let grid = grid((0..=60).map(|i| 0.05 * f64::from(i)).collect());
         let c = Mat::from_fn(2, grid.times.len(), |j, i| if j == 0 { grid.times[i] } else { 1.0 });
-        let Answer { value, rate, acceleration } =
-            system.answered(&c, &none(&system, &grid), &grid, false).expect("a motion");
+        let TruncatedAmplitudes { value, rate, acceleration } =
+            system.amplitudes(&c, &none(&system, &grid), &grid, false).expect("a motion");
         for (i, t) in grid.times.iter().enumerate() {
             let (sin, cos) = (2.0 * t).sin_cos();
             assert!((value[(0, i)] - (t - sin / 2.0)).abs() < 1e-12, "{t}");
@@ -284,7 +284,7 @@ mod tests {
             assert!((value[(1, i)] - (1.0 - (50.0 * t).cos())).abs() < 1e-10, "{t}");
             assert!((acceleration[(1, i)] - 2500.0 * (50.0 * t).cos()).abs() < 1e-6, "{t}");
         }
-        let settled = system.answered(&c, &none(&system, &grid), &grid, true).expect("a motion").value;
+        let settled = system.amplitudes(&c, &none(&system, &grid), &grid, true).expect("a motion").value;
         assert!(
             (0..grid.times.len()).all(|i| (settled[(1, i)] - 1.0).abs() < 1e-12),
             "a constant force on what is settled"
@@ -298,8 +298,8 @@ mod tests {
         let system = alone([1e4, 1e6]);
         let grid = grid((0..=240).map(|i| 0.05 * f64::from(i)).collect());
         let c = Mat::from_fn(2, grid.times.len(), |_, i| grid.times[i] - grid.times[i].sin());
-        let Answer { acceleration, .. } =
-            system.answered(&c, &none(&system, &grid), &grid, true).expect("a motion");
+        let TruncatedAmplitudes { acceleration, .. } =
+            system.amplitudes(&c, &none(&system, &grid), &grid, true).expect("a motion");
         for (i, t) in grid.times.iter().enumerate() {
             for j in 0..2 {
                 assert!(
@@ -316,10 +316,10 @@ mod tests {
     #[test]
     fn what_is_missed_moves_the_modes_by_its_inertia() {
         let one = |value: f64| Mat::full(1, 1, value);
-        let system = Lacking {
+        let system = TruncatedEquations {
             modal_stiffness: one(9.0),
             modal_mass: one(1.0),
-            damping: LackingDamping::OfModes(one(0.0)),
+            damping: TruncatedDamping::OfModes(one(0.0)),
             shared_mass: one(0.3),
             stiffness: one(100.0),
             mass: one(0.5),
@@ -330,7 +330,8 @@ mod tests {
         let c = Mat::from_fn(1, grid.times.len(), |_, i| force(grid.times[i]));
         let on_modes = |t: f64| 2.0 * t.cos();
         let g = Mat::from_fn(1, grid.times.len(), |_, i| on_modes(grid.times[i]));
-        let Answer { value, acceleration, .. } = system.answered(&c, &g, &grid, false).expect("a motion");
+        let TruncatedAmplitudes { value, acceleration, .. } =
+            system.amplitudes(&c, &g, &grid, false).expect("a motion");
         for i in 1..grid.times.len() - 1 {
             let second =
                 |j: usize| (value[(j, i + 1)] - 2.0 * value[(j, i)] + value[(j, i - 1)]) / step.powi(2);
@@ -346,9 +347,9 @@ mod tests {
         }
         assert!((0..grid.times.len()).any(|i| value[(0, i)].abs() > 0.01), "the mode moves");
         // The reference values with damping come from a Runge-Kutta method of order 4.
-        let damped = Lacking { damping: LackingDamping::OfModes(one(0.4)), ..system };
+        let damped = TruncatedEquations { damping: TruncatedDamping::OfModes(one(0.4)), ..system };
         let steady = Mat::full(1, grid.times.len(), 1.0);
-        let pushed = damped.answered(&steady, &none(&damped, &grid), &grid, false).expect("a motion").value;
+        let pushed = damped.amplitudes(&steady, &none(&damped, &grid), &grid, false).expect("a motion").value;
         let largest = |from: usize| (from..from + 1000).map(|i| pushed[(0, i)].abs()).fold(0.0, f64::max);
         assert!((largest(0) - 0.5659).abs() < 2e-3 && (largest(4000) - 0.4415).abs() < 2e-3);
     }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// Errors of a body relative to its model.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct LackFacts {
+pub(super) struct ReferenceErrorFacts {
     modes: usize,
     /// Errors by quantity. The attitude error is zero if the rotation is prescribed; the reaction error is
     /// `None` without prescribed motion.
@@ -21,14 +21,14 @@ pub(super) struct LackFacts {
     unknown: Option<&'static str>,
 }
 
-impl LackFacts {
-    pub(crate) fn new(lack: &ReferenceError) -> Self {
-        let (modes, time, unknown) = (lack.modes, lack.time, lack.unknown);
+impl ReferenceErrorFacts {
+    pub(crate) fn new(reference: &ReferenceError) -> Self {
+        let (modes, time, unknown) = (reference.modes, reference.time, reference.unknown);
         let known = |value: f64| unknown.is_none().then_some(value);
         Self {
             modes,
-            errors: lack.errors.map(|error| error.and_then(known)),
-            worst: known(lack.worst),
+            errors: reference.errors.map(|error| error.and_then(known)),
+            worst: known(reference.worst),
             time,
             unknown,
         }
@@ -38,7 +38,7 @@ impl LackFacts {
     /// motion also `reaction 1.2 %`.
     pub(crate) fn parts(&self) -> String {
         if let Some(reason) = self.unknown {
-            return format!("an unknown part ({reason})");
+            return format!("an unknown amount ({reason})");
         }
         let attitude = self.errors.attitude.filter(|angle| *angle > 0.0);
         errors_to_digits(&OutputErrors { attitude, ..self.errors }, 2)
@@ -47,18 +47,21 @@ impl LackFacts {
     fn in_words(&self) -> String {
         let (parts, time) = (self.parts(), significant(self.time, 3));
         match self.unknown {
-            Some(_) => format!("{} modes lack {parts} of the FE model", self.modes),
-            None => format!("{} modes lack {parts} of the FE model, most at t = {time}", self.modes),
+            Some(_) => format!("a body of {} modes differs from the FE model by {parts}", self.modes),
+            None => format!(
+                "a body of {} modes differs from the FE model by {parts}, most at t = {time}",
+                self.modes
+            ),
         }
     }
 }
 
-/// Returns the error of the reference of all measured errors in words: the last of `lacks`. The first entry
+/// Returns the error of the reference of all measured errors in words: the last of `rounds`. The first entry
 /// is the error before enrichment.
-pub(super) fn reference_in_words(lacks: &[LackFacts]) -> String {
-    match lacks {
-        [] => "the modes of the body; what these lack of an FE model is not known".to_owned(),
+pub(super) fn reference_in_words(rounds: &[ReferenceErrorFacts]) -> String {
+    match rounds {
+        [] => "the body with all its modes; its difference from an FE model is not known".to_owned(),
         [own] => format!("{} (estimated)", own.in_words()),
-        [first, .., own] => format!("{} (estimated; {} at first)", own.in_words(), first.in_words()),
+        [first, .., own] => format!("{} (estimated; before enrichment {})", own.in_words(), first.in_words()),
     }
 }

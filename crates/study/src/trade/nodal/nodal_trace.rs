@@ -5,14 +5,14 @@ use flexbody_linalg::{combine, larger, multiply, not_negative};
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{NodalEvaluation, NodalMotion, NodalPoint};
 use flexbody_motion::integration::{Failure, Work};
-use flexbody_motion::scene::{Apart, ErrorHistory, Extremes, Peak, Scheme, Trace};
+use flexbody_motion::scene::{DeformationDifference, ErrorHistory, Extremes, Peak, Scheme, Trace};
 
 /// Number of instants whose errors are computed together.
 const BLOCK: usize = 256;
 
 /// Displacements of all rows, with the data of a [`Trace`].
 #[derive(Debug, Clone)]
-pub(super) struct Seen {
+pub(super) struct NodalTrace {
     /// Displacements (N x instants), in rows and axes of the model.
     displacements: Vec<f64>,
     rows: usize,
@@ -22,7 +22,7 @@ pub(super) struct Seen {
     internal: Peak,
 }
 
-impl Seen {
+impl NodalTrace {
     /// Creates an empty motion of `rows` rows with the layout of `motion`, the trace of a body.
     pub(super) fn new(rows: usize, motion: &Trace) -> Self {
         let trace = Trace {
@@ -42,7 +42,7 @@ impl Seen {
         Self { displacements: Vec::new(), rows, trace, spin: Peak::default(), internal: Peak::default() }
     }
 
-    /// Records the state at a time, and the displacements of the `watched` points. `room` is scratch space of N
+    /// Records the state at a time, and the displacements of the `watched` points. `workspace` is scratch space of N
     /// entries.
     pub(super) fn see<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)>(
         &mut self,
@@ -50,13 +50,13 @@ impl Seen {
         state: &[f64],
         motion: &mut NodalMotion<'e, L>,
         watched: &[NodalPoint],
-        room: &mut [f64],
+        workspace: &mut [f64],
     ) -> Result<(), Failure> {
         let trace = &mut self.trace;
         // Only reactions need the accelerations.
         match &mut trace.reactions {
             Some(reactions) => {
-                motion.accelerations(time, state, room)?;
+                motion.accelerations(time, state, workspace)?;
                 reactions.push(motion.evaluation().driving_force());
             }
             None => drop(motion.evaluate(time, state)?),
@@ -123,7 +123,11 @@ impl Seen {
             energy.extend((0..count).map(|i| not_negative(product(i))));
             deflection.extend((0..count).map(|i| longest(model, difference.col_as_slice(i))));
         }
-        ErrorHistory::new(&self.trace, candidate, &Apart { energy, deflection, largest_deflection })
+        ErrorHistory::new(
+            &self.trace,
+            candidate,
+            &DeformationDifference { energy, deflection, largest_deflection },
+        )
     }
 
     /// Returns the displacements of a body with the shapes `vectors` (N x nf), at `count` instants of a motion from

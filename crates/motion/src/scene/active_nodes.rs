@@ -7,12 +7,12 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Nodes of a body, and their rows of the modes: three per node, each with nf entries.
 #[derive(Debug, Clone)]
-pub(super) struct LivelyNodes {
+pub(super) struct ActiveNodes {
     rows: Vec<f64>,
     nf: usize,
 }
 
-impl LivelyNodes {
+impl ActiveNodes {
     /// Takes the given nodes (from 0).
     pub(super) fn new(body: &FlexBody, nodes: &[usize]) -> Self {
         let nf = body.n_modes();

@@ -4,13 +4,13 @@ use super::{Scene, Trace};
 use flexbody_body::flex_body::FlexBody;
 
 /// Ratio of neighbouring intervals above which differences are not taken: the samples are at a break.
-const UNEVEN: f64 = 8.0;
+const MAX_INTERVAL_RATIO: f64 = 8.0;
 
 /// Returns the largest circular frequency of the modes that contribute to the motion: modes whose root of
 /// the elastic energy is at least this `part` of the tolerances. For a carried body the frequencies are not
 /// above those of the free body. A mode that follows slow forces has no motion of its own at any frequency;
 /// the criterion is therefore the amplitude q'' / omega^2 of its acceleration at its own frequency.
-pub fn liveliest_rate(body: &FlexBody, scene: &Scene, motion: &Trace, part: f64) -> f64 {
+pub fn highest_excited_rate(body: &FlexBody, scene: &Scene, motion: &Trace, part: f64) -> f64 {
     let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
     let roots = rates.iter().zip(&motion.extremes.amplitudes).map(|(rate, amplitude)| rate * amplitude.abs());
     let tolerance = &scene.requirements.tolerance.errors;
@@ -25,7 +25,11 @@ fn accelerations(motion: &Trace, modes: usize) -> Vec<f64> {
     let mut largest = vec![0.0f64; modes];
     for (times, q) in motion.time.windows(3).zip(motion.q.windows(3)) {
         let (before, after) = (times[1] - times[0], times[2] - times[1]);
-        if !(before > 0.0 && after > 0.0 && before < UNEVEN * after && after < UNEVEN * before) {
+        if !(before > 0.0
+            && after > 0.0
+            && before < MAX_INTERVAL_RATIO * after
+            && after < MAX_INTERVAL_RATIO * before)
+        {
             continue;
         }
         for (j, largest) in largest.iter_mut().enumerate() {

@@ -11,7 +11,7 @@ use flexbody_model::FeModel;
 use std::path::{Path, PathBuf};
 
 /// Source of the modes of a conversion.
-pub(super) enum Elsewhere {
+pub(super) enum ModeSource {
     /// This program.
     Nowhere,
     /// SLEPc over MPI, in a folder that is removed afterwards unless the user named it.
@@ -21,7 +21,7 @@ pub(super) enum Elsewhere {
     Cluster { folder: PathBuf, prepared: Box<Prepared>, prove: bool },
 }
 
-impl Elsewhere {
+impl ModeSource {
     /// Returns the source that the command line requests.
     pub(super) fn of(arguments: &ConvertArguments) -> Self {
         let asked = &arguments.engine;

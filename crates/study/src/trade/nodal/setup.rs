@@ -1,6 +1,6 @@
 //! Equations of all nodes of a model in a scene, prepared for integration.
 
-use super::seen::Seen;
+use super::nodal_trace::NodalTrace;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::FlexBody;
@@ -9,7 +9,7 @@ use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{
     LoadAxes, NodalEquations, NodalEvaluation, NodalModes, NodalMotion, NodalPoint, ReferenceConditions,
 };
-use flexbody_motion::integration::{Explicit, Failure, Gauss, Method, Sight, integrate_closely};
+use flexbody_motion::integration::{Explicit, Failure, Gauss, Method, ObserverEvent, integrate_closely};
 use flexbody_motion::scene::{Axes, Driving, Load, Scene, Scheme, Trace, damped, nodal_point};
 
 /// Residual of the implicit stages, relative to the scales of the motion: far below the errors that are reported, far
@@ -17,7 +17,7 @@ use flexbody_motion::scene::{Axes, Driving, Load, Scene, Scheme, Trace, damped, 
 const SOLVED: f64 = 1e-11;
 
 /// Equations of all nodes in a scene, with the modal damping of a body.
-pub(super) struct Staged<'a> {
+pub(super) struct NodalSetup<'a> {
     pub equations: NodalEquations<'a>,
     pub scene: &'a Scene,
     loads: Vec<(NodalPoint, &'a Load)>,
@@ -32,7 +32,7 @@ pub(super) struct Staged<'a> {
 /// Returns the error for a scene that the nodal equations do not support.
 pub(super) fn refused(what: impl std::fmt::Display) -> Error {
     let diagnostic = Diagnostic::new(Code::Usage, format!("--reference nodal: {what}"));
-    diagnostic.with_help("take --reference full").into()
+    diagnostic.with_help("use --reference full").into()
 }
 
 /// Returns the error for an integration of `scene` that failed.
@@ -41,7 +41,7 @@ fn stopped(scene: &Scene, failure: Failure) -> Error {
     Diagnostic::new(Code::SimulationStopped, message).into()
 }
 
-impl<'a> Staged<'a> {
+impl<'a> NodalSetup<'a> {
     /// Prepares `model` in `scene`, both in the frame of `body`, a body of the model. The initial state is that of
     /// `motion`.
     pub(super) fn new(
@@ -63,7 +63,7 @@ impl<'a> Staged<'a> {
         let equations = equations.map_err(refused)?;
         let loads = scene.loads.iter().map(|load| Ok((nodal_point(model, &load.at)?, load)));
         let watched = scene.watched.iter().map(|point| nodal_point(model, point));
-        let mut staged = Self {
+        let mut setup = Self {
             loads: loads.collect::<Result<Vec<_>>>()?,
             watched: watched.collect::<Result<Vec<_>>>()?,
             driving: Driving::new(body.frame(), scene),
@@ -73,16 +73,16 @@ impl<'a> Staged<'a> {
             motion,
         };
         // Initial state: that of the modal motion, or the static deformation of the model.
-        let modes =
-            NodalModes::new(&staged.equations, body).ok_or_else(|| refused("the body has other rows"))?;
+        let modes = NodalModes::new(&setup.equations, body)
+            .ok_or_else(|| refused("the matrix rows of the body and the model differ"))?;
         let mut start = modes.lift(&motion.start);
         if scene.initial.settled {
             let softest = body.modes().eigenvalue[0];
             start =
-                staged.system().settled(0.0, &start, softest).map_err(|failure| stopped(scene, failure))?;
+                setup.system().settled(0.0, &start, softest).map_err(|failure| stopped(scene, failure))?;
         }
-        staged.start = staged.equations.state(&start).map_err(refused)?;
-        Ok(staged)
+        setup.start = setup.equations.state(&start).map_err(refused)?;
+        Ok(setup)
     }
 
     /// Returns the system of equations that is integrated.
@@ -90,10 +90,7 @@ impl<'a> Staged<'a> {
         let motion = NodalMotion::new(&self.equations, |time, evaluation: &mut NodalEvaluation<'s>| {
             self.act(time, evaluation);
         });
-        match self.scene.prescribes() {
-            true => motion.driven(|time, axes| self.driving.at(time, axes)),
-            false => motion,
-        }
+        if self.scene.prescribes() { motion.driven(|time, axes| self.driving.at(time, axes)) } else { motion }
     }
 
     fn act(&self, time: f64, evaluation: &mut NodalEvaluation<'_>) {
@@ -115,11 +112,16 @@ impl<'a> Staged<'a> {
     }
 
     /// Integrates with the explicit method, and records the motion at `instants`.
-    pub(super) fn explicit(&self, tolerance: f64, instants: &[f64], context: &Context<'_>) -> Result<Seen> {
+    pub(super) fn explicit(
+        &self,
+        tolerance: f64,
+        instants: &[f64],
+        context: &Context<'_>,
+    ) -> Result<NodalTrace> {
         let end = instants.last().copied().unwrap_or(0.0);
         let method = Method::Explicit(Explicit::new(self.start.len(), tolerance, end));
         let scheme = Scheme::Adaptive { tolerance };
-        self.integrate(method, scheme, instants, context, |sight| sight == Sight::Instant)
+        self.integrate(method, scheme, instants, context, |event| event == ObserverEvent::Instant)
     }
 
     /// Integrates to `end` by collocation of the given order, in steps of at most `step`, each divided into
@@ -131,20 +133,20 @@ impl<'a> Staged<'a> {
         refinement: u32,
         end: f64,
         context: &Context<'_>,
-    ) -> Result<Seen> {
+    ) -> Result<NodalTrace> {
         let method = Gauss::new(self.start.len(), order).solved_to(SOLVED).refined(refinement);
         let scheme = Scheme::Conserving { order, step: Some(step / f64::from(refinement)) };
         let mut taken = 0;
-        self.integrate(Method::Gauss { method, step }, scheme, &[0.0, end], context, |sight| match sight {
-            Sight::Start => {
+        self.integrate(Method::Gauss { method, step }, scheme, &[0.0, end], context, |event| match event {
+            ObserverEvent::Start => {
                 taken = 0;
                 true
             }
-            Sight::End => {
+            ObserverEvent::End => {
                 taken += 1;
                 taken % refinement == 0
             }
-            Sight::Instant | Sight::Within => false,
+            ObserverEvent::Instant | ObserverEvent::Within => false,
         })
     }
 
@@ -154,15 +156,15 @@ impl<'a> Staged<'a> {
         scheme: Scheme,
         instants: &[f64],
         context: &Context<'_>,
-        mut counts: impl FnMut(Sight) -> bool,
-    ) -> Result<Seen> {
+        mut counts: impl FnMut(ObserverEvent) -> bool,
+    ) -> Result<NodalTrace> {
         let end = instants.last().copied().unwrap_or(0.0);
         let (mut motion, mut state, mut seen) =
-            (self.system(), self.start.clone(), Seen::new(self.equations.n_rows(), self.motion));
-        let (mut observer, mut room) = (self.system(), vec![0.0; self.equations.n_rows()]);
-        let look = |sight: Sight, time: f64, state: &[f64]| {
-            if counts(sight) {
-                seen.see(time, state, &mut observer, &self.watched, &mut room)?;
+            (self.system(), self.start.clone(), NodalTrace::new(self.equations.n_rows(), self.motion));
+        let (mut observer, mut workspace) = (self.system(), vec![0.0; self.equations.n_rows()]);
+        let look = |event: ObserverEvent, time: f64, state: &[f64]| {
+            if counts(event) {
+                seen.see(time, state, &mut observer, &self.watched, &mut workspace)?;
             }
             context.fraction(time / end);
             Ok::<(), Failure>(())
