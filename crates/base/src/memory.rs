@@ -9,28 +9,28 @@ use std::cell::Cell;
 use std::sync::OnceLock;
 
 thread_local! {
-    static GOES_WITHOUT: Cell<bool> = const { Cell::new(false) };
+    static ACCEPTS_FAILURE: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Function that returns the number of bytes that may still be allocated; set by the program.
-static LEFT: OnceLock<fn() -> Option<u64>> = OnceLock::new();
+static AVAILABLE_BYTES: OnceLock<fn() -> Option<u64>> = OnceLock::new();
 
 /// Sets the function that finds the number of bytes that may still be allocated. Only the first call has an effect.
 pub fn tell_left(find: fn() -> Option<u64>) {
     // Another run in the same process uses an equivalent function.
-    let _ = LEFT.set(find);
+    let _ = AVAILABLE_BYTES.set(find);
 }
 
 /// Returns the number of bytes that may still be allocated; `None` if unknown, as in the library.
 pub fn left() -> Option<u64> {
-    LEFT.get().and_then(|find| find())
+    AVAILABLE_BYTES.get().and_then(|find| find())
 }
 
 /// Runs `ask`, whose allocations may fail without ending the program.
 pub fn or_go_without<T>(ask: impl FnOnce() -> T) -> T {
-    let before = GOES_WITHOUT.replace(true);
+    let before = ACCEPTS_FAILURE.replace(true);
     let answer = ask();
-    GOES_WITHOUT.set(before);
+    ACCEPTS_FAILURE.set(before);
     answer
 }
 
@@ -54,5 +54,5 @@ pub fn refuse_beyond(left: Option<u64>, needed: f64, what: &str, help: &str) -> 
 
 /// Returns true if the current thread continues when an allocation fails.
 pub fn goes_without() -> bool {
-    GOES_WITHOUT.get()
+    ACCEPTS_FAILURE.get()
 }

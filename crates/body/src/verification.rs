@@ -20,14 +20,14 @@ mod interfaces;
 mod recounts;
 
 /// Limit for recomputed invariants, relative to their Cauchy-Schwarz bounds: the rounding of their sums.
-const RECOMPUTED: f64 = 1e-12;
+const MAX_RECOMPUTED_DIFFERENCE: f64 = 1e-12;
 
 /// Name of K_ff in [`primary_differences`].
 const STIFFNESS: &str = "modal_stiffness";
 
 /// Allowed difference between two evaluations of K psi, in units of the rounding estimate eps | |K| |psi|
 /// |. The shapes were also turned to body axes and back.
-const ROUNDING: f64 = 30.0;
+const MAX_ROUNDING_ESTIMATES: f64 = 30.0;
 
 /// Evaluates all checks of `body` that need no model: the identities of theory section 10, and the
 /// consistency of the numbers stored in the file.
@@ -149,7 +149,7 @@ impl<'a> Recomputed<'a> {
         // Turning shapes and rigid motions rounds them; relative to the small moment of a needle that
         // rounding is larger.
         let inertia = body.invariants().inertia().diagonal();
-        let recomputed = RECOMPUTED
+        let recomputed = MAX_RECOMPUTED_DIFFERENCE
             + body.storage().rounding()
             + 8.0 * f64::EPSILON * (inertia.max() / inertia.min()).sqrt();
         // If the condensation assumed m_ff = I, `orthonormal_recomputed` checks the modal mass.
@@ -181,7 +181,7 @@ impl<'a> Recomputed<'a> {
                 "stiffness_recomputed",
                 "K_ff = Psi' K Psi",
                 self.difference_of(|name| name == STIFFNESS),
-                RECOMPUTED + storage.rounding() + stiffness,
+                MAX_RECOMPUTED_DIFFERENCE + storage.rounding() + stiffness,
             ),
             IdentityCheck::new(
                 "residual_recomputed",
@@ -211,7 +211,7 @@ impl<'a> Recomputed<'a> {
             let (k_psi, m_psi) = (self.kx.col(j), self.mx.col(j));
             let size = residual_scale(k_psi, m_psi, lambda);
             residual = larger(residual, relative_residual(k_psi, m_psi, lambda));
-            stored = stored.max(modes.residual[j]).max(ROUNDING * rounding[j] / size);
+            stored = stored.max(modes.residual[j]).max(MAX_ROUNDING_ESTIMATES * rounding[j] / size);
             // |psi_p' d(K psi_q)| <= |psi_p| |d(K psi_q)|, relative to sqrt(lambda_p lambda_q).
             long = long.max(self.modes.vectors.col(j).norm_l2() / lambda.sqrt());
             loose = loose.max(rounding[j] / lambda.sqrt());
@@ -240,7 +240,7 @@ impl<'a> Recomputed<'a> {
         let own = self.modes.inertia_stiffness(self.model, &self.place.frame);
         let formula = "moments of the nodes and stiffness of inertia from M";
         let check = |value| {
-            let limit = RECOMPUTED + 4.0 * self.body.storage().rounding();
+            let limit = MAX_RECOMPUTED_DIFFERENCE + 4.0 * self.body.storage().rounding();
             Some(IdentityCheck::new("inertia_stiffness_recomputed", formula, value, limit))
         };
         match (self.body.inertia_stiffness(), own) {
@@ -329,7 +329,7 @@ impl Difference {
         let relative = |value: f64| if value == 0.0 { 0.0 } else { value / size };
         let rounding = if rounding > 0.0 { rounding } else { 0.0 };
         // Two matrices that consist of rounding errors differ by at most twice the size.
-        Self { largest: relative(largest), allowed: RECOMPUTED + relative(rounding).min(2.0) }
+        Self { largest: relative(largest), allowed: MAX_RECOMPUTED_DIFFERENCE + relative(rounding).min(2.0) }
     }
 
     /// Returns the difference with the larger ratio of actual to allowed value; NaN counts as worst.
@@ -342,7 +342,7 @@ impl Difference {
 /// Returns an upper bound of the rounding error of |psi_p' A psi_q|.
 fn rounding_of(a: &SymmetricMatrix, shapes: &Mat<f64>, storage: Storage) -> f64 {
     let longest = shapes.col_iter().fold(0.0f64, |m, column| m.max(column.norm_l2()));
-    ROUNDING
+    MAX_ROUNDING_ESTIMATES
         * storage.roundings()
         * longest
         * rounding_residual(a, shapes.as_ref()).into_iter().fold(0.0, f64::max)

@@ -1,7 +1,7 @@
 //! Result of a cluster: `result.jsonl`, `modes.petsc` and `condensed.petsc`, compared with the model and the prepared
 //! files.
 
-use super::condensed::{CONDENSED_ROUNDING, Condensed};
+use super::condensed::{Condensed, MAX_CONDENSED_DIFFERENCE};
 use super::petsc::{IndexBytes, read_vector};
 use super::prepare::{index_bytes, matrices_of};
 use super::prepared::Prepared;
@@ -165,11 +165,11 @@ fn hold_condensation(
     let (columns, file) = (condensed.columns(), Vectors { path, digest, of: "products of condensation" });
     let products = file.read((columns, columns), index_bytes(result.index_bytes)?, |row| row)?;
     let difference = condensed.difference(products.as_ref());
-    if difference <= CONDENSED_ROUNDING {
+    if difference <= MAX_CONDENSED_DIFFERENCE {
         return Ok(());
     }
     let message = format!(
-        "the products of condensation are not those of the mass matrix: they differ by {difference:.0e}, rounding explains {CONDENSED_ROUNDING:.0e}"
+        "the products of condensation are not those of the mass matrix: they differ by {difference:.0e}, rounding explains {MAX_CONDENSED_DIFFERENCE:.0e}"
     );
     Err(Diagnostic::new(Code::ClusterInaccurate, message).in_file(path).into())
 }

@@ -13,7 +13,7 @@ use std::path::Path;
 const VERSION: u32 = 1;
 
 /// Largest size of such a file in bytes: ledgers of some hundred thousand bodies.
-const MOST: u64 = 1 << 30;
+const MAX_BYTES: u64 = 1 << 30;
 
 #[derive(Serialize, Deserialize)]
 struct Head {
@@ -46,7 +46,7 @@ pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> 
 /// [`ClusterChanged`](Code::ClusterChanged) if its digest differs.
 pub(super) fn open_kept<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
-    let text = read_text(path, MOST).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
+    let text = read_text(path, MAX_BYTES).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
     let not_ours = || unreadable(format!("file is no `{format}`"));
     let (head, body) = text.split_once('\n').ok_or_else(not_ours)?;
     let head: Head = serde_json::from_str(head).map_err(|_| not_ours())?;

@@ -22,25 +22,26 @@ use std::ops::Range;
 
 /// Residual asked of the first mode beyond the wanted ones. The error of its eigenvalue, which bounds the gap of the
 /// count, is the square of this residual.
-const BEYOND: f64 = 1e-3;
+const NEXT_MODE_RESIDUAL: f64 = 1e-3;
 
 /// Relative distance between the last wanted eigenvalue and the next one up to which the next mode may belong to the
-/// same cluster: with a residual of [`BEYOND`] its Ritz value does not decide. Such a mode is corrected like the wanted
-/// ones, so that the cluster is seen, and its canonical basis does not depend on the progress of the search.
-const MAY_REPEAT: f64 = 1e-3;
+/// same cluster: with a residual of [`NEXT_MODE_RESIDUAL`] its Ritz value does not decide. Such a mode is corrected
+/// like the wanted ones, so that the cluster is seen, and its canonical basis does not depend on the progress of the
+/// search.
+const POSSIBLE_CLUSTER_GAP: f64 = 1e-3;
 
 /// Largest number of rounds of corrections.
-const MAX_ROUNDS: usize = 60;
+const MAX_CORRECTION_ROUNDS: usize = 60;
 
 /// Number of successive rounds without a gain of a factor of two after which the corrections end.
-const PATIENCE: usize = 6;
+const MAX_STALLED_ROUNDS: usize = 6;
 
 /// Numbers of rounds of cycles, each with the factor by which the residuals must have fallen by then. With a smaller
 /// gain a factor takes less time than the remaining rounds. Measured gains: cubes, bars and brackets of every element
 /// 2.4 and more after two rounds, 5 to 10^5 after four; blocks with thin bars, flat elements, contrasts of stiffness
 /// and nearly incompressible bodies at most 1.25 after two. The test after two rounds halves the time lost on the
 /// latter.
-const GAINS_ASKED: [(usize, f64); 2] = [(2, 1.5), (4, 7.0)];
+const REQUIRED_GAINS: [(usize, f64); 2] = [(2, 1.5), (4, 7.0)];
 
 /// Search space that is corrected until its lowest Ritz pairs keep the tolerance and the end of the cluster of the last
 /// wanted mode is known.
@@ -102,7 +103,7 @@ impl<'a> Correction<'a> {
 
     /// Corrects until the modes keep the tolerance. Returns the modes and the examined eigenvalues after them.
     pub(super) fn modes(mut self) -> Result<FoundModes, EigenFailure> {
-        for _ in 0..MAX_ROUNDS {
+        for _ in 0..MAX_CORRECTION_ROUNDS {
             let (forces, looked) = self.excess();
             let keeps = |pair: &Pair| pair.residual <= pair.allowed;
             self.converged = looked[..self.wanted].iter().filter(|pair| keeps(pair)).count();
@@ -127,8 +128,9 @@ impl<'a> Correction<'a> {
             return self.excess();
         }
         let (tolerance, lambda) = (self.goal.tolerance, &self.space.lambda);
-        let may_be_wanted = cluster_end(self.wanted, lambda.len(), MAY_REPEAT, |i| lambda[i]);
-        let allowed = |j: usize| if j < may_be_wanted { tolerance.max(self.floors[j]) } else { BEYOND };
+        let may_be_wanted = cluster_end(self.wanted, lambda.len(), POSSIBLE_CLUSTER_GAP, |i| lambda[i]);
+        let allowed =
+            |j: usize| if j < may_be_wanted { tolerance.max(self.floors[j]) } else { NEXT_MODE_RESIDUAL };
         let pair = |(number, residual)| Pair { number, residual, allowed: allowed(number) };
         (forces, relative.into_iter().enumerate().map(pair).collect())
     }
@@ -150,7 +152,7 @@ impl<'a> Correction<'a> {
     /// Extends the wanted modes to the next gap wide enough for the count, if the gap above them is too narrow and such
     /// a gap is near. Does so only when the pairs are accurate enough to decide. Returns true when it extended them.
     fn seeks_gap(&mut self, relative: &[f64]) -> bool {
-        let are_good = relative.iter().all(|relative| *relative <= BEYOND);
+        let are_good = relative.iter().all(|relative| *relative <= NEXT_MODE_RESIDUAL);
         if self.goal.separation == 0.0 || !are_good {
             return false;
         }
@@ -188,9 +190,9 @@ impl<'a> Correction<'a> {
         }
         let rounds = self.rounds;
         let is_behind = |(after, gain): &(usize, f64)| rounds == *after && worst > self.first / gain;
-        let is_slow = matches!(self.corrector, Corrector::Levels(_)) && GAINS_ASKED.iter().any(is_behind);
+        let is_slow = matches!(self.corrector, Corrector::Levels(_)) && REQUIRED_GAINS.iter().any(is_behind);
         self.rounds += 1;
-        self.since <= PATIENCE && !is_slow && !worst.is_nan()
+        self.since <= MAX_STALLED_ROUNDS && !is_slow && !worst.is_nan()
     }
 
     /// Extends the search space by corrections of the poor pairs among the examined ones, and of some pairs after them.
@@ -201,7 +203,7 @@ impl<'a> Correction<'a> {
         // The block is filled up with the residual forces of the next Ritz pairs.
         let (after, relative) = space.unbalanced(looked..space.lambda.len().min(looked + filled));
         let later = relative.iter().zip(looked..);
-        let later = later.map(|(&residual, number)| Pair { number, residual, allowed: BEYOND });
+        let later = later.map(|(&residual, number)| Pair { number, residual, allowed: NEXT_MODE_RESIDUAL });
         let pairs: Vec<Pair> = poor.iter().copied().chain(later).collect();
         let poor = poor.iter().map(|pair| forces.as_ref().col(pair.number));
         let columns: Vec<_> = poor.chain(after.as_ref().col_iter()).collect();
@@ -224,25 +226,25 @@ impl<'a> Correction<'a> {
 }
 /// Part of the error of a correction that may remain, relative to the residual of the pair: a correction is accurate to
 /// about the square of the residual, and the residual is mostly roughness that one step removes. Measured with this
-/// value and [`LEAST_LEFT`] on a bar and a cube of 100,000 rows, 16 to 24 modes: the steps of cycles vary by a
+/// value and [`MIN_TARGET_ERROR`] on a bar and a cube of 100,000 rows, 16 to 24 modes: the steps of cycles vary by a
 /// twentieth.
-const LEFT_OF_RESIDUAL: f64 = 0.2;
+const ERROR_PER_RESIDUAL: f64 = 0.2;
 
 /// Smallest part of the error of a correction that is aimed at: the missing directions of the span limit the gain of a
 /// more accurate correction.
-const LEAST_LEFT: f64 = 0.007;
+const MIN_TARGET_ERROR: f64 = 0.007;
 
 /// Part of the allowed residual that a last correction aims at.
-const BELOW_ALLOWED: f64 = 0.3;
+const LAST_TARGET_FRACTION: f64 = 0.3;
 
 /// Number of pairs that cycles correct together: their number is filled up to a multiple of it. With additional pairs
 /// above the wanted ones the last wanted pairs converge sooner. Fewer poor pairs than this, near the end, are not
 /// filled up: they take fewer steps alone.
-const FILLED: usize = 8;
+const PAIRS_PER_CYCLE: usize = 8;
 
 /// Returns the capacity of a search space that levels correct and that starts with `base` vectors.
 pub(super) fn room_with_levels(base: usize) -> usize {
-    2 * base + FILLED
+    2 * base + PAIRS_PER_CYCLE
 }
 
 /// Operator that turns residual forces into corrections.
@@ -276,7 +278,7 @@ impl Corrector<'_> {
     /// Returns the number of pairs to correct when `poor` of them are poor.
     pub(super) fn filled(self, poor: usize) -> usize {
         match self {
-            Self::Levels(_) if poor >= FILLED => poor.next_multiple_of(FILLED),
+            Self::Levels(_) if poor >= PAIRS_PER_CYCLE => poor.next_multiple_of(PAIRS_PER_CYCLE),
             _ => poor,
         }
     }
@@ -334,8 +336,8 @@ impl Corrector<'_> {
 impl Pair {
     /// Returns the part of the error that the correction of this pair may leave.
     fn aim(&self) -> Aim {
-        let last = BELOW_ALLOWED * self.allowed / self.residual;
-        Aim { pair: self.number, left: (LEFT_OF_RESIDUAL * self.residual).max(last).max(LEAST_LEFT) }
+        let last = LAST_TARGET_FRACTION * self.allowed / self.residual;
+        Aim { pair: self.number, left: (ERROR_PER_RESIDUAL * self.residual).max(last).max(MIN_TARGET_ERROR) }
     }
 }
 

@@ -14,22 +14,22 @@ use flexbody_linalg::multigrid::{can_have_levels, levels};
 
 /// Largest number of modes that are searched for without a factor. With more, the products of all pairs of vectors take
 /// longer than the solutions.
-const MULTIGRID_MODES: usize = 100;
+const MAX_MULTIGRID_MODES: usize = 100;
 
 /// Bytes of all levels and of their construction: per stored entry of K, and per row.
 const LEVEL_BYTES: (u64, u64) = (12, 400);
 
 /// Approximate number of entries in a row of K of linear hexahedra.
-const LINEAR_COUPLINGS: f64 = 64.0;
+const LINEAR_HEXAHEDRON_ROW_ENTRIES: f64 = 64.0;
 
 /// Largest factor by which the stronger coupling of second-order elements raises the threshold, beside the coupling
 /// itself. Hexahedra of second order have not been measured beyond it.
-const MOST_RAISED: f64 = 2.1;
+const MAX_THRESHOLD_FACTOR: f64 = 2.1;
 
 /// Number of modes up to which the threshold is that of the settings. More modes raise the threshold: corrections take
 /// more time the more modes they must be orthogonal to, while a factor is computed once. (Measured: equal times with 35
 /// modes of a bar of 100,000 rows, with 80 of a cube, whose factor takes three times the operations.)
-const FEW: f64 = 28.0;
+const UNRAISED_MODES: f64 = 28.0;
 
 /// Cycles over levels of groups of nodes, without a factor.
 pub(super) struct Cycles;
@@ -82,15 +82,15 @@ fn pays(task: &Task<'_>, wanted: usize) -> bool {
     let entries = problem.pencil.stiffness().as_csc().nnz() as f64;
     // Elements of the second order couple more rows, and take more cycles. (Measured: tetrahedra of 100,000 rows, which
     // couple a quarter more, take twice the time of a factor.)
-    let coupled = (entries / (problem.pencil.n() as f64 * LINEAR_COUPLINGS)).max(1.0);
-    let many = (wanted as f64 / FEW).max(1.0);
-    let threshold = settings.multigrid_pays * many * coupled * coupled.powi(2).min(MOST_RAISED);
+    let coupled = (entries / (problem.pencil.n() as f64 * LINEAR_HEXAHEDRON_ROW_ENTRIES)).max(1.0);
+    let many = (wanted as f64 / UNRAISED_MODES).max(1.0);
+    let threshold = settings.multigrid_pays * many * coupled * coupled.powi(2).min(MAX_THRESHOLD_FACTOR);
     settings.accuracy != Accuracy::Certified
         && settings.factor == FactorChoice::Auto
         && settings.method == Method::Auto
         && matches!(settings.wanted, Wanted::Lowest(_))
         && can_have_levels(&problem.pencil, problem.rigid.ncols())
-        && (1..=MULTIGRID_MODES).contains(&wanted)
+        && (1..=MAX_MULTIGRID_MODES).contains(&wanted)
         && analysis.flops() > threshold * entries
 }
 

@@ -136,25 +136,25 @@ fn from_midway(
 /// vectors. These Ritz values are too high: in truth a tenth more modes lie below the shift. (Columns solved for 200
 /// modes without a second shift, and with parts of 0.6 and 0.65: bar of 100,000 rows 632, 440, 440; cube of 100,000
 /// rows 672, 440, 520; tetrahedra of 64,000 rows 600, 521, 400.)
-const PART: f64 = 0.65;
+const SECOND_SHIFT_POSITION: f64 = 0.65;
 
-/// Part of the wanted modes, on either side of [`PART`], within which the widest gap is chosen.
-const REACH: f64 = 0.025;
+/// Part of the wanted modes, on either side of [`SECOND_SHIFT_POSITION`], within which the widest gap is chosen.
+const SECOND_SHIFT_WINDOW: f64 = 0.025;
 
 /// Largest number of modes below the shift, per wanted mode, with which the second shift is used.
-const MOST_BELOW: f64 = 1.2;
+const MAX_BELOW_SECOND_SHIFT: f64 = 1.2;
 
 /// Backward error of the factor above which the second shift is not used: modes are requested to 1e-9 at the best.
-const LARGEST_ERROR: f64 = 1e-12;
+const MAX_BACKWARD_ERROR: f64 = 1e-12;
 
 /// Smallest number of wanted modes for a second shift: with fewer, a basis of as many vectors is a poor estimate.
-const LEAST: usize = 40;
+const MIN_MODES_FOR_SECOND_SHIFT: usize = 40;
 
 /// Columns that the second shift saves per wanted mode.
-const SAVED: f64 = 0.9;
+const SAVED_COLUMNS_PER_MODE: f64 = 0.9;
 
 /// Operations of a factorisation that take as long as one operation of solving and orthogonalising.
-const DENSER: f64 = 1.4;
+const FACTOR_OPERATION_SPEED: f64 = 1.4;
 
 /// Factor at a shift among the modes, and the number of flexible modes below the shift.
 struct SecondFactor<'a> {
@@ -177,17 +177,17 @@ impl<'a> SecondFactor<'a> {
         let factor = Indefinite::new(analysis, &problem.pencil, sigma);
         let inertia = factor.inertia();
         let below = inertia.negative.checked_sub(problem.rigid.ncols())?;
-        let is_good = inertia.zero == 0 && inertia.backward_error <= LARGEST_ERROR;
-        let is_useful = below > 0 && below as f64 <= MOST_BELOW * wanted as f64;
+        let is_good = inertia.zero == 0 && inertia.backward_error <= MAX_BACKWARD_ERROR;
+        let is_useful = below > 0 && below as f64 <= MAX_BELOW_SECOND_SHIFT * wanted as f64;
         (is_good && is_useful).then_some(Self { factor, below })
     }
 }
 
-/// Returns the middle of the widest gap of `eigenvalues` near the [`PART`] of the wanted modes; `None` if there is no
-/// gap.
+/// Returns the middle of the widest gap of `eigenvalues` near the [`SECOND_SHIFT_POSITION`] of the wanted modes; `None`
+/// if there is no gap.
 fn among(eigenvalues: &[f64], wanted: usize) -> Option<f64> {
     let part = |part: f64| (part * wanted as f64).round() as usize;
-    let (middle, reach) = (part(PART), part(REACH).max(1));
+    let (middle, reach) = (part(SECOND_SHIFT_POSITION), part(SECOND_SHIFT_WINDOW).max(1));
     let near = eigenvalues.get(middle.checked_sub(reach)?..=middle + reach)?;
     let widest = near.windows(2).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
     let sigma = 0.5 * (widest[0] + widest[1]);
@@ -199,7 +199,8 @@ fn pays(task: &Task<'_>, wanted: usize) -> bool {
     let Task { problem, analysis, .. } = task;
     let vectors = problem.pencil.n() as f64 * basis_columns(wanted) as f64;
     let column = 4.0 * analysis.factor_len() as f64 + 8.0 * vectors;
-    wanted >= LEAST && analysis.flops() < DENSER * SAVED * wanted as f64 * column
+    wanted >= MIN_MODES_FOR_SECOND_SHIFT
+        && analysis.flops() < FACTOR_OPERATION_SPEED * SAVED_COLUMNS_PER_MODE * wanted as f64 * column
 }
 
 #[cfg(test)]

@@ -11,17 +11,17 @@ use flexbody_linalg::{
 
 /// Part of a vector's squared norm in the diagonal of M below which its squared M-norm counts as zero: such a vector
 /// lies in the null space of M, and its M-norm is the rounding of the product.
-const UNSEEN: f64 = 1e-13;
+const NULL_SPACE_FRACTION: f64 = 1e-13;
 
 /// Part of a vector's M-norm below which its remainder after projection counts as zero: such a vector lies in the
 /// basis, and the remainder is rounding.
-const VANISHED: f64 = 1e-13;
+const DEPENDENT_FRACTION: f64 = 1e-13;
 
-/// Multiple of [`UNSEEN`] and [`VANISHED`] below which columns are orthonormalised one by one.
-const FAR_ABOVE: f64 = 1e4;
+/// Multiple of [`NULL_SPACE_FRACTION`] and [`DEPENDENT_FRACTION`] below which columns are orthonormalised one by one.
+const ONE_BY_ONE_MULTIPLE: f64 = 1e4;
 
 /// Smallest part of a column that may remain after projection off the columns before it without loss of a digit.
-const LEAST_KEPT: f64 = 0.1;
+const MIN_REMAINDER: f64 = 0.1;
 
 /// Basis V (N x m), the projected operator T = V' M OP V, and M times the newest block.
 pub(super) struct Krylov<'a> {
@@ -256,7 +256,7 @@ impl<'a> Krylov<'a> {
             self.context.count(|work| work.mass_columns += w.ncols() as u64);
             pencil.mass_times(w.as_ref(), mw.as_mut());
             // Orthonormalisation inside the block, with M W carried along.
-            let unseen = |w: ColRef<'_, f64>| UNSEEN * weighted_square(w, &self.mass_diagonal);
+            let unseen = |w: ColRef<'_, f64>| NULL_SPACE_FRACTION * weighted_square(w, &self.mass_diagonal);
             let t = orthonormalise_at_once(&mut w, &mut mw, &norms, &unseen)
                 .unwrap_or_else(|| gram_schmidt(&mut w, &mut mw, &norms, &unseen));
             // The carried products have lost a digit: they are computed again.
@@ -284,7 +284,7 @@ fn loses_digits(t: &Mat<f64>) -> bool {
     (0..t.ncols()).any(|j| {
         let before = t.col(j).norm_l2();
         let left = (0..t.nrows()).rev().map(|i| t[(i, j)].abs()).find(|entry| *entry > 0.0);
-        left.is_some_and(|left| left < LEAST_KEPT * before)
+        left.is_some_and(|left| left < MIN_REMAINDER * before)
     })
 }
 
@@ -308,11 +308,13 @@ fn orthonormalise_at_once(
     let width = w.ncols();
     let g = gram(w.as_ref(), mw.as_ref());
     let sizes = sizes(&g);
-    let is_clear =
-        |j: usize| sizes[j] > FAR_ABOVE * VANISHED * norms[j] && g[(j, j)] > FAR_ABOVE * unseen(w.col(j));
+    let is_clear = |j: usize| {
+        sizes[j] > ONE_BY_ONE_MULTIPLE * DEPENDENT_FRACTION * norms[j]
+            && g[(j, j)] > ONE_BY_ONE_MULTIPLE * unseen(w.col(j))
+    };
     let cosine = |i: usize, j: usize| 0.5 * (g[(i, j)] + g[(j, i)]) / (sizes[i] * sizes[j]);
     let l = (0..width).all(is_clear).then(|| dense_cholesky(Mat::from_fn(width, width, cosine)))??;
-    let keeps = |j: usize| l[(j, j)] >= LEAST_KEPT;
+    let keeps = |j: usize| l[(j, j)] >= MIN_REMAINDER;
     (0..width).all(keeps).then(|| {
         let inverse = solve_upper(&l, &Mat::identity(width, width));
         let inverse = Mat::from_fn(width, width, |i, j| inverse[(i, j)] / sizes[i]);
@@ -327,8 +329,8 @@ fn dot(w: &Mat<f64>, mw: &Mat<f64>, i: usize, j: usize) -> f64 {
 }
 
 /// M-orthonormalises the columns of W in place, and carries M W along. A column is dropped if it keeps less than
-/// [`VANISHED`] of its earlier norm, or if its square does not exceed `unseen`. Returns T (new x old) with W_old =
-/// W_new T.
+/// [`DEPENDENT_FRACTION`] of its earlier norm, or if its square does not exceed `unseen`. Returns T (new x old) with
+/// W_old = W_new T.
 fn gram_schmidt(
     w: &mut Mat<f64>,
     mw: &mut Mat<f64>,
@@ -355,7 +357,7 @@ fn gram_schmidt(
         }
         let square = dot(w, mw, j, j);
         let norm = square.max(0.0).sqrt();
-        if norm <= VANISHED * norms[j] || square <= unseen(w.col(j)) {
+        if norm <= DEPENDENT_FRACTION * norms[j] || square <= unseen(w.col(j)) {
             continue;
         }
         t[(kept, j)] = norm;

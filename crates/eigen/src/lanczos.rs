@@ -10,7 +10,7 @@ use super::failure::EigenFailure;
 use super::krylov::Krylov;
 use super::problem::EigenProblem;
 use super::refine::{FoundModes, Refined, residuals};
-use super::zero_energy::NOISE_FACTOR;
+use super::zero_energy::NOISE_DEVIATIONS;
 use super::zero_energy::{energy_noise, is_noisy};
 use faer::Mat;
 use flexbody_linalg::context::Context;
@@ -20,45 +20,45 @@ use std::ops::RangeInclusive;
 /// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138 with 6, 88 to
 /// 160 with 8; a hexahedral bar of 100 000 rows takes 6.6 CPU s with 4, 7.0 with 5, 7.1 with 8. The value 4 is also one
 /// more than the multiplicity of an eigenvalue of an isotropic cube.
-const BLOCK: usize = 4;
+const COLUMNS_PER_STEP: usize = 4;
 
 /// Number of modes from which on twice as many columns per step take less time: most steps then work on a large basis,
 /// which each step reads from memory, as it does the factor. (Measured on a bar of 100,000 rows: no difference with 30
 /// modes, a tenth less time with 50, a fifth less with 200.)
-const MANY: usize = 40;
+const MIN_MODES_FOR_DOUBLE_STEPS: usize = 40;
 
 /// Returns the number of columns per step for `wanted` modes.
 pub(super) fn columns_per_step(wanted: usize) -> usize {
-    if wanted < MANY { BLOCK } else { 2 * BLOCK }
+    if wanted < MIN_MODES_FOR_DOUBLE_STEPS { COLUMNS_PER_STEP } else { 2 * COLUMNS_PER_STEP }
 }
 
 /// Largest number of restarts: ten times the number that any model needed so far.
 const MAX_RESTARTS: u64 = 100;
 
 /// Number of basis vectors beyond two for each wanted mode. With this value restarts are rare.
-const SPARE: usize = 128;
+const SPARE_VECTORS: usize = 128;
 
 /// Part of the tolerance that the estimates must keep where rounding hides the true residuals: the modes are then as
 /// accurate as the estimates say.
-const BELOW_NOISE: f64 = 1e-2;
+const NOISE_TOLERANCE_FRACTION: f64 = 1e-2;
 
 /// Smallest residual that is asked of an estimate: the solves have no more digits.
-const LEAST_ASKED: f64 = 1e-12;
+const MIN_RESIDUAL: f64 = 1e-12;
 
 /// Part of the shift below which the first flexible eigenvalue asks for a smaller shift: with a lower one the number of
 /// iterations grows.
-const SMALLEST_PART: f64 = 0.02;
+const MIN_EIGENVALUE_PER_SHIFT: f64 = 0.02;
 
 /// Smallest shift relative to the last wanted eigenvalue, however low the first eigenvalues are: with a smaller shift
 /// the last modes would lose as many digits. The refinement separates a few much softer modes.
-const DIGITS_PART: f64 = 1e-3;
+const MIN_SHIFT_FRACTION: f64 = 1e-3;
 
 /// Relative gap of two eigenvalues across which converged modes do not mix.
-const WIDE: f64 = 1e-3;
+const SEPARATING_GAP: f64 = 1e-3;
 
 /// Numbers of block steps after which the shift is judged. The lowest Ritz value is near the first eigenvalue after
 /// six. A Ritz value far below the shift can only fall further, so an early judgement saves steps.
-const STEPS_TO_JUDGE: RangeInclusive<usize> = 3..=6;
+const SHIFT_JUDGEMENT_STEPS: RangeInclusive<usize> = 3..=6;
 
 /// Judges the shift by the current Ritz values, which are upper bounds of the eigenvalues. Returns the shift to use
 /// instead if this one is far too large for them.
@@ -75,12 +75,12 @@ fn better_shift(
 ) -> Result<Option<f64>, EigenFailure> {
     let tau = factor.shift();
     let ritz = projected_pairs(krylov)?;
-    if ritz.values.last().is_none_or(|theta| theta.recip() - tau > SMALLEST_PART * tau) {
+    if ritz.values.last().is_none_or(|theta| theta.recip() - tau > MIN_EIGENVALUE_PER_SHIFT * tau) {
         return Ok(None);
     }
     let (lambda, vectors) = best(krylov, &ritz, wanted.max(1), tau);
     let lowest = lambda[0];
-    let noise = NOISE_FACTOR
+    let noise = NOISE_DEVIATIONS
         * energy_noise(problem.pencil.stiffness(), vectors.as_ref().subcols(0, 1), problem.input_error)[0];
     if lowest.abs() <= noise {
         // The value is far below the shift and within noise. No shift can resolve it: the mode has no strain energy.
@@ -97,8 +97,8 @@ fn better_shift(
 
 /// Returns the shift for modes from `first` to `last` if it is much smaller than `tau`.
 fn suited_shift(first: f64, last: f64, tau: f64) -> Option<f64> {
-    let suited = (0.5 * first).max(DIGITS_PART * last);
-    (first < SMALLEST_PART * tau && suited < 0.1 * tau).then_some(suited)
+    let suited = (0.5 * first).max(MIN_SHIFT_FRACTION * last);
+    (first < MIN_EIGENVALUE_PER_SHIFT * tau && suited < 0.1 * tau).then_some(suited)
 }
 
 /// Size of the basis in which zero-energy modes are counted; at most half of its vectors can be such modes.
@@ -112,14 +112,14 @@ fn zero_energy(
     context: &Context<'_>,
 ) -> Result<EigenFailure, EigenFailure> {
     let mut krylov = Krylov::new(problem, ZERO_ENERGY_BASIS, context);
-    krylov.append_random(BLOCK, factor);
-    while krylov.room() >= BLOCK && !krylov.exhausted() {
+    krylov.append_random(COLUMNS_PER_STEP, factor);
+    while krylov.room() >= COLUMNS_PER_STEP && !krylov.exhausted() {
         krylov.step(factor);
     }
     let ritz = projected_pairs(&krylov)?;
     let (lambda, vectors) = best(&krylov, &ritz, krylov.projected() / 2, tau);
     let noise = energy_noise(problem.pencil.stiffness(), vectors.as_ref(), problem.input_error);
-    let count = lambda.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_FACTOR * **n).count().max(1);
+    let count = lambda.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_DEVIATIONS * **n).count().max(1);
     Ok(EigenFailure::ZeroEnergy {
         count,
         eigenvalues: lambda[..count].to_vec(),
@@ -220,7 +220,8 @@ impl Ritz {
     /// -M r / theta^2; M-norms replace the Euclidean norms.
     fn estimate(&self, i: usize) -> f64 {
         let theta = self.theta[i];
-        0.5 * self.norms[i] / (theta * (1.0 - self.tau * theta)).abs().max(SMALLEST_PART * theta.abs())
+        0.5 * self.norms[i]
+            / (theta * (1.0 - self.tau * theta)).abs().max(MIN_EIGENVALUE_PER_SHIFT * theta.abs())
     }
 
     /// Returns true when the first pair beyond the modes is accurate enough to establish the gap below it.
@@ -247,7 +248,7 @@ impl<'a> Iteration<'a> {
         context: &Context<'a>,
     ) -> Self {
         let free = problem.pencil.n() - problem.rigid.ncols();
-        let capacity = (2 * goal.wanted + SPARE).min(free + block);
+        let capacity = (2 * goal.wanted + SPARE_VECTORS).min(free + block);
         let mut krylov = Krylov::new(problem, capacity, context);
         krylov.choose_random(1000 * goal.round as u64);
         krylov.append_random(block.min(free), factor);
@@ -377,7 +378,7 @@ impl<'a> Iteration<'a> {
 
     /// Returns the shift to use instead of the current one, once the lowest Ritz value shows that it is too large.
     fn better_shift(&self, factor: &dyn Solve) -> Result<Option<f64>, EigenFailure> {
-        if self.first.is_some() || !STEPS_TO_JUDGE.contains(&self.steps) {
+        if self.first.is_some() || !SHIFT_JUDGEMENT_STEPS.contains(&self.steps) {
             return Ok(None);
         }
         better_shift(self.problem, &self.krylov, factor, self.goal.wanted, &self.context)
@@ -461,7 +462,7 @@ impl<'a> Iteration<'a> {
     /// Lowers the residual asked of the estimates if rounding hides the true residual of the first mode, whose strain
     /// energy is least. Returns true when it lowered it.
     fn asks_below_noise(&mut self, ritz: &Ritz) -> bool {
-        let below_noise = (BELOW_NOISE * self.goal.tolerance).max(LEAST_ASKED);
+        let below_noise = (NOISE_TOLERANCE_FRACTION * self.goal.tolerance).max(MIN_RESIDUAL);
         let may_ask = !self.complete && self.asked > below_noise;
         let asks = may_ask && {
             let count = ritz.last.min(1);
@@ -505,7 +506,7 @@ impl<'a> Iteration<'a> {
 fn settled(eigenvalues: &[f64], converged: usize) -> usize {
     let is_end = |end: &usize| {
         let (last, next) = (eigenvalues[end - 1], eigenvalues.get(*end).copied());
-        next.is_some_and(|next| next - last > WIDE * next)
+        next.is_some_and(|next| next - last > SEPARATING_GAP * next)
     };
     (1..=converged).rev().find(is_end).unwrap_or(0)
 }

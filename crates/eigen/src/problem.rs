@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// Part of tr K / tr M by which a pencil without further information is shifted: far above the rounding of a factor in
 /// double precision, and far below the first eigenvalue of most pencils.
-const UNKNOWN_SHIFT: f64 = 1e-8;
+const DEFAULT_RELATIVE_SHIFT: f64 = 1e-8;
 
 /// Seed of the fixed numbers from which the first eigenvalue is estimated.
 const SEED: u64 = 7;
@@ -63,7 +63,7 @@ fn rayleigh_estimate(
     order: &EliminationOrder,
 ) -> Result<f64, EigenFailure> {
     let trace = |diagonal: Vec<f64>| diagonal.into_iter().sum::<f64>();
-    let shift = UNKNOWN_SHIFT * trace(pencil.stiffness().diagonal()) / trace(pencil.mass_diagonal());
+    let shift = DEFAULT_RELATIVE_SHIFT * trace(pencil.stiffness().diagonal()) / trace(pencil.mass_diagonal());
     let analysis = order.of(pencil).ok_or(EigenFailure::TooLarge)?;
     let factor = Cholesky::<f64>::new(&analysis, pencil, shift);
     let factor = factor.ok_or(EigenFailure::NotPositiveDefinite { shift })?;

@@ -3,7 +3,7 @@
 use super::attempt::Goal;
 use super::bounds::enclose;
 use super::canonical::{CLUSTER_GAP, canonical_basis, clusters};
-use super::completeness::{Completeness, Counting, NEAR, Proof, count, size_along};
+use super::completeness::{Completeness, Counting, Proof, SINGLE_COUNT_DISTANCE, count, size_along};
 use super::failure::EigenFailure;
 use super::needs::{CountPlan, gigabytes};
 use super::plan::{Plan, PlannedAttempt, Way};
@@ -19,14 +19,14 @@ use std::sync::Arc;
 
 /// Part of the guaranteed residual that the search aims at. The canonical basis of an eigenvalue with m copies mixes
 /// their residuals, up to the root of m times the largest.
-const SEARCHED: f64 = 0.4;
+const SEARCH_RESIDUAL_FRACTION: f64 = 0.4;
 
-/// Gap of eigenvalues that a count in single precision needs, over [`NEAR`]. The shift is in the middle of the gap,
-/// which gives a factor of 2; a fifth more, since the gap is not known yet.
-const SEPARATION: f64 = 2.4;
+/// Gap of eigenvalues that a count in single precision needs, over [`SINGLE_COUNT_DISTANCE`]. The shift is in the
+/// middle of the gap, which gives a factor of 2; a fifth more, since the gap is not known yet.
+const SINGLE_COUNT_GAP: f64 = 2.4;
 
 /// Largest number of searches for the same modes: a second one follows if the count finds missing modes.
-const ROUNDS: usize = 2;
+const MAX_SEARCHES: usize = 2;
 
 /// Computes the wanted flexible modes.
 ///
@@ -110,7 +110,7 @@ fn find_all(
         if there == counted {
             return Ok((found, completeness));
         }
-        if there > counted || round == ROUNDS {
+        if there > counted || round == MAX_SEARCHES {
             return Err(EigenFailure::CountDiffers { found: there, counted, shift: completeness.shift });
         }
         // The next search asks for the missing modes as well.
@@ -125,9 +125,9 @@ fn search(
     (wanted, round): (usize, usize),
 ) -> Result<FoundModes, EigenFailure> {
     let Task { problem, settings, context, .. } = task;
-    let tolerance = SEARCHED * settings.accuracy.residual();
+    let tolerance = SEARCH_RESIDUAL_FRACTION * settings.accuracy.residual();
     let separation = match plan.count.counting {
-        Some(Counting::Single { .. }) => SEPARATION * NEAR,
+        Some(Counting::Single { .. }) => SINGLE_COUNT_GAP * SINGLE_COUNT_DISTANCE,
         _ => 0.0,
     };
     let goal = Goal { wanted, tolerance, separation, round };
@@ -225,7 +225,8 @@ fn prove(task: &Task<'_>, plan: &Plan, search: &FoundModes) -> Result<Completene
 /// the rounding of a factor in single precision may move one across the other.
 fn is_near(problem: &EigenProblem<'_>, found: &Refined, shift: f64) -> bool {
     let Some(last) = found.eigenvalues.iter().rposition(|&lambda| lambda < shift) else { return false };
-    shift - found.eigenvalues[last] < NEAR * size_along(problem, shift, found.vectors.col(last))
+    shift - found.eigenvalues[last]
+        < SINGLE_COUNT_DISTANCE * size_along(problem, shift, found.vectors.col(last))
 }
 
 /// Puts the modes into canonical form, and returns the wanted ones with their final residuals.

@@ -17,7 +17,7 @@ use flexbody_linalg::is_positive_semidefinite;
 
 /// Distances of the count's shift from the last eigenvector, relative to its eigenvalue. The second is used if the
 /// count with the first is too large, since the additional modes may lie beyond the given ones.
-const ABOVE: [f64; 2] = [1e-3, 1e-5];
+const SHIFT_DISTANCES: [f64; 2] = [1e-3, 1e-5];
 
 /// Returns the modes of the body in the span of `basis` (N x k, nearly M-orthonormal): mass-normalised Ritz vectors,
 /// M-orthogonal to the rigid modes, ascending.
@@ -164,7 +164,7 @@ fn count(task: &Task<'_>, eigenvalues: &[f64]) -> Result<Completeness, EigenFail
     }
     // The smaller distance is used if the larger one counts too many.
     let mut counted = (last, 0);
-    for above in ABOVE {
+    for above in SHIFT_DISTANCES {
         let shift = (1.0 + above) * last;
         let negative = count_below(problem, analysis, shift, context)?;
         if negative == rigid + found {

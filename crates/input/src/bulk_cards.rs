@@ -16,9 +16,9 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Depth of included files above which a file is taken to include itself.
-const DEEPEST: usize = 20;
+const MAX_INCLUDE_DEPTH: usize = 20;
 /// Largest number of files of a deck.
-const MOST_FILES: usize = 1000;
+const MAX_FILES: usize = 1000;
 
 /// Part of a deck, in the order of the deck.
 pub(super) enum Item<'a> {
@@ -114,12 +114,12 @@ impl Card {
 /// Returns the whole number in a field of a card; `None` if it is none.
 pub(super) fn whole(field: &[u8]) -> Option<i64> {
     /// Number of digits that fit into an i64, whichever digits they are.
-    const FIT: usize = 18;
+    const MAX_DIGITS: usize = 18;
     let digits = match field {
         [b'+' | b'-', digits @ ..] => digits,
         digits => digits,
     };
-    if digits.is_empty() || digits.len() > FIT {
+    if digits.is_empty() || digits.len() > MAX_DIGITS {
         return std::str::from_utf8(field).ok()?.parse().ok();
     }
     let mut number = 0;
@@ -236,9 +236,10 @@ impl<'t> BulkReader<'t> {
     }
 
     fn file(&mut self, path: &Path, file: &InputFile, depth: usize) -> Taken {
-        if depth > DEEPEST || self.files.len() >= MOST_FILES {
-            let message =
-                format!("files include one another more than {DEEPEST} levels deep, or {MOST_FILES} times");
+        if depth > MAX_INCLUDE_DEPTH || self.files.len() >= MAX_FILES {
+            let message = format!(
+                "files include one another more than {MAX_INCLUDE_DEPTH} levels deep, or {MAX_FILES} times"
+            );
             return Err(Diagnostic::new(Code::DeckSyntax, message)
                 .in_file(path)
                 .with_help("a file includes itself: take the INCLUDE out"));

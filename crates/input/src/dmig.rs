@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 pub(super) use columns::Point;
 
 /// Number of bad cards that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN_CARDS: usize = 5;
 
 /// Form of rectangular matrices, such as loads.
 const RECTANGULAR: i64 = 9;
@@ -159,7 +159,7 @@ impl Dmigs {
     }
 
     fn complain(&mut self, bad: Option<Diagnostic>) {
-        self.bad.extend(bad.filter(|_| self.bad.len() < SHOWN));
+        self.bad.extend(bad.filter(|_| self.bad.len() < MAX_SHOWN_CARDS));
     }
 
     /// Returns the index of a point, which is created if necessary.

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use tempfile::tempfile_in;
 
 /// Number of bytes that are written at a time.
-const PIECE: usize = 1 << 20;
+const BYTES_PER_WRITE: usize = 1 << 20;
 
 /// Type of stored numbers.
 pub(super) trait Number: AnyBitPattern + NoUninit + Send + Sync + UnwindSafe + RefUnwindSafe {}
@@ -38,7 +38,7 @@ impl<T: Number> Kept<T> {
     /// FB104 if no file can be created.
     pub(crate) fn new(folder: &Path) -> Result<Self, Diagnostic> {
         let file = tempfile_in(folder).map_err(|e| unwritable(folder, &e))?;
-        let out = BufWriter::with_capacity(PIECE, file);
+        let out = BufWriter::with_capacity(BYTES_PER_WRITE, file);
         Ok(Self { out, folder: folder.to_owned(), count: 0, numbers: PhantomData })
     }
 

@@ -11,7 +11,7 @@ use std::path::Path;
 const APART: f64 = 1e-3;
 
 /// Number of kinds of elements that a message names.
-const NAMED: usize = 6;
+const MAX_NAMED: usize = 6;
 
 /// Sources of the surface of a model.
 pub(super) struct MeshReading<'m> {
@@ -70,8 +70,8 @@ impl MeshReading<'_> {
             partly.push(Diagnostic::new(Code::MeshPartial, message).in_file(path));
         };
         if !left_out.is_empty() {
-            let more = if left_out.len() > NAMED { ", and of other kinds" } else { "" };
-            let named = left_out[..left_out.len().min(NAMED)].join(", ");
+            let more = if left_out.len() > MAX_NAMED { ", and of other kinds" } else { "" };
+            let named = left_out[..left_out.len().min(MAX_NAMED)].join(", ");
             tell(format!("elements that are not drawn: {named}{more}"));
         }
         if without_nodes > 0 {

@@ -15,7 +15,7 @@ use faer::linalg::qr::no_pivoting::factor as qr;
 use faer::{Auto, Col, Conj, Mat, MatRef, Par};
 
 /// Largest backward error |A V - V L| / |A| (maximum norms) of an accepted decomposition.
-const BACKWARD_ERROR: f64 = 3e-14;
+const MAX_BACKWARD_ERROR: f64 = 3e-14;
 
 /// Eigenvalues and orthonormal eigenvectors of a symmetric matrix.
 #[derive(Debug, Clone)]
@@ -45,7 +45,9 @@ pub fn symmetric_eigen(a: MatRef<'_, f64>) -> Option<SymmetricEigen> {
     let automatic = <SelfAdjointEvdParams as Auto<f64>>::auto();
     let only_qr = SelfAdjointEvdParams { recursion_threshold: usize::MAX, ..automatic };
     decompose(&full, automatic)
-        .filter(|eigen| n < automatic.recursion_threshold || backward_error(&full, eigen) <= BACKWARD_ERROR)
+        .filter(|eigen| {
+            n < automatic.recursion_threshold || backward_error(&full, eigen) <= MAX_BACKWARD_ERROR
+        })
         .or_else(|| decompose(&full, only_qr))
 }
 
@@ -175,7 +177,7 @@ mod tests {
                 }
             }
             let eigen = symmetric_eigen(graded.as_ref()).expect("finite");
-            assert!(backward_error(&graded, &eigen) < BACKWARD_ERROR, "n = {n}");
+            assert!(backward_error(&graded, &eigen) < MAX_BACKWARD_ERROR, "n = {n}");
             assert!(eigen.values.windows(2).all(|w| w[0] <= w[1]));
         }
     }

@@ -316,7 +316,7 @@ fn is_positive_definite<T: Real>(analysis: &Analysis, matrix: &SymmetricMatrix) 
 }
 
 /// Smallest number of rows that a task reorders, so that the work is far longer than the start of the task.
-const ROWS: usize = 4096;
+const MIN_ROWS_PER_TASK: usize = 4096;
 
 /// Substitutes upward and downward over the tree for the columns of `x`, at most `K`, with the `scale` of each row.
 /// `forward` eliminates the leading rows of the front of a supernode; `backward` computes them from the rows below.
@@ -371,7 +371,7 @@ pub(super) fn substitute<T: Real, const K: usize>(
     };
     analysis.walk.down(tree, &mut slots, &down);
     // Back to the order and scale of the model.
-    let columns_per_task = (ROWS / x.nrows().max(1)).max(1);
+    let columns_per_task = (MIN_ROWS_PER_TASK / x.nrows().max(1)).max(1);
     let columns: Vec<_> = x.col_iter_mut().collect();
     columns.into_par_iter().with_min_len(columns_per_task).enumerate().for_each(|(j, mut to)| {
         for (&vertex, from) in tree.order().iter().zip(values.chunks_exact(block)) {
@@ -397,11 +397,11 @@ fn in_elimination_order<T: Real, const K: usize>(
         }
         values
     };
-    (0..x.nrows()).into_par_iter().with_min_len(ROWS).map(scaled).collect()
+    (0..x.nrows()).into_par_iter().with_min_len(MIN_ROWS_PER_TASK).map(scaled).collect()
 }
 
 /// Number of columns that are solved together: the factor is read from memory once for all of them.
-pub(super) const COLUMNS: usize = 8;
+pub(super) const COLUMNS_PER_SOLVE: usize = 8;
 
 impl<T: Real> Solve for Cholesky<'_, T> {
     fn shift(&self) -> f64 {
@@ -411,13 +411,13 @@ impl<T: Real> Solve for Cholesky<'_, T> {
     fn solve_in_place(&self, mut x: MatMut<'_, f64>) {
         let mut start = 0;
         while start < x.ncols() {
-            let width = COLUMNS.min(x.ncols() - start);
+            let width = COLUMNS_PER_SOLVE.min(x.ncols() - start);
             let columns = x.rb_mut().subcols_mut(start, width);
             // In single precision eight columns are one vector: four would not be faster.
-            if width > COLUMNS / 2 || size_of::<T>() < size_of::<f64>() {
-                self.solve_block::<COLUMNS>(columns);
+            if width > COLUMNS_PER_SOLVE / 2 || size_of::<T>() < size_of::<f64>() {
+                self.solve_block::<COLUMNS_PER_SOLVE>(columns);
             } else {
-                self.solve_block::<{ COLUMNS / 2 }>(columns);
+                self.solve_block::<{ COLUMNS_PER_SOLVE / 2 }>(columns);
             }
             start += width;
         }
@@ -426,16 +426,16 @@ impl<T: Real> Solve for Cholesky<'_, T> {
 
 /// Ratio of the number of entries of M to that of K, both counted in blocks of vertices, above which the factor of M
 /// uses the structure of the joint factor: computing its own structure would take longer than it saves.
-const NEARLY_FULL: f64 = 0.5;
+const SHARED_STRUCTURE_RATIO: f64 = 0.5;
 
 /// Part of the largest diagonal entry of M up to which entries of a row without a positive diagonal are rounding.
-const NO_MASS: f64 = 1e-14;
+const ROUNDING_MASS_FRACTION: f64 = 1e-14;
 
 /// Returns true when a row without a positive diagonal entry has entries beyond rounding: no semidefinite matrix has
 /// such a row, since m_ij^2 <= m_ii m_jj.
 fn has_row_without_mass_that_couples(mass: &SymmetricMatrix) -> bool {
     let diagonal = mass.diagonal();
-    let noise = NO_MASS * largest(diagonal.iter().copied());
+    let noise = ROUNDING_MASS_FRACTION * largest(diagonal.iter().copied());
     let couples = |row: usize| mass.row(row).1.iter().any(|entry| entry.abs() > noise);
     diagonal.iter().enumerate().any(|(row, entry)| *entry <= 0.0 && couples(row))
 }
@@ -457,7 +457,7 @@ pub fn is_positive_semidefinite(pencil: &Pencil<'_>, analysis: &Analysis) -> boo
     let by_vertices =
         |matrix: &SymmetricMatrix, rows: usize| matrix.as_csc().nnz() as f64 / (rows * rows) as f64;
     let full = by_vertices(pencil.stiffness(), rows * pencil.block());
-    let tree = if by_vertices(mass, rows) >= NEARLY_FULL * full {
+    let tree = if by_vertices(mass, rows) >= SHARED_STRUCTURE_RATIO * full {
         Arc::clone(&analysis.tree)
     } else {
         let Some(graph) = vertex_graph(&Pencil::new(mass, mass, 1), rows) else { return false };

@@ -7,7 +7,7 @@ use super::ordering::{nested_dissection, node_graph};
 use super::{Pencil, SymmetricMatrix};
 
 /// Marks a root of the elimination tree: no parent.
-const NONE: u32 = u32::MAX;
+const NO_PARENT: u32 = u32::MAX;
 
 /// Factor A = P' L D L' P. If A is singular, it is the factor of A with some diagonal entries doubled.
 #[derive(Debug, Clone)]
@@ -151,7 +151,7 @@ impl Structure {
             nodes.iter().flat_map(|&node| (0..block).map(move |k| block * node + k)).collect();
         let mut place = vec![0u32; n];
         order.iter().enumerate().for_each(|(k, &row)| place[row as usize] = k as u32);
-        let (mut parent, mut met) = (vec![NONE; n], vec![NONE; n]);
+        let (mut parent, mut met) = (vec![NO_PARENT; n], vec![NO_PARENT; n]);
         let mut col_ptr = vec![0usize; n + 1];
         // The entries of row k of L are the paths in the tree from the entries of row k of A.
         for k in 0..n as u32 {
@@ -162,7 +162,7 @@ impl Structure {
                     let at = i as usize;
                     col_ptr[at + 1] += 1;
                     met[at] = k;
-                    if parent[at] == NONE {
+                    if parent[at] == NO_PARENT {
                         parent[at] = k;
                     }
                     i = parent[at];
@@ -203,7 +203,7 @@ impl<'a, T: Scalar> RowByRow<'a, T> {
             pivots: vec![T::ZERO; n],
             sums: vec![T::ZERO; n],
             reach: Vec::new(),
-            met: vec![NONE; n],
+            met: vec![NO_PARENT; n],
             path: Vec::new(),
             structure,
         }

@@ -7,10 +7,10 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Smallest part of all work in a heavy subtree: enough subtrees for eight threads.
-const HEAVY_PART: f64 = 1.0 / 32.0;
+const HEAVY_WORK_FRACTION: f64 = 1.0 / 32.0;
 
 /// Amount of work below which a subtree is not divided.
-const HEAVY_WORK: f64 = 1e7;
+const MIN_DIVIDED_OPERATIONS: f64 = 1e7;
 
 /// Subtree with the heavy subtrees below its lowest branching. These run in parallel, the rest after them.
 #[derive(Debug)]
@@ -52,7 +52,7 @@ impl TreeWalk {
         }
         let roots: Vec<usize> = (0..tree.len()).filter(|&s| tree.parent(s).is_none()).collect();
         let all: f64 = roots.iter().map(|&r| below[r]).sum();
-        let heavy = (HEAVY_PART * all).max(HEAVY_WORK);
+        let heavy = (HEAVY_WORK_FRACTION * all).max(MIN_DIVIDED_OPERATIONS);
         // Parents come after children, so that the branches of their segments exist already.
         let mut branches: Vec<Vec<Segment>> = (0..tree.len()).map(|_| Vec::new()).collect();
         let gather = |children: Vec<usize>, branches: &mut Vec<Vec<Segment>>| -> Vec<Segment> {

@@ -212,12 +212,12 @@ fn mass_that_does_not_turn(model: &FeModel, rounding: f64, worst: [DofLabel; 2])
 /// Adds a warning if D damps rigid motion: forces on the motion of the whole body are not in the modes.
 fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     /// Residual due to node tables with few digits.
-    const LIMIT: f64 = 1e-6;
+    const MAX_RIGID_DAMPING: f64 = 1e-6;
     let Some(damping) = body.damping.as_ref().and_then(Damping::matrix) else { return };
     let (centre, length) = centre_and_length(&body.nodes.positions);
     let fields = body.rows.rigid_fields(&body.nodes.positions, centre, length);
     let residuals = rigid_residuals(damping, &fields, &body.rows.field_sizes(length));
-    let damped = residuals.iter().filter(|r| r.is_nan() || **r > LIMIT).count();
+    let damped = residuals.iter().filter(|r| r.is_nan() || **r > MAX_RIGID_DAMPING).count();
     if damped > 0 {
         let worst = largest(residuals.iter().copied());
         let message = format!(
@@ -230,7 +230,7 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
 
 /// Range of plausible densities in kg/m^3, from aerogel to osmium, for the bounding box of the nodes; used
 /// for bodies other than solids.
-const DENSITY: (f64, f64) = (0.1, 30_000.0);
+const PLAUSIBLE_DENSITY: (f64, f64) = (0.1, 30_000.0);
 
 fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, found: &mut Vec<Diagnostic>) {
     if !raw.has_units() {
@@ -243,7 +243,7 @@ fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, fou
         return;
     }
     let density = total / volume;
-    if !(DENSITY.0..=DENSITY.1).contains(&density) {
+    if !(PLAUSIBLE_DENSITY.0..=PLAUSIBLE_DENSITY.1).contains(&density) {
         let message =
             format!("{total:.3e} kg in a box of {x:.3e} x {y:.3e} x {z:.3e} m is {density:.1e} kg/m^3");
         found.push(Diagnostic::new(Code::InertiaImplausible, message));

@@ -12,7 +12,7 @@ pub(super) fn state_units(fitting: &str) -> String {
 }
 
 /// Common units: their names, length in m and mass in kg; time is in s.
-const COMMON: [(&str, f64, f64); 5] = [
+const COMMON_UNITS: [(&str, f64, f64); 5] = [
     ("m, kg, s", 1.0, 1.0),
     ("mm, t, s", 1e-3, 1e3),
     ("cm, g, s", 1e-2, 1e-3),
@@ -26,11 +26,11 @@ pub(super) fn fitting_units(density: f64, speed: f64) -> Vec<&'static str> {
     let fits = |&&(name, length, mass): &&(&str, f64, f64)| {
         (500.0..20_000.0).contains(&(density * mass / length.powi(3))) && of_speed.contains(&name)
     };
-    COMMON.iter().filter(fits).map(|&(name, ..)| name).collect()
+    COMMON_UNITS.iter().filter(fits).map(|&(name, ..)| name).collect()
 }
 
 /// Returns the common units in which a speed of sound is plausible.
 pub(super) fn units_of_speed(speed: f64) -> Vec<&'static str> {
     let fits = |&&(_, length, _): &&(&str, f64, f64)| (500.0..20_000.0).contains(&(speed * length));
-    COMMON.iter().filter(fits).map(|&(name, ..)| name).collect()
+    COMMON_UNITS.iter().filter(fits).map(|&(name, ..)| name).collect()
 }

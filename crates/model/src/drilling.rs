@@ -24,7 +24,7 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// Area of the triangle of three nodes, projected across the direction and relative to the square of its
 /// longest side, below which the nodes determine no rotation about it.
-const NARROW: f64 = 1e-3;
+const MIN_TRIANGLE_AREA: f64 = 1e-3;
 
 /// Number of digits of M below which rounding entries along a direction without mass are removed: they
 /// would make M indefinite.
@@ -203,7 +203,7 @@ impl Shell<'_> {
                 let (x, y) = (arm(a), arm(b));
                 let longest = x.norm_squared().max(y.norm_squared());
                 let area = x.cross(&y).dot(normal).abs();
-                if area > NARROW * longest && best.is_none_or(|(largest, _)| area > largest) {
+                if area > MIN_TRIANGLE_AREA * longest && best.is_none_or(|(largest, _)| area > largest) {
                     best = Some((area, [node, a, b]));
                 }
             }

@@ -7,7 +7,7 @@ use flexbody_linalg::SymmetricMatrix;
 
 /// Row sum of a stiffness, relative to that of its absolute values, below which translations leave the row
 /// free.
-const FREE: f64 = 1e-6;
+const FREE_ROW_SUM: f64 = 1e-6;
 
 /// Returns an error if translations leave M free but not K.
 pub(super) fn check_exchanged_matrices(body: &Assembled) -> Option<Diagnostic> {
@@ -36,7 +36,7 @@ fn free_rows(matrix: &SymmetricMatrix, rows: &Rows) -> f64 {
             sums[column as usize % d] += value;
             size += value.abs();
         }
-        match sums.iter().all(|sum: &f64| sum.abs() <= FREE * size) {
+        match sums.iter().all(|sum: &f64| sum.abs() <= FREE_ROW_SUM * size) {
             _ if size == 0.0 => {}
             true => free += 1,
             false => held += 1,

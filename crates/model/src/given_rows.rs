@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 pub type NodeAxes = [[f64; 3]; 3];
 
 /// Largest allowed entry in rows that the model does not have, relative to the largest entry of the matrix.
-const ROUNDING: f64 = 1e-12;
+const MAX_FOREIGN_ENTRY: f64 = 1e-12;
 
 /// Maps from data given by rows, or along the axes of nodes, to the rows of the model.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -70,7 +70,7 @@ impl RowMap {
             let (rows, values) = all.column(column);
             let own = self.place(column as u32);
             let is_lost = |row: u32, value: f64| {
-                (own.is_none() || self.place(row).is_none()) && value.abs() > ROUNDING * largest
+                (own.is_none() || self.place(row).is_none()) && value.abs() > MAX_FOREIGN_ENTRY * largest
             };
             rows.iter().zip(values).any(|(row, value)| is_lost(*row, *value))
         });
@@ -163,7 +163,7 @@ impl GivenRows {
     pub fn forces(&self, columns: Mat<f64>) -> Result<Mat<f64>, LostRow> {
         let Some(map) = self.map(columns.nrows()) else { return Ok(columns) };
         let (forces, lost) = map.columns(&map.follows, &columns);
-        if lost > ROUNDING * columns.norm_max() { Err(LostRow) } else { Ok(forces) }
+        if lost > MAX_FOREIGN_ENTRY * columns.norm_max() { Err(LostRow) } else { Ok(forces) }
     }
 
     /// Turns displacements given along the axes of the nodes to the axes of the model: rows by `labels`,

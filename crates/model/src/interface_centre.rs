@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 /// Part of the nodes of an interface above which its faces (or edges) must reach for their centre to be
 /// used.
-const REACHED: f64 = 0.5;
+const MIN_COVERED_NODES: f64 = 0.5;
 
 /// Nodes of an interface, by indices of `positions`, at least one.
 pub(super) struct InterfaceNodes<'n> {
@@ -121,7 +121,7 @@ impl<'m> Members<'m> {
             total += size;
         }
         let reached = is_reached.iter().filter(|reached| **reached).count();
-        let is_enough = reached as f64 > REACHED * self.nodes.len() as f64;
+        let is_enough = reached as f64 > MIN_COVERED_NODES * self.nodes.len() as f64;
         (is_enough && total > 0.0).then(|| self.first + moment / total)
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of nodes per parallel task: sums have fixed partitions.
-const NODES: usize = 2048;
+const NODES_PER_TASK: usize = 2048;
 
 /// Form of the mass matrix.
 pub(super) struct MassForm {
@@ -35,8 +35,9 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
     let dimension = rows.dimension;
     let displacements = rows.displacements();
     let n = displacements / dimension;
-    let chunks =
-        |n: usize| -> Vec<Range<usize>> { (0..n).step_by(NODES).map(|i| i..(i + NODES).min(n)).collect() };
+    let chunks = |n: usize| -> Vec<Range<usize>> {
+        (0..n).step_by(NODES_PER_TASK).map(|i| i..(i + NODES_PER_TASK).min(n)).collect()
+    };
     let parts: Vec<([f64; 3], f64)> = chunks(rows.nodes)
         .into_par_iter()
         .map(|nodes| directional_mass(m, dimension, dimension * rows.nodes, nodes))

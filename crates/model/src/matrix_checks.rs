@@ -82,7 +82,7 @@ struct Asymmetry {
 impl Asymmetry {
     fn of(matrix: &CscMatrix) -> Self {
         /// Number of columns per parallel task.
-        const COLUMNS: usize = 256;
+        const COLUMNS_PER_TASK: usize = 256;
         let n = matrix.n_cols();
         let size: Vec<f64> = (0..n).map(|i| matrix.get(i, i).abs().sqrt()).collect();
         let of_column = |j: usize| {
@@ -102,7 +102,7 @@ impl Asymmetry {
             }
             own
         };
-        let columns = (0..n).into_par_iter().with_min_len(COLUMNS);
+        let columns = (0..n).into_par_iter().with_min_len(COLUMNS_PER_TASK);
         columns.map(of_column).reduce(Self::default, Self::and)
     }
 

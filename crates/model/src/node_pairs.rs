@@ -11,10 +11,10 @@ use std::collections::HashMap;
 
 /// Mass between two rows, relative to the root of their diagonal entries, below which it is the rounding of
 /// zero.
-const NOTHING: f64 = 1e-10;
+const ROUNDING_MASS: f64 = 1e-10;
 
 /// Number of vertices per parallel task.
-const VERTICES: usize = 2048;
+const VERTICES_PER_TASK: usize = 2048;
 
 /// Pairs of vertices ([`Rows::vertex`]) coupled by the mass.
 #[derive(Default)]
@@ -31,7 +31,7 @@ impl MassPairs {
         let diagonal = mass.diagonal();
         let own = |first: usize| {
             let mut part = Self::default();
-            for vertex in first..(first + VERTICES).min(rows.vertices()) {
+            for vertex in first..(first + VERTICES_PER_TASK).min(rows.vertices()) {
                 let mut coupled = by_mass(mass, &diagonal, rows, vertex);
                 coupled.retain(|&other| other as usize > vertex);
                 part.count += coupled.len();
@@ -44,7 +44,7 @@ impl MassPairs {
             }
             part
         };
-        let starts = (0..rows.vertices()).into_par_iter().step_by(VERTICES);
+        let starts = (0..rows.vertices()).into_par_iter().step_by(VERTICES_PER_TASK);
         let mut all = Self::default();
         for part in starts.map(own).collect::<Vec<_>>() {
             all.count += part.count;
@@ -80,7 +80,7 @@ pub(super) fn neighbours(
 
 fn by_mass(mass: &SymmetricMatrix, diagonal: &[f64], rows: &Rows, vertex: usize) -> Vec<u32> {
     let counts = |i: usize, j: usize, value: f64| {
-        value != 0.0 && value * value > NOTHING * NOTHING * (diagonal[i] * diagonal[j]).abs()
+        value != 0.0 && value * value > ROUNDING_MASS * ROUNDING_MASS * (diagonal[i] * diagonal[j]).abs()
     };
     neighbours(mass, rows, vertex, counts)
 }

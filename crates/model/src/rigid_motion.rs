@@ -61,7 +61,7 @@ pub(super) fn check_rigid_motion(
 /// stress. `fields` are the rigid motions, with rotations divided by a length.
 fn is_stressed(body: &Assembled, fields: &Mat<f64>, strained: &[usize], limit: f64) -> bool {
     /// Part of the forces that may deviate from theta x F.
-    const OTHER: f64 = 1e-3;
+    const MAX_FORCE_DEVIATION: f64 = 1e-3;
     let d = body.rows.dimension;
     let force = |row: usize, field: usize| {
         let (columns, values) = body.stiffness.row(row);
@@ -78,7 +78,7 @@ fn is_stressed(body: &Assembled, fields: &Mat<f64>, strained: &[usize], limit: f
             let block = [0, 1, 2].map(|k| [3, 4, 5].map(|field| force(3 * vertex + k, field)));
             let pairs = || (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
             let largest = pairs().map(|(k, l)| block[k][l].abs()).fold(0.0, f64::max);
-            pairs().all(|(k, l)| (block[k][l] + block[l][k]).abs() <= OTHER * largest)
+            pairs().all(|(k, l)| (block[k][l] + block[l][k]).abs() <= MAX_FORCE_DEVIATION * largest)
         })
 }
 

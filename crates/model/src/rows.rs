@@ -11,7 +11,7 @@ use flexbody_linalg::{SymmetricMatrix, connected_components};
 use std::ops::Range;
 
 /// Largest rigid motion of a row at rest, relative to a unit translation: rounding of the stiffness.
-const STILL: f64 = 1e-9;
+const MAX_MOTION_AT_REST: f64 = 1e-9;
 
 /// Rows of a model beyond its plain displacements, and the order of all rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -139,7 +139,7 @@ impl Rows {
     pub(super) fn are_still(&self) -> bool {
         let known = &self.recovered.fields;
         let rows = self.dimension * self.vectors.len();
-        (0..known.ncols()).all(|c| (0..rows).all(|row| known[(row, c)].abs() < STILL))
+        (0..known.ncols()).all(|c| (0..rows).all(|row| known[(row, c)].abs() < MAX_MOTION_AT_REST))
     }
 
     /// Returns the connected component of every vertex, numbered from 0 in the order of their first

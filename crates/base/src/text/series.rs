@@ -10,18 +10,18 @@ use crate::diagnostic::{Code, Diagnostic};
 use std::borrow::Cow;
 
 /// Number of bad rows that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN_ROWS: usize = 5;
 
 /// Smallest number of rows.
-const LEAST_ROWS: usize = 2;
+const MIN_ROWS: usize = 2;
 
 /// Distance of two rows, relative to the largest time of a table, below which they may differ by rounding only: times
 /// that are summed over ten thousand steps have this error.
-const ROUNDING: f64 = 1e-12;
+const ROUNDING_DISTANCE: f64 = 1e-12;
 
-/// Smallest distance of rows within [`ROUNDING`] of each other, relative to the usual distance of rows, that is still
-/// accepted: dates in seconds may have rows every millisecond.
-const UNUSUAL: f64 = 1e-3;
+/// Smallest distance of rows within [`ROUNDING_DISTANCE`] of each other, relative to the usual distance of rows, that
+/// is still accepted: dates in seconds may have rows every millisecond.
+const MIN_ROW_DISTANCE: f64 = 1e-3;
 
 /// Returns the first row whose time differs from the one before by rounding only; `None` if there is none. Between such
 /// rows a history would change at an arbitrary rate.
@@ -31,10 +31,11 @@ pub fn closer_than_rounding(times: &[f64]) -> Option<usize> {
     let largest = times.iter().fold(0.0f64, |most, time| most.max(time.abs()));
     let mut apart: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let ulps = 4.0 * f64::EPSILON * largest;
-    let is_close =
-        |apart: f64, usual: f64| apart <= ulps || (apart < ROUNDING * largest && apart < UNUSUAL * usual);
+    let is_close = |apart: f64, usual: f64| {
+        apart <= ulps || (apart < ROUNDING_DISTANCE * largest && apart < MIN_ROW_DISTANCE * usual)
+    };
     let shortest = apart.iter().copied().fold(f64::INFINITY, f64::min);
-    if shortest >= ROUNDING * largest {
+    if shortest >= ROUNDING_DISTANCE * largest {
         return None;
     }
     let middle = apart.len() / 2;
@@ -350,7 +351,7 @@ impl<'r> SeriesReader<'r> {
         if let Err(diagnostic) = self.row(line, text) {
             self.bad += 1;
             match self.bad {
-                bad if bad <= SHOWN => self.shown.push(diagnostic),
+                bad if bad <= MAX_SHOWN_ROWS => self.shown.push(diagnostic),
                 _ => self.first_not_shown = self.first_not_shown.or(Some(line)),
             }
         }
@@ -423,7 +424,7 @@ impl<'r> SeriesReader<'r> {
             self.shown.push(row_error(self.file, line, message));
         }
         let rows = self.series.times.len();
-        if self.bad == 0 && rows < LEAST_ROWS {
+        if self.bad == 0 && rows < MIN_ROWS {
             let count = if rows == 0 { "no rows" } else { "only one row" };
             let message = format!("file has {count}, a history needs two at least");
             self.shown.push(Diagnostic::new(Code::SeriesRow, message).in_file(self.file.path()));

@@ -6,7 +6,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use std::path::Path;
 
 /// Number of bad rows that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN: usize = 5;
 
 /// Column that a table may have.
 #[derive(Debug, Clone, Copy)]
@@ -158,7 +158,7 @@ impl<'a> BadRows<'a> {
     /// Adds the error of a row.
     pub fn add(&mut self, diagnostic: Diagnostic) {
         self.count += 1;
-        if self.shown.len() < SHOWN {
+        if self.shown.len() < MAX_SHOWN {
             self.shown.push(diagnostic.in_file(self.path));
         }
     }
@@ -231,9 +231,9 @@ pub fn integer(field: &[u8]) -> Option<i64> {
 
 /// Returns text of a file in a form that can be shown in a message.
 pub fn printable(text: &[u8]) -> String {
-    const SHOWN: usize = 60;
-    let end = if text.len() > SHOWN { "..." } else { "" };
-    format!("{}{end}", text[..text.len().min(SHOWN)].escape_ascii())
+    const MAX_CHARACTERS: usize = 60;
+    let end = if text.len() > MAX_CHARACTERS { "..." } else { "" };
+    format!("{}{end}", text[..text.len().min(MAX_CHARACTERS)].escape_ascii())
 }
 
 #[cfg(test)]

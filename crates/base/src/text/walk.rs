@@ -79,10 +79,10 @@ impl Walk<'_> {
     /// Returns the findings in the order of lines, up to a limit.
     fn told(mut self) -> Vec<Diagnostic> {
         /// Largest number of findings that are listed.
-        const SHOWN: usize = 200;
+        const MAX_SHOWN: usize = 200;
         self.found.sort_by_key(Diagnostic::line);
-        let more = self.found.len().saturating_sub(SHOWN);
-        self.found.truncate(SHOWN);
+        let more = self.found.len().saturating_sub(MAX_SHOWN);
+        self.found.truncate(MAX_SHOWN);
         if more > 0 {
             let message = format!("{more} more findings are not shown");
             self.found.push(Diagnostic::new(self.syntax, message).in_file(self.path));

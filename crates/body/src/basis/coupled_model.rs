@@ -16,7 +16,7 @@ use std::ops::Range;
 
 /// Largest deformation of a rigid interface, relative to the largest motion of any node, that rounding of
 /// single-precision modes explains.
-const RIGID: f64 = 1e-6;
+const MAX_RIGID_DEFORMATION: f64 = 1e-6;
 
 /// Model whose rigid interfaces move as rigid bodies: u = T y, with the pencil (T'KT, T'MT). Forces and
 /// displacements refer to all rows of the model. Without rigid interfaces T = 1.
@@ -53,7 +53,7 @@ impl<'m> CoupledModel<'m> {
         };
         let joints: Vec<CoupledInterface> = coupled_sets(model, &rigid)
             .into_iter()
-            .filter(|joint| deformation(model, joint, vectors) <= RIGID && is_apart(joint))
+            .filter(|joint| deformation(model, joint, vectors) <= MAX_RIGID_DEFORMATION && is_apart(joint))
             .collect();
         if joints.is_empty() {
             return Self::uncoupled(model);

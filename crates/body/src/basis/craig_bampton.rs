@@ -33,10 +33,10 @@ use flexbody_model::{Coupling, FeModel, rigid_count};
 
 /// Smallest relative M-norm that a shape must keep after projection against the shapes before it. Shapes
 /// below this limit are removed as dependent.
-const LEFT: f64 = 1e-8;
+const MIN_SHAPE_REMAINDER: f64 = 1e-8;
 
 /// Number of copies of the shapes held at once while they are made independent (measured: 18).
-const COPIES: u64 = 20;
+const SHAPE_COPIES: u64 = 20;
 
 /// Craig-Bampton basis: modes with all interfaces held, and constraint modes of all interfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -60,7 +60,7 @@ impl Basis for CraigBampton {
         let failed = |failure| explain(model, failure);
         // Remove rigid motion and dependent shapes.
         let shapes = side_by_side(&[parts.fixed_shapes().as_ref(), parts.constraint.as_ref()]);
-        let found = independent(&problem.pencil, rigid.as_ref(), shapes, LEFT)
+        let found = independent(&problem.pencil, rigid.as_ref(), shapes, MIN_SHAPE_REMAINDER)
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
         let mut notes = parts.notes(model, settings);
         notes.extend(parts.removed(&found, rigid_count(model.dimension())));
@@ -241,7 +241,7 @@ impl<'a> Parts<'a> {
             let which = removed.iter().map(|&j| self.name(j)).map(|(kind, name)| format!("{kind} {name}"));
             let which = named(which.collect());
             let message = format!(
-                "{} of {all} shapes are left out, they are rigid motions, move no mass, or add less than {LEFT:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
+                "{} of {all} shapes are left out, they are rigid motions, move no mass, or add less than {MIN_SHAPE_REMAINDER:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
                 removed.len()
             );
             Diagnostic::new(Code::ShapesDependent, message)
@@ -262,7 +262,7 @@ impl<'a> Parts<'a> {
         let counted = negative_pivots.filter(|_| proof == Proof::InertiaCount);
         // A mode below the shift that is left out is known by its eigenvalue.
         let next = self.fixed.next_eigenvalue.filter(|_| counted.is_some_and(|counted| counted > modes));
-        let cut = counted.and(next.map(|next| next * (1.0 - KNOWN)).or(Some(shift)));
+        let cut = counted.and(next.map(|next| next * (1.0 - MAX_FIXED_EIGENVALUE_ERROR)).or(Some(shift)));
         let (of_rigid, of_modes) =
             (coordinates_of(self.joints, rigid), coordinates_of(self.joints, solution.vectors.as_ref()));
         let FreeEstimate { estimate, lower } = free_estimate(
@@ -409,7 +409,7 @@ impl<'a> Parts<'a> {
 
 /// Bound of the relative error of a computed fixed-interface eigenvalue, far above the effect of its
 /// residual.
-const KNOWN: f64 = 1e-8;
+const MAX_FIXED_EIGENVALUE_ERROR: f64 = 1e-8;
 
 /// Computes the wanted fixed-interface modes. If none are wanted (static condensation), the first is
 /// computed nevertheless, since its eigenvalue limits the frequency range of the basis.
@@ -520,5 +520,5 @@ fn expanded(failure: EigenFailure, elimination: &Elimination) -> EigenFailure {
 
 /// Returns the bytes needed for `count` shapes of n rows.
 fn shape_bytes(n: usize, count: usize) -> u64 {
-    8 * COPIES * (n as u64) * (count as u64)
+    8 * SHAPE_COPIES * (n as u64) * (count as u64)
 }

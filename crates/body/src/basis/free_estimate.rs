@@ -17,11 +17,11 @@ use flexbody_linalg::{combine, gram, symmetric_eigen};
 use nalgebra::DMatrix;
 
 /// Relative energy below which a response outside the basis is rounding.
-const COUPLED: f64 = 1e-14;
+const ROUNDING_ENERGY: f64 = 1e-14;
 
 /// Largest number of dense eigenproblems solved for the lower bounds; with more modes, several modes share
 /// one problem.
-const PROBLEMS: usize = 64;
+const MAX_EIGENPROBLEMS: usize = 64;
 
 /// Static responses to the inertia of the interface motions (c of them), without their part in the basis.
 #[derive(Debug, Clone)]
@@ -64,7 +64,7 @@ pub(super) fn free_estimate(
     if let Some(cut) = cut {
         // Relative distance 1e-5 from the cut: closer to the cut the bound has no meaning.
         let below = theta.partition_point(|t| *t < cut * (1.0 - 1e-5));
-        for chunk in (0..below).collect::<Vec<_>>().chunks(below.div_ceil(PROBLEMS).max(1)) {
+        for chunk in (0..below).collect::<Vec<_>>().chunks(below.div_ceil(MAX_EIGENPROBLEMS).max(1)) {
             let highest = theta[chunk[chunk.len() - 1]];
             let bounds = weighed_down(theta, &blocks, highest * cut / (cut - highest))?;
             for &j in chunk {
@@ -91,7 +91,7 @@ fn corrected(
     let unit = |i: usize| if size[i] > 0.0 { 1.0 / size[i] } else { 0.0 };
     let scaled = Mat::from_fn(c, c, |i, j| unit(i) * lacking.stiffness[(i, j)] * unit(j));
     let eigen = symmetric_eigen(scaled.as_ref())?;
-    let kept: Vec<usize> = (0..c).filter(|&i| eigen.values[i] > COUPLED).collect();
+    let kept: Vec<usize> = (0..c).filter(|&i| eigen.values[i] > ROUNDING_ENERGY).collect();
     let k = kept.len();
     let corrections =
         Mat::from_fn(c, k, |i, j| unit(i) * eigen.vectors[(i, kept[j])] / eigen.values[kept[j]].sqrt());

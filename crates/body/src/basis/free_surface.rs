@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 /// Number of columns multiplied by K or M at a time if only products with other columns are needed; equals
 /// the width of one product.
-const PANEL: usize = 8;
+const PANEL_COLUMNS: usize = 8;
 
 /// Basis of the lowest free-surface modes.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -268,18 +268,19 @@ fn slope(monomial: &[usize], r: &[f64; 3], along: usize) -> f64 {
 fn resolved_ratio(pencil: &Pencil<'_>, x: MatRef<'_, f64>) -> Option<f64> {
     let energy = gram(x, pencil.apply_stiffness(x).as_ref())[(0, 0)];
     let noise = energy_noise(pencil.stiffness(), x, f64::EPSILON)[0];
-    (energy > RESOLVED * noise).then(|| energy / gram(x, pencil.apply_mass(x).as_ref())[(0, 0)])
+    (energy > MIN_ENERGY_PER_ROUNDING * noise)
+        .then(|| energy / gram(x, pencil.apply_mass(x).as_ref())[(0, 0)])
 }
 
 /// Ratio of energy to its rounding error above which a field gives a valid estimate of the first
 /// eigenvalue.
-const RESOLVED: f64 = 1e3;
+const MIN_ENERGY_PER_ROUNDING: f64 = 1e3;
 
 /// Returns X' f(X), where f takes a few columns at a time, so that f(X) is never stored as a whole.
 fn gram_in_panels(x: MatRef<'_, f64>, product: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> Mat<f64> {
     let mut whole = Mat::zeros(x.ncols(), x.ncols());
-    for start in (0..x.ncols()).step_by(PANEL) {
-        let width = PANEL.min(x.ncols() - start);
+    for start in (0..x.ncols()).step_by(PANEL_COLUMNS) {
+        let width = PANEL_COLUMNS.min(x.ncols() - start);
         let panel = gram(x, product(x.subcols(start, width)).as_ref());
         whole.as_mut().subcols_mut(start, width).copy_from(&panel);
     }

@@ -20,7 +20,7 @@ use std::collections::HashMap;
 /// Smallest singular value of the conditions of averaging interfaces that share nodes, each interface
 /// orthonormal by itself, above which the conditions count as independent. The static shapes lose as many
 /// digits as this value lies below one.
-const INDEPENDENT: f64 = 1e-4;
+const MIN_SINGULAR_VALUE: f64 = 1e-4;
 
 /// Checks that the coordinates of all `joints` can be prescribed at once, and that the body is held if they
 /// are zero.
@@ -187,7 +187,9 @@ impl Conditions {
             first += count;
         }
         let eigen = symmetric_eigen(gram(scaled.as_ref(), scaled.as_ref()).as_ref());
-        eigen.is_some_and(|eigen| eigen.values.first().is_some_and(|least| *least > INDEPENDENT.powi(2)))
+        eigen.is_some_and(|eigen| {
+            eigen.values.first().is_some_and(|least| *least > MIN_SINGULAR_VALUE.powi(2))
+        })
     }
 }
 

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Part of the rotational mass of a node that counts as rounding. Since M is positive semidefinite, the
 /// coupling of such a direction with other rows is at most the root of this part.
-const NOTHING: f64 = 1e-13;
+const ROUNDING_MASS: f64 = 1e-13;
 
 /// Rows of the model and the components of a motion that moves no mass.
 type LocalMotion = Vec<(usize, f64)>;
@@ -97,7 +97,7 @@ fn massless_rotations(model: &FeModel, first: usize, count: usize) -> Vec<LocalM
     let own = DMatrix::from_fn(count, count, |i, j| mass.as_csc().get(first + i, first + j));
     let SymmetricEigen { eigenvectors, eigenvalues } = own.clone().symmetric_eigen();
     let size = own.trace();
-    let is_massless = |&at: &usize| eigenvalues[at].abs() <= NOTHING * size;
+    let is_massless = |&at: &usize| eigenvalues[at].abs() <= ROUNDING_MASS * size;
     let motion = |at: usize| rows.clone().zip(eigenvectors.column(at).iter().copied()).collect();
     (0..count).filter(is_massless).map(motion).collect()
 }

@@ -74,13 +74,13 @@ pub struct ModalBasis {
 
 /// Relative energy of rigid motion above which the first mode is not a free mode: the body has a weak tie
 /// to ground.
-const RIGID_ENERGY: f64 = 0.05;
+const MAX_RIGID_ENERGY: f64 = 0.05;
 
 /// Decimal digits of numbers written without loss.
 const ALL_DIGITS: u8 = 17;
 
 /// Relative noise of lambda above which a diagnostic reports the noise.
-const NOISE_TOLD: f64 = 1e-6;
+const REPORTED_NOISE: f64 = 1e-6;
 
 /// Returns the relative error of the entries of K: half a unit of the last digit.
 pub(super) fn input_error(model: &FeModel) -> f64 {
@@ -116,7 +116,7 @@ impl ModalBasis {
         let (pencil, rigid) = (&problem.pencil, problem.rigid);
         let energy = gram(rigid, pencil.apply_stiffness(rigid).as_ref());
         let rigid_noise = energy.norm_l2() / first;
-        if rigid_noise > RIGID_ENERGY {
+        if rigid_noise > MAX_RIGID_ENERGY {
             return Err(rigid_motion_strained(rigid_noise).into());
         }
         let noise = energy_noise(pencil.stiffness(), solution.vectors.as_ref(), problem.input_error);
@@ -165,7 +165,7 @@ fn rigid_motion_strained(rigid_noise: f64) -> Diagnostic {
 /// Returns a diagnostic about the noise of the eigenvalues due to the digits of the input, if the noise is
 /// large enough.
 fn noise_note(model: &FeModel, noise: f64) -> Option<Diagnostic> {
-    if noise <= NOISE_TOLD {
+    if noise <= REPORTED_NOISE {
         return None;
     }
     let message = format!(

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// Backward error of a factorisation above which missing rows are not completed with it. It corresponds to
 /// the digits of the shapes.
-const INACCURATE: f64 = 1e-7;
+const MAX_BACKWARD_ERROR: f64 = 1e-7;
 
 /// Returns the modes with their values along the axes of the model.
 ///
@@ -103,7 +103,8 @@ fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &Raw
         let mut values = Mat::from_fn(missing.len(), 1, force);
         let factor = Indefinite::<f64>::new(&analysis, &own, lambda);
         let inertia = factor.inertia();
-        if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > INACCURATE {
+        if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > MAX_BACKWARD_ERROR
+        {
             return Err(refuse("they do not follow from the others").into());
         }
         factor.solve_in_place(values.as_mut());
@@ -141,14 +142,14 @@ pub(super) struct StatedModes {
 }
 
 /// Share of a mode, in the M-norm, that must lie in modes of its frequency.
-const ASSURED: f64 = 0.99;
+const MIN_FREQUENCY_SHARE: f64 = 0.99;
 
 /// Relative distance of eigenvalues below which modes count as one frequency: any mixture of their shapes
 /// is valid.
-const CLOSE: f64 = 1e-3;
+const SAME_FREQUENCY_DISTANCE: f64 = 1e-3;
 
 /// Largest number of modes that a message names one by one.
-const NAMED: usize = 3;
+const MAX_NAMED_MODES: usize = 3;
 
 /// Mode that differs from the data in its file.
 struct Difference {
@@ -182,14 +183,14 @@ impl StatedModes {
         let hertz = |eigenvalue: f64| model.units().frequency_of(eigenvalue.max(0.0));
         let said = |one: &Difference| {
             let (stated, own) = (hertz(one.stated), hertz(one.rayleigh));
-            let assurance = match one.assurance < ASSURED {
+            let assurance = match one.assurance < MIN_FREQUENCY_SHARE {
                 true => format!(", MAC {:.2}", one.assurance),
                 false => String::new(),
             };
             format!("mode {} has {stated:.6} Hz in the file, {own:.6} Hz by K and M{assurance}", one.mode + 1)
         };
-        let named: Vec<String> = different.iter().take(NAMED).map(said).collect();
-        let more = if different.len() > NAMED { "; ..." } else { "" };
+        let named: Vec<String> = different.iter().take(MAX_NAMED_MODES).map(said).collect();
+        let more = if different.len() > MAX_NAMED_MODES { "; ..." } else { "" };
         let message = format!(
             "{} of {} flexible modes differ: {}{more}",
             different.len(),
@@ -227,11 +228,12 @@ impl StatedModes {
             let rayleigh = energies[mode] / masses[mode];
             let square = |p: usize| shares[(p, mode)].powi(2);
             let all: f64 = (0..solution.eigenvalues.len()).map(square).sum();
-            let is_close = |p: &usize| (solution.eigenvalues[*p] - rayleigh).abs() <= CLOSE * rayleigh;
+            let is_close =
+                |p: &usize| (solution.eigenvalues[*p] - rayleigh).abs() <= SAME_FREQUENCY_DISTANCE * rayleigh;
             let close = (0..solution.eigenvalues.len()).filter(is_close).map(square).fold(0.0, |a, b| a + b);
             let assurance = if is_whole && all > 0.0 { close / all } else { 1.0 };
             let difference = (stated - rayleigh).abs();
-            if difference <= precision * stated.abs().max(rayleigh) && assurance >= ASSURED {
+            if difference <= precision * stated.abs().max(rayleigh) && assurance >= MIN_FREQUENCY_SHARE {
                 return None;
             }
             let noise = self.rounding_energy(&stiffness, shapes, mode) / masses[mode];

@@ -10,20 +10,20 @@ use flexbody_linalg::{
 
 /// Relative M-norm after removal of rigid motion below which a shape counts as a rigid motion. Rigid
 /// motions from eigen-solvers leave 1e-6 and less.
-const RIGID: f64 = 1e-5;
+const RIGID_REMAINDER: f64 = 1e-5;
 
 /// Squared M-norm of a shape relative to sum_i M_ii psi_i^2 below which the shape moves no mass: rounding
 /// leaves 1e-15.
-const MASSLESS: f64 = 1e-12;
+const MASSLESS_SHAPE: f64 = 1e-12;
 
 /// Limit of this ratio for the remainder of a shape after projection against others. With a singular M some
 /// combinations of shapes have almost no mass. Below the limit such a remainder, once normalised, would be
 /// so large and its eigenvalue so high that the other shapes lose their digits.
-const NEARLY_MASSLESS: f64 = 1e-4;
+const MASSLESS_REMAINDER: f64 = 1e-4;
 
 /// Elastic energy of the remainder of a shape, relative to that of the whole shape, above which the
 /// remainder is a massless motion and not the rounding error of a dependent shape.
-const ELASTIC: f64 = 1e-10;
+const MIN_ELASTIC_ENERGY: f64 = 1e-10;
 
 /// Linearly independent deformations in a set of shapes, and the removed shapes by reason (indices from 0).
 #[derive(Debug, Clone)]
@@ -55,7 +55,7 @@ pub(super) fn independent(
     set.scale_to_unit_mass()?;
     // Remove rigid motion twice: a shape may differ from a rigid motion only in its last digits.
     set.remove_rigid(rigid);
-    set.leave_out_rigid(RIGID.max(dependent));
+    set.leave_out_rigid(RIGID_REMAINDER.max(dependent));
     set.remove_rigid(rigid);
     let (mut found, without_mass) = set.orthonormalised(dependent);
     found.vectors = in_equilibrium(pencil, rigid, found.vectors, &without_mass);
@@ -108,10 +108,10 @@ impl<'a> ShapeSet<'a> {
     fn scale_to_unit_mass(&mut self) -> Option<()> {
         for (j, square) in self.squares().into_iter().enumerate() {
             let bound = diagonal_square(&self.mass_diagonal, &self.shapes, j);
-            if square < -MASSLESS.sqrt() * bound {
+            if square < -MASSLESS_SHAPE.sqrt() * bound {
                 return None;
             }
-            if square <= MASSLESS * bound {
+            if square <= MASSLESS_SHAPE * bound {
                 self.outcome.massless.push(j);
                 self.without_mass.push(self.shapes.as_ref().subcols(j, 1).to_owned());
                 self.is_in[j] = false;
@@ -162,9 +162,9 @@ impl<'a> ShapeSet<'a> {
             let square = column_products(vector.as_ref(), product.as_ref())[0];
             // With a singular M the remainder of shapes that have mass may have none.
             let bound = diagonal_square(&mass_diagonal, &vector, 0);
-            if square <= NEARLY_MASSLESS * bound {
+            if square <= MASSLESS_REMAINDER * bound {
                 outcome.massless.push(j);
-                if square <= MASSLESS * bound {
+                if square <= MASSLESS_SHAPE * bound {
                     without_mass.push(vector);
                 }
                 continue;
@@ -184,7 +184,7 @@ impl<'a> ShapeSet<'a> {
 /// Returns true if the remainder `left` of a shape has elastic energy of its own.
 fn is_elastic(pencil: &Pencil<'_>, left: &Mat<f64>, shape: MatRef<'_, f64>) -> bool {
     let energy = |x: MatRef<'_, f64>| column_products(x, pencil.apply_stiffness(x).as_ref())[0];
-    energy(left.as_ref()) > ELASTIC * energy(shape)
+    energy(left.as_ref()) > MIN_ELASTIC_ENERGY * energy(shape)
 }
 
 /// Moves the massless motions Z `without_mass` in the vectors V to elastic equilibrium, V - Z (Z'K Z)^-1
@@ -206,7 +206,7 @@ fn in_equilibrium(
     let sizes: Vec<f64> = (0..energy.nrows()).map(|j| energy[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
     let scaled = Mat::from_fn(sizes.len(), sizes.len(), |i, j| energy[(i, j)] / (sizes[i] * sizes[j]));
     let Some(eigen) = symmetric_eigen(scaled.as_ref()) else { return vectors };
-    let kept: Vec<usize> = (0..sizes.len()).filter(|&k| eigen.values[k] > ELASTIC).collect();
+    let kept: Vec<usize> = (0..sizes.len()).filter(|&k| eigen.values[k] > MIN_ELASTIC_ENERGY).collect();
     let unit = |j: usize, k: usize| eigen.vectors[(j, kept[k])] / (sizes[j] * eigen.values[kept[k]].sqrt());
     let unit = Mat::from_fn(sizes.len(), kept.len(), unit);
     let (motions, forces) =

@@ -26,11 +26,11 @@ use nalgebra::Vector3;
 /// Smallest relative M-norm that a response must keep after projection against the modes and the residual
 /// vectors before it. Responses below this limit are dropped. A larger value drops more loads; a smaller
 /// value admits vectors that consist of rounding errors.
-const LEFT: f64 = 1e-8;
+const MIN_RESPONSE_REMAINDER: f64 = 1e-8;
 
 /// Smallest norm of a self-equilibrated load relative to the norm of the load. A load below this limit
 /// moves the body only as a rigid body and needs no residual vector.
-const SELF_EQUILIBRATED: f64 = 1e-10;
+const MIN_SELF_EQUILIBRATED_NORM: f64 = 1e-10;
 
 /// Returns the static responses K^+ f to all columns of `loads` (N x m), made self-equilibrated by inertia
 /// relief. The accuracy is that of an estimate ([`ResponseAccuracy::ROUGH`]).
@@ -339,10 +339,10 @@ pub(super) fn interface_truncation(
 /// the modal search used.
 fn responses_fit(model: &FeModel, free: &EigenSolution, context: &Context<'_>) -> bool {
     /// Number of blocks of all loads held at once: forces, responses, and their products with K and M.
-    const BLOCKS: usize = 5;
+    const LOAD_BLOCKS: usize = 5;
     let loads = |set: &NodeSet| if set.coupling() == Coupling::Free { 3 * set.nodes.len() } else { 6 };
     let columns: usize = model.interfaces().iter().map(loads).sum();
-    let bytes = (BLOCKS * columns * free.vectors.nrows() * size_of::<f64>()) as u64;
+    let bytes = (LOAD_BLOCKS * columns * free.vectors.nrows() * size_of::<f64>()) as u64;
     let factor = free.plan.as_ref().map_or(0, Plan::bytes);
     bytes.saturating_add(factor) <= context.available()
 }
@@ -442,7 +442,7 @@ impl<'a> Responses<'a> {
             let left = self.mass_beside[j].max(0.0);
             if !self.deforms[j] {
                 dropped.push(format!("{name} (deforms nothing)"));
-            } else if left.sqrt() < LEFT * self.mass[j].sqrt() {
+            } else if left.sqrt() < MIN_RESPONSE_REMAINDER * self.mass[j].sqrt() {
                 dropped.push(format!("{name} ({})", part_in_words((left / self.mass[j]).sqrt())));
             } else {
                 used.push(j);
@@ -450,7 +450,7 @@ impl<'a> Responses<'a> {
         }
         let candidates = Mat::from_fn(self.beside.nrows(), used.len(), |i, j| self.beside[(i, used[j])]);
         let known = side_by_side(&[problem.rigid, modes]);
-        let found = independent(&problem.pencil, known.as_ref(), candidates, LEFT)?;
+        let found = independent(&problem.pencil, known.as_ref(), candidates, MIN_RESPONSE_REMAINDER)?;
         let name = |j: usize| &names[used[j]];
         dropped.extend(
             found.dependent.iter().map(|&(j, left)| format!("{} ({})", name(j), part_in_words(left))),
@@ -500,7 +500,8 @@ fn deforming(problem: &EigenProblem<'_>, forces: &Mat<f64>, energy: &[f64]) -> V
     let resultants = gram(problem.rigid, forces.as_ref());
     let equilibrated = forces - problem.pencil.apply_mass(problem.rigid) * resultants;
     let deforms = |j: usize| {
-        equilibrated.col(j).norm_l2() > SELF_EQUILIBRATED * forces.col(j).norm_l2() && energy[j] > 0.0
+        equilibrated.col(j).norm_l2() > MIN_SELF_EQUILIBRATED_NORM * forces.col(j).norm_l2()
+            && energy[j] > 0.0
     };
     (0..forces.ncols()).map(deforms).collect()
 }
@@ -539,7 +540,7 @@ impl Added {
         let dropped = &self.dropped;
         (!dropped.is_empty()).then(|| {
             let message = format!(
-                "{} of {} {what}s are left out, they add less than {LEFT:.0e} of their M-norm: {}",
+                "{} of {} {what}s are left out, they add less than {MIN_RESPONSE_REMAINDER:.0e} of their M-norm: {}",
                 dropped.len(),
                 names.len(),
                 dropped.join(", ")

@@ -37,11 +37,11 @@ pub struct LumpedPipeline {
 /// Relative difference of eigenvalues up to which modes count as one group with one frequency.
 /// Discretisation splits the pairs of symmetric parts by less, and any vectors of the group may be its
 /// modes. A larger value also warns about neighbours that are distinct.
-const SAME_FREQUENCY: f64 = 1e-3;
+const SAME_EIGENVALUE_DIFFERENCE: f64 = 1e-3;
 
 /// Cosine below which a direction of one subspace is closer to the complement of the other than to the
 /// other itself (45 degrees).
-const NEARLY_DISJOINT: f64 = std::f64::consts::FRAC_1_SQRT_2;
+const MIN_SUBSPACE_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 impl Lumping {
     /// Returns the masses of the nodes of `model`.
@@ -145,11 +145,11 @@ fn caution(
     let hertz = |lambda: f64| format!("{:.5} Hz", modal.model.units().frequency_of(lambda));
     let cut = cuts.iter().filter_map(|&(whose, last, next)| {
         let (last, next) = (last?, next?);
-        (next - last <= SAME_FREQUENCY * next).then(|| {
+        (next - last <= SAME_EIGENVALUE_DIFFERENCE * next).then(|| {
             format!("{count} modes cut a group of equal frequencies of the {whose} at {}", hertz(last))
         })
     });
-    let disjoint = (subspace_cosine < NEARLY_DISJOINT).then(|| {
+    let disjoint = (subspace_cosine < MIN_SUBSPACE_COSINE).then(|| {
         let angle = subspace_cosine.clamp(0.0, 1.0).acos().to_degrees();
         format!("the subspaces differ by {angle:.0} degrees: other modes are among the lowest {count}")
     });

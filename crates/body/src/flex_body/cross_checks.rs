@@ -6,7 +6,7 @@ use crate::invariants::{CauchySchwarz, IdentityCheck, LumpedScheme};
 use flexbody_linalg::{larger, largest};
 
 /// Allowed rounding error between two ways to one sum, relative to its Cauchy-Schwarz bound.
-const ROUNDING: f64 = 1e-12;
+const MAX_SUM_ROUNDING: f64 = 1e-12;
 
 impl Parts {
     /// Checks masses, modes and damping against each other.
@@ -38,7 +38,7 @@ impl Parts {
             "row_sums",
             "m, c and C1 of the row sums of M are those of M",
             value,
-            ROUNDING,
+            MAX_SUM_ROUNDING,
         ))
     }
 
@@ -47,7 +47,7 @@ impl Parts {
         let (own, rotation) = (self.inertia_stiffness.as_ref()?, self.modes.rotation.as_ref()?);
         let formula = "K = sum over the nodes of theta' (sym G - tr G I) theta";
         // Both rotations in a product are rounded.
-        let limit = ROUNDING + 4.0 * self.storage.rounding();
+        let limit = MAX_SUM_ROUNDING + 4.0 * self.storage.rounding();
         let value = own.deviation(rotation.as_ref(), self.dimension);
         Some(IdentityCheck::new("inertia_stiffness", formula, value, limit))
     }
@@ -63,6 +63,6 @@ impl Parts {
             if difference == 0.0 { 0.0 } else { difference / size }
         };
         let value = largest(self.modes.eigenvalue.iter().enumerate().map(difference));
-        Some(IdentityCheck::new("damping_ratios", "zeta_j = D_jj / (2 omega_j)", value, ROUNDING))
+        Some(IdentityCheck::new("damping_ratios", "zeta_j = D_jj / (2 omega_j)", value, MAX_SUM_ROUNDING))
     }
 }

@@ -8,7 +8,7 @@ use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen}
 
 /// Part of the squared M-norm left after removal of rigid motion, below which a combination of modes is a
 /// rigid motion.
-const RIGID: f64 = 1e-10;
+const RIGID_REMAINDER: f64 = 1e-10;
 
 /// New modes psi' = (Psi - R(x) A) X with the rigid motions R about the origin of the frame. The span of
 /// frame motion and modes does not change.
@@ -87,7 +87,7 @@ impl Split {
             modal[(i, j)] - (0..axes.len()).map(|k| whitened[(k, i)] * whitened[(k, j)]).sum::<f64>()
         };
         let own = |j: usize| beside(j, j) / modal[(j, j)];
-        if let Some(j) = (0..nf).find(|&j| own(j) < -RIGID) {
+        if let Some(j) = (0..nf).find(|&j| own(j) < -RIGID_REMAINDER) {
             return Err(format!(
                 "mode {} and rigid motion together have negative kinetic energy: mass, coupling and modal mass do not belong together",
                 j + 1
@@ -103,7 +103,7 @@ impl Split {
         let Some(eigen) = symmetric_eigen(relative.as_ref()) else {
             return Err("the modal mass holds numbers that are not finite".to_owned());
         };
-        let count = eigen.values.iter().filter(|left| **left <= RIGID).count();
+        let count = eigen.values.iter().filter(|left| **left <= RIGID_REMAINDER).count();
         if count == nf {
             return Err("all modes are rigid motions: nothing deforms the body".to_owned());
         }
@@ -114,7 +114,10 @@ impl Split {
             rigid: Mat::from_fn(6, nf, |k, j| row(k).map_or(0.0, |row| nearest[(row, j)])),
             deforming: solve_upper(&modal_lower, &vectors),
             left: eigen.values[count..].to_vec(),
-            rigid_motions: RigidMotions { count, modes: (0..nf).filter(|&j| own(j) <= RIGID).collect() },
+            rigid_motions: RigidMotions {
+                count,
+                modes: (0..nf).filter(|&j| own(j) <= RIGID_REMAINDER).collect(),
+            },
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{MassStructure, Parts, ReferenceConditions, SurfaceMesh, TermGroup};
 use crate::invariants::{DIGITS, InertiaStiffness};
-use crate::problems::{LARGEST, Problems};
+use crate::problems::{MAX_NUMBER, Problems};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_model::{Coupling, UnitLoad};
 use nalgebra::Matrix3;
@@ -22,7 +22,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.nodes(parts);
     check.mesh(parts, n);
     check.modes(parts, n, nf);
-    if !(parts.units.hertz().is_finite() && parts.units.hertz() * LARGEST.sqrt() <= LARGEST) {
+    if !(parts.units.hertz().is_finite() && parts.units.hertz() * MAX_NUMBER.sqrt() <= MAX_NUMBER) {
         check.add(format!(
             "`units.time` is {} s, too short for frequencies in hertz",
             parts.units.time.name()

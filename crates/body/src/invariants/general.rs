@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of columns of X multiplied by M at a time. A larger block needs more memory.
-const BLOCK: usize = 32;
+const COLUMNS_PER_BLOCK: usize = 32;
 
 /// Product of a symmetric mass matrix with columns.
 pub trait MassProduct: Sync {
@@ -175,8 +175,8 @@ impl<'a> GeneralColumns<'a> {
         mass.times(self.motion.fields, y.as_mut());
         let first_mode = count - self.shapes.ncols();
         let mut all = Mat::from_fn(count, count, |i, j| if i == j && i >= first_mode { 1.0 } else { 0.0 });
-        for start in (0..count).step_by(BLOCK) {
-            let columns = start..(start + BLOCK).min(count);
+        for start in (0..count).step_by(COLUMNS_PER_BLOCK) {
+            let columns = start..(start + COLUMNS_PER_BLOCK).min(count);
             let part = gram(self.block(columns.clone()).as_ref(), y.as_ref());
             for (k, column) in columns.enumerate() {
                 for row in 0..r.min(column + 1) {
@@ -191,8 +191,10 @@ impl<'a> GeneralColumns<'a> {
     /// Returns X' M X, exactly symmetric.
     fn gram(&self, mass: &(impl MassProduct + ?Sized)) -> Mat<f64> {
         let count = self.count();
-        let blocks: Vec<Range<usize>> =
-            (0..count).step_by(BLOCK).map(|start| start..(start + BLOCK).min(count)).collect();
+        let blocks: Vec<Range<usize>> = (0..count)
+            .step_by(COLUMNS_PER_BLOCK)
+            .map(|start| start..(start + COLUMNS_PER_BLOCK).min(count))
+            .collect();
         let mut all = Mat::zeros(count, count);
         for (right, columns) in blocks.iter().enumerate() {
             let x = self.block(columns.clone());

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 /// Allowed difference of reference points, relative to the coordinates of the nodes: the rounding of the
 /// change of frame.
-const PLACE: f64 = 1e-12;
+const MAX_POINT_DIFFERENCE: f64 = 1e-12;
 
 /// Compares names, nodes, couplings and reference points; empty if neither has interfaces. Bodies from
 /// files of versions without reference points have none. A body of an earlier version has the mean of the
@@ -47,7 +47,7 @@ pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<Identity
             "reference_points",
             "x_ref = A' (x_model - origin)",
             moved.fold(0.0, f64::max),
-            PLACE,
+            MAX_POINT_DIFFERENCE,
         ),
     ]
 }

@@ -8,11 +8,11 @@ use flexbody_linalg::{combine, gram, larger, largest};
 use flexbody_model::{Coupling, rigid_count};
 
 /// Allowed rounding error of a rigid motion of the nodes of an interface, relative to its largest motion.
-const RIGID: f64 = 1e-8;
+const MAX_RIGID_ROUNDING: f64 = 1e-8;
 /// Allowed rounding error of error norms, which are relative differences of nearly equal numbers.
-const NORMS: f64 = 1e-9;
+const MAX_NORM_ROUNDING: f64 = 1e-9;
 /// Allowed rounding error between coordinates computed from the shapes in two ways.
-const COORDINATES: f64 = 1e-9;
+const MAX_COORDINATE_ROUNDING: f64 = 1e-9;
 
 /// Returns the checks of all statements that the body makes.
 pub(super) fn recounts(body: &FlexBody) -> Vec<IdentityCheck> {
@@ -48,7 +48,8 @@ fn fixed_interface_modes(body: &FlexBody) -> Option<IdentityCheck> {
     let lambda = fixed_eigenvalues(coordinates);
     let below = lambda.iter().filter(|lambda| **lambda < *shift).count();
     let count = counted.map_or(0.0, |counted| apart(below, counted.min(*modes)));
-    let order = next.is_some_and(|next| lambda.iter().any(|lambda| *lambda > next * (1.0 + RIGID)));
+    let order =
+        next.is_some_and(|next| lambda.iter().any(|lambda| *lambda > next * (1.0 + MAX_RIGID_ROUNDING)));
     let value = apart(lambda.len(), *modes)
         + apart(coordinates.names.len(), modes.saturating_add(*interface_motions))
         + count
@@ -77,7 +78,7 @@ fn rigid_interfaces(body: &FlexBody) -> Option<IdentityCheck> {
     }
     let rigid = body.interfaces().iter().filter(|one| one.coupling == Some(Coupling::Rigid));
     let value = largest(rigid.map(|interface| deformation(body, interface)));
-    let limit = RIGID + 4.0 * body.storage().rounding();
+    let limit = MAX_RIGID_ROUNDING + 4.0 * body.storage().rounding();
     let formula = "nodes of rigid interfaces move as their reference points";
     Some(IdentityCheck::new("rigid_interfaces", formula, value, limit))
 }
@@ -121,7 +122,7 @@ fn coordinates_of_modes(body: &FlexBody) -> Option<IdentityCheck> {
     });
     let value = larger(largest(momentum), reference_difference(body, b));
     let certificate = body.certificate();
-    let limit = COORDINATES
+    let limit = MAX_COORDINATE_ROUNDING
         + 10.0 * certificate.rigid_noise
         + certificate.eigenvalue_rounding
         + body.storage().rounding();
@@ -177,7 +178,7 @@ fn lumped_errors(body: &FlexBody) -> Option<IdentityCheck> {
     if body.lumped().is_empty() {
         return None;
     }
-    let limit = NORMS + 100.0 * body.storage().rounding();
+    let limit = MAX_NORM_ROUNDING + 100.0 * body.storage().rounding();
     let formula = "error norms of the lumped comparators";
     Some(IdentityCheck::new("lumped_errors", formula, largest(body.lumped().iter().map(own)), limit))
 }

@@ -5,7 +5,7 @@ use flexbody_base::text::InputFile;
 use std::ops::Range;
 
 /// Bytes of cards that one thread reads at a time.
-const PART: usize = 1 << 20;
+const BYTES_PER_TASK: usize = 1 << 20;
 
 /// Lines of consecutive DMIG cards.
 pub(crate) struct MatrixLines<'a> {
@@ -37,7 +37,7 @@ impl<'a> MatrixLines<'a> {
             if begins_matrix(line) {
                 let is_header = is_header(line);
                 match parts.last_mut() {
-                    Some(part) if !is_header && !part.is_header && part.bytes.len() < PART => {
+                    Some(part) if !is_header && !part.is_header && part.bytes.len() < BYTES_PER_TASK => {
                         part.bytes.end = end;
                     }
                     _ => parts.push(Part { bytes: at..end, above: last_line, is_header }),

@@ -6,7 +6,7 @@ use crate::coordinates::real;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
 /// Largest number of cards that one line may represent.
-const MOST_REPEATED: i64 = 1_000_000;
+const MAX_REPEATED_CARDS: i64 = 1_000_000;
 
 /// Change of a field from card to card.
 #[derive(Clone)]
@@ -40,7 +40,8 @@ impl Replication {
     pub(super) fn asked(line: &Line<'_>) -> Result<Option<Asked>, Diagnostic> {
         let Some(rest) = line.head().strip_prefix(b"=") else { return Ok(None) };
         if !rest.is_empty() && rest != b"=" {
-            let count = whole(without_brackets(rest)).filter(|count| (1..=MOST_REPEATED).contains(count));
+            let count =
+                whole(without_brackets(rest)).filter(|count| (1..=MAX_REPEATED_CARDS).contains(count));
             let message = "expected a number of repetitions, as in =(4)";
             return count.map(|count| Some(Asked::Repeat(count))).ok_or_else(|| bad(message));
         }

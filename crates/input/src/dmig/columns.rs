@@ -39,7 +39,7 @@ impl Columns {
     /// Adds the entries of a card; for a bad card those before the error.
     pub(super) fn card(&mut self, card: &Card, path: &Path, heads: &Heads) {
         if let Err(bad) = self.column(card, path, heads)
-            && self.bad.len() < super::SHOWN
+            && self.bad.len() < super::MAX_SHOWN_CARDS
         {
             self.bad.push(bad);
         }

@@ -17,7 +17,7 @@ use hdf5_metno::Group;
 use std::path::Path;
 
 /// Number of entries read at a time.
-const PIECE: usize = 1 << 20;
+const ENTRIES_PER_READ: usize = 1 << 20;
 
 /// Reads the matrix in `group`, which messages call `name`.
 pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Found<RawMatrix> {
@@ -217,7 +217,7 @@ impl GroupReader<'_> {
         mut keep: impl FnMut(Entry),
     ) -> Found<Sides> {
         // Pieces consist of whole chunks, so that no chunk is unpacked twice.
-        let step = indices.iter().map(|v| v.chunk).fold(PIECE.max(values.chunk), usize::max);
+        let step = indices.iter().map(|v| v.chunk).fold(ENTRIES_PER_READ.max(values.chunk), usize::max);
         let mut sides = Sides::default();
         let mut bad = Bad { n, shown: Vec::new(), count: 0 };
         for start in (0..values.len).step_by(step) {

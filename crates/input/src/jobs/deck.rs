@@ -9,10 +9,10 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Depth of included files above which a file is taken to include itself.
-const DEEPEST: usize = 20;
+const MAX_INCLUDE_DEPTH: usize = 20;
 
 /// Largest number of included files, each counted as often as it is included.
-const MOST_FILES: usize = 1000;
+const MAX_FILES: usize = 1000;
 
 /// Deck with all files that it includes.
 pub(super) struct Deck {
@@ -107,9 +107,10 @@ impl Deck {
 
     fn include(&mut self, path: &Path, depth: usize) -> Result<(), Diagnostic> {
         let file = InputFile::open(path)?;
-        if depth > DEEPEST || self.files.len() >= MOST_FILES {
-            let message =
-                format!("files include one another more than {DEEPEST} levels deep, or {MOST_FILES} times");
+        if depth > MAX_INCLUDE_DEPTH || self.files.len() >= MAX_FILES {
+            let message = format!(
+                "files include one another more than {MAX_INCLUDE_DEPTH} levels deep, or {MAX_FILES} times"
+            );
             return Err(Diagnostic::new(Code::DeckSyntax, message)
                 .in_file(path)
                 .with_help("a file includes itself: take the *INCLUDE out"));

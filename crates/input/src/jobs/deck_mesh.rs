@@ -11,13 +11,13 @@ use nalgebra::{Rotation3, Unit, Vector3};
 use std::collections::{BTreeMap, HashMap};
 
 /// Number of bad lines of a deck that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN_LINES: usize = 5;
 
 /// Largest number of members of a line of a generated set.
-const MOST_GENERATED: i64 = 100_000_000;
+const MAX_GENERATED: i64 = 100_000_000;
 
 /// Upper limit of the numbers of renumbered nodes.
-const LARGEST: i64 = 1_000_000_000_000;
+const MAX_NODE_NUMBER: i64 = 1_000_000_000_000;
 
 /// Nodes, elements and node sets in the numbering of the whole model.
 #[derive(Debug, Default)]
@@ -139,7 +139,7 @@ impl Scopes {
         let unique = placed.iter().all(|(_, scope)| scope.nodes.keys().all(|id| taken.insert(*id)));
         let keys = placed.iter().map(|(_, scope)| &scope.nodes).chain([&self.top.nodes]);
         let highest = keys.filter_map(|nodes| nodes.keys().next_back().copied()).max().unwrap_or(0);
-        if !unique && highest > LARGEST / placed.len() as i64 {
+        if !unique && highest > MAX_NODE_NUMBER / placed.len() as i64 {
             let message =
                 format!("instances share node numbers, which are too large ({highest}) to be changed");
             return Err(vec![Diagnostic::new(Code::DeckUnsupported, message)]);
@@ -236,7 +236,7 @@ impl DeckMeshReader<'_> {
 
     fn complain(&mut self, diagnostic: Diagnostic) {
         self.bad_count += 1;
-        if self.bad.len() < SHOWN {
+        if self.bad.len() < MAX_SHOWN_LINES {
             self.bad.push(diagnostic);
         }
     }
@@ -456,7 +456,7 @@ fn range(bounds: &[i64]) -> Option<(i64, i64, i64)> {
         [first, last, step] if step > 0 => (first, last, step),
         _ => return None,
     };
-    let few = last.checked_sub(first).is_some_and(|length| length / step < MOST_GENERATED);
+    let few = last.checked_sub(first).is_some_and(|length| length / step < MAX_GENERATED);
     (first <= last && few).then_some((first, last, step))
 }
 

@@ -8,7 +8,7 @@ use flexbody_base::text::table::integer;
 use std::collections::{BTreeMap, HashMap};
 
 /// Number of instances that a message names.
-const NAMED: usize = 5;
+const MAX_NAMED: usize = 5;
 
 /// Members of a set, or the reason why it cannot be resolved.
 pub(super) type Found<T> = Result<Vec<T>, Diagnostic>;
@@ -114,7 +114,7 @@ impl Sets {
                     1 => add(name.clone(), members, *shift),
                     // The first of several instances reports the ambiguity.
                     _ if instances[..k].iter().all(|(_, scope, _)| scope.sets.find(name).is_none()) => {
-                        let names = others().take(NAMED).map(|(own, ..)| format!("{own}.{name}"));
+                        let names = others().take(MAX_NAMED).map(|(own, ..)| format!("{own}.{name}"));
                         add(name.clone(), &Err(ambiguous(name, &names.collect::<Vec<_>>())), 0);
                     }
                     _ => {}

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// Number of bad lines of a file that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN_LINES: usize = 5;
 
 /// Reads two matrices and the labels of their rows.
 ///
@@ -97,7 +97,7 @@ fn bad_lines(pieces: &[LabelledEntries], path: &Path) -> Vec<Diagnostic> {
         told.extend(piece.bad.iter().map(|(line, bad)| bad.clone().in_file(path).at_line(before + line)));
         before += piece.lines;
     }
-    told.truncate(SHOWN);
+    told.truncate(MAX_SHOWN_LINES);
     told
 }
 
@@ -133,7 +133,7 @@ impl LabelledEntries {
                     let (row, col) = (place(row), place(col));
                     piece.entries.push(Entry { row, col, value });
                 }
-                None if piece.bad.len() < SHOWN => {
+                None if piece.bad.len() < MAX_SHOWN_LINES => {
                     const LINE: &str = "node, direction, node, direction, value";
                     piece.bad.push((number, expected(Code::MatrixSyntax, LINE, line)));
                 }

@@ -11,7 +11,7 @@ use std::path::Path;
 pub(super) const SINGLE_DIGITS: u8 = 7;
 
 /// Number of rows from which on the start of a string does not fit into one word with its length.
-const BIG: u64 = 65_536;
+const MIN_ROWS_OF_TWO_WORDS: u64 = 65_536;
 
 /// Header of a matrix.
 #[derive(Debug, Clone)]
@@ -52,7 +52,7 @@ impl Header {
             columns: columns.unsigned_abs(),
             form,
             kind,
-            is_big: rows < 0 || rows.unsigned_abs() >= BIG,
+            is_big: rows < 0 || rows.unsigned_abs() >= MIN_ROWS_OF_TWO_WORDS,
         })
     }
 
@@ -140,7 +140,7 @@ pub(super) struct Stretch {
 
 impl Stored {
     /// Bytes of columns that one thread reads at a time.
-    const STRETCH: usize = 1 << 20;
+    const BYTES_PER_TASK: usize = 1 << 20;
 
     pub(super) fn new(header: Header) -> Self {
         Self { header, stretches: Vec::new(), values: 0, ascending: true, last: None }
@@ -152,7 +152,7 @@ impl Stored {
         self.last = Some(column);
         self.values += values;
         match self.stretches.last_mut() {
-            Some(stretch) if stretch.bytes.len() < Self::STRETCH => stretch.bytes.end = bytes.end,
+            Some(stretch) if stretch.bytes.len() < Self::BYTES_PER_TASK => stretch.bytes.end = bytes.end,
             _ => self.stretches.push(Stretch { bytes, line }),
         }
     }

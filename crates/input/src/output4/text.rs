@@ -223,14 +223,14 @@ impl<'a> Text<'a> {
         columns: &mut Columns,
     ) -> Result<(), Diagnostic> {
         /// Number of values, for each of the [`Columns`], whose written digits are counted.
-        const COUNTED: usize = 512;
+        const MAX_COUNTED_VALUES: usize = 512;
         let number = field.trim_ascii();
         let value = real(number).ok_or_else(|| {
             let what = format!("a number of {} characters", field.len());
             let diagnostic = expected(Code::MatrixSyntax, &what, field).at_line(self.lines.number);
             diagnostic.with_help("write the file again")
         })?;
-        if columns.count() < COUNTED {
+        if columns.count() < MAX_COUNTED_VALUES {
             columns.written = columns.written.max(written_digits(number));
         }
         columns.push(row, column, value).map_err(|d| d.at_line(self.lines.number))

@@ -5,16 +5,16 @@ use super::blocks::{BlockMatrix, Entries};
 use rayon::prelude::*;
 
 /// Number of nodes per parallel task.
-const NODES: usize = 256;
+const NODES_PER_TASK: usize = 256;
 /// Number of groups per parallel task.
-const GROUPS: usize = 16;
+const GROUPS_PER_TASK: usize = 16;
 
 /// Length of a motion of a group after orthogonalisation, relative to its full length, up to which it counts as
 /// dependent.
-const DEPENDENT: f64 = 1e-5;
+const DEPENDENT_MOTION_LENGTH: f64 = 1e-5;
 
 /// Size of a pivot of a node's diagonal block, relative to its diagonal entry, up to which it counts as zero.
-const NO_PIVOT: f64 = 1e-10;
+const ZERO_PIVOT_RATIO: f64 = 1e-10;
 
 /// Block in double precision.
 pub(super) type Block<const R: usize, const C: usize> = [[f64; C]; R];
@@ -55,7 +55,7 @@ pub(super) fn stored<const B: usize>(a: &impl SymmetricBlocks<B>) -> BlockMatrix
         a.visit(node, |column, block| row.push((column as u32, narrow(block))));
         row
     };
-    BlockMatrix::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES).map(row).collect())
+    BlockMatrix::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK).map(row).collect())
 }
 
 /// Returns the diagonal block of each node.
@@ -69,7 +69,7 @@ pub(super) fn diagonal<const B: usize>(a: &impl SymmetricBlocks<B>) -> Vec<Block
         });
         own
     };
-    (0..a.nodes()).into_par_iter().with_min_len(NODES).map(own).collect()
+    (0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK).map(own).collect()
 }
 
 /// Returns the inverse of a symmetric positive definite matrix by its Cholesky factor; `None` for any other matrix.
@@ -78,7 +78,7 @@ pub(super) fn inverse<const B: usize>(a: &Block<B, B>) -> Option<Block<B, B>> {
     for j in 0..B {
         // Cholesky factor L, column by column.
         let pivot = a[j][j] - l[j][..j].iter().map(|x| x * x).sum::<f64>();
-        if pivot.is_nan() || pivot <= NO_PIVOT * a[j][j] {
+        if pivot.is_nan() || pivot <= ZERO_PIVOT_RATIO * a[j][j] {
             return None;
         }
         l[j][j] = pivot.sqrt();
@@ -118,7 +118,7 @@ pub(super) fn strong_couplings<const B: usize>(
         });
         row
     };
-    Strong::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES).map(row).collect())
+    Strong::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK).map(row).collect())
 }
 
 /// Groups of a level, with an orthonormal basis of the motions of each.
@@ -140,7 +140,7 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
         // Orthonormalise the motions of each group.
         let found: Vec<(Motions<B, C>, Block<C, C>)> = members
             .par_iter()
-            .with_min_len(GROUPS)
+            .with_min_len(GROUPS_PER_TASK)
             .map(|members| orthonormal(members.iter().map(|&node| motions[node as usize]).collect()))
             .collect();
         let mut basis = vec![[[0.0; C]; B]; of_node.len()];
@@ -184,7 +184,7 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
                 std::array::from_fn(|b| std::array::from_fn(|c| entry(b, c)))
             })
         };
-        let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES);
+        let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK);
         BlockMatrix::from_rows(nodes.map_init(|| Sums::new(self.count), row).collect())
     }
 }
@@ -206,7 +206,7 @@ fn orthonormal<const B: usize, const C: usize>(mut own: Motions<B, C>) -> (Motio
             }
         }
         let length = product(&own, j, j).sqrt();
-        let is_new = length > DEPENDENT * before;
+        let is_new = length > DEPENDENT_MOTION_LENGTH * before;
         coefficients[j][j] = if is_new { length } else { 0.0 };
         let scale = if is_new { 1.0 / length } else { 0.0 };
         own.iter_mut().flatten().for_each(|row| row[j] *= scale);
@@ -229,7 +229,7 @@ pub(super) fn galerkin<const B: usize, const C: usize>(
         });
         sums.take(|_, sum| narrow(sum))
     };
-    let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES);
+    let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK);
     let ap = BlockMatrix::from_rows(nodes.map_init(|| Sums::new(count), forces).collect());
     let row = |sums: &mut Sums<C, C>, group: usize| {
         for (node, motion) in r.row(group) {
@@ -244,7 +244,7 @@ pub(super) fn galerkin<const B: usize, const C: usize>(
             block
         })
     };
-    let groups = (0..count).into_par_iter().with_min_len(GROUPS);
+    let groups = (0..count).into_par_iter().with_min_len(GROUPS_PER_TASK);
     BlockMatrix::from_rows(groups.map_init(|| Sums::new(count), row).collect())
 }
 

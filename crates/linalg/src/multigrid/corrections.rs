@@ -12,16 +12,16 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of nodes per parallel task.
-const NODES: usize = 512;
+const NODES_PER_TASK: usize = 512;
 
 /// Largest number of steps for which other columns wait for a column.
-const MOST_STEPS: usize = 6;
+const MAX_AWAITED_STEPS: usize = 6;
 
 /// Part of the error that the first step is expected to leave.
-const LEFT_AT_FIRST: f64 = 0.2;
+const FIRST_STEP_ERROR_FRACTION: f64 = 0.2;
 
 /// Part of the error below which single precision allows no further gain.
-const NOTHING_LEFT: f64 = 1e-4;
+const SINGLE_PRECISION_ERROR_FLOOR: f64 = 1e-4;
 
 /// Goal of a correction.
 #[derive(Debug, Clone, Copy)]
@@ -156,7 +156,7 @@ impl<'a, const B: usize> Work<'a, B> {
             return;
         }
         // Start from t = 0: the residual is the force, in single precision.
-        let blocks = r.par_iter_mut().zip(t).zip(p).enumerate().with_min_len(NODES);
+        let blocks = r.par_iter_mut().zip(t).zip(p).enumerate().with_min_len(NODES_PER_TASK);
         blocks.for_each(|(node, ((r, t), p))| {
             for &(w, force) in &fresh {
                 for b in 0..B {
@@ -172,7 +172,7 @@ impl<'a, const B: usize> Work<'a, B> {
         let mut beta = [0.0f32; WIDTH];
         for ((slot, &rz), beta) in self.slots.iter_mut().zip(rz).zip(&mut beta) {
             let Some(slot) = slot else { continue };
-            let mut left = LEFT_AT_FIRST;
+            let mut left = FIRST_STEP_ERROR_FRACTION;
             if slot.steps == 0 {
                 slot.first = rz;
             } else {
@@ -182,12 +182,12 @@ impl<'a, const B: usize> Work<'a, B> {
             }
             slot.last = rz;
             slot.steps += 1;
-            slot.is_reached |= left <= slot.aim.left || slot.steps >= MOST_STEPS;
-            slot.is_at_end = left <= NOTHING_LEFT;
+            slot.is_reached |= left <= slot.aim.left || slot.steps >= MAX_AWAITED_STEPS;
+            slot.is_at_end = left <= SINGLE_PRECISION_ERROR_FLOOR;
         }
         // A column with NaN gets a zero direction.
         let is_number = rz.map(f64::is_finite);
-        self.p.par_iter_mut().zip(z).with_min_len(NODES).for_each(|(p, z)| {
+        self.p.par_iter_mut().zip(z).with_min_len(NODES_PER_TASK).for_each(|(p, z)| {
             for b in 0..B {
                 for w in 0..WIDTH {
                     p[b][w] = if is_number[w] { z[b][w] + beta[w] * p[b][w] } else { 0.0 };
@@ -209,7 +209,7 @@ impl<'a, const B: usize> Work<'a, B> {
             alpha[w] = f32::from(u8::from(slot.steps == 1));
             (slot.is_reached, slot.is_at_end) = (true, true);
         }
-        let blocks = self.t.par_iter_mut().zip(&mut self.r).zip(&self.p).zip(q).with_min_len(NODES);
+        let blocks = self.t.par_iter_mut().zip(&mut self.r).zip(&self.p).zip(q).with_min_len(NODES_PER_TASK);
         blocks.for_each(|(((t, r), p), q)| {
             for b in 0..B {
                 for w in 0..WIDTH {
@@ -230,7 +230,7 @@ impl<'a, const B: usize> Work<'a, B> {
         let mut ended = Vec::new();
         for (w, slot) in slots.iter_mut().enumerate() {
             let Some(Slot { column, .. }) = slot.take_if(|slot| ends(slot)) else { continue };
-            columns[column].par_chunks_mut(B).zip(&*t).with_min_len(NODES).for_each(|(own, t)| {
+            columns[column].par_chunks_mut(B).zip(&*t).with_min_len(NODES_PER_TASK).for_each(|(own, t)| {
                 own.iter_mut().zip(t).for_each(|(own, t)| *own = f64::from(t[w]));
             });
             ended.push(w);
@@ -238,7 +238,7 @@ impl<'a, const B: usize> Work<'a, B> {
         if ended.is_empty() || is_last {
             return;
         }
-        r.par_iter_mut().zip(p).with_min_len(NODES).for_each(|(r, p)| {
+        r.par_iter_mut().zip(p).with_min_len(NODES_PER_TASK).for_each(|(r, p)| {
             for &w in &ended {
                 (0..B).for_each(|b| (r[b][w], p[b][w]) = (0.0, 0.0));
             }

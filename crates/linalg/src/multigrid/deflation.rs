@@ -6,11 +6,11 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 /// Number of rows per partial product.
-const ROWS: usize = 4096;
+const ROWS_PER_PARTIAL_PRODUCT: usize = 4096;
 
 /// Distance of two eigenvalues, relative to one of them, up to which only M-orthogonality is applied: (K - theta
 /// M)-orthogonality would divide by a small number.
-const NEAR: f64 = 0.1;
+const NEAR_EIGENVALUE_DISTANCE: f64 = 0.1;
 
 /// Modes from which corrections are kept apart.
 pub struct Near<'a> {
@@ -63,7 +63,7 @@ impl<'a> Deflation<'a> {
     /// to the correction (deflated conjugate gradients: Saad, Yeung, Erhel and Guyomarc'h, SIAM J. Sci. Comput. 21
     /// (2000) 1909).
     pub(super) fn project<const B: usize>(&self, z: &mut [Rows<B>], pairs: &[Option<usize>; WIDTH]) {
-        let nodes = ROWS / B;
+        let nodes = ROWS_PER_PARTIAL_PRODUCT / B;
         let products = |(chunk, z): (usize, &[Rows<B>])| {
             let (start, rows) = (chunk * nodes * B, z.len() * B);
             let z = MatRef::from_row_major_slice(z.as_flattened().as_flattened(), rows, WIDTH);
@@ -84,7 +84,7 @@ impl<'a> Deflation<'a> {
             let conjugate = mode.zip(pairs[w]).and_then(|(mode, pair)| {
                 let theta = self.eigenvalues[pair];
                 let distance = self.eigenvalues[mode] - theta;
-                let is_apart = mode != pair && distance.abs() > NEAR * theta.abs();
+                let is_apart = mode != pair && distance.abs() > NEAR_EIGENVALUE_DISTANCE * theta.abs();
                 is_apart.then(|| (self.unit * sum(1, mode, w) - theta * heavy) / distance)
             });
             conjugate.unwrap_or(heavy) as f32

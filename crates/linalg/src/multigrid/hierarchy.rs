@@ -14,24 +14,24 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Largest number of rows of a level that is solved with a dense matrix.
-const BOTTOM: usize = 1500;
+const MAX_COARSEST_ROWS: usize = 1500;
 
 /// Largest number of levels. Each has at most about a tenth of the rows of the finer one.
-const MOST_LEVELS: usize = 10;
+const MAX_LEVELS: usize = 10;
 
 /// Coupling, relative to the diagonal, above which neighbours on the finest level are strongly coupled.
-const STRONG: f64 = 0.02;
+const FINEST_STRONG_COUPLING: f64 = 0.02;
 /// Coupling, relative to the diagonal, above which neighbours on the coarser levels are strongly coupled.
-const STRONG_BELOW: f64 = 0.01;
+const COARSER_STRONG_COUPLING: f64 = 0.01;
 
 /// Number of inverse iterations for the rough modes of the coarsest level.
-const ROUGH_ROUNDS: usize = 6;
+const COARSEST_INVERSE_ITERATIONS: usize = 6;
 
 /// Number of inverse iterations, by cycles, for the rough modes on each level between the coarsest and the finest.
-const POLISHED: usize = 3;
+const LEVEL_INVERSE_ITERATIONS: usize = 3;
 
 /// Number of nodes per parallel task.
-const NODES: usize = 1024;
+const NODES_PER_TASK: usize = 1024;
 
 /// Hierarchy of levels, for nodes of any size.
 pub trait Levels {
@@ -137,16 +137,16 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
             block
         };
         let masses = pencil.mass().diagonal().into_iter().map(scaled).collect();
-        let (fine, mut next) = Level::new(&shifted, &unit_motions(rigid), masses, STRONG)?;
+        let (fine, mut next) = Level::new(&shifted, &unit_motions(rigid), masses, FINEST_STRONG_COUPLING)?;
         let mass = masses_beside(fine.matrix(), pencil.mass(), 1.0 / heaviest);
         let mut coarser = Vec::new();
         // Coarsen until a dense inverse is cheap.
-        while next.a.n_rows() * C > BOTTOM {
-            if coarser.len() == MOST_LEVELS {
+        while next.a.n_rows() * C > MAX_COARSEST_ROWS {
+            if coarser.len() == MAX_LEVELS {
                 return None;
             }
             let Coarse { a, motions, masses } = next;
-            let (level, after) = Level::new(&a, &motions, masses, STRONG_BELOW)?;
+            let (level, after) = Level::new(&a, &motions, masses, COARSER_STRONG_COUPLING)?;
             coarser.push(level);
             next = after;
         }
@@ -174,7 +174,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
     fn bottom_modes(&self, count: usize) -> Option<Mat<f64>> {
         let n = self.inverse_of_bottom.nrows();
         let mut x = Mat::from_fn(n, count.min(n), |i, j| f64::from(noise(i * count + j)));
-        for _ in 0..ROUGH_ROUNDS {
+        for _ in 0..COARSEST_INVERSE_ITERATIONS {
             let product = |i: usize, j: usize| -> f64 {
                 let (group, own) = (i / C, &self.masses[i / C][i % C]);
                 (0..C).map(|c| own[c] * x[(group * C + c, j)]).sum()
@@ -198,7 +198,7 @@ impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
         let mut x = self.bottom_modes(count)?;
         for (at, level) in self.coarser.iter().enumerate().rev() {
             x = unit_columns(by_width(&x, level.nodes(), |x| level.prolonged(&x)));
-            for _ in 0..POLISHED {
+            for _ in 0..LEVEL_INVERSE_ITERATIONS {
                 let improved = |x: Vec<Rows<C>>| self.coarse_cycle(&self.coarser[at..], level.with_mass(&x));
                 x = unit_columns(by_width(&x, level.nodes(), improved));
             }
@@ -225,7 +225,7 @@ fn masses_beside<const B: usize>(a: &BlockMatrix<B, B>, mass: &SymmetricMatrix, 
             own.map_or(0.0, |(_, value)| (scale * value) as f32)
         })
     };
-    (0..a.n_rows()).into_par_iter().with_min_len(NODES).flat_map_iter(row).collect()
+    (0..a.n_rows()).into_par_iter().with_min_len(NODES_PER_TASK).flat_map_iter(row).collect()
 }
 
 /// Scales columns to a largest entry of one, within the range of single precision. Zero columns stay zero.
@@ -292,7 +292,7 @@ fn packed<const B: usize>(x: MatRef<'_, f64>) -> Vec<Rows<B>> {
         }
         rows
     };
-    (0..x.nrows() / B).into_par_iter().with_min_len(NODES).map(rows).collect()
+    (0..x.nrows() / B).into_par_iter().with_min_len(NODES_PER_TASK).map(rows).collect()
 }
 
 fn unpack<const B: usize>(rows: &[Rows<B>], x: MatMut<'_, f64>, scale: f64) {

@@ -14,13 +14,13 @@ use std::collections::{BinaryHeap, HashMap};
 
 /// Weight of the squared distance that a node moves, relative to its squared distance from the planes of
 /// its triangles. Up to triangles of eight tenths of the radius of curvature the moved distance dominates.
-const WAY: f64 = 0.01;
+const MOVED_DISTANCE_WEIGHT: f64 = 0.01;
 
 /// Weight of the planes that hold feature edges in place.
-const FEATURE: f64 = 10.0;
+const FEATURE_PLANE_WEIGHT: f64 = 10.0;
 
 /// Cosine of the largest rotation of a triangle in one move.
-const TURNED: f64 = 0.2;
+const MAX_ROTATION_COSINE: f64 = 0.2;
 
 impl SurfaceMesh {
     /// Returns the mesh with at most `most` triangles, on some of its nodes, whose positions are
@@ -111,14 +111,14 @@ impl Decimation {
             for (k, &node) in corners.iter().enumerate() {
                 let x = self.x(node);
                 self.error[node as usize] += Quadric::plane(normal, x, area);
-                self.error[node as usize] += Quadric::point(x, WAY * area);
+                self.error[node as usize] += Quadric::point(x, MOVED_DISTANCE_WEIGHT * area);
                 let next = corners[(k + 1) % 3];
                 if !self.features[node as usize].contains(&next) {
                     continue;
                 }
                 let along = self.x(next) - x;
                 let across = along.cross(&normal).try_normalize(0.0).unwrap_or_default();
-                let holding = Quadric::plane(across, x, FEATURE * along.norm_squared());
+                let holding = Quadric::plane(across, x, FEATURE_PLANE_WEIGHT * along.norm_squared());
                 self.error[node as usize] += holding;
                 self.error[next as usize] += holding;
             }
@@ -183,7 +183,7 @@ impl Decimation {
         let shared = self.around(from).filter(|corners| corners.contains(&to)).count();
         let folds = |corners: [u32; 3]| {
             let moved = corners.map(|node| if node == from { to } else { node });
-            normal(corners, &self.positions).dot(&normal(moved, &self.positions)) < TURNED
+            normal(corners, &self.positions).dot(&normal(moved, &self.positions)) < MAX_ROTATION_COSINE
         };
         common == shared && !self.around(from).filter(|corners| !corners.contains(&to)).any(folds)
     }

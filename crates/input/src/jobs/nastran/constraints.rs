@@ -15,7 +15,7 @@ const NOT_READ: &[&str] = &[
 ];
 
 /// Largest number of points in a THRU of a rigid element.
-const MOST_IN_RANGE: i64 = 1_000_000;
+const MAX_RANGE: i64 = 1_000_000;
 
 /// Constraints of a deck.
 #[derive(Default)]
@@ -213,7 +213,7 @@ fn grids(card: &Card, from: usize) -> Option<(Vec<i64>, usize)> {
         let field = card.field(k);
         if field.eq_ignore_ascii_case(b"THRU") {
             let (first, last) = (*ids.last()?, grid(card, k + 1)?);
-            (last > first && last - first < MOST_IN_RANGE).then_some(())?;
+            (last > first && last - first < MAX_RANGE).then_some(())?;
             ids.extend(first + 1..=last);
             k += 1;
         } else if !field.is_empty() {

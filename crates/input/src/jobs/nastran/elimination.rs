@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, HashMap};
 const SINGULAR: f64 = 1e-10;
 
 /// Number of constraints that a message names.
-const NAMED: usize = 8;
+const MAX_NAMED: usize = 8;
 
 /// Point as a weighted sum of others.
 type Sum = Vec<(Point, f64)>;
@@ -116,8 +116,8 @@ impl Followers {
 
     /// Returns the first names of constraints, and the number of the others.
     pub(super) fn some_names(&self) -> String {
-        let some = self.names[..self.names.len().min(NAMED)].join(", ");
-        match self.names.len().saturating_sub(NAMED) {
+        let some = self.names[..self.names.len().min(MAX_NAMED)].join(", ");
+        match self.names.len().saturating_sub(MAX_NAMED) {
             0 => some,
             more => format!("{some} and {more} more"),
         }

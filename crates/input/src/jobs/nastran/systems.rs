@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 /// Largest depth of systems that refer to one another.
-const DEEPEST: usize = 200;
+const MAX_REFERENCE_DEPTH: usize = 200;
 /// Sine of the angle between the points of a system below which they count as collinear.
 const ON_A_LINE: f64 = 1e-12;
 /// Distance from the axis, relative to that from the origin, below which a grid counts as on the axis.
@@ -134,7 +134,7 @@ impl<'b> Systems<'b> {
             return Err(refused(format!("coordinate system {id} is not in the deck")));
         };
         let at = |diagnostic: Diagnostic| diagnostic.in_file(&card.path).at_line(card.line);
-        if self.open.contains(&id) || self.open.len() >= DEEPEST {
+        if self.open.contains(&id) || self.open.len() >= MAX_REFERENCE_DEPTH {
             let through: Vec<String> = self.open.iter().take(8).map(i64::to_string).collect();
             let message = format!("coordinate system {id} refers to itself through {}", through.join(", "));
             return Err(at(refused(message)).with_help("give a system of the circle in the basic one"));
