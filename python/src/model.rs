@@ -189,7 +189,7 @@ impl Model {
     ) -> PyResult<Self> {
         if path.extension().is_some_and(|extension| extension == "toml") {
             if program.is_some() || units.is_some() || !sets.is_empty() {
-                let message = "a manifest states program, units and interfaces itself";
+                let message = "program, units and interfaces are given together with a manifest (.toml), which states them itself: leave them out";
                 return Err(PyValueError::new_err(message));
             }
             return Self::told(py, run(py, move |_| flexbody::Model::read(path))?);

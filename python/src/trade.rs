@@ -79,6 +79,6 @@ impl Trade {
 
     fn __repr__(&self) -> String {
         let taken = self.inner.recommended().map_or_else(|| "none".to_owned(), |row| row.to_string());
-        format!("<flexbody.Trade: {} candidates, take {taken}>", self.inner.candidates())
+        format!("<flexbody.Trade: {} candidates, recommended {taken}>", self.inner.candidates())
     }
 }

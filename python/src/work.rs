@@ -23,15 +23,17 @@ static OWNER: AtomicU32 = AtomicU32::new(0);
 /// Starts the threads that compute, once. A process that was forked afterwards has none of them and would wait for
 /// their results forever: it gets an exception.
 fn start_threads(py: Python<'_>) -> PyResult<()> {
-    let own = std::process::id();
-    match OWNER.compare_exchange(0, own, Ordering::SeqCst, Ordering::SeqCst) {
+    let current = std::process::id();
+    match OWNER.compare_exchange(0, current, Ordering::SeqCst, Ordering::SeqCst) {
         Ok(_) => {
             py.detach(|| use_threads(None));
             Ok(())
         }
-        Err(owner) if owner == own => Ok(()),
+        Err(owner) if owner == current => Ok(()),
         Err(owner) => {
-            let message = format!("process {own} was forked from {owner} after the first work of that");
+            let message = format!(
+                "process {current} was forked from process {owner} after the first computation of that process"
+            );
             Err(exception(py, &Diagnostic::new(Code::Forked, message).into()))
         }
     }

@@ -284,13 +284,13 @@ pub fn codes_markdown() -> String {
          | 2 | bad input or usage |\n\
          | 3 | no trustworthy numerical result: not converged, mechanism, indefinite mass |\n\
          | 4 | not enough memory or disk, or an output that may not be written (no permission, a read-only file system: FB121) |\n\
-         | 70 | a bug of ours |\n\
-         | 130 | interrupted (Ctrl-C), told to end (SIGTERM) or left by its terminal (SIGHUP); no unfinished file is left |\n\n\
-         Other signals that end a program end this one too, after its unfinished files: a shell tells 128 + the number\n\
+         | 70 | internal error: a bug of flexbody |\n\
+         | 130 | interrupted (Ctrl-C), terminated (SIGTERM) or disconnected from its terminal (SIGHUP); no unfinished file is left |\n\n\
+         Other signals that end a program end this one too, after its unfinished files: a shell reports 128 + the number\n\
          of the signal. With exit code 0 all outputs are in their places; with 2, 3, 4, 70, 130 and after a signal none\n\
          is, and the files that they would have replaced are there ([reference](reference.md#output-files)).\n\n\
          A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
-         `--deny-warnings` takes a warning as a failed check (1): then nothing is written.\n\n\
+         `--deny-warnings` treats a warning as a failed check (1): then nothing is written.\n\n\
          | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",
     );
     for code in Code::ALL {

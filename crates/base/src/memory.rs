@@ -45,7 +45,8 @@ pub fn or_go_without<T>(ask: impl FnOnce() -> T) -> T {
 pub fn refuse_beyond(left: Option<u64>, needed: f64, what: &str, help: &str) -> Result<()> {
     match left.map(|left| left as f64) {
         Some(left) if needed > left => {
-            let message = format!("{what} takes {:.3} GB, {:.3} GB are left", needed / 1e9, left / 1e9);
+            let message =
+                format!("{what} takes {:.3} GB of memory, {:.3} GB are available", needed / 1e9, left / 1e9);
             Err(Diagnostic::new(Code::MemoryShort, message).with_help(help).into())
         }
         _ => Ok(()),

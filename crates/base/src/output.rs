@@ -156,7 +156,9 @@ impl Temporary {
                 return Ok(Self { parts: Some((path, file)) });
             }
         }
-        Err(std::io::Error::other("temporary files vanish as soon as they are made"))
+        Err(std::io::Error::other(
+            "temporary files are removed by another process as soon as they are created",
+        ))
     }
 
     fn path(&self) -> &Path {
@@ -485,7 +487,7 @@ fn target_of(asked: &Path) -> Result<PathBuf> {
             Err(fail(Code::OutputForbidden, asked, "the existing file is write-protected".to_owned()))
         }
         Ok(_) => std::fs::canonicalize(asked).map_err(|e| match e.kind() {
-            ErrorKind::NotFound => not_a_file("the file that it leads to has been removed"),
+            ErrorKind::NotFound => not_a_file("the target of the link has been removed"),
             _ => io(asked, &e),
         }),
         // The name is too long: the temporary file, with its short name, would not reveal this.

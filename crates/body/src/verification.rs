@@ -53,9 +53,8 @@ pub fn accept(body: &FlexBody) -> Result<()> {
     let told: Vec<Diagnostic> = failed
         .map(|check| {
             let IdentityCheck { name, formula, value, limit, .. } = check;
-            let message = format!(
-                "the body breaks `{name}` ({formula}): {value:.1e}, where at most {limit:.1e} is rounding"
-            );
+            let message =
+                format!("the body violates `{name}` ({formula}): {value:.1e}, expected at most {limit:.1e}");
             Diagnostic::new(Code::BodyUntrustworthy, message)
         })
         .collect();
@@ -255,7 +254,7 @@ impl<'a> Recomputed<'a> {
     fn guarantee(&self) -> Vec<IdentityCheck> {
         let body = self.body;
         if body.certificate().guarantee.is_some() && !self.model.has_exact_scalar_mass() {
-            let formula = "M as stored is what the bounds are about: the same along x, y and z";
+            let formula = "M as stored is the same along x, y and z, as the bounds require";
             let deviation = self.model.mass_deviation().max(f64::MIN_POSITIVE);
             return vec![IdentityCheck::new("certified_mass", formula, deviation, 0.0)];
         }
@@ -427,8 +426,10 @@ pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
             let before = files[..i].iter().filter(|other| other.role == file.role).count();
             let now = model.sources().iter().filter(|other| other.role == file.role).nth(before)?;
             (now.sha256 != file.sha256).then(|| {
-                let message =
-                    format!("{} file {} has other bytes than {} had", file.role, now.name, file.name);
+                let message = format!(
+                    "{} file {} differs from {}, of which the body was made",
+                    file.role, now.name, file.name
+                );
                 Diagnostic::new(Code::BodySourceChanged, message)
             })
         })

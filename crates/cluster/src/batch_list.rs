@@ -57,7 +57,7 @@ pub fn read_batch_list(path: &Path) -> Result<BatchList> {
         return Err(wrong("the list has no [[body]]".to_owned()));
     }
     if list.parallel == Some(0) || list.threads == Some(0) {
-        return Err(wrong("`parallel` and `threads` are at least 1".to_owned()));
+        return Err(wrong("`parallel` and `threads` must be at least 1".to_owned()));
     }
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     for body in &mut list.bodies {

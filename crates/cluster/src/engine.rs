@@ -72,12 +72,15 @@ impl Engine {
         for python in candidates {
             match probe(python) {
                 Ok(output) if output.status.success() => return Ok(python.to_owned()),
-                Ok(output) => why = format!("{python} says: {}", last_line(&output)),
+                Ok(output) => why = format!("{python} reports: {}", last_line(&output)),
                 Err(e) => why = format!("{python} cannot be started: {e}"),
             }
         }
-        Err(Diagnostic::new(Code::EngineMissing, format!("no Python with petsc4py and slepc4py: {why}"))
-            .into())
+        Err(Diagnostic::new(
+            Code::EngineMissing,
+            format!("no Python with petsc4py and slepc4py was found: {why}"),
+        )
+        .into())
     }
 
     /// Checks, before anything is written, that the driver can be run. Returns the Python for it.
@@ -99,7 +102,7 @@ impl Engine {
     /// driver ends without a result.
     pub fn run(&self, python: &str, folder: &Path) -> Result<()> {
         let Some((program, options)) = self.mpiexec.split_first() else {
-            return Err(Diagnostic::new(Code::EngineMissing, "no program is named that starts MPI").into());
+            return Err(Diagnostic::new(Code::EngineMissing, "no program that starts MPI is given").into());
         };
         let mut command = Command::new(program);
         command.args(options).arg("-n").arg(self.ranks.to_string());

@@ -91,7 +91,7 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
     let matrices = matrices_of(model, &order, index_bytes(prepared.index_bytes)?);
     if matrices != prepared.matrices {
         let message = format!(
-            "K and M of `{}` are not those that the folder was prepared with, of `{}`",
+            "K and M of `{}` differ from those that the folder was prepared with, of `{}`",
             model.name(),
             prepared.name
         );
@@ -104,12 +104,12 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
     }
     let result: ResultFile = sealed::open(&path, "flexbody-result")?;
     if result.matrices != matrices {
-        let message = "the result belongs to other matrices than those that were prepared";
+        let message = "the result was computed with other matrices than those of the prepared folder";
         return Err(Diagnostic::new(Code::ClusterForeign, message).in_file(path).into());
     }
     let damaged = |why: &str| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(&path));
     if result.modes == 0 || result.eigenvalues.len() != result.modes {
-        return Err(damaged("the result does not have one eigenvalue for each of its modes"));
+        return Err(damaged("the numbers of eigenvalues and modes of the result differ"));
     }
     let count = result.count.clone().map(|CountFile { negative, zero, shift, by }| {
         let by = format!("{by} ({} ranks)", result.ranks);
@@ -145,8 +145,8 @@ fn unfinished(folder: &Path, prepared: &Prepared) -> Error {
     let kept = kept.filter(|kept| kept.matrices == prepared.matrices);
     let kept = kept.map_or(0, |kept| kept.parts.iter().map(|part| part.vectors).sum());
     let message = match kept {
-        0 => "there is no result, and no mode is kept yet".to_owned(),
-        kept => format!("there is no result yet; {kept} modes are kept"),
+        0 => "there is no result, and no mode is saved yet".to_owned(),
+        saved => format!("there is no result yet; {saved} modes are saved"),
     };
     Diagnostic::new(Code::ClusterUnfinished, message).in_file(folder).into()
 }
@@ -169,7 +169,7 @@ fn hold_condensation(
         return Ok(());
     }
     let message = format!(
-        "the products of condensation are not those of the mass matrix: they differ by {difference:.0e}, rounding explains {MAX_CONDENSED_DIFFERENCE:.0e}"
+        "the products of condensation differ from those of the mass matrix by {difference:.0e}, rounding explains at most {MAX_CONDENSED_DIFFERENCE:.0e}"
     );
     Err(Diagnostic::new(Code::ClusterInaccurate, message).in_file(path).into())
 }
@@ -194,7 +194,7 @@ impl Vectors<'_> {
             |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(self.path));
         let failed = |e: std::io::Error| unreadable(format!("file cannot be read: {e}"));
         if sha256_of_file(self.path).map_err(failed)? != self.digest {
-            let message = format!("the {} are not those that the result was written with", self.of);
+            let message = format!("the {} changed since the result was written", self.of);
             return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(self.path).into());
         }
         note_read(self.path);

@@ -47,7 +47,7 @@ pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> 
 pub(super) fn open_kept<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
     let text = read_text(path, MAX_BYTES).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
-    let not_ours = || unreadable(format!("file is no `{format}`"));
+    let not_ours = || unreadable(format!("file is not a `{format}` file"));
     let (head, body) = text.split_once('\n').ok_or_else(not_ours)?;
     let head: Head = serde_json::from_str(head).map_err(|_| not_ours())?;
     if head.format != format {
@@ -60,8 +60,9 @@ pub(super) fn open_kept<T: DeserializeOwned>(path: &Path, format: &str) -> Resul
     }
     let body = body.strip_suffix('\n').unwrap_or(body);
     if sha256_hex(body.as_bytes()) != head.sha256 {
-        let message = "the content of the file is not the one that it was written with";
+        let message = "the content of the file changed since it was written";
         return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(path).into());
     }
-    serde_json::from_str(body).map_err(|e| unreadable(format!("content of the file: {e}")))
+    serde_json::from_str(body)
+        .map_err(|e| unreadable(format!("the content of the file is not understood: {e}")))
 }

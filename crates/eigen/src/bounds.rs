@@ -64,7 +64,9 @@ pub(super) fn enclose(
     let factor = RELATIVE_SHIFTS
         .iter()
         .find_map(|part| ProvedFactor::new(analysis, pencil, part * eigenvalues[0], context))
-        .ok_or(EigenFailure::NotCertified { why: "K + tau M is positive definite by less than rounding" })?;
+        .ok_or(EigenFailure::NotCertified {
+            why: "the lowest eigenvalue of K + tau M does not exceed its rounding error",
+        })?;
     let tau = factor.tau;
     let omega: Vec<f64> = eigenvalues.iter().map(|lambda| lambda + tau).collect();
     let trial = Trial::new(&factor, vectors, omega, context);

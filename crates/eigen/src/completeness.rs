@@ -84,7 +84,7 @@ impl Count {
     pub(crate) fn remark(&self) -> String {
         self.rounding.map_or_else(String::new, |rounding| {
             format!(
-                "counted in single precision, whose rounding is {rounding:.0e} of what may change the count"
+                "counted in single precision, with {rounding:.0e} of the rounding error that could change the count"
             )
         })
     }

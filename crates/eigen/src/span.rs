@@ -117,7 +117,7 @@ fn uncounted(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness 
     let remark = if exact < given {
         let pairs = modes.residuals.iter().zip(&modes.floors);
         let others = pairs.filter(|(r, f)| !keeps(**r, **f, accuracy.residual())).count();
-        format!("{others} of {given} modes of the given subspace are no eigenvectors")
+        format!("{others} of {given} modes of the given subspace are not eigenvectors")
     } else {
         "accuracy `fast` leaves the count out".to_owned()
     };
@@ -136,7 +136,7 @@ fn certifiable<'t>(
         return Err("not every mode of the subspace is an eigenvector to a K-residual of 1e-12");
     }
     if completeness.proof == Proof::NotProved {
-        return Err("modes are missing in the subspace");
+        return Err("the subspace does not contain all modes");
     }
     Ok(task.expect("a count needs the task"))
 }
@@ -178,7 +178,8 @@ fn count(task: &Task<'_>, eigenvalues: &[f64]) -> Result<Completeness, EigenFail
     }
     let (shift, negative) = counted;
     let there = negative - rigid;
-    let remark =
-        format!("the body has {there} flexible modes below lambda = {shift:.6e}, the given subspace {found}");
+    let remark = format!(
+        "the body has {there} flexible modes below lambda = {shift:.6e}, the given subspace has {found}"
+    );
     Ok(outcome(shift, Some(negative), remark))
 }

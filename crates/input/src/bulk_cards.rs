@@ -238,11 +238,11 @@ impl<'t> BulkReader<'t> {
     fn file(&mut self, path: &Path, file: &InputFile, depth: usize) -> Taken {
         if depth > MAX_INCLUDE_DEPTH || self.files.len() >= MAX_FILES {
             let message = format!(
-                "files include one another more than {MAX_INCLUDE_DEPTH} levels deep, or {MAX_FILES} times"
+                "included files are nested more than {MAX_INCLUDE_DEPTH} levels deep, or are more than {MAX_FILES}"
             );
             return Err(Diagnostic::new(Code::DeckSyntax, message)
                 .in_file(path)
-                .with_help("a file includes itself: take the INCLUDE out"));
+                .with_help("remove the INCLUDE with which a file includes itself"));
         }
         self.files.push(file.seen()?);
         let before = std::mem::replace(&mut self.apart, Apart::of(file));

@@ -148,7 +148,7 @@ impl Coordinates {
                 message += "; it is the last line and has no line end: the file may be cut off";
             }
             if k + 1 == MAX_SHOWN_LINES && more > 0 {
-                message += &format!(" ({more} more lines are bad)");
+                message += &format!(" ({more} more lines have errors)");
             }
             Diagnostic::new(bad.code(), message).at_line(*line).with_help(bad.help())
         };

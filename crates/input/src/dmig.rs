@@ -227,9 +227,10 @@ impl Dmigs {
             1 | 2 | 9 => StoredEntries::Full,
             6 => StoredEntries::Triangle,
             other => {
-                let message = format!("form {other} is none of a symmetric matrix");
+                let message = format!("form {other} is not that of a symmetric matrix");
                 return Err(about(
-                    Diagnostic::new(Code::MatrixKind, message).with_help("forms are 1, 2, 6, 9"),
+                    Diagnostic::new(Code::MatrixKind, message)
+                        .with_help("write a DMIG of form 6: forms are 1, 2, 6 and 9"),
                 ));
             }
         };
@@ -244,7 +245,7 @@ impl Dmigs {
         assemble_distinct(n, pieces, stored, own.written, &own.path, |row, column| {
             let [row, column] = [row, column].map(|row| named(points[row as usize]));
             let message = format!("the entry of {row} and {column} is given twice");
-            let help = "form 6 has one triangle; write the matrix again";
+            let help = "write the matrix again: form 6 has one triangle";
             about(Diagnostic::new(Code::MatrixTriangles, message).with_help(help))
         })
     }

@@ -136,9 +136,12 @@ pub(super) fn read_job(job: &JobFile) -> Found<JobModel> {
     };
     match reader {
         Some(reader) if job.matrices.is_some() && !reader.names_matrices() => {
-            let message = format!("the matrices of a job of {} have no names to choose by", reader.name());
+            let message =
+                format!("matrices are chosen by name, but those of a job of {} have no names", reader.name());
             Err(vec![
-                Diagnostic::new(Code::Usage, message).in_file(&job.path).with_help("leave the names out"),
+                Diagnostic::new(Code::Usage, message)
+                    .in_file(&job.path)
+                    .with_help("leave the names of the matrices out"),
             ])
         }
         Some(reader) => reader.read(job),
@@ -150,8 +153,10 @@ fn unknown(job: &JobFile) -> Diagnostic {
     let needed: Vec<String> =
         JOBS.iter().map(|reader| format!("{}: {}", reader.name(), reader.needs())).collect();
     let message = match &job.program {
-        Some(program) => format!("`{program}` is no program whose jobs are read"),
-        None => "neither a manifest nor the job of an FE program with its matrices beside it".to_owned(),
+        Some(program) => format!("jobs of `{program}` are not supported"),
+        None => {
+            "file is neither a manifest nor the job of an FE program with its matrices beside it".to_owned()
+        }
     };
     Diagnostic::new(Code::JobUnknown, message).in_file(&job.path).with_help(needed.join("; "))
 }

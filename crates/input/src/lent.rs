@@ -115,7 +115,7 @@ impl KeptColumns {
 }
 
 fn unwritable(folder: &Path, error: &std::io::Error) -> Diagnostic {
-    let message = format!("the numbers of a matrix cannot be kept in {}: {error}", folder.display());
+    let message = format!("the numbers of a matrix cannot be stored in {}: {error}", folder.display());
     Diagnostic::new(Code::OutputUnwritable, message)
 }
 

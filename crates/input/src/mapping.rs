@@ -69,7 +69,7 @@ fn node_array(file: &InputFile) -> Found<Vec<i64>> {
     }
     let whole = |value: &f64| match value.fract() == 0.0 && value.abs() < 9e15 {
         true => Ok(*value as i64),
-        false => Err(wrong(format!("{value} is no node number"))),
+        false => Err(wrong(format!("{value} is not a node number"))),
     };
     array.values.iter().map(whole).collect()
 }

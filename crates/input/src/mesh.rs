@@ -77,7 +77,7 @@ impl MeshReading<'_> {
         if without_nodes > 0 {
             let all = elements.len();
             tell(format!(
-                "{without_nodes} of {all} elements have nodes that the model lacks: they are not drawn"
+                "{without_nodes} of {all} elements have nodes that are not in the model: they are not drawn"
             ));
         }
         (mesh, partly)

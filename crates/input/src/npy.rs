@@ -64,7 +64,7 @@ fn described(bytes: &[u8]) -> Result<(Header<'_>, &[u8]), Diagnostic> {
     let (header, data) = split(bytes)?;
     let text = header.escape_ascii().to_string();
     let shown = text.get(..100).unwrap_or(&text).trim_end();
-    let header = parse(header).ok_or_else(|| syntax(format!("header is not understood: `{shown}`")))?;
+    let header = parse(header).ok_or_else(|| syntax(format!("header cannot be parsed: `{shown}`")))?;
     Ok((header, data))
 }
 
@@ -89,7 +89,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
 pub(super) fn read_integers(bytes: &[u8]) -> Result<Vec<i64>, Diagnostic> {
     let (header, data) = split(bytes)?;
     let Header { descr, shape, .. } =
-        parse(header).ok_or_else(|| syntax("header is not understood".into()))?;
+        parse(header).ok_or_else(|| syntax("header cannot be parsed".into()))?;
     let digits = descr.get(1..).and_then(|size| size.strip_prefix(['i', 'u']));
     let Some(size) = digits.and_then(|digits| digits.parse().ok()).filter(|size| [1, 2, 4, 8].contains(size))
     else {

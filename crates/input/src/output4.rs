@@ -116,8 +116,11 @@ impl Contents {
         }
         let columns = columns(file, stored, *encoding)?;
         if !matches!(header.form, 1 | 2 | 6) {
-            let message = format!("form {} is none of a symmetric matrix", header.form);
-            return Err(about(Diagnostic::new(Code::MatrixKind, message).with_help("forms are 1, 2, 6")));
+            let message = format!("form {} is not that of a symmetric matrix", header.form);
+            return Err(about(
+                Diagnostic::new(Code::MatrixKind, message)
+                    .with_help("write a matrix of form 6: forms are 1, 2 and 6"),
+            ));
         }
         let n = check_size(header.rows, header.columns, columns.count() as u64).map_err(about)?;
         let triangle = undeclared_triangle(columns.sides(), |_| "write the whole matrix".into());

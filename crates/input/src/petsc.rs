@@ -153,8 +153,7 @@ fn wrong_size(values: &[u8], entries: u64, whole: Whole) -> Diagnostic {
     let following = entries.checked_mul(8).and_then(|end| values.get(usize::try_from(end).ok()?..));
     if following.is_some_and(|rest| Whole::of(rest) == Some(whole)) {
         let message = "file holds several objects of PETSc";
-        return Diagnostic::new(Code::Hdf5Layout, message)
-            .with_help("write every matrix to a file of its own");
+        return Diagnostic::new(Code::Hdf5Layout, message).with_help("write every matrix to a separate file");
     }
     if entries.checked_mul(16) == Some(bytes as u64) {
         let message = "values have 16 bytes: they are complex, or of quadruple precision";

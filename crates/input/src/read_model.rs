@@ -366,9 +366,9 @@ impl<'m> NodeLookup<'m> {
             let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
             let help = match names.is_empty() {
                 true => {
-                    "the files of the model have no node sets: list the nodes, or give a region".to_owned()
+                    "list the nodes, or give a region: the files of the model have no node sets".to_owned()
                 }
-                false => format!("node sets: {}", names.join(", ")),
+                false => format!("name one of the node sets: {}", names.join(", ")),
             };
             return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message)).with_help(help)]);
         };
@@ -449,7 +449,7 @@ fn refuse_followers(followers: &[(String, Vec<DofLabel>)], labels: &[DofLabel], 
         return Ok(());
     }
     let message =
-        format!("rows of the matrices follow others by constraints of the deck: {}", names.join(", "));
+        format!("rows of the matrices depend on others by constraints of the deck: {}", names.join(", "));
     let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(deck);
     Err(vec![diagnostic.with_help("give the deck as the model, with its matrices beside it")])
 }
@@ -472,9 +472,8 @@ fn turned(
         return Ok(([stiffness, mass], GivenRows::default()));
     }
     let turn = Turn::new(labels, &axes).map_err(|node| {
-        let message = format!(
-            "rows of node {node} stand along axes of its own, but not each of its directions is there once"
-        );
+        let message =
+            format!("rows of node {node} are along local axes, but not each of its directions occurs once");
         vec![Diagnostic::new(Code::DofIncomplete, message).in_file(&stiffness.path)]
     })?;
     let own = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
@@ -492,7 +491,9 @@ fn by_rows_of_model(raw: RawMatrix, rows: &GivenRows) -> Found<RawMatrix> {
         Err(LostRow) => {
             let message = "the matrix has entries in rows that K and M leave empty";
             let diagnostic = Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(path);
-            Err(vec![diagnostic.with_help("leave these rows out of it, or give them stiffness and mass")])
+            Err(vec![
+                diagnostic.with_help("remove these rows from the matrix, or give them stiffness and mass"),
+            ])
         }
     }
 }

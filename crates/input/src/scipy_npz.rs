@@ -193,7 +193,7 @@ impl<'a> Archive<'a> {
     fn open_member(&mut self, name: &str) -> std::result::Result<impl Read + use<'_, 'a>, Diagnostic> {
         self.0.by_name(&format!("{name}.npy")).map_err(|error| match error {
             zip::result::ZipError::FileNotFound => {
-                let message = format!("archive has no array `{name}`: it is no sparse matrix of SciPy");
+                let message = format!("archive has no array `{name}`: it is not a sparse matrix of SciPy");
                 Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP)
             }
             error => damaged(&error),

@@ -171,7 +171,7 @@ fn is_diagonal(m: &SymmetricMatrix) -> bool {
 fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnostic>) {
     let (raw, rows) = (&body.raw, &body.rows);
     if diagonal_mass {
-        let message = "mass matrix is diagonal: it was lumped before it came here";
+        let message = "mass matrix is diagonal: the program that wrote it lumped the mass";
         found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));
     }
     let [vectors, others] = rows.without_place();
@@ -204,7 +204,7 @@ fn mass_that_does_not_turn(model: &FeModel, rounding: f64, worst: [DofLabel; 2])
             ),
             false => format!("displacements and rotations share symmetric blocks of up to {share:.1e}"),
         };
-        let message = format!("part of the mass matrix does not turn with the nodes: {why}");
+        let message = format!("part of the mass matrix does not rotate with the nodes: {why}");
         Diagnostic::new(Code::MassBlockStructure, message)
     })
 }

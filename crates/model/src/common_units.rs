@@ -2,12 +2,12 @@
 
 /// Returns advice on numbers without stated units, with the units in which they are plausible.
 pub(super) fn state_units(fitting: &str) -> String {
-    let those = match fitting {
+    let advice = match fitting {
         "" => "state the units".to_owned(),
-        fitting => format!("the numbers are those of matter in {fitting}: state the units"),
+        fitting => format!("state the units: the numbers fit materials in {fitting}"),
     };
     format!(
-        "{those} with --units LENGTH,MASS,TIME, or [model.units] in the manifest; --allow-implausible (or allow_implausible in [model]) if m, kg, s are meant"
+        "{advice} with --units LENGTH,MASS,TIME, or [model.units] in the manifest; use --allow-implausible (or allow_implausible in [model]) if m, kg, s are intended"
     )
 }
 

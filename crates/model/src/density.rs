@@ -226,7 +226,7 @@ pub(super) fn check_density(
     if upper >= MATERIAL_DENSITIES.0 && lower <= MATERIAL_DENSITIES.1 {
         return Some(median);
     }
-    let said = if units.stated { "" } else { ", which nothing states" };
+    let said = if units.stated { "" } else { ", assumed since no units are given" };
     let message = format!(
         "the elements have a density of {median:.3e} kg/m^3 (median of {nodes} nodes; half of them between {lower:.3e} and {upper:.3e}), with length in {}, mass in {}{said}",
         units.length.name(),
@@ -243,7 +243,7 @@ pub(super) fn check_density(
         diagnostic = diagnostic.with_help(state_units(&fitting));
     } else if !fitting.is_empty() {
         diagnostic = diagnostic.with_help(format!(
-            "the numbers are those of matter in {fitting}: check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant"
+            "check the units of the manifest and of the coordinates: the numbers fit materials in {fitting}; use --allow-implausible (or allow_implausible in [model]) if the density is intended"
         ));
     }
     found.push(diagnostic);

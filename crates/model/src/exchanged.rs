@@ -15,7 +15,7 @@ pub(super) fn check_exchanged_matrices(body: &Assembled) -> Option<Diagnostic> {
     let (free_in_mass, free_in_stiffness) = (free_rows(mass, rows), free_rows(stiffness, rows));
     (free_in_mass > 0.5 && free_in_stiffness < 0.1).then(|| {
         let message = format!(
-            "the matrix given as mass ({}) resists no translation, as a stiffness; the one given as stiffness ({}) does, as a mass: they are exchanged",
+            "the matrix given as mass ({}) does not resist translations, like a stiffness matrix, and the one given as stiffness ({}) does, like a mass matrix: they are exchanged",
             raw.mass.path.display(),
             raw.stiffness.path.display()
         );

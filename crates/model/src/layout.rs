@@ -113,7 +113,7 @@ fn check_plane(raw: &RawModel, labels: &[DofLabel], found: &mut Vec<Diagnostic>)
     let outside: Vec<DofLabel> = labels.iter().filter(leads_out).copied().collect();
     if !outside.is_empty() {
         let message = format!(
-            "{} degrees of freedom of a plane model lead out of the plane: {}",
+            "{} degrees of freedom of a plane model are out of the plane: {}",
             outside.len(),
             name_some(&outside)
         );

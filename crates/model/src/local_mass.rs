@@ -193,7 +193,7 @@ pub(super) fn check_speed(
     let heavy = density.filter(|density| *density > MIN_HEAVY_DENSITY);
     let slowest = if heavy.is_some() { MIN_HEAVY_SPEED } else { PLAUSIBLE_SPEEDS.0 };
     if whole.min(median) > PLAUSIBLE_SPEEDS.1 || whole.max(median) < slowest {
-        let matter = heavy.map_or(String::new(), |density| format!(" in matter of {density:.0} kg/m^3"));
+        let matter = heavy.map_or(String::new(), |density| format!(" in a material of {density:.0} kg/m^3"));
         let message = format!(
             "stiffness, mass and coordinates give a speed of sound of {median:.3e} m/s{matter} (median of the nodes; {whole:.3e} m/s of the whole body)"
         );
@@ -202,7 +202,7 @@ pub(super) fn check_speed(
         found.push(match unstated && !found.iter().any(|own| own.code() == Code::DensityImplausible) {
             true => Diagnostic::new(
                 Code::DensityImplausible,
-                format!("{message}, with numbers in m, kg, s, which nothing states"),
+                format!("{message}, with numbers in m, kg, s, assumed since no units are given"),
             )
             .with_help(state_units(&fitting)),
             false => Diagnostic::new(Code::SpeedImplausible, message),

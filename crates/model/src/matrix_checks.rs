@@ -60,7 +60,7 @@ pub(super) fn symmetric(
         );
         let mut diagnostic = Diagnostic::new(Code::MatrixAsymmetric, message).in_file(&raw.path);
         if one_sided * 2 >= ordered.nnz().saturating_sub(n) * 2 && one_sided > 0 {
-            diagnostic = diagnostic.with_help("only one triangle is stored: declare the matrix symmetric");
+            diagnostic = diagnostic.with_help("declare the matrix symmetric: only one triangle is stored");
         }
         found.push(diagnostic);
         return None;

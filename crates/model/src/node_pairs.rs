@@ -112,7 +112,7 @@ pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) ->
     } else if let Some(order) = other_order(body) {
         found.push(report(Code::MassOrder).with_help(order));
     } else if are_mass_elements(mass, rows, count, &foreign) {
-        let help = "each of these nodes shares mass with each other, as of a mass element or a mass spread over nodes: nothing to do if the model has one";
+        let help = "nothing to do if the model has a mass element or a mass spread over nodes: each of these nodes shares mass with each other";
         found.push(report(Code::MassPairs).with_help(help));
     } else {
         found.push(report(Code::MassOrder));
@@ -193,27 +193,27 @@ fn other_order(body: &Assembled) -> Option<&'static str> {
         (
             true,
             &|row| by_label[row],
-            "the rows of the mass matrix follow ascending node numbers, those of the stiffness matrix another order: write both in one",
+            "write both matrices in one order: the rows of the mass matrix follow ascending node numbers, those of the stiffness matrix do not",
         ),
         (
             true,
             &|row| row,
-            "the rows of the mass matrix follow the node table, those of the stiffness matrix another order: write both in one",
+            "write both matrices in one order: the rows of the mass matrix follow the node table, those of the stiffness matrix do not",
         ),
         (
             true,
             &|row| internal(n - 1 - row),
-            "the rows of the mass matrix stand in the reverse order of those of the stiffness matrix: write both in one",
+            "write both matrices in one order: the rows of the mass matrix are in the reverse order of those of the stiffness matrix",
         ),
         (
             per_node * rows.nodes == n,
             &|row| internal(blocked(row)),
-            "the rows of the mass matrix are those of the first direction for all nodes, then the second, and so on; those of the stiffness matrix go node by node: write both in one order",
+            "write both matrices in one order: the rows of the mass matrix go direction by direction, those of the stiffness matrix node by node",
         ),
         (
             per_node * rows.nodes == n,
             &|row| internal(transposed(row)),
-            "the rows of the mass matrix go node by node, those of the stiffness matrix direction by direction: write both in one order",
+            "write both matrices in one order: the rows of the mass matrix go node by node, those of the stiffness matrix direction by direction",
         ),
     ];
     orders.iter().find(|(possible, to, _)| *possible && fits(body, &row_of, to)).map(|(.., help)| *help)

@@ -86,7 +86,7 @@ fn impossible(name: &str, reference: [f64; 3], dimension: u8, body: &Extent) -> 
         let message = format!(
             "reference point of interface `{name}` is {away:.1e} times the size of the body away from its middle"
         );
-        let help = "it is in model axes and in the unit of length of the nodes";
+        let help = "give the reference point in model axes and in the unit of length of the nodes";
         Diagnostic::new(Code::InterfaceCoupling, message).with_help(help)
     })
 }
@@ -105,7 +105,7 @@ fn beside_the_mean(
         let [point, mean] = [centre.point, centre.mean].map(|x| in_words(x, size));
         let away = significant(away, 4);
         let message = format!(
-            "interface `{name}`: the reference point is {}, at ({point}); the mean of its nodes, ({mean}), is {away} beside it, with an extent of {}",
+            "interface `{name}`: the reference point is {}, at ({point}); the mean of its nodes, ({mean}), is {away} away from it, and the nodes extend over {}",
             centre.origin,
             significant(extent, 4)
         );

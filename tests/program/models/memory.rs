@@ -93,7 +93,7 @@ fn where_nothing_fits_the_numbers_are_told_before_any_work() {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(ExitCode::Resources as i32), "{said}");
     assert!(said.contains("error[FB601]: the factor and the vectors need 0."), "{said}");
-    assert!(said.contains(" GB on top of the matrices, 0.") && said.contains(" GB are left"), "{said}");
+    assert!(said.contains(" GB on top of the matrices, 0.") && said.contains(" GB are available"), "{said}");
     assert_eq!(members(folder.path()), before);
 
     let model = check(block([9; 3], [1.0; 3]).raw_model()).expect("a sound model").model;

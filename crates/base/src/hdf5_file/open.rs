@@ -40,7 +40,7 @@ pub fn open_kept(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, 
     // The check of the heaps supports 8-byte sizes only, which all files in use have.
     let sizes = file.create_plist().and_then(|p| p.get_sizes());
     if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (Sizeof::Bytes8, Sizeof::Bytes8)) {
-        let why = "its addresses or sizes do not have 8 bytes".to_owned();
+        let why = "its addresses or sizes have another width than 8 bytes".to_owned();
         return Err(unreadable(foreign, why));
     }
     Ok((file, meta.len()))

@@ -163,7 +163,7 @@ impl InputFile {
             while reader.read(&mut piece).map_err(|e| self.failed(&e))? > 0 {}
             self.refuse_changed()?;
         }
-        self.sha256.get().cloned().ok_or_else(|| self.changed("its length is another one"))
+        self.sha256.get().cloned().ok_or_else(|| self.changed("its length has changed"))
     }
 
     /// Returns the path of the file with its fingerprint and its state, to detect later changes.
@@ -249,7 +249,7 @@ impl Read for FileReader<'_> {
         let length = self.file.state.length;
         let at = self.at + count as u64;
         if at > length || count == 0 && !buffer.is_empty() && at < length {
-            return Err(failed(self.file.changed("its length is another one")));
+            return Err(failed(self.file.changed("its length has changed")));
         }
         self.at = at;
         if let Some(hashed) = &mut self.hashed {
@@ -324,9 +324,9 @@ impl FileState {
         let what = if now.length != self.length {
             format!("it had {} bytes, now it has {}", self.length, now.length)
         } else if now.number != self.number {
-            "another file has its name now".to_owned()
+            "its name now belongs to another file".to_owned()
         } else {
-            "it was written to".to_owned()
+            "it was modified".to_owned()
         };
         Err(changed(path, &what))
     }

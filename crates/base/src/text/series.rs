@@ -279,7 +279,7 @@ impl<'f> Layout<'f> {
                 [] => (),
                 [first, second, ..] => {
                     let name = printable(name);
-                    let message = format!("columns {} and {} are both `{name}`", first + 1, second + 1);
+                    let message = format!("columns {} and {} are both named `{name}`", first + 1, second + 1);
                     return Err((message, "give the number of the column".to_owned()));
                 }
             }
@@ -301,9 +301,10 @@ impl<'f> Layout<'f> {
     /// Returns a help with all columns.
     fn all(&self) -> String {
         let names: Vec<String> = self.names.iter().map(|name| printable(name)).collect();
-        match names.is_empty() {
-            true => format!("the columns have the numbers 1 to {}", self.fields),
-            false => format!("the columns are: {}", names.join(", ")),
+        if names.is_empty() {
+            format!("use a number from 1 to {}", self.fields)
+        } else {
+            format!("use one of the columns {}", names.join(", "))
         }
     }
 }
@@ -377,7 +378,7 @@ impl<'r> SeriesReader<'r> {
             && time <= before
         {
             let message = format!("time {time} does not increase: line {above} has {before}");
-            let help = "times must ascend: leave one row of an instant, and one of several runs in a file";
+            let help = "write ascending times: keep one row for each instant, and one run in each file";
             return Err(row_error(self.file, line, message).with_help(help));
         }
         self.series.times.push(time);
@@ -410,23 +411,23 @@ impl<'r> SeriesReader<'r> {
         let Series { times, lines, .. } = &self.series;
         let [before, time] = [times[row - 1], times[row]];
         let message = format!(
-            "time {time:?} is the time of line {} ({before:?}) but for rounding: between the two rows the history would change without time",
+            "time {time:?} differs from that of line {} ({before:?}) by rounding only: the history would change in no time between the two rows",
             lines[row - 1]
         );
-        let help = "leave one of the two rows out; a jump needs rows that are further apart";
+        let help = "remove one of the two rows, or write a jump with rows that are further apart";
         row_error(self.file, lines[row], message).with_help(help)
     }
 
     fn finish(mut self) -> Result<Series, Vec<Diagnostic>> {
         let more = self.bad - self.shown.len();
         if let Some(line) = self.first_not_shown {
-            let message = format!("{more} more rows are bad, from this one on");
+            let message = format!("{more} more rows have errors, the first of them in this line");
             self.shown.push(row_error(self.file, line, message));
         }
         let rows = self.series.times.len();
         if self.bad == 0 && rows < MIN_ROWS {
             let count = if rows == 0 { "no rows" } else { "only one row" };
-            let message = format!("file has {count}, a history needs two at least");
+            let message = format!("file has {count}, a history needs at least two");
             self.shown.push(Diagnostic::new(Code::SeriesRow, message).in_file(self.file.path()));
         }
         if let (0, Some(row)) = (self.bad, closer_than_rounding(&self.series.times)) {

@@ -49,7 +49,7 @@ impl<'a> Table<'a> {
             Diagnostic::new(Code::TableHeader, message)
                 .in_file(path)
                 .at_line(line)
-                .with_help(format!("the first line names the columns: `{}`", names.join(",")))
+                .with_help(format!("name the columns in the first line: `{}`", names.join(",")))
         };
         if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
             return Err(header_error(1, "file is UTF-16".into()).with_help("save it as UTF-8 or ASCII text"));
@@ -69,7 +69,7 @@ impl<'a> Table<'a> {
             let known = columns.iter().position(|column| column.name == name);
             match known {
                 Some(column) if order.contains(&column) => {
-                    return Err(header_error(header_line, format!("column `{name}` is there twice")));
+                    return Err(header_error(header_line, format!("column `{name}` occurs twice")));
                 }
                 Some(column) => order.push(column),
                 None if fast_float2::parse::<f64, _>(field).is_ok() => {
@@ -170,7 +170,7 @@ impl<'a> BadRows<'a> {
     pub fn finish(mut self) -> Result<(), Vec<Diagnostic>> {
         let more = self.count - self.shown.len();
         if more > 0 {
-            let message = format!("{more} more rows are bad");
+            let message = format!("{more} more rows have errors");
             self.shown.push(Diagnostic::new(Code::TableRow, message).in_file(self.path));
         }
         if self.shown.is_empty() { Ok(()) } else { Err(self.shown) }

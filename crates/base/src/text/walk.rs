@@ -129,7 +129,7 @@ impl Walk<'_> {
             let unknown = self.at(self.syntax, key.span(), unknown);
             let help = match nearest {
                 Some((_, candidate)) => format!("did you mean `{candidate}`?"),
-                None => format!("known keys: {}", known.join(", ")),
+                None => format!("use one of the keys {}", known.join(", ")),
             };
             self.found.push(unknown.with_help(help));
         }

@@ -93,7 +93,7 @@ impl Basis for CraigBampton {
 /// are made.
 fn check_possible(model: &FeModel, settings: &ModeSettings, context: &Context<'_>) -> Result<()> {
     if settings.accuracy == Accuracy::Certified {
-        let message = "modes of a Craig-Bampton basis are no eigenvectors and cannot be certified";
+        let message = "modes of a Craig-Bampton basis are not eigenvectors and cannot be certified";
         return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
     }
     let coordinates = model.interfaces().iter().map(|set| match set.coupling() {
@@ -109,7 +109,7 @@ fn check_possible(model: &FeModel, settings: &ModeSettings, context: &Context<'_
 }
 
 fn nothing_deforms() -> Diagnostic {
-    let message = "no shape deforms the body: one interface alone has no constraint modes, and no fixed-interface mode was asked for";
+    let message = "no shape deforms the body: one interface alone has no constraint modes, and no fixed-interface mode was requested";
     Diagnostic::new(Code::ShapesNone, message).with_help("ask for more modes, or raise --max-frequency")
 }
 
@@ -140,7 +140,7 @@ impl<'a> Parts<'a> {
         let failed = |failure| explain(model, failure);
         let elimination = hold(pencil.n(), joints, context.memory).map_err(failed)?;
         if elimination.is_empty() {
-            let message = "the interfaces hold every node of the body: nothing is left to deform";
+            let message = "the interfaces contain every node of the body: no node is left that can deform";
             return Err(Diagnostic::new(Code::InterfaceCoupling, message)
                 .with_help("give the interfaces fewer nodes")
                 .into());
@@ -232,7 +232,7 @@ impl<'a> Parts<'a> {
         let note = if self.lacks_rigid_motion_only(found, rigid) {
             let (fixed, motions) = (self.fixed.eigenvalues.len(), self.constraint.ncols());
             let message = format!(
-                "the {motions} interface motions contain the {rigid} rigid-body motions, which the body frame carries out: with {fixed} fixed-interface modes that leaves {} ways to deform",
+                "the {motions} interface motions contain the {rigid} rigid-body motions, which the body frame performs: with {fixed} fixed-interface modes the body has {} modes",
                 found.kept.len()
             );
             Diagnostic::new(Code::ShapesRigid, message)
@@ -241,7 +241,7 @@ impl<'a> Parts<'a> {
             let which = removed.iter().map(|&j| self.name(j)).map(|(kind, name)| format!("{kind} {name}"));
             let which = named(which.collect());
             let message = format!(
-                "{} of {all} shapes are left out, they are rigid motions, move no mass, or add less than {MIN_SHAPE_REMAINDER:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
+                "{} of {all} shapes are left out since they are rigid motions, move no mass, or add less than {MIN_SHAPE_REMAINDER:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
                 removed.len()
             );
             Diagnostic::new(Code::ShapesDependent, message)
@@ -292,7 +292,7 @@ impl<'a> Parts<'a> {
             && given < wanted
             && wanted < usize::MAX
         {
-            let message = format!("{wanted} fixed-interface modes were asked for, there are {given}");
+            let message = format!("{wanted} fixed-interface modes were requested, the model has {given}");
             notes.push(Diagnostic::new(Code::ModesClamped, message));
         }
         let completeness = &self.fixed.completeness;
@@ -309,7 +309,7 @@ impl<'a> Parts<'a> {
             let hertz =
                 self.fixed.eigenvalues.last().map_or(0.0, |&lambda| model.units().frequency_of(lambda));
             let message = format!(
-                "fixed-interface mode {given} ({hertz:.6} Hz) shares its eigenvalue with {more} that are left out"
+                "fixed-interface mode {given} ({hertz:.6} Hz) shares its eigenvalue with other modes that are left out (number: {more})"
             );
             notes.push(
                 Diagnostic::new(Code::RepeatedSplit, message)

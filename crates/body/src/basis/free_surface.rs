@@ -82,16 +82,16 @@ pub(super) fn single_precision_note(solution: &EigenSolution, settings: &ModeSet
     let plan = solution.plan.as_ref().filter(|_| settings.factor == FactorChoice::Auto)?;
     let message = match plan.current().way {
         Way::Cycles => {
-            "no factor: the modes are found by cycles over levels of groups of nodes, and corrected in double precision"
+            "the modes were found by multigrid cycles without a factor, and corrected in double precision"
         }
         _ if plan.has_failed(Way::Cycles) => {
-            "cycles over levels of groups of nodes do not converge for this model: factored instead"
+            "multigrid cycles did not converge for this model: a factor was used instead"
         }
         Way::SinglePrecision => {
-            "the factor is in single precision; the modes are corrected in double precision"
+            "the factor was computed in single precision, and the modes were corrected in double precision"
         }
         _ if plan.has_failed(Way::SinglePrecision) => {
-            "a single-precision factor is too poor for the conditioning of this model: factored in double precision"
+            "a factor in single precision is too inaccurate for the conditioning of this model: the factor was computed in double precision"
         }
         _ => return None,
     };
@@ -112,7 +112,7 @@ fn describe(
         && given < wanted
     {
         let message = format!(
-            "{wanted} modes were asked for, the model has {given} flexible modes with finite frequency"
+            "{wanted} modes were requested, the model has {given} flexible modes with finite frequency"
         );
         notes.push(Diagnostic::new(Code::ModesClamped, message));
         finite = finite.or(Some(given));
@@ -120,7 +120,10 @@ fn describe(
     notes.extend(singular_mass_note(problem, finite));
     let below = solution.completeness.modes_below;
     if matches!(settings.wanted, Wanted::Lowest(_)) && below > given {
-        let message = format!("mode {given} shares its eigenvalue with {} that are left out", below - given);
+        let message = format!(
+            "mode {given} shares its eigenvalue with other modes that are left out (number: {})",
+            below - given
+        );
         notes.push(
             Diagnostic::new(Code::RepeatedSplit, message)
                 .with_help(format!("ask for {below} modes to keep the body's symmetry")),
@@ -133,7 +136,7 @@ fn describe(
         notes.push(match settings.accuracy {
             Accuracy::Fast => note,
             _ => note.with_help(
-                "the modes keep their accuracy; a larger --memory-limit or machine allows the proof",
+                "raise --memory-limit or use a larger machine for the proof; the modes keep their accuracy",
             ),
         });
     }

@@ -54,7 +54,7 @@ fn determining(dimension: usize) -> (&'static str, &'static str) {
 fn undetermined(model: &FeModel, joint: &CoupledInterface) -> Diagnostic {
     if joint.coupling == Coupling::Free {
         let message =
-            format!("nodes of the free interface `{}` have a part of their rotations only", joint.name);
+            format!("nodes of the free interface `{}` have only some of their rotations", joint.name);
         let help = "give it nodes with all rotations, nodes with none, or another coupling";
         return Diagnostic::new(Code::InterfaceCoupling, message).with_help(help);
     }

@@ -128,7 +128,7 @@ impl Basis for ImportedShapes {
             && wanted > given
             && wanted < usize::MAX
         {
-            let message = format!("{wanted} modes were asked for, the shapes give {given}");
+            let message = format!("{wanted} modes were requested, the shapes give {given}");
             basis.diagnostics.push(Diagnostic::new(Code::ModesClamped, message));
         }
         basis.describe_span(settings.accuracy);
@@ -147,7 +147,7 @@ impl ModalBasis {
         let others = solution.residuals.len() - solution.eigenvectors(accuracy);
         if others > 0 {
             let message = format!(
-                "{others} of {} modes are no eigenvectors but the best that the span of the shapes has: K-residual up to {worst:.0e}, eigenvectors have {promised:.0e}",
+                "{others} of {} modes are not eigenvectors but the best approximations in the span of the shapes: K-residual up to {worst:.0e}, expected at most {promised:.0e}",
                 residuals.len()
             );
             self.diagnostics.push(Diagnostic::new(Code::ShapesSpan, message));

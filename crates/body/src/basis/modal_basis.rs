@@ -140,13 +140,13 @@ impl ModalBasis {
 /// Returns the error for a solution without modes, with the reason.
 fn no_modes(model: &FeModel, settings: &ModeSettings, solution: &EigenSolution) -> Diagnostic {
     if settings.wanted == Wanted::Lowest(0) {
-        let message = "no mode is asked for, and a body without modes is rigid".to_owned();
+        let message = "no mode is requested, and a body without modes is rigid".to_owned();
         return Diagnostic::new(Code::NoModes, message).with_help("ask for one mode or more");
     }
     let message = match (settings.wanted, solution.next_eigenvalue) {
         (Wanted::Below(_), Some(next)) => {
             let hertz = model.units().frequency_of(next);
-            format!("the first flexible mode has {hertz:.6} Hz, above the limit that was given")
+            format!("the first flexible mode has {hertz:.6} Hz, above the given limit")
         }
         _ => "no flexible mode has a finite frequency".to_owned(),
     };
@@ -159,7 +159,7 @@ fn rigid_motion_strained(rigid_noise: f64) -> Diagnostic {
         100.0 * rigid_noise
     );
     Diagnostic::new(Code::RigidMotionStrained, message)
-        .with_help("soft ties to ground, or a thin body whose matrices carry too few digits")
+        .with_help("remove soft ties to ground; of a thin body write the matrices with more digits")
 }
 
 /// Returns a diagnostic about the noise of the eigenvalues due to the digits of the input, if the noise is
@@ -177,7 +177,7 @@ fn noise_note(model: &FeModel, noise: f64) -> Option<Diagnostic> {
         diagnostic
     } else {
         diagnostic.with_help(
-            "double precision holds no more digits: expect no better of a body as thin or stiff as this",
+            "nothing to do: double precision has no more digits for a body as thin or stiff as this",
         )
     })
 }

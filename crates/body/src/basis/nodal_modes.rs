@@ -23,7 +23,7 @@ pub(super) fn along_the_model(model: &FeModel, mut raw: RawModes) -> Result<RawM
     if std::mem::take(&mut raw.along_nodes) {
         model.given_rows().turn(&raw.labels, &mut raw.matrix).map_err(|node| {
             let message = format!(
-                "values of node {node} stand along axes of its own, and the file does not have all three directions of them"
+                "values of node {node} are along local axes, and the file does not have all three directions"
             );
             Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path)
         })?;
@@ -52,7 +52,11 @@ pub(super) fn by_rows(model: &FeModel, raw: &RawModes) -> Result<(Mat<f64>, Vec<
         return Ok((shapes, Vec::new()));
     }
     complete(model, &mut shapes, &missing, raw)?;
-    let message = format!("the file lacks {} of {n} rows, of {}", missing.len(), some_nodes(model, &missing));
+    let message = format!(
+        "the file has no values for {} of {n} rows, of {}",
+        missing.len(),
+        some_nodes(model, &missing)
+    );
     Ok((shapes, vec![Diagnostic::new(Code::ModesCompleted, message).in_file(&raw.path)]))
 }
 
@@ -89,12 +93,12 @@ fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &Raw
     let mass = principal_mass(&whole, missing);
     let own = Pencil::new(&stiffness, &mass, 1);
     let refuse = |why: &str| {
-        let message = format!("the file lacks rows of {}, and {why}", some_nodes(model, missing));
+        let message = format!("the file has no values for rows of {}, and {why}", some_nodes(model, missing));
         let help = "write the modes of all nodes, with their rotations where the model has them";
         Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path).with_help(help)
     };
-    let analysis =
-        Analysis::new(&own).ok_or_else(|| refuse("they are too many to follow from the others"))?;
+    let analysis = Analysis::new(&own)
+        .ok_or_else(|| refuse("there are too many to compute them from the other rows"))?;
     for (mode, eigenvalue) in raw.eigenvalues.iter().enumerate() {
         let lambda = eigenvalue.unwrap_or(0.0).max(0.0);
         let shape = shapes.as_ref().subcols(mode, 1);
@@ -105,7 +109,7 @@ fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &Raw
         let inertia = factor.inertia();
         if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > MAX_BACKWARD_ERROR
         {
-            return Err(refuse("they do not follow from the others").into());
+            return Err(refuse("they cannot be computed from the other rows").into());
         }
         factor.solve_in_place(values.as_mut());
         missing.iter().enumerate().for_each(|(i, row)| shapes[(*row, mode)] = values[(i, 0)]);
@@ -200,7 +204,7 @@ impl StatedModes {
         let diagnostic = Diagnostic::new(Code::ModesDiffer, message).in_file(&self.path);
         Some(match worst.rounded && different.iter().all(|one| one.rounded) {
             true => diagnostic.with_help(format!(
-                "the {} digits of the shapes explain it: write them with more, or compute the modes here",
+                "write the shapes with more than {} digits, which explain the difference, or compute the modes here",
                 self.digits
             )),
             false => diagnostic,

@@ -232,7 +232,7 @@ impl NamedLoads {
     /// `certified`: residual vectors have no guaranteed bounds.
     pub(super) fn new(model: &FeModel, loads: &[Loads], what: &str, settings: &ModeSettings) -> Result<Self> {
         if settings.accuracy == Accuracy::Certified {
-            let message = format!("{what}s are no eigenvectors and cannot be certified");
+            let message = format!("{what}s are not eigenvectors and cannot be certified");
             return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
         }
         Self::of(model, loads, what)
@@ -381,7 +381,7 @@ fn no_response(model: &FeModel, hertz: f64, failure: EigenFailure) -> Error {
     let message =
         format!("the responses at {hertz} Hz are found with a relative residual of {residual:.1e} only");
     Diagnostic::new(Code::FactorizationFailed, message)
-        .with_help("a natural frequency beyond the modes may be too near: name another frequency")
+        .with_help("name another frequency: a natural frequency beyond the modes may be too near")
         .into()
 }
 
@@ -540,7 +540,7 @@ impl Added {
         let dropped = &self.dropped;
         (!dropped.is_empty()).then(|| {
             let message = format!(
-                "{} of {} {what}s are left out, they add less than {MIN_RESPONSE_REMAINDER:.0e} of their M-norm: {}",
+                "{} of {} {what}s are left out since they add less than {MIN_RESPONSE_REMAINDER:.0e} of their M-norm: {}",
                 dropped.len(),
                 names.len(),
                 dropped.join(", ")

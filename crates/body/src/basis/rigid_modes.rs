@@ -54,6 +54,6 @@ fn degenerate(model: &FeModel, centre: [f64; 3], length: f64) -> Diagnostic {
     }
     let message =
         format!("the {nodes} nodes do not lie on one line, but all mass does: nothing has inertia about it");
-    let help = "elements of reduced integration (C3D8R, hourglass modes) have their mass in their middles: a bar of one row of them has none beside its axis; use C3D8 or C3D20, or two rows; else look for nodes without mass";
+    let help = "use C3D8 or C3D20, or two rows of elements, in a bar of one row of elements of reduced integration (C3D8R), which have their mass in their middles; else look for nodes without mass";
     Diagnostic::new(Code::BodyDegenerate, message).with_help(help)
 }

@@ -146,7 +146,7 @@ fn caution(
     let cut = cuts.iter().filter_map(|&(whose, last, next)| {
         let (last, next) = (last?, next?);
         (next - last <= SAME_EIGENVALUE_DIFFERENCE * next).then(|| {
-            format!("{count} modes cut a group of equal frequencies of the {whose} at {}", hertz(last))
+            format!("{count} modes divide a group of equal frequencies of the {whose} at {}", hertz(last))
         })
     });
     let disjoint = (subspace_cosine < MIN_SUBSPACE_COSINE).then(|| {
@@ -157,7 +157,7 @@ fn caution(
     if found.is_empty() {
         return String::new();
     }
-    format!("{}; errors of invariants are arbitrary, take another --modes", found.join("; "))
+    format!("{}; the errors of the invariants are arbitrary: choose another --modes", found.join("; "))
 }
 
 /// Returns as many modes of the lumped mass as the body has, or the reason why there are none.
@@ -181,7 +181,7 @@ fn own_modes(
         .map_err(|error| error.first_error().message().to_owned())?
         .solution;
     if found.eigenvalues.len() < modal.n_modes() {
-        return Err(format!("the lumped mass has {} modes only", found.eigenvalues.len()));
+        return Err(format!("the lumped mass has only {} modes", found.eigenvalues.len()));
     }
     Ok(found)
 }

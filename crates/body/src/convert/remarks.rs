@@ -56,7 +56,7 @@ pub fn interface_compliance(body: &FlexBody) -> Option<Diagnostic> {
     let found: Vec<String> = body.interfaces().iter().filter_map(worst).collect();
     (!found.is_empty()).then(|| {
         let message = format!(
-            "of the static compliance at the interfaces the {} modes lack {}",
+            "the {} modes do not contain the whole static compliance at the interfaces: missing {}",
             body.n_modes(),
             found.join(", ")
         );
@@ -82,7 +82,7 @@ fn poor_fit(interface: &Interface, body: &FlexBody) -> Option<Diagnostic> {
     let (mode, part) = rows.deformation();
     (part > ROUNDING_DEFORMATION + 4.0 * body.storage().rounding()).then(|| {
         let message = format!(
-            "interface `{}` was declared rigid, but deforms by {:.2} % of its largest motion in mode {}: its rows are its mean rigid motion",
+            "interface `{}` was declared rigid, but deforms by {:.2} % of its largest motion in mode {}: its mean rigid motion is used",
             interface.name,
             100.0 * part,
             mode + 1

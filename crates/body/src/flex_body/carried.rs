@@ -84,7 +84,7 @@ impl FlexBody {
         if self.groups() != TermGroups::ALL {
             let lacking: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
             return Err(refused(format!(
-                "the body lacks {}, without which its terms about {carrier} are not known",
+                "the body does not have {}, which its terms about {carrier} require",
                 lacking.join(", ")
             )));
         }
@@ -174,7 +174,7 @@ impl FlexBody {
         let worst = missing(c1).max(missing(&c2));
         (worst > MAX_TRUNCATION).then(|| {
             let message = format!(
-                "the {nf} modes resolve {carrier} badly: where it is accelerated, about {:.0} % of the elastic energy of the body that hangs from it are missing in the worst direction",
+                "the {nf} modes resolve {carrier} poorly: when it is accelerated, up to about {:.0} % of the elastic energy is missing, depending on the direction",
                 100.0 * worst
             );
             Diagnostic::new(Code::CarrierUnresolved, message)

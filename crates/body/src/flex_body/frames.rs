@@ -93,8 +93,8 @@ impl FlexBody {
         if self.groups() != TermGroups::ALL {
             let dropped: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
             return refuse(
-                &format!("{} would be needed, which the body does not have", dropped.join(", ")),
-                "take a body with all terms",
+                &format!("{} are needed, which the body does not have", dropped.join(", ")),
+                "use a body with all terms",
             );
         }
         let convert = "convert the FE model with the frame that is needed (--frame)";

@@ -89,7 +89,7 @@ impl Split {
         let own = |j: usize| beside(j, j) / modal[(j, j)];
         if let Some(j) = (0..nf).find(|&j| own(j) < -RIGID_REMAINDER) {
             return Err(format!(
-                "mode {} and rigid motion together have negative kinetic energy: mass, coupling and modal mass do not belong together",
+                "mode {} and rigid motion together have negative kinetic energy: mass, coupling and modal mass contradict each other",
                 j + 1
             ));
         }

@@ -181,7 +181,7 @@ fn decks_that_cannot_be_read_are_refused_where_they_cannot() {
             Code::MatrixKind,
             "type 4",
         ),
-        ("job.pch", "DMIG    MAAX ", "DMIG    XAAX ", Code::MatrixSyntax, "above its header"),
+        ("job.pch", "DMIG    MAAX ", "DMIG    XAAX ", Code::MatrixSyntax, "before its header"),
         (
             "job.pch",
             "$TITLE",

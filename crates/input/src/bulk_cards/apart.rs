@@ -99,7 +99,7 @@ impl Apart {
         match stray {
             None => Ok(cards),
             Some(line) => {
-                let message = format!("`{}` continues no card", excerpt(&line.text));
+                let message = format!("`{}` does not continue any card", excerpt(&line.text));
                 Err(Diagnostic::new(Code::DeckSyntax, message).in_file(path).at_line(line.number))
             }
         }

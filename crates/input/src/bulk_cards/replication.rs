@@ -84,7 +84,11 @@ impl Replication {
                 Change::Same => card.field(k).to_vec(),
                 Change::Text(text) => text.clone(),
                 Change::More(more) => sum(card.field(k), more).ok_or_else(|| {
-                    bad(&format!("field {} of the {} is no number to add to", k + 1, card.name))
+                    bad(&format!(
+                        "field {} of the {} is not a number that can be incremented",
+                        k + 1,
+                        card.name
+                    ))
                 })?,
             };
             next.push(&field);

@@ -56,7 +56,7 @@ impl Columns {
     fn column(&mut self, card: &Card, path: &Path, heads: &Heads) -> Result<(), Diagnostic> {
         let field = card.field(0);
         let Some(at) = heads.iter().rposition(|(name, _)| field.eq_ignore_ascii_case(name.as_bytes())) else {
-            let message = format!("a column of DMIG {} stands above its header", upper(field));
+            let message = format!("a column of DMIG {} comes before its header", upper(field));
             return Err(bad_card(card, 0, path, message));
         };
         let (name, is_real) = &heads[at];

@@ -39,8 +39,9 @@ fn named(file: &File, name: &str) -> Found<Numbers> {
     let mut group = root(file)?;
     let mut path = String::new();
     for part in groups {
-        let missing =
-            || vec![layout(format!("`{part}` of `{name}` is no group of the file")).with_help(listing(file))];
+        let missing = || {
+            vec![layout(format!("`{part}` of `{name}` is not a group of the file")).with_help(listing(file))]
+        };
         if !Members::of(&group).is_here(part) {
             return Err(missing());
         }

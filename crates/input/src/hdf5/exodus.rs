@@ -74,7 +74,7 @@ impl Mesh<'_> {
         } else if self.has("coord") {
             self.rows_of("coord")?
         } else {
-            return Err(wrong("file has neither `coordx` nor `coord`: it is no Exodus mesh".to_owned()));
+            return Err(wrong("file has neither `coordx` nor `coord`: it is not an Exodus mesh".to_owned()));
         };
         let count = axes.first().map_or(0, Vec::len);
         if axes.len() > 3 || axes.iter().any(|axis| axis.len() != count) {
@@ -143,7 +143,7 @@ fn nodes_at(dataset: &str, ids: &[i64], places: impl Iterator<Item = Option<i64>
         ids.get(at).copied()
     };
     let nodes: Option<Vec<i64>> = places.map(node).collect();
-    nodes.ok_or_else(|| wrong(format!("`{dataset}` names a node that there is not")))
+    nodes.ok_or_else(|| wrong(format!("`{dataset}` names a node that does not exist")))
 }
 
 /// Adds an element of a type with an Exodus name (`HEX8`, `TETRA`, `SHELL4`). Points are not drawn.

@@ -247,7 +247,7 @@ impl GroupReader<'_> {
         }
         let message =
             format!("{} has {} values, {} has {}", values.name, values.len, indices.name, indices.len);
-        let help = "both have one value per entry: write the matrix again";
+        let help = "write the matrix again: both must have one value per entry";
         Err(vec![Diagnostic::new(Code::MatrixCount, message).with_help(help)])
     }
 
@@ -283,7 +283,7 @@ impl GroupReader<'_> {
             Some(false) => return Ok(Declared::No),
             None => text_of(&attribute, &Heaps::of(self.file)),
         };
-        let help = "it may be true, false, \"lower\" or \"upper\"";
+        let help = "set it to true, false, \"lower\" or \"upper\"";
         let refuse = |what: String| {
             let message = format!("attribute `symmetric` of group `{}` {what}", self.name);
             Diagnostic::new(Code::MatrixKind, message).with_help(help)
@@ -331,7 +331,7 @@ impl Bad {
     fn finish(mut self, group: &str) -> Vec<Diagnostic> {
         let more = self.count - self.shown.len();
         if more > 0 {
-            let message = format!("{more} more entries of group `{group}` are bad");
+            let message = format!("{more} more entries of group `{group}` have errors");
             self.shown.push(Diagnostic::new(Code::MatrixIndex, message));
         }
         self.shown

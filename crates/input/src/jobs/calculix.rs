@@ -101,7 +101,7 @@ fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
         });
         let Some(label) = label else {
             let diagnostic = expected(Code::TableRow, "a node and a direction as in `17.3`", line);
-            let help = "structures have the directions 1 to 3: write the file again";
+            let help = "write the file again: structures have the directions 1 to 3";
             return Err(vec![diagnostic.in_file(path).at_line(number).with_help(help)]);
         };
         labels.push(label);

@@ -109,11 +109,11 @@ impl Deck {
         let file = InputFile::open(path)?;
         if depth > MAX_INCLUDE_DEPTH || self.files.len() >= MAX_FILES {
             let message = format!(
-                "files include one another more than {MAX_INCLUDE_DEPTH} levels deep, or {MAX_FILES} times"
+                "included files are nested more than {MAX_INCLUDE_DEPTH} levels deep, or are more than {MAX_FILES}"
             );
             return Err(Diagnostic::new(Code::DeckSyntax, message)
                 .in_file(path)
-                .with_help("a file includes itself: take the *INCLUDE out"));
+                .with_help("remove the *INCLUDE with which a file includes itself"));
         }
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let at = self.files.len();
@@ -227,11 +227,11 @@ impl Deck {
             }
             (Some((line, text)), _) => Err(Diagnostic::new(
                 Code::DeckSyntax,
-                format!("`{}` stands before the first keyword", excerpt(text)),
+                format!("`{}` comes before the first keyword", excerpt(text)),
             )
             .in_file(self.files[at].path())
             .at_line(line)
-            .with_help("a deck begins with a keyword line such as *NODE")),
+            .with_help("begin the deck with a keyword line such as *NODE")),
         }
     }
 }

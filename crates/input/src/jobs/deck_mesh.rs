@@ -243,7 +243,7 @@ impl DeckMeshReader<'_> {
 
     fn finish(mut self) -> Vec<Diagnostic> {
         if self.bad_count > self.bad.len() {
-            let message = format!("{} more lines are bad", self.bad_count - self.bad.len());
+            let message = format!("{} more lines have errors", self.bad_count - self.bad.len());
             self.bad.extend(
                 self.deck.path().map(|path| Diagnostic::new(Code::DeckSyntax, message).in_file(path)),
             );
@@ -374,8 +374,11 @@ impl DeckMeshReader<'_> {
                 match integer(name.as_bytes()).map(|id| vec![number(id)]).or_else(|| known(name)) {
                     Some(more) => members.extend(more),
                     None => {
-                        let message = format!("*{}: `{name}` is no number and no set above", card.title);
-                        let help = "define the set above, or correct the name";
+                        let message = format!(
+                            "*{}: `{name}` is neither a number nor a set that is defined above",
+                            card.title
+                        );
+                        let help = "define the set before this line, or correct the name";
                         let refused = self.deck.at(card, line, Code::DeckSyntax, message).with_help(help);
                         unknown.get_or_insert(refused);
                     }
@@ -410,9 +413,9 @@ impl DeckMeshReader<'_> {
             }
         };
         nodes.ok_or_else(|| {
-            let message = format!("element set `{elements}` is not known here");
+            let message = format!("element set `{elements}` is not defined above");
             let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
-            diagnostic.with_help("define the element set above")
+            diagnostic.with_help("define the element set before this line")
         })
     }
 

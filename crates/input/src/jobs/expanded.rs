@@ -64,20 +64,20 @@ pub(super) fn label_once(
     let kinds = expanded_kinds(mesh);
     let refuse = |why: &str| vec![refused(first, &kinds, why).in_file(path)];
     if kinds.is_empty() || !kinds.iter().all(|kind| SHELLS.contains(kind)) {
-        return Err(refuse("the deck does not say where their nodes lie"));
+        return Err(refuse("the deck does not determine the positions of their nodes"));
     }
     // Copies of each node from one face to the other, and the vector through the thickness from K.
     let offsets = offsets(deck, mesh, &rows).map_err(refuse)?;
     let mut all = Vec::new();
     for (&node, own) in &rows {
         let copies = copies(own, &labels, mass, offsets[&node]);
-        let copies = copies.ok_or_else(|| refuse("their rows cannot be told apart"))?;
+        let copies = copies.ok_or_else(|| refuse("their rows cannot be distinguished"))?;
         all.push(Expanded { node, copies });
     }
     all.sort_by_key(|own| own.copies[0].0);
     let through = thickness(stiffness, &labels, &mesh.nodes, &all)
-        .ok_or_else(|| refuse("the stiffness does not say where their nodes lie"))?;
-    numbered(mesh, labels, &all, &through).ok_or_else(|| refuse("their nodes have no numbers left"))
+        .ok_or_else(|| refuse("the stiffness does not determine the positions of their nodes"))?;
+    numbered(mesh, labels, &all, &through).ok_or_else(|| refuse("no node numbers are left for their nodes"))
 }
 
 /// Returns the copies of a node with their distances from the node in units of d. `None` means that the rows are no
@@ -246,6 +246,7 @@ fn expanded_kinds(mesh: &DeckMesh) -> Vec<&str> {
 fn refused(label: DofLabel, kinds: &[&str], why: &str) -> Diagnostic {
     let kinds = if kinds.is_empty() { "elements".to_owned() } else { kinds.join(", ") };
     let message = format!("{label} labels several rows: CalculiX expands {kinds} into solids, and {why}");
-    Diagnostic::new(Code::DeckUnsupported, message)
-        .with_help("model the part with solid elements, C3D4, C3D8, C3D10, C3D20 and their kin, or with the shells S6, S8, S8R alone")
+    Diagnostic::new(Code::DeckUnsupported, message).with_help(
+        "use solid elements only (C3D4, C3D8, C3D10, C3D20 and their variants), or shells S6, S8, S8R only",
+    )
 }

@@ -129,7 +129,7 @@ pub(crate) fn nodes_of_bulk(path: &Path) -> Found<NodeFile> {
     let (nodes, axes) = places(&bulk)?;
     if let Some(grid) = axes.keys().min() {
         let message = format!(
-            "rows of {} grids stand along the axes of their CD, the first of them grid {grid}: matrices from elsewhere cannot be turned with them",
+            "rows of {} grids are along the axes of their CD, the first of them grid {grid}: matrices that are not of this job cannot be transformed to the axes of the model",
             axes.len()
         );
         let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(path);

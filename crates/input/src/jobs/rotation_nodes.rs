@@ -33,17 +33,17 @@ pub(super) fn rotation_nodes(deck: &Deck, mesh: &DeckMesh, labels: &[DofLabel]) 
     for Rotation { node, reference, card } in rotations {
         // A rotation node belongs to one reference node, and a reference node has one rotation node.
         if let Some(other) = nodes.insert(node, reference).filter(|other| *other != reference) {
-            let message = format!("ROT NODE {node} is that of two reference nodes, {other} and {reference}");
+            let message = format!("ROT NODE {node} belongs to two reference nodes, {other} and {reference}");
             let diagnostic = deck.about(card, Code::DeckUnsupported, message);
-            return Err(vec![diagnostic.with_help("give each *RIGID BODY a ROT NODE of its own")]);
+            return Err(vec![diagnostic.with_help("give each *RIGID BODY a separate ROT NODE")]);
         }
         if with_rows.contains(&node) && turned.insert(reference, node).is_some_and(|other| other != node) {
             let message = format!(
-                "REF NODE {reference} of *{} is also the REF NODE of another coupling: it has two sets of rotations",
+                "REF NODE {reference} of *{} is also the REF NODE of another coupling: its rotations are not unique",
                 card.title
             );
             let diagnostic = deck.about(card, Code::DeckUnsupported, message);
-            return Err(vec![diagnostic.with_help("give each coupling a REF NODE of its own")]);
+            return Err(vec![diagnostic.with_help("give each coupling a separate REF NODE")]);
         }
     }
     Ok(nodes)

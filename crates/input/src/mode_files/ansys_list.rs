@@ -41,7 +41,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
                 let message = format!("the list is not along the axes of the model: `{}`", excerpt(line));
                 return Err(syntax(file, at, message)
                     .into_iter()
-                    .map(|d| d.with_help("RSYS,0 before PRNSOL"))
+                    .map(|d| d.with_help("set RSYS,0 before PRNSOL"))
                     .collect());
             }
         } else if let Some(node) = integer(first) {
@@ -52,7 +52,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     }
     let AnsysListReader { mut table, .. } = reading;
     if table.len() == 0 {
-        let help = "SET,1,K and PRNSOL,DOF for every mode K";
+        let help = "print SET,1,K and PRNSOL,DOF for every mode K";
         return Err(unreadable(file, "no displacements of modes are in the list", help));
     }
     table.digits = table.digits.max(1);
@@ -75,7 +75,7 @@ impl AnsysListReader {
             return Err(syntax(
                 file,
                 at,
-                "the list belongs to a time: the modes of a modal analysis are read",
+                "the list belongs to a time, expected the modes of a modal analysis",
             ));
         } else if let Some(text) = behind(line, b"FREQ=") {
             let Some(hertz) = real(text) else {

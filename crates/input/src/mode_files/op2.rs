@@ -72,7 +72,8 @@ fn add_mode(table: &mut ModeTable, records: &Records<'_>, head: &[u64], values: 
         || whole(9) != WORDS_PER_POINT as i64
         || !values.len().is_multiple_of(WORDS_PER_POINT)
     {
-        let message = "eigenvectors are complex, or not sorted by modes: real ones (SORT1) are read";
+        let message =
+            "eigenvectors are complex or not sorted by modes, expected real ones sorted by modes (SORT1)";
         return Err(unreadable(file, message, HELP));
     }
     table.begin(Some(records.real(head[5])));

@@ -69,7 +69,7 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
     let format = text.get(head + 1).and_then(|line| widths(line));
     let Some([(count, width), (reals, length)]) = format.filter(|[whole, reals]| whole.1 > 0 && reals.1 > 0)
     else {
-        let message = "the line below NBLOCK is no format such as (3i9,6e21.13e3)".to_owned();
+        let message = "the line below NBLOCK is not a format such as (3i9,6e21.13e3)".to_owned();
         return Err(syntax(file, head + 2, message));
     };
     for (k, line) in text.iter().enumerate().skip(head + 2) {

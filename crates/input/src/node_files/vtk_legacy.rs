@@ -50,7 +50,7 @@ impl Cursor<'_> {
             match words.as_slice() {
                 [] | ["DIMENSIONS" | "METADATA" | "INFORMATION" | "NAME" | "DATA", ..] => {}
                 ["DATASET", "UNSTRUCTURED_GRID" | "POLYDATA" | "STRUCTURED_GRID"] => {}
-                ["DATASET", kind] => return Err(format!("{kind} has no points of its own")),
+                ["DATASET", kind] => return Err(format!("a data set {kind} has no list of points")),
                 ["FIELD", _, count] => self.skip_fields(count)?,
                 ["POINTS", count, kind] => {
                     let (count, kind) = self.announced(count, "3", kind, begin)?;

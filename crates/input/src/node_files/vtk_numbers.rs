@@ -161,10 +161,10 @@ impl<'a> Base64<'a> {
                 b'/' => 63,
                 b'=' => 0,
                 _ if character.is_ascii_whitespace() => continue,
-                _ => return wrong("a character is none of base64"),
+                _ => return wrong("a character does not belong to base64"),
             };
             if padding > 0 && character != b'=' {
-                return wrong("padding of base64 stands within the text");
+                return wrong("padding of base64 is within the text");
             }
             padding += usize::from(character == b'=');
             bits = bits << 6 | u32::from(value);

@@ -182,6 +182,6 @@ impl Binary {
 }
 
 fn misread(header: &Header) -> Diagnostic {
-    let message = format!("a record of matrix {} is none of a column", header.name);
+    let message = format!("a record of matrix {} is not that of a column", header.name);
     Diagnostic::new(Code::MatrixSyntax, message).with_help("write the file again with OUTPUT4")
 }

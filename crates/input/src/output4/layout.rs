@@ -43,7 +43,7 @@ impl Header {
             || !(1..=4).contains(&kind)
             || !name.chars().all(is_name)
         {
-            let message = format!("header of a matrix says {columns} columns, {rows} rows, type {kind}");
+            let message = format!("header of a matrix states {columns} columns, {rows} rows, type {kind}");
             return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help("write the file again"));
         }
         Ok(Self {

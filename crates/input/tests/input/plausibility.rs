@@ -348,7 +348,7 @@ fn numbers_without_units_are_those_of_matter() {
         let error = refused(raw.clone());
         let found = error.diagnostics().iter().find(|d| d.code() == Code::DensityImplausible).expect("told");
         assert!(
-            found.message().contains(said) && found.message().contains("which nothing states"),
+            found.message().contains(said) && found.message().contains("assumed since no units are given"),
             "{error}"
         );
         assert!(

@@ -67,7 +67,7 @@ impl Judged<'_> {
         }
         if *rotation > MAX_RELATION_ERROR {
             let message = format!(
-                "geometric stiffness for {name} does not turn the forces of its load under rigid rotation: {} of the forces that it gives are no turned forces (allowed 1 %)",
+                "geometric stiffness for {name} does not rotate the forces of its load with the body: {} of its forces under rigid rotation are not rotated forces (allowed 1 %)",
                 per_cent(*rotation)
             );
             return Some(Diagnostic::new(Code::GeometricStiffnessMotion, message));

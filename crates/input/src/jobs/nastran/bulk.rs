@@ -105,7 +105,7 @@ impl Bulk {
         .map_err(|diagnostic| vec![diagnostic])?;
         let mut bad = std::mem::take(&mut bulk.bad);
         if bulk.bad_count > bad.len() {
-            let message = format!("{} more cards are bad", bulk.bad_count - bad.len());
+            let message = format!("{} more cards have errors", bulk.bad_count - bad.len());
             bad.push(Diagnostic::new(Code::DeckSyntax, message).in_file(path));
         }
         bad.extend(bulk.dmigs.take_bad());

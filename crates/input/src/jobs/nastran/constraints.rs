@@ -164,13 +164,15 @@ impl Constraints {
                     let moves = |grid: i64| (0..=6).any(|component| has(&(grid, component)));
                     if numbers.iter().filter(|number| moves(**number)).count() > 1 {
                         let help = "write the matrices of the a-set (EXTOUT, EXTSEOUT), which contain it, or write it as RBE2, RBE3 without UM, RBAR or MPC";
-                        return Err(own.refused("the constraint is not read").with_help(help));
+                        return Err(own
+                            .refused("constraints of this kind are not supported")
+                            .with_help(help));
                     }
                 }
                 Relation::Sum { set, .. } if !sets.contains(set) && own.dependent().iter().any(&has) => {
-                    let why = "the case control does not select the set, so that it may hold or not";
+                    let why = "the case control does not select the set, so that it is not known whether the constraint acts";
                     let help =
-                        format!("write MPC = {set} into the case control, or take the cards of the set out");
+                        format!("write MPC = {set} into the case control, or remove the cards of the set");
                     return Err(own.refused(why).with_help(help));
                 }
                 _ if own.dependent().iter().any(&has) => open.push(own),

@@ -66,7 +66,7 @@ impl<'b> GridPlaces<'b> {
     ) -> Result<Vector6<f64>, Diagnostic> {
         let axis = self.axis(point);
         if point.1 == 0 {
-            return Err(of.refused(format!("scalar point {} has no place in it", point.0)));
+            return Err(of.refused(format!("scalar point {} cannot be a part of it", point.0)));
         }
         let (along, about) = if point.1 <= 3 {
             (axis, (self.position(point.0, of)? - origin).cross(&axis) / length)
@@ -87,7 +87,7 @@ impl Followers {
         for constraint in constraints {
             for (point, sum) in sums(constraint, places)? {
                 if let Some((_, other)) = direct.insert(point, (sum, constraint)) {
-                    let why = format!("{} follows by {} as well", named(point), other.name);
+                    let why = format!("{} is also dependent by {}", named(point), other.name);
                     return Err(constraint.refused(why));
                 }
             }
@@ -102,7 +102,7 @@ impl Followers {
                 direct.iter().filter(|(_, (sum, _))| ready(sum)).map(|(point, _)| *point).collect();
             if solved.is_empty() {
                 let (point, (_, constraint)) = direct.first_key_value().expect("some are left");
-                let why = format!("{} follows itself through other constraints", named(*point));
+                let why = format!("{} depends on itself through other constraints", named(*point));
                 return Err(constraint.refused(why));
             }
             for point in solved {
@@ -152,7 +152,7 @@ impl Followers {
         let left: Vec<Point> = points.iter().filter(|point| !self.contains(point)).copied().collect();
         let place = |point: &Point| {
             left.binary_search(point).map(|row| row as u32).map_err(|_| {
-                let message = format!("constraints let rows follow {}, which has none", named(*point));
+                let message = format!("rows depend by constraints on {}, which has no rows", named(*point));
                 Diagnostic::new(Code::DeckRows, message)
             })
         };
@@ -206,7 +206,7 @@ fn sums(of: &Constraint, places: &GridPlaces<'_>) -> Result<Vec<(Point, Sum)>, D
             let others = terms[1..].iter().filter(|(_, factor)| *factor != 0.0);
             Ok(vec![(point, others.map(|(other, factor)| (*other, -factor / first)).collect())])
         }
-        Relation::NotRead { .. } => Err(of.refused("the constraint is not read")),
+        Relation::NotRead { .. } => Err(of.refused("constraints of this kind are not supported")),
     }
 }
 
@@ -229,7 +229,8 @@ fn rigid(
     for (k, point) in independent.iter().enumerate() {
         own.set_row(k, &places.rigid(*point, origin, length, of)?.transpose());
     }
-    let inverse = inverted(own).ok_or_else(|| of.refused("its independent components leave it a motion"))?;
+    let inverse = inverted(own)
+        .ok_or_else(|| of.refused("its independent components do not prevent all rigid motions"))?;
     let follow = |point: &Point| {
         let factors = places.rigid(*point, origin, length, of)?.transpose() * inverse;
         Ok((
@@ -287,8 +288,8 @@ fn average(
         normal += weight * row * row.transpose();
         rows.push((point, weight * row));
     }
-    let inverse =
-        inverted(normal).ok_or_else(|| of.refused("the components that it averages leave it a motion"))?;
+    let inverse = inverted(normal)
+        .ok_or_else(|| of.refused("the components that it averages do not determine all rigid motions"))?;
     // Each component of the reference grid follows the fitted motion b (B' W B)^-1 B' W u.
     let follow = |component: &u8| {
         let point = (reference, *component);

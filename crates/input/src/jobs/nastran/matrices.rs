@@ -101,7 +101,7 @@ impl Matrices {
     pub(super) fn without_followers(self, found: &mut Vec<Diagnostic>) -> Self {
         let Some((own, names)) = &self.followers else { return self };
         let followers = self.n_given - own.points.len();
-        let message = format!("{followers} rows follow others and are eliminated: {names}");
+        let message = format!("{followers} rows depend on others and are eliminated: {names}");
         found.push(Diagnostic::new(Code::DeckConstrained, message).in_file(&self.stiffness.path));
         let all: Vec<u32> = (0..own.points.len() as u32).collect();
         let map = RowMap::new(own.follows.clone(), own.picks.clone(), all);
@@ -121,7 +121,7 @@ impl Matrices {
         }
         let turn = Turn::new(&self.labels, axes).map_err(|node| {
             let message = format!(
-                "rows of grid {node} stand along the axes of its CD, but not each of its directions is there once"
+                "rows of grid {node} are along the axes of its CD, but not each of its directions occurs once"
             );
             vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(&self.stiffness.path)]
         })?;

@@ -118,7 +118,7 @@ pub(super) fn no_pair(
         "name the pair: --matrices {},{}, or matrices = [\"{0}\", \"{1}\"] in [files] of a manifest",
         names[pairs[0].0], names[pairs[0].1]
     );
-    let message = format!("{} pairs of matrices stand to choose from: {}", pairs.len(), all.join("; "));
+    let message = format!("{} pairs of matrices can be used: {}", pairs.len(), all.join("; "));
     vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(path).with_help(help)]
 }
 
@@ -126,7 +126,7 @@ pub(super) fn no_pair(
 pub(super) fn no_files(path: &Path, absent: &[PathBuf]) -> Vec<Diagnostic> {
     let what = match absent.first() {
         Some(file) => format!("{}, which the deck assigns to OUTPUT4,", file.display()),
-        None => "beside the deck a file of matrices (job.pch, job.op4)".to_owned(),
+        None => "beside the deck, a file of matrices (job.pch, job.op4)".to_owned(),
     };
     // A file of another job may be the intended one.
     let is_like = |file: &Beside| !file.is_own && [".pch", ".op4"].iter().any(|end| file.rest.ends_with(end));

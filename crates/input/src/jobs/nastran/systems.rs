@@ -137,7 +137,9 @@ impl<'b> Systems<'b> {
         if self.open.contains(&id) || self.open.len() >= MAX_REFERENCE_DEPTH {
             let through: Vec<String> = self.open.iter().take(8).map(i64::to_string).collect();
             let message = format!("coordinate system {id} refers to itself through {}", through.join(", "));
-            return Err(at(refused(message)).with_help("give a system of the circle in the basic one"));
+            return Err(
+                at(refused(message)).with_help("define one of the systems of the circle in the basic system")
+            );
         }
         self.open.push(id);
         let points = self.points(card).map_err(|diagnostic| match diagnostic.file() {
