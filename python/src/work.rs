@@ -53,9 +53,8 @@ pub fn run<T: Send + 'static>(
     let told = Arc::clone(&stopped);
     let worker = std::thread::Builder::new().name("flexbody".to_owned()).stack_size(STACK);
     worker.spawn(move || {
-        let listener = |_: flexbody::Progress<'_>| match told.load(Ordering::Relaxed) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        let listener = |_: flexbody::Progress<'_>| {
+            if told.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         // The result is dropped if the caller was interrupted.
         let _ = send.send(catch_unwind(AssertUnwindSafe(|| work(&listener))));

@@ -440,9 +440,10 @@ impl<'a> Line<'a> {
 
     /// Returns the text before the fields: the name of the card, or a continuation.
     fn head(&self) -> &[u8] {
-        let head = match self.is_free {
-            true => self.text.split(|&b| b == b',').next().unwrap_or_default(),
-            false => &self.text[..self.text.len().min(8)],
+        let head = if self.is_free {
+            self.text.split(|&b| b == b',').next().unwrap_or_default()
+        } else {
+            &self.text[..self.text.len().min(8)]
         };
         head.trim_ascii()
     }

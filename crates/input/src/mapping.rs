@@ -67,9 +67,12 @@ fn node_array(file: &InputFile) -> Found<Vec<i64>> {
     if array.cols != 1 {
         return Err(wrong(format!("mapping has {} columns, expected one of node numbers", array.cols)));
     }
-    let whole = |value: &f64| match value.fract() == 0.0 && value.abs() < 9e15 {
-        true => Ok(*value as i64),
-        false => Err(wrong(format!("{value} is not a node number"))),
+    let whole = |value: &f64| {
+        if value.fract() == 0.0 && value.abs() < 9e15 {
+            Ok(*value as i64)
+        } else {
+            Err(wrong(format!("{value} is not a node number")))
+        }
     };
     array.values.iter().map(whole).collect()
 }

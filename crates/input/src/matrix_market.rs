@@ -92,9 +92,10 @@ fn wrong_count(header: &Header, body: &Coordinates) -> Option<Diagnostic> {
     let found = if body.stopped { "more".to_owned() } else { body.count.to_string() };
     let message = format!("header announces {} entries, the file has {found}", header.entries);
     let diagnostic = Diagnostic::new(Code::MatrixCount, message);
-    Some(match body.count > header.entries {
-        true => diagnostic.with_help("correct the size line, or write the file again"),
-        false => diagnostic,
+    Some(if body.count > header.entries {
+        diagnostic.with_help("correct the size line, or write the file again")
+    } else {
+        diagnostic
     })
 }
 

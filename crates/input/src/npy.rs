@@ -32,10 +32,8 @@ pub(super) fn read_blocks(bytes: &[u8]) -> Result<Blocks, Diagnostic> {
     let length = announced(&shape, size, data)?;
     let own = rows * columns;
     // In Fortran order the first index varies fastest.
-    let at = |k: usize| match fortran {
-        true => k / own + count * (k % own / columns + rows * (k % columns)),
-        false => k,
-    };
+    let at =
+        |k: usize| if fortran { k / own + count * (k % own / columns + rows * (k % columns)) } else { k };
     let values = (0..length).map(|k| decode(&data[at(k) * size..(at(k) + 1) * size])).collect();
     Ok(Blocks { count, rows, columns, values, digits: if size == 4 { 7 } else { 17 } })
 }
@@ -104,10 +102,7 @@ pub(super) fn read_integers(bytes: &[u8]) -> Result<Vec<i64>, Diagnostic> {
     let signed = descr.as_bytes()[1] == b'i';
     let decode = |bytes: &[u8]| {
         let digits = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
-        let number = match big {
-            true => bytes.iter().fold(0, digits),
-            false => bytes.iter().rev().fold(0, digits),
-        };
+        let number = if big { bytes.iter().fold(0, digits) } else { bytes.iter().rev().fold(0, digits) };
         let unused = 64 - 8 * size as u32;
         if signed { ((number << unused) as i64) >> unused } else { i64::try_from(number).unwrap_or(i64::MAX) }
     };

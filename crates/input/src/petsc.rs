@@ -106,9 +106,12 @@ fn read(bytes: &[u8], source: &MatrixSource<'_>) -> std::result::Result<RawMatri
         let length = whole.get(lengths, k).and_then(|length| u64::try_from(length).ok()).unwrap_or(u64::MAX);
         pointers.push(pointers[k].saturating_add(length));
     }
-    let value = |k: usize| match single {
-        true => values[4 * k..].first_chunk().map_or(f64::NAN, |b| f64::from(f32::from_be_bytes(*b))),
-        false => values[8 * k..].first_chunk().map_or(f64::NAN, |b| f64::from_be_bytes(*b)),
+    let value = |k: usize| {
+        if single {
+            values[4 * k..].first_chunk().map_or(f64::NAN, |b| f64::from(f32::from_be_bytes(*b)))
+        } else {
+            values[8 * k..].first_chunk().map_or(f64::NAN, |b| f64::from_be_bytes(*b))
+        }
     };
     let compressed = Compressed {
         n,

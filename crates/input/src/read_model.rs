@@ -364,11 +364,10 @@ impl<'m> NodeLookup<'m> {
         let Some(nodes) = self.members(name) else {
             let names: Vec<&str> = matrices.sets.iter().map(|(own, _)| own.as_str()).take(20).collect();
             let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
-            let help = match names.is_empty() {
-                true => {
-                    "list the nodes, or give a region: the files of the model have no node sets".to_owned()
-                }
-                false => format!("name one of the node sets: {}", names.join(", ")),
+            let help = if names.is_empty() {
+                "list the nodes, or give a region: the files of the model have no node sets".to_owned()
+            } else {
+                format!("name one of the node sets: {}", names.join(", "))
             };
             return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message)).with_help(help)]);
         };

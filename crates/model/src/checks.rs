@@ -198,12 +198,9 @@ fn mass_that_does_not_turn(model: &FeModel, rounding: f64, worst: [DofLabel; 2])
     (share > 0.0).then(|| {
         let [a, b] = worst;
         let place = if a == b { format!("at {a}") } else { format!("between {a} and {b}") };
-        let why = match deviation > rounding {
-            true => format!(
+        let why = if deviation > rounding { format!(
                 "blocks of displacements deviate by {deviation:.1e} from multiples of the identity, most {place}"
-            ),
-            false => format!("displacements and rotations share symmetric blocks of up to {share:.1e}"),
-        };
+            ) } else { format!("displacements and rotations share symmetric blocks of up to {share:.1e}") };
         let message = format!("part of the mass matrix does not rotate with the nodes: {why}");
         Diagnostic::new(Code::MassBlockStructure, message)
     })

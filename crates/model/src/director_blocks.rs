@@ -268,10 +268,7 @@ impl<'a> Blocks<'a> {
             for (l, value) in row.iter_mut().enumerate() {
                 let size = sizes[p][0] * sizes[q][usize::from(l >= 3)];
                 let share = value.abs() / size;
-                match share > ROUNDING_ENTRY {
-                    true => largest = largest.max(share),
-                    false => *value = 0.0,
-                }
+                if share > ROUNDING_ENTRY { largest = largest.max(share) } else { *value = 0.0 }
             }
         }
         (rest, largest)

@@ -199,13 +199,14 @@ pub(super) fn check_speed(
         );
         let fitting = units_of_speed(speeds.median).join(", or in ");
         let unstated = !units.stated && !body.raw.allow_implausible && !fitting.is_empty();
-        found.push(match unstated && !found.iter().any(|own| own.code() == Code::DensityImplausible) {
-            true => Diagnostic::new(
+        found.push(if unstated && !found.iter().any(|own| own.code() == Code::DensityImplausible) {
+            Diagnostic::new(
                 Code::DensityImplausible,
                 format!("{message}, with numbers in m, kg, s, assumed since no units are given"),
             )
-            .with_help(state_units(&fitting)),
-            false => Diagnostic::new(Code::SpeedImplausible, message),
+            .with_help(state_units(&fitting))
+        } else {
+            Diagnostic::new(Code::SpeedImplausible, message)
         });
     }
 }

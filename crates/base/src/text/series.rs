@@ -168,9 +168,10 @@ fn has_decimal_comma(field: &[u8]) -> bool {
 
 /// Parses a number. The exponent may have the letter D, as Fortran writes it.
 fn number(field: &[u8]) -> Option<f64> {
-    let text: Cow<'_, [u8]> = match field.iter().any(|byte| matches!(byte, b'D' | b'd')) {
-        true => field.iter().map(|&byte| if matches!(byte, b'D' | b'd') { b'e' } else { byte }).collect(),
-        false => field.into(),
+    let text: Cow<'_, [u8]> = if field.iter().any(|byte| matches!(byte, b'D' | b'd')) {
+        field.iter().map(|&byte| if matches!(byte, b'D' | b'd') { b'e' } else { byte }).collect()
+    } else {
+        field.into()
     };
     fast_float2::parse(text.as_ref()).ok()
 }

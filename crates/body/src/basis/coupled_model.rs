@@ -136,9 +136,8 @@ impl<'m> CoupledModel<'m> {
 fn deformation(model: &FeModel, joint: &CoupledInterface, vectors: MatRef<'_, f64>) -> f64 {
     let own = joint.gather(vectors);
     let left = &own - combine(joint.motion(), gram(joint.measure(), own.as_ref()).as_ref());
-    let largest = |a: MatRef<'_, f64>, rows: Range<usize>| match rows.is_empty() {
-        true => 0.0,
-        false => a.subrows(rows.start, rows.len()).norm_max(),
+    let largest = |a: MatRef<'_, f64>, rows: Range<usize>| {
+        if rows.is_empty() { 0.0 } else { a.subrows(rows.start, rows.len()).norm_max() }
     };
     let part = |of_joint: Range<usize>, of_all: Range<usize>| match largest(left.as_ref(), of_joint) {
         0.0 => 0.0,

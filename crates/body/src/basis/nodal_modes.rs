@@ -187,9 +187,10 @@ impl StatedModes {
         let hertz = |eigenvalue: f64| model.units().frequency_of(eigenvalue.max(0.0));
         let said = |one: &Difference| {
             let (stated, own) = (hertz(one.stated), hertz(one.rayleigh));
-            let assurance = match one.assurance < MIN_FREQUENCY_SHARE {
-                true => format!(", MAC {:.2}", one.assurance),
-                false => String::new(),
+            let assurance = if one.assurance < MIN_FREQUENCY_SHARE {
+                format!(", MAC {:.2}", one.assurance)
+            } else {
+                String::new()
             };
             format!("mode {} has {stated:.6} Hz in the file, {own:.6} Hz by K and M{assurance}", one.mode + 1)
         };
@@ -202,12 +203,13 @@ impl StatedModes {
             named.join("; ")
         );
         let diagnostic = Diagnostic::new(Code::ModesDiffer, message).in_file(&self.path);
-        Some(match worst.rounded && different.iter().all(|one| one.rounded) {
-            true => diagnostic.with_help(format!(
+        Some(if worst.rounded && different.iter().all(|one| one.rounded) {
+            diagnostic.with_help(format!(
                 "write the shapes with more than {} digits, which explain the difference, or compute the modes here",
                 self.digits
-            )),
-            false => diagnostic,
+            ))
+        } else {
+            diagnostic
         })
     }
 
@@ -250,9 +252,12 @@ impl StatedModes {
     /// Returns twice the strain energy expected from rounding the values of a shape to their digits: the
     /// sum of K_ii u_i^2 / 12, where u_i is one unit of the last digit of the value.
     fn rounding_energy(&self, stiffness: &[f64], shapes: MatRef<'_, f64>, mode: usize) -> f64 {
-        let unit = |value: f64| match value == 0.0 {
-            true => 0.0,
-            false => 10f64.powi(value.abs().log10().floor() as i32 + 1 - i32::from(self.digits)),
+        let unit = |value: f64| {
+            if value == 0.0 {
+                0.0
+            } else {
+                10f64.powi(value.abs().log10().floor() as i32 + 1 - i32::from(self.digits))
+            }
         };
         let column = shapes.col(mode);
         stiffness.iter().zip(column.iter()).map(|(k, value)| k * unit(*value).powi(2) / 12.0).sum()

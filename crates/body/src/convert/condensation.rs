@@ -52,12 +52,11 @@ impl ModalModel<'_> {
         let groups =
             dropped.fold(TermGroups::ALL, |groups, term| groups.and(TermGroups::without(term.group)));
         let is_enough = !groups.w2 && !groups.w3 && self.found.solution.bounds.is_none();
-        let condensed = match is_enough {
-            true => linear,
-            false => {
-                let whole = self.condense();
-                Condensation { columns: linear.columns + whole.columns, ..whole }
-            }
+        let condensed = if is_enough {
+            linear
+        } else {
+            let whole = self.condense();
+            Condensation { columns: linear.columns + whole.columns, ..whole }
         };
         Condensation { invariants: condensed.invariants.with_groups(groups), terms, ..condensed }
     }

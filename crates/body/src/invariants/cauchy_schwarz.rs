@@ -148,9 +148,10 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
         ("first_moment", pair.first_moment()),
         ("second_moment", pair.second_moment()),
         ("C1", entries(&a.0.c1, &b.0.c1, |_, p| bound.c1(p))),
-        match groups.w1 {
-            true => ("Ibar", pair.ibar()),
-            false => ("C2", entries(&a.c2(), &b.c2(), |k, p| bound.c2(k, p))),
+        if groups.w1 {
+            ("Ibar", pair.ibar())
+        } else {
+            ("C2", entries(&a.c2(), &b.c2(), |k, p| bound.c2(k, p)))
         },
     ];
     if groups.w2 {

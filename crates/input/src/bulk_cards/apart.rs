@@ -124,13 +124,12 @@ fn is_named(line: &[u8]) -> bool {
 /// Returns the name that the continuation of a line must have, in upper case; empty if the line gives none.
 fn end_of(line: &[u8]) -> Vec<u8> {
     let line = Line::of(line);
-    let end = match line.is_free {
-        true => {
-            let is_large = line.head().ends_with(b"*") || line.head().starts_with(b"*");
-            let fields = if is_large { 4 } else { 8 };
-            line.text.split(|&b| b == b',').nth(fields + 1).unwrap_or_default()
-        }
-        false => line.text.get(72..line.text.len().min(80)).unwrap_or_default(),
+    let end = if line.is_free {
+        let is_large = line.head().ends_with(b"*") || line.head().starts_with(b"*");
+        let fields = if is_large { 4 } else { 8 };
+        line.text.split(|&b| b == b',').nth(fields + 1).unwrap_or_default()
+    } else {
+        line.text.get(72..line.text.len().min(80)).unwrap_or_default()
     };
     bare(end.trim_ascii()).to_ascii_uppercase()
 }

@@ -75,12 +75,11 @@ fn begins_matrix(line: &[u8]) -> bool {
 /// Returns true when a card of a matrix is its header: the second field is 0.
 fn is_header(line: &[u8]) -> bool {
     let line = Line::of(without_comment(line));
-    let field = match line.is_free {
-        true => line.text.split(|&b| b == b',').nth(2),
-        false => {
-            let columns = if line.head().ends_with(b"*") { 24..40 } else { 16..24 };
-            line.text.get(columns.start..line.text.len().min(columns.end))
-        }
+    let field = if line.is_free {
+        line.text.split(|&b| b == b',').nth(2)
+    } else {
+        let columns = if line.head().ends_with(b"*") { 24..40 } else { 16..24 };
+        line.text.get(columns.start..line.text.len().min(columns.end))
     };
     field.is_some_and(|field| field.trim_ascii() == b"0")
 }

@@ -46,9 +46,10 @@ impl Replication {
             return count.map(|count| Some(Asked::Repeat(count))).ok_or_else(|| bad(message));
         }
         let mut given = Card::default();
-        match line.is_free {
-            true => free_fields(&mut given, &line.text, 8)?,
-            false => fixed_fields(&mut given, &line.text, 8),
+        if line.is_free {
+            free_fields(&mut given, &line.text, 8)?
+        } else {
+            fixed_fields(&mut given, &line.text, 8)
         }
         let mut changes = Vec::new();
         let mut all_same = rest == b"=";

@@ -40,9 +40,10 @@ struct Mesh<'f> {
 impl Mesh<'_> {
     fn read(&self) -> Found<(Nodes, NamedSets, Elements)> {
         let positions = self.positions()?;
-        let ids = match self.has("node_num_map") {
-            true => self.whole_numbers("node_num_map")?,
-            false => (1..=positions.len() as i64).collect(),
+        let ids = if self.has("node_num_map") {
+            self.whole_numbers("node_num_map")?
+        } else {
+            (1..=positions.len() as i64).collect()
         };
         if ids.len() != positions.len() {
             let message = format!("`node_num_map` has {} numbers for {} nodes", ids.len(), positions.len());
@@ -114,10 +115,8 @@ impl Mesh<'_> {
 
     /// Returns the node sets, which list node positions from 1. A set without a name is named by its number.
     fn sets(&self, ids: &[i64]) -> Found<NamedSets> {
-        let names = match self.has("ns_names") {
-            true => names_of(&self.root, &self.members, "ns_names")?,
-            false => Vec::new(),
-        };
+        let names =
+            if self.has("ns_names") { names_of(&self.root, &self.members, "ns_names")? } else { Vec::new() };
         let numbers = if self.has("ns_prop1") { self.whole_numbers("ns_prop1")? } else { Vec::new() };
         let mut sets = Vec::new();
         for k in 0.. {

@@ -66,10 +66,7 @@ impl NumberType {
 
 fn digits(bytes: &[u8], big_endian: bool) -> u64 {
     let append = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
-    match big_endian {
-        true => bytes.iter().fold(0, append),
-        false => bytes.iter().rev().fold(0, append),
-    }
+    if big_endian { bytes.iter().fold(0, append) } else { bytes.iter().rev().fold(0, append) }
 }
 
 /// Packing of the arrays of an XML file.

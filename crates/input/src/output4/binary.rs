@@ -107,12 +107,11 @@ impl Binary {
         let mut rest = data;
         while !rest.is_empty() {
             let first = self.integer(rest, 0).ok_or_else(misread)?;
-            let (start, length, head) = match header.is_big {
-                true => (self.integer(rest, 1).ok_or_else(misread)?, first.saturating_sub(1), 2),
-                false => {
-                    let (start, length) = Header::unpacked(first);
-                    (start, length, 1)
-                }
+            let (start, length, head) = if header.is_big {
+                (self.integer(rest, 1).ok_or_else(misread)?, first.saturating_sub(1), 2)
+            } else {
+                let (start, length) = Header::unpacked(first);
+                (start, length, 1)
             };
             let bytes = usize::try_from(length).ok().filter(|words| *words > 0);
             let bytes = bytes.and_then(|words| words.checked_mul(self.word)).ok_or_else(misread)?;

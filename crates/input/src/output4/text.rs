@@ -135,9 +135,10 @@ impl<'a> Text<'a> {
             ColumnRecord::End => {
                 // The number after the last column has a separate format.
                 let lines = words.clamp(1, 1 << 20).unsigned_abs().div_ceil(format.per_line as u64);
-                return match (0..lines).all(|_| self.next_line().is_some()) {
-                    true => Ok(None),
-                    false => Err(cut_off(&header.name)),
+                return if (0..lines).all(|_| self.next_line().is_some()) {
+                    Ok(None)
+                } else {
+                    Err(cut_off(&header.name))
                 };
             }
             ColumnRecord::Number(column) if start != 0 => {
