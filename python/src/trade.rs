@@ -21,7 +21,7 @@ pub fn options(modes: usize, repeat: usize, reference: &str) -> PyResult<TradeOp
 }
 
 impl Trade {
-    pub fn told(py: Python<'_>, inner: flexbody::Trade) -> PyResult<Self> {
+    pub fn with_warnings(py: Python<'_>, inner: flexbody::Trade) -> PyResult<Self> {
         warn(py, inner.diagnostics())?;
         Ok(Self { inner })
     }

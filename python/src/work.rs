@@ -50,11 +50,15 @@ pub fn run<T: Send + 'static>(
     start_threads(py)?;
     let stopped = Arc::new(AtomicBool::new(false));
     let (send, mut receive) = sync_channel(1);
-    let told = Arc::clone(&stopped);
+    let with_warnings = Arc::clone(&stopped);
     let worker = std::thread::Builder::new().name("flexbody".to_owned()).stack_size(STACK);
     worker.spawn(move || {
         let listener = |_: flexbody::Progress<'_>| {
-            if told.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if with_warnings.load(Ordering::Relaxed) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         };
         // The result is dropped if the caller was interrupted.
         let _ = send.send(catch_unwind(AssertUnwindSafe(|| work(&listener))));

@@ -210,7 +210,7 @@ codes! {
     LoadIdle = "FB545", Warning, Done, "load has no effect", "let an interface carry the body to see gravity and inertia bend it: [carried] in docs/simulate.md";
     CarrierUnresolved = "FB546", Warning, Done, "modes resolve the carried interface poorly", "convert with --basis craig-bampton, or with --residual-vectors interfaces, and with the interface in the manifest";
     CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness does not act while the body is carried", "trust spin rates far below the first frequency only: the geometric stiffness is that of the free body";
-    ReferenceLacks = "FB548", Warning, Done, "reference body lacks a part of the model that matters here", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where the difference comes from";
+    ReferenceIncomplete = "FB548", Warning, Done, "reference body lacks a part of the model that matters here", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where the difference comes from";
     LumpedWithoutBody = "FB549", Note, Done, "lumped mass gives no body to compare with", "nothing to do: a program that lumps the mass in this way has no body either";
     RunTooLong = "FB550", Error, BadInput, "run takes more steps than allowed", "simulate a shorter `duration`, leave out modes beyond the frequencies of the loads, or raise `most_steps` in [run]";
     StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";

@@ -1,7 +1,7 @@
 //! Allocations that may fail.
 //!
 //! The program ends with exit code 4 if an allocation fails (`main.rs`), since almost no code could continue. Code that
-//! can continue (for a size that a damaged file declares) allocates inside [`or_go_without`].
+//! can continue (for a size that a damaged file declares) allocates inside [`allow_failure`].
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -16,7 +16,7 @@ thread_local! {
 static AVAILABLE_BYTES: OnceLock<fn() -> Option<u64>> = OnceLock::new();
 
 /// Sets the function that finds the number of bytes that may still be allocated. Only the first call has an effect.
-pub fn tell_left(find: fn() -> Option<u64>) {
+pub fn set_left(find: fn() -> Option<u64>) {
     // Another run in the same process uses an equivalent function.
     let _ = AVAILABLE_BYTES.set(find);
 }
@@ -27,7 +27,7 @@ pub fn left() -> Option<u64> {
 }
 
 /// Runs `ask`, whose allocations may fail without ending the program.
-pub fn or_go_without<T>(ask: impl FnOnce() -> T) -> T {
+pub fn allow_failure<T>(ask: impl FnOnce() -> T) -> T {
     let before = ACCEPTS_FAILURE.replace(true);
     let answer = ask();
     ACCEPTS_FAILURE.set(before);
@@ -54,6 +54,6 @@ pub fn refuse_beyond(left: Option<u64>, needed: f64, what: &str, help: &str) -> 
 }
 
 /// Returns true if the current thread continues when an allocation fails.
-pub fn goes_without() -> bool {
+pub fn accepts_failure() -> bool {
     ACCEPTS_FAILURE.get()
 }

@@ -31,7 +31,7 @@ const MAX_ROUNDING_ESTIMATES: f64 = 30.0;
 
 /// Evaluates all checks of `body` that need no model: the identities of theory section 10, and the
 /// consistency of the numbers stored in the file.
-pub fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
+pub fn body_identities(body: &FlexBody) -> Vec<IdentityCheck> {
     let mut checks = body.identities(frame_of(body));
     checks.extend(recounts(body));
     checks
@@ -43,14 +43,14 @@ fn frame_of(body: &FlexBody) -> BodyFrame {
     name.and_then(BodyFrame::from_name).unwrap_or(BodyFrame::Model)
 }
 
-/// Rejects a body that breaks one of [`own_identities`], so that every body written passes `flexbody
+/// Rejects a body that breaks one of [`body_identities`], so that every body written passes `flexbody
 /// check`.
 ///
 /// # Errors
 /// [`BodyUntrustworthy`](Code::BodyUntrustworthy), one diagnostic per identity that does not hold.
 pub fn accept(body: &FlexBody) -> Result<()> {
-    let failed = own_identities(body).into_iter().filter(|check| !check.passed);
-    let told: Vec<Diagnostic> = failed
+    let failed = body_identities(body).into_iter().filter(|check| !check.passed);
+    let diagnostics: Vec<Diagnostic> = failed
         .map(|check| {
             let IdentityCheck { name, formula, value, limit, .. } = check;
             let message =
@@ -58,7 +58,7 @@ pub fn accept(body: &FlexBody) -> Result<()> {
             Diagnostic::new(Code::BodyUntrustworthy, message)
         })
         .collect();
-    if told.is_empty() { Ok(()) } else { Err(Error::new(told)) }
+    if diagnostics.is_empty() { Ok(()) } else { Err(Error::new(diagnostics)) }
 }
 
 /// Recomputes invariants, residuals and orthogonality of `body` from the matrices of `model`.

@@ -58,11 +58,11 @@ struct CountFile {
 #[derive(Debug, Clone, Deserialize)]
 struct CheckpointFile {
     matrices: String,
-    parts: Vec<Part>,
+    parts: Vec<SavedModes>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
-struct Part {
+struct SavedModes {
     vectors: usize,
 }
 
@@ -72,7 +72,7 @@ pub struct ClusterModes {
     /// Modes, in the rows of the model.
     pub modes: SolvedModes,
     /// Description of the computation.
-    pub told: String,
+    pub solver_description: String,
     /// Seconds of each phase on the cluster.
     pub seconds: BTreeMap<String, f64>,
     /// Size and work of the factor of the count.
@@ -119,11 +119,11 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
     let n = model.stiffness().n();
     let file = Vectors { path: &folder.join(MODES), digest: &result.modes_sha256, of: "modes" };
     let index = index_bytes(result.index_bytes)?;
-    let vectors = file.read((n, result.modes), index, |row| order.internal(row))?;
+    let vectors = file.read(n, result.modes, index, |row| order.internal(row))?;
     if let Some(digest) = &result.condensed_sha256 {
-        hold_condensation(&folder.join(CONDENSED), digest, &result, model, &order, vectors.as_ref())?;
+        check_condensation(&folder.join(CONDENSED), digest, &result, model, &order, vectors.as_ref())?;
     }
-    let told = format!(
+    let solver_description = format!(
         "SLEPc {}, PETSc {}, solver `{}` on {} ranks",
         result.slepc, result.petsc, result.solver, result.ranks
     );
@@ -136,15 +136,16 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
         prove,
         source: SourceFile::new("modes", Path::new(MODES), result.modes_sha256),
     };
-    Ok(ClusterModes { modes, told, seconds: result.seconds, factor: result.factor })
+    Ok(ClusterModes { modes, solver_description, seconds: result.seconds, factor: result.factor })
 }
 
 /// Returns the error for a missing result, with the number of modes found so far.
 fn unfinished(folder: &Path, prepared: &Prepared) -> Error {
-    let kept = sealed::open::<CheckpointFile>(&folder.join(CHECKPOINT), "flexbody-kept").ok();
-    let kept = kept.filter(|kept| kept.matrices == prepared.matrices);
-    let kept = kept.map_or(0, |kept| kept.parts.iter().map(|part| part.vectors).sum());
-    let message = match kept {
+    let checkpoint = sealed::open::<CheckpointFile>(&folder.join(CHECKPOINT), "flexbody-kept").ok();
+    let checkpoint = checkpoint.filter(|checkpoint| checkpoint.matrices == prepared.matrices);
+    let checkpoint =
+        checkpoint.map_or(0, |checkpoint| checkpoint.parts.iter().map(|part| part.vectors).sum());
+    let message = match checkpoint {
         0 => "there is no result, and no mode is saved yet".to_owned(),
         saved => format!("there is no result yet; {saved} modes are saved"),
     };
@@ -152,7 +153,7 @@ fn unfinished(folder: &Path, prepared: &Prepared) -> Error {
 }
 
 /// Refuses condensation products that are not those of M.
-fn hold_condensation(
+fn check_condensation(
     path: &Path,
     digest: &str,
     result: &ResultFile,
@@ -163,7 +164,7 @@ fn hold_condensation(
     let rigid = rigid_modes(model, &model.pencil())?;
     let condensed = Condensed::new(model, order, rigid.as_ref(), modes);
     let (columns, file) = (condensed.columns(), Vectors { path, digest, of: "products of condensation" });
-    let products = file.read((columns, columns), index_bytes(result.index_bytes)?, |row| row)?;
+    let products = file.read(columns, columns, index_bytes(result.index_bytes)?, |row| row)?;
     let difference = condensed.difference(products.as_ref());
     if difference <= MAX_CONDENSED_DIFFERENCE {
         return Ok(());
@@ -186,7 +187,8 @@ impl Vectors<'_> {
     /// Reads `count` columns of `n` rows. `place` returns the target row of each row.
     fn read(
         &self,
-        (n, count): (usize, usize),
+        n: usize,
+        count: usize,
         index: IndexBytes,
         place: impl Fn(usize) -> usize,
     ) -> Result<Mat<f64>> {
@@ -199,7 +201,7 @@ impl Vectors<'_> {
         }
         note_read(self.path);
         let file = open_regular(self.path).map_err(failed)?;
-        columns(BufReader::with_capacity(1 << 20, file), (n, count), index, place)
+        columns(BufReader::with_capacity(1 << 20, file), n, count, index, place)
             .map_err(failed)?
             .ok_or_else(|| unreadable(format!("file does not hold {count} vectors of {n} finite numbers")))
     }
@@ -207,7 +209,8 @@ impl Vectors<'_> {
 
 fn columns(
     mut file: impl Read,
-    (n, count): (usize, usize),
+    n: usize,
+    count: usize,
     index: IndexBytes,
     place: impl Fn(usize) -> usize,
 ) -> std::io::Result<Option<Mat<f64>>> {

@@ -33,10 +33,10 @@ pub(super) fn seal(format: &str, content: &impl Serialize) -> String {
 /// Reads the content of an input file.
 ///
 /// # Errors
-/// The errors of [`open_kept`].
+/// The errors of [`open_unrecorded`].
 pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     note_read(path);
-    open_kept(path, format)
+    open_unrecorded(path, format)
 }
 
 /// Reads the content of a file that the run itself writes and replaces.
@@ -44,14 +44,14 @@ pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> 
 /// # Errors
 /// [`ClusterUnreadable`](Code::ClusterUnreadable) if the file cannot be read or does not have this format;
 /// [`ClusterChanged`](Code::ClusterChanged) if its digest differs.
-pub(super) fn open_kept<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
+pub(super) fn open_unrecorded<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
     let text = read_text(path, MAX_BYTES).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
-    let not_ours = || unreadable(format!("file is not a `{format}` file"));
-    let (head, body) = text.split_once('\n').ok_or_else(not_ours)?;
-    let head: Head = serde_json::from_str(head).map_err(|_| not_ours())?;
+    let wrong_format = || unreadable(format!("file is not a `{format}` file"));
+    let (head, body) = text.split_once('\n').ok_or_else(wrong_format)?;
+    let head: Head = serde_json::from_str(head).map_err(|_| wrong_format())?;
     if head.format != format {
-        return Err(not_ours());
+        return Err(wrong_format());
     }
     if head.version != VERSION {
         let message =

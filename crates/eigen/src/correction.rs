@@ -12,8 +12,8 @@ use super::refine::{FoundModes, Refined, residuals};
 use super::refine::{independent, leave_unbalanced, small_ritz};
 use faer::Mat;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::multigrid::Near;
-use flexbody_linalg::multigrid::{Aim, Levels};
+use flexbody_linalg::multigrid::DeflationSpace;
+use flexbody_linalg::multigrid::{CorrectionTarget, Levels};
 use flexbody_linalg::{
     Solve, Tall, combine, combine_in_place, combine_into, gram, largest, subtract_combination,
 };
@@ -61,12 +61,14 @@ pub(super) struct Correction<'a> {
     floors: Vec<f64>,
     /// Size of the matrix along the last examined pair: [`size_along`].
     size: f64,
-    /// Number of rounds so far, and the largest excess before the first of them.
+    /// Number of rounds so far.
     rounds: usize,
-    first: f64,
-    /// Least excess so far, and the number of rounds since it last halved.
-    least: f64,
-    since: usize,
+    /// Largest excess before the first round.
+    first_excess: f64,
+    /// Least excess so far.
+    least_excess: f64,
+    /// Number of rounds since the least excess last halved.
+    rounds_since: usize,
 }
 
 impl<'a> Correction<'a> {
@@ -75,12 +77,13 @@ impl<'a> Correction<'a> {
         task: &Task<'a>,
         corrector: Corrector<'a>,
         goal: &'a Goal,
-        (x, wanted): (Mat<f64>, usize),
+        x: Mat<f64>,
+        wanted: usize,
     ) -> Result<Self, EigenFailure> {
         let Task { problem, context, .. } = *task;
         let base = x.ncols();
-        let mut space = SearchSpace::new(problem, x, corrector.room(base), context)?;
-        if corrector.contracts(base, base) {
+        let mut space = SearchSpace::new(problem, x, corrector.capacity(base), context)?;
+        if corrector.must_contract(base, base) {
             space.contract(base);
         }
         Ok(Self {
@@ -95,24 +98,24 @@ impl<'a> Correction<'a> {
             floors: Vec::new(),
             size: 0.0,
             rounds: 0,
-            first: f64::NAN,
-            least: f64::INFINITY,
-            since: 0,
+            first_excess: f64::NAN,
+            least_excess: f64::INFINITY,
+            rounds_since: 0,
         })
     }
 
     /// Corrects until the modes keep the tolerance. Returns the modes and the examined eigenvalues after them.
     pub(super) fn modes(mut self) -> Result<FoundModes, EigenFailure> {
         for _ in 0..MAX_CORRECTION_ROUNDS {
-            let (forces, looked) = self.excess();
+            let (forces, examined) = self.excess();
             let keeps = |pair: &Pair| pair.residual <= pair.allowed;
-            self.converged = looked[..self.wanted].iter().filter(|pair| keeps(pair)).count();
-            let poor: Vec<Pair> = looked.iter().copied().filter(|pair| !keeps(pair)).collect();
-            self.context.fraction(1.0 - poor.len() as f64 / looked.len() as f64);
+            self.converged = examined[..self.wanted].iter().filter(|pair| keeps(pair)).count();
+            let poor: Vec<Pair> = examined.iter().copied().filter(|pair| !keeps(pair)).collect();
+            self.context.fraction(1.0 - poor.len() as f64 / examined.len() as f64);
             if poor.is_empty() {
-                return self.hand_over(looked.len());
+                return self.hand_over(examined.len());
             }
-            if !self.gains(largest(looked.iter().map(|pair| pair.residual / pair.allowed))) {
+            if !self.is_worthwhile(largest(examined.iter().map(|pair| pair.residual / pair.allowed))) {
                 break;
             }
             self.correct(&forces, &poor)?;
@@ -123,8 +126,8 @@ impl<'a> Correction<'a> {
     /// Returns the residual forces of the examined pairs, with the relative sizes of the residuals and the sizes
     /// allowed.
     fn excess(&mut self) -> (Tall, Vec<Pair>) {
-        let (forces, relative) = self.look();
-        if self.seeks_gap(&relative) {
+        let (forces, relative) = self.examine();
+        if self.extend_to_gap(&relative) {
             return self.excess();
         }
         let (tolerance, lambda) = (self.goal.tolerance, &self.space.lambda);
@@ -136,22 +139,22 @@ impl<'a> Correction<'a> {
     }
 
     /// Returns the residual forces of the wanted pairs and of the next one, and their relative sizes.
-    fn look(&mut self) -> (Tall, Vec<f64>) {
+    fn examine(&mut self) -> (Tall, Vec<f64>) {
         let Self { problem, context, space, .. } = self;
         let lambda = &space.lambda;
         self.wanted = cluster_end(self.wanted, lambda.len(), CLUSTER_GAP, |i| lambda[i]);
-        let looked = (self.wanted + 1).min(lambda.len());
-        if self.floors.len() < looked {
-            let lowest = space.some_vectors(0..looked);
-            self.floors = residuals(problem, &lambda[..looked], lowest.as_ref(), context).1;
-            self.size = size_along(problem, lambda[looked - 1], lowest.as_ref().col(looked - 1));
+        let examined = (self.wanted + 1).min(lambda.len());
+        if self.floors.len() < examined {
+            let lowest = space.some_vectors(0..examined);
+            self.floors = residuals(problem, &lambda[..examined], lowest.as_ref(), context).1;
+            self.size = size_along(problem, lambda[examined - 1], lowest.as_ref().col(examined - 1));
         }
-        space.unbalanced(0..looked)
+        space.unbalanced(0..examined)
     }
 
     /// Extends the wanted modes to the next gap wide enough for the count, if the gap above them is too narrow and such
     /// a gap is near. Does so only when the pairs are accurate enough to decide. Returns true when it extended them.
-    fn seeks_gap(&mut self, relative: &[f64]) -> bool {
+    fn extend_to_gap(&mut self, relative: &[f64]) -> bool {
         let are_good = relative.iter().all(|relative| *relative <= NEXT_MODE_RESIDUAL);
         if self.goal.separation == 0.0 || !are_good {
             return false;
@@ -162,47 +165,47 @@ impl<'a> Correction<'a> {
         let is_wide =
             |end: &usize| *end > 0 && lambda[*end] - lambda[end - 1] >= self.goal.separation * self.size;
         let end = (self.wanted..=farthest).find(is_wide).unwrap_or(self.wanted);
-        let seeks = end > self.wanted;
-        if seeks {
+        let extends = end > self.wanted;
+        if extends {
             self.wanted = end;
-            (self.least, self.since) = (f64::INFINITY, 0);
+            (self.least_excess, self.rounds_since) = (f64::INFINITY, 0);
         }
-        seeks
+        extends
     }
 
     /// Returns the wanted modes of the span, and the examined eigenvalues beyond them.
-    fn hand_over(self, looked: usize) -> Result<FoundModes, EigenFailure> {
+    fn hand_over(self, examined: usize) -> Result<FoundModes, EigenFailure> {
         let Self { problem, corrector, space, wanted, context, .. } = self;
-        let next = space.lambda[wanted..looked].to_vec();
+        let next = space.lambda[wanted..examined].to_vec();
         let refined = Refined::new(problem, space.vectors(0..wanted), &context)?;
         Ok(FoundModes { refined, next, tau: corrector.shift(), finite: None })
     }
 
     /// Returns true when further corrections pay, given the largest excess `worst`.
-    fn gains(&mut self, worst: f64) -> bool {
+    fn is_worthwhile(&mut self, worst: f64) -> bool {
         if self.rounds == 0 {
-            self.first = worst;
+            self.first_excess = worst;
         }
-        if worst < 0.5 * self.least {
-            (self.least, self.since) = (worst, 0);
+        if worst < 0.5 * self.least_excess {
+            (self.least_excess, self.rounds_since) = (worst, 0);
         } else {
-            self.since += 1;
+            self.rounds_since += 1;
         }
         let rounds = self.rounds;
-        let is_behind = |(after, gain): &(usize, f64)| rounds == *after && worst > self.first / gain;
+        let is_behind = |(after, gain): &(usize, f64)| rounds == *after && worst > self.first_excess / gain;
         let is_slow = matches!(self.corrector, Corrector::Levels(_)) && REQUIRED_GAINS.iter().any(is_behind);
         self.rounds += 1;
-        self.since <= MAX_STALLED_ROUNDS && !is_slow && !worst.is_nan()
+        self.rounds_since <= MAX_STALLED_ROUNDS && !is_slow && !worst.is_nan()
     }
 
     /// Extends the search space by corrections of the poor pairs among the examined ones, and of some pairs after them.
     fn correct(&mut self, forces: &Tall, poor: &[Pair]) -> Result<(), EigenFailure> {
         let Self { corrector, space, base, context, .. } = self;
-        let looked = forces.ncols();
-        let filled = corrector.filled(poor.len()) - poor.len();
+        let examined = forces.ncols();
+        let added = corrector.batch_size(poor.len()) - poor.len();
         // The block is filled up with the residual forces of the next Ritz pairs.
-        let (after, relative) = space.unbalanced(looked..space.lambda.len().min(looked + filled));
-        let later = relative.iter().zip(looked..);
+        let (after, relative) = space.unbalanced(examined..space.lambda.len().min(examined + added));
+        let later = relative.iter().zip(examined..);
         let later = later.map(|(&residual, number)| Pair { number, residual, allowed: NEXT_MODE_RESIDUAL });
         let pairs: Vec<Pair> = poor.iter().copied().chain(later).collect();
         let poor = poor.iter().map(|pair| forces.as_ref().col(pair.number));
@@ -210,15 +213,15 @@ impl<'a> Correction<'a> {
         // Columns are scaled to unit size: residuals near rounding would leave the range of single precision.
         let unit = |size: f64| if size > 0.0 { size.recip() } else { 0.0 };
         let scales: Vec<f64> = columns.par_iter().map(|column| unit(column.norm_max())).collect();
-        let mut d = Tall::with_room(self.problem.pencil.n(), columns.len());
+        let mut d = Tall::with_capacity(self.problem.pencil.n(), columns.len());
         columns.iter().zip(scales).for_each(|(column, scale)| d.push_multiple(scale, *column));
         corrector.correct(space, &pairs, &mut d, context);
         // A space without capacity for the corrections is first reduced to its lowest Ritz vectors.
-        if d.ncols() > space.room() {
+        if d.ncols() > space.free_columns() {
             space.contract(*base);
         }
         space.extend(&mut d, corrector.passes(), context)?;
-        if corrector.contracts(space.lambda.len(), *base) {
+        if corrector.must_contract(space.lambda.len(), *base) {
             space.contract(*base);
         }
         Ok(())
@@ -243,7 +246,7 @@ const LAST_TARGET_FRACTION: f64 = 0.3;
 const PAIRS_PER_CYCLE: usize = 8;
 
 /// Returns the capacity of a search space that levels correct and that starts with `base` vectors.
-pub(super) fn room_with_levels(base: usize) -> usize {
+pub(super) fn capacity_with_levels(base: usize) -> usize {
     2 * base + PAIRS_PER_CYCLE
 }
 
@@ -261,8 +264,9 @@ pub(super) enum Corrector<'a> {
 pub(super) struct Pair {
     /// Index of the pair, from the lowest.
     pub number: usize,
-    /// Relative residual, and the residual allowed.
+    /// Relative residual.
     pub residual: f64,
+    /// Largest allowed relative residual.
     pub allowed: f64,
 }
 
@@ -276,7 +280,7 @@ impl Corrector<'_> {
     }
 
     /// Returns the number of pairs to correct when `poor` of them are poor.
-    pub(super) fn filled(self, poor: usize) -> usize {
+    pub(super) fn batch_size(self, poor: usize) -> usize {
         match self {
             Self::Levels(_) if poor >= PAIRS_PER_CYCLE => poor.next_multiple_of(PAIRS_PER_CYCLE),
             _ => poor,
@@ -295,7 +299,7 @@ impl Corrector<'_> {
     /// Returns true when a search space that started with `base` vectors and now has `vectors` must be contracted. With
     /// earlier corrections by a factor the last modes take half the columns. Earlier corrections by levels add nothing
     /// more, and levels need a basis of Ritz vectors.
-    pub(super) fn contracts(self, vectors: usize, base: usize) -> bool {
+    pub(super) fn must_contract(self, vectors: usize, base: usize) -> bool {
         match self {
             Self::Factor(_) => vectors > 2 * base,
             Self::Levels(_) => true,
@@ -303,10 +307,10 @@ impl Corrector<'_> {
     }
 
     /// Returns the capacity of a search space that starts with `base` vectors.
-    pub(super) fn room(self, base: usize) -> usize {
+    pub(super) fn capacity(self, base: usize) -> usize {
         match self {
             Self::Factor(_) => 3 * base + 1,
-            Self::Levels(_) => room_with_levels(base),
+            Self::Levels(_) => capacity_with_levels(base),
         }
     }
 
@@ -325,8 +329,8 @@ impl Corrector<'_> {
                 forces.ncols() as u64
             }
             Self::Levels(levels) => {
-                let aims: Vec<Aim> = pairs.iter().map(Pair::aim).collect();
-                levels.correct(&space.near(), &aims, forces.as_mut())
+                let targets: Vec<CorrectionTarget> = pairs.iter().map(Pair::target).collect();
+                levels.correct(&space.deflation_space(), &targets, forces.as_mut())
             }
         };
         context.count(|work| work.solved_columns += solved);
@@ -335,9 +339,12 @@ impl Corrector<'_> {
 
 impl Pair {
     /// Returns the part of the error that the correction of this pair may leave.
-    fn aim(&self) -> Aim {
+    fn target(&self) -> CorrectionTarget {
         let last = LAST_TARGET_FRACTION * self.allowed / self.residual;
-        Aim { pair: self.number, left: (ERROR_PER_RESIDUAL * self.residual).max(last).max(MIN_TARGET_ERROR) }
+        CorrectionTarget {
+            pair: self.number,
+            left: (ERROR_PER_RESIDUAL * self.residual).max(last).max(MIN_TARGET_ERROR),
+        }
     }
 }
 
@@ -366,27 +373,28 @@ pub(super) struct SearchSpace<'a> {
 }
 
 impl<'a> SearchSpace<'a> {
-    /// Creates the space from the span of `x`, made M-orthogonal to the rigid modes, with a capacity of `room` vectors.
+    /// Creates the space from the span of `x`, made M-orthogonal to the rigid modes, with a capacity of `capacity`
+    /// vectors.
     pub(super) fn new(
         problem: &'a EigenProblem<'a>,
         x: Mat<f64>,
-        room: usize,
+        capacity: usize,
         context: &Context<'_>,
     ) -> Result<Self, EigenFailure> {
         let n = problem.pencil.n();
         let mut own = Self {
             problem,
             m_rigid: problem.pencil.apply_mass(problem.rigid),
-            x: Tall::with_room(n, room),
-            kx: Tall::with_room(n, room),
-            mx: Tall::with_room(n, room),
-            capacity: room,
+            x: Tall::with_capacity(n, capacity),
+            kx: Tall::with_capacity(n, capacity),
+            mx: Tall::with_capacity(n, capacity),
+            capacity,
             gm: Mat::zeros(0, 0),
             gk: Mat::zeros(0, 0),
             lambda: Vec::new(),
             ritz: Mat::zeros(0, 0),
             is_ritz: false,
-            work: Tall::with_room(n, x.ncols()),
+            work: Tall::with_capacity(n, x.ncols()),
         };
         let mut first = Tall::copied(x.as_ref());
         drop(x);
@@ -395,7 +403,7 @@ impl<'a> SearchSpace<'a> {
     }
 
     /// Returns the number of vectors that can still be added.
-    pub(super) fn room(&self) -> usize {
+    pub(super) fn free_columns(&self) -> usize {
         self.capacity - self.x.ncols()
     }
 
@@ -456,8 +464,8 @@ impl<'a> SearchSpace<'a> {
     }
 
     /// Returns the rigid modes and the basis. The basis must consist of Ritz vectors.
-    pub(super) fn near(&self) -> Near<'_> {
-        Near {
+    pub(super) fn deflation_space(&self) -> DeflationSpace<'_> {
+        DeflationSpace {
             rigid: [self.problem.rigid, self.m_rigid.as_ref()],
             modes: self.x.as_ref(),
             k_modes: self.kx.as_ref(),

@@ -3,7 +3,7 @@
 //! of the memory.
 
 use super::attempt::{Attempt, Goal};
-use super::correction::{Correction, Corrector, room_with_levels};
+use super::correction::{Correction, Corrector, capacity_with_levels};
 use super::failure::EigenFailure;
 use super::needs::{Needs, Unusable, made_of_modes, resident, search_seconds};
 use super::problem::Task;
@@ -16,8 +16,12 @@ use flexbody_linalg::multigrid::{can_have_levels, levels};
 /// longer than the solutions.
 const MAX_MULTIGRID_MODES: usize = 100;
 
-/// Bytes of all levels and of their construction: per stored entry of K, and per row.
-const LEVEL_BYTES: (u64, u64) = (12, 400);
+/// Bytes of all levels and of their construction per stored entry of K. Together with [`LEVEL_BYTES_PER_ROW`], a larger
+/// value refuses cycles for models that would fit the memory.
+const LEVEL_BYTES_PER_ENTRY: u64 = 12;
+
+/// Bytes of all levels and of their construction per row of K, in addition to those of the entries.
+const LEVEL_BYTES_PER_ROW: u64 = 400;
 
 /// Approximate number of entries in a row of K of linear hexahedra.
 const LINEAR_HEXAHEDRON_ROW_ENTRIES: f64 = 64.0;
@@ -36,12 +40,12 @@ pub(super) struct Cycles;
 
 impl Attempt for Cycles {
     fn needs(&self, task: &Task<'_>, wanted: usize) -> Result<Needs, Unusable> {
-        if !pays(task, wanted) {
+        if !saves_time(task, wanted) {
             return Err(Unusable::Unsuited);
         }
         let pencil = &task.problem.pencil;
         let (n, entries) = (pencil.n(), pencil.stiffness().as_csc().nnz() as u64);
-        let levels = LEVEL_BYTES.0 * entries + LEVEL_BYTES.1 * n as u64;
+        let levels = LEVEL_BYTES_PER_ENTRY * entries + LEVEL_BYTES_PER_ROW * n as u64;
         let needed = (levels + vector_bytes(n, wanted)).max(made_of_modes(n, wanted));
         if resident(needed) > task.context.available() {
             return Err(Unusable::Unsuited);
@@ -61,7 +65,7 @@ impl Attempt for Cycles {
         if rough.ncols() <= goal.wanted {
             return Err(unsuited());
         }
-        Correction::begin(task, Corrector::Levels(&*levels), goal, (rough, goal.wanted))?.modes()
+        Correction::begin(task, Corrector::Levels(&*levels), goal, rough, goal.wanted)?.modes()
     }
 
     /// Returns false: a failure of cycles does not concern the model, and another attempt may succeed.
@@ -77,7 +81,7 @@ fn guards(wanted: usize) -> usize {
 }
 
 /// Returns true when cycles take less time than a factor.
-fn pays(task: &Task<'_>, wanted: usize) -> bool {
+fn saves_time(task: &Task<'_>, wanted: usize) -> bool {
     let Task { problem, settings, analysis, .. } = task;
     let entries = problem.pencil.stiffness().as_csc().nnz() as f64;
     // Elements of the second order couple more rows, and take more cycles. (Measured: tetrahedra of 100,000 rows, which
@@ -99,5 +103,5 @@ fn pays(task: &Task<'_>, wanted: usize) -> bool {
 /// less than what was in use before and has been released.
 fn vector_bytes(n: usize, wanted: usize) -> u64 {
     let base = wanted + guards(wanted);
-    8 * (n * (3 * room_with_levels(base) + 4 * base)) as u64
+    8 * (n * (3 * capacity_with_levels(base) + 4 * base)) as u64
 }

@@ -78,7 +78,7 @@ fn better_shift(
     if ritz.values.last().is_none_or(|theta| theta.recip() - tau > MIN_EIGENVALUE_PER_SHIFT * tau) {
         return Ok(None);
     }
-    let (lambda, vectors) = best(krylov, &ritz, wanted.max(1), tau);
+    let (lambda, vectors) = largest_pairs(krylov, &ritz, wanted.max(1), tau);
     let lowest = lambda[0];
     let noise = NOISE_DEVIATIONS
         * energy_noise(problem.pencil.stiffness(), vectors.as_ref().subcols(0, 1), problem.input_error)[0];
@@ -113,11 +113,11 @@ fn zero_energy(
 ) -> Result<EigenFailure, EigenFailure> {
     let mut krylov = Krylov::new(problem, ZERO_ENERGY_BASIS, context);
     krylov.append_random(COLUMNS_PER_STEP, factor);
-    while krylov.room() >= COLUMNS_PER_STEP && !krylov.exhausted() {
+    while krylov.free_columns() >= COLUMNS_PER_STEP && !krylov.exhausted() {
         krylov.step(factor);
     }
     let ritz = projected_pairs(&krylov)?;
-    let (lambda, vectors) = best(&krylov, &ritz, krylov.projected() / 2, tau);
+    let (lambda, vectors) = largest_pairs(&krylov, &ritz, krylov.projected() / 2, tau);
     let noise = energy_noise(problem.pencil.stiffness(), vectors.as_ref(), problem.input_error);
     let count = lambda.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_DEVIATIONS * **n).count().max(1);
     Ok(EigenFailure::ZeroEnergy {
@@ -158,7 +158,7 @@ pub(super) struct Iteration<'a> {
     /// Size of the projected eigenproblem from which on it is solved again.
     next_test: usize,
     /// K-residual that the estimates must keep before the true residuals are computed.
-    asked: f64,
+    requested: f64,
     /// Least excess of the true residuals so far.
     least_excess: f64,
 }
@@ -234,17 +234,18 @@ impl Ritz {
     }
 
     /// Returns true when all modes have converged by their estimates and their cluster has ended.
-    fn all_there(&self) -> bool {
+    fn has_all_modes(&self) -> bool {
         self.converged == self.last && self.beyond
     }
 }
 
 impl<'a> Iteration<'a> {
-    /// Begins with a block of random vectors.
+    /// Begins with a block of `block` random vectors.
     pub(super) fn begin(
         problem: &'a EigenProblem<'a>,
         factor: &dyn Solve,
-        (goal, block): (&'a Goal, usize),
+        goal: &'a Goal,
+        block: usize,
         context: &Context<'a>,
     ) -> Self {
         let free = problem.pencil.n() - problem.rigid.ncols();
@@ -265,7 +266,7 @@ impl<'a> Iteration<'a> {
             restarts: 0,
             complete: false,
             next_test: 0,
-            asked: goal.tolerance,
+            requested: goal.tolerance,
             least_excess: f64::INFINITY,
         }
     }
@@ -300,7 +301,7 @@ impl<'a> Iteration<'a> {
                 continue;
             }
             let ritz = self.test()?;
-            if ritz.all_there() {
+            if ritz.has_all_modes() {
                 return Ok(Outcome::Reached(ritz));
             }
             if let Some(shift) = self.restart(&ritz)? {
@@ -348,7 +349,7 @@ impl<'a> Iteration<'a> {
         let Self { krylov, block, .. } = self;
         if krylov.exhausted() {
             // The basis is an invariant subspace: it continues with new directions, if there are any.
-            krylov.append_random((*block).min(krylov.room()), factor);
+            krylov.append_random((*block).min(krylov.free_columns()), factor);
         }
         self.complete = krylov.exhausted();
         if !self.complete {
@@ -358,13 +359,13 @@ impl<'a> Iteration<'a> {
     }
 
     /// Returns the Ritz values, ascending, and the converged modes that are kept when the shift changes.
-    pub(super) fn look_midway(&mut self) -> Result<Midway, EigenFailure> {
+    pub(super) fn midway(&mut self) -> Result<Midway, EigenFailure> {
         let mut ritz = self.test()?;
-        if self.asks_below_noise(&ritz) {
+        if self.tightens_below_noise(&ritz) {
             ritz = self.test()?;
         }
         let eigenvalues: Vec<f64> = (0..ritz.size()).map(|i| ritz.lambda(i)).collect();
-        let modes = self.vectors(&ritz, settled(&eigenvalues, ritz.converged));
+        let modes = self.vectors(&ritz, settled_count(&eigenvalues, ritz.converged));
         Ok(Midway { eigenvalues, modes })
     }
 
@@ -386,7 +387,7 @@ impl<'a> Iteration<'a> {
 
     /// Returns true when no further step fits before a restart.
     fn is_full(&self) -> bool {
-        self.krylov.room() < self.block
+        self.krylov.free_columns() < self.block
     }
 
     /// Returns true when solving the projected eigenproblem pays. It costs size^3: beyond some 100 vectors it is not
@@ -401,7 +402,8 @@ impl<'a> Iteration<'a> {
     fn test(&mut self) -> Result<Ritz, EigenFailure> {
         let (krylov, wanted) = (&self.krylov, self.goal.wanted);
         let tau = self.tau;
-        let (below, settled) = self.first.as_ref().map_or((0, 0), |first| (first.below, first.modes.ncols()));
+        let (below, settled_count) =
+            self.first.as_ref().map_or((0, 0), |first| (first.below, first.modes.ncols()));
         let size = krylov.projected();
         let found = projected_pairs(krylov)?;
         let is_negative = |theta: &f64| *theta < -1e-8 * found.values[size - 1].abs();
@@ -413,13 +415,13 @@ impl<'a> Iteration<'a> {
         let order: Vec<usize> = (0..below).rev().chain((below..size).rev()).collect();
         let theta: Vec<f64> = order.iter().map(|&i| found.values[i]).collect();
         let s = Mat::from_fn(size, size, |i, j| found.vectors[(i, order[j])]);
-        let all_below_are_there = below == 0 || found.values[below - 1] < 0.0;
+        let has_all_below = below == 0 || found.values[below - 1] < 0.0;
         let norms = krylov.residual_norms(s.as_ref());
         let last = cluster_end(wanted, size, CLUSTER_GAP, |i| 1.0 / theta[i] - tau);
         let mut ritz = Ritz { theta, s, norms, tau, last, converged: 0, beyond: false };
         // A pair counts as a mode by its estimate; pairs that converged with the first shift count without one.
-        let is_mode = |i: &usize| self.complete || *i < settled || ritz.estimate(*i) <= self.asked;
-        let converged = if all_below_are_there { (0..last).take_while(is_mode).count() } else { settled };
+        let is_mode = |i: &usize| self.complete || *i < settled_count || ritz.estimate(*i) <= self.requested;
+        let converged = if has_all_below { (0..last).take_while(is_mode).count() } else { settled_count };
         ritz.converged = converged;
         ritz.beyond = self.complete || ritz.shows_gap();
         // Size of the basis at the next test: 4 % more, or a quarter of the missing modes more.
@@ -430,7 +432,7 @@ impl<'a> Iteration<'a> {
 
     /// Returns the modes if they keep the tolerance; otherwise lowers the residual asked of the estimates.
     fn hand_over(&mut self, ritz: &Ritz) -> Result<Option<FoundModes>, EigenFailure> {
-        if self.asks_below_noise(ritz) {
+        if self.tightens_below_noise(ritz) {
             return Ok(None);
         }
         let (size, last) = (ritz.size(), ritz.last);
@@ -444,7 +446,7 @@ impl<'a> Iteration<'a> {
             return Ok(Some(FoundModes { refined, next, tau: self.tau, finite: None }));
         }
         self.least_excess = excess;
-        self.asked /= 1.2 * excess;
+        self.requested /= 1.2 * excess;
         Ok(None)
     }
 
@@ -461,19 +463,19 @@ impl<'a> Iteration<'a> {
 
     /// Lowers the residual asked of the estimates if rounding hides the true residual of the first mode, whose strain
     /// energy is least. Returns true when it lowered it.
-    fn asks_below_noise(&mut self, ritz: &Ritz) -> bool {
+    fn tightens_below_noise(&mut self, ritz: &Ritz) -> bool {
         let below_noise = (NOISE_TOLERANCE_FRACTION * self.goal.tolerance).max(MIN_RESIDUAL);
-        let may_ask = !self.complete && self.asked > below_noise;
-        let asks = may_ask && {
+        let may_tighten = !self.complete && self.requested > below_noise;
+        let tightens = may_tighten && {
             let count = ritz.last.min(1);
             let (first, eigenvalues) = (self.vectors(ritz, count), &[ritz.lambda(0)][..count]);
             let (_, floors) = residuals(self.problem, eigenvalues, first.as_ref(), &self.context);
             is_noisy(&floors, self.goal.tolerance)
         };
-        if asks {
-            self.asked = below_noise;
+        if tightens {
+            self.requested = below_noise;
         }
-        asks
+        tightens
     }
 
     /// Restarts a full basis from the lowest Ritz pairs. Returns a shift if the search should begin again with that
@@ -503,7 +505,7 @@ impl<'a> Iteration<'a> {
 
 /// Returns the number of modes that do not change when the search continues with another shift: the `converged` ones up
 /// to the last wide gap. Within a cluster modes may rotate.
-fn settled(eigenvalues: &[f64], converged: usize) -> usize {
+fn settled_count(eigenvalues: &[f64], converged: usize) -> usize {
     let is_end = |end: &usize| {
         let (last, next) = (eigenvalues[end - 1], eigenvalues.get(*end).copied());
         next.is_some_and(|next| next - last > SEPARATING_GAP * next)
@@ -517,7 +519,7 @@ fn projected_pairs(krylov: &Krylov<'_>) -> Result<SymmetricEigen, EigenFailure> 
 }
 
 /// Returns the `count` Ritz pairs with the largest theta, as eigenvalues lambda, ascending, and vectors.
-fn best(krylov: &Krylov<'_>, ritz: &SymmetricEigen, count: usize, tau: f64) -> (Vec<f64>, Mat<f64>) {
+fn largest_pairs(krylov: &Krylov<'_>, ritz: &SymmetricEigen, count: usize, tau: f64) -> (Vec<f64>, Mat<f64>) {
     let size = ritz.values.len();
     let count = count.min(size);
     let lambda = (0..count).map(|i| 1.0 / ritz.values[size - 1 - i] - tau).collect();

@@ -147,7 +147,7 @@ pub(super) fn resident_for_count(task: &Task<'_>, found: usize) -> u64 {
 
 /// Returns the bytes of a count in single precision, with the vectors that measure its rounding.
 fn single_count_bytes(task: &Task<'_>, modes: usize) -> u64 {
-    4 * task.peaks.kept_inertia + 8 * ((3 * modes + PROBE_VECTORS) * task.problem.pencil.n()) as u64
+    4 * task.peaks.retained_inertia + 8 * ((3 * modes + PROBE_VECTORS) * task.problem.pencil.n()) as u64
 }
 
 /// Number of vectors in use while the rounding of a count in single precision is measured.

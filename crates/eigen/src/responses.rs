@@ -320,11 +320,11 @@ impl DynamicResponses<'_> {
             residual = &loads - self.pencil.apply_stiffness(x.as_ref())
                 + self.pencil.apply_mass(x.as_ref()) * Scale(self.square);
             self.complement.equilibrate(&mut residual);
-            if largest_part(&residual, &loads) <= TARGET_RESIDUAL {
+            if largest_ratio(&residual, &loads) <= TARGET_RESIDUAL {
                 break;
             }
         }
-        match largest_part(&residual, &loads) {
+        match largest_ratio(&residual, &loads) {
             left if left <= MAX_RESIDUAL => Ok(x),
             residual => Err(EigenFailure::Inaccurate { residual }),
         }
@@ -332,7 +332,7 @@ impl DynamicResponses<'_> {
 }
 
 /// Returns the largest |residual| / |load| of all columns; NaN if one of them is NaN.
-fn largest_part(residual: &Mat<f64>, loads: &Mat<f64>) -> f64 {
+fn largest_ratio(residual: &Mat<f64>, loads: &Mat<f64>) -> f64 {
     let part = |j: usize| match (residual.col(j).norm_l2(), loads.col(j).norm_l2()) {
         (0.0, _) => 0.0,
         (left, load) => left / load,

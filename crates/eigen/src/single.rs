@@ -45,7 +45,7 @@ impl Attempt for SinglePrecision {
         let rough = Goal { tolerance: HANDOVER_RESIDUAL, ..*goal };
         with_suited_shift(task, |factor: Cholesky<'_, f32>| {
             let mut iteration =
-                Iteration::begin(task.problem, &factor, (&rough, COLUMNS_PER_STEP), task.context);
+                Iteration::begin(task.problem, &factor, &rough, COLUMNS_PER_STEP, task.context);
             let ritz = match iteration.estimate(&factor)? {
                 Outcome::Reached(ritz) => ritz,
                 Outcome::ShiftTooLarge(shift) => return Ok(Outcome::ShiftTooLarge(shift)),
@@ -56,7 +56,7 @@ impl Attempt for SinglePrecision {
             let (vectors, wanted) = (iteration.rough_modes(&ritz), ritz.last());
             drop(iteration);
             let factor: &dyn Solve = &factor;
-            Correction::begin(task, Corrector::Factor(factor), goal, (vectors, wanted))?
+            Correction::begin(task, Corrector::Factor(factor), goal, vectors, wanted)?
                 .modes()
                 .map(Outcome::Reached)
         })

@@ -39,12 +39,12 @@ pub fn solve(
 ) -> Result<EigenSolution, EigenFailure> {
     let analysis = analyse(problem, context)?;
     let task = Task::new(problem, settings, &analysis, context);
-    let wanted = count_wanted(&task)?;
+    let wanted = wanted_count(&task)?;
     let mut plan = Plan::new(&task, wanted)?;
     let (found, completeness) = find_all(&task, &mut plan, wanted)?;
     let bounds = bounds(&task, &found.refined, &completeness)?;
     context.count(|work| work.factor_bytes = plan.current().needs.factor_bytes);
-    finish(&task, found, (completeness, bounds), (wanted, plan))
+    finish(&task, found, completeness, bounds, wanted, plan)
 }
 
 /// Returns the plan of [`solve`] without a search. A request for all flexible modes below an eigenvalue counts as
@@ -81,7 +81,7 @@ fn analyse(problem: &EigenProblem<'_>, context: &Context<'_>) -> Result<Arc<Anal
 }
 
 /// Returns the number of wanted modes, at most the number of flexible modes.
-fn count_wanted(task: &Task<'_>) -> Result<usize, EigenFailure> {
+fn wanted_count(task: &Task<'_>) -> Result<usize, EigenFailure> {
     match task.settings.wanted {
         Wanted::Lowest(count) => Ok(count.min(task.flexible_rows())),
         Wanted::Below(lambda) => {
@@ -101,29 +101,29 @@ fn find_all(
     wanted: usize,
 ) -> Result<(FoundModes, Completeness), EigenFailure> {
     let rigid = task.problem.rigid.ncols();
-    let (mut asked, mut round) = (wanted, 0);
+    let (mut requested, mut round) = (wanted, 0);
     loop {
-        let found = search(task, plan, (asked, round))?;
+        let found = search(task, plan, requested, round)?;
         let completeness = prove(task, plan, &found)?;
-        let (there, counted) = (completeness.modes_below, completeness.counted(rigid));
+        let (found_below, counted) = (completeness.modes_below, completeness.counted(rigid));
         round += 1;
-        if there == counted {
+        if found_below == counted {
             return Ok((found, completeness));
         }
-        if there > counted || round == MAX_SEARCHES {
-            return Err(EigenFailure::CountDiffers { found: there, counted, shift: completeness.shift });
+        if found_below > counted || round == MAX_SEARCHES {
+            return Err(EigenFailure::CountDiffers {
+                found: found_below,
+                counted,
+                shift: completeness.shift,
+            });
         }
         // The next search asks for the missing modes as well.
-        asked = wanted + counted - there;
+        requested = wanted + counted - found_below;
     }
 }
 
 /// Makes the attempts of the plan in their order until one of them finds the modes.
-fn search(
-    task: &Task<'_>,
-    plan: &mut Plan,
-    (wanted, round): (usize, usize),
-) -> Result<FoundModes, EigenFailure> {
+fn search(task: &Task<'_>, plan: &mut Plan, wanted: usize, round: usize) -> Result<FoundModes, EigenFailure> {
     let Task { problem, settings, context, .. } = task;
     let tolerance = SEARCH_RESIDUAL_FRACTION * settings.accuracy.residual();
     let separation = match plan.count.counting {
@@ -233,8 +233,10 @@ fn is_near(problem: &EigenProblem<'_>, found: &Refined, shift: f64) -> bool {
 fn finish(
     task: &Task<'_>,
     search: FoundModes,
-    (completeness, mut bounds): (Completeness, Option<EigenvalueBounds>),
-    (wanted, plan): (usize, Plan),
+    completeness: Completeness,
+    mut bounds: Option<EigenvalueBounds>,
+    wanted: usize,
+    plan: Plan,
 ) -> Result<EigenSolution, EigenFailure> {
     let mut modes = search.refined;
     // Rotated or moved modes get new residuals.
@@ -248,8 +250,8 @@ fn finish(
     modes.renew(task.problem, &changed, task.context);
     let Refined { eigenvalues, mut vectors, residuals, floors } = modes;
     let tolerance = task.settings.accuracy.residual();
-    let kept = |i: &usize| keeps(residuals[*i], floors[*i], tolerance);
-    let converged = (0..eigenvalues.len()).filter(kept).count();
+    let is_converged = |i: &usize| keeps(residuals[*i], floors[*i], tolerance);
+    let converged = (0..eigenvalues.len()).filter(is_converged).count();
     if converged < eigenvalues.len() {
         return Err(EigenFailure::NotConverged { converged, wanted });
     }

@@ -48,7 +48,7 @@ pub fn modes_of_span(
     let task = analysis.as_deref().map(|analysis| Task::new(problem, settings, analysis, context));
     let completeness = match &task {
         Some(task) => count(task, &modes.eigenvalues[..exact])?,
-        None => uncounted(&modes, exact, settings.accuracy),
+        None => without_counter(&modes, exact, settings.accuracy),
     };
     let mut bounds = None;
     if settings.accuracy == Accuracy::Certified && !modes.eigenvalues.is_empty() {
@@ -112,7 +112,7 @@ impl Refined {
 }
 
 /// Returns the state of the proof without a count.
-fn uncounted(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness {
+fn without_counter(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness {
     let given = modes.eigenvalues.len();
     let remark = if exact < given {
         let pairs = modes.residuals.iter().zip(&modes.floors);
@@ -163,7 +163,7 @@ fn count(task: &Task<'_>, eigenvalues: &[f64]) -> Result<Completeness, EigenFail
         return Err(EigenFailure::MassIndefinite);
     }
     // The smaller distance is used if the larger one counts too many.
-    let mut counted = (last, 0);
+    let mut last_count = (last, 0);
     for above in SHIFT_DISTANCES {
         let shift = (1.0 + above) * last;
         let negative = count_below(problem, analysis, shift, context)?;
@@ -174,12 +174,12 @@ fn count(task: &Task<'_>, eigenvalues: &[f64]) -> Result<Completeness, EigenFail
             let counted = negative.saturating_sub(rigid);
             return Err(EigenFailure::CountDiffers { found, counted, shift });
         }
-        counted = (shift, negative);
+        last_count = (shift, negative);
     }
-    let (shift, negative) = counted;
-    let there = negative - rigid;
+    let (shift, negative) = last_count;
+    let counted = negative - rigid;
     let remark = format!(
-        "the body has {there} flexible modes below lambda = {shift:.6e}, the given subspace has {found}"
+        "the body has {counted} flexible modes below lambda = {shift:.6e}, the given subspace has {found}"
     );
     Ok(outcome(shift, Some(negative), remark))
 }

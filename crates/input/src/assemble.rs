@@ -3,7 +3,7 @@
 
 use super::digits::significant_digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::memory::{left, or_go_without, refuse_beyond};
+use flexbody_base::memory::{allow_failure, left, refuse_beyond};
 use flexbody_linalg::{ColumnBlock, CscMatrix, split_columns};
 use flexbody_model::RawMatrix;
 use rayon::prelude::*;
@@ -287,10 +287,10 @@ pub(super) struct ColumnEntries {
 
 impl ColumnEntries {
     /// Creates an empty list for `n` columns, with capacity for about `entries`.
-    pub(super) fn with_room(n: usize, entries: usize) -> Self {
+    pub(super) fn with_capacity(n: usize, entries: usize) -> Self {
         let (mut row_idx, mut values) = (Vec::new(), Vec::new());
         // The number comes from a file. Without memory for it the lists grow as needed.
-        or_go_without(|| {
+        allow_failure(|| {
             if row_idx.try_reserve_exact(entries).is_ok() {
                 let _ = values.try_reserve_exact(entries);
             }
@@ -514,7 +514,7 @@ mod tests {
         let mut ordered: Vec<Entry> = list.into_iter().filter(|e| e.value != 0.0).collect();
         ordered.sort_by_key(|e| e.col);
         let columns = || {
-            let mut columns = ColumnEntries::with_room(n, ordered.len());
+            let mut columns = ColumnEntries::with_capacity(n, ordered.len());
             ordered.iter().for_each(|&e| columns.push(e));
             columns
         };

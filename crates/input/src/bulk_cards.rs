@@ -11,7 +11,7 @@ use apart::Apart;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 pub(super) use matrix_lines::MatrixLines;
-use replication::{Asked, Replication};
+use replication::{Replication, ReplicationRequest};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -334,13 +334,13 @@ impl<'t> BulkReader<'t> {
         let head = line.head();
         let here = |diagnostic: Diagnostic| diagnostic.in_file(at.path).at_line(at.line);
         // A line of replication makes cards from the last one.
-        match Replication::asked(&line).map_err(here)? {
+        match Replication::request(&line).map_err(here)? {
             None => {}
-            Some(Asked::One(replication)) => {
+            Some(ReplicationRequest::One(replication)) => {
                 self.replication = replication;
                 return self.replicate(1, at);
             }
-            Some(Asked::Repeat(count)) => return self.replicate(count, at),
+            Some(ReplicationRequest::Repeat(count)) => return self.replicate(count, at),
         }
         if matches!(head.first(), None | Some(b'+' | b'*')) {
             let refused = |what: &str| {

@@ -112,8 +112,8 @@ impl Coordinates {
             let before = self.lines;
             self.count += (piece.entries.len() + piece.bad_count) as u64;
             self.bad_count += piece.bad_count;
-            let room = MAX_SHOWN_LINES.saturating_sub(self.bad.len());
-            self.bad.extend(piece.bad.into_iter().take(room).map(|(line, bad)| (line + before, bad)));
+            let remaining = MAX_SHOWN_LINES.saturating_sub(self.bad.len());
+            self.bad.extend(piece.bad.into_iter().take(remaining).map(|(line, bad)| (line + before, bad)));
             self.lower = self.lower.or(piece.lower.map(|line| line + before));
             self.upper = self.upper.or(piece.upper.map(|line| line + before));
             self.written = self.written.max(piece.written);
@@ -142,7 +142,7 @@ impl Coordinates {
     /// Returns diagnostics of the bad lines, the first few one by one.
     pub(super) fn bad_lines(&self, ends_with_newline: bool) -> Vec<Diagnostic> {
         let more = self.bad_count - self.bad.len();
-        let told = |(k, (line, bad)): (usize, &(usize, Diagnostic))| {
+        let located = |(k, (line, bad)): (usize, &(usize, Diagnostic))| {
             let mut message = bad.message().to_owned();
             if *line == self.lines && !ends_with_newline {
                 message += "; it is the last line and has no line end: the file may be cut off";
@@ -152,7 +152,7 @@ impl Coordinates {
             }
             Diagnostic::new(bad.code(), message).at_line(*line).with_help(bad.help())
         };
-        self.bad.iter().enumerate().map(told).collect()
+        self.bad.iter().enumerate().map(located).collect()
     }
 }
 

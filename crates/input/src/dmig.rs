@@ -258,10 +258,10 @@ impl Dmigs {
             let mut sides = Sides::default();
             piece.retain_mut(|entry| {
                 (entry.row, entry.col) = (row_of[entry.row as usize], row_of[entry.col as usize]);
-                let is_kept = entry.value != 0.0 && entry.row != u32::MAX && entry.col != u32::MAX;
-                sides.lower |= is_kept && entry.row > entry.col;
-                sides.upper |= is_kept && entry.row < entry.col;
-                is_kept
+                let is_entry = entry.value != 0.0 && entry.row != u32::MAX && entry.col != u32::MAX;
+                sides.lower |= is_entry && entry.row > entry.col;
+                sides.upper |= is_entry && entry.row < entry.col;
+                is_entry
             });
             sides
         };

@@ -182,22 +182,22 @@ fn is_deck(path: &Path) -> bool {
 /// an underscore or the like, or a matrix name of Abaqus. Each comes as the rest of its name after the stem, in lower
 /// case, and the path.
 fn siblings(main: &Path) -> impl Iterator<Item = (String, PathBuf)> {
-    let own = beginning_alike(main).into_iter().filter(|file| file.is_own);
-    own.map(|Beside { rest, path, .. }| (rest, path))
+    let own = beginning_alike(main).into_iter().filter(|file| file.is_of_job);
+    own.map(|JobSibling { rest, path, .. }| (rest, path))
 }
 
 /// File in the folder of the main file of a job whose name begins with the stem of the job.
-struct Beside {
+struct JobSibling {
     /// Rest of the name, in lower case.
     rest: String,
     path: PathBuf,
     /// False for files of other decks, whose names continue the stem (`job_2.op4` beside `job_2.bdf`), and for files
     /// that a letter or a number distinguishes from the job (`job2.op4`, `job_2.op4`, `job_v2.op4`).
-    is_own: bool,
+    is_of_job: bool,
 }
 
 /// Returns the files in the folder of the main file of a job whose names begin with its stem, in any case.
-fn beginning_alike(main: &Path) -> Vec<Beside> {
+fn beginning_alike(main: &Path) -> Vec<JobSibling> {
     let Some(stem) = main.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()) else {
         return Vec::new();
     };
@@ -213,20 +213,20 @@ fn beginning_alike(main: &Path) -> Vec<Beside> {
     let all: Vec<(String, PathBuf)> = listed.filter_map(|file| rest_of(file.file_name())).collect();
     let decks: Vec<String> = all.iter().filter_map(|(rest, _)| stem_of_deck(rest)).collect();
     // A file belongs to another deck if its name continues the stem of that deck.
-    let goes_on = |rest: &str, deck: &String| {
+    let continues = |rest: &str, deck: &String| {
         rest.strip_prefix(deck.as_str()).is_some_and(|more| !more.starts_with(char::is_alphanumeric))
     };
     // A name that continues the stem by a letter or a version number belongs to another job, except for the matrices of
     // Abaqus.
-    let is_own = |rest: &str| {
+    let is_of_job = |rest: &str| {
         let name = rest.trim_start_matches(|c: char| !c.is_alphanumeric());
         let version = name.strip_prefix('v').unwrap_or(name);
         let is_of_abaqus = ["stif", "mass"].iter().any(|kind| rest.starts_with(kind));
         (is_of_abaqus || !rest.starts_with(char::is_alphanumeric))
             && !version.starts_with(|c: char| c.is_ascii_digit())
-            && !decks.iter().any(|deck| goes_on(rest, deck))
+            && !decks.iter().any(|deck| continues(rest, deck))
     };
-    let beside = |(rest, path): (String, PathBuf)| Beside { is_own: is_own(&rest), rest, path };
+    let beside = |(rest, path): (String, PathBuf)| JobSibling { is_of_job: is_of_job(&rest), rest, path };
     all.into_iter().map(beside).collect()
 }
 

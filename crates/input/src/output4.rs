@@ -140,7 +140,7 @@ impl Contents {
 /// the next group, so that the entries are in memory once.
 fn columns(file: &InputFile, stored: &Stored, encoding: Encoding) -> Found<Columns> {
     let at_once = 8 * rayon::current_num_threads();
-    let mut all = Columns::with_room(stored.values);
+    let mut all = Columns::with_capacity(stored.values);
     for stretches in stored.stretches.chunks(at_once) {
         let read = |stretch: &Stretch| {
             let bytes = &file.bytes()[stretch.bytes.clone()];

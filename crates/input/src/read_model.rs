@@ -44,7 +44,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let mut opened = OpenFiles::new(files);
     let read = read_opened_files(files, &opened);
     opened.refuse_changed()?;
-    let (model, of_job) = read.map_err(|error| told_to_users(files, error))?;
+    let (model, of_job) = read.map_err(|error| without_outside_quotes(files, error))?;
     of_job.iter().try_for_each(|(_, file)| file.refuse_changed())?;
     opened.forget_bytes();
     let given = files.clone();
@@ -52,7 +52,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
 }
 
 /// Returns the error without quotes from files that the manifest or the deck names outside the model.
-fn told_to_users(files: &ModelFiles, error: Error) -> Error {
+fn without_outside_quotes(files: &ModelFiles, error: Error) -> Error {
     let main = match (&files.manifest, &files.source) {
         (Some(manifest), _) => manifest,
         (None, ModelSource::Job(job)) => &job.path,

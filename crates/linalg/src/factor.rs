@@ -80,10 +80,14 @@ impl Analysis {
         let numbers = |needs: &dyn Fn(usize) -> Needs| self.walk.peak(&self.tree, threads, needs) as u64;
         Peaks {
             factor: self.len as u64,
-            cholesky: numbers(&|s| Needs { kept: pivots(s), handed_on: rest(s), in_work: 0 }),
+            cholesky: numbers(&|s| Needs { retained: pivots(s), handed_on: rest(s), in_work: 0 }),
             // An inertia count holds L and L B.
-            inertia: numbers(&|s| Needs { kept: 0, handed_on: rest(s), in_work: 2 * pivots(s) }),
-            kept_inertia: numbers(&|s| Needs { kept: pivots(s), handed_on: rest(s), in_work: pivots(s) }),
+            inertia: numbers(&|s| Needs { retained: 0, handed_on: rest(s), in_work: 2 * pivots(s) }),
+            retained_inertia: numbers(&|s| Needs {
+                retained: pivots(s),
+                handed_on: rest(s),
+                in_work: pivots(s),
+            }),
         }
     }
 
@@ -121,7 +125,7 @@ pub struct Peaks {
     /// Entries during an inertia count that does not keep its factor.
     pub inertia: u64,
     /// Entries during an inertia count that keeps its factor.
-    pub kept_inertia: u64,
+    pub retained_inertia: u64,
 }
 
 /// Returns the multiplications and additions for the elimination of `width` columns with `rest` rows below them.
@@ -433,7 +437,7 @@ const ROUNDING_MASS_FRACTION: f64 = 1e-14;
 
 /// Returns true when a row without a positive diagonal entry has entries beyond rounding: no semidefinite matrix has
 /// such a row, since m_ij^2 <= m_ii m_jj.
-fn has_row_without_mass_that_couples(mass: &SymmetricMatrix) -> bool {
+fn has_coupled_massless_row(mass: &SymmetricMatrix) -> bool {
     let diagonal = mass.diagonal();
     let noise = ROUNDING_MASS_FRACTION * largest(diagonal.iter().copied());
     let couples = |row: usize| mass.row(row).1.iter().any(|entry| entry.abs() > noise);
@@ -448,7 +452,7 @@ fn has_row_without_mass_that_couples(mass: &SymmetricMatrix) -> bool {
 /// is that of `analysis`, which must belong to the pencil.
 pub fn is_positive_semidefinite(pencil: &Pencil<'_>, analysis: &Analysis) -> bool {
     let mass = pencil.mass();
-    if has_row_without_mass_that_couples(mass) {
+    if has_coupled_massless_row(mass) {
         return false;
     }
     let order = analysis.tree.order();

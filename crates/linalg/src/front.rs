@@ -42,8 +42,8 @@ pub trait Real:
     fn of(x: f64) -> Self;
     /// Returns the number in double precision.
     fn wide(self) -> f64;
-    /// Returns the numbers in double precision: themselves, or converted into `room`.
-    fn all_wide<'a>(numbers: &'a [Self], room: &'a mut Vec<f64>) -> &'a [f64];
+    /// Returns the numbers in double precision: themselves, or converted into `buffer`.
+    fn all_wide<'a>(numbers: &'a [Self], buffer: &'a mut Vec<f64>) -> &'a [f64];
 }
 
 impl Real for f64 {
@@ -69,10 +69,10 @@ impl Real for f32 {
     fn wide(self) -> f64 {
         f64::from(self)
     }
-    fn all_wide<'a>(numbers: &'a [Self], room: &'a mut Vec<f64>) -> &'a [f64] {
-        room.clear();
-        room.extend(numbers.iter().map(|x| x.wide()));
-        room
+    fn all_wide<'a>(numbers: &'a [Self], buffer: &'a mut Vec<f64>) -> &'a [f64] {
+        buffer.clear();
+        buffer.extend(numbers.iter().map(|x| x.wide()));
+        buffer
     }
 }
 

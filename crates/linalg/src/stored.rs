@@ -14,7 +14,7 @@ impl<T, L: AsRef<[T]> + Send + Sync + UnwindSafe + RefUnwindSafe> Lender<T> for 
 #[derive(Clone)]
 pub enum Stored<T: 'static> {
     /// Owned numbers.
-    Own(Vec<T>),
+    Owned(Vec<T>),
     /// Numbers borrowed from a lender.
     Lent(Arc<dyn Lender<T>>),
 }
@@ -23,10 +23,10 @@ impl<T: Clone> Stored<T> {
     /// Returns the numbers for writing; copies borrowed ones first.
     pub(super) fn own(&mut self) -> &mut Vec<T> {
         if let Self::Lent(lent) = self {
-            *self = Self::Own((**lent).as_ref().to_vec());
+            *self = Self::Owned((**lent).as_ref().to_vec());
         }
         match self {
-            Self::Own(own) => own,
+            Self::Owned(own) => own,
             Self::Lent(_) => unreachable!("a copy was taken"),
         }
     }
@@ -37,7 +37,7 @@ impl<T> Deref for Stored<T> {
 
     fn deref(&self) -> &[T] {
         match self {
-            Self::Own(own) => own,
+            Self::Owned(own) => own,
             Self::Lent(lent) => (**lent).as_ref(),
         }
     }
@@ -45,7 +45,7 @@ impl<T> Deref for Stored<T> {
 
 impl<T> From<Vec<T>> for Stored<T> {
     fn from(own: Vec<T>) -> Self {
-        Self::Own(own)
+        Self::Owned(own)
     }
 }
 

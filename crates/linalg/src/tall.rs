@@ -26,19 +26,19 @@ pub struct Tall {
 impl Tall {
     /// Creates a block of zeros.
     pub fn zeros(rows: usize, columns: usize) -> Self {
-        let mut own = Self::with_room(rows, columns);
+        let mut own = Self::with_capacity(rows, columns);
         own.add_zeros(columns);
         own
     }
 
     /// Creates a block without columns, with memory reserved for `columns`.
-    pub fn with_room(rows: usize, columns: usize) -> Self {
+    pub fn with_capacity(rows: usize, columns: usize) -> Self {
         Self { entries: Vec::with_capacity(rows * columns), rows }
     }
 
     /// Returns a copy, made by all threads.
     pub fn copied(x: MatRef<'_, f64>) -> Self {
-        let mut own = Self::with_room(x.nrows(), x.ncols());
+        let mut own = Self::with_capacity(x.nrows(), x.ncols());
         own.push(x);
         own
     }
@@ -123,10 +123,11 @@ pub fn zeros(rows: usize, columns: usize) -> Mat<f64> {
     let stride = own.col_stride().unsigned_abs();
     // SAFETY: faer reserves `stride` numbers for each of the requested columns, and no other reference to them exists;
     // uninitialised numbers are accessed as `MaybeUninit`.
-    let room = unsafe {
+    let spare = unsafe {
         std::slice::from_raw_parts_mut(own.as_ptr_mut().cast::<MaybeUninit<f64>>(), stride * columns)
     };
-    room.par_chunks_mut(ROWS_PER_PARTIAL_PRODUCT)
+    spare
+        .par_chunks_mut(ROWS_PER_PARTIAL_PRODUCT)
         .with_min_len(MIN_PIECES_PER_TASK)
         .for_each(|part| part.fill(MaybeUninit::new(0.0)));
     // SAFETY: all numbers have been written.
@@ -378,7 +379,7 @@ mod tests {
     #[test]
     fn columns_come_and_go() {
         let given = block(ROWS_PER_PARTIAL_PRODUCT + 3, 3);
-        let mut grown = Tall::with_room(ROWS_PER_PARTIAL_PRODUCT + 3, 4);
+        let mut grown = Tall::with_capacity(ROWS_PER_PARTIAL_PRODUCT + 3, 4);
         assert_eq!(grown.ncols(), 0);
         grown.push(given.first(2));
         grown.push(given.columns(2..3));

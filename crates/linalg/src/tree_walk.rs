@@ -23,7 +23,7 @@ struct Segment {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Needs {
     /// Memory held until the end of the walk.
-    pub kept: usize,
+    pub retained: usize,
     /// Memory held until the parent has been visited.
     pub handed_on: usize,
     /// Memory held during the visit only.
@@ -143,8 +143,8 @@ fn peak(
     beyond.sort_unstable();
     let mut most = held + beyond.iter().rev().take(threads).sum::<usize>();
     for s in own(segment) {
-        let Needs { kept, handed_on, in_work } = needs(s);
-        held += kept + handed_on;
+        let Needs { retained, handed_on, in_work } = needs(s);
+        held += retained + handed_on;
         most = most.max(held + in_work);
         held -= tree.children(s).iter().map(|&c| needs(c as usize).handed_on).sum::<usize>();
     }

@@ -101,7 +101,7 @@ pub(super) fn check_body(
     let [first, second] = [form.worst.0, form.worst.1].map(|row| body.rows.label(&body.nodes, row));
     let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
     model.find_fixed_mass(mass_rounding);
-    let kept = mass_that_does_not_turn(&model, mass_rounding, [first, second]);
+    let kept = unrotated_mass_note(&model, mass_rounding, [first, second]);
     found.extend(kept.map(|note| note.in_file(&mass_path)));
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
     stop_on_error(&mut found)?;
@@ -192,15 +192,19 @@ fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnos
 
 /// Returns a note about the part of the mass that keeps the axes of the body while its nodes turn; `worst`
 /// labels the rows of the displacement block that differs most by direction.
-fn mass_that_does_not_turn(model: &FeModel, rounding: f64, worst: [DofLabel; 2]) -> Option<Diagnostic> {
+fn unrotated_mass_note(model: &FeModel, rounding: f64, worst: [DofLabel; 2]) -> Option<Diagnostic> {
     let share = model.fixed_mass_share();
     let deviation = model.mass_deviation();
     (share > 0.0).then(|| {
         let [a, b] = worst;
         let place = if a == b { format!("at {a}") } else { format!("between {a} and {b}") };
-        let why = if deviation > rounding { format!(
+        let why = if deviation > rounding {
+            format!(
                 "blocks of displacements deviate by {deviation:.1e} from multiples of the identity, most {place}"
-            ) } else { format!("displacements and rotations share symmetric blocks of up to {share:.1e}") };
+            )
+        } else {
+            format!("displacements and rotations share symmetric blocks of up to {share:.1e}")
+        };
         let message = format!("part of the mass matrix does not rotate with the nodes: {why}");
         Diagnostic::new(Code::MassBlockStructure, message)
     })

@@ -226,9 +226,9 @@ pub(super) fn check_density(
     if upper >= MATERIAL_DENSITIES.0 && lower <= MATERIAL_DENSITIES.1 {
         return Some(median);
     }
-    let said = if units.stated { "" } else { ", assumed since no units are given" };
+    let assumption = if units.stated { "" } else { ", assumed since no units are given" };
     let message = format!(
-        "the elements have a density of {median:.3e} kg/m^3 (median of {nodes} nodes; half of them between {lower:.3e} and {upper:.3e}), with length in {}, mass in {}{said}",
+        "the elements have a density of {median:.3e} kg/m^3 (median of {nodes} nodes; half of them between {lower:.3e} and {upper:.3e}), with length in {}, mass in {}{assumption}",
         units.length.name(),
         units.mass.name()
     );

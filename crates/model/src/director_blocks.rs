@@ -38,7 +38,7 @@ fn symmetric(n: usize, parts: Vec<Columns>) -> SymmetricMatrix {
 
 /// Columns of a range of vertices.
 #[derive(Default)]
-struct Part {
+struct Partial {
     points: Columns,
     directors: Columns,
     rest_of_points: Columns,
@@ -81,7 +81,7 @@ impl<'a> Blocks<'a> {
     pub(crate) fn split(&self) -> (SymmetricMatrix, Option<SymmetricMatrix>) {
         let d = self.rows.dimension;
         let sizes = self.sizes();
-        let parts: Vec<Part> =
+        let parts: Vec<Partial> =
             self.chunks().into_par_iter().map(|vertices| self.part(vertices, &sizes)).collect();
         let (mut points, mut directors, mut share) = (Vec::new(), Vec::new(), 0.0f64);
         let (mut rest_of_points, mut rest_of_rotations) = (Vec::new(), Vec::new());
@@ -127,8 +127,8 @@ impl<'a> Blocks<'a> {
     }
 
     /// Returns the columns of these vertices.
-    fn part(&self, vertices: Range<usize>, sizes: &[[f64; 2]]) -> Part {
-        let mut part = Part::default();
+    fn part(&self, vertices: Range<usize>, sizes: &[[f64; 2]]) -> Partial {
+        let mut part = Partial::default();
         for p in vertices {
             let blocks = self.neighbours(p);
             self.point_column(&blocks, &mut part.points);

@@ -191,7 +191,7 @@ impl GivenRows {
     }
 
     /// Returns only the axes of nodes, for a part of the model: no file has the rows of a part.
-    pub(super) fn of_part(&self) -> Self {
+    pub(super) fn of_body(&self) -> Self {
         Self { maps: Vec::new(), axes: self.axes.clone() }
     }
 }

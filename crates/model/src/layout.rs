@@ -268,10 +268,10 @@ impl Occupied {
         sorted
     }
 
-    /// Adds a note about nodes that are left out, except those whose rows a note already reports (`told`).
-    fn note_unused(&self, raw: &RawModel, told: &[i64], found: &mut Vec<Diagnostic>) {
-        let told: HashSet<i64> = told.iter().copied().collect();
-        let unused: Vec<i64> = self.unused.iter().copied().filter(|node| !told.contains(node)).collect();
+    /// Adds a note about nodes that are left out, except those whose rows a note already reports (`reported`).
+    fn note_unused(&self, raw: &RawModel, reported: &[i64], found: &mut Vec<Diagnostic>) {
+        let reported: HashSet<i64> = reported.iter().copied().collect();
+        let unused: Vec<i64> = self.unused.iter().copied().filter(|node| !reported.contains(node)).collect();
         if !unused.is_empty() {
             let message = format!(
                 "{} nodes have no degree of freedom and are left out: {}",

@@ -76,7 +76,7 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
     let parts = members.into_iter().zip(nodes.into_iter().zip(interfaces));
     let mut bodies = Vec::with_capacity(parts.len());
     for (i, ((kept, rows), (nodes, interfaces))) in parts.enumerate() {
-        bodies.push(part(&whole, i + 1, &kept, rows, nodes, interfaces));
+        bodies.push(body_model(&whole, i + 1, &kept, rows, nodes, interfaces));
     }
     Ok(bodies)
 }
@@ -145,7 +145,7 @@ fn nodes_of_bodies(nodes: &Nodes, component: &[usize], bodies: usize) -> Vec<Nod
 }
 
 /// Returns the body with this number, made of the rows `kept`.
-fn part(
+fn body_model(
     whole: &Assembled,
     number: usize,
     kept: &[usize],
@@ -167,7 +167,7 @@ fn part(
         .collect();
     let name = format!("{}-{number}", whole.raw.name);
     Assembled {
-        raw: RawModel { name, interfaces, given_rows: whole.raw.given_rows.of_part(), ..whole.raw.clone() },
+        raw: RawModel { name, interfaces, given_rows: whole.raw.given_rows.of_body(), ..whole.raw.clone() },
         mesh: whole.mesh.as_ref().and_then(|mesh| mesh.among(&whole.nodes.ids, &nodes.ids)),
         nodes,
         rows,

@@ -104,7 +104,7 @@ fn where_nothing_fits_the_numbers_are_told_before_any_work() {
         }
     };
     let settings = ModeSettings { method: Method::Lanczos, ..ModeSettings::default() };
-    let little = Context { memory: Some(1_000_000), ..Context::heard_by(&watch) };
+    let little = Context { memory: Some(1_000_000), ..Context::with_listener(&watch) };
     let error = free_surface(&model, &settings, &little).expect_err("too little memory");
     assert_eq!(error.diagnostics()[0].code(), Code::MemoryShort);
     assert_eq!(*phases.lock().expect("one thread"), ["ordering"], "nothing was factored");

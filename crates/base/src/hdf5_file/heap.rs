@@ -22,7 +22,7 @@ pub fn first_broken(file: &mut (impl Read + Seek)) -> Result<Option<u64>> {
     let end = file.seek(SeekFrom::End(0))?;
     let mut looks = MAX_CHECKS_PER_OBJECT * end.div_ceil(HEADER_BYTES);
     for position in collections(file)? {
-        if !sound(file, position, end, &mut looks)? {
+        if !is_sound(file, position, end, &mut looks)? {
             return Ok(Some(position));
         }
     }
@@ -46,7 +46,7 @@ fn collections(file: &mut (impl Read + Seek)) -> Result<Vec<u64>> {
 
 /// Returns true if the objects of the collection at `position` fill it. Returns false if they do not, or if no `looks`
 /// are left.
-fn sound(file: &mut (impl Read + Seek), position: u64, end: u64, looks: &mut u64) -> Result<bool> {
+fn is_sound(file: &mut (impl Read + Seek), position: u64, end: u64, looks: &mut u64) -> Result<bool> {
     let Some((_, size)) = header(file, position)? else { return Ok(false) };
     if size < HEADER_BYTES || size > end - position {
         return Ok(false);

@@ -12,13 +12,13 @@ use std::path::Path;
 
 /// Opens an HDF5 input file whose texts are safe to read. `what` names the expected file in messages; `foreign` is the
 /// code for a file that is not HDF5. Returns the file and its size in bytes.
-pub fn open_sound(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
+pub fn open_with_checked_texts(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
     note_read(path);
-    open_kept(path, what, foreign)
+    open_unrecorded(path, what, foreign)
 }
 
 /// Opens a file that the run itself writes and replaces, without recording it as an input.
-pub fn open_kept(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
+pub fn open_unrecorded(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
     let unreadable = |code, why: String| {
         Error::from(Diagnostic::new(code, format!("cannot read the {what}: {why}")).in_file(path))
     };

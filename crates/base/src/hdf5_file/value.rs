@@ -3,7 +3,7 @@
 //! Functions return `Ok(None)` for a missing entry, and `Err` for an unexpected one; the text reads `expected ...,
 //! found ...`.
 
-use crate::memory::{left, or_go_without};
+use crate::memory::{allow_failure, left};
 use hdf5::dataset::Layout;
 use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
 use hdf5::{IndexType, IterationOrder, LinkType};
@@ -132,7 +132,7 @@ pub fn dataset<T: Element>(
     let elements = fit(&dims)?;
     storage(&dataset, elements, size_of::<T>(), stored)?;
     let mut values = Vec::new();
-    or_go_without(|| values.try_reserve_exact(elements))
+    allow_failure(|| values.try_reserve_exact(elements))
         .map_err(|_| format!("expected an array that fits into memory, found {elements} values"))?;
     values.resize(elements, T::default());
     dataset.read_into_raw(&mut values).map_err(|e| format!("expected readable data, found {e}"))?;

@@ -5,7 +5,7 @@
 //! they are read; a file that changes meanwhile is refused.
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::memory::{left, or_go_without, refuse_beyond};
+use crate::memory::{allow_failure, left, refuse_beyond};
 use crate::provenance::Fingerprint;
 use crate::read_files::note_read;
 use std::fs::{File, Metadata};
@@ -100,7 +100,7 @@ impl InputFile {
         let mut bytes = Vec::new();
         // One byte more than expected: the end of the file is detected without growing the buffer.
         let size = usize::try_from(length).unwrap_or(usize::MAX).saturating_add(1);
-        if or_go_without(|| bytes.try_reserve_exact(size)).is_err() {
+        if allow_failure(|| bytes.try_reserve_exact(size)).is_err() {
             refuse(Some(0))?;
         }
         self.reader().read_to_end(&mut bytes).map_err(|e| self.failed(&e))?;

@@ -390,7 +390,7 @@ impl<'r> SeriesReader<'r> {
 
     /// Returns the number in a field.
     fn cell(&self, line: usize, place: usize, field: &[u8]) -> Result<f64, Diagnostic> {
-        let told = |what: &str| {
+        let cell_error = |what: &str| {
             let column = match self.layout.names.get(place) {
                 Some(name) => format!("`{}`", printable(name)),
                 None => format!("{}", place + 1),
@@ -399,11 +399,11 @@ impl<'r> SeriesReader<'r> {
         };
         match number(field) {
             Some(value) if value.is_finite() => Ok(value),
-            Some(_) => Err(told("is not a finite number")),
+            Some(_) => Err(cell_error("is not a finite number")),
             None if has_decimal_comma(field) => {
-                Err(told("has a decimal comma").with_help("write numbers with decimal points"))
+                Err(cell_error("has a decimal comma").with_help("write numbers with decimal points"))
             }
-            None => Err(told("is not a number")),
+            None => Err(cell_error("is not a number")),
         }
     }
 

@@ -41,7 +41,7 @@ pub fn read_toml<T>(
     let read = if errors.is_empty() { walk(&mut tables, document.get_ref()) } else { None };
     match read {
         Some(read) if tables.found.is_empty() => Ok(read),
-        _ => Err(Error::new(tables.told())),
+        _ => Err(Error::new(tables.into_findings())),
     }
 }
 
@@ -77,7 +77,7 @@ pub struct Walk<'a> {
 
 impl Walk<'_> {
     /// Returns the findings in the order of lines, up to a limit.
-    fn told(mut self) -> Vec<Diagnostic> {
+    fn into_findings(mut self) -> Vec<Diagnostic> {
         /// Largest number of findings that are listed.
         const MAX_SHOWN: usize = 200;
         self.found.sort_by_key(Diagnostic::line);

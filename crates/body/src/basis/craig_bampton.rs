@@ -64,21 +64,21 @@ impl Basis for CraigBampton {
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
         let mut notes = parts.notes(model, settings);
         notes.extend(parts.removed(&found, rigid_count(model.dimension())));
-        if found.kept.is_empty() {
+        if found.retained.is_empty() {
             return Err(nothing_deforms().into());
         }
         // Solve the small eigenproblem in the span.
         let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
-        let whole = parts.lacks_rigid_motion_only(&found, rigid_count(model.dimension()));
+        let whole = parts.misses_only_rigid_motions(&found, rigid_count(model.dimension()));
         let span = found.vectors;
         let mut solution = modes_of_span(&problem, span.clone(), &all, context).map_err(failed)?;
         let parted = gram(span.as_ref(), problem.pencil.apply_mass(solution.vectors.as_ref()).as_ref());
-        let provenance = parts.provenance(&found.kept, parted.as_ref());
+        let provenance = parts.provenance(&found.retained, parted.as_ref());
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
         let fixed_interface = parts.fixed_interface(rigid.as_ref(), &solution, whole);
         solution.completeness = parts.completeness(model, &solution);
         // Memory of the dense shapes counts if it exceeds that of the search.
-        let bytes = shape_bytes(problem.pencil.n(), found.kept.len());
+        let bytes = shape_bytes(problem.pencil.n(), found.retained.len());
         solution.plan = parts.fixed.plan.map(|plan| plan.with_bytes(|search| search.max(bytes)));
         let mut basis = ModalBasis::new(model, &problem, settings, solution, "")?;
         basis.provenance = provenance;
@@ -125,7 +125,7 @@ struct Parts<'a> {
     /// interfaces, (T'KT) Y = -T'K D.
     constraint: Mat<f64>,
     /// Part of the responses to the inertia of the constraint modes outside the basis.
-    lacking: MissingResponses,
+    missing_responses: MissingResponses,
 }
 
 impl<'a> Parts<'a> {
@@ -181,11 +181,19 @@ impl<'a> Parts<'a> {
         let [interior, correction] =
             static_responses_twice(&problem, loads, inertia, lowest, precision, accuracy, context)
                 .map_err(in_model)?;
-        let lacking = lacking(&problem, correction, &fixed);
+        let missing_responses = missing_responses(&problem, correction, &fixed);
         let mut constraint = moved + elimination.expand(interior.as_ref());
         restore_rigid_motion(joints, rigid.as_ref(), &mut constraint)
             .ok_or_else(|| failed(EigenFailure::Inaccurate { residual: f64::NAN }))?;
-        Ok(Self { joints, names: names.collect(), elimination, reduced, fixed, constraint, lacking })
+        Ok(Self {
+            joints,
+            names: names.collect(),
+            elimination,
+            reduced,
+            fixed,
+            constraint,
+            missing_responses,
+        })
     }
 
     fn fixed_shapes(&self) -> Mat<f64> {
@@ -210,30 +218,30 @@ impl<'a> Parts<'a> {
 
     /// Returns true if the removed shapes are constraint modes and as many as the rigid motions, which the
     /// constraint modes contain.
-    fn lacks_rigid_motion_only(&self, found: &Independent, rigid: usize) -> bool {
+    fn misses_only_rigid_motions(&self, found: &Independent, rigid: usize) -> bool {
         let removed = Self::removed_shapes(found);
         removed.len() == rigid && removed[0] >= self.fixed.eigenvalues.len()
     }
 
     /// Returns the shape with the largest share in each mode. `parted` holds the products of the shapes
-    /// `kept` with the modes.
-    fn provenance(&self, kept: &[usize], parted: MatRef<'_, f64>) -> Vec<String> {
-        let told = |(j, share): (usize, f64)| {
-            let (kind, name) = self.name(kept[j]);
+    /// `retained` with the modes.
+    fn provenance(&self, retained: &[usize], parted: MatRef<'_, f64>) -> Vec<String> {
+        let described = |(j, share): (usize, f64)| {
+            let (kind, name) = self.name(retained[j]);
             format!("{kind}: {:.0} % {name}", 100.0 * share)
         };
-        largest_shares(parted).into_iter().map(told).collect()
+        largest_shares(parted).into_iter().map(described).collect()
     }
 
     /// Returns the diagnostics about removed shapes.
     fn removed(&self, found: &Independent, rigid: usize) -> Vec<Diagnostic> {
         let removed = Self::removed_shapes(found);
-        let all = found.kept.len() + removed.len();
-        let note = if self.lacks_rigid_motion_only(found, rigid) {
+        let all = found.retained.len() + removed.len();
+        let note = if self.misses_only_rigid_motions(found, rigid) {
             let (fixed, motions) = (self.fixed.eigenvalues.len(), self.constraint.ncols());
             let message = format!(
                 "the {motions} interface motions contain the {rigid} rigid-body motions, which the body frame performs: with {fixed} fixed-interface modes the body has {} modes",
-                found.kept.len()
+                found.retained.len()
             );
             Diagnostic::new(Code::ShapesRigid, message)
                 .with_help("nothing to do: every Craig-Bampton body is counted in this way")
@@ -269,7 +277,7 @@ impl<'a> Parts<'a> {
             &solution.eigenvalues,
             of_rigid.as_ref(),
             of_modes.as_ref(),
-            &self.lacking,
+            &self.missing_responses,
             cut.filter(|_| whole),
         )?;
         Some(FixedInterface {
@@ -435,7 +443,11 @@ fn fixed_modes(
 
 /// Returns G and H of the responses y to the inertia of the constraint modes, after removal of the part
 /// along the fixed-interface modes.
-fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolution) -> MissingResponses {
+fn missing_responses(
+    problem: &EigenProblem<'_>,
+    mut response: Mat<f64>,
+    fixed: &EigenSolution,
+) -> MissingResponses {
     let pencil = &problem.pencil;
     let whole = column_products(response.as_ref(), pencil.apply_stiffness(response.as_ref()).as_ref());
     for _ in 0..2 {

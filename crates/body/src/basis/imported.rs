@@ -112,7 +112,7 @@ impl Basis for ImportedShapes {
         let independent = independent(&problem.pencil, rigid.as_ref(), self.shapes.clone(), criterion)
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
         let notes = independent.notes(several, criterion, |j| format!("shape {}", j + 1));
-        if independent.kept.is_empty() {
+        if independent.retained.is_empty() {
             let message = format!("none of {} {several} deforms the body", self.shapes.ncols());
             return Err(Error::new([vec![Diagnostic::new(Code::ShapesNone, message)], notes].concat()));
         }
@@ -121,7 +121,7 @@ impl Basis for ImportedShapes {
         let compared = self
             .stated
             .as_ref()
-            .map(|stated| stated.beside(model, self.shapes.as_ref(), &independent.kept, &basis.solution));
+            .map(|stated| stated.beside(model, self.shapes.as_ref(), &independent.retained, &basis.solution));
         basis.diagnostics.extend(self.notes.iter().cloned().chain(compared.flatten()).chain(notes));
         let given = basis.solution.eigenvalues.len();
         if let Wanted::Lowest(wanted) = settings.wanted

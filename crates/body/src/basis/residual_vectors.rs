@@ -7,7 +7,7 @@ use super::failure::explain;
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
 use super::massless::on_mass;
 use super::modal_basis::{ModalBasis, problem_of_span};
-use super::pseudo_free_surface::{independent, part_in_words};
+use super::pseudo_free_surface::{independent, norm_in_words};
 use super::rigid_modes::rigid_modes;
 use super::{ModeSettings, Truncation};
 use faer::{Mat, MatRef};
@@ -328,9 +328,9 @@ pub(super) fn interface_truncation(
         let rigid = rigid_modes(model, &model.pencil())?;
         let problem = problem_of_span(model, rigid.as_ref());
         let loads = NamedLoads::of(model, &[Loads::Interfaces], "interface load")?;
-        let uncounted = context.uncounted();
-        let beside = beside_modes(model, &problem, free, &loads, ResponseAccuracy::ROUGH, &uncounted)?;
-        Ok(Responses::new(&problem, free, &loads, beside).lacking())
+        let without_counter = context.without_counter();
+        let beside = beside_modes(model, &problem, free, &loads, ResponseAccuracy::ROUGH, &without_counter)?;
+        Ok(Responses::new(&problem, free, &loads, beside).truncations())
     };
     found().unwrap_or_default()
 }
@@ -443,7 +443,7 @@ impl<'a> Responses<'a> {
             if !self.deforms[j] {
                 dropped.push(format!("{name} (deforms nothing)"));
             } else if left.sqrt() < MIN_RESPONSE_REMAINDER * self.mass[j].sqrt() {
-                dropped.push(format!("{name} ({})", part_in_words((left / self.mass[j]).sqrt())));
+                dropped.push(format!("{name} ({})", norm_in_words((left / self.mass[j]).sqrt())));
             } else {
                 used.push(j);
             }
@@ -453,21 +453,21 @@ impl<'a> Responses<'a> {
         let found = independent(&problem.pencil, known.as_ref(), candidates, MIN_RESPONSE_REMAINDER)?;
         let name = |j: usize| &names[used[j]];
         dropped.extend(
-            found.dependent.iter().map(|&(j, left)| format!("{} ({})", name(j), part_in_words(left))),
+            found.dependent.iter().map(|&(j, left)| format!("{} ({})", name(j), norm_in_words(left))),
         );
         dropped.extend(found.massless.iter().map(|&j| format!("{} (moves no mass)", name(j))));
         dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", name(j))));
-        let kept = found.kept.iter().map(|&j| used[j]).collect();
-        Some(Added { vectors: found.vectors, kept, dropped })
+        let retained = found.retained.iter().map(|&j| used[j]).collect();
+        Some(Added { vectors: found.vectors, retained, dropped })
     }
 
     /// Returns the truncated part of each static response for the free modes alone.
-    fn lacking(&self) -> Vec<Truncation> {
-        let lacking = |(j, load): (usize, &String)| {
+    fn truncations(&self) -> Vec<Truncation> {
+        let truncations = |(j, load): (usize, &String)| {
             let error = self.error(self.energy_beside[j], j);
             Truncation { load: load.clone(), before: error, after: error }
         };
-        self.loads.names.iter().enumerate().map(lacking).collect()
+        self.loads.names.iter().enumerate().map(truncations).collect()
     }
 
     /// Returns the K-norm of a part of the response `j`, given by its square, relative to the K-norm of the
@@ -511,7 +511,7 @@ struct Added {
     /// M-orthonormal, M-orthogonal to rigid motions and free modes.
     vectors: Mat<f64>,
     /// Index of the load of each vector.
-    kept: Vec<usize>,
+    retained: Vec<usize>,
     /// Names of the dropped loads, each with the reason.
     dropped: Vec<String>,
 }
@@ -528,7 +528,7 @@ impl Added {
             }
             let largest = (free..parts.nrows()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
             let largest = largest.expect("the span is more than the free modes");
-            let name = &loads.names[self.kept[largest - free]];
+            let name = &loads.names[self.retained[largest - free]];
             format!("{}: {:.0} % {name}", loads.what, 100.0 * share(largest))
         };
         (0..parts.ncols()).map(origin).collect()

@@ -167,13 +167,13 @@ impl SolvedModes {
         solution.residuals.truncate(given);
         solution.rounding_floors.truncate(given);
         solution.vectors = solution.vectors.as_ref().subcols(0, given).to_owned();
-        notes.extend(self.told(model, &solution.completeness));
+        notes.extend(self.completeness_note(model, &solution.completeness));
         notes
     }
 
     /// Returns a diagnostic about the program that counted the modes, unless the built-in count proved
     /// them.
-    fn told(&self, model: &FeModel, completeness: &Completeness) -> Option<Diagnostic> {
+    fn completeness_note(&self, model: &FeModel, completeness: &Completeness) -> Option<Diagnostic> {
         let Completeness { proof, negative_pivots, remark, .. } = completeness;
         let help = "count again with flexbody assemble --prove, if the factor fits the memory";
         match (proof, negative_pivots) {

@@ -210,7 +210,7 @@ impl BodyModes {
         let motion =
             RigidMotion { fields: fields.as_ref(), displacements: mass.turning_rows(), axes: frame.axes };
         let shapes = mass.extend(self.vectors.as_ref());
-        condensed(mass, &motion, shapes.as_ref()).without_feeling_of_flight().shifted(-offset)
+        condensed(mass, &motion, shapes.as_ref()).with_w0_of_c1().shifted(-offset)
     }
 }
 

@@ -47,7 +47,7 @@ impl ModalModel<'_> {
 
     /// Condenses the groups that `terms` keep; `linear` holds the data already known. Accuracy `certified`
     /// condenses everything first, since its digits refer to all data.
-    pub fn condense_kept(&self, linear: Condensation, terms: Vec<TermDecision>) -> Condensation {
+    pub fn condense_selected(&self, linear: Condensation, terms: Vec<TermDecision>) -> Condensation {
         let dropped = terms.iter().filter(|term| !term.kept);
         let groups =
             dropped.fold(TermGroups::ALL, |groups, term| groups.and(TermGroups::without(term.group)));

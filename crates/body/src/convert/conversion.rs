@@ -62,11 +62,11 @@ impl ModalModel<'_> {
         let exact = &condensed.invariants;
         context.phase("lumped comparison");
         let lumped = self.schemes.iter().map(|masses| lumped::comparator(&self, masses, exact)).collect();
-        let uncounted = context.uncounted();
+        let without_counter = context.without_counter();
         let pipelines = if self.settings.lumped_modes { self.schemes.as_slice() } else { &[] };
         let lumped_modes = pipelines
             .iter()
-            .map(|masses| lumped::pipeline(&self, masses, exact, &uncounted))
+            .map(|masses| lumped::pipeline(&self, masses, exact, &without_counter))
             .collect::<Result<_>>()?;
         let (parts, overdamped) = self.parts(&condensed, lumped)?;
         let body = FlexBody::new(parts)?;

@@ -108,11 +108,11 @@ pub(super) fn pipeline(
     context: &Context<'_>,
 ) -> Result<LumpedPipeline> {
     let scheme = masses.scheme().name().to_owned();
-    let EigenSolution { eigenvalues, vectors, next_eigenvalue, .. } = match own_modes(modal, masses, context)
-    {
-        Ok(found) => found,
-        Err(remark) => return Ok(LumpedPipeline::without_result(scheme, remark)),
-    };
+    let EigenSolution { eigenvalues, vectors, next_eigenvalue, .. } =
+        match lumped_modes(modal, masses, context) {
+            Ok(found) => found,
+            Err(remark) => return Ok(LumpedPipeline::without_result(scheme, remark)),
+        };
     let modes = BodyModes::new(modal.model, &modal.place, vectors);
     let mass_times_modes = modal.model.pencil().apply_mass(modes.vectors.as_ref());
     let cross = gram(modal.modes.vectors.as_ref(), mass_times_modes.as_ref());
@@ -161,7 +161,7 @@ fn caution(
 }
 
 /// Returns as many modes of the lumped mass as the body has, or the reason why there are none.
-fn own_modes(
+fn lumped_modes(
     modal: &ModalModel<'_>,
     masses: &LumpedMasses,
     context: &Context<'_>,

@@ -51,13 +51,13 @@ impl<'m> ModalModel<'m> {
         refuse_uncertifiable(model, settings.modes.accuracy)?;
         let schemes =
             settings.lumped.iter().map(|lumping| lumping.masses(model)).collect::<Result<Vec<_>>>()?;
-        let own_frame = own_frame(model, settings)?;
+        let given_frame = given_frame(model, settings)?;
         let counter = WorkCounter::default();
-        let task = Task { model, settings: &settings.modes, context: &context.counted_by(&counter) };
+        let task = Task { model, settings: &settings.modes, context: &context.with_counter(&counter) };
         let mut found = settings.basis.basis().modes(&task)?;
         context.phase("invariants");
         let (frame, mass_properties) = body_frame(model, &settings.frame)?;
-        let frame = own_frame.unwrap_or(frame);
+        let frame = given_frame.unwrap_or(frame);
         let place = NodesInFrame::new(model, frame);
         let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
         if let Some(name) = settings.frame.interface() {
@@ -68,7 +68,7 @@ impl<'m> ModalModel<'m> {
         let twice = found.solution.is_noisy() && settings.modes.accuracy == Accuracy::Standard;
         let reduced = if twice { reduced_in_twice_the_precision } else { reduced };
         let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
-        let shift = match own_frame {
+        let shift = match given_frame {
             Some(own) => own.origin - mass_properties.centre_of_mass,
             None => Vector3::zeros(),
         };
@@ -125,7 +125,7 @@ fn refuse_uncertifiable(model: &FeModel, accuracy: Accuracy) -> Result<()> {
 /// # Errors
 /// [`Usage`](Code::Usage) together with settings that need free modes; the errors of
 /// [`frame_of_interface`](interface_frame::frame_of_interface).
-fn own_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame>> {
+fn given_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame>> {
     let Some(name) = settings.frame.interface() else { return Ok(None) };
     let refuse = |message: &str, help: &str| {
         Err(Diagnostic::new(Code::Usage, message.to_owned()).with_help(help.to_owned()).into())

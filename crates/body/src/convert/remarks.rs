@@ -49,9 +49,9 @@ pub fn interface_compliance(body: &FlexBody) -> Option<Diagnostic> {
             let direction = one.load.strip_prefix(interface.name.as_str())?.strip_prefix(' ')?;
             Some((one.after.powi(2), direction))
         });
-        let (lacking, direction) = of_interface.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
-        let named = || format!("`{}` {:.0} % ({direction})", interface.name, 100.0 * lacking);
-        (lacking > REPORTED_COMPLIANCE).then(named)
+        let (missing, direction) = of_interface.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
+        let named = || format!("`{}` {:.0} % ({direction})", interface.name, 100.0 * missing);
+        (missing > REPORTED_COMPLIANCE).then(named)
     };
     let found: Vec<String> = body.interfaces().iter().filter_map(worst).collect();
     (!found.is_empty()).then(|| {

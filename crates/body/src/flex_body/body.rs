@@ -52,9 +52,9 @@ impl InertiaRates {
                     .map(|a| format!("an angular acceleration of {} 1/{time}^2", significant(a, 3))),
             ),
         ];
-        let told: Vec<String> =
-            all.into_iter().filter(|(kind, _)| asked(kind)).filter_map(|(_, told)| told).collect();
-        told.join(", ")
+        let described: Vec<String> =
+            all.into_iter().filter(|(kind, _)| asked(kind)).filter_map(|(_, described)| described).collect();
+        described.join(", ")
     }
 }
 
@@ -293,7 +293,7 @@ impl FlexBody {
             eigenvalue_rounding: self.parts.certificate.eigenvalue_rounding,
             turning: match (&self.parts.inertia_stiffness, &self.parts.source.approximation) {
                 (None, _) => Turning::None,
-                (Some(_), Some(_)) => Turning::InPart,
+                (Some(_), Some(_)) => Turning::Partial,
                 (Some(_), None) => Turning::Whole,
             },
         };

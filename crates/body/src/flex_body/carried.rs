@@ -82,14 +82,14 @@ impl FlexBody {
     /// or no orientation, or if the body does not hold all groups of the kinetic energy.
     pub fn carried(&self, carrier: &Carrier) -> Result<Self> {
         if self.groups() != TermGroups::ALL {
-            let lacking: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
+            let dropped: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
             return Err(refused(format!(
                 "the body does not have {}, which its terms about {carrier} require",
-                lacking.join(", ")
+                dropped.join(", ")
             )));
         }
         let along_model = self.frame().axes == nalgebra::Matrix3::identity();
-        if along_model && self.rests_on(carrier)? {
+        if along_model && self.has_carrier_at_rest(carrier)? {
             let mut parts = self.clone().into_parts();
             parts.geometric_stiffness.retain(|one| matches!(one.load.kind, LoadKind::Named(_)));
             return Self::new(parts);
@@ -170,7 +170,7 @@ impl FlexBody {
                 modes.clone().map(|j| loads[(a, j)] * loads[(b, j)] / stiffness[(j, j)]).sum::<f64>()
             })
         };
-        let missing = |loads: &Mat<f64>| largest_part(&energy(loads, nf / 2..nf), &energy(loads, 0..nf));
+        let missing = |loads: &Mat<f64>| largest_ratio(&energy(loads, nf / 2..nf), &energy(loads, 0..nf));
         let worst = missing(c1).max(missing(&c2));
         (worst > MAX_TRUNCATION).then(|| {
             let message = format!(
@@ -229,18 +229,18 @@ impl FlexBody {
     ///
     /// # Errors
     /// The errors FB212 and FB214 of [`FlexBody::carried`].
-    fn rests_on(&self, carrier: &Carrier) -> Result<bool> {
+    fn has_carrier_at_rest(&self, carrier: &Carrier) -> Result<bool> {
         if let (ReferenceConditions::Interface(own), Carrier::Interface(name)) = (self.conditions(), carrier)
             && own == name
         {
             return Ok(true);
         }
         let at = self.place_of(carrier)?;
-        Ok(at.reference == Vector3::zeros() && self.rests(&at.motion))
+        Ok(at.reference == Vector3::zeros() && self.is_at_rest(&at.motion))
     }
 
     /// Returns true if a point with `motion` (6 x nf) moves in no mode.
-    fn rests(&self, motion: &Mat<f64>) -> bool {
+    fn is_at_rest(&self, motion: &Mat<f64>) -> bool {
         let extent = self.extent();
         (0..self.n_modes()).all(|j| {
             let size = ROUNDING_MOTION * self.largest_displacement(j);
@@ -300,7 +300,7 @@ fn refused(message: String) -> Error {
 const ROUNDING_ENERGY: f64 = 1e-9;
 
 /// Returns the largest b'P b / b'W b over all directions b in which `whole` = W has energy.
-fn largest_part(part: &Matrix3<f64>, whole: &Matrix3<f64>) -> f64 {
+fn largest_ratio(part: &Matrix3<f64>, whole: &Matrix3<f64>) -> f64 {
     let eigen = whole.symmetric_eigen();
     let most = eigen.eigenvalues.max();
     let unit = Matrix3::from_fn(|i, k| match eigen.eigenvalues[k] {

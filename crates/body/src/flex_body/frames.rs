@@ -61,7 +61,7 @@ impl FlexBody {
         }
         self.refuse_changed_frame(&format!("the frame on interface `{name}`"))?;
         let carried = self.carried(&Carrier::Interface(name.to_owned()))?;
-        let change = ModalChange::in_own_frame(carried.invariants(), carried.dimension())
+        let change = ModalChange::in_present_frame(carried.invariants(), carried.dimension())
             .map_err(|reason| impossible(format!("no frame can stand on interface `{name}`: {reason}")))?;
         let mut parts = carried.changed(&change, conditions)?.into_parts();
         parts.source.settings["frame"] = FrameChoice::Interface(name.to_owned()).text().into();

@@ -151,7 +151,7 @@ impl ModalChange {
     ///
     /// # Errors
     /// The errors of `ModalChange::to_mean_axes`.
-    pub fn in_own_frame(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
+    pub fn in_present_frame(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
         let split = Split::new(invariants, dimension)?;
         let modes = eigenmodes(invariants, &split.deforming)?;
         Ok(Self { modes, taken: None, left_out: split.rigid_motions })

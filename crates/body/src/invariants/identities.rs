@@ -76,7 +76,7 @@ pub enum Turning {
     #[default]
     None,
     /// Points and directors, and a part of the mass that does not turn: W0 = -C1~.
-    InPart,
+    Partial,
     /// Points and directors only: every formula of M = Ms kron I3 holds, except for signs of products,
     /// since the mass of directors may belong to no position.
     Whole,
@@ -139,7 +139,7 @@ fn turning_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning
     let (check, nf, solid) = (IdentityCheck::new, body.n_modes(), body.as_solid());
     let difference = terms::difference(&solid.w0(), &body.w0(), &|_, column| bound.c1(column % nf));
     let mut checks = vec![check("w0_of_c1", "W0 = -C1~", difference, GRAM_LIMIT)];
-    if turning == Turning::InPart {
+    if turning == Turning::Partial {
         return checks;
     }
     let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);

@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Line of a continuation.
-struct OwnLine {
+struct NumberedLine {
     text: Vec<u8>,
     number: usize,
 }
@@ -19,7 +19,7 @@ struct OwnLine {
 pub(super) struct Apart {
     /// Names of these continuations, in upper case.
     names: HashSet<Vec<u8>>,
-    lines: HashMap<Vec<u8>, Vec<OwnLine>>,
+    lines: HashMap<Vec<u8>, Vec<NumberedLine>>,
     /// Last continuation that was read, and the name that a line must have to continue it.
     last: Option<(Vec<u8>, Vec<u8>)>,
     cards: Vec<(Card, PathBuf)>,
@@ -66,7 +66,7 @@ impl Apart {
             _ if self.contains(name) => name.to_vec(),
             _ => return false,
         };
-        self.lines.entry(first.clone()).or_default().push(OwnLine { text: line.to_vec(), number });
+        self.lines.entry(first.clone()).or_default().push(NumberedLine { text: line.to_vec(), number });
         self.last = Some((first, end_of(line)));
         true
     }
@@ -89,7 +89,7 @@ impl Apart {
         let mut cards = std::mem::take(&mut self.cards);
         for (card, path) in &mut cards {
             while let Some(lines) = self.lines.remove(&card.continuation) {
-                for OwnLine { text, number } in lines {
+                for NumberedLine { text, number } in lines {
                     card_fields(card, &Line::of(&text), number)
                         .map_err(|diagnostic| diagnostic.in_file(&*path).at_line(number))?;
                 }

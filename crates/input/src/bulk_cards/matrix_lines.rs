@@ -11,13 +11,13 @@ const BYTES_PER_TASK: usize = 1 << 20;
 pub(crate) struct MatrixLines<'a> {
     pub file: &'a InputFile,
     /// Parts in the order of the file.
-    pub parts: Vec<Part>,
+    pub parts: Vec<LineRange>,
     /// Last line of the last card, from 1.
     last_line: usize,
 }
 
 /// Part of whole cards: the headers of matrices, or columns.
-pub(crate) struct Part {
+pub(crate) struct LineRange {
     pub bytes: Range<usize>,
     /// Number of lines above the part.
     pub above: usize,
@@ -29,7 +29,7 @@ impl<'a> MatrixLines<'a> {
     /// `None` if that line begins another card.
     pub(super) fn at(file: &'a InputFile, start: usize, above: usize) -> Option<Self> {
         let bytes = file.bytes();
-        let (mut parts, mut last_line): (Vec<Part>, usize) = (Vec::new(), above);
+        let (mut parts, mut last_line): (Vec<LineRange>, usize) = (Vec::new(), above);
         let mut at = start;
         while at < bytes.len() {
             let end = memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |length| at + length + 1);
@@ -40,11 +40,11 @@ impl<'a> MatrixLines<'a> {
                     Some(part) if !is_header && !part.is_header && part.bytes.len() < BYTES_PER_TASK => {
                         part.bytes.end = end;
                     }
-                    _ => parts.push(Part { bytes: at..end, above: last_line, is_header }),
+                    _ => parts.push(LineRange { bytes: at..end, above: last_line, is_header }),
                 }
             } else {
                 match parts.last_mut() {
-                    Some(part) if goes_on(line) => part.bytes.end = end,
+                    Some(part) if continues(line) => part.bytes.end = end,
                     _ => break,
                 }
             }
@@ -85,7 +85,7 @@ fn is_header(line: &[u8]) -> bool {
 }
 
 /// Returns true when a line continues a card, is empty or is a comment.
-fn goes_on(line: &[u8]) -> bool {
+fn continues(line: &[u8]) -> bool {
     if matches!(line.first(), Some(b'*' | b'+' | b'$')) {
         return true;
     }

@@ -25,7 +25,7 @@ pub(super) struct Replication {
 }
 
 /// Request of a line that begins with `=`.
-pub(super) enum Asked {
+pub(super) enum ReplicationRequest {
     /// One card.
     One(Replication),
     /// Number of cards, each made by the preceding replication.
@@ -37,13 +37,13 @@ impl Replication {
     ///
     /// # Errors
     /// FB110 for invalid counts, and fields beyond the line.
-    pub(super) fn asked(line: &Line<'_>) -> Result<Option<Asked>, Diagnostic> {
+    pub(super) fn request(line: &Line<'_>) -> Result<Option<ReplicationRequest>, Diagnostic> {
         let Some(rest) = line.head().strip_prefix(b"=") else { return Ok(None) };
         if !rest.is_empty() && rest != b"=" {
             let count =
                 whole(without_brackets(rest)).filter(|count| (1..=MAX_REPEATED_CARDS).contains(count));
             let message = "expected a number of repetitions, as in =(4)";
-            return count.map(|count| Some(Asked::Repeat(count))).ok_or_else(|| bad(message));
+            return count.map(|count| Some(ReplicationRequest::Repeat(count))).ok_or_else(|| bad(message));
         }
         let mut given = Card::default();
         if line.is_free {
@@ -63,7 +63,7 @@ impl Replication {
                 text => Change::Text(text.to_vec()),
             });
         }
-        Ok(Some(Asked::One(Self { changes })))
+        Ok(Some(ReplicationRequest::One(Self { changes })))
     }
 
     /// Returns the card that follows `card`.

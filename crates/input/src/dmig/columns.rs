@@ -24,7 +24,7 @@ pub(super) struct Columns {
     pub bad: Vec<Diagnostic>,
     recent: Recent<Point>,
     /// Capacity in entries of the next run.
-    room: usize,
+    capacity: usize,
 }
 
 impl Columns {
@@ -33,7 +33,7 @@ impl Columns {
         /// Bytes of an entry in large fields.
         const ENTRY: usize = 56;
         let (points, runs, bad) = (Vec::new(), Vec::new(), Vec::new());
-        Self { points, runs, bad, recent: Recent::new(), room: bytes / ENTRY }
+        Self { points, runs, bad, recent: Recent::new(), capacity: bytes / ENTRY }
     }
 
     /// Adds the entries of a card; for a bad card those before the error.
@@ -64,7 +64,7 @@ impl Columns {
             return Ok(());
         }
         if self.runs.last().is_none_or(|(matrix, ..)| *matrix != at) {
-            self.runs.push((at, Vec::with_capacity(std::mem::take(&mut self.room)), 0));
+            self.runs.push((at, Vec::with_capacity(std::mem::take(&mut self.capacity)), 0));
         }
         let col = self.point(card, 1, path)?;
         for k in (4..card.len()).step_by(4) {

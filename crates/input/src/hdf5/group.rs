@@ -7,7 +7,7 @@ use super::super::assemble::{
 };
 use super::members::{Members, POINTERS};
 use super::values::{Found, Heaps, Vector, integers_of, text_of, truth_of};
-use crate::lent::KeptColumns;
+use crate::lent::StoredColumns;
 use crate::reader::MatrixSource;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
@@ -53,7 +53,7 @@ pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Foun
         _ => StoredEntries::Full,
     };
     let made = match (parsed.entries, stored) {
-        (Entries::Kept(matrix), _) => assembled(matrix, 17, file.path()),
+        (Entries::Stored(matrix), _) => assembled(matrix, 17, file.path()),
         (Entries::Columns(columns), StoredEntries::Full) => assemble_columns(columns, 17, file.path()),
         (Entries::Columns(columns), StoredEntries::Triangle) => {
             assemble(parsed.n, columns.into_entries(), stored, 17, file.path())
@@ -89,7 +89,7 @@ struct Parsed {
 /// Entries of a matrix, in the order in which its group stores them.
 enum Entries {
     /// Sorted columns of both triangles, in files.
-    Kept(CscMatrix),
+    Stored(CscMatrix),
     Columns(ColumnEntries),
     Listed(Vec<Vec<Entry>>),
 }
@@ -150,12 +150,12 @@ impl GroupReader<'_> {
             ]);
         }
         if let Some(folder) = self.keep_in
-            && let Some(parsed) = self.kept(folder, (&values, &indices, &pointer_values), n)?
+            && let Some(parsed) = self.stored_in_files(folder, (&values, &indices, &pointer_values), n)?
         {
             return Ok(parsed);
         }
         // Compressed rows are read as columns: symmetric matrices have equal rows and columns.
-        let mut columns = ColumnEntries::with_room(n, entries);
+        let mut columns = ColumnEntries::with_capacity(n, entries);
         let place = by_major(&pointer_values);
         let sides = self.visit(&values, &[&indices], n, place, |entry| columns.push(entry))?;
         let single_precision = values.is_single_precision();
@@ -163,13 +163,13 @@ impl GroupReader<'_> {
     }
 
     /// Returns the matrix in files of `folder`; `None` if its columns are not sorted or one triangle is missing.
-    fn kept(
+    fn stored_in_files(
         &self,
         folder: &Path,
         (values, indices, pointers): (&Vector, &Vector, &[i64]),
         n: usize,
     ) -> Found<Option<Parsed>> {
-        let mut columns = KeptColumns::new(folder, n).map_err(|d| vec![d])?;
+        let mut columns = StoredColumns::new(folder, n).map_err(|d| vec![d])?;
         let mut wrong = None;
         let sides = self.visit(values, &[indices], n, by_major(pointers), |entry| {
             if wrong.is_none() {
@@ -184,7 +184,7 @@ impl GroupReader<'_> {
         }
         let matrix = columns.compress().map_err(|d| vec![d])?;
         let single_precision = values.is_single_precision();
-        Ok(matrix.map(|matrix| Parsed { n, entries: Entries::Kept(matrix), sides, single_precision }))
+        Ok(matrix.map(|matrix| Parsed { n, entries: Entries::Stored(matrix), sides, single_precision }))
     }
 
     fn coordinates(&self, (values, rows, columns): (&str, &str, &str)) -> Found<Parsed> {

@@ -248,18 +248,18 @@ pub(super) fn truth_of(attribute: &Attribute) -> Option<bool> {
 /// Global heaps of a file, which hold texts of variable length. The HDF5 library walks damaged ones endlessly.
 pub(super) struct Heaps<'f> {
     file: &'f InputFile,
-    are_sound: OnceCell<bool>,
+    are_checked: OnceCell<bool>,
 }
 
 impl<'f> Heaps<'f> {
     pub(super) fn of(file: &'f InputFile) -> Self {
-        Self { file, are_sound: OnceCell::new() }
+        Self { file, are_checked: OnceCell::new() }
     }
 
     /// Returns true when walking the heaps comes to an end. The first call examines the file.
-    fn are_sound(&self) -> bool {
+    fn are_checked(&self) -> bool {
         let look = || first_broken_heap(&mut self.file.reader()).is_ok_and(|broken| broken.is_none());
-        *self.are_sound.get_or_init(look)
+        *self.are_checked.get_or_init(look)
     }
 }
 
@@ -270,10 +270,10 @@ pub(super) fn text_of(attribute: &Attribute, heaps: &Heaps<'_>) -> Option<String
         return None;
     }
     let text = match attribute.dtype().ok()?.to_descriptor().ok()? {
-        TypeDescriptor::VarLenUnicode if heaps.are_sound() => {
+        TypeDescriptor::VarLenUnicode if heaps.are_checked() => {
             attribute.read_raw::<VarLenUnicode>().ok()?.first()?.as_bytes().to_vec()
         }
-        TypeDescriptor::VarLenAscii if heaps.are_sound() => {
+        TypeDescriptor::VarLenAscii if heaps.are_checked() => {
             attribute.read_raw::<VarLenAscii>().ok()?.first()?.as_bytes().to_vec()
         }
         TypeDescriptor::FixedAscii(_) => {

@@ -197,8 +197,8 @@ impl Deck {
                 let text = String::from_utf8_lossy(&bytes[end..stop]);
                 head.push_str(text.trim());
                 (end, number) = (stop.min(bytes.len()), number + 1);
-                let goes_on = head.ends_with(',') && end < bytes.len() && !is_keyword(&bytes[end..]);
-                if !goes_on {
+                let continues = head.ends_with(',') && end < bytes.len() && !is_keyword(&bytes[end..]);
+                if !continues {
                     break;
                 }
             }

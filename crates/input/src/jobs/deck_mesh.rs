@@ -324,21 +324,21 @@ impl DeckMeshReader<'_> {
             return self.complain(diagnostic.with_help("write *ELEMENT, TYPE=C3D20, for example"));
         };
         let mut members: Vec<(i64, Vec<i64>)> = Vec::new();
-        let mut goes_on = false;
+        let mut continues = false;
         for (line, text) in self.deck.data(card) {
             let ids: Option<Vec<i64>> = fields(text).filter(|field| !field.is_empty()).map(integer).collect();
             let Some(ids) = ids else {
                 self.syntax(card, line, "an element number and its nodes", text);
                 continue;
             };
-            match (goes_on, members.last_mut()) {
+            match (continues, members.last_mut()) {
                 (true, Some((_, nodes))) => nodes.extend(ids),
                 _ => members.extend(ids.split_first().map(|(id, nodes)| (*id, nodes.to_vec()))),
             }
             // A line that ends with a comma continues. Elements with many nodes continue without a comma as well.
             let wanted = super::element_kinds::n_nodes(&kind);
             let have = members.last().map_or(0, |(_, nodes)| nodes.len());
-            goes_on = wanted.map_or(text.ends_with(b","), |wanted| have < wanted);
+            continues = wanted.map_or(text.ends_with(b","), |wanted| have < wanted);
         }
         if let Some(name) = card.name("ELSET") {
             scope.element_sets.entry(name).or_default().extend(members.iter().map(|(id, _)| *id));

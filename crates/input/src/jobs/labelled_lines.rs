@@ -92,13 +92,13 @@ impl LabelledLines {
 
 fn bad_lines(pieces: &[LabelledEntries], path: &Path) -> Vec<Diagnostic> {
     let mut before = 0;
-    let mut told = Vec::new();
+    let mut shown = Vec::new();
     for piece in pieces {
-        told.extend(piece.bad.iter().map(|(line, bad)| bad.clone().in_file(path).at_line(before + line)));
+        shown.extend(piece.bad.iter().map(|(line, bad)| bad.clone().in_file(path).at_line(before + line)));
         before += piece.lines;
     }
-    told.truncate(MAX_SHOWN_LINES);
-    told
+    shown.truncate(MAX_SHOWN_LINES);
+    shown
 }
 
 /// Entries of some lines. Rows and columns are indices in `labels`, where a label may occur more than once.

@@ -59,7 +59,7 @@ impl JobReader for Nastran {
         let dmigs = std::mem::take(&mut bulk.dmigs);
         let places = GridPlaces::new(&nodes, &axes);
         let matrices = Matrices::of(&bulk, dmigs, job, &places)?;
-        let mut diagnostics = told(&bulk, path);
+        let mut diagnostics = deck_notes(&bulk, path);
         let matrices = matrices.without_followers(&mut diagnostics).turned(&axes)?;
         let matrices = matrices.without_empty_rows(&mut diagnostics);
         matrices.refuse_modal(&bulk)?;
@@ -141,7 +141,7 @@ pub(crate) fn nodes_of_bulk(path: &Path) -> Found<NodeFile> {
 }
 
 /// Returns warnings and notes about the deck.
-fn told(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
+fn deck_notes(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     if bulk.has_elements && !bulk.coupled_mass {
         let message = "the deck does not ask for coupled masses (PARAM,COUPMASS,1): Nastran lumps them";

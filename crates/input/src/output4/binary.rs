@@ -68,7 +68,7 @@ impl Binary {
     /// FB301 for records that cannot be parsed, FB303 for indices outside the matrix, FB306 for values that are not
     /// finite.
     pub(super) fn columns(self, bytes: &[u8], header: &Header) -> Result<Columns, Diagnostic> {
-        let mut columns = Columns::with_room(bytes.len() / self.size(header));
+        let mut columns = Columns::with_capacity(bytes.len() / self.size(header));
         columns.written = if self.size(header) == 4 { SINGLE_DIGITS } else { 17 };
         let mut at = 0;
         while let Some((record, next)) = self.record(bytes, at) {

@@ -2,7 +2,7 @@
 
 use crate::assemble::{ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, push};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::memory::or_go_without;
+use flexbody_base::memory::allow_failure;
 use flexbody_model::RawMatrix;
 use std::ops::Range;
 use std::path::Path;
@@ -172,9 +172,9 @@ pub(super) struct Columns {
 
 impl Columns {
     /// Creates an empty list with capacity for `entries` entries, as far as memory allows.
-    pub(super) fn with_room(entries: usize) -> Self {
+    pub(super) fn with_capacity(entries: usize) -> Self {
         let mut own = Self::default();
-        or_go_without(|| {
+        allow_failure(|| {
             if own.rows.try_reserve_exact(entries).is_ok() {
                 let _ = own.values.try_reserve_exact(entries);
             }

@@ -108,7 +108,7 @@ pub(super) fn columns(
     format: Format,
 ) -> Result<Columns, Diagnostic> {
     let mut text = Text { lines: Lines::below(bytes, line) };
-    let mut columns = Columns::with_room(bytes.len() / format.width);
+    let mut columns = Columns::with_capacity(bytes.len() / format.width);
     columns.written = if header.is_single() { SINGLE_DIGITS } else { 0 };
     while !text.lines.is_at_end() && text.column(header, format, Some(&mut columns))?.is_some() {}
     Ok(columns)

@@ -44,10 +44,10 @@ impl<const R: usize, const C: usize> BlockMatrix<R, C> {
         let (mut free_columns, mut free_blocks) = (&mut columns[..], &mut blocks[..]);
         let mut places = Vec::with_capacity(rows.len());
         for row in &rows {
-            let (own_columns, own_blocks);
-            (own_columns, free_columns) = free_columns.split_at_mut(row.len());
-            (own_blocks, free_blocks) = free_blocks.split_at_mut(row.len());
-            places.push((own_columns, own_blocks));
+            let (row_columns, row_blocks);
+            (row_columns, free_columns) = free_columns.split_at_mut(row.len());
+            (row_blocks, free_blocks) = free_blocks.split_at_mut(row.len());
+            places.push((row_columns, row_blocks));
         }
         rows.into_par_iter().zip(places).with_min_len(BLOCK_ROWS_PER_TASK).for_each(
             |(row, (columns, blocks))| {

@@ -176,9 +176,9 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
             sums.take(|column, force| {
                 let mut moved = [[0.0; C]; B];
                 add_product(&mut moved, &inverse[node], force);
-                let is_own = column == self.of_node[node];
+                let is_in_group = column == self.of_node[node];
                 let entry = |b: usize, c: usize| {
-                    let own = if is_own { self.basis[node][b][c] } else { 0.0 };
+                    let own = if is_in_group { self.basis[node][b][c] } else { 0.0 };
                     (own - omega * moved[b][c]) as f32
                 };
                 std::array::from_fn(|b| std::array::from_fn(|c| entry(b, c)))

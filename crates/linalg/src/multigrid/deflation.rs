@@ -13,7 +13,7 @@ const ROWS_PER_PARTIAL_PRODUCT: usize = 4096;
 const NEAR_EIGENVALUE_DISTANCE: f64 = 0.1;
 
 /// Modes from which corrections are kept apart.
-pub struct Near<'a> {
+pub struct DeflationSpace<'a> {
     /// Rigid modes, M-orthonormal, and M times these.
     pub rigid: [MatRef<'a, f64>; 2],
     /// Approximate modes, M-orthonormal.
@@ -26,7 +26,7 @@ pub struct Near<'a> {
     pub eigenvalues: &'a [f64],
 }
 
-/// Modes of a [`Near`], in single precision.
+/// Modes of a [`DeflationSpace`], in single precision.
 pub(super) struct Deflation<'a> {
     rigid: usize,
     eigenvalues: &'a [f64],
@@ -41,7 +41,7 @@ pub(super) struct Deflation<'a> {
 }
 
 impl<'a> Deflation<'a> {
-    pub(super) fn new(near: &Near<'a>) -> Self {
+    pub(super) fn new(near: &DeflationSpace<'a>) -> Self {
         let [rigid, m_rigid] = near.rigid;
         let sizes: Vec<f64> =
             [rigid, near.modes].iter().flat_map(|x| x.col_iter()).map(|x| x.norm_max()).collect();

@@ -2,8 +2,8 @@
 
 use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use super::coarsening::{Block, Motions, SymmetricBlocks};
-use super::corrections::{Aim, Corrections, SmallPencil};
-use super::deflation::{Deflation, Near};
+use super::corrections::{CorrectionTarget, Corrections, SmallPencil};
+use super::deflation::{Deflation, DeflationSpace};
 use super::level::{Coarse, Level};
 use crate::{
     Pencil, SymmetricMatrix, combine, contiguous_mut, dense_cholesky, dense_inverse, gram, largest,
@@ -45,7 +45,12 @@ pub trait Levels {
 
     /// Replaces the residual forces of approximate modes, columns of about unit size, by corrections of the modes.
     /// Returns the number of columns of cycles.
-    fn correct(&self, near: &Near<'_>, aims: &[Aim], forces: MatMut<'_, f64>) -> u64;
+    fn correct(
+        &self,
+        near: &DeflationSpace<'_>,
+        targets: &[CorrectionTarget],
+        forces: MatMut<'_, f64>,
+    ) -> u64;
 }
 
 /// Returns true if a pencil with this block size, of a body with `rigid_modes` rigid modes, can have levels.
@@ -206,12 +211,17 @@ impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
         Some(by_width(&x, self.fine.nodes(), |x| self.fine.prolonged(&x)))
     }
 
-    fn correct(&self, near: &Near<'_>, aims: &[Aim], forces: MatMut<'_, f64>) -> u64 {
+    fn correct(
+        &self,
+        near: &DeflationSpace<'_>,
+        targets: &[CorrectionTarget],
+        forces: MatMut<'_, f64>,
+    ) -> u64 {
         let ratio = self.heaviest / self.size;
         let pencil = SmallPencil { a: self.fine.matrix(), mass: &self.mass, tau: self.tau, ratio };
         let cycle = |b: &[Rows<B>]| self.cycle(b);
         let deflation = Deflation::new(near);
-        Corrections { pencil, cycle, deflation, eigenvalues: near.eigenvalues }.solve(aims, forces)
+        Corrections { pencil, cycle, deflation, eigenvalues: near.eigenvalues }.solve(targets, forces)
     }
 }
 

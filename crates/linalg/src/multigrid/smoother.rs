@@ -134,10 +134,10 @@ impl<const B: usize> Smoother<B> {
         x: &[Rows<B>],
         step: impl Fn(usize) -> Rows<B> + Sync,
     ) -> Vec<Rows<B>> {
-        let Steps { kept, second, .. } = self.steps();
+        let Steps { momentum, second, .. } = self.steps();
         self.a.apply(x, |node, ax| {
             let (force, d) = (self.divided(node, &minus(&b[node], ax)), step(node));
-            let moved = |i: usize, w: usize| x[node][i][w] + kept * d[i][w] + second * force[i][w];
+            let moved = |i: usize, w: usize| x[node][i][w] + momentum * d[i][w] + second * force[i][w];
             std::array::from_fn(|i| std::array::from_fn(|w| moved(i, w)))
         })
     }
@@ -150,7 +150,7 @@ impl<const B: usize> Smoother<B> {
         let rho = 1.0 / (2.0 * middle / half - half / middle);
         Steps {
             first: (1.0 / middle) as f32,
-            kept: (rho * half / middle) as f32,
+            momentum: (rho * half / middle) as f32,
             second: (2.0 * rho / half) as f32,
         }
     }
@@ -183,7 +183,7 @@ impl<const B: usize> WithSimd for FirstStep<'_, B> {
 /// Factor of the first step, of its repetition in the second step, and of the second correction.
 struct Steps {
     first: f32,
-    kept: f32,
+    momentum: f32,
     second: f32,
 }
 

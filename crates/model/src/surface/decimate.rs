@@ -57,7 +57,7 @@ struct Decimation {
     /// Number of changes of the error of each node.
     changes: Vec<u32>,
     /// Node that each node moved onto; itself if it did not move.
-    gone_to: Vec<u32>,
+    merged_into: Vec<u32>,
 }
 
 /// Move of the first node onto the second, ordered by its error (the bits of a non-negative number sort
@@ -79,7 +79,7 @@ impl Decimation {
             features: vec![Vec::new(); n],
             error: vec![Quadric::default(); n],
             changes: vec![0; n],
-            gone_to: (0..n as u32).collect(),
+            merged_into: (0..n as u32).collect(),
             nodes,
             index,
         };
@@ -137,8 +137,8 @@ impl Decimation {
         while self.alive > most {
             let Some(Reverse((_, [from, to], changes))) = moves.pop() else { return };
             let current = [from, to].map(|node| self.changes[node as usize]);
-            let there = [from, to].iter().all(|&node| self.gone_to[node as usize] == node);
-            if there && current == changes && (!form || self.keeps_form(from, to)) {
+            let are_present = [from, to].iter().all(|&node| self.merged_into[node as usize] == node);
+            if are_present && current == changes && (!form || self.keeps_form(from, to)) {
                 self.collapse(from, to);
                 self.offer(to, &mut moves);
             }
@@ -218,23 +218,24 @@ impl Decimation {
         let error = self.error[from as usize];
         self.error[to as usize] += error;
         self.changes[to as usize] += 1;
-        self.gone_to[from as usize] = to;
+        self.merged_into[from as usize] = to;
     }
 
     /// Returns the remaining mesh, by the nodes of the body.
     fn mesh(&self, before: &SurfaceMesh) -> Option<SurfaceMesh> {
-        let there = |node: u32| {
+        let are_present = |node: u32| {
             let Some(&own) = self.index.get(&node) else { return node };
             let mut at = own;
-            while self.gone_to[at as usize] != at {
-                at = self.gone_to[at as usize];
+            while self.merged_into[at as usize] != at {
+                at = self.merged_into[at as usize];
             }
             self.nodes[at as usize]
         };
         let left = self.triangles.iter().filter(|[a, b, c]| a != b && b != c && c != a);
         let triangles = left.map(|corners| corners.map(|node| self.nodes[node as usize])).collect();
         let ordered = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
-        let mut edges: Vec<[u32; 2]> = before.edges.iter().map(|ends| ordered(ends.map(there))).collect();
+        let mut edges: Vec<[u32; 2]> =
+            before.edges.iter().map(|ends| ordered(ends.map(are_present))).collect();
         edges.retain(|[a, b]| a != b);
         edges.sort_unstable();
         edges.dedup();

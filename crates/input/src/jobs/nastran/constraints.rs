@@ -47,7 +47,7 @@ pub(super) enum Relation {
     /// Zero sum of components, solved for the first of them; `set` is the number of its set.
     Sum { set: i64, terms: Vec<(Point, f64)> },
     /// Unsupported card with the whole numbers on it, some of which are grids.
-    NotRead { numbers: Vec<i64> },
+    Unsupported { numbers: Vec<i64> },
 }
 
 impl Constraint {
@@ -60,7 +60,7 @@ impl Constraint {
                 components.iter().map(|component| (*reference, *component)).collect()
             }
             Relation::Sum { terms, .. } => vec![terms[0].0],
-            Relation::NotRead { .. } => Vec::new(),
+            Relation::Unsupported { .. } => Vec::new(),
         }
     }
 
@@ -74,7 +74,7 @@ impl Constraint {
             }
             Relation::Average { weighted, .. } => weighted.iter().map(|(point, _)| *point).collect(),
             Relation::Sum { terms, .. } => terms[1..].iter().map(|(point, _)| *point).collect(),
-            Relation::NotRead { .. } => Vec::new(),
+            Relation::Unsupported { .. } => Vec::new(),
         }
     }
 
@@ -160,7 +160,7 @@ impl Constraints {
         for own in &self.all {
             match &own.relation {
                 // An unsupported card matters only if it connects grids with rows.
-                Relation::NotRead { numbers } => {
+                Relation::Unsupported { numbers } => {
                     let moves = |grid: i64| (0..=6).any(|component| has(&(grid, component)));
                     if numbers.iter().filter(|number| moves(**number)).count() > 1 {
                         let help = "write the matrices of the a-set (EXTOUT, EXTSEOUT), which contain it, or write it as RBE2, RBE3 without UM, RBAR or MPC";
@@ -231,7 +231,7 @@ fn grids(card: &Card, from: usize) -> Option<(Vec<i64>, usize)> {
 }
 
 fn not_read(card: &Card) -> Relation {
-    Relation::NotRead { numbers: (1..card.len()).filter_map(|k| whole(card.field(k))).collect() }
+    Relation::Unsupported { numbers: (1..card.len()).filter_map(|k| whole(card.field(k))).collect() }
 }
 
 /// Reads RBE2 with the fields EID, GN, CM, GM1, GM2, ..., ALPHA.

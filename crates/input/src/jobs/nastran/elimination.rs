@@ -206,7 +206,7 @@ fn sums(of: &Constraint, places: &GridPlaces<'_>) -> Result<Vec<(Point, Sum)>, D
             let others = terms[1..].iter().filter(|(_, factor)| *factor != 0.0);
             Ok(vec![(point, others.map(|(other, factor)| (*other, -factor / first)).collect())])
         }
-        Relation::NotRead { .. } => Err(of.refused("constraints of this kind are not supported")),
+        Relation::Unsupported { .. } => Err(of.refused("constraints of this kind are not supported")),
     }
 }
 

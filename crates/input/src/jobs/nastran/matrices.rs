@@ -29,7 +29,7 @@ pub(super) struct Matrices {
     /// Rotation of the rows to the axes of the model, if they had others.
     turn: Option<CscMatrix>,
     /// Rows that were kept, if others were left out.
-    kept: Option<Vec<usize>>,
+    retained: Option<Vec<usize>>,
 }
 
 impl Matrices {
@@ -94,7 +94,7 @@ impl Matrices {
         let followers = eliminated.transpose().map_err(in_file)?;
         let n_given = points.len();
         let labels = points.into_iter().map(label).collect();
-        Ok(Self { stiffness, mass, labels, files, n_given, followers, turn: None, kept: None })
+        Ok(Self { stiffness, mass, labels, files, n_given, followers, turn: None, retained: None })
     }
 
     /// Returns the matrices without the rows that follow others by constraints of the deck.
@@ -142,20 +142,21 @@ impl Matrices {
         let keeps = |(label, filled): (&DofLabel, &bool)| {
             *filled || label.direction <= 3 && moving.contains(&label.node)
         };
-        let kept: Vec<usize> = (0..labels.len()).filter(|&row| keeps((&labels[row], &filled[row]))).collect();
-        if kept.len() == labels.len() {
+        let retained: Vec<usize> =
+            (0..labels.len()).filter(|&row| keeps((&labels[row], &filled[row]))).collect();
+        if retained.len() == labels.len() {
             return self;
         }
         let turning = rows().filter(|(label, filled)| !**filled && moving.contains(&label.node)).count();
-        let left_out = labels.len() - kept.len();
+        let left_out = labels.len() - retained.len();
         let message = format!(
             "{left_out} rows without stiffness and mass are left out: {turning} rotations, {} of points that nothing is fixed to",
             left_out - turning
         );
         found.push(Diagnostic::new(Code::RowsEmpty, message).in_file(&self.stiffness.path));
-        let labels = kept.iter().map(|&row| labels[row]).collect();
-        let [stiffness, mass] = [self.stiffness, self.mass].map(|raw| principal(raw, &kept));
-        Self { stiffness, mass, labels, kept: Some(kept), ..self }
+        let labels = retained.iter().map(|&row| labels[row]).collect();
+        let [stiffness, mass] = [self.stiffness, self.mass].map(|raw| principal(raw, &retained));
+        Self { stiffness, mass, labels, retained: Some(retained), ..self }
     }
 
     /// Returns FB111 for modal coordinates: rows of scalar points with mass. K and M do not contain their shapes, and
@@ -189,19 +190,19 @@ impl Matrices {
     pub(super) fn given_rows(&self, axes: HashMap<i64, Axes>) -> GivenRows {
         let n = self.followers.as_ref().map_or(self.n_given, |(own, _)| own.points.len());
         let all = || (0..n).collect::<Vec<usize>>();
-        let kept = self.kept.clone().unwrap_or_else(all);
-        if self.followers.is_none() && self.turn.is_none() && kept.len() == n {
+        let retained = self.retained.clone().unwrap_or_else(all);
+        if self.followers.is_none() && self.turn.is_none() && retained.len() == n {
             return GivenRows::default();
         }
         let turn = self.turn.clone().unwrap_or_else(|| columns_of_identity(n, &all()));
-        let rows = || kept.iter().map(|&row| row as u32).collect::<Vec<u32>>();
+        let rows = || retained.iter().map(|&row| row as u32).collect::<Vec<u32>>();
         // Maps for rows of the files, for rows without dependent ones, and for rows that are also not empty.
         let whole = match &self.followers {
             Some((own, _)) => RowMap::new(product(&turn, &own.follows), product(&turn, &own.picks), rows()),
             None => RowMap::new(turn.clone(), turn.clone(), rows()),
         };
         let left = RowMap::new(turn.clone(), turn.clone(), rows());
-        let own = product(&turn, &columns_of_identity(n, &kept));
+        let own = product(&turn, &columns_of_identity(n, &retained));
         let least = RowMap::new(own.clone(), own, rows());
         let mut maps = vec![whole];
         for map in [left, least] {
@@ -267,18 +268,18 @@ fn followers(bulk: &Bulk, has: impl Fn(&Point) -> bool, places: &GridPlaces<'_>)
     Followers::new(&open, places).map(Some).map_err(one)
 }
 
-/// Returns the rows `kept` (ascending) and the same columns of a matrix that has no entries elsewhere.
-fn principal(raw: RawMatrix, kept: &[usize]) -> RawMatrix {
+/// Returns the rows `retained` (ascending) and the same columns of a matrix that has no entries elsewhere.
+fn principal(raw: RawMatrix, retained: &[usize]) -> RawMatrix {
     let mut local = vec![u32::MAX; raw.matrix.n_rows()];
-    kept.iter().enumerate().for_each(|(to, &row)| local[row] = to as u32);
+    retained.iter().enumerate().for_each(|(to, &row)| local[row] = to as u32);
     let mut col_ptr = vec![0];
     let (mut row_idx, mut values) = (Vec::new(), Vec::new());
-    for &column in kept {
+    for &column in retained {
         let (rows, own) = raw.matrix.column(column);
         row_idx.extend(rows.iter().map(|&row| local[row as usize]));
         values.extend_from_slice(own);
         col_ptr.push(row_idx.len());
     }
-    let matrix = CscMatrix::from_parts(kept.len(), kept.len(), col_ptr, row_idx, values);
+    let matrix = CscMatrix::from_parts(retained.len(), retained.len(), col_ptr, row_idx, values);
     RawMatrix { matrix, ..raw }
 }

@@ -3,7 +3,7 @@
 use super::bulk::Bulk;
 use super::rows;
 use crate::dmig::Point;
-use crate::jobs::{Beside, Found, beginning_alike, both, missing};
+use crate::jobs::{Found, JobSibling, beginning_alike, both, missing};
 use crate::nastran_names::{named_pair, pair};
 use crate::output4;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -129,7 +129,8 @@ pub(super) fn no_files(path: &Path, absent: &[PathBuf]) -> Vec<Diagnostic> {
         None => "beside the deck, a file of matrices (job.pch, job.op4)".to_owned(),
     };
     // A file of another job may be the intended one.
-    let is_like = |file: &Beside| !file.is_own && [".pch", ".op4"].iter().any(|end| file.rest.ends_with(end));
+    let is_like =
+        |file: &JobSibling| !file.is_of_job && [".pch", ".op4"].iter().any(|end| file.rest.ends_with(end));
     let mut others: Vec<String> = beginning_alike(path)
         .iter()
         .filter(|file| is_like(file))

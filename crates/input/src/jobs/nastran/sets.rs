@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Default)]
 pub(super) struct SetLines {
     lines: Vec<String>,
-    goes_on: bool,
+    continues: bool,
 }
 
 impl SetLines {
@@ -16,7 +16,7 @@ impl SetLines {
         let line = line.trim();
         let words: Vec<&str> = line.split_whitespace().collect();
         let is_set = words.first().is_some_and(|word| word.eq_ignore_ascii_case("SET")) && line.contains('=');
-        if self.goes_on
+        if self.continues
             && let Some(last) = self.lines.last_mut()
         {
             last.push(' ');
@@ -24,7 +24,7 @@ impl SetLines {
         } else if is_set {
             self.lines.push(line.to_owned());
         }
-        self.goes_on = (self.goes_on || is_set) && line.ends_with(',');
+        self.continues = (self.continues || is_set) && line.ends_with(',');
     }
 
     /// Returns the sets with those members that are nodes, each by its number and as `SET5`.
@@ -61,9 +61,9 @@ fn parsed<T>(line: &str, nodes: &BTreeMap<i64, T>) -> Option<(i64, Vec<i64>)> {
         let first: i64 = word.parse().ok()?;
         if words.next_if(|word| word.eq_ignore_ascii_case("THRU")).is_some() {
             let last: i64 = words.next()?.parse().ok()?;
-            let own_range = (first <= last).then_some(first..=last)?;
-            own.extend(nodes.range(own_range.clone()).map(|(id, _)| *id));
-            (range, except) = (Some(own_range), false);
+            let listed_range = (first <= last).then_some(first..=last)?;
+            own.extend(nodes.range(listed_range.clone()).map(|(id, _)| *id));
+            (range, except) = (Some(listed_range), false);
         } else if except && range.as_ref().is_some_and(|range| range.contains(&first)) {
             own.remove(&first);
         } else {
