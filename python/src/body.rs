@@ -281,10 +281,10 @@ impl Body {
     /// of_modes); None for other bodies.
     #[getter]
     fn interface_coordinates<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let Some(own) = self.inner.interface_coordinates() else { return Ok(None) };
+        let Some(coordinates) = self.inner.interface_coordinates() else { return Ok(None) };
         let class = py.import("flexbody._types")?.getattr("InterfaceCoordinates")?;
-        let (stiffness, mass) = (matrix(py, &own.stiffness)?, matrix(py, &own.mass)?);
-        class.call1((own.names, stiffness, mass, matrix(py, &own.of_modes)?)).map(Some)
+        let (stiffness, mass) = (matrix(py, &coordinates.stiffness)?, matrix(py, &coordinates.mass)?);
+        class.call1((coordinates.names, stiffness, mass, matrix(py, &coordinates.of_modes)?)).map(Some)
     }
 
     /// Decisions about the groups of the kinetic energy: list of (name, true if it is kept, reason). Empty if no
@@ -299,9 +299,9 @@ impl Body {
     fn lumped_errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         for (scheme, errors) in self.inner.lumped_errors() {
-            let own = PyDict::new(py);
-            errors.iter().try_for_each(|(name, value)| own.set_item(name, value))?;
-            all.set_item(scheme, own)?;
+            let of_scheme = PyDict::new(py);
+            errors.iter().try_for_each(|(name, value)| of_scheme.set_item(name, value))?;
+            all.set_item(scheme, of_scheme)?;
         }
         Ok(all)
     }

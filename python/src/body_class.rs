@@ -46,7 +46,7 @@ impl Body {
         of: impl FnOnce(&FlexBody) -> Option<Matrix>,
     ) -> PyResult<Bound<'py, PyAny>> {
         self.cache.get(py, name, || match of(&self.inner) {
-            Some(own) => matrix(py, &own),
+            Some(given) => matrix(py, &given),
             None => Ok(py.None().into_bound(py)),
         })
     }

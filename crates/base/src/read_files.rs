@@ -42,8 +42,8 @@ pub fn note_read(path: &Path) {
 pub fn refuse_read(output: &Path) -> Result<()> {
     let of_run = read();
     let Some(files) = of_run.as_ref() else { return Ok(()) };
-    let own = FileIdentity::of(output);
-    if files.iter().any(|file| file.is_same(&own)) {
+    let target = FileIdentity::of(output);
+    if files.iter().any(|file| file.is_same(&target)) {
         return Err(replaces(output).into());
     }
     Ok(())

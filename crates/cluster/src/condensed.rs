@@ -44,11 +44,11 @@ impl<'a> Condensed<'a> {
     pub(crate) fn difference(&self, g: MatRef<'_, f64>) -> f64 {
         let v = Mat::from_fn(self.columns(), RANDOM_COLUMNS, |i, j| uniform(SEED, i as u64, j as u64));
         let momentum = self.model.pencil().apply_mass(self.combined(v.as_ref()).as_ref());
-        let (own, given) = (self.projected(momentum.as_ref()), g * &v);
+        let (computed, given) = (self.projected(momentum.as_ref()), g * &v);
         let largest = (0..g.nrows()).map(|i| g[(i, i)]).fold(0.0, f64::max);
         let relative = |j: usize| {
-            let size = (largest * (v.col(j).transpose() * own.col(j))).sqrt();
-            (given.col(j) - own.col(j)).norm_max() / size
+            let size = (largest * (v.col(j).transpose() * computed.col(j))).sqrt();
+            (given.col(j) - computed.col(j)).norm_max() / size
         };
         (0..RANDOM_COLUMNS).map(relative).fold(0.0, larger)
     }

@@ -65,7 +65,7 @@ impl Engine {
     /// [`EngineMissing`](Code::EngineMissing) with the message of the last interpreter that was tested.
     pub fn find_python(&self) -> Result<String> {
         let candidates: Vec<&str> = match &self.python {
-            Some(own) => vec![own],
+            Some(stated) => vec![stated],
             None => PYTHONS.to_vec(),
         };
         let mut why = String::new();
@@ -147,8 +147,8 @@ fn probe(python: &str) -> std::io::Result<Output> {
 /// Returns the reason of a failure: the error message of the program if there is one, else its last line.
 fn cause(output: &Output) -> String {
     let text = String::from_utf8_lossy(&output.stderr);
-    let own = text.lines().find(|line| line.starts_with("error") || line.contains("exited on signal"));
-    own.map_or_else(|| last_line(output), |line| line.trim().to_owned())
+    let error_line = text.lines().find(|line| line.starts_with("error") || line.contains("exited on signal"));
+    error_line.map_or_else(|| last_line(output), |line| line.trim().to_owned())
 }
 
 fn last_line(output: &Output) -> String {

@@ -300,8 +300,9 @@ impl Trial {
             for j in 0..count {
                 let (a, m) = (self.stiffness[i][j], self.mass[i][j]);
                 let (wi, wj) = (self.omega[i], self.omega[j]);
-                let own = if i == j { count as f64 * self.residual[i] * ROUNDING_MARGIN } else { 0.0 };
-                let t = m * wi + m * wj - a + DoubleDouble::from(own);
+                let known_residual =
+                    if i == j { count as f64 * self.residual[i] * ROUNDING_MARGIN } else { 0.0 };
+                let t = m * wi + m * wj - a + DoubleDouble::from(known_residual);
                 let scaled = |value: DoubleDouble| value * wi * wj;
                 p[i][j] = scaled(a - s * m) * sign;
                 q[i][j] = scaled(a - s * m * 2.0) + s * s * t;
@@ -312,7 +313,9 @@ impl Trial {
                 p_error[i][j] = ROUNDING_MARGIN * wi * wj * (da + s.hi * dm);
                 q_error[i][j] = ROUNDING_MARGIN
                     * (wi * wj * (da + 2.0 * s.hi * dm)
-                        + s.hi * s.hi * ((wi + wj) * dm + da + 32.0 * UNIT_ROUNDOFF * UNIT_ROUNDOFF * own));
+                        + s.hi
+                            * s.hi
+                            * ((wi + wj) * dm + da + 32.0 * UNIT_ROUNDOFF * UNIT_ROUNDOFF * known_residual));
             }
         }
         let (p_slack, q_slack) = (Slack::of(&p, &p_error)?, Slack::of(&q, &q_error)?);

@@ -382,7 +382,7 @@ impl<'a> SearchSpace<'a> {
         context: &Context<'_>,
     ) -> Result<Self, EigenFailure> {
         let n = problem.pencil.n();
-        let mut own = Self {
+        let mut space = Self {
             problem,
             m_rigid: problem.pencil.apply_mass(problem.rigid),
             x: Tall::with_capacity(n, capacity),
@@ -398,8 +398,8 @@ impl<'a> SearchSpace<'a> {
         };
         let mut first = Tall::copied(x.as_ref());
         drop(x);
-        own.extend(&mut first, 1, context)?;
-        Ok(own)
+        space.extend(&mut first, 1, context)?;
+        Ok(space)
     }
 
     /// Returns the number of vectors that can still be added.
@@ -481,9 +481,9 @@ impl<'a> SearchSpace<'a> {
 
     /// Returns the Ritz vectors of the range `which` (N x k), computed by all threads.
     pub(super) fn some_vectors(&self, which: Range<usize>) -> Tall {
-        let mut own = Tall::zeros(self.problem.pencil.n(), which.len());
-        combine_into(own.as_mut(), self.x.as_ref(), self.ritz.as_ref().subcols(which.start, which.len()));
-        own
+        let mut vectors = Tall::zeros(self.problem.pencil.n(), which.len());
+        combine_into(vectors.as_mut(), self.x.as_ref(), self.ritz.as_ref().subcols(which.start, which.len()));
+        vectors
     }
 
     /// Returns the residual forces K x - lambda M x of the Ritz pairs `which`, and their norms relative to |K x| +

@@ -90,12 +90,12 @@ pub(super) fn rayleigh_ritz(
     subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
     let [mut gm, mut gk] = [(); 2].map(|()| Mat::zeros(k, k));
     for columns in columns_together(k) {
-        let own = x.as_ref().subcols(columns.start, columns.len());
+        let block = x.as_ref().subcols(columns.start, columns.len());
         let above = x.as_ref().subcols(0, columns.end);
         let mut product = Tall::zeros(n, columns.len());
-        pencil.mass_times(own, product.as_mut());
+        pencil.mass_times(block, product.as_mut());
         mirror(&mut gm, columns.start, &gram(above, product.as_ref()));
-        pencil.stiffness_times(own, product.as_mut());
+        pencil.stiffness_times(block, product.as_mut());
         mirror(&mut gk, columns.start, &gram(above, product.as_ref()));
     }
     let (values, coefficients) = small_ritz(&gm, &gk)?;
@@ -176,8 +176,8 @@ pub(super) fn residuals(
     let m_rigid = problem.pencil.apply_mass(problem.rigid);
     columns_together(x.ncols())
         .flat_map(|columns| {
-            let own = x.subcols(columns.start, columns.len());
-            residuals_together(problem, m_rigid.as_ref(), &eigenvalues[columns], own)
+            let block = x.subcols(columns.start, columns.len());
+            residuals_together(problem, m_rigid.as_ref(), &eigenvalues[columns], block)
         })
         .unzip()
 }

@@ -182,8 +182,8 @@ fn is_deck(path: &Path) -> bool {
 /// an underscore or the like, or a matrix name of Abaqus. Each comes as the rest of its name after the stem, in lower
 /// case, and the path.
 fn siblings(main: &Path) -> impl Iterator<Item = (String, PathBuf)> {
-    let own = beginning_alike(main).into_iter().filter(|file| file.is_of_job);
-    own.map(|JobSibling { rest, path, .. }| (rest, path))
+    let siblings = beginning_alike(main).into_iter().filter(|file| file.is_of_job);
+    siblings.map(|JobSibling { rest, path, .. }| (rest, path))
 }
 
 /// File in the folder of the main file of a job whose name begins with the stem of the job.

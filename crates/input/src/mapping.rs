@@ -92,7 +92,7 @@ fn named_directions(bytes: &[u8]) -> Option<Vec<DofLabel>> {
             return None;
         };
         let name = String::from_utf8_lossy(name).to_uppercase();
-        let direction = NAMES.iter().position(|own| *own == name);
+        let direction = NAMES.iter().position(|known| *known == name);
         match (integer(row), integer(node), direction) {
             (Some(row), Some(node), Some(at)) => rows.push((row, DofLabel { node, direction: at as u8 + 1 })),
             _ if rows.is_empty() => {}

@@ -53,10 +53,11 @@ impl MeshReading<'_> {
         let index: HashMap<i64, usize> = self.nodes.ids.iter().copied().zip(0..).collect();
         let allowed = APART * extents(&self.nodes.positions).into_iter().fold(0.0, f64::max);
         let elsewhere = |(id, x): (&i64, &[f64; 3])| {
-            let own = &self.nodes.positions[*index.get(id)?];
-            let apart = (0..3).map(|k| (x[k] - own[k]).powi(2)).sum::<f64>().sqrt();
-            (apart > allowed)
-                .then(|| format!("node {id} of the mesh lies at {x:?}, the node of the model at {own:?}"))
+            let in_model = &self.nodes.positions[*index.get(id)?];
+            let apart = (0..3).map(|k| (x[k] - in_model[k]).powi(2)).sum::<f64>().sqrt();
+            (apart > allowed).then(|| {
+                format!("node {id} of the mesh lies at {x:?}, the node of the model at {in_model:?}")
+            })
         };
         mesh.ids.iter().zip(&mesh.positions).find_map(elsewhere)
     }

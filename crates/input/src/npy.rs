@@ -30,10 +30,11 @@ pub(super) fn read_blocks(bytes: &[u8]) -> Result<Blocks, Diagnostic> {
     let (size, decode) = number_type(descr)?;
     let &[count, rows, columns] = shape.as_slice() else { return Err(other_extents(&shape, 3)) };
     let length = announced(&shape, size, data)?;
-    let own = rows * columns;
+    let per_array = rows * columns;
     // In Fortran order the first index varies fastest.
-    let at =
-        |k: usize| if fortran { k / own + count * (k % own / columns + rows * (k % columns)) } else { k };
+    let at = |k: usize| {
+        if fortran { k / per_array + count * (k % per_array / columns + rows * (k % columns)) } else { k }
+    };
     let values = (0..length).map(|k| decode(&data[at(k) * size..(at(k) + 1) * size])).collect();
     Ok(Blocks { count, rows, columns, values, digits: if size == 4 { 7 } else { 17 } })
 }

@@ -55,7 +55,9 @@ impl Whole {
     /// Returns the size of the integers, if the file begins with the number of an object.
     fn of(head: &[u8]) -> Option<Self> {
         let known = |number: i64| {
-            u64::try_from(number).is_ok_and(|own| own == MATRIX || OTHERS.iter().any(|(id, _)| *id == own))
+            u64::try_from(number).is_ok_and(|id_of_file| {
+                id_of_file == MATRIX || OTHERS.iter().any(|(id, _)| *id == id_of_file)
+            })
         };
         [Self::Four, Self::Eight].into_iter().find(|whole| whole.get(head, 0).is_some_and(known))
     }
@@ -69,10 +71,10 @@ impl Whole {
 
     /// Returns the k-th number of a list.
     fn get(self, bytes: &[u8], k: usize) -> Option<i64> {
-        let own = bytes.get(k * self.bytes()..(k + 1) * self.bytes())?;
+        let bytes_of_number = bytes.get(k * self.bytes()..(k + 1) * self.bytes())?;
         Some(match self {
-            Self::Four => i64::from(i32::from_be_bytes(own.try_into().ok()?)),
-            Self::Eight => i64::from_be_bytes(own.try_into().ok()?),
+            Self::Four => i64::from(i32::from_be_bytes(bytes_of_number.try_into().ok()?)),
+            Self::Eight => i64::from_be_bytes(bytes_of_number.try_into().ok()?),
         })
     }
 

@@ -195,7 +195,7 @@ impl ModelMatrices {
 impl From<JobModel> for ModelMatrices {
     fn from(job: JobModel) -> Self {
         let path = |role: &str| {
-            let file = job.files.iter().find(|(own, _)| *own == role).or(job.files.first());
+            let file = job.files.iter().find(|(file_role, _)| *file_role == role).or(job.files.first());
             file.map(|(_, file)| file.path.clone()).unwrap_or_default()
         };
         Self {
@@ -350,19 +350,19 @@ impl<'m> NodeLookup<'m> {
     /// Returns the members of a node set, including those without rows.
     fn members(&self, name: &str) -> Option<&[i64]> {
         let sets = &self.matrices?.sets;
-        let known = sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name));
-        let known = known.or_else(|| sets.iter().find(|(own, _)| comparable(own) == comparable(name)));
+        let known = sets.iter().find(|(key, _)| key.eq_ignore_ascii_case(name));
+        let known = known.or_else(|| sets.iter().find(|(key, _)| comparable(key) == comparable(name)));
         known.map(|(_, nodes)| nodes.as_slice())
     }
 
     fn of_set(&self, interface: &InterfaceSource, name: &str, files: &ModelFiles) -> Found<Vec<i64>> {
         let Some(matrices) = self.matrices else { return Ok(Vec::new()) };
-        let refused = matrices.unresolved.iter().find(|(own, _)| comparable(own) == comparable(name));
+        let refused = matrices.unresolved.iter().find(|(key, _)| comparable(key) == comparable(name));
         if let Some((_, refused)) = refused {
             return Err(vec![refused.clone().about(format!("interface `{}`", interface.name))]);
         }
         let Some(nodes) = self.members(name) else {
-            let names: Vec<&str> = matrices.sets.iter().map(|(own, _)| own.as_str()).take(20).collect();
+            let names: Vec<&str> = matrices.sets.iter().map(|(key, _)| key.as_str()).take(20).collect();
             let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
             let help = if names.is_empty() {
                 "list the nodes, or give a region: the files of the model have no node sets".to_owned()
@@ -475,8 +475,8 @@ fn turned(
             format!("rows of node {node} are along local axes, but not each of its directions occurs once");
         vec![Diagnostic::new(Code::DofIncomplete, message).in_file(&stiffness.path)]
     })?;
-    let own = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
-    let matrices = [own(stiffness)?, own(mass)?];
+    let transformed = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
+    let matrices = [transformed(stiffness)?, transformed(mass)?];
     let rows = (0..labels.len() as u32).collect();
     let map = RowMap::new(turn.axes(), turn.axes(), rows);
     Ok((matrices, GivenRows::new(vec![map], axes)))

@@ -124,8 +124,8 @@ fn blocks(archive: &mut Archive<'_>, n: usize, path: &Path) -> std::result::Resu
     let (mut pieces, mut check) = (Vec::new(), EntryCheck::new(n, HELP));
     for (block_row, pair) in pointers.windows(2).enumerate() {
         for block in pair[0] as usize..pair[1] as usize {
-            let own = &values[block * rows * columns..(block + 1) * rows * columns];
-            for (k, &value) in own.iter().enumerate() {
+            let block_values = &values[block * rows * columns..(block + 1) * rows * columns];
+            for (k, &value) in block_values.iter().enumerate() {
                 // Zeros pad the blocks: they are no entries, but their indices must still lie within the matrix.
                 let row = (block_row * rows + k / columns) as i64;
                 let column =

@@ -172,8 +172,8 @@ impl Elimination {
             let mut column = ColumnSums { sums: vec![0.0; m], met: vec![false; m], rows: Vec::new() };
             let (mut lengths, mut row_idx, mut values) = (Vec::new(), Vec::new(), Vec::new());
             let last = (first + COLUMNS_PER_TASK).min(m);
-            for (&own, others) in self.free[first..last].iter().zip(&taken[first..last]) {
-                for (row, weight) in std::iter::once((own as usize, 1.0)).chain(others.iter().copied()) {
+            for (&free_row, others) in self.free[first..last].iter().zip(&taken[first..last]) {
+                for (row, weight) in std::iter::once((free_row as usize, 1.0)).chain(others.iter().copied()) {
                     let (nodes, entries) = a.row(row / block);
                     for (&node, &value) in nodes.iter().zip(entries) {
                         self.add(&mut column, node as usize * block + row % block, weight * value);

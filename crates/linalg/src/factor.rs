@@ -184,14 +184,14 @@ impl Scaled<'_> {
         let block = self.analysis.block;
         let vertex = places.vertex();
         let (copies, heavy) = (self.pencil.block(), block / self.pencil.block());
-        for own in 0..heavy {
-            let (others, masses) = self.pencil.mass().row(vertex * heavy + own);
+        for heavy_row in 0..heavy {
+            let (others, masses) = self.pencil.mass().row(vertex * heavy + heavy_row);
             let mut at = 0;
             for (&other, &mass) in others.iter().zip(masses) {
                 let (other, part) = (other as usize / heavy, other as usize % heavy);
                 let Some(place) = places.of(other, &mut at) else { continue };
                 for copy in 0..copies {
-                    let (b, c) = (part * copies + copy, own * copies + copy);
+                    let (b, c) = (part * copies + copy, heavy_row * copies + copy);
                     let (row, local) = (place * block + b, local + c);
                     if row >= local {
                         let scale = self.scale[other * block + b] * self.scale[vertex * block + c];
@@ -336,15 +336,15 @@ pub(super) fn substitute<T: Real, const K: usize>(
     let mut slots: Vec<&mut [[T; K]]> = Vec::with_capacity(tree.len());
     let mut rest = values.as_mut_slice();
     for s in 0..tree.len() {
-        let (own, tail) = rest.split_at_mut(tree.columns(s).len() * block);
-        slots.push(own);
+        let (pivots, tail) = rest.split_at_mut(tree.columns(s).len() * block);
+        slots.push(pivots);
         rest = tail;
     }
     // Upward: collect the contributions of the children, eliminate, hand on the rest.
-    let up = |s: usize, own: &mut &mut [[T; K]], children: Vec<Vec<[T; K]>>| {
+    let up = |s: usize, pivots: &mut &mut [[T; K]], children: Vec<Vec<[T; K]>>| {
         let (width, below) = tree.front(s, block);
         let mut front = vec![[T::default(); K]; width + below];
-        front[..own.len()].copy_from_slice(own);
+        front[..pivots.len()].copy_from_slice(pivots);
         for (&c, update) in tree.children(s).iter().zip(&children) {
             for (&place, update) in tree.places(c as usize).iter().zip(update.chunks_exact(block)) {
                 for (to, from) in front[place as usize * block..].iter_mut().zip(update) {
@@ -353,16 +353,16 @@ pub(super) fn substitute<T: Real, const K: usize>(
             }
         }
         forward(s, &mut front);
-        own.copy_from_slice(&front[..own.len()]);
-        Ok::<_, Infallible>(front.split_off(own.len()))
+        pivots.copy_from_slice(&front[..pivots.len()]);
+        Ok::<_, Infallible>(front.split_off(pivots.len()))
     };
     let Ok(()) = analysis.walk.up(tree, &mut slots, &up);
     // Downward: append the solution of the rows below, solve, and send each child its rows.
-    let down = |s: usize, own: &mut &mut [[T; K]], below: Option<Vec<[T; K]>>| {
-        let mut front = own.to_vec();
+    let down = |s: usize, pivots: &mut &mut [[T; K]], below: Option<Vec<[T; K]>>| {
+        let mut front = pivots.to_vec();
         front.extend(below.unwrap_or_default());
         backward(s, &mut front);
-        own.copy_from_slice(&front[..own.len()]);
+        pivots.copy_from_slice(&front[..pivots.len()]);
         let message = |c: u32| {
             let places = tree.places(c as usize);
             let mut rows = Vec::with_capacity(places.len() * block);

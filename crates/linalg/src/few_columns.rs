@@ -239,8 +239,9 @@ impl Tiled for Combination<'_> {
             std::array::from_fn(|q| std::array::from_fn(|c| self.alpha * self.h[(first + q, column + c)]));
         let ahead = ahead(self.v, first, V);
         let v = columns_of::<V>(self.v, first, rows);
-        let mut own = self.w.rb_mut().subcols_mut(column, W).col_iter_mut();
-        let w = [(); W].map(|()| &mut contiguous_mut(own.next().expect("so many columns"))[rows.clone()]);
+        let mut columns_of_tile = self.w.rb_mut().subcols_mut(column, W).col_iter_mut();
+        let w = [(); W]
+            .map(|()| &mut contiguous_mut(columns_of_tile.next().expect("so many columns"))[rows.clone()]);
         add_multiples::<S, V, W>(simd, w, v, &factors, ahead);
     }
 }

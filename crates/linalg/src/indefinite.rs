@@ -156,11 +156,11 @@ fn forward<T: Real, const K: usize>(
 ) {
     for (p, block) in blocks.iter().enumerate() {
         let (first, width) = (p * PANEL_COLUMNS, columns.panel_width(p));
-        let (own, below) = values[first..].split_at_mut(width);
-        let mut y: Vec<[f64; K]> = block.order.iter().map(|&row| own[row]).collect();
+        let (pivots, below) = values[first..].split_at_mut(width);
+        let mut y: Vec<[f64; K]> = block.order.iter().map(|&row| pivots[row]).collect();
         let (triangle, l) = columns.panels[p].split_at(width * width);
         solve_lower(T::all_wide(triangle, &mut Vec::new()), &mut y);
-        own.copy_from_slice(&y);
+        pivots.copy_from_slice(&y);
         let piece = |l: &[T], below: &mut [[f64; K]]| {
             for_rows(l, width, below.chunks_mut(ROWS_CONVERTED_TOGETHER), |l, below| {
                 subtract_product(l, &y, below)
@@ -182,9 +182,9 @@ fn backward<T: Real, const K: usize>(
 ) {
     for (p, block) in blocks.iter().enumerate().rev() {
         let (first, width) = (p * PANEL_COLUMNS, columns.panel_width(p));
-        let (own, below) = values[first..].split_at_mut(width);
+        let (pivots, below) = values[first..].split_at_mut(width);
         // Blocks of B: y <- B^-1 y, one column at a time.
-        let mut y = own.to_vec();
+        let mut y = pivots.to_vec();
         let mut column = vec![0.0; width];
         for k in 0..K {
             column.iter_mut().zip(&y).for_each(|(to, from)| *to = from[k]);
@@ -216,7 +216,7 @@ fn backward<T: Real, const K: usize>(
         // Unit triangle of the panel: L' x = y, then back from the order of the pivots.
         solve_transposed(T::all_wide(triangle, &mut Vec::new()), &mut y);
         for (&row, x) in block.order.iter().zip(&y) {
-            own[row] = *x;
+            pivots[row] = *x;
         }
     }
 }

@@ -88,9 +88,9 @@ pub(super) fn eliminate_front<T: Real>(
     }
     let width = columns.width();
     let blocks = eliminate(&mut columns, &mut rest, &mut growth);
-    let own = largest(growth[..width].iter().copied());
+    let pivot_growth = largest(growth[..width].iter().copied());
     let handed_on = Contribution { schur: rest, growth: growth.split_off(width) };
-    (Eliminated { columns, blocks, growth: own }, handed_on)
+    (Eliminated { columns, blocks, growth: pivot_growth }, handed_on)
 }
 
 impl Inertia {
@@ -139,11 +139,11 @@ fn eliminate<T: Real>(
         subtract_eliminated(&mut panel, width, &left, &right);
         let (square, below) = panel.split_at_mut(width * width);
         let blocks = Blocks::new(MatRef::from_row_major_slice(&*square, width, width));
-        let (own, later) = growth[first..].split_at_mut(width);
+        let (in_block, later) = growth[first..].split_at_mut(width);
         blocks.divide_below(below, &mut scaled.panels[p][width * width..], later);
         for (i, &place) in blocks.order.iter().enumerate() {
             let row: Vec<T> = blocks.row(i).collect();
-            own[place] += blocks.growth(&row);
+            in_block[place] += blocks.growth(&row);
         }
         pivots.panels[p] = panel;
         squares.push(blocks);

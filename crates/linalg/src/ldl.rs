@@ -242,12 +242,12 @@ impl<'a, T: Scalar> RowByRow<'a, T> {
         let diagonal = std::mem::replace(&mut sums[k], T::ZERO);
         let mut pivot = diagonal;
         for &i in reach.iter().rev() {
-            let own = std::mem::replace(&mut sums[i], T::ZERO);
+            let sum = std::mem::replace(&mut sums[i], T::ZERO);
             for at in structure.col_ptr[i]..end[i] {
-                sums[row_idx[at] as usize] -= values[at] * own;
+                sums[row_idx[at] as usize] -= values[at] * sum;
             }
-            let entry = own / pivots[i];
-            pivot -= entry * own;
+            let entry = sum / pivots[i];
+            pivot -= entry * sum;
             (row_idx[end[i]], values[end[i]]) = (k as u32, entry);
             end[i] += 1;
         }

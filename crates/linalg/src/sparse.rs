@@ -260,7 +260,7 @@ impl CscMatrix {
         if self.values.iter().all(|value| *value != 0.0) {
             return;
         }
-        let (row_idx, values) = (self.row_idx.own(), self.values.own());
+        let (row_idx, values) = (self.row_idx.to_mut(), self.values.to_mut());
         let (mut from, mut to) = (0, 0);
         for j in 0..self.n_cols {
             let end = self.col_ptr[j + 1];
@@ -310,7 +310,7 @@ impl SymmetricMatrix {
                     return Self::symmetrised_by_transpose(&matrix);
                 }
                 cursor[i] += 1;
-                let values = matrix.values.own();
+                let values = matrix.values.to_mut();
                 let mean = 0.5 * (values[at] + values[mirrored]);
                 (values[at], values[mirrored]) = (mean, mean);
             }
@@ -408,7 +408,7 @@ impl SymmetricMatrix {
     pub fn scaled(&self, diagonal: &[f64]) -> Self {
         assert_eq!(diagonal.len(), self.n(), "one factor per row");
         let mut matrix = self.0.clone();
-        let values = matrix.values.own();
+        let values = matrix.values.to_mut();
         for j in 0..self.n() {
             let range = self.0.col_ptr[j]..self.0.col_ptr[j + 1];
             for (&i, v) in self.0.row_idx[range.clone()].iter().zip(&mut values[range]) {
@@ -423,7 +423,7 @@ impl SymmetricMatrix {
     /// not stored.
     pub fn with_diagonal(&self, f: impl Fn(usize, f64) -> f64) -> Option<Self> {
         let mut matrix = self.clone();
-        let values = matrix.0.values.own();
+        let values = matrix.0.values.to_mut();
         for i in 0..self.n() {
             let at = self.0.col_ptr[i] + self.row(i).0.binary_search(&(i as u32)).ok()?;
             values[at] = f(i, self.0.values[at]);

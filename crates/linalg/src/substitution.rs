@@ -200,15 +200,15 @@ impl<T: Real, S: Simd, const N: usize> Kernels<T, S, N> {
         let width = x.len();
         let l = &l[base * width..];
         let (open, rest) = x.split_at_mut(base);
-        let Some(own) = rest.first_chunk_mut::<R>() else { return };
+        let Some(block) = rest.first_chunk_mut::<R>() else { return };
         for i in (0..R).rev() {
-            self.divide(&mut own[i], l[i * width + base + i]);
-            let solved = own[i];
+            self.divide(&mut block[i], l[i * width + base + i]);
+            let solved = block[i];
             for j in 0..i {
-                self.add_multiple(&mut own[j], -l[i * width + base + j], &solved);
+                self.add_multiple(&mut block[j], -l[i * width + base + j], &solved);
             }
         }
-        self.subtract_rows(l, width, own, open);
+        self.subtract_rows(l, width, block, open);
     }
 
     #[inline(always)]

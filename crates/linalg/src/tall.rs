@@ -26,9 +26,9 @@ pub struct Tall {
 impl Tall {
     /// Creates a block of zeros.
     pub fn zeros(rows: usize, columns: usize) -> Self {
-        let mut own = Self::with_capacity(rows, columns);
-        own.add_zeros(columns);
-        own
+        let mut block = Self::with_capacity(rows, columns);
+        block.add_zeros(columns);
+        block
     }
 
     /// Creates a block without columns, with memory reserved for `columns`.
@@ -38,9 +38,9 @@ impl Tall {
 
     /// Returns a copy, made by all threads.
     pub fn copied(x: MatRef<'_, f64>) -> Self {
-        let mut own = Self::with_capacity(x.nrows(), x.ncols());
-        own.push(x);
-        own
+        let mut block = Self::with_capacity(x.nrows(), x.ncols());
+        block.push(x);
+        block
     }
 
     /// Appends columns, copied by all threads.
@@ -119,20 +119,20 @@ impl Tall {
 /// memory at the first access, which takes longer than most computations with the block.
 #[allow(unsafe_code)]
 pub fn zeros(rows: usize, columns: usize) -> Mat<f64> {
-    let mut own = Mat::<f64>::with_capacity(rows, columns);
-    let stride = own.col_stride().unsigned_abs();
+    let mut block = Mat::<f64>::with_capacity(rows, columns);
+    let stride = block.col_stride().unsigned_abs();
     // SAFETY: faer reserves `stride` numbers for each of the requested columns, and no other reference to them exists;
     // uninitialised numbers are accessed as `MaybeUninit`.
     let spare = unsafe {
-        std::slice::from_raw_parts_mut(own.as_ptr_mut().cast::<MaybeUninit<f64>>(), stride * columns)
+        std::slice::from_raw_parts_mut(block.as_ptr_mut().cast::<MaybeUninit<f64>>(), stride * columns)
     };
     spare
         .par_chunks_mut(ROWS_PER_PARTIAL_PRODUCT)
         .with_min_len(MIN_PIECES_PER_TASK)
         .for_each(|part| part.fill(MaybeUninit::new(0.0)));
     // SAFETY: all numbers have been written.
-    unsafe { own.set_dims(rows, columns) };
-    own
+    unsafe { block.set_dims(rows, columns) };
+    block
 }
 
 /// Returns a copy, made by all threads.
@@ -305,10 +305,10 @@ pub fn side_by_side(blocks: &[MatRef<'_, f64>]) -> Mat<f64> {
     let n = blocks.first().map_or(0, |block| block.nrows());
     assert!(blocks.iter().all(|block| block.nrows() == n), "rows of blocks side by side");
     let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
-    let mut own = zeros(n, columns.len());
-    let pairs: Vec<_> = own.col_iter_mut().zip(columns).collect();
+    let mut joined = zeros(n, columns.len());
+    let pairs: Vec<_> = joined.col_iter_mut().zip(columns).collect();
     pairs.into_par_iter().for_each(|(mut to, from)| to.copy_from(from));
-    own
+    joined
 }
 
 fn add_product(w: MatMut<'_, f64>, accum: Accum, v: MatRef<'_, f64>, h: MatRef<'_, f64>, alpha: f64) {
@@ -395,8 +395,8 @@ mod tests {
     #[test]
     fn blocks_of_any_shape_are_zeros_and_copies() {
         for (rows, columns) in [(0, 0), (0, 3), (5, 0), (1, 1), (7, 3), (ROWS_PER_PARTIAL_PRODUCT + 3, 5)] {
-            let own = zeros(rows, columns);
-            assert_eq!(own, Mat::<f64>::zeros(rows, columns), "{rows} {columns}");
+            let block = zeros(rows, columns);
+            assert_eq!(block, Mat::<f64>::zeros(rows, columns), "{rows} {columns}");
             let given = Mat::from_fn(rows, columns, |i, j| (i + 10 * j) as f64);
             assert_eq!(copied(given.as_ref()), given);
             // Copied by columns and by rows.

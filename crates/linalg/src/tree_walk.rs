@@ -112,15 +112,15 @@ fn split<'a, 'b, S>(segment: &'a Segment, slots: &'b mut [S]) -> Vec<(&'a Segmen
     let mut parts = Vec::with_capacity(segment.branches.len());
     for branch in &segment.branches {
         let (_, tail) = rest.split_at_mut(branch.supernodes.start - at);
-        let (own, tail) = tail.split_at_mut(branch.supernodes.len());
-        parts.push((branch, own));
+        let (of_branch, tail) = tail.split_at_mut(branch.supernodes.len());
+        parts.push((branch, of_branch));
         (rest, at) = (tail, branch.supernodes.end);
     }
     parts
 }
 
 /// Returns the supernodes of a segment outside its branches, ascending.
-fn own(segment: &Segment) -> impl DoubleEndedIterator<Item = usize> {
+fn supernodes_of(segment: &Segment) -> impl DoubleEndedIterator<Item = usize> {
     let ends = segment.branches.iter().map(|b| b.supernodes.end);
     let starts = segment.branches.iter().map(|b| b.supernodes.start).chain([segment.supernodes.end]);
     let begins: Vec<usize> = std::iter::once(segment.supernodes.start).chain(ends).collect();
@@ -142,7 +142,7 @@ fn peak(
     let mut beyond: Vec<usize> = branches.iter().map(|b| b.0 - b.1).collect();
     beyond.sort_unstable();
     let mut most = held + beyond.iter().rev().take(threads).sum::<usize>();
-    for s in own(segment) {
+    for s in supernodes_of(segment) {
         let Needs { retained, handed_on, in_work } = needs(s);
         held += retained + handed_on;
         most = most.max(held + in_work);
@@ -170,7 +170,7 @@ fn up<S: Send, U: Send, E: Send>(
             pending[s - start] = Some(value);
         }
     }
-    for s in own(segment) {
+    for s in supernodes_of(segment) {
         let children = tree.children(s).iter();
         let below =
             children.map(|&c| pending[c as usize - start].take().expect("children come first")).collect();
@@ -192,7 +192,7 @@ fn down<S: Send, D: Send>(
     for (s, message) in messages {
         pending[s - start] = Some(message);
     }
-    for s in own(segment).rev() {
+    for s in supernodes_of(segment).rev() {
         let message = pending[s - start].take();
         let below = visit(s, &mut slots[s - start], message);
         for (&c, message) in tree.children(s).iter().zip(below) {

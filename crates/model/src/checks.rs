@@ -134,8 +134,9 @@ fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Res
         found.push(diagnostic.in_file(&body.raw.stiffness.path));
     }
     let written = body.raw.stiffness.digits;
-    let limits = (rounding(written, 1).max(1e-9), rounding(written, 3).max(1e-6));
-    let rigid_residual = check_rigid_motion(body, limits, found);
+    let rounded = rounding(written, 1).max(1e-9);
+    let limit = rounding(written, 3).max(1e-6);
+    let rigid_residual = check_rigid_motion(body, rounded, limit, found);
     check_rigid_damping(body, found);
     found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
     Ok(rigid_residual)

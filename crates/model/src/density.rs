@@ -98,7 +98,7 @@ fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Option<f64> {
     let Assembled { nodes, rows, stiffness, .. } = body;
     let coupled = |i: usize| neighbours(stiffness, rows, i, |_, _, value| value != 0.0);
     let n = nodes.len();
-    let turns = |i: u32| rows.rotations().binary_search_by_key(&i, |&(own, _)| own).is_ok();
+    let turns = |i: u32| rows.rotations().binary_search_by_key(&i, |&(row, _)| row).is_ok();
     let mut near = coupled(node);
     near.retain(|&j| (j as usize) < n);
     // Nodes with rotations, bars and crowded nodes are not evaluated.

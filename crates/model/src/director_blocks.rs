@@ -150,7 +150,7 @@ impl<'a> Blocks<'a> {
         };
         let mut blocks: Vec<(usize, Block)> = Vec::new();
         for row in self.rows.of_vertex(p) {
-            let own = local(row);
+            let local_row = local(row);
             let (columns, values) = self.m.row(row);
             let mut at = 0;
             for (&column, &value) in columns.iter().zip(values) {
@@ -166,7 +166,7 @@ impl<'a> Blocks<'a> {
                         }
                     },
                 };
-                blocks[at].1[own][local(column as usize)] = value;
+                blocks[at].1[local_row][local(column as usize)] = value;
             }
         }
         blocks

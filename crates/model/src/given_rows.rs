@@ -38,7 +38,7 @@ impl RowMap {
     /// # Panics
     /// If the shapes of `follows` and `picks` differ.
     pub fn new(follows: CscMatrix, picks: CscMatrix, kept: Vec<u32>) -> Self {
-        let shape = |own: &CscMatrix| (own.n_rows(), own.n_cols());
+        let shape = |matrix: &CscMatrix| (matrix.n_rows(), matrix.n_cols());
         assert_eq!(shape(&follows), shape(&picks), "shapes of a map of rows");
         Self { follows, picks, kept }
     }
@@ -68,9 +68,9 @@ impl RowMap {
         let all = CscMatrix::from_triplets(n, n, &entries);
         let lost = (0..n).find(|&column| {
             let (rows, values) = all.column(column);
-            let own = self.place(column as u32);
+            let target = self.place(column as u32);
             let is_lost = |row: u32, value: f64| {
-                (own.is_none() || self.place(row).is_none()) && value.abs() > MAX_FOREIGN_ENTRY * largest
+                (target.is_none() || self.place(row).is_none()) && value.abs() > MAX_FOREIGN_ENTRY * largest
             };
             rows.iter().zip(values).any(|(row, value)| is_lost(*row, *value))
         });
@@ -173,7 +173,9 @@ impl GivenRows {
     /// The number of a node with some but not all three of its displacements, or of its rotations.
     pub fn turn(&self, labels: &[DofLabel], columns: &mut Mat<f64>) -> Result<(), i64> {
         let mut vectors: BTreeMap<(i64, bool), [Option<usize>; 3]> = BTreeMap::new();
-        for (row, label) in labels.iter().enumerate().filter(|(_, own)| self.axes.contains_key(&own.node)) {
+        for (row, label) in
+            labels.iter().enumerate().filter(|(_, label_of_row)| self.axes.contains_key(&label_of_row.node))
+        {
             let vector = vectors.entry((label.node, label.direction > 3)).or_default();
             vector[usize::from(label.direction - 1) % 3] = Some(row);
         }
@@ -181,9 +183,9 @@ impl GivenRows {
             let [Some(x), Some(y), Some(z)] = rows else { return Err(node) };
             let (axes, rows) = (self.axes[&node], [x, y, z]);
             for j in 0..columns.ncols() {
-                let own = rows.map(|row| columns[(row, j)]);
+                let local = rows.map(|row| columns[(row, j)]);
                 for (k, row) in rows.into_iter().enumerate() {
-                    columns[(row, j)] = (0..3).map(|axis| axes[axis][k] * own[axis]).sum();
+                    columns[(row, j)] = (0..3).map(|axis| axes[axis][k] * local[axis]).sum();
                 }
             }
         }

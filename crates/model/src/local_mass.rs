@@ -77,9 +77,9 @@ impl LocalMass {
                 dilation -= 0.5 * sum;
             }
             let (columns, values) = scalar_mass.row(i);
-            let own = columns.iter().zip(values).take_while(|(j, _)| (**j as usize) < n);
+            let entries = columns.iter().zip(values).take_while(|(j, _)| (**j as usize) < n);
             let (mut mass, mut diagonal) = (0.0, 0.0);
-            for (&j, &value) in own {
+            for (&j, &value) in entries {
                 mass += value;
                 if j as usize == i {
                     diagonal = value;
@@ -199,14 +199,16 @@ pub(super) fn check_speed(
         );
         let fitting = units_of_speed(speeds.median).join(", or in ");
         let unstated = !units.stated && !body.raw.allow_implausible && !fitting.is_empty();
-        found.push(if unstated && !found.iter().any(|own| own.code() == Code::DensityImplausible) {
-            Diagnostic::new(
-                Code::DensityImplausible,
-                format!("{message}, with numbers in m, kg, s, assumed since no units are given"),
-            )
-            .with_help(state_units(&fitting))
-        } else {
-            Diagnostic::new(Code::SpeedImplausible, message)
-        });
+        found.push(
+            if unstated && !found.iter().any(|diagnostic| diagnostic.code() == Code::DensityImplausible) {
+                Diagnostic::new(
+                    Code::DensityImplausible,
+                    format!("{message}, with numbers in m, kg, s, assumed since no units are given"),
+                )
+                .with_help(state_units(&fitting))
+            } else {
+                Diagnostic::new(Code::SpeedImplausible, message)
+            },
+        );
     }
 }

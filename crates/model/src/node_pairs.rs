@@ -29,7 +29,7 @@ impl MassPairs {
     /// Finds all pairs in matrices in the internal order.
     pub(crate) fn new(stiffness: &SymmetricMatrix, mass: &SymmetricMatrix, rows: &Rows) -> Self {
         let diagonal = mass.diagonal();
-        let own = |first: usize| {
+        let pairs_of_chunk = |first: usize| {
             let mut part = Self::default();
             for vertex in first..(first + VERTICES_PER_TASK).min(rows.vertices()) {
                 let mut coupled = by_mass(mass, &diagonal, rows, vertex);
@@ -46,7 +46,7 @@ impl MassPairs {
         };
         let starts = (0..rows.vertices()).into_par_iter().step_by(VERTICES_PER_TASK);
         let mut all = Self::default();
-        for part in starts.map(own).collect::<Vec<_>>() {
+        for part in starts.map(pairs_of_chunk).collect::<Vec<_>>() {
             all.count += part.count;
             all.foreign.extend(part.foreign);
         }
@@ -141,25 +141,25 @@ fn are_mass_elements(mass: &SymmetricMatrix, rows: &Rows, count: usize, foreign:
         if seen.contains_key(&first) {
             continue;
         }
-        let mut own = vec![first];
+        let mut clique = vec![first];
         seen.insert(first, group);
         let mut at = 0;
-        while at < own.len() {
-            for &other in &pairs_of[&own[at]] {
+        while at < clique.len() {
+            for &other in &pairs_of[&clique[at]] {
                 if seen.insert(other, group).is_none() {
-                    own.push(other);
+                    clique.push(other);
                 }
             }
             at += 1;
         }
-        let pairs = own.iter().map(|vertex| pairs_of[vertex].len()).sum::<usize>() / 2;
+        let pairs = clique.iter().map(|vertex| pairs_of[vertex].len()).sum::<usize>() / 2;
         let single = pairs == 1 && foreign.len() > 1;
-        let star = pairs > 1 && own.iter().any(|vertex| pairs_of[vertex].len() == pairs);
+        let star = pairs > 1 && clique.iter().any(|vertex| pairs_of[vertex].len() == pairs);
         let complete = |&vertex: &u32| {
             let coupled = by_mass(mass, &diagonal, rows, vertex as usize);
-            coupled.iter().filter(|other| seen.get(other) == Some(&group)).count() == own.len() - 1
+            coupled.iter().filter(|other| seen.get(other) == Some(&group)).count() == clique.len() - 1
         };
-        if single || star || !own.iter().all(complete) {
+        if single || star || !clique.iter().all(complete) {
             return false;
         }
     }
@@ -226,11 +226,12 @@ fn fits(body: &Assembled, row_of: &[usize], to: &dyn Fn(usize) -> usize) -> bool
     let place: Vec<usize> = row_of.iter().map(|&row| rows.vertex(to(row))).collect();
     let mut tied: HashMap<usize, Vec<u32>> = HashMap::new();
     (0..rows.len()).all(|row| {
-        let own = place[row];
-        let near = tied.entry(own).or_insert_with(|| neighbours(stiffness, rows, own, |_, _, v| v != 0.0));
+        let target = place[row];
+        let near =
+            tied.entry(target).or_insert_with(|| neighbours(stiffness, rows, target, |_, _, v| v != 0.0));
         mass.row(row).0.iter().all(|&column| {
             let other = place[column as usize];
-            other == own || near.binary_search(&(other as u32)).is_ok()
+            other == target || near.binary_search(&(other as u32)).is_ok()
         })
     })
 }

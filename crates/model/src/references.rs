@@ -37,7 +37,7 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
         }
         let places = |ids: &[i64]| ids.iter().filter_map(|id| index.get(id)).copied().collect::<Vec<u32>>();
         let nodes = places(&set.nodes);
-        let own: Vec<[f64; 3]> = nodes.iter().map(|&node| positions[node as usize]).collect();
+        let member_positions: Vec<[f64; 3]> = nodes.iter().map(|&node| positions[node as usize]).collect();
         match set.reference {
             Reference::Node(id) => match index.get(&id) {
                 Some(&node) => set.reference = Reference::Point(positions[node as usize]),
@@ -52,14 +52,14 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
                 outline.dedup();
                 let members = InterfaceNodes { nodes: &nodes, outline: &outline, positions };
                 let centre = InterfaceCentre::new(&members, raw.mesh.as_ref(), &set.reference);
-                found.extend(beside_the_mean(&set.name, &centre, &own, body.size));
+                found.extend(beside_the_mean(&set.name, &centre, &member_positions, body.size));
                 set.reference = Reference::Default(centre.point);
             }
             _ => {}
         }
         if let Some(x) = set.reference.point() {
             let problem = impossible(&set.name, x, raw.dimension, &body);
-            found.extend(problem.or_else(|| far_reference(&set.name, x, &own, body.size)));
+            found.extend(problem.or_else(|| far_reference(&set.name, x, &member_positions, body.size)));
         }
     }
 }

@@ -9,11 +9,12 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{Pencil, gram, largest};
 
 /// Returns max |K R|_i / sum_j |K_ij| over the rows. Adds an error if rigid motion strains the body, above
-/// the second limit: node tables with few digits leave up to 1e-6, supports 0.01 to 1. Above the first
-/// limit a note reports the accuracy of the positions, since the invariants have no more digits.
+/// `limit`: node tables with few digits leave up to 1e-6, supports 0.01 to 1. Above `rounded` a note
+/// reports the accuracy of the positions, since the invariants have no more digits.
 pub(super) fn check_rigid_motion(
     body: &Assembled,
-    (rounded, limit): (f64, f64),
+    rounded: f64,
+    limit: f64,
     found: &mut Vec<Diagnostic>,
 ) -> f64 {
     let Assembled { raw, nodes, rows, stiffness, .. } = body;

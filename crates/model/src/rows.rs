@@ -99,7 +99,7 @@ impl Rows {
     /// Returns the rows of a [`vertex`](Self::vertex), ascending.
     pub(super) fn of_vertex(&self, vertex: usize) -> impl Iterator<Item = usize> {
         let (after, d) = (self.displacements(), self.dimension);
-        let up_to = |node: usize| after + self.rotations.partition_point(|&(own, _)| (own as usize) < node);
+        let up_to = |node: usize| after + self.rotations.partition_point(|&(row, _)| (row as usize) < node);
         let (first, second) = match vertex.checked_sub(self.nodes + self.vectors.len()) {
             Some(other) => {
                 (after + self.rotations.len() + other..after + self.rotations.len() + other + 1, 0..0)
@@ -172,12 +172,12 @@ impl Rows {
         let mut number = vec![usize::MAX; root.len()];
         let mut count = 0;
         let numbered = |&c: &usize| {
-            let own = &mut number[find(&root, c)];
-            if *own == usize::MAX {
-                *own = count;
+            let component = &mut number[find(&root, c)];
+            if *component == usize::MAX {
+                *component = count;
                 count += 1;
             }
-            *own
+            *component
         };
         first.iter().map(numbered).collect()
     }

@@ -31,7 +31,7 @@ pub(super) fn recover(stiffness: &SymmetricMatrix, rows: &mut Rows, nodes: &Node
     let (centre, length) = centre_and_length(&nodes.positions);
     let known = rows.rigid_fields(&nodes.positions, centre, length);
     let count = rigid_count(rows.dimension);
-    let own = Restricted::new(stiffness, &placeless);
+    let restricted = Restricted::new(stiffness, &placeless);
     let mut fields = Mat::zeros(placeless.len(), count);
     for (to, &row) in placeless.iter().enumerate() {
         let (columns, values) = stiffness.row(row);
@@ -42,7 +42,7 @@ pub(super) fn recover(stiffness: &SymmetricMatrix, rows: &mut Rows, nodes: &Node
             }
         }
     }
-    own.solve(&mut fields).map_err(|free| {
+    restricted.solve(&mut fields).map_err(|free| {
         let labels: Vec<DofLabel> = free.iter().map(|&i| rows.label(nodes, placeless[i])).collect();
         let message = format!("stiffness does not hold rows without coordinates: {}", name_some(&labels));
         Diagnostic::new(Code::RowsUnheld, message)
@@ -120,10 +120,10 @@ struct Restricted {
 impl Restricted {
     fn new(stiffness: &SymmetricMatrix, rows: &[usize]) -> Self {
         let n = rows.len();
-        let own = stiffness.principal(rows);
+        let block = stiffness.principal(rows);
         let inverse_root = |d: f64| if d > 0.0 { d.sqrt().recip() } else { 0.0 };
-        let scale: Vec<f64> = own.diagonal().into_iter().map(inverse_root).collect();
-        let matrix = own.scaled(&scale);
+        let scale: Vec<f64> = block.diagonal().into_iter().map(inverse_root).collect();
+        let matrix = block.scaled(&scale);
         let unit: Vec<(u32, u32, f64)> = (0..n as u32).map(|i| (i, i, 1.0)).collect();
         let one = SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &unit)).expect("diagonal");
         Self { matrix, one, scale }

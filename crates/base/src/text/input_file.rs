@@ -189,8 +189,8 @@ impl InputFile {
 
     /// Returns the diagnostic of an error of reading this file.
     pub fn failed(&self, error: &std::io::Error) -> Diagnostic {
-        let own = || Diagnostic::new(Code::FileUnreadable, reason(error)).in_file(&self.path);
-        reading_error(error).unwrap_or_else(own)
+        let other_failure = || Diagnostic::new(Code::FileUnreadable, reason(error)).in_file(&self.path);
+        reading_error(error).unwrap_or_else(other_failure)
     }
 }
 

@@ -271,8 +271,8 @@ impl<'f> Layout<'f> {
             return Err((message, format!("give its number, 1 to {}", self.fields)));
         }
         // The whole name first, then the name without its unit: "Fx [N]" is found by "Fx".
-        let whole = |own: &[u8]| own == name;
-        let without_unit = |own: &[u8]| before_unit(own) == name;
+        let whole = |column: &[u8]| column == name;
+        let without_unit = |column: &[u8]| before_unit(column) == name;
         for matches in [&whole as &dyn Fn(&[u8]) -> bool, &without_unit] {
             let places: Vec<usize> = (0..self.names.len()).filter(|&at| matches(self.names[at])).collect();
             match places[..] {
@@ -291,10 +291,10 @@ impl<'f> Layout<'f> {
     /// Returns a help with the most similar name, and all names.
     fn nearest(&self, name: &[u8]) -> String {
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).to_lowercase();
-        let distance = |own: &&&[u8]| strsim::damerau_levenshtein(&text(name), &text(before_unit(own)));
-        let near = |own: &&&[u8]| distance(own) <= 2 && distance(own) < before_unit(own).len();
+        let distance = |column: &&&[u8]| strsim::damerau_levenshtein(&text(name), &text(before_unit(column)));
+        let near = |column: &&&[u8]| distance(column) <= 2 && distance(column) < before_unit(column).len();
         match self.names.iter().filter(near).min_by_key(distance) {
-            Some(own) => format!("did you mean `{}`? {}", printable(own), self.all()),
+            Some(column) => format!("did you mean `{}`? {}", printable(column), self.all()),
             None => self.all(),
         }
     }

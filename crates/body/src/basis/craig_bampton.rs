@@ -164,10 +164,11 @@ impl<'a> Parts<'a> {
             order: None,
         };
         let in_model = |failure| failed(expanded(failure, &elimination));
-        let own = reduced.bytes();
-        let left = Context { memory: context.memory.map(|bytes| bytes.saturating_sub(own)), ..*context };
+        let reduced_bytes = reduced.bytes();
+        let left =
+            Context { memory: context.memory.map(|bytes| bytes.saturating_sub(reduced_bytes)), ..*context };
         let mut fixed = fixed_modes(&problem, settings, &left).map_err(in_model)?;
-        fixed.plan = fixed.plan.map(|plan| plan.with_bytes(|search| search + own));
+        fixed.plan = fixed.plan.map(|plan| plan.with_bytes(|search| search + reduced_bytes));
         context.phase("constraint modes");
         let lowest = fixed.eigenvalues.first().copied().or(fixed.next_eigenvalue).unwrap_or(first_estimate);
         let precision = fixed.plan.as_ref().map_or(Precision::Double, Plan::precision);

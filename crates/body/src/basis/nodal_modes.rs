@@ -91,13 +91,13 @@ fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &Raw
     let whole = model.pencil();
     let stiffness = whole.stiffness().principal(missing);
     let mass = principal_mass(&whole, missing);
-    let own = Pencil::new(&stiffness, &mass, 1);
+    let pencil = Pencil::new(&stiffness, &mass, 1);
     let refuse = |why: &str| {
         let message = format!("the file has no values for rows of {}, and {why}", some_nodes(model, missing));
         let help = "write the modes of all nodes, with their rotations where the model has them";
         Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path).with_help(help)
     };
-    let analysis = Analysis::new(&own)
+    let analysis = Analysis::new(&pencil)
         .ok_or_else(|| refuse("there are too many to compute them from the other rows"))?;
     for (mode, eigenvalue) in raw.eigenvalues.iter().enumerate() {
         let lambda = eigenvalue.unwrap_or(0.0).max(0.0);
@@ -105,7 +105,7 @@ fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &Raw
         let (elastic, inertial) = (whole.apply_stiffness(shape), whole.apply_mass(shape));
         let force = |i: usize, _| lambda * inertial[(missing[i], 0)] - elastic[(missing[i], 0)];
         let mut values = Mat::from_fn(missing.len(), 1, force);
-        let factor = Indefinite::<f64>::new(&analysis, &own, lambda);
+        let factor = Indefinite::<f64>::new(&analysis, &pencil, lambda);
         let inertia = factor.inertia();
         if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > MAX_BACKWARD_ERROR
         {
@@ -186,13 +186,16 @@ impl StatedModes {
         let worst = different.first()?;
         let hertz = |eigenvalue: f64| model.units().frequency_of(eigenvalue.max(0.0));
         let said = |one: &Difference| {
-            let (stated, own) = (hertz(one.stated), hertz(one.rayleigh));
+            let (stated, computed) = (hertz(one.stated), hertz(one.rayleigh));
             let assurance = if one.assurance < MIN_FREQUENCY_SHARE {
                 format!(", MAC {:.2}", one.assurance)
             } else {
                 String::new()
             };
-            format!("mode {} has {stated:.6} Hz in the file, {own:.6} Hz by K and M{assurance}", one.mode + 1)
+            format!(
+                "mode {} has {stated:.6} Hz in the file, {computed:.6} Hz by K and M{assurance}",
+                one.mode + 1
+            )
         };
         let named: Vec<String> = different.iter().take(MAX_NAMED_MODES).map(said).collect();
         let more = if different.len() > MAX_NAMED_MODES { "; ..." } else { "" };

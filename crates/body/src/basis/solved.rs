@@ -104,7 +104,7 @@ impl SolvedModes {
 
     /// Returns the completeness by the built-in count if it was made, otherwise by the count of the solver,
     /// whose name then appears.
-    fn completeness(&self, model: &FeModel, rigid: usize, own: Completeness) -> Result<Completeness> {
+    fn completeness(&self, model: &FeModel, rigid: usize, stated: Completeness) -> Result<Completeness> {
         let missing = |message: String| {
             let found = Diagnostic::new(Code::CompletenessFailed, message);
             Err(Error::from(
@@ -112,14 +112,14 @@ impl SolvedModes {
             ))
         };
         if self.prove {
-            return match (own.proof, own.negative_pivots) {
-                (Proof::NotProved, Some(_)) => missing(own.remark),
-                _ => Ok(own),
+            return match (stated.proof, stated.negative_pivots) {
+                (Proof::NotProved, Some(_)) => missing(stated.remark),
+                _ => Ok(stated),
             };
         }
         let Some(CountElsewhere { negative, zero, shift, by }) = &self.count else {
             let remark = "the solver made no inertia count".to_owned();
-            return Ok(Completeness { proof: Proof::NotProved, negative_pivots: None, remark, ..own });
+            return Ok(Completeness { proof: Proof::NotProved, negative_pivots: None, remark, ..stated });
         };
         let below = self.eigenvalues.iter().filter(|lambda| *lambda < shift).count();
         let hertz = model.units().frequency_of(*shift);

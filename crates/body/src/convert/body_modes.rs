@@ -149,8 +149,8 @@ impl BodyModes {
         frame.rotate_rigid(&mut fields);
         let nothing = NodeMoments { first: Vector3::zeros(), second: nalgebra::Matrix3::zeros() };
         let mut moments = vec![nothing; self.nodes];
-        for (&node, own) in mass.nodes().iter().zip(mass.moments(fields.as_ref(), &frame.axes)) {
-            moments[node as usize] = own;
+        for (&node, moment) in mass.nodes().iter().zip(mass.moments(fields.as_ref(), &frame.axes)) {
+            moments[node as usize] = moment;
         }
         Some(InertiaStiffness::new(moments, rotations.as_ref(), model.dimension()))
     }

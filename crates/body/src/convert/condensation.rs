@@ -67,16 +67,16 @@ impl ModalModel<'_> {
         let (bounds, mass) = (self.found.solution.bounds.as_ref()?, self.model.scalar_mass()?);
         let shapes = self.modes.displacements.as_ref();
         let (positions, axes) = (&self.place.positions, &self.place.frame.axes);
-        let own = condense_certified(mass, positions, shapes, self.model.stiffness(), axes);
+        let certified = condense_certified(mass, positions, shapes, self.model.stiffness(), axes);
         let guarantee = Guarantee {
             shift_below: bounds.shift_below,
             pivots_below: bounds.pivots_below,
             eigenvalue_lower: bounds.lower.clone(),
             eigenvalue_upper: bounds.upper.clone(),
             shape_error: bounds.shape_error.clone(),
-            digits: own.digits,
+            digits: certified.digits,
         };
-        Some((own.invariants, guarantee))
+        Some((certified.invariants, guarantee))
     }
 }
 

@@ -168,9 +168,9 @@ impl ModalModel<'_> {
 
     /// Returns K and M in interface coordinates, in body axes, for bases that have them.
     fn coordinates(&self) -> Option<InterfaceCoordinates> {
-        let own = self.found.coordinates.as_ref()?;
+        let coordinates = self.found.coordinates.as_ref()?;
         let axes = &self.place.frame.axes;
-        Some(own.in_axes(axes, self.model.dimension(), &self.modes.signs))
+        Some(coordinates.in_axes(axes, self.model.dimension(), &self.modes.signs))
     }
 
     /// Returns warnings and notes about the finished body.

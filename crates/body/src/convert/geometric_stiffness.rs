@@ -34,8 +34,8 @@ pub fn modal_geometric_stiffness(
 ) -> Result<Vec<GeometricStiffness<Mat<f64>>>> {
     let mut out: Vec<GeometricStiffness<Mat<f64>>> = Vec::new();
     for GeometricStiffness { load, matrix } in model.geometric_stiffness() {
-        let own = reduced(matrix, vectors);
-        if own.col_iter().any(|column| column.iter().any(|v| v.is_nan() || v.abs() > MAX_ENTRY)) {
+        let reduced_matrix = reduced(matrix, vectors);
+        if reduced_matrix.col_iter().any(|column| column.iter().any(|v| v.is_nan() || v.abs() > MAX_ENTRY)) {
             let message = format!("geometric stiffness for {load} overflows on the modes");
             return Err(Diagnostic::new(Code::MatrixNotFinite, message).into());
         }
@@ -43,7 +43,7 @@ pub fn modal_geometric_stiffness(
             load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING_COSINE);
         for (component, factor) in along {
             let load = UnitLoad { kind: load.kind.clone(), component };
-            let part = &own * Scale(factor);
+            let part = &reduced_matrix * Scale(factor);
             match out.iter_mut().find(|known| known.load == load) {
                 Some(sum) => sum.matrix += part,
                 None => out.push(GeometricStiffness { load, matrix: part }),

@@ -75,11 +75,12 @@ impl Lumping {
 /// Returns the invariants of `masses` on the modes of the body, and their error norms.
 pub(super) fn comparator(modal: &ModalModel<'_>, masses: &LumpedMasses, exact: &Invariants) -> LumpedBody {
     let shapes = modal.modes.of_nodes();
-    let own = lumped_invariants(modal, masses, shapes, exact.modal_stiffness().clone(), exact.groups());
+    let invariants =
+        lumped_invariants(modal, masses, shapes, exact.modal_stiffness().clone(), exact.groups());
     LumpedBody {
         scheme: masses.scheme().name().to_owned(),
-        comparison: error_norms(exact, &own),
-        invariants: own,
+        comparison: error_norms(exact, &invariants),
+        invariants,
         negative_masses: masses.negative(),
     }
 }
@@ -95,8 +96,8 @@ fn lumped_invariants(
 ) -> Invariants {
     let only_about_z = modal.model.dimension() == 2 && modal.model.scalar_mass().is_none();
     let condense = if groups.w2 || groups.w3 { condense_lumped } else { condense_lumped_linear };
-    let own = condense(masses, &modal.place.positions, shapes, modal_stiffness);
-    if only_about_z { own.about_z() } else { own }.with_groups(groups)
+    let invariants = condense(masses, &modal.place.positions, shapes, modal_stiffness);
+    if only_about_z { invariants.about_z() } else { invariants }.with_groups(groups)
 }
 
 /// Computes modes and invariants from the lumped mass, aligned with the exact subspace before the
@@ -118,7 +119,7 @@ pub(super) fn pipeline(
     let cross = gram(modal.modes.vectors.as_ref(), mass_times_modes.as_ref());
     let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..modal.n_modes())));
     let stiffness = reduced(modal.model.stiffness(), modes.vectors.as_ref());
-    let own = lumped_invariants(modal, masses, modes.of_nodes(), stiffness, exact.groups());
+    let invariants = lumped_invariants(modal, masses, modes.of_nodes(), stiffness, exact.groups());
     let exact_modes = &modal.found.solution;
     let cuts = [
         ("model", exact_modes.eigenvalues.last().copied(), exact_modes.next_eigenvalue),
@@ -129,7 +130,7 @@ pub(super) fn pipeline(
         scheme,
         eigenvalues,
         subspace_cosine: alignment.agreement,
-        comparison: error_norms(exact, &own.with_basis(alignment.basis.as_ref())),
+        comparison: error_norms(exact, &invariants.with_basis(alignment.basis.as_ref())),
         remark: String::new(),
     })
 }

@@ -69,7 +69,7 @@ impl<'m> ModalModel<'m> {
         let reduced = if twice { reduced_in_twice_the_precision } else { reduced };
         let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
         let shift = match given_frame {
-            Some(own) => own.origin - mass_properties.centre_of_mass,
+            Some(frame) => frame.origin - mass_properties.centre_of_mass,
             None => Vector3::zeros(),
         };
         let geometric_stiffness =

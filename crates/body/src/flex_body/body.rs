@@ -196,7 +196,7 @@ impl FlexBody {
     /// Returns the stiffness of inertia plus the geometric stiffness for a unit of `load`, to be added to
     /// K_ff. Returns `None` if the body has neither.
     pub fn stiffness_under(&self, load: &UnitLoad) -> Option<Mat<f64>> {
-        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness);
         let all = of_inertia.chain(self.geometric_stiffness()).filter(|one| one.load == *load);
         all.fold(None, |sum: Option<Mat<f64>>, one| match sum {
             None => Some(one.matrix.clone()),
@@ -219,7 +219,7 @@ impl FlexBody {
 
     /// Returns the loads that the body has a [stiffness](FlexBody::stiffness_under) for, each once.
     pub fn stiffening_loads(&self) -> Vec<UnitLoad> {
-        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness);
         let mut loads: Vec<UnitLoad> = Vec::new();
         for one in self.geometric_stiffness().iter().chain(of_inertia) {
             if !loads.contains(&one.load) {

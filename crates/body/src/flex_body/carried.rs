@@ -111,7 +111,9 @@ impl FlexBody {
         parts.geometric_stiffness.retain(|one| matches!(one.load.kind, LoadKind::Named(_)));
         // The nodes turn relative to the carrier, which turns the frame.
         parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
-            (Some(own), Some(rotation)) => Some(own.with_rotations(rotation.as_ref(), parts.dimension)),
+            (Some(inertia), Some(rotation)) => {
+                Some(inertia.with_rotations(rotation.as_ref(), parts.dimension))
+            }
             _ => None,
         };
         Self::new(parts)
@@ -230,8 +232,9 @@ impl FlexBody {
     /// # Errors
     /// The errors FB212 and FB214 of [`FlexBody::carried`].
     fn has_carrier_at_rest(&self, carrier: &Carrier) -> Result<bool> {
-        if let (ReferenceConditions::Interface(own), Carrier::Interface(name)) = (self.conditions(), carrier)
-            && own == name
+        if let (ReferenceConditions::Interface(frame_interface), Carrier::Interface(name)) =
+            (self.conditions(), carrier)
+            && frame_interface == name
         {
             return Ok(true);
         }

@@ -113,7 +113,9 @@ impl FlexBody {
         let invariants = change.invariants(&parts.invariants);
         parts.modes = self.changed_modes(change, &invariants);
         parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
-            (Some(own), Some(rotation)) => Some(own.with_rotations(rotation.as_ref(), parts.dimension)),
+            (Some(inertia), Some(rotation)) => {
+                Some(inertia.with_rotations(rotation.as_ref(), parts.dimension))
+            }
             _ => None,
         };
         let stiffness = |one: &GeometricStiffness<Mat<f64>>| GeometricStiffness {
@@ -121,7 +123,8 @@ impl FlexBody {
             matrix: change.congruent(&one.matrix),
         };
         parts.geometric_stiffness = parts.geometric_stiffness.iter().map(stiffness).collect();
-        parts.lumped = parts.lumped.iter().map(|own| changed_lumped(own, change, &invariants)).collect();
+        parts.lumped =
+            parts.lumped.iter().map(|lumped| changed_lumped(lumped, change, &invariants)).collect();
         parts.certificate = unproved(&parts);
         (parts.invariants, parts.conditions, parts.coordinates) = (invariants, conditions, None);
         Self::new(parts)
@@ -154,23 +157,27 @@ fn impossible(message: String) -> Error {
 }
 
 /// Applies the change of modes to lumped invariants and compares them again.
-fn changed_lumped(own: &LumpedBody, change: &ModalChange, exact: &Invariants) -> LumpedBody {
-    let invariants = change.invariants(&own.invariants);
-    LumpedBody { comparison: error_norms(exact, &invariants), invariants, ..own.clone() }
+fn changed_lumped(lumped: &LumpedBody, change: &ModalChange, exact: &Invariants) -> LumpedBody {
+    let invariants = change.invariants(&lumped.invariants);
+    LumpedBody { comparison: error_norms(exact, &invariants), invariants, ..lumped.clone() }
 }
 
 /// Returns the certificate of a body whose modes are combinations of modes with a proof: the proof does not
 /// carry over.
 fn unproved(parts: &Parts) -> Certificate {
-    let own = &parts.certificate;
+    let certificate = &parts.certificate;
     let about = "combinations of the modes of a body with other reference conditions";
-    let remark = if own.remark.is_empty() { about.to_owned() } else { format!("{about}; {}", own.remark) };
+    let remark = if certificate.remark.is_empty() {
+        about.to_owned()
+    } else {
+        format!("{about}; {}", certificate.remark)
+    };
     Certificate {
         proved_modes: None,
         negative_pivots: None,
         guarantee: None,
         fixed_interface: None,
         remark,
-        ..own.clone()
+        ..certificate.clone()
     }
 }

@@ -31,8 +31,8 @@ impl Parts {
         // A rotation displaces the nodes of the interface by their distances; for a single node the extent
         // of the body counts.
         let places: Vec<[f64; 3]> = interface.nodes.iter().map(|&i| self.nodes.positions[i]).collect();
-        let (extent, own) = (span(&self.nodes.positions), span(&places));
-        let arm = if own > 0.0 { own } else { extent };
+        let (extent, interface_extent) = (span(&self.nodes.positions), span(&places));
+        let arm = if interface_extent > 0.0 { interface_extent } else { extent };
         // Rotations of a single node at rest are zeros, as for nodes without rotations.
         let unknown = if self.modes.rotation.is_some() { 0.0 } else { f64::INFINITY };
         let moved = |j: usize| {
@@ -77,13 +77,13 @@ impl Parts {
             interface_mass(&inertia, &twice(&magnitudes(mass), &magnitudes(of_modes))),
         ];
         if let Some(rigid) = self.rigid_coordinates() {
-            let (expected, own) = (self.rigid_mass(), twice(mass, &rigid));
+            let (expected, found) = (self.rigid_mass(), twice(mass, &rigid));
             let r = rigid.ncols();
             checks.push(IdentityCheck::new(
                 "interface_rigid_mass",
                 "R' M R = [m, -c~; c~, I0]",
                 worst(
-                    &|i, j| (own[(i, j)] - expected[(i, j)]) / (expected[(i, i)] * expected[(j, j)]).sqrt(),
+                    &|i, j| (found[(i, j)] - expected[(i, j)]) / (expected[(i, i)] * expected[(j, j)]).sqrt(),
                     r,
                     r,
                 ),

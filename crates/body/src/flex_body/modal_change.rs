@@ -41,7 +41,9 @@ impl RigidMotions {
         match (self.count, self.modes.len()) {
             (0, _) => None,
             (1, 1) => Some(format!("mode {} is a rigid motion", named(&self.modes))),
-            (count, own) if count == own => Some(format!("modes {} are rigid motions", named(&self.modes))),
+            (count, rigid) if count == rigid => {
+                Some(format!("modes {} are rigid motions", named(&self.modes)))
+            }
             (1, _) => Some("a combination of the modes is a rigid motion".to_owned()),
             (count, 0) => Some(format!("{count} combinations of the modes are rigid motions")),
             (count, _) => Some(format!(
@@ -86,8 +88,8 @@ impl Split {
         let beside = |i: usize, j: usize| {
             modal[(i, j)] - (0..axes.len()).map(|k| whitened[(k, i)] * whitened[(k, j)]).sum::<f64>()
         };
-        let own = |j: usize| beside(j, j) / modal[(j, j)];
-        if let Some(j) = (0..nf).find(|&j| own(j) < -RIGID_REMAINDER) {
+        let remainder = |j: usize| beside(j, j) / modal[(j, j)];
+        if let Some(j) = (0..nf).find(|&j| remainder(j) < -RIGID_REMAINDER) {
             return Err(format!(
                 "mode {} and rigid motion together have negative kinetic energy: mass, coupling and modal mass contradict each other",
                 j + 1
@@ -116,7 +118,7 @@ impl Split {
             left: eigen.values[count..].to_vec(),
             rigid_motions: RigidMotions {
                 count,
-                modes: (0..nf).filter(|&j| own(j) <= RIGID_REMAINDER).collect(),
+                modes: (0..nf).filter(|&j| remainder(j) <= RIGID_REMAINDER).collect(),
             },
         })
     }

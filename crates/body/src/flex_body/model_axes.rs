@@ -79,12 +79,12 @@ impl FlexBody {
     /// Returns the stiffness of inertia about the point `d` and along the columns of `axes`, both in the
     /// body frame; `None` if the body has none.
     pub fn inertia_stiffness_in(&self, d: &Vector3<f64>, axes: &Matrix3<f64>) -> Option<InertiaStiffness> {
-        let (own, rotation) = (self.inertia_stiffness()?, self.modes().rotation.as_ref()?);
+        let (inertia, rotation) = (self.inertia_stiffness()?, self.modes().rotation.as_ref()?);
         if *d == Vector3::zeros() && *axes == Matrix3::identity() {
-            return Some(own.clone());
+            return Some(inertia.clone());
         }
         let rotation = turned(rotation.as_ref(), &axes.transpose(), usize::MAX);
-        Some(own.in_frame(d, axes, rotation.as_ref(), self.dimension()))
+        Some(inertia.in_frame(d, axes, rotation.as_ref(), self.dimension()))
     }
 }
 

@@ -66,14 +66,14 @@ impl FlexBody {
 
     /// Returns the softened part at `omega`, and the most softened motion, scaled to unit stiffness.
     fn softest_motion(&self, omega: &Vector3<f64>) -> Option<(f64, Vec<f64>)> {
-        let own = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
-        let spins = own.filter(|one| one.load.kind == LoadKind::Spin);
+        let inertia = self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness);
+        let spins = inertia.filter(|one| one.load.kind == LoadKind::Spin);
         let of_inertia = spins.fold(None, |sum: Option<Mat<f64>>, one| {
             let (k, l) = LoadKind::SPIN[one.load.component];
-            let own = &one.matrix * Scale(omega[k] * omega[l]);
+            let term = &one.matrix * Scale(omega[k] * omega[l]);
             Some(match sum {
-                Some(sum) => sum + own,
-                None => own,
+                Some(sum) => sum + term,
+                None => term,
             })
         });
         self.invariants().softening(omega, of_inertia.as_ref())
@@ -86,7 +86,7 @@ impl FlexBody {
             (0..nf).map(|i| motion[i] * (0..nf).map(|j| entry(i, j) * motion[j]).sum::<f64>()).sum()
         };
         let mut parts = Matrix3::from_fn(|a, b| quadratic(&|i, j| w2[(a * nf + i, b * nf + j)]));
-        for one in self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness) {
+        for one in self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness) {
             if one.load.kind == LoadKind::Spin {
                 let (k, l) = LoadKind::SPIN[one.load.component];
                 parts[(k, l)] -= quadratic(&|i, j| one.matrix[(i, j)]);

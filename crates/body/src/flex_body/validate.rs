@@ -189,18 +189,18 @@ impl Problems {
 
     /// Checks that the stiffness of inertia is complete or absent.
     fn inertia_stiffness(&mut self, parts: &Parts, n: usize, nf: usize) {
-        let Some(own) = &parts.inertia_stiffness else { return };
+        let Some(inertia) = &parts.inertia_stiffness else { return };
         if parts.modes.rotation.is_none() {
             self.add("`inertia_stiffness` exists, but the nodes have no rotations".to_owned());
         }
-        self.length("inertia_stiffness.moments", own.moments.len(), n, "node");
-        let numbers = own.moments.iter().flat_map(|m| m.first.iter().chain(m.second.iter()).copied());
+        self.length("inertia_stiffness.moments", inertia.moments.len(), n, "node");
+        let numbers = inertia.moments.iter().flat_map(|m| m.first.iter().chain(m.second.iter()).copied());
         self.finite("inertia_stiffness.moments", numbers);
-        for one in &own.stiffness {
+        for one in &inertia.stiffness {
             self.matrix(&format!("inertia_stiffness `{}`", one.load.label()), &one.matrix, nf, nf);
         }
         let wanted: Vec<_> = InertiaStiffness::loads(parts.dimension).collect();
-        if !own.stiffness.iter().map(|one| &one.load).eq(&wanted) {
+        if !inertia.stiffness.iter().map(|one| &one.load).eq(&wanted) {
             let wanted: Vec<String> = wanted.iter().map(UnitLoad::label).collect();
             self.add(format!("`inertia_stiffness` has other loads than {}", wanted.join(", ")));
         }

@@ -163,7 +163,7 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
         table.push(("W0", entries(&a.w0(), &b.w0(), |_, column| bound.c1(column % nf))));
     }
     if pair.general || !groups.w2 {
-        table.extend(a.w3().zip(b.w3()).map(|(own, other)| ("W3", entries(&own, &other, by_modes))));
+        table.extend(a.w3().zip(b.w3()).map(|(w3, other)| ("W3", entries(&w3, &other, by_modes))));
         table.push(("modal_mass", entries(&a.modal_mass(), &b.modal_mass(), by_modes)));
     }
     table.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()

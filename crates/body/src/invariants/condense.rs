@@ -318,8 +318,8 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel:
                 columns.by_node(first, 0..before, before, earlier);
                 matmul(top, Accum::Add, transposed(earlier, before), product, 1.0, Par::Seq);
             }
-            let own = transposed(&x[first * width..][..rows * width], width);
-            matmul(bottom, Accum::Add, own, product, 1.0, Par::Seq);
+            let rows_of_x = transposed(&x[first * width..][..rows * width], width);
+            matmul(bottom, Accum::Add, rows_of_x, product, 1.0, Par::Seq);
         }
         sum
     })

@@ -83,19 +83,19 @@ fn rigid_products<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) ->
     });
     let arch = Arch::new();
     sum_of_groups(n, (count, LANE_COLUMNS), |nodes| {
-        let mut own = Aligned::zeros(ROWS_PER_PRODUCT * count);
+        let mut block = Aligned::zeros(ROWS_PER_PRODUCT * count);
         let mut product = [[0.0; LANE_COLUMNS]; ROWS_PER_PRODUCT];
         let mut sum = Mat::<f64>::zeros(count, LANE_COLUMNS);
         for first in nodes.clone().step_by(ROWS_PER_PRODUCT) {
             let rows = ROWS_PER_PRODUCT.min(nodes.end - first);
             let product = &mut product[..rows];
             arch.dispatch(MassTimes { mass, first, x: &x, lanes: 1, targets: product });
-            let own = &mut own.get_mut()[..rows * count];
-            columns.by_node(first, 0..count, count, own);
+            let block = &mut block.get_mut()[..rows * count];
+            columns.by_node(first, 0..count, count, block);
             // Rows of nodes are columns of the transpose.
             let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
             let product = transposed(product.as_flattened(), LANE_COLUMNS).transpose();
-            matmul(&mut sum, Accum::Add, transposed(own, count), product, 1.0, Par::Seq);
+            matmul(&mut sum, Accum::Add, transposed(block, count), product, 1.0, Par::Seq);
         }
         sum
     })

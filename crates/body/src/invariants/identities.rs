@@ -143,8 +143,8 @@ fn turning_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning
         return checks;
     }
     let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
-    if let (Some(own), Some(of_s), true) = (body.w3(), solid.w3(), body.0.groups.w2) {
-        let value = terms::difference(&of_s, &own, &by_modes);
+    if let (Some(w3), Some(of_s), true) = (body.w3(), solid.w3(), body.0.groups.w2) {
+        let value = terms::difference(&of_s, &w3, &by_modes);
         checks.push(check("w3_of_s", "W3_k = S_lm - S_ml", value, GENERAL_MASS_LIMIT));
         let value = terms::difference(&solid.modal_mass(), &body.modal_mass(), &by_modes);
         checks.push(check("modal_mass_of_s", "m_ff = S11 + S22 + S33", value, GENERAL_MASS_LIMIT));
@@ -263,17 +263,23 @@ fn scalar_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCh
 pub fn derived_identities(body: &Invariants, stored: &Derived) -> Vec<IdentityCheck> {
     let nf = body.n_modes();
     let bound = CauchySchwarz::of(body);
-    let own = body.derived();
+    let computed = body.derived();
     let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
     let check = |name, formula, a: &Mat<f64>, b: &Mat<f64>, bound: &dyn Fn(usize, usize) -> f64| {
         IdentityCheck::new(name, formula, terms::difference(a, b, bound), GRAM_LIMIT)
     };
-    let (i0, stored_i0) = (terms::matrix(&own.inertia), terms::matrix(&stored.inertia));
+    let (i0, stored_i0) = (terms::matrix(&computed.inertia), terms::matrix(&stored.inertia));
     let w1 = |k: usize, column: usize| bound.w1(k, column / nf, column % nf);
     let mut checks = vec![
         check("i0_of_j", "I0 = tr(J) I - J", &i0, &stored_i0, &|k, l| bound.inertia(k, l)),
-        check("c2_of_ibar", "C2_k = Ibar_lm - Ibar_ml", &own.c2, &stored.c2, &|k, p| bound.c2(k, p)),
-        check("modal_mass_of_s", "m_ff = S11 + S22 + S33", &own.modal_mass, &stored.modal_mass, &by_modes),
+        check("c2_of_ibar", "C2_k = Ibar_lm - Ibar_ml", &computed.c2, &stored.c2, &|k, p| bound.c2(k, p)),
+        check(
+            "modal_mass_of_s",
+            "m_ff = S11 + S22 + S33",
+            &computed.modal_mass,
+            &stored.modal_mass,
+            &by_modes,
+        ),
     ];
     let none = Mat::new();
     let mut group =
@@ -291,12 +297,12 @@ pub fn derived_identities(body: &Invariants, stored: &Derived) -> Vec<IdentityCh
     group(
         "w1_of_ibar",
         "W1_kl = -(Ibar_kl + Ibar_lk), W1_kk = 2 (Ibar_ll + Ibar_mm)",
-        &own.w1,
+        &computed.w1,
         &stored.w1,
         &w1,
     );
-    group("w2_of_s", "W2_kl = -S_lk, W2_kk = S_ll + S_mm", &own.w2, &stored.w2, &by_modes);
-    group("w3_of_s", "W3_k = S_lm - S_ml", &own.w3, &stored.w3, &by_modes);
+    group("w2_of_s", "W2_kl = -S_lk, W2_kk = S_ll + S_mm", &computed.w2, &stored.w2, &by_modes);
+    group("w3_of_s", "W3_k = S_lm - S_ml", &computed.w3, &stored.w3, &by_modes);
     if let Some((w2, w3)) = stored.w2.as_ref().zip(stored.w3.as_ref()).filter(|_| body.0.general.is_none()) {
         let expected = terms::w3_of_w2(w2, nf);
         checks.push(check("w3_of_w2", "W3_k = W2_lm - W2_ml", &expected, w3, &by_modes));

@@ -97,10 +97,10 @@ fn deformation(body: &FlexBody, interface: &Interface) -> f64 {
     for &node in &interface.nodes {
         for k in 0..3 {
             let row = rotation.as_ref().subrows(3 * node + k, 1);
-            let own = row.norm_max();
+            let row_size = row.norm_max();
             // Nodes may have some rotations, or none.
-            if own > 0.0 {
-                size = larger(size, own);
+            if row_size > 0.0 {
+                size = larger(size, row_size);
                 left = larger(left, (row.to_owned() - turns.as_ref().subrows(k, 1)).norm_max());
             }
         }
@@ -146,14 +146,14 @@ fn reference_difference(body: &FlexBody, b: &Mat<f64>) -> f64 {
             return f64::INFINITY;
         };
         let turns = rigid_count(d) - d;
-        let own = |rows: &Mat<f64>, from: usize, count: usize, at: usize| {
+        let difference_at = |rows: &Mat<f64>, from: usize, count: usize, at: usize| {
             let stored = b.as_ref().subrows(at, count);
             let difference = (stored.to_owned() - rows.as_ref().subrows(from, count)).norm_max();
             if difference == 0.0 { 0.0 } else { difference / stored.norm_max() }
         };
-        worst = larger(worst, own(&rows.translation, 0, d, first));
+        worst = larger(worst, difference_at(&rows.translation, 0, d, first));
         if let Some(rotation) = &rows.rotation {
-            worst = larger(worst, own(rotation, 3 - turns, turns, first + d));
+            worst = larger(worst, difference_at(rotation, 3 - turns, turns, first + d));
         }
         first += rigid_count(d);
     }
@@ -163,7 +163,7 @@ fn reference_difference(body: &FlexBody, b: &Mat<f64>) -> f64 {
 /// Compares the error norms of lumped comparators with norms recomputed from their invariants; norms of
 /// other programs are not checked.
 fn lumped_errors(body: &FlexBody) -> Option<IdentityCheck> {
-    let own = |lumped: &LumpedBody| {
+    let recount = |lumped: &LumpedBody| {
         let norms = error_norms(body.invariants(), &lumped.invariants);
         let differences: Vec<f64> = lumped
             .comparison
@@ -180,5 +180,5 @@ fn lumped_errors(body: &FlexBody) -> Option<IdentityCheck> {
     }
     let limit = MAX_NORM_ROUNDING + 100.0 * body.storage().rounding();
     let formula = "error norms of the lumped comparators";
-    Some(IdentityCheck::new("lumped_errors", formula, largest(body.lumped().iter().map(own)), limit))
+    Some(IdentityCheck::new("lumped_errors", formula, largest(body.lumped().iter().map(recount)), limit))
 }

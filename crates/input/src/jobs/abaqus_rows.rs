@@ -48,8 +48,12 @@ pub(super) fn labels(mesh: &DeckMesh, deck: &Path) -> Found<Vec<DofLabel>> {
 
 /// Returns FB112: the matrix has other rows than the deck.
 pub(super) fn other_rows(mesh: &DeckMesh, labels: usize, rows: usize, matrix: &Path) -> Diagnostic {
-    let mut internal: Vec<&str> =
-        mesh.elements.iter().map(|own| own.kind.as_str()).filter(|kind| has_internal_nodes(kind)).collect();
+    let mut internal: Vec<&str> = mesh
+        .elements
+        .iter()
+        .map(|elements| elements.kind.as_str())
+        .filter(|kind| has_internal_nodes(kind))
+        .collect();
     internal.sort_unstable();
     internal.dedup();
     let mut message = format!(

@@ -153,7 +153,7 @@ impl SubstructureFile<'_> {
     /// Returns the matrix of a type with `n` rows.
     fn matrix(&self, kind: &str, n: usize, stored: StoredEntries) -> Found<RawMatrix> {
         let is_meant =
-            |card: &&Card| card.keyword == "MATRIX" && card.name("TYPE").is_some_and(|own| own == kind);
+            |card: &&Card| card.keyword == "MATRIX" && card.name("TYPE").is_some_and(|stated| stated == kind);
         let Some(card) = self.deck.cards().iter().find(is_meant) else {
             return Err(vec![missing(self.path, &format!("*MATRIX, TYPE={kind}"), HELP)]);
         };

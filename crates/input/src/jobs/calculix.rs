@@ -56,9 +56,9 @@ impl JobReader for Calculix {
         let stiffness = read(&sti);
         let ((stiffness, stiffness_file), (mass, mass_file)) = both(stiffness, read(&mas))?;
         let Once { labels, places } = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
-        let label = |own: &DofLabel| match rotations.get(&own.node) {
-            Some(reference) => DofLabel { node: *reference, direction: own.direction + 3 },
-            None => *own,
+        let label = |label: &DofLabel| match rotations.get(&label.node) {
+            Some(reference) => DofLabel { node: *reference, direction: label.direction + 3 },
+            None => *label,
         };
         let dofs: Vec<DofLabel> = labels.iter().map(label).collect();
         // Nodes that only carry rotations have no position.

@@ -40,7 +40,7 @@ pub(super) struct Card {
 impl Card {
     /// Returns the value of a parameter, without quotes; empty if it has none, `None` without the parameter.
     pub(super) fn parameter(&self, name: &str) -> Option<&str> {
-        self.parameters.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str())
+        self.parameters.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 
     /// Returns the value of a parameter in the form in which names are compared.
@@ -135,7 +135,7 @@ impl Deck {
                 let path = path?;
                 self.include(&path, depth + 1).map_err(|diagnostic| match diagnostic.file() {
                     // A missing file is reported at the card that includes it.
-                    Some(own) if own == path && diagnostic.code() == Code::FileUnreadable => self.about(
+                    Some(file) if file == path && diagnostic.code() == Code::FileUnreadable => self.about(
                         &card,
                         Code::FileUnreadable,
                         format!("{} is included: {}", path.display(), diagnostic.message()),

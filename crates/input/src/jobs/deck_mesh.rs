@@ -71,7 +71,7 @@ impl DeckMesh {
 struct Instance {
     name: String,
     /// Nodes, elements and sets of the part, and those defined within the instance.
-    own: Scope,
+    scope: Scope,
     moved: Placement,
 }
 
@@ -111,14 +111,14 @@ impl Scopes {
     fn instances(&self) -> Instances<'_> {
         let is_assembly = self.part.is_none() && !self.in_instance;
         let some = if is_assembly { self.instances.as_slice() } else { &[] };
-        Instances::new(some.iter().map(|own| (own.name.as_str(), &own.own)).collect())
+        Instances::new(some.iter().map(|one| (one.name.as_str(), &one.scope)).collect())
     }
 
     /// Returns the scope to which cards belong; `None` for a part without content.
     fn open(&self) -> Option<&Scope> {
         match (&self.part, self.in_instance) {
             (Some(part), _) => self.parts.get(part),
-            (None, true) => self.instances.last().map(|instance| &instance.own),
+            (None, true) => self.instances.last().map(|instance| &instance.scope),
             _ => Some(&self.top),
         }
     }
@@ -126,7 +126,7 @@ impl Scopes {
     fn current(&mut self) -> &mut Scope {
         match (&self.part, self.in_instance) {
             (Some(part), _) => self.parts.entry(part.clone()).or_default(),
-            (None, true) => &mut self.instances.last_mut().expect("an instance is open").own,
+            (None, true) => &mut self.instances.last_mut().expect("an instance is open").scope,
             _ => &mut self.top,
         }
     }
@@ -134,7 +134,7 @@ impl Scopes {
     /// Returns the model of all instances. Node numbers are kept if no two instances share one; else every instance
     /// gets a separate range of numbers.
     fn assembled(self) -> Found<DeckMesh> {
-        let placed: Vec<(&Instance, &Scope)> = self.instances.iter().map(|one| (one, &one.own)).collect();
+        let placed: Vec<(&Instance, &Scope)> = self.instances.iter().map(|one| (one, &one.scope)).collect();
         let mut taken: std::collections::HashSet<i64> = self.top.nodes.keys().copied().collect();
         let unique = placed.iter().all(|(_, scope)| scope.nodes.keys().all(|id| taken.insert(*id)));
         let keys = placed.iter().map(|(_, scope)| &scope.nodes).chain([&self.top.nodes]);
@@ -187,7 +187,7 @@ impl DeckMesh {
     /// Returns the nodes of a set.
     pub(super) fn set(&self, name: &str) -> Option<&[i64]> {
         let name = comparable(name);
-        self.sets.iter().find(|(own, _)| comparable(own) == name).map(|(_, nodes)| nodes.as_slice())
+        self.sets.iter().find(|(key, _)| comparable(key) == name).map(|(_, nodes)| nodes.as_slice())
     }
 }
 
@@ -216,8 +216,8 @@ impl DeckMeshReader<'_> {
                 let moved = self.placement(card);
                 let name = card.parameter("NAME").unwrap_or_default().to_owned();
                 let part = card.name("PART").unwrap_or_default();
-                let own = scopes.parts.get(&part).cloned().unwrap_or_default();
-                scopes.instances.push(Instance { name, own, moved });
+                let scope = scopes.parts.get(&part).cloned().unwrap_or_default();
+                scopes.instances.push(Instance { name, scope, moved });
                 scopes.in_instance = true;
             }
             "ENDINSTANCE" => scopes.in_instance = false,
@@ -314,7 +314,7 @@ impl DeckMeshReader<'_> {
             }
         }
         if let Some(name) = card.parameter("NSET") {
-            scope.sets.extend(name, Ok(ids.into_iter().map(Member::own).collect()));
+            scope.sets.extend(name, Ok(ids.into_iter().map(Member::of_scope).collect()));
         }
     }
 
@@ -409,7 +409,7 @@ impl DeckMeshReader<'_> {
             Some(instance) => scopes.instances().nodes_of_elements(instance, elements),
             None => {
                 let nodes = scopes.open().and_then(|scope| scope.nodes_of_elements(elements));
-                nodes.map(|own| own.into_iter().map(Member::own).collect())
+                nodes.map(|ids| ids.into_iter().map(Member::of_scope).collect())
             }
         };
         nodes.ok_or_else(|| {
@@ -424,10 +424,10 @@ impl DeckMeshReader<'_> {
         let instances = scopes.instances();
         let Some(instance) = card.parameter("INSTANCE") else {
             let known = |set: &str| {
-                let own = scopes.open().and_then(|scope| scope.sets.find(set)?.as_ref().ok());
-                own.cloned().or_else(|| instances.named(set))
+                let known_set = scopes.open().and_then(|scope| scope.sets.find(set)?.as_ref().ok());
+                known_set.cloned().or_else(|| instances.named(set))
             };
-            return self.members(card, Member::own, known);
+            return self.members(card, Member::of_scope, known);
         };
         match instances.find(instance) {
             Some(one) => self.members(card, |id| one.member(id), |set| one.set(set)),

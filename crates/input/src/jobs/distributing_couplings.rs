@@ -90,8 +90,8 @@ fn reference_node(card: &Card, mesh: &DeckMesh) -> Result<i64, String> {
     let nodes: Vec<i64> = mesh
         .elements
         .iter()
-        .filter(|own| is_coupling(&own.kind))
-        .flat_map(|own| &own.members)
+        .filter(|elements| is_coupling(&elements.kind))
+        .flat_map(|elements| &elements.members)
         .filter(|(id, _)| members.contains(id))
         .flat_map(|(_, nodes)| nodes.iter().copied())
         .collect();

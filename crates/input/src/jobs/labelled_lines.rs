@@ -26,7 +26,7 @@ const MAX_SHOWN_LINES: usize = 5;
 /// [`assemble`].
 pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
     let ((k, k_file), (m, m_file)) = both(LabelledLines::read(paths[0]), LabelledLines::read(paths[1]))?;
-    let all = [&k, &m].into_iter().flat_map(|own| &own.pieces).flat_map(|piece| &piece.labels);
+    let all = [&k, &m].into_iter().flat_map(|lines| &lines.pieces).flat_map(|piece| &piece.labels);
     let mut labels: Vec<DofLabel> = all.copied().collect();
     labels.sort_unstable();
     labels.dedup();
@@ -206,9 +206,9 @@ mod tests {
         let row = |node, direction| labels.binary_search(&DofLabel { node, direction }).expect("labelled");
         for (at, &id) in ids.iter().enumerate().step_by(97) {
             for direction in 1..=3u8 {
-                let (own, next) = (row(id, direction), row(ids[(at + 1) % ids.len()], direction));
-                assert_eq!(k.matrix.get(own, own), 2.0 + at as f64);
-                assert_eq!(k.matrix.get(next, own), -1.0 - f64::from(direction));
+                let (this, next) = (row(id, direction), row(ids[(at + 1) % ids.len()], direction));
+                assert_eq!(k.matrix.get(this, this), 2.0 + at as f64);
+                assert_eq!(k.matrix.get(next, this), -1.0 - f64::from(direction));
             }
         }
     }

@@ -99,11 +99,11 @@ fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
     for (&id, grid) in &bulk.grids {
         let found = systems.position(grid).and_then(|x| Ok((x, systems.axes(grid, x)?)));
         match found {
-            Ok((x, own)) => {
+            Ok((x, axes_of_grid)) => {
                 nodes.ids.push(id);
                 nodes.positions.push(x);
                 if grid.axes.is_some_and(|system| system != 0) {
-                    axes.insert(id, own);
+                    axes.insert(id, axes_of_grid);
                 }
             }
             Err(diagnostic) if bad.len() < MAX_SHOWN => bad.push(match diagnostic.file() {

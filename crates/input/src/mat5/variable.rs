@@ -100,8 +100,8 @@ impl<'a> Variable<'a> {
             (VariableKind::Sparse, None) => {
                 let (indices, values) = (self.most_entries() * 4, self.most_entries() * 8);
                 let pointers = self.columns.saturating_add(1).saturating_mul(8);
-                let own = [elements.next(indices)?, elements.next(pointers)?, elements.next(values)?];
-                self.sparse(own, path)?
+                let arrays = [elements.next(indices)?, elements.next(pointers)?, elements.next(values)?];
+                self.sparse(arrays, path)?
             }
             (VariableKind::Full, None) => {
                 let places = self.rows.saturating_mul(self.columns);

@@ -86,10 +86,10 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
         let mut good = id.is_some();
         for (axis, value) in values.iter_mut().enumerate().take(reals) {
             let start = count * width + axis * length;
-            let own = field(line, start..start + length);
+            let text = field(line, start..start + length);
             // Zeros at the end of a line are left out.
-            match if own.is_empty() { Some(0.0) } else { real(own) } {
-                Some(own) => *value = own,
+            match if text.is_empty() { Some(0.0) } else { real(text) } {
+                Some(number) => *value = number,
                 None => good = false,
             }
         }

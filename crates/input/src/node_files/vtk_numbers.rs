@@ -48,7 +48,7 @@ impl NumberType {
 
     /// Returns the numbers in `bytes`; incomplete bytes at the end are left out.
     pub(super) fn decode(self, bytes: &[u8], big_endian: bool) -> Vec<f64> {
-        bytes.chunks_exact(self.bytes()).map(|own| self.number(digits(own, big_endian))).collect()
+        bytes.chunks_exact(self.bytes()).map(|chunk| self.number(digits(chunk, big_endian))).collect()
     }
 
     fn number(self, digits: u64) -> f64 {
@@ -185,9 +185,9 @@ impl Read for Base64<'_> {
             if self.given == self.count && !self.next_group()? {
                 break;
             }
-            let own = &self.group[self.given..self.count];
-            let length = own.len().min(out.len() - written);
-            out[written..written + length].copy_from_slice(&own[..length]);
+            let unread = &self.group[self.given..self.count];
+            let length = unread.len().min(out.len() - written);
+            out[written..written + length].copy_from_slice(&unread[..length]);
             (written, self.given) = (written + length, self.given + length);
         }
         Ok(written)

@@ -150,7 +150,7 @@ impl<'a> Mesh<'a> {
 
     /// Returns the arrays within the elements named `parent`.
     fn arrays(&self, parent: &'static str) -> impl Iterator<Item = &Element<'a>> {
-        self.elements.iter().filter(move |own| own.name == "DataArray" && own.parent == parent)
+        self.elements.iter().filter(move |element| element.name == "DataArray" && element.parent == parent)
     }
 
     /// Returns the numbers of an array. A compressed array may have at most `most` of them.
@@ -179,11 +179,11 @@ impl<'a> Mesh<'a> {
         // The data begin after an underscore.
         let content = data.content.trim_ascii_start().strip_prefix(b"_").unwrap_or_default();
         let offset = array.number("offset").and_then(|offset| usize::try_from(offset).ok());
-        let own = offset.and_then(|offset| content.get(offset..));
-        let own = own.ok_or("begins behind the end of the file: it may be cut off")?;
+        let encoded = offset.and_then(|offset| content.get(offset..));
+        let encoded = encoded.ok_or("begins behind the end of the file: it may be cut off")?;
         match data.attribute("encoding") {
-            Some("raw") => self.packing.unpack(own, most),
-            Some("base64") | None => self.packing.unpack(Base64::new(own), most),
+            Some("raw") => self.packing.unpack(encoded, most),
+            Some("base64") | None => self.packing.unpack(Base64::new(encoded), most),
             Some(other) => Err(format!("is encoded by `{other}`, which is not read")),
         }
     }

@@ -17,7 +17,7 @@ impl Binary {
     /// Returns the storage of a file that begins with `head`; `None` if it is no binary OUTPUT4 file.
     pub(super) fn of(head: &[u8]) -> Option<Self> {
         let length: [u8; 4] = head.get(..4)?.try_into().ok()?;
-        let own = [(24, 4), (48, 8)].into_iter().find_map(|(bytes, word)| {
+        let layout = [(24, 4), (48, 8)].into_iter().find_map(|(bytes, word)| {
             let is_big_endian = match bytes {
                 _ if u32::from_le_bytes(length) == bytes => false,
                 _ if u32::from_be_bytes(length) == bytes => true,
@@ -25,11 +25,11 @@ impl Binary {
             };
             Some(Self { is_big_endian, word })
         })?;
-        let (record, _) = own.record(head, 0)?;
-        let [_, _, form, kind] = [0, 1, 2, 3].map(|k| own.integer(record, k));
-        let name = &record[4 * own.word..];
+        let (record, _) = layout.record(head, 0)?;
+        let [_, _, form, kind] = [0, 1, 2, 3].map(|k| layout.integer(record, k));
+        let name = &record[4 * layout.word..];
         let is_name = name.iter().all(|b| b.is_ascii_graphic() || matches!(b, b' ' | 0));
-        ((1..=15).contains(&form?) && (1..=4).contains(&kind?) && is_name).then_some(own)
+        ((1..=15).contains(&form?) && (1..=4).contains(&kind?) && is_name).then_some(layout)
     }
 
     /// Returns the positions of the columns of the matrices.
@@ -154,10 +154,10 @@ impl Binary {
             let length = if self.is_big_endian { i32::from_be_bytes(four) } else { i32::from_le_bytes(four) };
             usize::try_from(length).ok()
         };
-        let own = length(at)?;
-        let end = (at + 4).checked_add(own)?;
+        let record_length = length(at)?;
+        let end = (at + 4).checked_add(record_length)?;
         let record = bytes.get(at + 4..end)?;
-        (length(end)? == own).then_some((record, end + 4))
+        (length(end)? == record_length).then_some((record, end + 4))
     }
 
     /// Returns the k-th word as an integer.

@@ -173,13 +173,13 @@ pub(super) struct Columns {
 impl Columns {
     /// Creates an empty list with capacity for `entries` entries, as far as memory allows.
     pub(super) fn with_capacity(entries: usize) -> Self {
-        let mut own = Self::default();
+        let mut columns_of_task = Self::default();
         allow_failure(|| {
-            if own.rows.try_reserve_exact(entries).is_ok() {
-                let _ = own.values.try_reserve_exact(entries);
+            if columns_of_task.rows.try_reserve_exact(entries).is_ok() {
+                let _ = columns_of_task.values.try_reserve_exact(entries);
             }
         });
-        own
+        columns_of_task
     }
 
     /// Adds an entry unless it is zero.

@@ -41,10 +41,10 @@ pub(super) fn aggregates(strong: &Strong) -> (Vec<u32>, usize) {
     }
     // Remaining nodes join the group of their strongest neighbour.
     let first = group.clone();
-    for (node, own) in group.iter_mut().enumerate().filter(|(_, own)| **own == UNASSIGNED) {
+    for (node, assigned) in group.iter_mut().enumerate().filter(|(_, assigned)| **assigned == UNASSIGNED) {
         let grouped = strong.around(node).iter().filter(|(other, _)| first[*other as usize] != UNASSIGNED);
         if let Some(&(other, _)) = grouped.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0))) {
-            *own = first[other as usize];
+            *assigned = first[other as usize];
         }
     }
     // Nodes without a neighbouring group form new groups.
@@ -74,8 +74,9 @@ mod tests {
             others.into_iter().flatten().map(|other| (other, 1.0)).collect()
         };
         let (group, count) = aggregates(&Strong::from_rows((0..n).map(row).collect()));
-        assert!(group.is_sorted() && group.iter().all(|own| (*own as usize) < count), "{group:?}");
-        let sizes = (0..count as u32).map(|own| group.iter().filter(|other| **other == own).count());
+        assert!(group.is_sorted() && group.iter().all(|assigned| (*assigned as usize) < count), "{group:?}");
+        let sizes =
+            (0..count as u32).map(|assigned| group.iter().filter(|other| **other == assigned).count());
         assert!(sizes.clone().all(|size| (2..=4).contains(&size)), "{group:?}");
     }
 

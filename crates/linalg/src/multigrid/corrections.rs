@@ -230,8 +230,8 @@ impl<'a, const B: usize> Work<'a, B> {
         let mut ended = Vec::new();
         for (w, slot) in slots.iter_mut().enumerate() {
             let Some(Slot { column, .. }) = slot.take_if(|slot| ends(slot)) else { continue };
-            columns[column].par_chunks_mut(B).zip(&*t).with_min_len(NODES_PER_TASK).for_each(|(own, t)| {
-                own.iter_mut().zip(t).for_each(|(own, t)| *own = f64::from(t[w]));
+            columns[column].par_chunks_mut(B).zip(&*t).with_min_len(NODES_PER_TASK).for_each(|(rows, t)| {
+                rows.iter_mut().zip(t).for_each(|(rows, t)| *rows = f64::from(t[w]));
             });
             ended.push(w);
         }

@@ -100,11 +100,11 @@ impl<'a> Deflation<'a> {
 /// Returns the columns of the blocks, each multiplied by `scale(size)`; zero for columns of size zero.
 fn narrow(blocks: &[MatRef<'_, f64>], sizes: &[f64], scale: impl Fn(f64) -> f64 + Sync) -> Mat<f32> {
     let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
-    let mut own = Mat::zeros(blocks[0].nrows(), columns.len());
-    let pairs: Vec<_> = own.col_iter_mut().zip(columns).zip(sizes).collect();
+    let mut narrowed = Mat::zeros(blocks[0].nrows(), columns.len());
+    let pairs: Vec<_> = narrowed.col_iter_mut().zip(columns).zip(sizes).collect();
     pairs.into_par_iter().for_each(|((to, from), &size)| {
         let scale = if size > 0.0 { scale(size) } else { 0.0 };
         to.iter_mut().zip(from.iter()).for_each(|(to, from)| *to = (scale * from) as f32);
     });
-    own
+    narrowed
 }

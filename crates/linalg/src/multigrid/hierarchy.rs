@@ -109,11 +109,11 @@ impl<const B: usize> SymmetricBlocks<B> for Shifted<'_, B> {
             let heavy = others.first().map(|&other| other as usize);
             let Some(next) = stiff.into_iter().chain(heavy).min() else { return };
             let mut block = [[0.0; B]; B];
-            for (own, (columns, values)) in block.iter_mut().zip(&mut rows) {
+            for (block_row, (columns, values)) in block.iter_mut().zip(&mut rows) {
                 while let Some((&column, after)) = columns.split_first()
                     && column as usize / B == next
                 {
-                    own[column as usize % B] = self.scale * values[0];
+                    block_row[column as usize % B] = self.scale * values[0];
                     (*columns, *values) = (after, &values[1..]);
                 }
             }
@@ -181,8 +181,8 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
         let mut x = Mat::from_fn(n, count.min(n), |i, j| f64::from(noise(i * count + j)));
         for _ in 0..COARSEST_INVERSE_ITERATIONS {
             let product = |i: usize, j: usize| -> f64 {
-                let (group, own) = (i / C, &self.masses[i / C][i % C]);
-                (0..C).map(|c| own[c] * x[(group * C + c, j)]).sum()
+                let (group, masses) = (i / C, &self.masses[i / C][i % C]);
+                (0..C).map(|c| masses[c] * x[(group * C + c, j)]).sum()
             };
             // M-orthonormalise by Cholesky of X'MX, then solve.
             let force = Mat::from_fn(n, x.ncols(), product);
@@ -231,8 +231,8 @@ fn masses_beside<const B: usize>(a: &BlockMatrix<B, B>, mass: &SymmetricMatrix, 
         let (others, values) = mass.row(node);
         let mut entries = others.iter().zip(values).peekable();
         a.row(node).map(move |(column, _)| {
-            let own = entries.next_if(|(other, _)| **other as usize == column);
-            own.map_or(0.0, |(_, value)| (scale * value) as f32)
+            let entry = entries.next_if(|(other, _)| **other as usize == column);
+            entry.map_or(0.0, |(_, value)| (scale * value) as f32)
         })
     };
     (0..a.n_rows()).into_par_iter().with_min_len(NODES_PER_TASK).flat_map_iter(row).collect()
@@ -308,8 +308,8 @@ fn packed<const B: usize>(x: MatRef<'_, f64>) -> Vec<Rows<B>> {
 fn unpack<const B: usize>(rows: &[Rows<B>], x: MatMut<'_, f64>, scale: f64) {
     let mut columns: Vec<&mut [f64]> = x.col_iter_mut().map(contiguous_mut).collect();
     columns.par_iter_mut().enumerate().for_each(|(w, column)| {
-        for (own, rows) in column.chunks_exact_mut(B).zip(rows) {
-            own.iter_mut().zip(rows).for_each(|(x, row)| *x = scale * f64::from(row[w]));
+        for (node_rows, rows) in column.chunks_exact_mut(B).zip(rows) {
+            node_rows.iter_mut().zip(rows).for_each(|(x, row)| *x = scale * f64::from(row[w]));
         }
     });
 }

@@ -30,9 +30,9 @@ pub(super) struct Smoother<const B: usize> {
 impl<const B: usize> Smoother<B> {
     /// Creates the smoother; `None` if the largest eigenvalue of D^-1 A is not finite and positive.
     pub(super) fn new(a: BlockMatrix<B, B>, inverse: Vec<[[f32; B]; B]>) -> Option<Self> {
-        let mut own = Self { a, inverse, largest: 0.0 };
-        own.largest = (SPECTRAL_BOUND_FACTOR * own.largest_eigenvalue()?) as f32;
-        Some(own)
+        let mut smoother = Self { a, inverse, largest: 0.0 };
+        smoother.largest = (SPECTRAL_BOUND_FACTOR * smoother.largest_eigenvalue()?) as f32;
+        Some(smoother)
     }
 
     pub(super) fn nodes(&self) -> usize {
@@ -80,13 +80,13 @@ impl<const B: usize> Smoother<B> {
             [&mut u, &mut v].into_iter().for_each(|x| scale_columns(x, &scale));
             let mut next = self.a.apply(&v, |_, av| *av);
             let along = products(&v, &next);
-            let own = along.map(|along| along as f32);
+            let weights = along.map(|along| along as f32);
             // The first step has no predecessor.
             let before = length.map(|length| if diagonals.is_empty() { 0.0 } else { length as f32 });
             next.par_iter_mut().with_min_len(NODES_PER_TASK).enumerate().for_each(|(node, next)| {
                 for b in 0..B {
                     for w in 0..WIDTH {
-                        next[b][w] -= own[w] * u[node][b][w] + before[w] * u_before[node][b][w];
+                        next[b][w] -= weights[w] * u[node][b][w] + before[w] * u_before[node][b][w];
                     }
                 }
             });
@@ -203,7 +203,7 @@ pub(super) fn products<const B: usize>(x: &[Rows<B>], y: &[Rows<B>]) -> [f64; WI
     };
     let pieces: Vec<[f64; WIDTH]> =
         x.par_chunks(NODES_PER_TASK).zip(y.par_chunks(NODES_PER_TASK)).map(piece).collect();
-    pieces.iter().fold([0.0; WIDTH], |all, own| std::array::from_fn(|w| all[w] + own[w]))
+    pieces.iter().fold([0.0; WIDTH], |all, sums| std::array::from_fn(|w| all[w] + sums[w]))
 }
 
 fn scale_columns<const B: usize>(x: &mut [Rows<B>], scale: &[f32; WIDTH]) {

@@ -184,8 +184,9 @@ impl<'m> UnitLoads<'m> {
             lengths.sort_by(f64::total_cmp);
             let kept = (FREE_NODE_FRACTION * ids.len() as f64).ceil() as usize;
             let elsewhere = lengths.iter().take(kept).sum::<f64>() / total;
-            let own: Vec<_> = (0..ids.len()).filter(|&i| is_member[i]).map(|i| (i, rest(i))).collect();
-            larger(elsewhere, self.resultant_error(&own, set, wanted, &is_member))
+            let rest_forces: Vec<_> =
+                (0..ids.len()).filter(|&i| is_member[i]).map(|i| (i, rest(i))).collect();
+            larger(elsewhere, self.resultant_error(&rest_forces, set, wanted, &is_member))
         };
         candidates.iter().map(error).fold(f64::INFINITY, f64::min)
     }
@@ -195,7 +196,7 @@ impl<'m> UnitLoads<'m> {
     /// compared if nodes have rotations.
     fn resultant_error(
         &self,
-        own: &[(usize, Vector3<f64>)],
+        rest_forces: &[(usize, Vector3<f64>)],
         set: &NodeSet,
         wanted: &Vector6<f64>,
         is_member: &[bool],
@@ -204,7 +205,7 @@ impl<'m> UnitLoads<'m> {
         let about = self.reference(set, is_member);
         let mut difference = -wanted.fixed_rows::<3>(0).into_owned();
         let mut moment = -wanted.fixed_rows::<3>(3).into_owned();
-        for (i, f) in own {
+        for (i, f) in rest_forces {
             difference += f;
             moment += (Vector3::from(positions[*i]) - about).cross(f);
         }
@@ -221,8 +222,9 @@ impl<'m> UnitLoads<'m> {
         if let Some(point) = set.reference.point() {
             return Vector3::from(point);
         }
-        let own: Vec<_> = self.model.nodes().positions.iter().zip(is_member).filter(|(_, m)| **m).collect();
-        own.iter().map(|(x, _)| Vector3::from(**x)).sum::<Vector3<f64>>() / own.len().max(1) as f64
+        let members: Vec<_> =
+            self.model.nodes().positions.iter().zip(is_member).filter(|(_, m)| **m).collect();
+        members.iter().map(|(x, _)| Vector3::from(**x)).sum::<Vector3<f64>>() / members.len().max(1) as f64
     }
 
     /// Returns the work of a force and moment at a point on the unit rigid motions.
@@ -258,15 +260,15 @@ impl<'m> UnitLoads<'m> {
         let usual = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0);
         let (mut difference, mut size, mut carried) = (0.0, 0.0, 0.0);
         for (count, &(rest, i)) in nodes.iter().enumerate() {
-            let own = size_of(i);
+            let force_size = size_of(i);
             let is_enough =
                 count as f64 >= FREE_NODE_FRACTION * net.len() as f64 && carried >= MIN_FREE_LOAD * all;
-            if is_enough && rest > MIN_SUPPORTED_RATIO * usual * own {
+            if is_enough && rest > MIN_SUPPORTED_RATIO * usual * force_size {
                 continue;
             }
             carried += net[i].norm();
             difference += rest;
-            size += own;
+            size += force_size;
         }
         difference / larger(size, floor)
     }

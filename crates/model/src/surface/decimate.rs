@@ -71,7 +71,7 @@ impl Decimation {
         nodes.dedup();
         let index: HashMap<u32, u32> = nodes.iter().zip(0..).map(|(&node, i)| (node, i)).collect();
         let n = nodes.len();
-        let mut own = Self {
+        let mut decimation = Self {
             positions: nodes.iter().map(|&node| positions[node as usize]).collect(),
             triangles: mesh.triangles.iter().map(|corners| corners.map(|node| index[&node])).collect(),
             alive: mesh.triangles.len(),
@@ -83,17 +83,17 @@ impl Decimation {
             nodes,
             index,
         };
-        for (t, corners) in (0..).zip(&own.triangles) {
-            corners.iter().for_each(|&node| own.at_node[node as usize].push(t));
+        for (t, corners) in (0..).zip(&decimation.triangles) {
+            corners.iter().for_each(|&node| decimation.at_node[node as usize].push(t));
         }
         for [a, b] in &mesh.edges {
-            if let (Some(&a), Some(&b)) = (own.index.get(a), own.index.get(b)) {
-                own.features[a as usize].push(b);
-                own.features[b as usize].push(a);
+            if let (Some(&a), Some(&b)) = (decimation.index.get(a), decimation.index.get(b)) {
+                decimation.features[a as usize].push(b);
+                decimation.features[b as usize].push(a);
             }
         }
-        own.measure();
-        own
+        decimation.measure();
+        decimation
     }
 
     fn x(&self, node: u32) -> Vector3<f64> {
@@ -224,8 +224,8 @@ impl Decimation {
     /// Returns the remaining mesh, by the nodes of the body.
     fn mesh(&self, before: &SurfaceMesh) -> Option<SurfaceMesh> {
         let are_present = |node: u32| {
-            let Some(&own) = self.index.get(&node) else { return node };
-            let mut at = own;
+            let Some(&start) = self.index.get(&node) else { return node };
+            let mut at = start;
             while self.merged_into[at as usize] != at {
                 at = self.merged_into[at as usize];
             }

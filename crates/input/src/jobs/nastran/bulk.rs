@@ -132,7 +132,7 @@ impl Bulk {
 
     fn named(&self, members: &[Members]) -> BTreeSet<(i64, u8)> {
         let mut points = BTreeSet::new();
-        for Members { first, last, components } in members.iter().filter(|own| own.first <= own.last) {
+        for Members { first, last, components } in members.iter().filter(|range| range.first <= range.last) {
             for (&id, _) in self.grids.range(first..=last) {
                 points.extend(components.iter().filter(|c| **c > 0).map(|&c| (id, c)));
             }
@@ -346,7 +346,7 @@ fn triples(card: &Card, members: &mut Vec<Members>) -> Option<()> {
 
 /// Adds the points of a card with components, then points or a range of them.
 fn list(card: &Card, at: usize, members: &mut Vec<Members>) -> Option<()> {
-    let own = components(card.field(at))?;
+    let components = components(card.field(at))?;
     let mut k = at + 1;
     while k < card.len() {
         let field = card.field(k);
@@ -361,7 +361,7 @@ fn list(card: &Card, at: usize, members: &mut Vec<Members>) -> Option<()> {
         } else {
             first
         };
-        members.push(Members { first, last, components: own.clone() });
+        members.push(Members { first, last, components: components.clone() });
     }
     Some(())
 }

@@ -72,7 +72,7 @@ impl Matrices {
         let mut points: BTreeSet<Point> = dmigs.points(&[k, m]).into_iter().collect();
         // Rows that others follow must exist, even if they are zero.
         let followers = followers(bulk, |point| points.contains(point), places)?;
-        points.extend(followers.iter().flat_map(|own| own.leaders()));
+        points.extend(followers.iter().flat_map(|followed| followed.leaders()));
         // Rows that are rotated together must exist as well.
         let turned: Vec<Point> = points.iter().filter(|(id, _)| places.are_turned(*id)).copied().collect();
         for (id, component) in turned {
@@ -90,7 +90,7 @@ impl Matrices {
         let Read { stiffness, mass, points, files } = read;
         let followers = followers(bulk, |point| points.binary_search(point).is_ok(), places)?;
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(&stiffness.path)];
-        let eliminated = followers.map(|own| Ok((own.eliminate(&points)?, own.some_names())));
+        let eliminated = followers.map(|all| Ok((all.eliminate(&points)?, all.some_names())));
         let followers = eliminated.transpose().map_err(in_file)?;
         let n_given = points.len();
         let labels = points.into_iter().map(label).collect();
@@ -99,14 +99,14 @@ impl Matrices {
 
     /// Returns the matrices without the rows that follow others by constraints of the deck.
     pub(super) fn without_followers(self, found: &mut Vec<Diagnostic>) -> Self {
-        let Some((own, names)) = &self.followers else { return self };
-        let followers = self.n_given - own.points.len();
+        let Some((elimination, names)) = &self.followers else { return self };
+        let followers = self.n_given - elimination.points.len();
         let message = format!("{followers} rows depend on others and are eliminated: {names}");
         found.push(Diagnostic::new(Code::DeckConstrained, message).in_file(&self.stiffness.path));
-        let all: Vec<u32> = (0..own.points.len() as u32).collect();
-        let map = RowMap::new(own.follows.clone(), own.picks.clone(), all);
+        let all: Vec<u32> = (0..elimination.points.len() as u32).collect();
+        let map = RowMap::new(elimination.follows.clone(), elimination.picks.clone(), all);
         let rows = GivenRows::new(vec![map], HashMap::new());
-        let labels = own.points.iter().copied().map(label).collect();
+        let labels = elimination.points.iter().copied().map(label).collect();
         let [stiffness, mass] = [&self.stiffness, &self.mass].map(|raw| {
             let matrix = rows.matrix(raw.matrix.clone()).expect("all rows are kept");
             RawMatrix { matrix, digits: raw.digits, path: raw.path.clone() }
@@ -167,7 +167,7 @@ impl Matrices {
                 && bulk.scalars.contains(&label.node)
                 && !self.mass.matrix.column(row).0.is_empty()
         };
-        let modal = self.labels.iter().enumerate().filter(|own| is_modal(*own)).count();
+        let modal = self.labels.iter().enumerate().filter(|row| is_modal(*row)).count();
         if modal == 0 {
             return Ok(());
         }
@@ -188,7 +188,7 @@ impl Matrices {
     /// Returns the maps from data by rows of the files, or by the remaining rows, to data by rows of K and M in this
     /// model. `axes` are the row axes of the grids.
     pub(super) fn given_rows(&self, axes: HashMap<i64, Axes>) -> GivenRows {
-        let n = self.followers.as_ref().map_or(self.n_given, |(own, _)| own.points.len());
+        let n = self.followers.as_ref().map_or(self.n_given, |(elimination, _)| elimination.points.len());
         let all = || (0..n).collect::<Vec<usize>>();
         let retained = self.retained.clone().unwrap_or_else(all);
         if self.followers.is_none() && self.turn.is_none() && retained.len() == n {
@@ -198,12 +198,14 @@ impl Matrices {
         let rows = || retained.iter().map(|&row| row as u32).collect::<Vec<u32>>();
         // Maps for rows of the files, for rows without dependent ones, and for rows that are also not empty.
         let whole = match &self.followers {
-            Some((own, _)) => RowMap::new(product(&turn, &own.follows), product(&turn, &own.picks), rows()),
+            Some((elimination, _)) => {
+                RowMap::new(product(&turn, &elimination.follows), product(&turn, &elimination.picks), rows())
+            }
             None => RowMap::new(turn.clone(), turn.clone(), rows()),
         };
         let left = RowMap::new(turn.clone(), turn.clone(), rows());
-        let own = product(&turn, &columns_of_identity(n, &retained));
-        let least = RowMap::new(own.clone(), own, rows());
+        let turned = product(&turn, &columns_of_identity(n, &retained));
+        let least = RowMap::new(turned.clone(), turned, rows());
         let mut maps = vec![whole];
         for map in [left, least] {
             if maps.iter().all(|known| known.n_given() != map.n_given()) {
@@ -227,8 +229,10 @@ fn product(a: &CscMatrix, b: &CscMatrix) -> CscMatrix {
     for column in 0..b.n_cols() {
         let (rows, values) = b.column(column);
         for (row, factor) in rows.iter().zip(values) {
-            let (to, own) = a.column(*row as usize);
-            entries.extend(to.iter().zip(own).map(|(to, value)| (*to, column as u32, value * factor)));
+            let (to, values_of_column) = a.column(*row as usize);
+            entries.extend(
+                to.iter().zip(values_of_column).map(|(to, value)| (*to, column as u32, value * factor)),
+            );
         }
     }
     CscMatrix::from_triplets(a.n_rows(), b.n_cols(), &entries)
@@ -275,9 +279,9 @@ fn principal(raw: RawMatrix, retained: &[usize]) -> RawMatrix {
     let mut col_ptr = vec![0];
     let (mut row_idx, mut values) = (Vec::new(), Vec::new());
     for &column in retained {
-        let (rows, own) = raw.matrix.column(column);
+        let (rows, values_of_column) = raw.matrix.column(column);
         row_idx.extend(rows.iter().map(|&row| local[row as usize]));
-        values.extend_from_slice(own);
+        values.extend_from_slice(values_of_column);
         col_ptr.push(row_idx.len());
     }
     let matrix = CscMatrix::from_parts(retained.len(), retained.len(), col_ptr, row_idx, values);

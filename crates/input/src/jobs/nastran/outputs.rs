@@ -64,7 +64,7 @@ impl Outputs {
             contents.matrix(file, at).map_err(|diagnostic| vec![diagnostic.in_file(file.path())])
         };
         let (stiffness, mass) = both(matrix(k), matrix(m))?;
-        let [rows, others] = [&stiffness, &mass].map(|own| own.matrix.n_cols());
+        let [rows, others] = [&stiffness, &mass].map(|raw| raw.matrix.n_cols());
         if rows != others {
             let message = format!("{} has {rows} rows, {} has {others}", self.names[k], self.names[m]);
             return Err(vec![Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&mass.path)]);

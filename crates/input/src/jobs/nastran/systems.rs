@@ -60,7 +60,7 @@ pub(super) enum Definition {
 impl Grid {
     /// Returns true when both cards define the same grid.
     pub(super) fn is_the_same(&self, other: &Self) -> bool {
-        let said = |own: &Self| (own.system, own.x, own.axes, own.held.clone());
+        let said = |position: &Self| (position.system, position.x, position.axes, position.held.clone());
         said(self) == said(other)
     }
 }
@@ -255,8 +255,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
-    let own = length(a);
-    (own > 0.0 && own.is_finite()).then(|| a.map(|x| x / own))
+    let length_of_a = length(a);
+    (length_of_a > 0.0 && length_of_a.is_finite()).then(|| a.map(|x| x / length_of_a))
 }
 
 #[cfg(test)]
