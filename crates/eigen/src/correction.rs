@@ -82,6 +82,7 @@ impl<'a> Correction<'a> {
     ) -> Result<Self, EigenFailure> {
         let Task { problem, context, .. } = *task;
         let base = x.ncols();
+        // Levels need a basis of Ritz vectors from the start.
         let mut space = SearchSpace::new(problem, x, corrector.capacity(base), context)?;
         if corrector.must_contract(base, base) {
             space.contract(base);
@@ -107,11 +108,13 @@ impl<'a> Correction<'a> {
     /// Corrects until the modes keep the tolerance. Returns the modes and the examined eigenvalues after them.
     pub(super) fn modes(mut self) -> Result<FoundModes, EigenFailure> {
         for _ in 0..MAX_CORRECTION_ROUNDS {
+            // Examine the wanted pairs and the next one.
             let (forces, examined) = self.excess();
             let keeps = |pair: &Pair| pair.residual <= pair.allowed;
             self.converged = examined[..self.wanted].iter().filter(|pair| keeps(pair)).count();
             let poor: Vec<Pair> = examined.iter().copied().filter(|pair| !keeps(pair)).collect();
             self.context.fraction(1.0 - poor.len() as f64 / examined.len() as f64);
+            // Done when all pairs keep their residuals; given up when the gain is too small.
             if poor.is_empty() {
                 return self.hand_over(examined.len());
             }
@@ -131,6 +134,7 @@ impl<'a> Correction<'a> {
             return self.excess();
         }
         let (tolerance, lambda) = (self.goal.tolerance, &self.space.lambda);
+        // Pairs that may belong to the cluster of the last wanted one need the full accuracy.
         let may_be_wanted = cluster_end(self.wanted, lambda.len(), POSSIBLE_CLUSTER_GAP, |i| lambda[i]);
         let allowed =
             |j: usize| if j < may_be_wanted { tolerance.max(self.floors[j]) } else { NEXT_MODE_RESIDUAL };
@@ -142,8 +146,10 @@ impl<'a> Correction<'a> {
     fn examine(&mut self) -> (Tall, Vec<f64>) {
         let Self { problem, context, space, .. } = self;
         let lambda = &space.lambda;
+        // The wanted pairs, to the end of their cluster, and the one after it.
         self.wanted = cluster_end(self.wanted, lambda.len(), CLUSTER_GAP, |i| lambda[i]);
         let examined = (self.wanted + 1).min(lambda.len());
+        // Rounding floors change little between rounds: they are computed once for each pair.
         if self.floors.len() < examined {
             let lowest = space.some_vectors(0..examined);
             self.floors = residuals(problem, &lambda[..examined], lowest.as_ref(), context).1;
@@ -164,6 +170,7 @@ impl<'a> Correction<'a> {
         let farthest = ((self.goal.wanted + self.base) / 2).min(lambda.len().saturating_sub(1));
         let is_wide =
             |end: &usize| *end > 0 && lambda[*end] - lambda[end - 1] >= self.goal.separation * self.size;
+        // The first gap that is wide enough, if there is one within reach.
         let end = (self.wanted..=farthest).find(is_wide).unwrap_or(self.wanted);
         let extends = end > self.wanted;
         if extends {
@@ -186,11 +193,13 @@ impl<'a> Correction<'a> {
         if self.rounds == 0 {
             self.first_excess = worst;
         }
+        // A round counts as a gain if it halves the excess.
         if worst < 0.5 * self.least_excess {
             (self.least_excess, self.rounds_since) = (worst, 0);
         } else {
             self.rounds_since += 1;
         }
+        // Cycles must also have reached the gains that justify them.
         let rounds = self.rounds;
         let is_behind = |(after, gain): &(usize, f64)| rounds == *after && worst > self.first_excess / gain;
         let is_slow = matches!(self.corrector, Corrector::Levels(_)) && REQUIRED_GAINS.iter().any(is_behind);
@@ -215,6 +224,7 @@ impl<'a> Correction<'a> {
         let scales: Vec<f64> = columns.par_iter().map(|column| unit(column.norm_max())).collect();
         let mut d = Tall::with_capacity(self.problem.pencil.n(), columns.len());
         columns.iter().zip(scales).for_each(|(column, scale)| d.push_multiple(scale, *column));
+        // Solve the correction equations.
         corrector.correct(space, &pairs, &mut d, context);
         // A space without capacity for the corrections is first reduced to its lowest Ritz vectors.
         if d.ncols() > space.free_columns() {

@@ -52,6 +52,7 @@ fn find_refined(
         Outcome::Reached(found) => found,
         Outcome::ShiftTooLarge(shift) => return Ok(Outcome::ShiftTooLarge(shift)),
     };
+    // Refine with the first factor, whose shift is below all modes.
     drop(iteration);
     let refined = refine(task.problem, factor, found.refined, goal.tolerance, task.context)?;
     Ok(Outcome::Reached(FoundModes { refined, ..found }))
@@ -106,11 +107,13 @@ fn from_midway(
         return find_refined(task, iteration, &first, goal);
     }
     let not_converged = || EigenFailure::NotConverged { converged: 0, wanted: goal.wanted };
+    // Ritz values of the first shift show the gap for the second one; the first factor makes room for its factor.
     let midway = iteration.midway()?;
     let tau = first.shift();
     drop(first);
     let first_factor = || factorise::<f64>(problem, analysis, tau, context);
     let second = SecondFactor::new(problem, analysis, &midway.eigenvalues, goal.wanted, context);
+    // Continue with the second shift, or with the first one if there is no gap.
     let found = match second {
         Some(second) => {
             iteration.change_shift(midway, &second.factor, second.below);
@@ -194,6 +197,7 @@ impl<'a> SecondFactor<'a> {
 fn second_shift_at(eigenvalues: &[f64], wanted: usize) -> Option<f64> {
     let count_at = |fraction: f64| (fraction * wanted as f64).round() as usize;
     let (middle, window) = (count_at(SECOND_SHIFT_POSITION), count_at(SECOND_SHIFT_WINDOW).max(1));
+    // Widest gap in the window around the best position.
     let near = eigenvalues.get(middle.checked_sub(window)?..=middle + window)?;
     let widest = near.windows(2).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
     let sigma = 0.5 * (widest[0] + widest[1]);
@@ -203,6 +207,7 @@ fn second_shift_at(eigenvalues: &[f64], wanted: usize) -> Option<f64> {
 /// Returns true when solving the columns that a second shift saves takes longer than its factor.
 fn saves_time(task: &Task<'_>, wanted: usize) -> bool {
     let Task { problem, analysis, .. } = task;
+    // Operations for one column: substitution with the factor and orthogonalisation.
     let vectors = problem.pencil.n() as f64 * basis_columns(wanted) as f64;
     let column = 4.0 * analysis.factor_len() as f64 + 8.0 * vectors;
     wanted >= MIN_MODES_FOR_SECOND_SHIFT

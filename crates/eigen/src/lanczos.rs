@@ -78,6 +78,7 @@ fn better_shift(
     if ritz.values.last().is_none_or(|theta| theta.recip() - tau > MIN_EIGENVALUE_PER_SHIFT * tau) {
         return Ok(None);
     }
+    // The lowest eigenvalue is far below the shift: find out if it has strain energy.
     let (lambda, vectors) = largest_pairs(krylov, &ritz, wanted.max(1), tau);
     let lowest = lambda[0];
     let noise = NOISE_DEVIATIONS
@@ -113,11 +114,13 @@ fn zero_energy(
 ) -> Result<EigenFailure, EigenFailure> {
     let mut krylov = Krylov::new(problem, ZERO_ENERGY_BASIS, context);
     krylov.append_random(COLUMNS_PER_STEP, factor);
+    // Fill the basis.
     while krylov.free_columns() >= COLUMNS_PER_STEP && !krylov.exhausted() {
         krylov.step(factor);
     }
     let ritz = projected_pairs(&krylov)?;
     let (lambda, vectors) = largest_pairs(&krylov, &ritz, krylov.projected() / 2, tau);
+    // Modes within the noise of K have no strain energy.
     let noise = energy_noise(problem.pencil.stiffness(), vectors.as_ref(), problem.input_error);
     let count = lambda.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_DEVIATIONS * **n).count().max(1);
     Ok(EigenFailure::ZeroEnergy {
@@ -248,6 +251,7 @@ impl<'a> Iteration<'a> {
         block: usize,
         context: &Context<'a>,
     ) -> Self {
+        // The basis holds twice the wanted modes and some spare vectors.
         let free = problem.pencil.n() - problem.rigid.ncols();
         let capacity = (2 * goal.wanted + SPARE_VECTORS).min(free + block);
         let mut krylov = Krylov::new(problem, capacity, context);
@@ -405,6 +409,7 @@ impl<'a> Iteration<'a> {
         let (below, settled_count) =
             self.first.as_ref().map_or((0, 0), |first| (first.below, first.modes.ncols()));
         let size = krylov.projected();
+        // Eigenpairs of the projected operator; a negative theta without a second shift means an indefinite M.
         let found = projected_pairs(krylov)?;
         let is_negative = |theta: &f64| *theta < -1e-8 * found.values[size - 1].abs();
         if below == 0 && found.values.first().is_some_and(is_negative) {
@@ -416,6 +421,7 @@ impl<'a> Iteration<'a> {
         let theta: Vec<f64> = order.iter().map(|&i| found.values[i]).collect();
         let s = Mat::from_fn(size, size, |i, j| found.vectors[(i, order[j])]);
         let has_all_below = below == 0 || found.values[below - 1] < 0.0;
+        // Residuals, and the end of the cluster of the last wanted mode.
         let norms = krylov.residual_norms(s.as_ref());
         let last = cluster_end(wanted, size, CLUSTER_GAP, |i| 1.0 / theta[i] - tau);
         let mut ritz = Ritz { theta, s, norms, tau, last, converged: 0, beyond: false };
@@ -435,6 +441,7 @@ impl<'a> Iteration<'a> {
         if self.tightens_below_noise(ritz) {
             return Ok(None);
         }
+        // True residuals of the modes.
         let (size, last) = (ritz.size(), ritz.last);
         let refined = Refined::new(self.problem, self.vectors(ritz, last), &self.context)?;
         let excess = refined.excess(self.goal.tolerance);
@@ -445,6 +452,7 @@ impl<'a> Iteration<'a> {
             let next = (last..size).take_while(is_known).map(|i| ritz.lambda(i)).collect();
             return Ok(Some(FoundModes { refined, next, tau: self.tau, finite: None }));
         }
+        // Continue with estimates that must be as much smaller as the true residuals are too large.
         self.least_excess = excess;
         self.requested /= 1.2 * excess;
         Ok(None)
@@ -485,6 +493,7 @@ impl<'a> Iteration<'a> {
     /// [`EigenFailure::NotConverged`] if the basis spans the whole space, or after too many restarts.
     fn restart(&mut self, ritz: &Ritz) -> Result<Option<f64>, EigenFailure> {
         let Ritz { last, converged, .. } = *ritz;
+        // Neither a complete basis nor the last restart can continue.
         if self.complete || self.restarts >= MAX_RESTARTS {
             return Err(EigenFailure::NotConverged { converged, wanted: self.goal.wanted });
         }
@@ -496,6 +505,7 @@ impl<'a> Iteration<'a> {
         }
         self.restarts += 1;
         self.context.count(|work| work.restarts += 1);
+        // Keep the wanted Ritz vectors and a third of the spare ones.
         let keep = (last + (self.capacity - last) / 3).min(ritz.size().saturating_sub(self.block));
         self.krylov.restart(ritz.s.as_ref().subcols(0, keep), &ritz.theta[..keep]);
         self.next_test = 0;

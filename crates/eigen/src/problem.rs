@@ -62,11 +62,13 @@ fn rayleigh_estimate(
     rigid: MatRef<'_, f64>,
     order: &EliminationOrder,
 ) -> Result<f64, EigenFailure> {
+    // Factor of K + tau M with a small shift.
     let trace = |diagonal: Vec<f64>| diagonal.into_iter().sum::<f64>();
     let shift = DEFAULT_RELATIVE_SHIFT * trace(pencil.stiffness().diagonal()) / trace(pencil.mass_diagonal());
     let analysis = order.of(pencil).ok_or(EigenFailure::TooLarge)?;
     let factor = Cholesky::<f64>::new(&analysis, pencil, shift);
     let factor = factor.ok_or(EigenFailure::NotPositiveDefinite { shift })?;
+    // Two inverse iterations from fixed numbers.
     let mut field = Mat::from_fn(pencil.n(), 1, |row, _| uniform(SEED, row as u64, 0));
     for _ in 0..2 {
         let mut solved = pencil.apply_mass(field.as_ref());
@@ -76,6 +78,7 @@ fn rayleigh_estimate(
         subtract_combination(solved.as_mut(), rigid, in_null_space.as_ref());
         field = solved;
     }
+    // The Rayleigh quotient is an upper bound.
     let energy = gram(field.as_ref(), pencil.apply_stiffness(field.as_ref()).as_ref())[(0, 0)];
     let mass = gram(field.as_ref(), pencil.apply_mass(field.as_ref()).as_ref())[(0, 0)];
     Ok(energy / mass)

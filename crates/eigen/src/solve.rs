@@ -37,10 +37,12 @@ pub fn solve(
     settings: &EigenSettings,
     context: &Context<'_>,
 ) -> Result<EigenSolution, EigenFailure> {
+    // Structure of the factors, and the plan of attempts.
     let analysis = analyse(problem, context)?;
     let task = Task::new(problem, settings, &analysis, context);
     let wanted = wanted_count(&task)?;
     let mut plan = Plan::new(&task, wanted)?;
+    // Modes with the proof that none is missing, and their guaranteed bounds.
     let (found, completeness) = find_all(&task, &mut plan, wanted)?;
     let bounds = bounds(&task, &found.refined, &completeness)?;
     context.count(|work| work.factor_bytes = plan.current().needs.factor_bytes);
@@ -103,6 +105,7 @@ fn find_all(
     let rigid = task.problem.rigid.ncols();
     let (mut requested, mut round) = (wanted, 0);
     loop {
+        // Search, then count the modes below a shift above the last one.
         let found = search(task, plan, requested, round)?;
         let completeness = prove(task, plan, &found)?;
         let (found_below, counted) = (completeness.modes_below, completeness.counted(rigid));
@@ -110,6 +113,7 @@ fn find_all(
         if found_below == counted {
             return Ok((found, completeness));
         }
+        // More modes than counted, or still missing modes, cannot be repaired.
         if found_below > counted || round == MAX_SEARCHES {
             return Err(EigenFailure::CountDiffers {
                 found: found_below,
@@ -125,6 +129,7 @@ fn find_all(
 /// Makes the attempts of the plan in their order until one of them finds the modes.
 fn search(task: &Task<'_>, plan: &mut Plan, wanted: usize, round: usize) -> Result<FoundModes, EigenFailure> {
     let Task { problem, settings, context, .. } = task;
+    // The goal is stricter than the guarantee, and asks for a gap wide enough for a count in single precision.
     let tolerance = SEARCH_RESIDUAL_FRACTION * settings.accuracy.residual();
     let separation = match plan.count.counting {
         Some(Counting::Single { .. }) => SINGLE_COUNT_GAP * SINGLE_COUNT_DISTANCE,
@@ -135,6 +140,7 @@ fn search(task: &Task<'_>, plan: &mut Plan, wanted: usize, round: usize) -> Resu
     for number in 0..plan.attempts.len() {
         let PlannedAttempt { way, failure, .. } = &plan.attempts[number];
         let (way, attempt) = (*way, way.attempt());
+        // Skip attempts that failed before, and those that would only repeat themselves.
         if failure.is_some() || (round > 0 && !attempt.is_repeated()) {
             continue;
         }
@@ -142,6 +148,7 @@ fn search(task: &Task<'_>, plan: &mut Plan, wanted: usize, round: usize) -> Resu
             context.plan(&plan.to_string());
         }
         match attempt.search(task, &goal) {
+            // Modes: sharpen their residuals and refuse those without strain energy.
             Ok(found) => {
                 let refined = found.refined.sharpened(problem, tolerance, context);
                 check_zero_energy(problem, &refined)?;
@@ -190,6 +197,7 @@ fn prove(task: &Task<'_>, plan: &Plan, search: &FoundModes) -> Result<Completene
         // No eigenvalue above: every finite mode was computed.
         (_, None) => 1.1 * last,
     };
+    // Without a count the modes are returned unproved, with the reason.
     let remark = match plan.count.too_large {
         _ if settings.accuracy == Accuracy::Fast => Some("accuracy `fast` leaves the count out".to_owned()),
         Some((needed, available)) => Some(format!(
@@ -205,12 +213,14 @@ fn prove(task: &Task<'_>, plan: &Plan, search: &FoundModes) -> Result<Completene
     }
     context.phase("completeness");
     let below = search.refined.eigenvalues.iter().filter(|&&l| l < shift).count();
+    // Count in double precision if the shift is too near to a mode for single precision.
     let counting = match plan.count.counting {
         Some(Counting::Single { double_fits: true }) if is_near(problem, &search.refined, shift) => {
             Counting::Double
         }
         counting => counting.unwrap_or(Counting::Double),
     };
+    // The inertia of K - shift M.
     let count = count(task, shift, counting)?;
     Ok(Completeness {
         proof: Proof::InertiaCount,
@@ -239,22 +249,25 @@ fn finish(
     plan: Plan,
 ) -> Result<EigenSolution, EigenFailure> {
     let mut modes = search.refined;
-    // Rotated or moved modes get new residuals.
+    // Canonical basis of every cluster, and eigenvalues within their bounds.
     let groups = clusters(&modes.eigenvalues, CLUSTER_GAP);
     canonical_basis(modes.vectors.as_mut(), &groups);
     if let Some(bounds) = &bounds {
         bounds.clamp(&mut modes.eigenvalues);
     }
+    // Rotated or moved modes get new residuals.
     let is_changed = |group: &Range<usize>| bounds.is_some() || group.len() > 1;
     let changed: Vec<usize> = groups.into_iter().filter(is_changed).flatten().collect();
     modes.renew(task.problem, &changed, task.context);
     let Refined { eigenvalues, mut vectors, residuals, floors } = modes;
+    // Every mode keeps the guaranteed residual.
     let tolerance = task.settings.accuracy.residual();
     let is_converged = |i: &usize| keeps(residuals[*i], floors[*i], tolerance);
     let converged = (0..eigenvalues.len()).filter(is_converged).count();
     if converged < eigenvalues.len() {
         return Err(EigenFailure::NotConverged { converged, wanted });
     }
+    // Modes that only complete the last cluster are left out.
     let given = wanted.min(eigenvalues.len());
     let next_eigenvalue = eigenvalues.get(given).copied().or(search.next.first().copied());
     vectors.truncate(vectors.nrows(), given);

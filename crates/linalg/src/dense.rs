@@ -42,6 +42,7 @@ pub fn symmetric_eigen(a: MatRef<'_, f64>) -> Option<SymmetricEigen> {
     if !(0..n).all(|j| (0..n).all(|i| full[(i, j)].is_finite())) {
         return None;
     }
+    // Divide and conquer, accepted if its backward error is small; otherwise the QR iteration.
     let automatic = <SelfAdjointEvdParams as Auto<f64>>::auto();
     let only_qr = SelfAdjointEvdParams { recursion_threshold: usize::MAX, ..automatic };
     decompose(&full, automatic)
@@ -77,6 +78,7 @@ pub fn dense_cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
     let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(a.nrows(), Par::Seq, params));
     cholesky_in_place(a.as_mut(), LltRegularization::default(), Par::Seq, MemStack::new(&mut memory), params)
         .ok()?;
+    // The factor has zeros above the diagonal.
     for j in 1..a.ncols() {
         for i in 0..j {
             a[(i, j)] = 0.0;
@@ -116,7 +118,9 @@ pub fn full_qr(mut a: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
             householder::apply_block_householder_sequence_on_the_left_in_place_scratch::<f64>(n, block, n),
         ));
     let stack = MemStack::new(&mut memory);
+    // Householder vectors below the diagonal of `a`, R on and above it.
     qr::qr_in_place(a.as_mut(), factor.as_mut(), Par::Seq, stack, params);
+    // Q is the product of the reflections.
     let mut q = Mat::identity(n, n);
     householder::apply_block_householder_sequence_on_the_left_in_place_with_conj(
         a.as_ref(),

@@ -333,6 +333,7 @@ pub(super) fn substitute<T: Real, const K: usize>(
 ) {
     let (tree, block) = (&analysis.tree, analysis.block);
     let mut values: Vec<[T; K]> = in_elimination_order(analysis, scale, x.as_ref());
+    // One slot of pivot rows for each supernode.
     let mut slots: Vec<&mut [[T; K]]> = Vec::with_capacity(tree.len());
     let mut rest = values.as_mut_slice();
     for s in 0..tree.len() {
@@ -455,6 +456,7 @@ pub fn is_positive_semidefinite(pencil: &Pencil<'_>, analysis: &Analysis) -> boo
     if has_coupled_massless_row(mass) {
         return false;
     }
+    // The order by vertices of M, which may be coarser or finer than that of the pencil.
     let order = analysis.tree.order();
     let rows = (mass.n() / order.len().max(1)).max(1);
     // Count the entries of both matrices in blocks of vertices.

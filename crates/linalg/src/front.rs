@@ -137,6 +137,7 @@ pub(super) fn extend_add<T: Real>(
 ) {
     let w = pivots.width;
     for (p, panel) in source.panels.iter().enumerate() {
+        // Entries of the source panel go to the pivots or to the Schur complement of the front.
         let (first, width) = (p * PANEL_COLUMNS, source.panel_width(p));
         // Columns that stay adjacent are added run by run.
         let runs = runs(&places[first..first + width], w);
@@ -232,6 +233,7 @@ pub(super) fn subtract_eliminated<T: Real>(
 ) {
     let depth: usize = left.iter().map(|l| l.ncols()).sum();
     let cost = target.len() * depth;
+    // Rows below the square, in pieces; then the lower triangle of the square.
     let (square, below) = target.split_at_mut(width * width);
     by_rows(below, width, cost, |piece, rows| {
         let count = rows.len() / width;

@@ -105,6 +105,7 @@ impl<T: Scalar> SparseLdl<T> {
         let n = self.n();
         assert!(x.len() == n * B && scratch.len() == n * B, "sizes of a solve");
         let (x, y) = (x.as_chunks_mut::<B>().0, scratch.as_chunks_mut::<B>().0);
+        // To elimination order.
         for (y, &row) in y.iter_mut().zip(&self.order) {
             *y = x[row as usize];
         }
@@ -124,6 +125,7 @@ impl<T: Scalar> SparseLdl<T> {
             }
             y[j] = sum;
         }
+        // Back to the order of the rows.
         for (y, &row) in y.iter().zip(&self.order) {
             x[row as usize] = *y;
         }
@@ -146,6 +148,7 @@ impl Structure {
     fn new<T: Scalar>(a: &MatrixSum<'_, T>, pencil: &Pencil<'_>) -> Option<Self> {
         let n = a.n();
         let block = pencil.block() as u32;
+        // Elimination order of the rows, and its inverse.
         let nodes = nested_dissection(&mut node_graph(pencil)?)?;
         let order: Vec<u32> =
             nodes.iter().flat_map(|&node| (0..block).map(move |k| block * node + k)).collect();
@@ -169,6 +172,7 @@ impl Structure {
                 }
             });
         }
+        // Counts of the columns become their starts.
         (0..n).for_each(|j| col_ptr[j + 1] += col_ptr[j]);
         Some(Self { order, place, parent, col_ptr })
     }

@@ -192,6 +192,7 @@ pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
         lanes.iter().for_each(|x| (0..8).for_each(|w| sums[w] += x[w] * x[w]));
         sums.iter().sum::<f64>() + rest.iter().map(|x| x * x).sum::<f64>()
     };
+    // Sums of squares in fixed order; norms outside the safe range are computed with scaling.
     let parts: Vec<f64> = (0..chunks * a.ncols()).into_par_iter().map(squares).collect();
     let norm = |j: usize| {
         let norm = parts[j * chunks..(j + 1) * chunks].iter().sum::<f64>().sqrt();

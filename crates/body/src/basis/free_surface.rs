@@ -188,6 +188,7 @@ pub fn search_plan(model: &FeModel, settings: &ModeSettings, context: &Context<'
 pub(super) fn polynomial_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
     let has_rotations = !model.rows().rotations().is_empty();
     let monomials = if has_rotations { [QUADRATIC, CUBIC].concat() } else { QUADRATIC.to_vec() };
+    // Polynomial fields, M-orthogonal to rigid motion (twice, against rounding).
     let mut fields = polynomial_fields(model, pencil.n(), &monomials);
     let mass = |x: MatRef<'_, f64>| pencil.apply_mass(x);
     let before = gram_in_panels(fields.as_ref(), mass);
@@ -293,6 +294,7 @@ fn gram_in_panels(x: MatRef<'_, f64>, product: impl Fn(MatRef<'_, f64>) -> Mat<f
 /// Returns the smallest eigenvalue of the small pencil (K, M) and its eigenvector (one column), restricted
 /// to eigenvectors of M above `kept_above` times its largest eigenvalue.
 fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>, kept_above: f64) -> Option<(f64, Mat<f64>)> {
+    // Scale the fields to unit mass.
     let scale: Vec<f64> =
         (0..m.nrows()).map(|i| if m[(i, i)] > 0.0 { m[(i, i)].sqrt().recip() } else { 0.0 }).collect();
     let scaled = |a: &Mat<f64>| {
@@ -300,11 +302,13 @@ fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>, kept_above: f64) -> Option<(f64, M
     };
     let eigen = symmetric_eigen(scaled(m).as_ref())?;
     let largest = *eigen.values.last()?;
+    // Directions of M above rounding.
     let kept: Vec<usize> =
         (0..eigen.values.len()).filter(|&i| eigen.values[i] > kept_above * largest).collect();
     let root = Mat::from_fn(m.nrows(), kept.len(), |i, c| {
         eigen.vectors[(i, kept[c])] / eigen.values[kept[c]].sqrt()
     });
+    // Lowest eigenpair of K in these directions, back in the unscaled fields.
     let projected = gram(root.as_ref(), combine(scaled(k).as_ref(), root.as_ref()).as_ref());
     let ratios = symmetric_eigen(projected.as_ref())?;
     let ratio = *ratios.values.first()?;

@@ -36,12 +36,14 @@ pub(super) fn along_the_model(model: &FeModel, mut raw: RawModes) -> Result<RawM
 /// # Errors
 /// [`ShapesSize`](Code::ShapesSize), [`ShapesZero`](Code::ShapesZero).
 pub(super) fn by_rows(model: &FeModel, raw: &RawModes) -> Result<(Mat<f64>, Vec<Diagnostic>)> {
+    // Place of each row in the file.
     let places: HashMap<_, usize> =
         raw.labels.iter().enumerate().map(|(place, label)| (*label, place)).collect();
     let n = model.stiffness().n();
     let place: Vec<Option<usize>> = (0..n).map(|row| places.get(&model.label(row)).copied()).collect();
     let missing: Vec<usize> = (0..n).filter(|row| place[*row].is_none()).collect();
     refuse_too_few(model, raw, &missing)?;
+    // Values of the file; missing rows are zero until they are completed.
     let value = |row: usize, mode: usize| place[row].map_or(0.0, |at| raw.matrix[(at, mode)]);
     let mut shapes = Mat::from_fn(n, raw.matrix.ncols(), value);
     if let Some(mode) = (0..shapes.ncols()).find(|mode| shapes.col(*mode).norm_max() == 0.0) {
@@ -89,6 +91,7 @@ fn some_nodes(model: &FeModel, rows: &[usize]) -> String {
 /// x_b.
 fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &RawModes) -> Result<()> {
     let whole = model.pencil();
+    // Submatrices of the missing rows.
     let stiffness = whole.stiffness().principal(missing);
     let mass = principal_mass(&whole, missing);
     let pencil = Pencil::new(&stiffness, &mass, 1);
@@ -102,9 +105,11 @@ fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &Raw
     for (mode, eigenvalue) in raw.eigenvalues.iter().enumerate() {
         let lambda = eigenvalue.unwrap_or(0.0).max(0.0);
         let shape = shapes.as_ref().subcols(mode, 1);
+        // Force of the known rows on the missing ones.
         let (elastic, inertial) = (whole.apply_stiffness(shape), whole.apply_mass(shape));
         let force = |i: usize, _| lambda * inertial[(missing[i], 0)] - elastic[(missing[i], 0)];
         let mut values = Mat::from_fn(missing.len(), 1, force);
+        // Solve for the missing rows, unless the factor is inaccurate.
         let factor = Indefinite::<f64>::new(&analysis, &pencil, lambda);
         let inertia = factor.inertia();
         if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > MAX_BACKWARD_ERROR

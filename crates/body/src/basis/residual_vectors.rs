@@ -360,6 +360,7 @@ fn beside_modes(
     let precision = free.plan.as_ref().map_or(Precision::Double, Plan::precision);
     let mut beside = Mat::zeros(loads.forces.nrows(), loads.forces.ncols());
     for ((hertz, square), columns) in loads.by_frequency() {
+        // Loads of one frequency are solved together.
         let forces = Mat::from_fn(beside.nrows(), columns.len(), |i, c| loads.forces[(i, columns[c])]);
         let responses = if square == 0.0 {
             static_responses(problem, modes, forces, first, precision, accuracy, context)
@@ -418,6 +419,7 @@ impl<'a> Responses<'a> {
         let in_stiffness =
             |x: &Mat<f64>| column_products(x.as_ref(), pencil.apply_stiffness(x.as_ref()).as_ref());
         let in_mass = |x: &Mat<f64>| column_products(x.as_ref(), pencil.apply_mass(x.as_ref()).as_ref());
+        // Energies of the whole responses and of their parts outside the modes.
         let energy = in_stiffness(&whole);
         let deforms = deforming(problem, forces, &energy);
         Self {
@@ -438,6 +440,7 @@ impl<'a> Responses<'a> {
         let names = &self.loads.names;
         let mut dropped: Vec<String> = Vec::new();
         let mut used = Vec::new();
+        // Drop loads that deform nothing, and responses that the modes already contain.
         for (j, name) in names.iter().enumerate() {
             let left = self.mass_beside[j].max(0.0);
             if !self.deforms[j] {
@@ -448,6 +451,7 @@ impl<'a> Responses<'a> {
                 used.push(j);
             }
         }
+        // M-orthonormalise the others against rigid motions, modes and each other.
         let candidates = Mat::from_fn(self.beside.nrows(), used.len(), |i, j| self.beside[(i, used[j])]);
         let known = side_by_side(&[problem.rigid, modes]);
         let found = independent(&problem.pencil, known.as_ref(), candidates, MIN_RESPONSE_REMAINDER)?;
@@ -457,6 +461,7 @@ impl<'a> Responses<'a> {
         );
         dropped.extend(found.massless.iter().map(|&j| format!("{} (moves no mass)", name(j))));
         dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", name(j))));
+        // The load of each vector.
         let retained = found.retained.iter().map(|&j| used[j]).collect();
         Some(Added { vectors: found.vectors, retained, dropped })
     }
@@ -479,6 +484,7 @@ impl<'a> Responses<'a> {
     /// Returns the relative truncation error of each static response, for the free modes alone and for the
     /// modes of the extended span.
     fn truncation(mut self, problem: &EigenProblem<'_>, ritz: &EigenSolution) -> Vec<Truncation> {
+        // Whole response minus its part in the extended span.
         let modal = gram(ritz.vectors.as_ref(), self.loads.forces.as_ref());
         let amplitudes =
             Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| -modal[(p, j)] / ritz.eigenvalues[p]);
@@ -497,6 +503,7 @@ impl<'a> Responses<'a> {
 
 /// Returns, for every load, true if the load does more than move the body as a rigid body.
 fn deforming(problem: &EigenProblem<'_>, forces: &Mat<f64>, energy: &[f64]) -> Vec<bool> {
+    // Loads in equilibrium with the inertia forces of rigid motion.
     let resultants = gram(problem.rigid, forces.as_ref());
     let equilibrated = forces - problem.pencil.apply_mass(problem.rigid) * resultants;
     let deforms = |j: usize| {

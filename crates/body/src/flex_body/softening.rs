@@ -45,6 +45,7 @@ impl FlexBody {
             let mut omega = Vector3::ith(axis, 1.0);
             let (mut part, mut motion) = self.softest_motion(&omega)?;
             for _ in 0..MAX_AXIS_STEPS {
+                // Spin axis that softens the present motion most, then the motion that it softens most.
                 let next = largest_direction(&self.softening_of(&motion)?);
                 let (greater, other) = self.softest_motion(&next)?;
                 let is_done = greater <= part * (1.0 + MIN_GROWTH);
@@ -57,6 +58,7 @@ impl FlexBody {
             }
             Some((omega, part))
         };
+        // The best of the three searches.
         let all = (0..3).map(from_axis).collect::<Option<Vec<_>>>()?;
         let (omega, part) =
             all.into_iter().reduce(|a, b| if b.1 > a.1 * (1.0 + MIN_GROWTH) { b } else { a })?;
@@ -66,6 +68,7 @@ impl FlexBody {
 
     /// Returns the softened part at `omega`, and the most softened motion, scaled to unit stiffness.
     fn softest_motion(&self, omega: &Vector3<f64>) -> Option<(f64, Vec<f64>)> {
+        // Stiffness of inertia at this spin, from its six components.
         let inertia = self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness);
         let spins = inertia.filter(|one| one.load.kind == LoadKind::Spin);
         let of_inertia = spins.fold(None, |sum: Option<Mat<f64>>, one| {
@@ -85,6 +88,7 @@ impl FlexBody {
         let quadratic = |entry: &dyn Fn(usize, usize) -> f64| -> f64 {
             (0..nf).map(|i| motion[i] * (0..nf).map(|j| entry(i, j) * motion[j]).sum::<f64>()).sum()
         };
+        // W2 contributes w_a w_b q'W2_ab q, the stiffness of inertia is subtracted.
         let mut parts = Matrix3::from_fn(|a, b| quadratic(&|i, j| w2[(a * nf + i, b * nf + j)]));
         for one in self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness) {
             if one.load.kind == LoadKind::Spin {

@@ -293,6 +293,7 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel:
     let n = columns.rows();
     let lanes = panel.len().div_ceil(LANE_COLUMNS);
     let (before, width) = (panel.start, lanes * LANE_COLUMNS);
+    // Columns of the panel, node by node.
     let mut x = Aligned::zeros(n * width);
     x.get_mut().par_chunks_mut(ROWS_PER_PRODUCT * width).enumerate().for_each(|(chunk, rows)| {
         columns.by_node(chunk * ROWS_PER_PRODUCT, panel.clone(), width, rows);
@@ -306,6 +307,7 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel:
         let mut sum = Mat::<f64>::zeros(before + width, width);
         for first in nodes.clone().step_by(ROWS_PER_PRODUCT) {
             let rows = ROWS_PER_PRODUCT.min(nodes.end - first);
+            // Ms X of a chunk of rows.
             let product = &mut product.get_mut()[..rows * width];
             let targets = product.as_chunks_mut::<LANE_COLUMNS>().0;
             arch.dispatch(MassTimes { mass, first, x: x_lanes, lanes, targets });
@@ -313,6 +315,7 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel:
             let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
             let product = transposed(product, width).transpose();
             let (top, bottom) = sum.as_mut().split_at_row_mut(before);
+            // Products of the earlier columns, and of the panel itself, with this chunk.
             if before > 0 {
                 let earlier = &mut earlier.get_mut()[..rows * before];
                 columns.by_node(first, 0..before, before, earlier);

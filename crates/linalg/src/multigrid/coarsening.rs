@@ -134,6 +134,7 @@ pub(super) struct Aggregates<const B: usize, const C: usize> {
 
 impl<const B: usize, const C: usize> Aggregates<B, C> {
     pub(super) fn new(strong: &Strong, motions: &Motions<B, C>) -> Self {
+        // Members of each group.
         let (of_node, count) = aggregates(strong);
         let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
         of_node.iter().enumerate().for_each(|(node, &group)| members[group as usize].push(node as u32));
@@ -143,6 +144,7 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
             .with_min_len(GROUPS_PER_TASK)
             .map(|members| orthonormal(members.iter().map(|&node| motions[node as usize]).collect()))
             .collect();
+        // Rows of each node in the basis of its group.
         let mut basis = vec![[[0.0; C]; B]; of_node.len()];
         for (members, (rows_of_group, _)) in members.iter().zip(&found) {
             members.iter().zip(rows_of_group).for_each(|(&node, rows)| basis[node as usize] = *rows);
@@ -154,6 +156,7 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
     pub(super) fn masses(&self, nodes: &[Block<B, B>]) -> Vec<Block<C, C>> {
         let mut masses = vec![[[0.0; C]; C]; self.count];
         for ((&group, basis), mass) in self.of_node.iter().zip(&self.basis).zip(nodes) {
+            // B' M B of the node, added to its group.
             let mut moved = [[0.0; C]; B];
             add_product(&mut moved, mass, basis);
             let transposed = std::array::from_fn(|c| std::array::from_fn(|b| basis[b][c]));
@@ -170,9 +173,11 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
         omega: f64,
     ) -> BlockMatrix<B, C> {
         let row = |sums: &mut Sums<B, C>, node: usize| {
+            // Row of A times the basis, summed by groups.
             a.visit(node, |column, block| {
                 add_product(sums.at(self.of_node[column]), block, &self.basis[column]);
             });
+            // Basis minus omega D^-1 times that row.
             sums.take(|column, force| {
                 let mut moved = [[0.0; C]; B];
                 add_product(&mut moved, &inverse[node], force);
@@ -197,6 +202,7 @@ fn orthonormal<const B: usize, const C: usize>(mut motions: Motions<B, C>) -> (M
         motions.iter().flatten().map(|row| row[i] * row[j]).sum()
     };
     for j in 0..C {
+        // Remove the parts along the motions before; twice, against rounding.
         let before = product(&motions, j, j).sqrt();
         for _ in 0..2 {
             for i in 0..j {
@@ -205,6 +211,7 @@ fn orthonormal<const B: usize, const C: usize>(mut motions: Motions<B, C>) -> (M
                 motions.iter_mut().flatten().for_each(|row| row[j] -= along * row[i]);
             }
         }
+        // Normalise, or drop a dependent motion.
         let length = product(&motions, j, j).sqrt();
         let is_new = length > DEPENDENT_MOTION_LENGTH * before;
         coefficients[j][j] = if is_new { length } else { 0.0 };

@@ -64,6 +64,7 @@ impl<'a> Deflation<'a> {
     /// (2000) 1909).
     pub(super) fn project<const B: usize>(&self, z: &mut [Rows<B>], pairs: &[Option<usize>; WIDTH]) {
         let nodes = ROWS_PER_PARTIAL_PRODUCT / B;
+        // Partial products of a chunk of rows with M X and K X.
         let products = |(chunk, z): (usize, &[Rows<B>])| {
             let (start, rows) = (chunk * nodes * B, z.len() * B);
             let z = MatRef::from_row_major_slice(z.as_flattened().as_flattened(), rows, WIDTH);
@@ -79,6 +80,7 @@ impl<'a> Deflation<'a> {
         let sum = |block: usize, i: usize, w: usize| -> f64 {
             parts.iter().map(|part| f64::from(part[block][(i, w)])).sum()
         };
+        // Coefficients: conjugate for modes apart from the pair, M-orthogonal for all others.
         let along = Mat::from_fn(self.x.ncols(), WIDTH, |i, w| {
             let (heavy, mode) = (sum(0, i, w), i.checked_sub(self.rigid));
             let conjugate = mode.zip(pairs[w]).and_then(|(mode, pair)| {
@@ -89,6 +91,7 @@ impl<'a> Deflation<'a> {
             });
             conjugate.unwrap_or(heavy) as f32
         });
+        // z <- z - X times the coefficients.
         z.par_chunks_mut(nodes).enumerate().for_each(|(chunk, z)| {
             let (start, rows) = (chunk * nodes * B, z.len() * B);
             let z = MatMut::from_row_major_slice_mut(z.as_flattened_mut().as_flattened_mut(), rows, WIDTH);

@@ -128,6 +128,7 @@ impl<const B: usize> SymmetricBlocks<B> for Shifted<'_, B> {
 
 impl<const B: usize, const C: usize> Hierarchy<B, C> {
     fn new(pencil: &Pencil<'_>, rigid: MatRef<'_, f64>, tau: f64) -> Option<Self> {
+        // Scale of K + tau M, so that single precision holds the entries in any units.
         let size = largest(pencil.stiffness().diagonal());
         let has_size = size > 0.0 && size.is_finite();
         if !has_size {
@@ -142,6 +143,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
             block
         };
         let masses = pencil.mass().diagonal().into_iter().map(scaled).collect();
+        // The finest level, with its masses in the order of its blocks.
         let (fine, mut next) = Level::new(&shifted, &unit_motions(rigid), masses, FINEST_STRONG_COUPLING)?;
         let mass = masses_beside(fine.matrix(), pencil.mass(), 1.0 / heaviest);
         let mut coarser = Vec::new();
@@ -155,6 +157,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
             coarser.push(level);
             next = after;
         }
+        // The coarsest level is solved exactly.
         let inverse_of_bottom = dense_inverse(dense(&next.a))?;
         let masses = next.masses;
         Some(Self { fine, coarser, inverse_of_bottom, masses, mass, heaviest, size, tau })
@@ -178,6 +181,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
     /// Returns the lowest modes of the coarsest level, by inverse iterations from random vectors.
     fn bottom_modes(&self, count: usize) -> Option<Mat<f64>> {
         let n = self.inverse_of_bottom.nrows();
+        // Start from random vectors.
         let mut x = Mat::from_fn(n, count.min(n), |i, j| f64::from(noise(i * count + j)));
         for _ in 0..COARSEST_INVERSE_ITERATIONS {
             let product = |i: usize, j: usize| -> f64 {
@@ -200,8 +204,10 @@ impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
     }
 
     fn rough_modes(&self, count: usize) -> Option<Mat<f64>> {
+        // Rough modes of the coarsest level.
         let mut x = self.bottom_modes(count)?;
         for (at, level) in self.coarser.iter().enumerate().rev() {
+            // Prolong to the next finer level, and improve there by inverse iterations.
             x = unit_columns(by_width(&x, level.nodes(), |x| level.prolonged(&x)));
             for _ in 0..LEVEL_INVERSE_ITERATIONS {
                 let improved = |x: Vec<Rows<C>>| self.coarse_cycle(&self.coarser[at..], level.with_mass(&x));
@@ -219,6 +225,7 @@ impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
     ) -> u64 {
         let ratio = self.heaviest / self.size;
         let pencil = SmallPencil { a: self.fine.matrix(), mass: &self.mass, tau: self.tau, ratio };
+        // Conjugate gradients on the finest level, with one cycle as the preconditioner.
         let cycle = |b: &[Rows<B>]| self.cycle(b);
         let deflation = Deflation::new(near);
         Corrections { pencil, cycle, deflation, eigenvalues: near.eigenvalues }.solve(targets, forces)

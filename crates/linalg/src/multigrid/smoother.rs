@@ -75,9 +75,11 @@ impl<const B: usize> Smoother<B> {
                 .enumerate()
                 .map(|(node, u)| self.divided(node, u))
                 .collect();
+            // Normalise in the inner product of D: v' D v = 1.
             let length = products(&v, &u).map(f64::sqrt);
             let scale = length.map(|length| if length > 0.0 { (1.0 / length) as f32 } else { 0.0 });
             [&mut u, &mut v].into_iter().for_each(|x| scale_columns(x, &scale));
+            // Next vector: A v without its parts along this vector and the one before.
             let mut next = self.a.apply(&v, |_, av| *av);
             let along = products(&v, &next);
             let weights = along.map(|along| along as f32);
@@ -144,6 +146,7 @@ impl<const B: usize> Smoother<B> {
 
     /// Returns the factors of the Chebyshev iteration on the damped part of the spectrum.
     fn steps(&self) -> Steps {
+        // The damped part of the spectrum, by its middle and half its length.
         let high = f64::from(self.largest);
         let low = DAMPED_SPECTRUM_START * high;
         let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
