@@ -78,7 +78,7 @@ impl Sets {
     /// is an error as a whole.
     pub(super) fn extend(&mut self, name: &str, members: Found<Member>) {
         let wanted = comparable(name);
-        let Some((_, key)) = self.all.iter_mut().find(|(key, _)| comparable(key) == wanted) else {
+        let Some((_, set)) = self.all.iter_mut().find(|(key, _)| comparable(key) == wanted) else {
             return self.all.push((name.to_owned(), members));
         };
         match (set.as_mut(), members) {
