@@ -176,7 +176,7 @@ fn what_the_model_or_the_result_contradicts_is_refused() {
     let parts = json!([{ "file": "kept-0001.petsc", "sha256": "", "vectors": 4 }]);
     let kept = json!({ "matrices": job.result["matrices"], "parts": parts });
     fs::write(job.path("checkpoint.jsonl"), sealed("flexbody-kept", &kept)).expect("written");
-    job.refused(&[], "FB763", 2, "4 modes are kept");
+    job.refused(&[], "FB763", 2, "4 modes are saved");
     job.write();
     let other = manifest("cube_hex8").display().to_string();
     job.refused(&["--model", &other], "FB762", 2, "differ from those that the folder was prepared with");

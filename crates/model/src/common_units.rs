@@ -2,12 +2,10 @@
 
 /// Returns advice on numbers without stated units, with the units in which they are plausible.
 pub(super) fn state_units(fitting: &str) -> String {
-    let advice = match fitting {
-        "" => "state the units".to_owned(),
-        fitting => format!("state the units: the numbers fit materials in {fitting}"),
-    };
+    let reason =
+        if fitting.is_empty() { String::new() } else { format!(": the numbers fit materials in {fitting}") };
     format!(
-        "{advice} with --units LENGTH,MASS,TIME, or [model.units] in the manifest; use --allow-implausible (or allow_implausible in [model]) if m, kg, s are intended"
+        "state the units with --units LENGTH,MASS,TIME, or [model.units] in the manifest{reason}; use --allow-implausible (or allow_implausible in [model]) if m, kg, s are intended"
     )
 }
 

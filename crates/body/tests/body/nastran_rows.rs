@@ -204,7 +204,7 @@ fn constraints_that_cannot_be_applied_are_named() {
         ("MPC,7,35,1,1.0,38,1,-1.0\n", ["MPC 7", "does not select the set"]),
         ("RSPLINE,5,0.1,11,17,123,35\n", ["RSPLINE 5", "not supported"]),
         ("RBE3,6,,29,123,1.0,123,11,17\n,35,UM,11,1,17\n,1,35,1\n", ["RBE3 6", "not supported"]),
-        ("RBE2,1,29,123456,38\nRBE2,2,11,123,38\n", ["RBE2 2", "follows by RBE2 1"]),
+        ("RBE2,1,29,123456,38\nRBE2,2,11,123,38\n", ["RBE2 2", "is also dependent by RBE2 1"]),
         ("RBE2,1,29,123456,38\nRBE2,2,38,123456,29\n", ["RBE2 2", "depends on itself"]),
         ("RBAR,3,29,38,123,45\n", ["RBAR 3", "5 independent components"]),
         ("RBAR,3,29,38,123,123,4,\n", ["RBAR 3", "all rigid motions"]),

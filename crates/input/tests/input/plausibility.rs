@@ -352,7 +352,8 @@ fn numbers_without_units_are_those_of_matter() {
             "{error}"
         );
         assert!(
-            found.help().contains("those of matter in mm, t, s: state the units with --units"),
+            found.help().starts_with("state the units with --units")
+                && found.help().contains("the numbers fit materials in mm, t, s;"),
             "{error}"
         );
         let codes = told(RawModel { allow_implausible: true, ..raw.clone() });
