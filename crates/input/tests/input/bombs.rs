@@ -133,7 +133,7 @@ fn a_variable_of_matlab_has_no_more_bytes_than_its_extents_leave() {
     assert_refused(
         &path,
         Code::MatrixCount,
-        "a variable has 32000000 bytes but its extents allow at most 4000000",
+        "a variable has 32000000 bytes, but its extents allow at most 4000000",
     );
 }
 
