@@ -64,9 +64,10 @@
 //! ```
 //! use flexbody::{ConvertOptions, Model, Scene};
 //! # fn main() -> flexbody::Result<()> {
-//! let body = Model::read("fixtures/models/bracket_hex20/model.toml")?.convert(&ConvertOptions::default().modes(6))?.body;
-//! let motion = body.simulate(&Scene::read("fixtures/scenes/tumbling.toml")?)?;
-//! println!("a node is deflected by {} at most", motion.largest_deflection());
+//! let body =
+//! Model::read("fixtures/models/bracket_hex20/model.toml")?.convert(&ConvertOptions::default().modes(6))?.body;
+//! let motion = body.simulate(&Scene::read("fixtures/scenes/tumbling.toml")?)?; println!("a node is deflected
+//! by {} at most", motion.largest_deflection());
 //! # assert!(motion.largest_deflection() > 0.0);
 //! # Ok(())
 //! # }
@@ -134,6 +135,6 @@ pub use flexbody_base::error::{Error, ExitCode, Result};
 #[doc(hidden)]
 pub mod program {
     pub use crate::cli::{Arguments, end, end_without_unfinished_files, parse, run, use_threads};
-    pub use flexbody_base::memory::goes_without;
+    pub use flexbody_base::memory::accepts_failure;
     pub use flexbody_base::output::abandon_unfinished_soon;
 }

@@ -3,7 +3,7 @@
 #![allow(unsafe_code)] // an allocator, and calls of the C library that set limits of a process
 
 use flexbody::ExitCode;
-use flexbody::program::{abandon_unfinished_soon, end, goes_without};
+use flexbody::program::{abandon_unfinished_soon, accepts_failure, end};
 use mimalloc::MiMalloc;
 use std::alloc::{GlobalAlloc, Layout};
 use std::cell::Cell;
@@ -44,7 +44,7 @@ unsafe impl GlobalAlloc for Allocator {
 
 #[inline]
 fn sound(block: *mut u8, size: usize) -> *mut u8 {
-    if block.is_null() && !goes_without() {
+    if block.is_null() && !accepts_failure() {
         out_of_memory(size);
     }
     block

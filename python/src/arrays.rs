@@ -75,9 +75,9 @@ pub fn vector3(given: &Given<'_>, name: &str) -> PyResult<Vector3<f64>> {
 
 /// Cache of arrays for attributes. The arrays are read-only, since all users share them.
 #[derive(Default)]
-pub struct Kept(Mutex<HashMap<&'static str, Py<PyAny>>>);
+pub struct ArrayCache(Mutex<HashMap<&'static str, Py<PyAny>>>);
 
-impl Kept {
+impl ArrayCache {
     /// Returns the array of this name, which `make` creates at the first request.
     pub fn get<'py>(
         &self,

@@ -82,13 +82,13 @@ impl Body {
     /// Node numbers (n), int64.
     #[getter]
     fn node_ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, "node_ids", || Ok(PyArray1::from_slice(py, self.inner.node_ids()).into_any()))
+        self.cache.get(py, "node_ids", || Ok(PyArray1::from_slice(py, self.inner.node_ids()).into_any()))
     }
 
     /// Positions of the nodes in the body frame (n x 3). Unit: length.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, "positions", || triples(py, self.inner.positions()))
+        self.cache.get(py, "positions", || triples(py, self.inner.positions()))
     }
 
     /// Origin of the body frame in model coordinates (3). Unit: length.
@@ -100,7 +100,7 @@ impl Body {
     /// Axes of the body frame as columns, in model axes (3 x 3): x_model = origin + axes @ x_body.
     #[getter]
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, "axes", || matrix3(py, &self.inner.frame().1))
+        self.cache.get(py, "axes", || matrix3(py, &self.inner.frame().1))
     }
 
     /// Frequencies of the modes, ascending (nf). Unit: Hz.
@@ -142,14 +142,14 @@ impl Body {
     /// Psi (nf x n x 3): displacements of the nodes in each mode, shapes[j] for mode j. Unit: 1/sqrt(mass).
     #[getter]
     fn shapes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, "shapes", || by_node(py, &self.inner.shapes()))
+        self.cache.get(py, "shapes", || by_node(py, &self.inner.shapes()))
     }
 
     /// Rotations of the nodes in each mode (nf x n x 3), zero at nodes without rotations; None for models with
     /// displacements only. Unit: 1/(length sqrt(mass)).
     #[getter]
     fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, "rotations", || match self.inner.rotations() {
+        self.cache.get(py, "rotations", || match self.inner.rotations() {
             Some(rotations) => by_node(py, &rotations),
             None => Ok(py.None().into_bound(py)),
         })
@@ -170,13 +170,13 @@ impl Body {
     /// Second moment J = sum m x x' (3 x 3). Unit: mass length^2.
     #[getter]
     fn second_moment<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, "second_moment", || matrix3(py, &self.inner.second_moment()))
+        self.cache.get(py, "second_moment", || matrix3(py, &self.inner.second_moment()))
     }
 
     /// I0 (3 x 3): inertia of the undeformed body. Unit: mass length^2.
     #[getter(I0)]
     fn i0<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, "I0", || matrix3(py, &self.inner.inertia()))
+        self.cache.get(py, "I0", || matrix3(py, &self.inner.inertia()))
     }
 
     /// W0 (3 x 3nf): linear momentum of rotation, linear in the modal coordinates. Unit: sqrt(mass).
@@ -281,10 +281,10 @@ impl Body {
     /// of_modes); None for other bodies.
     #[getter]
     fn interface_coordinates<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let Some(own) = self.inner.interface_coordinates() else { return Ok(None) };
+        let Some(coordinates) = self.inner.interface_coordinates() else { return Ok(None) };
         let class = py.import("flexbody._types")?.getattr("InterfaceCoordinates")?;
-        let (stiffness, mass) = (matrix(py, &own.stiffness)?, matrix(py, &own.mass)?);
-        class.call1((own.names, stiffness, mass, matrix(py, &own.of_modes)?)).map(Some)
+        let (stiffness, mass) = (matrix(py, &coordinates.stiffness)?, matrix(py, &coordinates.mass)?);
+        class.call1((coordinates.names, stiffness, mass, matrix(py, &coordinates.of_modes)?)).map(Some)
     }
 
     /// Decisions about the groups of the kinetic energy: list of (name, true if it is kept, reason). Empty if no
@@ -299,9 +299,9 @@ impl Body {
     fn lumped_errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         for (scheme, errors) in self.inner.lumped_errors() {
-            let own = PyDict::new(py);
-            errors.iter().try_for_each(|(name, value)| own.set_item(name, value))?;
-            all.set_item(scheme, own)?;
+            let of_scheme = PyDict::new(py);
+            errors.iter().try_for_each(|(name, value)| of_scheme.set_item(name, value))?;
+            all.set_item(scheme, of_scheme)?;
         }
         Ok(all)
     }
@@ -354,13 +354,13 @@ impl Body {
     /// file.
     fn select(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Selection> {
         let (scene, body) = (Scene::whole(py, scene)?, Arc::clone(&self.inner));
-        Selection::told(py, run(py, move |listener| body.select_with_progress(&scene, listener))?)
+        Selection::with_warnings(py, run(py, move |listener| body.select_with_progress(&scene, listener))?)
     }
 
     /// Simulates the body in a scene: a Scene, or the path of a scene file without load cases.
     fn simulate(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Motion> {
         let (scene, body) = (Scene::one(py, scene)?, Arc::clone(&self.inner));
-        Motion::told(py, run(py, move |listener| body.simulate_with_progress(&scene, listener))?)
+        Motion::with_warnings(py, run(py, move |listener| body.simulate_with_progress(&scene, listener))?)
     }
 
     /// Measures accuracy against cost in a scene for reduced versions of this body. `Model.trade` compares conversions.
@@ -368,7 +368,7 @@ impl Body {
     fn trade(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, repeat: usize) -> PyResult<Trade> {
         let (scene, body) = (Scene::whole(py, scene)?, Arc::clone(&self.inner));
         let options = trade_options(self.inner.n_modes(), repeat, "full")?;
-        Trade::told(py, run(py, move |listener| body.trade(&scene, &options, listener))?)
+        Trade::with_warnings(py, run(py, move |listener| body.trade(&scene, &options, listener))?)
     }
 
     /// Returns the report of `flexbody inspect`: a dict with all numbers, or "json", "text", "html" as a str.

@@ -1,6 +1,6 @@
 //! The class of flexible bodies, on which the studies that return bodies depend. Its Python methods are in `body.rs`.
 
-use crate::arrays::{Kept, matrix, vector};
+use crate::arrays::{ArrayCache, matrix, vector};
 use flexbody::{Diagnostic, FlexBody, Matrix};
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ pub struct Body {
     pub inner: Arc<FlexBody>,
     pub diagnostics: Vec<Diagnostic>,
     /// Arrays that Python has requested.
-    pub kept: Kept,
+    pub cache: ArrayCache,
 }
 
 impl PartialEq for Body {
@@ -26,7 +26,7 @@ impl PartialEq for Body {
 
 impl Body {
     pub fn new(inner: FlexBody, diagnostics: Vec<Diagnostic>) -> Self {
-        Self { inner: Arc::new(inner), diagnostics, kept: Kept::default() }
+        Self { inner: Arc::new(inner), diagnostics, cache: ArrayCache::default() }
     }
 
     pub fn numbers<'py>(
@@ -35,7 +35,7 @@ impl Body {
         name: &'static str,
         of: &[f64],
     ) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, name, || Ok(vector(py, of)))
+        self.cache.get(py, name, || Ok(vector(py, of)))
     }
 
     /// Returns a matrix, or None if the body has none of this name.
@@ -45,8 +45,8 @@ impl Body {
         name: &'static str,
         of: impl FnOnce(&FlexBody) -> Option<Matrix>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, name, || match of(&self.inner) {
-            Some(own) => matrix(py, &own),
+        self.cache.get(py, name, || match of(&self.inner) {
+            Some(given) => matrix(py, &given),
             None => Ok(py.None().into_bound(py)),
         })
     }

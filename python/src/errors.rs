@@ -20,7 +20,7 @@ pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
 
 /// Returns the exception for an internal error of the library.
 pub fn bug(py: Python<'_>) -> PyErr {
-    let message = "the library stopped at a contradiction of its own";
+    let message = "an internal check of the library failed";
     exception(py, &Diagnostic::new(flexbody::Code::Internal, message).into())
 }
 

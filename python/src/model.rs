@@ -116,7 +116,7 @@ fn convert_options(
 }
 
 impl Model {
-    fn told(py: Python<'_>, inner: flexbody::Model) -> PyResult<Self> {
+    fn with_warnings(py: Python<'_>, inner: flexbody::Model) -> PyResult<Self> {
         warn(py, inner.diagnostics())?;
         Ok(Self { inner: Arc::new(inner) })
     }
@@ -174,7 +174,7 @@ impl Model {
         if allow_implausible {
             builder = builder.allow_implausible();
         }
-        Self::told(py, run(py, move |_| builder.build())?)
+        Self::with_warnings(py, run(py, move |_| builder.build())?)
     }
 
     /// Reads the model of a manifest, or of the job of an FE program, for `flexbody.read_model`.
@@ -189,10 +189,10 @@ impl Model {
     ) -> PyResult<Self> {
         if path.extension().is_some_and(|extension| extension == "toml") {
             if program.is_some() || units.is_some() || !sets.is_empty() {
-                let message = "a manifest states program, units and interfaces itself";
+                let message = "program, units and interfaces are given together with a manifest (.toml), which states them itself: leave them out";
                 return Err(PyValueError::new_err(message));
             }
-            return Self::told(py, run(py, move |_| flexbody::Model::read(path))?);
+            return Self::with_warnings(py, run(py, move |_| flexbody::Model::read(path))?);
         }
         let couplings: Vec<Option<Coupling>> =
             sets.iter().map(|(_, _, how)| coupling(how.as_deref())).collect::<PyResult<_>>()?;
@@ -205,7 +205,7 @@ impl Model {
             let units = units.as_ref().map(|units| units.each_ref().map(String::as_str));
             flexbody::Model::read_job(path, program.as_deref(), units, &sets)
         })?;
-        Self::told(py, read)
+        Self::with_warnings(py, read)
     }
 
     /// Name of the model.
@@ -290,7 +290,7 @@ impl Model {
     ) -> PyResult<Trade> {
         let (scene, options) = (Scene::whole(py, scene)?, trade_options(modes, repeat, reference)?);
         let model = Arc::clone(&self.inner);
-        Trade::told(py, run(py, move |listener| model.trade(&scene, &options, listener))?)
+        Trade::with_warnings(py, run(py, move |listener| model.trade(&scene, &options, listener))?)
     }
 
     fn __repr__(&self) -> String {

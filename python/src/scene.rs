@@ -1,6 +1,6 @@
 //! Scenes, the motion of bodies in them, and the selection of terms and modes.
 
-use crate::arrays::{Kept, shaped, triples, vector};
+use crate::arrays::{ArrayCache, shaped, triples, vector};
 use crate::errors::{diagnostics, warn};
 use crate::report::report;
 use crate::work::{alone, brief};
@@ -76,7 +76,7 @@ pub struct Selection {
 }
 
 impl Selection {
-    pub fn told(py: Python<'_>, inner: flexbody::Selection) -> PyResult<Self> {
+    pub fn with_warnings(py: Python<'_>, inner: flexbody::Selection) -> PyResult<Self> {
         warn(py, inner.diagnostics())?;
         Ok(Self { inner })
     }
@@ -115,9 +115,9 @@ impl Selection {
     }
 
     fn __repr__(&self) -> String {
-        let kept: Vec<&str> =
+        let cache: Vec<&str> =
             self.inner.groups().iter().filter(|group| group.1).map(|group| group.0).collect();
-        format!("<flexbody.Selection: {} modes, groups {}>", self.inner.modes().len(), kept.join(", "))
+        format!("<flexbody.Selection: {} modes, groups {}>", self.inner.modes().len(), cache.join(", "))
     }
 }
 
@@ -128,13 +128,13 @@ impl Selection {
 #[pyclass(frozen, module = "flexbody")]
 pub struct Motion {
     inner: flexbody::Motion,
-    kept: Kept,
+    cache: ArrayCache,
 }
 
 impl Motion {
-    pub fn told(py: Python<'_>, inner: flexbody::Motion) -> PyResult<Self> {
+    pub fn with_warnings(py: Python<'_>, inner: flexbody::Motion) -> PyResult<Self> {
         warn(py, inner.diagnostics())?;
-        Ok(Self { inner, kept: Kept::default() })
+        Ok(Self { inner, cache: ArrayCache::default() })
     }
 
     /// Returns the motion of the library.
@@ -149,7 +149,7 @@ impl Motion {
         name: &'static str,
         row: impl Fn(usize) -> R,
     ) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, name, || {
+        self.cache.get(py, name, || {
             let instants = self.inner.times().len();
             let all: Vec<f64> = (0..instants).flat_map(|instant| row(instant).as_ref().to_vec()).collect();
             let width = all.len() / instants.max(1);
@@ -164,7 +164,7 @@ impl Motion {
         name: &'static str,
         number: impl Fn(usize) -> f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, name, || {
+        self.cache.get(py, name, || {
             let all: Vec<f64> = (0..self.inner.times().len()).map(number).collect();
             Ok(vector(py, &all))
         })
@@ -176,7 +176,7 @@ impl Motion {
     /// Instants (nt). Unit: time.
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, "time", || Ok(vector(py, self.inner.times())))
+        self.cache.get(py, "time", || Ok(vector(py, self.inner.times())))
     }
 
     /// Modal coordinates q (nt x nf). Unit: sqrt(mass) length.

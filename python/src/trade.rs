@@ -21,7 +21,7 @@ pub fn options(modes: usize, repeat: usize, reference: &str) -> PyResult<TradeOp
 }
 
 impl Trade {
-    pub fn told(py: Python<'_>, inner: flexbody::Trade) -> PyResult<Self> {
+    pub fn with_warnings(py: Python<'_>, inner: flexbody::Trade) -> PyResult<Self> {
         warn(py, inner.diagnostics())?;
         Ok(Self { inner })
     }
@@ -79,6 +79,6 @@ impl Trade {
 
     fn __repr__(&self) -> String {
         let taken = self.inner.recommended().map_or_else(|| "none".to_owned(), |row| row.to_string());
-        format!("<flexbody.Trade: {} candidates, take {taken}>", self.inner.candidates())
+        format!("<flexbody.Trade: {} candidates, recommended {taken}>", self.inner.candidates())
     }
 }

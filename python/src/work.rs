@@ -23,15 +23,17 @@ static OWNER: AtomicU32 = AtomicU32::new(0);
 /// Starts the threads that compute, once. A process that was forked afterwards has none of them and would wait for
 /// their results forever: it gets an exception.
 fn start_threads(py: Python<'_>) -> PyResult<()> {
-    let own = std::process::id();
-    match OWNER.compare_exchange(0, own, Ordering::SeqCst, Ordering::SeqCst) {
+    let current = std::process::id();
+    match OWNER.compare_exchange(0, current, Ordering::SeqCst, Ordering::SeqCst) {
         Ok(_) => {
             py.detach(|| use_threads(None));
             Ok(())
         }
-        Err(owner) if owner == own => Ok(()),
+        Err(owner) if owner == current => Ok(()),
         Err(owner) => {
-            let message = format!("process {own} was forked from {owner} after the first work of that");
+            let message = format!(
+                "process {current} was forked from process {owner} after the first computation of that process"
+            );
             Err(exception(py, &Diagnostic::new(Code::Forked, message).into()))
         }
     }
@@ -48,12 +50,15 @@ pub fn run<T: Send + 'static>(
     start_threads(py)?;
     let stopped = Arc::new(AtomicBool::new(false));
     let (send, mut receive) = sync_channel(1);
-    let told = Arc::clone(&stopped);
+    let with_warnings = Arc::clone(&stopped);
     let worker = std::thread::Builder::new().name("flexbody".to_owned()).stack_size(STACK);
     worker.spawn(move || {
-        let listener = |_: flexbody::Progress<'_>| match told.load(Ordering::Relaxed) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        let listener = |_: flexbody::Progress<'_>| {
+            if with_warnings.load(Ordering::Relaxed) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         };
         // The result is dropped if the caller was interrupted.
         let _ = send.send(catch_unwind(AssertUnwindSafe(|| work(&listener))));

@@ -8,7 +8,7 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::convert::interface_compliance;
 use flexbody_body::flex_body;
-use flexbody_body::verification::own_identities;
+use flexbody_body::verification::body_identities;
 use flexbody_file::RecordedMotion;
 use flexbody_formats::export::ExportOptions;
 use flexbody_formats::{FORMATS, export, find_format};
@@ -211,7 +211,7 @@ impl FlexBody {
 
     /// Checks and returns all identities of the body.
     pub fn identities(&self) -> Vec<Identity> {
-        let checks = own_identities(&self.0).into_iter();
+        let checks = body_identities(&self.0).into_iter();
         checks
             .map(|check| Identity {
                 name: check.name,
@@ -251,18 +251,14 @@ impl FlexBody {
     /// use flexbody::dynamics::Evaluation;
     /// use flexbody::{ConvertOptions, Model};
     /// # fn main() -> flexbody::Result<()> {
-    /// let body = Model::read("fixtures/models/cube_hex8/model.toml")?.convert(&ConvertOptions::default().modes(6))?.body;
-    /// let node = body.node_point(body.node_ids()[0])?;
-    /// let equations = body.equations_of_motion();
-    /// let mut evaluation = Evaluation::new(&equations);
-    /// evaluation.set(&[1e-4; 6], &[0.1; 12]);
-    /// // A force does the power F v on the velocities nu, whatever the deformation.
-    /// let force = nalgebra::Vector3::new(1.0, 2.0, 3.0);
-    /// let mut generalised = vec![0.0; 12];
-    /// node.add_force(&evaluation, &force, &mut generalised);
-    /// let power: f64 = generalised.iter().map(|part| part * 0.1).sum();
-    /// assert!((power - force.dot(&node.velocity(&evaluation))).abs() < 1e-12);
-    /// assert!(body.node_point(-1).is_err());
+    /// let body =
+    /// Model::read("fixtures/models/cube_hex8/model.toml")?.convert(&ConvertOptions::default().modes(6))?.body; let
+    /// node = body.node_point(body.node_ids()[0])?; let equations = body.equations_of_motion(); let mut evaluation =
+    /// Evaluation::new(&equations); evaluation.set(&[1e-4; 6], &[0.1; 12]); // A force does the power F v on the
+    /// velocities nu, whatever the deformation. let force = nalgebra::Vector3::new(1.0, 2.0, 3.0); let mut generalised
+    /// = vec![0.0; 12]; node.add_force(&evaluation, &force, &mut generalised); let power: f64 =
+    /// generalised.iter().map(|part| part * 0.1).sum(); assert!((power - force.dot(&node.velocity(&evaluation))).abs()
+    /// < 1e-12); assert!(body.node_point(-1).is_err());
     /// # Ok(())
     /// # }
     /// ```

@@ -44,7 +44,7 @@ pub(super) fn heard<T>(listener: Listener<'_>, work: impl FnOnce(&Context<'_>) -
             resume_unwind(Box::new(Stopped));
         }
     };
-    match catch_unwind(AssertUnwindSafe(|| work(&Context::heard_by(&watch)))) {
+    match catch_unwind(AssertUnwindSafe(|| work(&Context::with_listener(&watch)))) {
         Ok(done) => done,
         Err(payload) if payload.is::<Stopped>() => {
             Err(Diagnostic::new(Code::Stopped, "the computation was stopped").into())

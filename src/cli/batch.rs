@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
         let inputs = inputs_of(words, converted);
         match ledger.done(&body.output, &inputs) {
             Some(done) => {
-                row.read(&done.told);
+                row.read(&done.summary);
                 row.state = "unchanged";
             }
             None => match need(body, converted, &watcher) {

@@ -7,7 +7,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::convert::poor_fits;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_body::verification::{changed_sources, own_identities, verify};
+use flexbody_body::verification::{body_identities, changed_sources, verify};
 use flexbody_input::read_model;
 use flexbody_model::{FeModel, RawModel};
 use flexbody_report::{dropped_text, identities_json, identities_text};
@@ -19,7 +19,7 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
     }
     let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     diagnostics.extend(poor_fits(&body));
-    let mut checks = own_identities(&body);
+    let mut checks = body_identities(&body);
     if let Some(path) = &arguments.against {
         let files = of_manifest_or_job(path, &arguments.job)?;
         let model = model_of(&body, read_model(&files)?)?;

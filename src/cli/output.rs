@@ -11,7 +11,7 @@ use super::{
 use clap::{CommandFactory, Parser};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{ExitCode, Result};
-use flexbody_base::memory::tell_left;
+use flexbody_base::memory::set_left;
 use flexbody_base::output::{begin_run, end_run, stand_by};
 use flexbody_base::read_files;
 use flexbody_report::output_json;
@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> ExitCode {
     let (name, printing) = command_of(arguments);
     read_files::begin_run();
     begin_run();
-    tell_left(|| memory_left(None));
+    set_left(|| memory_left(None));
     // Run inside the thread pool: from any other thread, every parallel loop would be handed over while this thread
     // sleeps.
     let outcome = rayon::scope(|_| outcome_of(arguments));

@@ -82,7 +82,7 @@ const LONGEST: f64 = 1800.0;
 /// and of time.
 pub(super) fn context(memory_limit: Option<u64>, allow_long: bool, watch: Watch<'_>) -> Context<'_> {
     let longest = (!allow_long).then_some(LONGEST);
-    Context { memory: memory_left(memory_limit), longest, ..Context::heard_by(watch) }
+    Context { memory: memory_left(memory_limit), longest, ..Context::with_listener(watch) }
 }
 
 /// Returns true if another thread can be started.

@@ -115,7 +115,7 @@ def killed(flexbody, folder):
     assert run.returncode != 0 and not (job / "result.jsonl").exists(), "the run was to be killed before its result"
     assert "signal 9" in said or "Killed" in said, said
     early = subprocess.run([str(flexbody), "assemble", str(job), "-o", str(folder / "early.flex.h5")], capture_output=True, text=True)
-    assert early.returncode == 2 and "modes are kept" in early.stderr, early.stderr
+    assert early.returncode == 2 and "modes are saved" in early.stderr, early.stderr
     again = drive(job, 2)
     assert again.returncode == 0 and "goes on from" in again.stderr, again.stderr
     body = folder / "again.flex.h5"

@@ -172,14 +172,14 @@ fn the_count_of_our_own_is_made_where_it_is_asked_for() {
 #[test]
 fn what_the_model_or_the_result_contradicts_is_refused() {
     let mut job = Job::new("bracket_hex20");
-    job.refused(&[], "FB763", 2, "no mode is kept yet");
+    job.refused(&[], "FB763", 2, "no mode is saved yet");
     let parts = json!([{ "file": "kept-0001.petsc", "sha256": "", "vectors": 4 }]);
     let kept = json!({ "matrices": job.result["matrices"], "parts": parts });
     fs::write(job.path("checkpoint.jsonl"), sealed("flexbody-kept", &kept)).expect("written");
-    job.refused(&[], "FB763", 2, "4 modes are kept");
+    job.refused(&[], "FB763", 2, "4 modes are saved");
     job.write();
     let other = manifest("cube_hex8").display().to_string();
-    job.refused(&["--model", &other], "FB762", 2, "not those that the folder was prepared with");
+    job.refused(&["--model", &other], "FB762", 2, "differ from those that the folder was prepared with");
 
     let matrices = std::mem::replace(&mut job.result["matrices"], "another".into());
     job.write();
@@ -190,7 +190,7 @@ fn what_the_model_or_the_result_contradicts_is_refused() {
     let right = job.vectors[(7, last)];
     job.vectors[(7, last)] += 1e-3 * right.abs().max(1e-3);
     job.write();
-    job.refused(&[], "FB764", 3, "no eigenvectors of the model");
+    job.refused(&[], "FB764", 3, "not eigenvectors of the model");
     job.vectors[(7, last)] = f64::NAN;
     job.write();
     job.refused(&[], "FB760", 2, "finite numbers");
@@ -220,7 +220,7 @@ fn products_of_condensation_are_held_to_the_mass_matrix() {
         let mut products = whole.clone();
         products[(i, j)] += 1e-9 * whole[(i, i)].abs().max(1e-3);
         job.write_condensed(&products);
-        job.refused(&[], "FB764", 3, "products of condensation are not those of the mass matrix");
+        job.refused(&[], "FB764", 3, "products of condensation differ from those of the mass matrix");
     }
     job.write_condensed(&whole.subcols(0, last).to_owned());
     job.refused(&[], "FB760", 2, "cannot be read");
@@ -229,7 +229,7 @@ fn products_of_condensation_are_held_to_the_mass_matrix() {
     let mut bytes = fs::read(job.path("condensed.petsc")).expect("a file");
     bytes[100] ^= 1;
     fs::write(job.path("condensed.petsc"), &bytes).expect("written");
-    job.refused(&[], "FB761", 1, "the products of condensation are not those");
+    job.refused(&[], "FB761", 1, "the products of condensation changed since");
     // Drivers of earlier versions did not compute these products.
     job.result.as_object_mut().expect("a table").remove("condensed_sha256");
     fs::write(job.path("result.jsonl"), sealed("flexbody-result", &job.result)).expect("written");
@@ -271,7 +271,7 @@ fn files_that_were_changed_are_refused() {
         let text = fs::read_to_string(job.path(name)).expect("a file");
         assert!(text.contains(old), "{text}");
         fs::write(job.path(name), text.replace(old, new)).expect("written");
-        job.refused(&[], "FB761", 1, "not the one that it was written with");
+        job.refused(&[], "FB761", 1, "the content of the file changed since it was written");
         fs::write(job.path(name), text.replace("\"version\":1", "\"version\":2")).expect("written");
         job.refused(&[], "FB760", 2, "version 2");
         fs::write(job.path(name), "no lines").expect("written");

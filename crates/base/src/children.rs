@@ -7,7 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Polling interval of [`wait_for_all`].
-const INTERVAL: Duration = Duration::from_millis(2);
+const POLLING_INTERVAL: Duration = Duration::from_millis(2);
 
 static RUNNING: Mutex<Running> = Mutex::new(Running { processes: Vec::new(), is_closed: false });
 
@@ -67,7 +67,7 @@ pub fn wait_for_all(patience: Duration) -> Vec<u32> {
         if left.is_empty() || began.elapsed() >= patience {
             return left;
         }
-        std::thread::sleep(INTERVAL);
+        std::thread::sleep(POLLING_INTERVAL);
     }
 }
 

@@ -102,23 +102,23 @@ codes! {
     InputChanged = "FB132", Error, BadInput, "file changed while it was read", "run again after the program that writes the file has finished";
     // FB2xx: tables and manifest
     ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/input.md for the keys";
-    ManifestUnit = "FB202", Error, BadInput, "unknown unit", "length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";
-    TableHeader = "FB203", Error, BadInput, "unexpected table header", "nodes: `node,x,y,z`; dofs: `node,dir` or `row,node,dir`";
+    ManifestUnit = "FB202", Error, BadInput, "unknown unit", "use one of length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";
+    TableHeader = "FB203", Error, BadInput, "unexpected table header", "write the header of nodes: `node,x,y,z`; of dofs: `node,dir` or `row,node,dir`";
     TableRow = "FB204", Error, BadInput, "table row cannot be read", "give one row per line with the columns of the header";
     NodeDuplicate = "FB205", Error, BadInput, "node number occurs twice", "list each node once";
     CoordinateNotFinite = "FB206", Error, BadInput, "node coordinate is not a finite number", "correct the coordinate";
-    DofDirection = "FB207", Error, BadInput, "direction is not between 1 and 6", "1, 2, 3 are displacements along x, y, z; 4, 5, 6 are rotations";
+    DofDirection = "FB207", Error, BadInput, "direction is not between 1 and 6", "use 1, 2, 3 for displacements along x, y, z, and 4, 5, 6 for rotations";
     DofRowOrder = "FB208", Error, BadInput, "row numbers of dofs.csv are not 0, 1, 2, ... without gaps", "number the rows from 0, or leave the column out";
     InterfaceNode = "FB209", Error, BadInput, "interface names a node that the model does not have", "correct the node list of the interface";
     InterfaceAcross = "FB210", Error, BadInput, "interface contains nodes of several bodies", "define one interface for each body";
     SceneSyntax = "FB211", Error, BadInput, "scene is not valid TOML or has unknown, missing or mistyped keys", "see docs/simulate.md for the keys";
-    SceneBody = "FB212", Error, BadInput, "scene does not fit the body", "flexbody inspect shows the modes and interfaces of the body";
+    SceneBody = "FB212", Error, BadInput, "scene does not fit the body", "run flexbody inspect, which shows the modes and interfaces of the body";
     SceneContradicts = "FB213", Error, BadInput, "scene contradicts itself", "remove one of the two entries";
     CarrierImpossible = "FB214", Error, BadInput, "body cannot be carried at this place", "carry an interface with a reference point whose nodes do not lie on one line, or a node with rotations, of a body with all terms";
     SeriesColumn = "FB215", Error, BadInput, "column of a history is not in the file", "name a column of the file, or give its number, from 1";
     SeriesRow = "FB216", Error, BadInput, "history file cannot be read as columns over time", "write one row per instant, with ascending times and decimal points";
     SeriesRange = "FB217", Error, BadInput, "history file does not cover the run", "shorten the run, or set `outside` = \"hold\" to hold the first and the last value outside the file";
-    PlaceUnknown = "FB218", Error, BadInput, "place or direction does not exist in the body", "flexbody inspect lists the interfaces; nodes are given by number";
+    PlaceUnknown = "FB218", Error, BadInput, "place or direction does not exist in the body", "run flexbody inspect, which lists the interfaces; give nodes by number";
     SceneCase = "FB219", Error, BadInput, "load case not found, or not named although the scene has several", "name a case of the scene with --case NAME";
     NodeSetUnknown = "FB220", Error, BadInput, "node set or region contains no node of the model", "name a node set of the deck, or correct the region";
     SceneDamping = "FB225", Error, BadInput, "scene and body both define damping", "remove [damping] from the scene (--damping from the command), or write `replace = true` in it to ignore the damping of the body";
@@ -129,7 +129,7 @@ codes! {
     MatrixCount = "FB304", Error, BadInput, "number of entries differs from the header", "write the file again; it may be cut off";
     MatrixNotSquare = "FB305", Error, BadInput, "matrix is not square", "give the whole symmetric matrix";
     MatrixNotFinite = "FB306", Error, BadInput, "matrix contains NaN or infinite values", "find the element that produced them in the FE program";
-    MatrixAsymmetric = "FB307", Error, BadInput, "matrix is not symmetric", "only symmetric K and M describe a conservative body; gyroscopic, follower and friction terms do not belong here";
+    MatrixAsymmetric = "FB307", Error, BadInput, "matrix is not symmetric", "remove gyroscopic, follower and friction terms: only symmetric K and M describe a conservative body";
     MatrixSizesDiffer = "FB308", Error, BadInput, "stiffness and mass matrix differ in size", "write both from the same analysis";
     MatrixTriangles = "FB309", Error, BadInput, "matrix declared symmetric has entries on both sides of the diagonal", "write one triangle, or declare the matrix general";
     Hdf5Layout = "FB310", Error, BadInput, "matrix not found in the file or group", "store data, indices, indptr and shape (CSC, CSR) or data, row, col and shape (COO); name the group as FILE.h5:/group";
@@ -141,7 +141,7 @@ codes! {
     // FB4xx: model
     NodesMissing = "FB401", Error, BadInput, "degrees of freedom refer to nodes without coordinates", "add the nodes to the node table";
     DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "give one row of dofs.csv for each matrix row; without dofs.csv there are three rows for each node";
-    DofDuplicate = "FB403", Error, BadInput, "direction of a node occurs twice", "each pair (node, direction) must label one matrix row";
+    DofDuplicate = "FB403", Error, BadInput, "direction of a node occurs twice", "label each matrix row with another pair (node, direction)";
     DofIncomplete = "FB404", Error, BadInput, "nodes lack displacement directions, so that the body cannot move rigidly", "export the matrices without supports, symmetry planes or eliminated constraints";
     NodesUnused = "FB406", Note, Done, "nodes without degrees of freedom were left out", "nothing to do if they are reference nodes or deleted nodes";
     MassNotPositive = "FB407", Error, Untrustworthy, "mass is not positive", "check densities and the matrix that was given as mass";
@@ -210,7 +210,7 @@ codes! {
     LoadIdle = "FB545", Warning, Done, "load has no effect", "let an interface carry the body to see gravity and inertia bend it: [carried] in docs/simulate.md";
     CarrierUnresolved = "FB546", Warning, Done, "modes resolve the carried interface poorly", "convert with --basis craig-bampton, or with --residual-vectors interfaces, and with the interface in the manifest";
     CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness does not act while the body is carried", "trust spin rates far below the first frequency only: the geometric stiffness is that of the free body";
-    ReferenceLacks = "FB548", Warning, Done, "reference body lacks a part of the model that matters here", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where the difference comes from";
+    ReferenceIncomplete = "FB548", Warning, Done, "reference body lacks a part of the model that matters here", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where the difference comes from";
     LumpedWithoutBody = "FB549", Note, Done, "lumped mass gives no body to compare with", "nothing to do: a program that lumps the mass in this way has no body either";
     RunTooLong = "FB550", Error, BadInput, "run takes more steps than allowed", "simulate a shorter `duration`, leave out modes beyond the frequencies of the loads, or raise `most_steps` in [run]";
     StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";
@@ -271,7 +271,7 @@ codes! {
     Usage = "FB801", Error, BadInput, "command line not understood", "see flexbody help";
     LumpedScheme = "FB802", Error, BadInput, "unknown lumping scheme", "use row-sum, diagonal-scaling, user=FILE or none";
     LumpedMassTable = "FB803", Error, BadInput, "nodal masses cannot be used", "give a table with the header `node,mass` and one finite mass for each node";
-    Internal = "FB999", Error, Bug, "internal error", "this is a bug of flexbody: please report it with the input";
+    Internal = "FB999", Error, Bug, "internal error", "report this bug of flexbody with the input";
 }
 
 /// Returns the content of `docs/codes.md`: the table of codes and the exit codes.
@@ -285,13 +285,13 @@ pub fn codes_markdown() -> String {
          | 2 | bad input or usage |\n\
          | 3 | no trustworthy numerical result: not converged, mechanism, indefinite mass |\n\
          | 4 | not enough memory or disk, or an output that may not be written (no permission, a read-only file system: FB121) |\n\
-         | 70 | a bug of ours |\n\
-         | 130 | interrupted (Ctrl-C), told to end (SIGTERM) or left by its terminal (SIGHUP); no unfinished file is left |\n\n\
-         Other signals that end a program end this one too, after its unfinished files: a shell tells 128 + the number\n\
+         | 70 | internal error: a bug of flexbody |\n\
+         | 130 | interrupted (Ctrl-C), terminated (SIGTERM) or disconnected from its terminal (SIGHUP); no unfinished file is left |\n\n\
+         Other signals that end a program end this one too, after its unfinished files: a shell reports 128 + the number\n\
          of the signal. With exit code 0 all outputs are in their places; with 2, 3, 4, 70, 130 and after a signal none\n\
          is, and the files that they would have replaced are there ([reference](reference.md#output-files)).\n\n\
          A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
-         `--deny-warnings` takes a warning as a failed check (1): then nothing is written.\n\n\
+         `--deny-warnings` treats a warning as a failed check (1): then nothing is written.\n\n\
          | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",
     );
     for code in Code::ALL {

@@ -12,9 +12,9 @@ pub(crate) const WORKING_MODE: u32 = 0o600;
 #[cfg(unix)]
 pub(crate) fn take_over(file: &File, replaced: &Metadata) {
     use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
-    let Ok(own) = file.metadata() else { return };
-    let owner = (own.uid() != replaced.uid()).then(|| replaced.uid());
-    let group = (own.gid() != replaced.gid()).then(|| replaced.gid());
+    let Ok(current) = file.metadata() else { return };
+    let owner = (current.uid() != replaced.uid()).then(|| replaced.uid());
+    let group = (current.gid() != replaced.gid()).then(|| replaced.gid());
     let mut mode = replaced.mode() & 0o777;
     let is_taken = (owner.is_none() && group.is_none()) || fchown(file, owner, group).is_ok();
     if !is_taken && group.is_some() && fchown(file, None, group).is_err() {

@@ -1,7 +1,7 @@
 //! Allocations that may fail.
 //!
 //! The program ends with exit code 4 if an allocation fails (`main.rs`), since almost no code could continue. Code that
-//! can continue (for a size that a damaged file declares) allocates inside [`or_go_without`].
+//! can continue (for a size that a damaged file declares) allocates inside [`allow_failure`].
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -9,28 +9,28 @@ use std::cell::Cell;
 use std::sync::OnceLock;
 
 thread_local! {
-    static GOES_WITHOUT: Cell<bool> = const { Cell::new(false) };
+    static ACCEPTS_FAILURE: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Function that returns the number of bytes that may still be allocated; set by the program.
-static LEFT: OnceLock<fn() -> Option<u64>> = OnceLock::new();
+static AVAILABLE_BYTES: OnceLock<fn() -> Option<u64>> = OnceLock::new();
 
 /// Sets the function that finds the number of bytes that may still be allocated. Only the first call has an effect.
-pub fn tell_left(find: fn() -> Option<u64>) {
+pub fn set_left(find: fn() -> Option<u64>) {
     // Another run in the same process uses an equivalent function.
-    let _ = LEFT.set(find);
+    let _ = AVAILABLE_BYTES.set(find);
 }
 
 /// Returns the number of bytes that may still be allocated; `None` if unknown, as in the library.
 pub fn left() -> Option<u64> {
-    LEFT.get().and_then(|find| find())
+    AVAILABLE_BYTES.get().and_then(|find| find())
 }
 
 /// Runs `ask`, whose allocations may fail without ending the program.
-pub fn or_go_without<T>(ask: impl FnOnce() -> T) -> T {
-    let before = GOES_WITHOUT.replace(true);
+pub fn allow_failure<T>(ask: impl FnOnce() -> T) -> T {
+    let before = ACCEPTS_FAILURE.replace(true);
     let answer = ask();
-    GOES_WITHOUT.set(before);
+    ACCEPTS_FAILURE.set(before);
     answer
 }
 
@@ -45,7 +45,8 @@ pub fn or_go_without<T>(ask: impl FnOnce() -> T) -> T {
 pub fn refuse_beyond(left: Option<u64>, needed: f64, what: &str, help: &str) -> Result<()> {
     match left.map(|left| left as f64) {
         Some(left) if needed > left => {
-            let message = format!("{what} takes {:.3} GB, {:.3} GB are left", needed / 1e9, left / 1e9);
+            let message =
+                format!("{what} takes {:.3} GB of memory, {:.3} GB are available", needed / 1e9, left / 1e9);
             Err(Diagnostic::new(Code::MemoryShort, message).with_help(help).into())
         }
         _ => Ok(()),
@@ -53,6 +54,6 @@ pub fn refuse_beyond(left: Option<u64>, needed: f64, what: &str, help: &str) -> 
 }
 
 /// Returns true if the current thread continues when an allocation fails.
-pub fn goes_without() -> bool {
-    GOES_WITHOUT.get()
+pub fn accepts_failure() -> bool {
+    ACCEPTS_FAILURE.get()
 }

@@ -22,9 +22,9 @@ use std::time::Duration;
 use tempfile::TempPath;
 
 /// Prefix of the names of temporary files.
-const PREFIX: &str = ".flexbody-";
+const TEMPORARY_PREFIX: &str = ".flexbody-";
 /// Suffix of the names of temporary files.
-const SUFFIX: &str = ".tmp";
+const TEMPORARY_SUFFIX: &str = ".tmp";
 
 /// Place for one output file, reserved before the work starts.
 ///
@@ -156,7 +156,9 @@ impl Temporary {
                 return Ok(Self { parts: Some((path, file)) });
             }
         }
-        Err(std::io::Error::other("temporary files vanish as soon as they are made"))
+        Err(std::io::Error::other(
+            "temporary files are removed by another process as soon as they are created",
+        ))
     }
 
     fn path(&self) -> &Path {
@@ -202,7 +204,9 @@ impl Book {
         let Ok(entries) = std::fs::read_dir(folder) else { return };
         for entry in entries.flatten() {
             let name = entry.file_name();
-            let is_ours = name.to_str().is_some_and(|n| n.starts_with(PREFIX) && n.ends_with(SUFFIX));
+            let is_ours = name
+                .to_str()
+                .is_some_and(|n| n.starts_with(TEMPORARY_PREFIX) && n.ends_with(TEMPORARY_SUFFIX));
             if is_ours && entry.file_type().is_ok_and(|kind| kind.is_file()) {
                 remove_if_abandoned(&entry.path());
             }
@@ -239,8 +243,8 @@ fn remove_if_abandoned(_: &Path) {}
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
-    let (Ok(own), Ok(named)) = (file.metadata(), std::fs::symlink_metadata(path)) else { return false };
-    (own.dev(), own.ino()) == (named.dev(), named.ino())
+    let (Ok(opened), Ok(named)) = (file.metadata(), std::fs::symlink_metadata(path)) else { return false };
+    (opened.dev(), opened.ino()) == (named.dev(), named.ino())
 }
 
 #[cfg(not(unix))]
@@ -277,7 +281,7 @@ impl OutputSlot {
             }
         }
         let mut builder = tempfile::Builder::new();
-        builder.prefix(PREFIX).suffix(SUFFIX);
+        builder.prefix(TEMPORARY_PREFIX).suffix(TEMPORARY_SUFFIX);
         // Temporary files are private by default. A new output has mode 666 minus the umask. One that replaces a file
         // gets its mode at the end, and is private until then.
         let replaced = std::fs::metadata(&target).ok();
@@ -383,7 +387,7 @@ impl OutputSlot {
     /// Creates another name for the file at the target, from which it can be restored.
     fn keep_old(&self) -> Option<Old> {
         let mut name = self.temporary.path().file_name()?.to_os_string();
-        name.push(SUFFIX);
+        name.push(TEMPORARY_SUFFIX);
         let path = self.temporary.path().with_file_name(name);
         std::fs::hard_link(&self.target, &path).ok()?;
         // A shared lock keeps other runs from removing the file as abandoned, without blocking readers.
@@ -483,7 +487,7 @@ fn target_of(asked: &Path) -> Result<PathBuf> {
             Err(fail(Code::OutputForbidden, asked, "the existing file is write-protected".to_owned()))
         }
         Ok(_) => std::fs::canonicalize(asked).map_err(|e| match e.kind() {
-            ErrorKind::NotFound => not_a_file("the file that it leads to has been removed"),
+            ErrorKind::NotFound => not_a_file("the target of the link has been removed"),
             _ => io(asked, &e),
         }),
         // The name is too long: the temporary file, with its short name, would not reveal this.

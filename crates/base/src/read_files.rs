@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Largest number of symbolic links in one path, as on Linux.
-const MOST_LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
 /// Files read since the run began; `None` outside a run of the program, where a file may be read and replaced.
-static READ: Mutex<Option<Vec<FileIdentity>>> = Mutex::new(None);
+static FILES_READ: Mutex<Option<Vec<FileIdentity>>> = Mutex::new(None);
 
 fn read() -> MutexGuard<'static, Option<Vec<FileIdentity>>> {
-    READ.lock().unwrap_or_else(PoisonError::into_inner)
+    FILES_READ.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Begins a run of the program: files that are read are recorded from now on.
@@ -42,8 +42,8 @@ pub fn note_read(path: &Path) {
 pub fn refuse_read(output: &Path) -> Result<()> {
     let of_run = read();
     let Some(files) = of_run.as_ref() else { return Ok(()) };
-    let own = FileIdentity::of(output);
-    if files.iter().any(|file| file.is_same(&own)) {
+    let target = FileIdentity::of(output);
+    if files.iter().any(|file| file.is_same(&target)) {
         return Err(replaces(output).into());
     }
     Ok(())
@@ -119,7 +119,7 @@ pub fn read_text(path: &Path, most: u64) -> std::io::Result<String> {
 /// Links that form a circle, and the errors of reading a link.
 pub fn followed(path: &Path) -> std::io::Result<PathBuf> {
     let mut at = path.to_path_buf();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         match std::fs::symlink_metadata(&at) {
             Ok(meta) if meta.is_symlink() => {
                 let target = std::fs::read_link(&at)?;

@@ -5,11 +5,11 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use std::collections::HashSet;
 
 /// Largest number allowed in the arrays: invariants are sums of products, which overflow beyond it.
-pub(crate) const LARGEST: f64 = 1e300;
+pub(crate) const MAX_NUMBER: f64 = 1e300;
 
 /// Longest name of an interface or lumping scheme in bytes, since the name becomes a group name in the
 /// file.
-const LONGEST_NAME: usize = 1000;
+const MAX_NAME_BYTES: usize = 1000;
 
 /// Errors found so far.
 #[derive(Default)]
@@ -34,9 +34,10 @@ impl Problems {
 
     /// Reports the first value that is not finite, or so large that results computed from it overflow.
     pub(crate) fn finite(&mut self, name: &str, values: impl IntoIterator<Item = f64>) {
-        if let Some((i, v)) = values.into_iter().enumerate().find(|(_, v)| v.is_nan() || v.abs() > LARGEST) {
+        if let Some((i, v)) = values.into_iter().enumerate().find(|(_, v)| v.is_nan() || v.abs() > MAX_NUMBER)
+        {
             self.add(format!(
-                "`{name}` has the value {v:e} at index {i}, expected finite numbers up to {LARGEST:e}"
+                "`{name}` has the value {v:e} at index {i}, expected finite numbers up to {MAX_NUMBER:e}"
             ));
         }
     }
@@ -67,8 +68,11 @@ impl Problems {
         for name in names {
             if name.is_empty() {
                 self.add(format!("empty name of {what}"));
-            } else if name.len() > LONGEST_NAME {
-                self.add(format!("name of {what} has {} bytes, expected at most {LONGEST_NAME}", name.len()));
+            } else if name.len() > MAX_NAME_BYTES {
+                self.add(format!(
+                    "name of {what} has {} bytes, expected at most {MAX_NAME_BYTES}",
+                    name.len()
+                ));
             } else if !seen.insert(name) {
                 self.add(format!("{what} `{name}` is given twice"));
             }

@@ -20,18 +20,18 @@ mod interfaces;
 mod recounts;
 
 /// Limit for recomputed invariants, relative to their Cauchy-Schwarz bounds: the rounding of their sums.
-const RECOMPUTED: f64 = 1e-12;
+const MAX_RECOMPUTED_DIFFERENCE: f64 = 1e-12;
 
 /// Name of K_ff in [`primary_differences`].
 const STIFFNESS: &str = "modal_stiffness";
 
 /// Allowed difference between two evaluations of K psi, in units of the rounding estimate eps | |K| |psi|
 /// |. The shapes were also turned to body axes and back.
-const ROUNDING: f64 = 30.0;
+const MAX_ROUNDING_ESTIMATES: f64 = 30.0;
 
 /// Evaluates all checks of `body` that need no model: the identities of theory section 10, and the
 /// consistency of the numbers stored in the file.
-pub fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
+pub fn body_identities(body: &FlexBody) -> Vec<IdentityCheck> {
     let mut checks = body.identities(frame_of(body));
     checks.extend(recounts(body));
     checks
@@ -43,23 +43,22 @@ fn frame_of(body: &FlexBody) -> BodyFrame {
     name.and_then(BodyFrame::from_name).unwrap_or(BodyFrame::Model)
 }
 
-/// Rejects a body that breaks one of [`own_identities`], so that every body written passes `flexbody
+/// Rejects a body that breaks one of [`body_identities`], so that every body written passes `flexbody
 /// check`.
 ///
 /// # Errors
 /// [`BodyUntrustworthy`](Code::BodyUntrustworthy), one diagnostic per identity that does not hold.
 pub fn accept(body: &FlexBody) -> Result<()> {
-    let failed = own_identities(body).into_iter().filter(|check| !check.passed);
-    let told: Vec<Diagnostic> = failed
+    let failed = body_identities(body).into_iter().filter(|check| !check.passed);
+    let diagnostics: Vec<Diagnostic> = failed
         .map(|check| {
             let IdentityCheck { name, formula, value, limit, .. } = check;
-            let message = format!(
-                "the body breaks `{name}` ({formula}): {value:.1e}, where at most {limit:.1e} is rounding"
-            );
+            let message =
+                format!("the body violates `{name}` ({formula}): {value:.1e}, expected at most {limit:.1e}");
             Diagnostic::new(Code::BodyUntrustworthy, message)
         })
         .collect();
-    if told.is_empty() { Ok(()) } else { Err(Error::new(told)) }
+    if diagnostics.is_empty() { Ok(()) } else { Err(Error::new(diagnostics)) }
 }
 
 /// Recomputes invariants, residuals and orthogonality of `body` from the matrices of `model`.
@@ -106,7 +105,7 @@ struct Recomputed<'a> {
     kx: Mat<f64>,
     mx: Mat<f64>,
     /// Invariants condensed from the model.
-    own: Invariants,
+    recomputed: Invariants,
     /// Difference of each stored invariant from the recomputed one, by name.
     differences: Vec<(String, f64)>,
 }
@@ -123,17 +122,17 @@ impl<'a> Recomputed<'a> {
         let kx = pencil.apply_stiffness(modes.vectors.as_ref());
         let mx = pencil.apply_mass(modes.vectors.as_ref());
         let modal_stiffness = gram(modes.vectors.as_ref(), kx.as_ref());
-        let own = modes.condensed(model, &place, modal_stiffness);
-        let differences = primary_differences(body.invariants(), &own);
-        Ok(Self { body, model, place, modes, kx, mx, own, differences })
+        let recomputed = modes.condensed(model, &place, modal_stiffness);
+        let differences = primary_differences(body.invariants(), &recomputed);
+        Ok(Self { body, model, place, modes, kx, mx, recomputed, differences })
     }
 
     /// Compares the positions of the nodes in the body frame.
     fn positions(&self) -> IdentityCheck {
-        let own = self.place.positions.iter().flatten();
-        let size = own.clone().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+        let recomputed = self.place.positions.iter().flatten();
+        let size = recomputed.clone().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
         let stored = self.body.nodes().positions.iter().flatten();
-        let moved = largest(own.zip(stored).map(|(a, b)| (a - b).abs()));
+        let moved = largest(recomputed.zip(stored).map(|(a, b)| (a - b).abs()));
         IdentityCheck::new("positions", "x_body = A' (x_model - origin)", moved / size, 1e-12)
     }
 
@@ -149,7 +148,7 @@ impl<'a> Recomputed<'a> {
         // Turning shapes and rigid motions rounds them; relative to the small moment of a needle that
         // rounding is larger.
         let inertia = body.invariants().inertia().diagonal();
-        let recomputed = RECOMPUTED
+        let recomputed = MAX_RECOMPUTED_DIFFERENCE
             + body.storage().rounding()
             + 8.0 * f64::EPSILON * (inertia.max() / inertia.min()).sqrt();
         // If the condensation assumed m_ff = I, `orthonormal_recomputed` checks the modal mass.
@@ -181,7 +180,7 @@ impl<'a> Recomputed<'a> {
                 "stiffness_recomputed",
                 "K_ff = Psi' K Psi",
                 self.difference_of(|name| name == STIFFNESS),
-                RECOMPUTED + storage.rounding() + stiffness,
+                MAX_RECOMPUTED_DIFFERENCE + storage.rounding() + stiffness,
             ),
             IdentityCheck::new(
                 "residual_recomputed",
@@ -211,7 +210,7 @@ impl<'a> Recomputed<'a> {
             let (k_psi, m_psi) = (self.kx.col(j), self.mx.col(j));
             let size = residual_scale(k_psi, m_psi, lambda);
             residual = larger(residual, relative_residual(k_psi, m_psi, lambda));
-            stored = stored.max(modes.residual[j]).max(ROUNDING * rounding[j] / size);
+            stored = stored.max(modes.residual[j]).max(MAX_ROUNDING_ESTIMATES * rounding[j] / size);
             // |psi_p' d(K psi_q)| <= |psi_p| |d(K psi_q)|, relative to sqrt(lambda_p lambda_q).
             long = long.max(self.modes.vectors.col(j).norm_l2() / lambda.sqrt());
             loose = loose.max(rounding[j] / lambda.sqrt());
@@ -220,7 +219,7 @@ impl<'a> Recomputed<'a> {
     }
 
     fn damping(&self) -> Result<Option<IdentityCheck>> {
-        let found = damping_check(self.body, self.model, &self.modes.vectors, &self.own)?;
+        let found = damping_check(self.body, self.model, &self.modes.vectors, &self.recomputed)?;
         Ok(found.map(|found| {
             let formula = "D_ff = Psi' D Psi, zeta = D_jj / (2 omega_j)";
             IdentityCheck::new("damping_recomputed", formula, found.largest, found.allowed)
@@ -237,15 +236,15 @@ impl<'a> Recomputed<'a> {
 
     /// Compares the stiffness of inertia, computed from the moments of the nodes and from the matrices.
     fn inertia_stiffness(&self) -> Option<IdentityCheck> {
-        let own = self.modes.inertia_stiffness(self.model, &self.place.frame);
+        let recomputed = self.modes.inertia_stiffness(self.model, &self.place.frame);
         let formula = "moments of the nodes and stiffness of inertia from M";
         let check = |value| {
-            let limit = RECOMPUTED + 4.0 * self.body.storage().rounding();
+            let limit = MAX_RECOMPUTED_DIFFERENCE + 4.0 * self.body.storage().rounding();
             Some(IdentityCheck::new("inertia_stiffness_recomputed", formula, value, limit))
         };
-        match (self.body.inertia_stiffness(), own) {
+        match (self.body.inertia_stiffness(), recomputed) {
             (None, None) => None,
-            (Some(stored), Some(own)) => check(own.largest_difference(stored)),
+            (Some(stored), Some(recomputed)) => check(recomputed.largest_difference(stored)),
             // The body was made by a version without stiffness of inertia, or from another model.
             (None, Some(_)) | (Some(_), None) => check(f64::INFINITY),
         }
@@ -255,7 +254,7 @@ impl<'a> Recomputed<'a> {
     fn guarantee(&self) -> Vec<IdentityCheck> {
         let body = self.body;
         if body.certificate().guarantee.is_some() && !self.model.has_exact_scalar_mass() {
-            let formula = "M as stored is what the bounds are about: the same along x, y and z";
+            let formula = "M as stored is the same along x, y and z, as the bounds require";
             let deviation = self.model.mass_deviation().max(f64::MIN_POSITIVE);
             return vec![IdentityCheck::new("certified_mass", formula, deviation, 0.0)];
         }
@@ -263,18 +262,18 @@ impl<'a> Recomputed<'a> {
             return Vec::new();
         };
         let (stored, shapes) = (&body.nodes().positions, self.modes.displacements.as_ref());
-        let own = condense_certified(mass, stored, shapes, self.model.stiffness(), &body.frame().axes);
+        let recomputed = condense_certified(mass, stored, shapes, self.model.stiffness(), &body.frame().axes);
         vec![
             IdentityCheck::new(
                 "digits_recomputed",
                 "invariants to their guaranteed digits",
-                excess_of_digits(body, guarantee, &own.invariants),
+                excess_of_digits(body, guarantee, &recomputed.invariants),
                 1.0,
             ),
             IdentityCheck::new(
                 "bounds_recomputed",
                 "psi' K psi / psi' M psi between the bounds of lambda",
-                outside_of_bounds(guarantee, &own.invariants),
+                outside_of_bounds(guarantee, &recomputed.invariants),
                 1e-9 + body.certificate().rigid_noise,
             ),
         ]
@@ -293,23 +292,23 @@ struct ModeErrors {
 
 /// Returns the largest difference of the invariants in units of the difference that their guaranteed digits
 /// allow.
-fn excess_of_digits(body: &FlexBody, guarantee: &Guarantee, own: &Invariants) -> f64 {
+fn excess_of_digits(body: &FlexBody, guarantee: &Guarantee, recomputed: &Invariants) -> f64 {
     let excess = |(name, difference): (String, f64)| {
         let digits = DIGITS.iter().zip(&guarantee.digits).find(|(known, _)| **known == name);
         let scale = digits.map_or(1.0, |(_, digits)| 10f64.powf(*digits));
         0.5 * difference * scale
     };
-    largest(primary_differences(body.invariants(), own).into_iter().map(excess))
+    largest(primary_differences(body.invariants(), recomputed).into_iter().map(excess))
 }
 
 /// Returns the largest relative distance of the Rayleigh quotient of a mode from the bounds of its
 /// eigenvalue, zero if all quotients lie inside. Stored modes are rounded, so their quotients follow the
 /// eigenvalues to the limit of the other checks of modes.
-fn outside_of_bounds(guarantee: &Guarantee, own: &Invariants) -> f64 {
+fn outside_of_bounds(guarantee: &Guarantee, recomputed: &Invariants) -> f64 {
     let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
-    let modal_mass = own.modal_mass();
+    let modal_mass = recomputed.modal_mass();
     largest(bounds.enumerate().map(|(j, (lower, upper))| {
-        let quotient = own.modal_stiffness()[(j, j)] / modal_mass[(j, j)];
+        let quotient = recomputed.modal_stiffness()[(j, j)] / modal_mass[(j, j)];
         larger((lower - quotient) / lower, (quotient - upper) / upper)
     }))
 }
@@ -329,7 +328,7 @@ impl Difference {
         let relative = |value: f64| if value == 0.0 { 0.0 } else { value / size };
         let rounding = if rounding > 0.0 { rounding } else { 0.0 };
         // Two matrices that consist of rounding errors differ by at most twice the size.
-        Self { largest: relative(largest), allowed: RECOMPUTED + relative(rounding).min(2.0) }
+        Self { largest: relative(largest), allowed: MAX_RECOMPUTED_DIFFERENCE + relative(rounding).min(2.0) }
     }
 
     /// Returns the difference with the larger ratio of actual to allowed value; NaN counts as worst.
@@ -342,7 +341,7 @@ impl Difference {
 /// Returns an upper bound of the rounding error of |psi_p' A psi_q|.
 fn rounding_of(a: &SymmetricMatrix, shapes: &Mat<f64>, storage: Storage) -> f64 {
     let longest = shapes.col_iter().fold(0.0f64, |m, column| m.max(column.norm_l2()));
-    ROUNDING
+    MAX_ROUNDING_ESTIMATES
         * storage.roundings()
         * longest
         * rounding_residual(a, shapes.as_ref()).into_iter().fold(0.0, f64::max)
@@ -353,11 +352,11 @@ fn damping_check(
     body: &FlexBody,
     model: &FeModel,
     shapes: &Mat<f64>,
-    own: &Invariants,
+    recomputed: &Invariants,
 ) -> Result<Option<Difference>> {
     let modes = body.modes();
     let nf = modes.eigenvalue.len();
-    let found = modal_damping(model, shapes.as_ref(), &modes.eigenvalue, own)?;
+    let found = modal_damping(model, shapes.as_ref(), &modes.eigenvalue, recomputed)?;
     if found.is_none()
         && modes.modal_damping.is_none()
         && modes.damping_ratio.iter().all(|ratio| *ratio == 0.0)
@@ -396,12 +395,12 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
     };
     let loads = stored.iter().chain(&found).map(|one| &one.load);
     let difference = |load: &UnitLoad| {
-        let (stored, own) = (matrix_of(stored, load), matrix_of(&found, load));
+        let (stored, recomputed) = (matrix_of(stored, load), matrix_of(&found, load));
         // Every component of the kind may contribute.
         let given = model.geometric_stiffness().iter().filter(|one| one.load.kind == load.kind);
         let rounding = given.map(|one| rounding_of(&one.matrix, shapes, body.storage())).sum();
-        let size = stored.norm_max().max(own.norm_max());
-        Difference::new(largest_entry((&stored - &own).as_ref()), size, rounding)
+        let size = stored.norm_max().max(recomputed.norm_max());
+        Difference::new(largest_entry((&stored - &recomputed).as_ref()), size, rounding)
     };
     Ok(loads.map(difference).reduce(Difference::worse))
 }
@@ -410,9 +409,11 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
 /// x 3 in the plane) and m, c and I0 of the body, relative to the Cauchy-Schwarz bounds. R'MR is computed
 /// independently of the condensation.
 fn rigid_inertia_error(body: &FlexBody, found: &Mat<f64>) -> f64 {
-    let own = body.parts().rigid_mass();
-    let error = |i: usize, j: usize| (found[(i, j)] - own[(i, j)]).abs() / (own[(i, i)] * own[(j, j)]).sqrt();
-    largest((0..own.nrows()).flat_map(|i| (0..own.ncols()).map(move |j| error(i, j))))
+    let recomputed = body.parts().rigid_mass();
+    let error = |i: usize, j: usize| {
+        (found[(i, j)] - recomputed[(i, j)]).abs() / (recomputed[(i, i)] * recomputed[(j, j)]).sqrt()
+    };
+    largest((0..recomputed.nrows()).flat_map(|i| (0..recomputed.ncols()).map(move |j| error(i, j))))
 }
 
 /// Returns a warning for every file in the provenance of `body` whose fingerprint differs from that of the
@@ -427,8 +428,10 @@ pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
             let before = files[..i].iter().filter(|other| other.role == file.role).count();
             let now = model.sources().iter().filter(|other| other.role == file.role).nth(before)?;
             (now.sha256 != file.sha256).then(|| {
-                let message =
-                    format!("{} file {} has other bytes than {} had", file.role, now.name, file.name);
+                let message = format!(
+                    "{} file {} differs from {}, of which the body was made",
+                    file.role, now.name, file.name
+                );
                 Diagnostic::new(Code::BodySourceChanged, message)
             })
         })

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Largest size of a list in bytes: some hundred thousand bodies.
-const MOST: u64 = 64 << 20;
+const MAX_BYTES: u64 = 64 << 20;
 
 /// Bodies to make, and the resources for them.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -47,7 +47,7 @@ pub struct BatchBody {
 pub fn read_batch_list(path: &Path) -> Result<BatchList> {
     let wrong = |message: String| Error::from(Diagnostic::new(Code::BatchSyntax, message).in_file(path));
     note_read(path);
-    let text = read_text(path, MOST).map_err(|e| wrong(format!("the list cannot be read: {e}")))?;
+    let text = read_text(path, MAX_BYTES).map_err(|e| wrong(format!("the list cannot be read: {e}")))?;
     let mut list: BatchList = toml::from_str(&text).map_err(|e| {
         let line = e.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
         let found = Diagnostic::new(Code::BatchSyntax, e.message().to_owned());
@@ -57,7 +57,7 @@ pub fn read_batch_list(path: &Path) -> Result<BatchList> {
         return Err(wrong("the list has no [[body]]".to_owned()));
     }
     if list.parallel == Some(0) || list.threads == Some(0) {
-        return Err(wrong("`parallel` and `threads` are at least 1".to_owned()));
+        return Err(wrong("`parallel` and `threads` must be at least 1".to_owned()));
     }
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     for body in &mut list.bodies {

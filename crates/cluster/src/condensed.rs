@@ -9,12 +9,12 @@ use flexbody_linalg::{combine, gram, larger, uniform};
 use flexbody_model::FeModel;
 
 /// Number of random columns for the check of G.
-const TRIALS: usize = 2;
+const RANDOM_COLUMNS: usize = 2;
 /// Seed of the random columns.
 const SEED: u64 = 21;
 
 /// Largest difference of G v and X' M X v that rounding explains, in the measure of [`Condensed::difference`].
-pub(super) const CONDENSED_ROUNDING: f64 = 1e-11;
+pub(super) const MAX_CONDENSED_DIFFERENCE: f64 = 1e-11;
 
 /// Operator X, without stored columns.
 pub(super) struct Condensed<'a> {
@@ -42,15 +42,15 @@ impl<'a> Condensed<'a> {
     /// Returns the largest difference of G v and X' M X v for random columns v, relative to sqrt(max G_ii) sqrt(v' G
     /// v): by the Cauchy-Schwarz inequality, the largest possible entry of G v.
     pub(crate) fn difference(&self, g: MatRef<'_, f64>) -> f64 {
-        let v = Mat::from_fn(self.columns(), TRIALS, |i, j| uniform(SEED, i as u64, j as u64));
+        let v = Mat::from_fn(self.columns(), RANDOM_COLUMNS, |i, j| uniform(SEED, i as u64, j as u64));
         let momentum = self.model.pencil().apply_mass(self.combined(v.as_ref()).as_ref());
-        let (own, given) = (self.projected(momentum.as_ref()), g * &v);
+        let (computed, given) = (self.projected(momentum.as_ref()), g * &v);
         let largest = (0..g.nrows()).map(|i| g[(i, i)]).fold(0.0, f64::max);
         let relative = |j: usize| {
-            let size = (largest * (v.col(j).transpose() * own.col(j))).sqrt();
-            (given.col(j) - own.col(j)).norm_max() / size
+            let size = (largest * (v.col(j).transpose() * computed.col(j))).sqrt();
+            (given.col(j) - computed.col(j)).norm_max() / size
         };
-        (0..TRIALS).map(relative).fold(0.0, larger)
+        (0..RANDOM_COLUMNS).map(relative).fold(0.0, larger)
     }
 
     /// Returns the first column of a block of X: turned modes for each axis, then the modes, after the rigid modes.

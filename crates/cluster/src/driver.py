@@ -64,9 +64,9 @@ def arguments():
     parser.add_argument("folder", nargs="?", help="folder of `flexbody prepare`")
     parser.add_argument("--solver", choices=["mumps", "slices", "gamg", "lobpcg"], default="mumps")
     parser.add_argument("--no-count", action="store_true", help="leave out the inertia count, and its factor")
-    parser.add_argument("--keep-every", type=int, default=0, help="modes of one search, after which they are kept [all]")
+    parser.add_argument("--keep-every", type=int, default=0, help="number of modes that one search finds before they are saved [all]")
     parser.add_argument("--subspace", type=int, help="vectors of the subspace [SLEPc's choice]")
-    parser.add_argument("--trust-files", action="store_true", help="do not read the files once more for their fingerprints")
+    parser.add_argument("--trust-files", action="store_true", help="do not check the fingerprints of the files, which reads them once more")
     parser.add_argument("--probe", action="store_true", help="print the versions of the packages and end")
     known, rest = parser.parse_known_args()
     if not known.folder and not known.probe:
@@ -87,9 +87,9 @@ def read_sealed(path, kind):
     with open(path, encoding="utf-8") as file:
         head, body = json.loads(file.readline()), file.readline().rstrip("\n")
     if head["format"] != kind or head["version"] != VERSION:
-        raise ValueError(f"{path} is no {kind} of version {VERSION}")
+        raise ValueError(f"{path} is not a {kind} file of version {VERSION}")
     if head["sha256"] != hashlib.sha256(body.encode()).hexdigest():
-        raise ValueError(f"{path} was changed since it was written")
+        raise ValueError(f"{path} changed since it was written")
     return json.loads(body)
 
 
@@ -114,9 +114,9 @@ class Run:
         self.prepared = self.sealed("prepared.jsonl", "flexbody-prepared")
         p = self.prepared
         if PETSc.IntType().itemsize != p["index_bytes"]:
-            self.refuse(f"the files have whole numbers of {p['index_bytes']} bytes, this PETSc of {PETSc.IntType().itemsize}: prepare with --indices {8 * PETSc.IntType().itemsize}")
+            self.refuse(f"the files have indices of {p['index_bytes']} bytes, this PETSc of {PETSc.IntType().itemsize}: prepare with --indices {8 * PETSc.IntType().itemsize}")
         if not PETSc.ScalarType().dtype == float:
-            self.refuse("this PETSc has no real numbers of double precision: take a real build")
+            self.refuse("this PETSc does not compute with real numbers of double precision: use such a build")
         if not options.trust_files:
             self.check_files()
         self.read()
@@ -151,7 +151,7 @@ class Run:
                 except OSError as problem:
                     changed = f"{problem}"
                 if changed:
-                    print(f"error: {self.path(name)} is not what `flexbody prepare` wrote", file=sys.stderr, flush=True)
+                    print(f"error: {self.path(name)} differs from what `flexbody prepare` wrote", file=sys.stderr, flush=True)
                     os._exit(2)
         PETSc.COMM_WORLD.barrier()
 
@@ -222,16 +222,16 @@ class Run:
             return
         kept = self.sealed("checkpoint.jsonl", "flexbody-kept")
         if kept["matrices"] != self.prepared["matrices"]:
-            self.say("the checkpoint belongs to other matrices and is left aside")
+            self.say("the checkpoint belongs to other matrices and is not used")
             return
         for part in kept["parts"]:
             if self.rank == 0 and fingerprint(self.path(part["file"])) != part["sha256"]:
-                print(f"error: {self.path(part['file'])} was changed since it was written: remove checkpoint.jsonl to start anew", file=sys.stderr, flush=True)
+                print(f"error: {self.path(part['file'])} changed since it was written: remove checkpoint.jsonl to start from the beginning", file=sys.stderr, flush=True)
                 os._exit(2)
             PETSc.COMM_WORLD.barrier()
             self.found += self.vectors(part["file"], part["vectors"])
         self.parts = kept["parts"]
-        self.say(f"goes on from {len(self.found)} modes that were kept")
+        self.say(f"continues from {len(self.found)} saved modes")
 
     def keep(self, vectors):
         """Adds converged vectors to what is kept."""
@@ -244,7 +244,7 @@ class Run:
             content = {"matrices": self.prepared["matrices"], "parts": self.parts}
             write_sealed(self.path("checkpoint.jsonl"), "flexbody-kept", content)
         PETSc.COMM_WORLD.barrier()
-        self.say(f"{sum(part['vectors'] for part in self.parts)} modes are kept")
+        self.say(f"{sum(part['vectors'] for part in self.parts)} modes are saved")
 
     # Searching.
 
@@ -673,10 +673,10 @@ def main():
         run.refuse("no mode was found", 1)
     end, count = complete(run, wanted, counted)
     if end < wanted:
-        run.refuse(f"{end} of {wanted} modes converged; what was found is kept: run the same command again, it goes on from there", 1)
+        run.refuse(f"{end} of {wanted} modes converged; what was found is saved: run the same command again, which continues from there", 1)
     if count and count["negative"] != run.prepared["rigid"] + end:
-        run.refuse(f"the inertia count is {count['negative']} below {run.hertz(count['shift']):.6g} Hz, {run.prepared['rigid']} rigid and {end} other modes were found; what was found is kept", 1)
-    run.say(f"K-residual up to {max(run.residuals[:end]):.0e}, {run.prepared['residual']:.0e} is promised, or what the rounding of K leaves")
+        run.refuse(f"the inertia count is {count['negative']} below {run.hertz(count['shift']):.6g} Hz, {run.prepared['rigid']} rigid and {end} other modes were found; what was found is saved", 1)
+    run.say(f"K-residual up to {max(run.residuals[:end]):.0e}, {run.prepared['residual']:.0e} is required, or the rounding floor of K")
     write_result(run, end, count, wanted)
     run.say(f"{end} modes up to {run.hertz(run.eigenvalues[end - 1]):.6g} Hz are in {run.path('result.jsonl')}")
 
@@ -697,7 +697,7 @@ elif __name__ == "__main__":
         main()
     except Exception as problem:
         # One rank that fails alone must not leave the others waiting: mpiexec ends them.
-        room = any(code in str(problem) for code in ("76", "91"))
-        hint = "; where MUMPS had too little room: -st_mat_mumps_icntl_14 100, or more nodes" if room else ""
+        is_out_of_memory = any(code in str(problem) for code in ("76", "91"))
+        hint = "; if MUMPS ran out of memory: use -st_mat_mumps_icntl_14 100, or more nodes" if is_out_of_memory else ""
         print(f"error on rank {PETSc.COMM_WORLD.getRank()}: {problem}{hint}", file=sys.stderr, flush=True)
         os._exit(3)

@@ -65,19 +65,22 @@ impl Engine {
     /// [`EngineMissing`](Code::EngineMissing) with the message of the last interpreter that was tested.
     pub fn find_python(&self) -> Result<String> {
         let candidates: Vec<&str> = match &self.python {
-            Some(own) => vec![own],
+            Some(stated) => vec![stated],
             None => PYTHONS.to_vec(),
         };
         let mut why = String::new();
         for python in candidates {
             match probe(python) {
                 Ok(output) if output.status.success() => return Ok(python.to_owned()),
-                Ok(output) => why = format!("{python} says: {}", last_line(&output)),
+                Ok(output) => why = format!("{python} reports: {}", last_line(&output)),
                 Err(e) => why = format!("{python} cannot be started: {e}"),
             }
         }
-        Err(Diagnostic::new(Code::EngineMissing, format!("no Python with petsc4py and slepc4py: {why}"))
-            .into())
+        Err(Diagnostic::new(
+            Code::EngineMissing,
+            format!("no Python with petsc4py and slepc4py was found: {why}"),
+        )
+        .into())
     }
 
     /// Checks, before anything is written, that the driver can be run. Returns the Python for it.
@@ -99,7 +102,7 @@ impl Engine {
     /// driver ends without a result.
     pub fn run(&self, python: &str, folder: &Path) -> Result<()> {
         let Some((program, options)) = self.mpiexec.split_first() else {
-            return Err(Diagnostic::new(Code::EngineMissing, "no program is named that starts MPI").into());
+            return Err(Diagnostic::new(Code::EngineMissing, "no program that starts MPI is given").into());
         };
         let mut command = Command::new(program);
         command.args(options).arg("-n").arg(self.ranks.to_string());
@@ -144,8 +147,8 @@ fn probe(python: &str) -> std::io::Result<Output> {
 /// Returns the reason of a failure: the error message of the program if there is one, else its last line.
 fn cause(output: &Output) -> String {
     let text = String::from_utf8_lossy(&output.stderr);
-    let own = text.lines().find(|line| line.starts_with("error") || line.contains("exited on signal"));
-    own.map_or_else(|| last_line(output), |line| line.trim().to_owned())
+    let error_line = text.lines().find(|line| line.starts_with("error") || line.contains("exited on signal"));
+    error_line.map_or_else(|| last_line(output), |line| line.trim().to_owned())
 }
 
 fn last_line(output: &Output) -> String {

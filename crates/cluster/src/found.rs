@@ -1,7 +1,7 @@
 //! Result of a cluster: `result.jsonl`, `modes.petsc` and `condensed.petsc`, compared with the model and the prepared
 //! files.
 
-use super::condensed::{CONDENSED_ROUNDING, Condensed};
+use super::condensed::{Condensed, MAX_CONDENSED_DIFFERENCE};
 use super::petsc::{IndexBytes, read_vector};
 use super::prepare::{index_bytes, matrices_of};
 use super::prepared::Prepared;
@@ -58,11 +58,11 @@ struct CountFile {
 #[derive(Debug, Clone, Deserialize)]
 struct CheckpointFile {
     matrices: String,
-    parts: Vec<Part>,
+    parts: Vec<SavedModes>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
-struct Part {
+struct SavedModes {
     vectors: usize,
 }
 
@@ -72,7 +72,7 @@ pub struct ClusterModes {
     /// Modes, in the rows of the model.
     pub modes: SolvedModes,
     /// Description of the computation.
-    pub told: String,
+    pub solver_description: String,
     /// Seconds of each phase on the cluster.
     pub seconds: BTreeMap<String, f64>,
     /// Size and work of the factor of the count.
@@ -91,7 +91,7 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
     let matrices = matrices_of(model, &order, index_bytes(prepared.index_bytes)?);
     if matrices != prepared.matrices {
         let message = format!(
-            "K and M of `{}` are not those that the folder was prepared with, of `{}`",
+            "K and M of `{}` differ from those that the folder was prepared with, of `{}`",
             model.name(),
             prepared.name
         );
@@ -104,12 +104,12 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
     }
     let result: ResultFile = sealed::open(&path, "flexbody-result")?;
     if result.matrices != matrices {
-        let message = "the result belongs to other matrices than those that were prepared";
+        let message = "the result was computed with other matrices than those of the prepared folder";
         return Err(Diagnostic::new(Code::ClusterForeign, message).in_file(path).into());
     }
     let damaged = |why: &str| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(&path));
     if result.modes == 0 || result.eigenvalues.len() != result.modes {
-        return Err(damaged("the result does not have one eigenvalue for each of its modes"));
+        return Err(damaged("the numbers of eigenvalues and modes of the result differ"));
     }
     let count = result.count.clone().map(|CountFile { negative, zero, shift, by }| {
         let by = format!("{by} ({} ranks)", result.ranks);
@@ -119,11 +119,11 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
     let n = model.stiffness().n();
     let file = Vectors { path: &folder.join(MODES), digest: &result.modes_sha256, of: "modes" };
     let index = index_bytes(result.index_bytes)?;
-    let vectors = file.read((n, result.modes), index, |row| order.internal(row))?;
+    let vectors = file.read(n, result.modes, index, |row| order.internal(row))?;
     if let Some(digest) = &result.condensed_sha256 {
-        hold_condensation(&folder.join(CONDENSED), digest, &result, model, &order, vectors.as_ref())?;
+        check_condensation(&folder.join(CONDENSED), digest, &result, model, &order, vectors.as_ref())?;
     }
-    let told = format!(
+    let solver_description = format!(
         "SLEPc {}, PETSc {}, solver `{}` on {} ranks",
         result.slepc, result.petsc, result.solver, result.ranks
     );
@@ -136,23 +136,24 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
         prove,
         source: SourceFile::new("modes", Path::new(MODES), result.modes_sha256),
     };
-    Ok(ClusterModes { modes, told, seconds: result.seconds, factor: result.factor })
+    Ok(ClusterModes { modes, solver_description, seconds: result.seconds, factor: result.factor })
 }
 
 /// Returns the error for a missing result, with the number of modes found so far.
 fn unfinished(folder: &Path, prepared: &Prepared) -> Error {
-    let kept = sealed::open::<CheckpointFile>(&folder.join(CHECKPOINT), "flexbody-kept").ok();
-    let kept = kept.filter(|kept| kept.matrices == prepared.matrices);
-    let kept = kept.map_or(0, |kept| kept.parts.iter().map(|part| part.vectors).sum());
-    let message = match kept {
-        0 => "there is no result, and no mode is kept yet".to_owned(),
-        kept => format!("there is no result yet; {kept} modes are kept"),
+    let checkpoint = sealed::open::<CheckpointFile>(&folder.join(CHECKPOINT), "flexbody-kept").ok();
+    let checkpoint = checkpoint.filter(|checkpoint| checkpoint.matrices == prepared.matrices);
+    let checkpoint =
+        checkpoint.map_or(0, |checkpoint| checkpoint.parts.iter().map(|part| part.vectors).sum());
+    let message = match checkpoint {
+        0 => "there is no result, and no mode is saved yet".to_owned(),
+        saved => format!("there is no result yet; {saved} modes are saved"),
     };
     Diagnostic::new(Code::ClusterUnfinished, message).in_file(folder).into()
 }
 
 /// Refuses condensation products that are not those of M.
-fn hold_condensation(
+fn check_condensation(
     path: &Path,
     digest: &str,
     result: &ResultFile,
@@ -163,13 +164,13 @@ fn hold_condensation(
     let rigid = rigid_modes(model, &model.pencil())?;
     let condensed = Condensed::new(model, order, rigid.as_ref(), modes);
     let (columns, file) = (condensed.columns(), Vectors { path, digest, of: "products of condensation" });
-    let products = file.read((columns, columns), index_bytes(result.index_bytes)?, |row| row)?;
+    let products = file.read(columns, columns, index_bytes(result.index_bytes)?, |row| row)?;
     let difference = condensed.difference(products.as_ref());
-    if difference <= CONDENSED_ROUNDING {
+    if difference <= MAX_CONDENSED_DIFFERENCE {
         return Ok(());
     }
     let message = format!(
-        "the products of condensation are not those of the mass matrix: they differ by {difference:.0e}, rounding explains {CONDENSED_ROUNDING:.0e}"
+        "the products of condensation differ from those of the mass matrix by {difference:.0e}, rounding explains at most {MAX_CONDENSED_DIFFERENCE:.0e}"
     );
     Err(Diagnostic::new(Code::ClusterInaccurate, message).in_file(path).into())
 }
@@ -186,7 +187,8 @@ impl Vectors<'_> {
     /// Reads `count` columns of `n` rows. `place` returns the target row of each row.
     fn read(
         &self,
-        (n, count): (usize, usize),
+        n: usize,
+        count: usize,
         index: IndexBytes,
         place: impl Fn(usize) -> usize,
     ) -> Result<Mat<f64>> {
@@ -194,12 +196,12 @@ impl Vectors<'_> {
             |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(self.path));
         let failed = |e: std::io::Error| unreadable(format!("file cannot be read: {e}"));
         if sha256_of_file(self.path).map_err(failed)? != self.digest {
-            let message = format!("the {} are not those that the result was written with", self.of);
+            let message = format!("the {} changed since the result was written", self.of);
             return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(self.path).into());
         }
         note_read(self.path);
         let file = open_regular(self.path).map_err(failed)?;
-        columns(BufReader::with_capacity(1 << 20, file), (n, count), index, place)
+        columns(BufReader::with_capacity(1 << 20, file), n, count, index, place)
             .map_err(failed)?
             .ok_or_else(|| unreadable(format!("file does not hold {count} vectors of {n} finite numbers")))
     }
@@ -207,7 +209,8 @@ impl Vectors<'_> {
 
 fn columns(
     mut file: impl Read,
-    (n, count): (usize, usize),
+    n: usize,
+    count: usize,
     index: IndexBytes,
     place: impl Fn(usize) -> usize,
 ) -> std::io::Result<Option<Mat<f64>>> {

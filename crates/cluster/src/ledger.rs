@@ -18,7 +18,8 @@ pub struct DoneBody {
     /// SHA-256 of the file that was written.
     pub output: String,
     /// Facts about the body for the report.
-    pub told: serde_json::Value,
+    #[serde(rename = "told")]
+    pub summary: serde_json::Value,
 }
 
 /// Bodies that were made, by the paths of their files.
@@ -34,7 +35,7 @@ impl Ledger {
         let mut path = list.as_os_str().to_owned();
         path.push(".done");
         let path = PathBuf::from(path);
-        let done = sealed::open_kept(&path, FORMAT).unwrap_or_default();
+        let done = sealed::open_unrecorded(&path, FORMAT).unwrap_or_default();
         Self { path, done }
     }
 
@@ -46,8 +47,8 @@ impl Ledger {
     /// Returns the entry of a body that was made of these inputs and whose file is unchanged.
     pub fn done(&self, output: &Path, inputs: &str) -> Option<&DoneBody> {
         let body = self.done.get(&output.display().to_string())?;
-        let is_there = || sha256_of_file(output).ok().is_some_and(|sha| sha == body.output);
-        (body.inputs == inputs && is_there()).then_some(body)
+        let is_unchanged = || sha256_of_file(output).ok().is_some_and(|sha| sha == body.output);
+        (body.inputs == inputs && is_unchanged()).then_some(body)
     }
 
     /// Checks before the work that the ledger can be written.
@@ -62,9 +63,9 @@ impl Ledger {
     ///
     /// # Errors
     /// The errors of [`OutputSlot`].
-    pub fn add(&mut self, output: &Path, inputs: String, told: serde_json::Value) -> Result<()> {
+    pub fn add(&mut self, output: &Path, inputs: String, summary: serde_json::Value) -> Result<()> {
         let Ok(sha) = sha256_of_file(output) else { return Ok(()) };
-        self.done.insert(output.display().to_string(), DoneBody { inputs, output: sha, told });
+        self.done.insert(output.display().to_string(), DoneBody { inputs, output: sha, summary });
         let slot = OutputSlot::prepare(&self.path)?;
         slot.fill(sealed::seal(FORMAT, &self.done).as_bytes())?;
         OutputSlot::keep_all([slot])

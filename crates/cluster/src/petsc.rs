@@ -84,10 +84,10 @@ impl<W: Write> Write for Sealing<W> {
 }
 
 /// Size of the write buffer in bytes.
-const PIECE: usize = 1 << 20;
+const BUFFER_BYTES: usize = 1 << 20;
 
 fn sealing<W: Write>(out: W, fill: impl FnOnce(&mut BufWriter<Sealing<W>>) -> Result<()>) -> Result<String> {
-    let mut to = BufWriter::with_capacity(PIECE, Sealing { out, fingerprint: Fingerprint::default() });
+    let mut to = BufWriter::with_capacity(BUFFER_BYTES, Sealing { out, fingerprint: Fingerprint::default() });
     fill(&mut to)?;
     let mut sealing = to.into_inner().map_err(std::io::IntoInnerError::into_error)?;
     sealing.flush()?;

@@ -78,9 +78,9 @@ pub fn prepare(model: &FeModel, settings: &PrepareSettings, folder: &Path) -> Re
     let mass = WrittenRows { matrix: pencil.mass(), block: pencil.block(), order: &order };
     let entries = [stiffness.entries(), mass.entries()];
     if let Some(most) = entries.into_iter().max().filter(|most| *most > index.largest()) {
-        let message = format!("a matrix has {most} entries, more than whole numbers of 32 bits count");
+        let message = format!("a matrix has {most} entries, too many for indices of 32 bits");
         return Err(Diagnostic::new(Code::Usage, message)
-            .with_help("take --indices 64, and a PETSc that is configured with 64-bit indices")
+            .with_help("use --indices 64, and a PETSc that is configured with 64-bit indices")
             .into());
     }
     let rigid = rigid_modes(model, &pencil)?;
@@ -139,7 +139,7 @@ fn matrices(stiffness: &str, mass: &str) -> String {
 /// Returns the integer size with this number of bytes.
 pub(super) fn index_bytes(bytes: u64) -> Result<IndexBytes> {
     IndexBytes::of(bytes).ok_or_else(|| {
-        let message = format!("whole numbers of PETSc have 4 or 8 bytes, not {bytes}");
+        let message = format!("indices of PETSc have {bytes} bytes, expected 4 or 8");
         Diagnostic::new(Code::ClusterUnreadable, message).into()
     })
 }

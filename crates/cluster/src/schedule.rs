@@ -8,10 +8,10 @@ use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 
 /// Memory of a process before it has read anything, in bytes.
-const PROCESS: u64 = 60_000_000;
+const PROCESS_BYTES: u64 = 60_000_000;
 
 /// Bytes per entry of a matrix while it is read: the stored entry and its source.
-const ENTRY: u64 = 40;
+const BYTES_PER_ENTRY: u64 = 40;
 
 /// Returns the largest memory of a conversion of a model in bytes: that of the search by its plan, and that of the
 /// matrices.
@@ -21,7 +21,9 @@ const ENTRY: u64 = 40;
 pub fn conversion_bytes(model: &FeModel, settings: &ModeSettings) -> Result<u64> {
     let pencil = model.pencil();
     let entries = pencil.stiffness().as_csc().nnz() + pencil.mass().as_csc().nnz();
-    Ok(PROCESS + ENTRY * entries as u64 + search_plan(model, settings, &Context::QUIET)?.bytes())
+    Ok(PROCESS_BYTES
+        + BYTES_PER_ENTRY * entries as u64
+        + search_plan(model, settings, &Context::QUIET)?.bytes())
 }
 
 /// Resources for parallel conversions.

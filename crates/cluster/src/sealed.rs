@@ -13,7 +13,7 @@ use std::path::Path;
 const VERSION: u32 = 1;
 
 /// Largest size of such a file in bytes: ledgers of some hundred thousand bodies.
-const MOST: u64 = 1 << 30;
+const MAX_BYTES: u64 = 1 << 30;
 
 #[derive(Serialize, Deserialize)]
 struct Head {
@@ -33,10 +33,10 @@ pub(super) fn seal(format: &str, content: &impl Serialize) -> String {
 /// Reads the content of an input file.
 ///
 /// # Errors
-/// The errors of [`open_kept`].
+/// The errors of [`open_unrecorded`].
 pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     note_read(path);
-    open_kept(path, format)
+    open_unrecorded(path, format)
 }
 
 /// Reads the content of a file that the run itself writes and replaces.
@@ -44,14 +44,14 @@ pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> 
 /// # Errors
 /// [`ClusterUnreadable`](Code::ClusterUnreadable) if the file cannot be read or does not have this format;
 /// [`ClusterChanged`](Code::ClusterChanged) if its digest differs.
-pub(super) fn open_kept<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
+pub(super) fn open_unrecorded<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
-    let text = read_text(path, MOST).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
-    let not_ours = || unreadable(format!("file is no `{format}`"));
-    let (head, body) = text.split_once('\n').ok_or_else(not_ours)?;
-    let head: Head = serde_json::from_str(head).map_err(|_| not_ours())?;
+    let text = read_text(path, MAX_BYTES).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
+    let wrong_format = || unreadable(format!("file is not a `{format}` file"));
+    let (head, body) = text.split_once('\n').ok_or_else(wrong_format)?;
+    let head: Head = serde_json::from_str(head).map_err(|_| wrong_format())?;
     if head.format != format {
-        return Err(not_ours());
+        return Err(wrong_format());
     }
     if head.version != VERSION {
         let message =
@@ -60,8 +60,9 @@ pub(super) fn open_kept<T: DeserializeOwned>(path: &Path, format: &str) -> Resul
     }
     let body = body.strip_suffix('\n').unwrap_or(body);
     if sha256_hex(body.as_bytes()) != head.sha256 {
-        let message = "the content of the file is not the one that it was written with";
+        let message = "the content of the file changed since it was written";
         return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(path).into());
     }
-    serde_json::from_str(body).map_err(|e| unreadable(format!("content of the file: {e}")))
+    serde_json::from_str(body)
+        .map_err(|e| unreadable(format!("the content of the file is not understood: {e}")))
 }

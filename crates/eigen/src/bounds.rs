@@ -20,18 +20,18 @@ use flexbody_linalg::{
 };
 
 /// Unit roundoff of f64.
-const U: f64 = f64::EPSILON / 2.0;
+const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
 
 /// Factor that covers the rounding of the bounds themselves where they are evaluated in f64.
-const ROOM: f64 = 1.0 + 1e-6;
+const ROUNDING_MARGIN: f64 = 1.0 + 1e-6;
 
 /// Shift between the rigid and the flexible modes, relative to the first flexible eigenvalue. Rigid modes whose
 /// rounding comes near this shift have been refused before.
-const PART_BELOW: f64 = 0.5;
+const RIGID_SHIFT_FRACTION: f64 = 0.5;
 
 /// Values of tau relative to the first eigenvalue, in the order of their use. A larger tau makes K + tau M better
 /// conditioned and the bounds wider.
-const SHIFTS: [f64; 4] = [1.0, 1e2, 1e4, 1e6];
+const RELATIVE_SHIFTS: [f64; 4] = [1.0, 1e2, 1e4, 1e6];
 
 /// Counts the eigenvalues below the modes and encloses the eigenvalues between the two shifts.
 ///
@@ -55,16 +55,18 @@ pub(super) fn enclose(
 ) -> Result<EigenvalueBounds, EigenFailure> {
     let Task { problem, analysis, context, .. } = *task;
     let pencil = &problem.pencil;
-    let low = PART_BELOW * eigenvalues[0];
+    let low = RIGID_SHIFT_FRACTION * eigenvalues[0];
     let (rigid, pivots_below) = (problem.rigid.ncols(), count_below(problem, analysis, low, context)?);
     if pivots_below != rigid {
         let counted = pivots_below.saturating_sub(rigid);
         return Err(EigenFailure::CountDiffers { found: 0, counted, shift: low });
     }
-    let factor = SHIFTS
+    let factor = RELATIVE_SHIFTS
         .iter()
         .find_map(|part| ProvedFactor::new(analysis, pencil, part * eigenvalues[0], context))
-        .ok_or(EigenFailure::NotCertified { why: "K + tau M is positive definite by less than rounding" })?;
+        .ok_or(EigenFailure::NotCertified {
+            why: "the lowest eigenvalue of K + tau M does not exceed its rounding error",
+        })?;
     let tau = factor.tau;
     let omega: Vec<f64> = eigenvalues.iter().map(|lambda| lambda + tau).collect();
     let trial = Trial::new(&factor, vectors, omega, context);
@@ -139,8 +141,9 @@ impl<'a> ProvedFactor<'a> {
             size = size.max(sum / root[i]);
             row = row.max(columns.len());
         }
-        let size = size * ROOM;
-        let rounding = 2.0 * U * (analysis.factor_len() + 3 * n) as f64 + 8.0 * U * size;
+        let size = size * ROUNDING_MARGIN;
+        let rounding =
+            2.0 * UNIT_ROUNDOFF * (analysis.factor_len() + 3 * n) as f64 + 8.0 * UNIT_ROUNDOFF * size;
         let alpha = 3.0 * rounding;
         let lowered = k.with_diagonal(|i, value| value - alpha * diagonal[i])?;
         context.count(|work| work.factorizations += 1);
@@ -151,12 +154,12 @@ impl<'a> ProvedFactor<'a> {
 
     /// Returns an upper bound of |x| in the norm of D.
     fn norm(&self, x: impl Iterator<Item = f64>) -> f64 {
-        ROOM * x.zip(&self.diagonal).map(|(x, d)| x * x * d).sum::<f64>().sqrt()
+        ROUNDING_MARGIN * x.zip(&self.diagonal).map(|(x, d)| x * x * d).sum::<f64>().sqrt()
     }
 
     /// Returns an upper bound of |r| in the norm of D^-1.
     fn dual_norm(&self, r: impl Iterator<Item = f64>) -> f64 {
-        ROOM * r.zip(&self.diagonal).map(|(r, d)| r * r / d).sum::<f64>().sqrt()
+        ROUNDING_MARGIN * r.zip(&self.diagonal).map(|(r, d)| r * r / d).sum::<f64>().sqrt()
     }
 
     /// Returns K X and M X in double-double arithmetic.
@@ -195,13 +198,20 @@ impl<'a> ProvedFactor<'a> {
                 let (z, r, e) = (z.col(c), r.col(c), e.col(c));
                 let along: f64 = z.iter().zip(r.iter()).map(|(z, r)| z * r).sum();
                 // z'Az = z'r - z'e; the computed sum may be off by n u of the sum of its magnitudes.
-                let slack: f64 =
-                    (0..n).map(|i| z[i].abs() * (e[i].abs() + (n as f64 + 2.0) * U * r[i].abs())).sum();
+                let slack: f64 = (0..n)
+                    .map(|i| z[i].abs() * (e[i].abs() + (n as f64 + 2.0) * UNIT_ROUNDOFF * r[i].abs()))
+                    .sum();
                 // e was rounded to f64 and evaluated to 8 u^2 of its terms.
                 let left = self.dual_norm(e.iter().copied())
-                    + 8.0 * U * U * (self.row + 16.0) * self.size * self.norm(z.iter().copied());
-                let norm = (along + slack).max(0.0).sqrt() + (1.0 + U) * left / self.margin.sqrt();
-                ROOM * norm * norm
+                    + 8.0
+                        * UNIT_ROUNDOFF
+                        * UNIT_ROUNDOFF
+                        * (self.row + 16.0)
+                        * self.size
+                        * self.norm(z.iter().copied());
+                let norm =
+                    (along + slack).max(0.0).sqrt() + (1.0 + UNIT_ROUNDOFF) * left / self.margin.sqrt();
+                ROUNDING_MARGIN * norm * norm
             })
             .collect()
     }
@@ -235,7 +245,7 @@ impl Trial {
         let zero = vec![vec![DoubleDouble::default(); count]; count];
         let mut trial =
             Self { stiffness: zero.clone(), mass: zero, error: Vec::new(), tau, residual: Vec::new(), omega };
-        let terms = 8.0 * U * U * (sum_length(n) + factor.row + 16.0) * factor.size;
+        let terms = 8.0 * UNIT_ROUNDOFF * UNIT_ROUNDOFF * (sum_length(n) + factor.row + 16.0) * factor.size;
         for start in (0..count).step_by(LANES) {
             let width = LANES.min(count - start);
             let block = x.subcols(start, width);
@@ -263,10 +273,10 @@ impl Trial {
                 trial.error.push((2.0 * terms).sqrt() * size);
                 // The residual was rounded to f64, after an evaluation in double-double.
                 let ratio = 1.0 + trial.omega[start + c] / tau;
-                let rounding = U * factor.dual_norm(r.col(c).iter().copied())
-                    + 8.0 * U * U * (factor.row + 16.0) * ratio * factor.size * size;
-                let norm = norm.sqrt() + ROOM * rounding / factor.margin.sqrt();
-                trial.residual.push(ROOM * norm * norm);
+                let rounding = UNIT_ROUNDOFF * factor.dual_norm(r.col(c).iter().copied())
+                    + 8.0 * UNIT_ROUNDOFF * UNIT_ROUNDOFF * (factor.row + 16.0) * ratio * factor.size * size;
+                let norm = norm.sqrt() + ROUNDING_MARGIN * rounding / factor.margin.sqrt();
+                trial.residual.push(ROUNDING_MARGIN * norm * norm);
             }
         }
         trial
@@ -290,19 +300,22 @@ impl Trial {
             for j in 0..count {
                 let (a, m) = (self.stiffness[i][j], self.mass[i][j]);
                 let (wi, wj) = (self.omega[i], self.omega[j]);
-                let own = if i == j { count as f64 * self.residual[i] * ROOM } else { 0.0 };
-                let t = m * wi + m * wj - a + DoubleDouble::from(own);
+                let known_residual =
+                    if i == j { count as f64 * self.residual[i] * ROUNDING_MARGIN } else { 0.0 };
+                let t = m * wi + m * wj - a + DoubleDouble::from(known_residual);
                 let scaled = |value: DoubleDouble| value * wi * wj;
                 p[i][j] = scaled(a - s * m) * sign;
                 q[i][j] = scaled(a - s * m * 2.0) + s * s * t;
                 // Errors of the Gram matrices, and 32 u^2 of all terms for the rounding of the lines above.
                 let (da, dm) = (self.error[i] * self.error[j], self.error[i] * self.error[j] / self.tau);
-                let da = da + 32.0 * U * U * a.hi.abs();
-                let dm = dm + 32.0 * U * U * m.hi.abs();
-                p_error[i][j] = ROOM * wi * wj * (da + s.hi * dm);
-                q_error[i][j] = ROOM
+                let da = da + 32.0 * UNIT_ROUNDOFF * UNIT_ROUNDOFF * a.hi.abs();
+                let dm = dm + 32.0 * UNIT_ROUNDOFF * UNIT_ROUNDOFF * m.hi.abs();
+                p_error[i][j] = ROUNDING_MARGIN * wi * wj * (da + s.hi * dm);
+                q_error[i][j] = ROUNDING_MARGIN
                     * (wi * wj * (da + 2.0 * s.hi * dm)
-                        + s.hi * s.hi * ((wi + wj) * dm + da + 32.0 * U * U * own));
+                        + s.hi
+                            * s.hi
+                            * ((wi + wj) * dm + da + 32.0 * UNIT_ROUNDOFF * UNIT_ROUNDOFF * known_residual));
             }
         }
         let (p_slack, q_slack) = (Slack::of(&p, &p_error)?, Slack::of(&q, &q_error)?);
@@ -319,7 +332,7 @@ impl Trial {
         let slack = p_slack.relative + q_slack.relative + (count as f64 + 10.0) * 2f64.powi(-96);
         let one = DoubleDouble::from(1.0);
         let bound = |kappa: DoubleDouble| {
-            let kappa = kappa * (1.0 - ROOM * slack);
+            let kappa = kappa * (1.0 - ROUNDING_MARGIN * slack);
             match side {
                 Side::Above => Some(s * kappa / (one + kappa)),
                 Side::Below => Some(kappa - one).filter(|over| over.hi > 0.0).map(|over| s * kappa / over),
@@ -357,7 +370,7 @@ impl Trial {
                 })
                 .sum();
             // Two unit vectors are at most 1 apart in this measure.
-            errors.extend(cluster.clone().map(|_| (ROOM * square.sqrt()).min(1.0)));
+            errors.extend(cluster.clone().map(|_| (ROUNDING_MARGIN * square.sqrt()).min(1.0)));
         }
         errors
     }
@@ -386,6 +399,6 @@ impl Slack {
         let off = largest((0..count).map(|i| row(i, &|j| if i == j { 0.0 } else { matrix[i][j].hi.abs() })));
         let slack = largest((0..count).map(|i| row(i, &|j| error[i][j])));
         // The smallest eigenvalue of the scaled matrix is at least 1 - off.
-        (off < 0.5 && slack < 0.25).then(|| Self { scale, relative: ROOM * slack / (1.0 - off) })
+        (off < 0.5 && slack < 0.25).then(|| Self { scale, relative: ROUNDING_MARGIN * slack / (1.0 - off) })
     }
 }

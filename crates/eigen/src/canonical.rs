@@ -14,7 +14,7 @@ pub const CLUSTER_GAP: f64 = 1e-9;
 /// Relative difference of squared components below which the components count as equally large. The first of them in
 /// row order is chosen, so that neither rounding nor the residual that [`Accuracy::Fast`](super::Accuracy::Fast) allows
 /// decides between symmetric nodes.
-const EQUAL: f64 = 1e-4;
+const EQUAL_COMPONENT_DIFFERENCE: f64 = 1e-4;
 
 /// Returns the index ranges of eigenvalues (ascending) whose neighbours differ by at most `gap` relative to their size.
 pub fn clusters(eigenvalues: &[f64], gap: f64) -> Vec<Range<usize>> {
@@ -70,7 +70,7 @@ pub fn canonical_sign(mut shape: impl Iterator<Item = f64> + Clone) -> f64 {
     if shape.nth(dominant).is_some_and(|x| x < 0.0) { -1.0 } else { 1.0 }
 }
 
-/// Returns the first row whose norm is the largest, up to [`EQUAL`].
+/// Returns the first row whose norm is the largest, up to [`EQUAL_COMPONENT_DIFFERENCE`].
 fn dominant_row(block: MatRef<'_, f64>) -> usize {
     let mut squares = vec![0.0f64; block.nrows()];
     for j in 0..block.ncols() {
@@ -81,10 +81,10 @@ fn dominant_row(block: MatRef<'_, f64>) -> usize {
     first_largest(squares.iter().copied())
 }
 
-/// Returns the index of the first square that is the largest, up to [`EQUAL`].
+/// Returns the index of the first square that is the largest, up to [`EQUAL_COMPONENT_DIFFERENCE`].
 fn first_largest(mut squares: impl Iterator<Item = f64> + Clone) -> usize {
     let largest = squares.clone().fold(0.0, f64::max);
-    squares.position(|square| square >= largest * (1.0 - EQUAL)).unwrap_or(0)
+    squares.position(|square| square >= largest * (1.0 - EQUAL_COMPONENT_DIFFERENCE)).unwrap_or(0)
 }
 
 /// Applies the Householder reflection of the columns after which only the first column has a component in `row`.

@@ -8,13 +8,13 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::{Analysis, Indefinite, Inertia};
 
 /// Backward error above which element growth may have spoilt a count in double precision.
-const GROWTH_LIMIT: f64 = 1e-4;
+const MAX_COUNT_BACKWARD_ERROR: f64 = 1e-4;
 
 /// Distance of a shift from an eigenvalue, relative to [`size_along`] its mode, below which the count is made in double
 /// precision, if that fits the memory. With a smaller value rounding may spoil counts in single precision. Measured on
 /// cubes and blocks: the norm of G of [`Indefinite::perturbation`](flexbody_linalg::Indefinite::perturbation) is 4.5e-7
 /// over this distance.
-pub(super) const NEAR: f64 = 2e-6;
+pub(super) const SINGLE_COUNT_DISTANCE: f64 = 2e-6;
 
 /// Returns the size of K - sigma M along a mode psi: psi' diag(K + sigma M) psi. Rounding moves the eigenvalue of the
 /// mode by about one unit roundoff of this size.
@@ -84,7 +84,7 @@ impl Count {
     pub(crate) fn remark(&self) -> String {
         self.rounding.map_or_else(String::new, |rounding| {
             format!(
-                "counted in single precision, whose rounding is {rounding:.0e} of what may change the count"
+                "counted in single precision, with {rounding:.0e} of the rounding error that could change the count"
             )
         })
     }
@@ -121,7 +121,10 @@ pub(super) fn count_below(
 ) -> Result<usize, EigenFailure> {
     context.count(|work| work.factorizations += 1);
     let inertia = Inertia::new(analysis, &problem.pencil, sigma);
-    if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > GROWTH_LIMIT {
+    if inertia.zero > 0
+        || inertia.backward_error.is_nan()
+        || inertia.backward_error > MAX_COUNT_BACKWARD_ERROR
+    {
         return Err(EigenFailure::Inaccurate { residual: inertia.backward_error });
     }
     Ok(inertia.negative)

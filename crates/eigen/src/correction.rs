@@ -12,8 +12,8 @@ use super::refine::{FoundModes, Refined, residuals};
 use super::refine::{independent, leave_unbalanced, small_ritz};
 use faer::Mat;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::multigrid::Near;
-use flexbody_linalg::multigrid::{Aim, Levels};
+use flexbody_linalg::multigrid::DeflationSpace;
+use flexbody_linalg::multigrid::{CorrectionTarget, Levels};
 use flexbody_linalg::{
     Solve, Tall, combine, combine_in_place, combine_into, gram, largest, subtract_combination,
 };
@@ -22,25 +22,26 @@ use std::ops::Range;
 
 /// Residual asked of the first mode beyond the wanted ones. The error of its eigenvalue, which bounds the gap of the
 /// count, is the square of this residual.
-const BEYOND: f64 = 1e-3;
+const NEXT_MODE_RESIDUAL: f64 = 1e-3;
 
 /// Relative distance between the last wanted eigenvalue and the next one up to which the next mode may belong to the
-/// same cluster: with a residual of [`BEYOND`] its Ritz value does not decide. Such a mode is corrected like the wanted
-/// ones, so that the cluster is seen, and its canonical basis does not depend on the progress of the search.
-const MAY_REPEAT: f64 = 1e-3;
+/// same cluster: with a residual of [`NEXT_MODE_RESIDUAL`] its Ritz value does not decide. Such a mode is corrected
+/// like the wanted ones, so that the cluster is seen, and its canonical basis does not depend on the progress of the
+/// search.
+const POSSIBLE_CLUSTER_GAP: f64 = 1e-3;
 
 /// Largest number of rounds of corrections.
-const MAX_ROUNDS: usize = 60;
+const MAX_CORRECTION_ROUNDS: usize = 60;
 
 /// Number of successive rounds without a gain of a factor of two after which the corrections end.
-const PATIENCE: usize = 6;
+const MAX_STALLED_ROUNDS: usize = 6;
 
 /// Numbers of rounds of cycles, each with the factor by which the residuals must have fallen by then. With a smaller
 /// gain a factor takes less time than the remaining rounds. Measured gains: cubes, bars and brackets of every element
 /// 2.4 and more after two rounds, 5 to 10^5 after four; blocks with thin bars, flat elements, contrasts of stiffness
 /// and nearly incompressible bodies at most 1.25 after two. The test after two rounds halves the time lost on the
 /// latter.
-const GAINS_ASKED: [(usize, f64); 2] = [(2, 1.5), (4, 7.0)];
+const REQUIRED_GAINS: [(usize, f64); 2] = [(2, 1.5), (4, 7.0)];
 
 /// Search space that is corrected until its lowest Ritz pairs keep the tolerance and the end of the cluster of the last
 /// wanted mode is known.
@@ -60,12 +61,14 @@ pub(super) struct Correction<'a> {
     floors: Vec<f64>,
     /// Size of the matrix along the last examined pair: [`size_along`].
     size: f64,
-    /// Number of rounds so far, and the largest excess before the first of them.
+    /// Number of rounds so far.
     rounds: usize,
-    first: f64,
-    /// Least excess so far, and the number of rounds since it last halved.
-    least: f64,
-    since: usize,
+    /// Largest excess before the first round.
+    first_excess: f64,
+    /// Least excess so far.
+    least_excess: f64,
+    /// Number of rounds since the least excess last halved.
+    rounds_since: usize,
 }
 
 impl<'a> Correction<'a> {
@@ -74,12 +77,14 @@ impl<'a> Correction<'a> {
         task: &Task<'a>,
         corrector: Corrector<'a>,
         goal: &'a Goal,
-        (x, wanted): (Mat<f64>, usize),
+        x: Mat<f64>,
+        wanted: usize,
     ) -> Result<Self, EigenFailure> {
         let Task { problem, context, .. } = *task;
         let base = x.ncols();
-        let mut space = SearchSpace::new(problem, x, corrector.room(base), context)?;
-        if corrector.contracts(base, base) {
+        // Levels need a basis of Ritz vectors from the start.
+        let mut space = SearchSpace::new(problem, x, corrector.capacity(base), context)?;
+        if corrector.must_contract(base, base) {
             space.contract(base);
         }
         Ok(Self {
@@ -94,24 +99,26 @@ impl<'a> Correction<'a> {
             floors: Vec::new(),
             size: 0.0,
             rounds: 0,
-            first: f64::NAN,
-            least: f64::INFINITY,
-            since: 0,
+            first_excess: f64::NAN,
+            least_excess: f64::INFINITY,
+            rounds_since: 0,
         })
     }
 
     /// Corrects until the modes keep the tolerance. Returns the modes and the examined eigenvalues after them.
     pub(super) fn modes(mut self) -> Result<FoundModes, EigenFailure> {
-        for _ in 0..MAX_ROUNDS {
-            let (forces, looked) = self.excess();
+        for _ in 0..MAX_CORRECTION_ROUNDS {
+            // Examine the wanted pairs and the next one.
+            let (forces, examined) = self.excess();
             let keeps = |pair: &Pair| pair.residual <= pair.allowed;
-            self.converged = looked[..self.wanted].iter().filter(|pair| keeps(pair)).count();
-            let poor: Vec<Pair> = looked.iter().copied().filter(|pair| !keeps(pair)).collect();
-            self.context.fraction(1.0 - poor.len() as f64 / looked.len() as f64);
+            self.converged = examined[..self.wanted].iter().filter(|pair| keeps(pair)).count();
+            let poor: Vec<Pair> = examined.iter().copied().filter(|pair| !keeps(pair)).collect();
+            self.context.fraction(1.0 - poor.len() as f64 / examined.len() as f64);
+            // Done when all pairs keep their residuals; given up when the gain is too small.
             if poor.is_empty() {
-                return self.hand_over(looked.len());
+                return self.hand_over(examined.len());
             }
-            if !self.gains(largest(looked.iter().map(|pair| pair.residual / pair.allowed))) {
+            if !self.is_worthwhile(largest(examined.iter().map(|pair| pair.residual / pair.allowed))) {
                 break;
             }
             self.correct(&forces, &poor)?;
@@ -122,35 +129,39 @@ impl<'a> Correction<'a> {
     /// Returns the residual forces of the examined pairs, with the relative sizes of the residuals and the sizes
     /// allowed.
     fn excess(&mut self) -> (Tall, Vec<Pair>) {
-        let (forces, relative) = self.look();
-        if self.seeks_gap(&relative) {
+        let (forces, relative) = self.examine();
+        if self.extend_to_gap(&relative) {
             return self.excess();
         }
         let (tolerance, lambda) = (self.goal.tolerance, &self.space.lambda);
-        let may_be_wanted = cluster_end(self.wanted, lambda.len(), MAY_REPEAT, |i| lambda[i]);
-        let allowed = |j: usize| if j < may_be_wanted { tolerance.max(self.floors[j]) } else { BEYOND };
+        // Pairs that may belong to the cluster of the last wanted one need the full accuracy.
+        let may_be_wanted = cluster_end(self.wanted, lambda.len(), POSSIBLE_CLUSTER_GAP, |i| lambda[i]);
+        let allowed =
+            |j: usize| if j < may_be_wanted { tolerance.max(self.floors[j]) } else { NEXT_MODE_RESIDUAL };
         let pair = |(number, residual)| Pair { number, residual, allowed: allowed(number) };
         (forces, relative.into_iter().enumerate().map(pair).collect())
     }
 
     /// Returns the residual forces of the wanted pairs and of the next one, and their relative sizes.
-    fn look(&mut self) -> (Tall, Vec<f64>) {
+    fn examine(&mut self) -> (Tall, Vec<f64>) {
         let Self { problem, context, space, .. } = self;
         let lambda = &space.lambda;
+        // The wanted pairs, to the end of their cluster, and the one after it.
         self.wanted = cluster_end(self.wanted, lambda.len(), CLUSTER_GAP, |i| lambda[i]);
-        let looked = (self.wanted + 1).min(lambda.len());
-        if self.floors.len() < looked {
-            let lowest = space.some_vectors(0..looked);
-            self.floors = residuals(problem, &lambda[..looked], lowest.as_ref(), context).1;
-            self.size = size_along(problem, lambda[looked - 1], lowest.as_ref().col(looked - 1));
+        let examined = (self.wanted + 1).min(lambda.len());
+        // Rounding floors change little between rounds: they are computed once for each pair.
+        if self.floors.len() < examined {
+            let lowest = space.some_vectors(0..examined);
+            self.floors = residuals(problem, &lambda[..examined], lowest.as_ref(), context).1;
+            self.size = size_along(problem, lambda[examined - 1], lowest.as_ref().col(examined - 1));
         }
-        space.unbalanced(0..looked)
+        space.unbalanced(0..examined)
     }
 
     /// Extends the wanted modes to the next gap wide enough for the count, if the gap above them is too narrow and such
     /// a gap is near. Does so only when the pairs are accurate enough to decide. Returns true when it extended them.
-    fn seeks_gap(&mut self, relative: &[f64]) -> bool {
-        let are_good = relative.iter().all(|relative| *relative <= BEYOND);
+    fn extend_to_gap(&mut self, relative: &[f64]) -> bool {
+        let are_good = relative.iter().all(|relative| *relative <= NEXT_MODE_RESIDUAL);
         if self.goal.separation == 0.0 || !are_good {
             return false;
         }
@@ -159,64 +170,68 @@ impl<'a> Correction<'a> {
         let farthest = ((self.goal.wanted + self.base) / 2).min(lambda.len().saturating_sub(1));
         let is_wide =
             |end: &usize| *end > 0 && lambda[*end] - lambda[end - 1] >= self.goal.separation * self.size;
+        // The first gap that is wide enough, if there is one within reach.
         let end = (self.wanted..=farthest).find(is_wide).unwrap_or(self.wanted);
-        let seeks = end > self.wanted;
-        if seeks {
+        let extends = end > self.wanted;
+        if extends {
             self.wanted = end;
-            (self.least, self.since) = (f64::INFINITY, 0);
+            (self.least_excess, self.rounds_since) = (f64::INFINITY, 0);
         }
-        seeks
+        extends
     }
 
     /// Returns the wanted modes of the span, and the examined eigenvalues beyond them.
-    fn hand_over(self, looked: usize) -> Result<FoundModes, EigenFailure> {
+    fn hand_over(self, examined: usize) -> Result<FoundModes, EigenFailure> {
         let Self { problem, corrector, space, wanted, context, .. } = self;
-        let next = space.lambda[wanted..looked].to_vec();
+        let next = space.lambda[wanted..examined].to_vec();
         let refined = Refined::new(problem, space.vectors(0..wanted), &context)?;
         Ok(FoundModes { refined, next, tau: corrector.shift(), finite: None })
     }
 
     /// Returns true when further corrections pay, given the largest excess `worst`.
-    fn gains(&mut self, worst: f64) -> bool {
+    fn is_worthwhile(&mut self, worst: f64) -> bool {
         if self.rounds == 0 {
-            self.first = worst;
+            self.first_excess = worst;
         }
-        if worst < 0.5 * self.least {
-            (self.least, self.since) = (worst, 0);
+        // A round counts as a gain if it halves the excess.
+        if worst < 0.5 * self.least_excess {
+            (self.least_excess, self.rounds_since) = (worst, 0);
         } else {
-            self.since += 1;
+            self.rounds_since += 1;
         }
+        // Cycles must also have reached the gains that justify them.
         let rounds = self.rounds;
-        let is_behind = |(after, gain): &(usize, f64)| rounds == *after && worst > self.first / gain;
-        let is_slow = matches!(self.corrector, Corrector::Levels(_)) && GAINS_ASKED.iter().any(is_behind);
+        let is_behind = |(after, gain): &(usize, f64)| rounds == *after && worst > self.first_excess / gain;
+        let is_slow = matches!(self.corrector, Corrector::Levels(_)) && REQUIRED_GAINS.iter().any(is_behind);
         self.rounds += 1;
-        self.since <= PATIENCE && !is_slow && !worst.is_nan()
+        self.rounds_since <= MAX_STALLED_ROUNDS && !is_slow && !worst.is_nan()
     }
 
     /// Extends the search space by corrections of the poor pairs among the examined ones, and of some pairs after them.
     fn correct(&mut self, forces: &Tall, poor: &[Pair]) -> Result<(), EigenFailure> {
         let Self { corrector, space, base, context, .. } = self;
-        let looked = forces.ncols();
-        let filled = corrector.filled(poor.len()) - poor.len();
+        let examined = forces.ncols();
+        let added = corrector.batch_size(poor.len()) - poor.len();
         // The block is filled up with the residual forces of the next Ritz pairs.
-        let (after, relative) = space.unbalanced(looked..space.lambda.len().min(looked + filled));
-        let later = relative.iter().zip(looked..);
-        let later = later.map(|(&residual, number)| Pair { number, residual, allowed: BEYOND });
+        let (after, relative) = space.unbalanced(examined..space.lambda.len().min(examined + added));
+        let later = relative.iter().zip(examined..);
+        let later = later.map(|(&residual, number)| Pair { number, residual, allowed: NEXT_MODE_RESIDUAL });
         let pairs: Vec<Pair> = poor.iter().copied().chain(later).collect();
         let poor = poor.iter().map(|pair| forces.as_ref().col(pair.number));
         let columns: Vec<_> = poor.chain(after.as_ref().col_iter()).collect();
         // Columns are scaled to unit size: residuals near rounding would leave the range of single precision.
         let unit = |size: f64| if size > 0.0 { size.recip() } else { 0.0 };
         let scales: Vec<f64> = columns.par_iter().map(|column| unit(column.norm_max())).collect();
-        let mut d = Tall::with_room(self.problem.pencil.n(), columns.len());
+        let mut d = Tall::with_capacity(self.problem.pencil.n(), columns.len());
         columns.iter().zip(scales).for_each(|(column, scale)| d.push_multiple(scale, *column));
+        // Solve the correction equations.
         corrector.correct(space, &pairs, &mut d, context);
         // A space without capacity for the corrections is first reduced to its lowest Ritz vectors.
-        if d.ncols() > space.room() {
+        if d.ncols() > space.free_columns() {
             space.contract(*base);
         }
         space.extend(&mut d, corrector.passes(), context)?;
-        if corrector.contracts(space.lambda.len(), *base) {
+        if corrector.must_contract(space.lambda.len(), *base) {
             space.contract(*base);
         }
         Ok(())
@@ -224,25 +239,25 @@ impl<'a> Correction<'a> {
 }
 /// Part of the error of a correction that may remain, relative to the residual of the pair: a correction is accurate to
 /// about the square of the residual, and the residual is mostly roughness that one step removes. Measured with this
-/// value and [`LEAST_LEFT`] on a bar and a cube of 100,000 rows, 16 to 24 modes: the steps of cycles vary by a
+/// value and [`MIN_TARGET_ERROR`] on a bar and a cube of 100,000 rows, 16 to 24 modes: the steps of cycles vary by a
 /// twentieth.
-const LEFT_OF_RESIDUAL: f64 = 0.2;
+const ERROR_PER_RESIDUAL: f64 = 0.2;
 
 /// Smallest part of the error of a correction that is aimed at: the missing directions of the span limit the gain of a
 /// more accurate correction.
-const LEAST_LEFT: f64 = 0.007;
+const MIN_TARGET_ERROR: f64 = 0.007;
 
 /// Part of the allowed residual that a last correction aims at.
-const BELOW_ALLOWED: f64 = 0.3;
+const LAST_TARGET_FRACTION: f64 = 0.3;
 
 /// Number of pairs that cycles correct together: their number is filled up to a multiple of it. With additional pairs
 /// above the wanted ones the last wanted pairs converge sooner. Fewer poor pairs than this, near the end, are not
 /// filled up: they take fewer steps alone.
-const FILLED: usize = 8;
+const PAIRS_PER_CYCLE: usize = 8;
 
 /// Returns the capacity of a search space that levels correct and that starts with `base` vectors.
-pub(super) fn room_with_levels(base: usize) -> usize {
-    2 * base + FILLED
+pub(super) fn capacity_with_levels(base: usize) -> usize {
+    2 * base + PAIRS_PER_CYCLE
 }
 
 /// Operator that turns residual forces into corrections.
@@ -259,8 +274,9 @@ pub(super) enum Corrector<'a> {
 pub(super) struct Pair {
     /// Index of the pair, from the lowest.
     pub number: usize,
-    /// Relative residual, and the residual allowed.
+    /// Relative residual.
     pub residual: f64,
+    /// Largest allowed relative residual.
     pub allowed: f64,
 }
 
@@ -274,9 +290,9 @@ impl Corrector<'_> {
     }
 
     /// Returns the number of pairs to correct when `poor` of them are poor.
-    pub(super) fn filled(self, poor: usize) -> usize {
+    pub(super) fn batch_size(self, poor: usize) -> usize {
         match self {
-            Self::Levels(_) if poor >= FILLED => poor.next_multiple_of(FILLED),
+            Self::Levels(_) if poor >= PAIRS_PER_CYCLE => poor.next_multiple_of(PAIRS_PER_CYCLE),
             _ => poor,
         }
     }
@@ -293,7 +309,7 @@ impl Corrector<'_> {
     /// Returns true when a search space that started with `base` vectors and now has `vectors` must be contracted. With
     /// earlier corrections by a factor the last modes take half the columns. Earlier corrections by levels add nothing
     /// more, and levels need a basis of Ritz vectors.
-    pub(super) fn contracts(self, vectors: usize, base: usize) -> bool {
+    pub(super) fn must_contract(self, vectors: usize, base: usize) -> bool {
         match self {
             Self::Factor(_) => vectors > 2 * base,
             Self::Levels(_) => true,
@@ -301,10 +317,10 @@ impl Corrector<'_> {
     }
 
     /// Returns the capacity of a search space that starts with `base` vectors.
-    pub(super) fn room(self, base: usize) -> usize {
+    pub(super) fn capacity(self, base: usize) -> usize {
         match self {
             Self::Factor(_) => 3 * base + 1,
-            Self::Levels(_) => room_with_levels(base),
+            Self::Levels(_) => capacity_with_levels(base),
         }
     }
 
@@ -323,8 +339,8 @@ impl Corrector<'_> {
                 forces.ncols() as u64
             }
             Self::Levels(levels) => {
-                let aims: Vec<Aim> = pairs.iter().map(Pair::aim).collect();
-                levels.correct(&space.near(), &aims, forces.as_mut())
+                let targets: Vec<CorrectionTarget> = pairs.iter().map(Pair::target).collect();
+                levels.correct(&space.deflation_space(), &targets, forces.as_mut())
             }
         };
         context.count(|work| work.solved_columns += solved);
@@ -333,9 +349,12 @@ impl Corrector<'_> {
 
 impl Pair {
     /// Returns the part of the error that the correction of this pair may leave.
-    fn aim(&self) -> Aim {
-        let last = BELOW_ALLOWED * self.allowed / self.residual;
-        Aim { pair: self.number, left: (LEFT_OF_RESIDUAL * self.residual).max(last).max(LEAST_LEFT) }
+    fn target(&self) -> CorrectionTarget {
+        let last = LAST_TARGET_FRACTION * self.allowed / self.residual;
+        CorrectionTarget {
+            pair: self.number,
+            left: (ERROR_PER_RESIDUAL * self.residual).max(last).max(MIN_TARGET_ERROR),
+        }
     }
 }
 
@@ -364,36 +383,37 @@ pub(super) struct SearchSpace<'a> {
 }
 
 impl<'a> SearchSpace<'a> {
-    /// Creates the space from the span of `x`, made M-orthogonal to the rigid modes, with a capacity of `room` vectors.
+    /// Creates the space from the span of `x`, made M-orthogonal to the rigid modes, with a capacity of `capacity`
+    /// vectors.
     pub(super) fn new(
         problem: &'a EigenProblem<'a>,
         x: Mat<f64>,
-        room: usize,
+        capacity: usize,
         context: &Context<'_>,
     ) -> Result<Self, EigenFailure> {
         let n = problem.pencil.n();
-        let mut own = Self {
+        let mut space = Self {
             problem,
             m_rigid: problem.pencil.apply_mass(problem.rigid),
-            x: Tall::with_room(n, room),
-            kx: Tall::with_room(n, room),
-            mx: Tall::with_room(n, room),
-            capacity: room,
+            x: Tall::with_capacity(n, capacity),
+            kx: Tall::with_capacity(n, capacity),
+            mx: Tall::with_capacity(n, capacity),
+            capacity,
             gm: Mat::zeros(0, 0),
             gk: Mat::zeros(0, 0),
             lambda: Vec::new(),
             ritz: Mat::zeros(0, 0),
             is_ritz: false,
-            work: Tall::with_room(n, x.ncols()),
+            work: Tall::with_capacity(n, x.ncols()),
         };
         let mut first = Tall::copied(x.as_ref());
         drop(x);
-        own.extend(&mut first, 1, context)?;
-        Ok(own)
+        space.extend(&mut first, 1, context)?;
+        Ok(space)
     }
 
     /// Returns the number of vectors that can still be added.
-    pub(super) fn room(&self) -> usize {
+    pub(super) fn free_columns(&self) -> usize {
         self.capacity - self.x.ncols()
     }
 
@@ -454,8 +474,8 @@ impl<'a> SearchSpace<'a> {
     }
 
     /// Returns the rigid modes and the basis. The basis must consist of Ritz vectors.
-    pub(super) fn near(&self) -> Near<'_> {
-        Near {
+    pub(super) fn deflation_space(&self) -> DeflationSpace<'_> {
+        DeflationSpace {
             rigid: [self.problem.rigid, self.m_rigid.as_ref()],
             modes: self.x.as_ref(),
             k_modes: self.kx.as_ref(),
@@ -471,9 +491,9 @@ impl<'a> SearchSpace<'a> {
 
     /// Returns the Ritz vectors of the range `which` (N x k), computed by all threads.
     pub(super) fn some_vectors(&self, which: Range<usize>) -> Tall {
-        let mut own = Tall::zeros(self.problem.pencil.n(), which.len());
-        combine_into(own.as_mut(), self.x.as_ref(), self.ritz.as_ref().subcols(which.start, which.len()));
-        own
+        let mut vectors = Tall::zeros(self.problem.pencil.n(), which.len());
+        combine_into(vectors.as_mut(), self.x.as_ref(), self.ritz.as_ref().subcols(which.start, which.len()));
+        vectors
     }
 
     /// Returns the residual forces K x - lambda M x of the Ritz pairs `which`, and their norms relative to |K x| +

@@ -3,7 +3,7 @@
 //! of the memory.
 
 use super::attempt::{Attempt, Goal};
-use super::correction::{Correction, Corrector, room_with_levels};
+use super::correction::{Correction, Corrector, capacity_with_levels};
 use super::failure::EigenFailure;
 use super::needs::{Needs, Unusable, made_of_modes, resident, search_seconds};
 use super::problem::Task;
@@ -14,34 +14,38 @@ use flexbody_linalg::multigrid::{can_have_levels, levels};
 
 /// Largest number of modes that are searched for without a factor. With more, the products of all pairs of vectors take
 /// longer than the solutions.
-const MULTIGRID_MODES: usize = 100;
+const MAX_MULTIGRID_MODES: usize = 100;
 
-/// Bytes of all levels and of their construction: per stored entry of K, and per row.
-const LEVEL_BYTES: (u64, u64) = (12, 400);
+/// Bytes of all levels and of their construction per stored entry of K. Together with [`LEVEL_BYTES_PER_ROW`], a larger
+/// value refuses cycles for models that would fit the memory.
+const LEVEL_BYTES_PER_ENTRY: u64 = 12;
+
+/// Bytes of all levels and of their construction per row of K, in addition to those of the entries.
+const LEVEL_BYTES_PER_ROW: u64 = 400;
 
 /// Approximate number of entries in a row of K of linear hexahedra.
-const LINEAR_COUPLINGS: f64 = 64.0;
+const LINEAR_HEXAHEDRON_ROW_ENTRIES: f64 = 64.0;
 
 /// Largest factor by which the stronger coupling of second-order elements raises the threshold, beside the coupling
 /// itself. Hexahedra of second order have not been measured beyond it.
-const MOST_RAISED: f64 = 2.1;
+const MAX_THRESHOLD_FACTOR: f64 = 2.1;
 
 /// Number of modes up to which the threshold is that of the settings. More modes raise the threshold: corrections take
 /// more time the more modes they must be orthogonal to, while a factor is computed once. (Measured: equal times with 35
 /// modes of a bar of 100,000 rows, with 80 of a cube, whose factor takes three times the operations.)
-const FEW: f64 = 28.0;
+const UNRAISED_MODES: f64 = 28.0;
 
 /// Cycles over levels of groups of nodes, without a factor.
 pub(super) struct Cycles;
 
 impl Attempt for Cycles {
     fn needs(&self, task: &Task<'_>, wanted: usize) -> Result<Needs, Unusable> {
-        if !pays(task, wanted) {
+        if !saves_time(task, wanted) {
             return Err(Unusable::Unsuited);
         }
         let pencil = &task.problem.pencil;
         let (n, entries) = (pencil.n(), pencil.stiffness().as_csc().nnz() as u64);
-        let levels = LEVEL_BYTES.0 * entries + LEVEL_BYTES.1 * n as u64;
+        let levels = LEVEL_BYTES_PER_ENTRY * entries + LEVEL_BYTES_PER_ROW * n as u64;
         let needed = (levels + vector_bytes(n, wanted)).max(made_of_modes(n, wanted));
         if resident(needed) > task.context.available() {
             return Err(Unusable::Unsuited);
@@ -61,7 +65,7 @@ impl Attempt for Cycles {
         if rough.ncols() <= goal.wanted {
             return Err(unsuited());
         }
-        Correction::begin(task, Corrector::Levels(&*levels), goal, (rough, goal.wanted))?.modes()
+        Correction::begin(task, Corrector::Levels(&*levels), goal, rough, goal.wanted)?.modes()
     }
 
     /// Returns false: a failure of cycles does not concern the model, and another attempt may succeed.
@@ -77,20 +81,20 @@ fn guards(wanted: usize) -> usize {
 }
 
 /// Returns true when cycles take less time than a factor.
-fn pays(task: &Task<'_>, wanted: usize) -> bool {
+fn saves_time(task: &Task<'_>, wanted: usize) -> bool {
     let Task { problem, settings, analysis, .. } = task;
     let entries = problem.pencil.stiffness().as_csc().nnz() as f64;
     // Elements of the second order couple more rows, and take more cycles. (Measured: tetrahedra of 100,000 rows, which
     // couple a quarter more, take twice the time of a factor.)
-    let coupled = (entries / (problem.pencil.n() as f64 * LINEAR_COUPLINGS)).max(1.0);
-    let many = (wanted as f64 / FEW).max(1.0);
-    let threshold = settings.multigrid_pays * many * coupled * coupled.powi(2).min(MOST_RAISED);
+    let coupled = (entries / (problem.pencil.n() as f64 * LINEAR_HEXAHEDRON_ROW_ENTRIES)).max(1.0);
+    let many = (wanted as f64 / UNRAISED_MODES).max(1.0);
+    let threshold = settings.multigrid_pays * many * coupled * coupled.powi(2).min(MAX_THRESHOLD_FACTOR);
     settings.accuracy != Accuracy::Certified
         && settings.factor == FactorChoice::Auto
         && settings.method == Method::Auto
         && matches!(settings.wanted, Wanted::Lowest(_))
         && can_have_levels(&problem.pencil, problem.rigid.ncols())
-        && (1..=MULTIGRID_MODES).contains(&wanted)
+        && (1..=MAX_MULTIGRID_MODES).contains(&wanted)
         && analysis.flops() > threshold * entries
 }
 
@@ -99,5 +103,5 @@ fn pays(task: &Task<'_>, wanted: usize) -> bool {
 /// less than what was in use before and has been released.
 fn vector_bytes(n: usize, wanted: usize) -> u64 {
     let base = wanted + guards(wanted);
-    8 * (n * (3 * room_with_levels(base) + 4 * base)) as u64
+    8 * (n * (3 * capacity_with_levels(base) + 4 * base)) as u64
 }

@@ -15,20 +15,20 @@ use flexbody_linalg::{
 };
 
 /// Scaled eigenvalues of Ms below this value count as zero: files with 10 digits leave smaller ones.
-const NULL: f64 = 1e-10;
+const ZERO_SCALED_MASS: f64 = 1e-10;
 
 /// Largest model that is always solved densely: all modes take less than a second.
-const DENSE_ALWAYS: usize = 600;
+const MAX_ALWAYS_DENSE_ROWS: usize = 600;
 
 /// Largest model that is solved densely because most of its modes are wanted (three arrays of n^2 numbers).
-const DENSE_AT_MOST: usize = 9000;
+const MAX_DENSE_ROWS: usize = 9000;
 
 /// Part of all modes above which the dense path does less work than a Krylov basis of twice that size.
-const DENSE_PART: f64 = 0.2;
+const DENSE_FRACTION: f64 = 0.2;
 
 /// Ratio of a shift among the wanted modes to the first shift below which the eigenproblem is solved again with the
 /// lower shift: the first one costs more than a digit.
-const FAR: f64 = 0.1;
+const LOWER_SHIFT_RATIO: f64 = 0.1;
 
 /// All modes by dense eigenproblems.
 pub(super) struct Dense;
@@ -41,8 +41,8 @@ pub(super) fn is_chosen(task: &Task<'_>, wanted: usize) -> bool {
         Method::Dense => true,
         Method::Lanczos => false,
         Method::Auto => {
-            let most = wanted as f64 > DENSE_PART * task.flexible_rows() as f64;
-            n <= DENSE_ALWAYS || (n <= DENSE_AT_MOST && most)
+            let most = wanted as f64 > DENSE_FRACTION * task.flexible_rows() as f64;
+            n <= MAX_ALWAYS_DENSE_ROWS || (n <= MAX_DENSE_ROWS && most)
         }
     }
 }
@@ -75,7 +75,7 @@ impl Attempt for Dense {
         // their eigenvalues are known, another shift is placed among them, if that matrix can be factored.
         let highest = if last > 0 { spectrum.eigenvalue(last - 1) } else { mean };
         let among = shift(problem.first_estimate.min(highest), highest);
-        if among < FAR * mean
+        if among < LOWER_SHIFT_RATIO * mean
             && let Ok(closer) = Spectrum::new(problem, among)
         {
             spectrum = closer;
@@ -102,8 +102,8 @@ fn finite_eigenvalues(pencil: &Pencil<'_>) -> Option<usize> {
         (0..n).map(|i| if ms[(i, i)] > 0.0 { ms[(i, i)].sqrt().recip() } else { 0.0 }).collect();
     let scaled = Mat::from_fn(n, n, |i, j| ms[(i, j)] * scale[i] * scale[j]);
     let eigen = symmetric_eigen(scaled.as_ref())?;
-    let indefinite = eigen.values.first().is_some_and(|&v| v < -NULL);
-    let rank = eigen.values.iter().filter(|&&v| v > NULL).count();
+    let indefinite = eigen.values.first().is_some_and(|&v| v < -ZERO_SCALED_MASS);
+    let rank = eigen.values.iter().filter(|&&v| v > ZERO_SCALED_MASS).count();
     (!indefinite).then_some(rank * pencil.block())
 }
 

@@ -91,19 +91,19 @@ impl fmt::Display for EigenFailure {
             }
             Self::MassIndefinite => write!(f, "M is indefinite"),
             Self::ZeroEnergy { count, .. } => {
-                write!(f, "{count} modes without strain energy beside the rigid ones")
+                write!(f, "{count} modes have no strain energy besides the rigid ones")
             }
             Self::CountDiffers { found, counted, shift } => {
-                write!(f, "{found} modes were found below {shift:e}, and {counted} are there")
+                write!(f, "{found} modes were found below {shift:e}, the inertia count is {counted}")
             }
             Self::Inaccurate { residual } => {
-                write!(f, "the factor is useless: its solutions have residuals of {residual:e}")
+                write!(f, "the factor is inaccurate: its solutions have residuals of {residual:e}")
             }
             Self::NotCertified { why } => write!(f, "no bounds of the eigenvalues can be guaranteed: {why}"),
             Self::Memory { bytes, available } => {
                 write!(f, "{bytes} bytes are needed, {available} are available")
             }
-            Self::TooLong { wanted, seconds, .. } => write!(f, "{wanted} modes take some {seconds:.0} s"),
+            Self::TooLong { wanted, seconds, .. } => write!(f, "{wanted} modes take about {seconds:.0} s"),
             Self::TooLarge => write!(f, "the pencil is too large for an ordering with 32-bit numbers"),
         }
     }

@@ -11,17 +11,17 @@ use flexbody_linalg::{
 
 /// Part of a vector's squared norm in the diagonal of M below which its squared M-norm counts as zero: such a vector
 /// lies in the null space of M, and its M-norm is the rounding of the product.
-const UNSEEN: f64 = 1e-13;
+const NULL_SPACE_FRACTION: f64 = 1e-13;
 
 /// Part of a vector's M-norm below which its remainder after projection counts as zero: such a vector lies in the
 /// basis, and the remainder is rounding.
-const VANISHED: f64 = 1e-13;
+const DEPENDENT_FRACTION: f64 = 1e-13;
 
-/// Multiple of [`UNSEEN`] and [`VANISHED`] below which columns are orthonormalised one by one.
-const FAR_ABOVE: f64 = 1e4;
+/// Multiple of [`NULL_SPACE_FRACTION`] and [`DEPENDENT_FRACTION`] below which columns are orthonormalised one by one.
+const ONE_BY_ONE_MULTIPLE: f64 = 1e4;
 
 /// Smallest part of a column that may remain after projection off the columns before it without loss of a digit.
-const LEAST_KEPT: f64 = 0.1;
+const MIN_REMAINDER: f64 = 0.1;
 
 /// Basis V (N x m), the projected operator T = V' M OP V, and M times the newest block.
 pub(super) struct Krylov<'a> {
@@ -37,7 +37,7 @@ pub(super) struct Krylov<'a> {
     /// Coupling B (fresh x previous block): OP V = V T + V_fresh B E'.
     coupling: Mat<f64>,
     /// First column of the basis that the operator couples to the newest block.
-    reach: usize,
+    first_coupled: usize,
     random: u64,
     mass_diagonal: Vec<f64>,
 }
@@ -58,12 +58,12 @@ impl<'a> Krylov<'a> {
         Self {
             problem,
             context: *context,
-            v: Tall::with_room(n, capacity),
+            v: Tall::with_capacity(n, capacity),
             t: Mat::zeros(capacity, capacity),
             fresh: 0,
             m_fresh: Mat::zeros(0, 0),
             coupling: Mat::zeros(0, 0),
-            reach: 0,
+            first_coupled: 0,
             random: 0,
             mass_diagonal: problem.pencil.mass_diagonal(),
         }
@@ -85,7 +85,7 @@ impl<'a> Krylov<'a> {
     }
 
     /// Returns the number of vectors that can still be added.
-    pub(super) fn room(&self) -> usize {
+    pub(super) fn free_columns(&self) -> usize {
         self.t.nrows() - self.size()
     }
 
@@ -129,7 +129,7 @@ impl<'a> Krylov<'a> {
     /// Appends the orthonormalised block `x`. Columns that depend on the basis are dropped.
     pub(super) fn append(&mut self, x: Mat<f64>) {
         let block = self.orthonormalise(x, 0);
-        self.reach = 0;
+        self.first_coupled = 0;
         self.coupling = Mat::zeros(block.w.ncols(), 0);
         self.push(block);
     }
@@ -159,8 +159,8 @@ impl<'a> Krylov<'a> {
         let mut w = std::mem::replace(&mut self.m_fresh, Mat::zeros(0, 0));
         self.context.count(|work| work.solved_columns += old as u64);
         factor.solve_in_place(w.as_mut());
-        let block = self.orthonormalise(w, self.reach);
-        self.reach = at;
+        let block = self.orthonormalise(w, self.first_coupled);
+        self.first_coupled = at;
         for j in 0..old {
             for i in 0..self.size() {
                 // The diagonal block of h is symmetric up to rounding; the mean keeps T exactly symmetric.
@@ -188,7 +188,7 @@ impl<'a> Krylov<'a> {
         for (i, &value) in theta.iter().enumerate() {
             self.t[(i, i)] = value;
         }
-        self.reach = 0;
+        self.first_coupled = 0;
     }
 
     /// Continues with the operator of another shift, tau' = tau + `difference`, in the same space (the rational Krylov
@@ -222,7 +222,7 @@ impl<'a> Krylov<'a> {
         combine_in_place(self.v.as_mut(), q.as_ref());
         self.context.count(|work| work.mass_columns += (all - size) as u64);
         self.m_fresh = self.problem.pencil.apply_mass(self.v.columns(size..all));
-        self.reach = 0;
+        self.first_coupled = 0;
     }
 
     fn push(&mut self, block: Block) {
@@ -232,10 +232,10 @@ impl<'a> Krylov<'a> {
     }
 
     /// Orthonormalises a block in two passes: block Gram-Schmidt against the rigid modes and the basis, then column by
-    /// column inside the block. The first pass leaves out the columns before `reach`, where the operator leaves only
-    /// rounding. The second pass works on unit vectors, so that even a direction that lost ten digits in the first pass
-    /// is orthogonal to rounding at the end. Only columns that are entirely rounding are dropped.
-    fn orthonormalise(&self, mut w: Mat<f64>, reach: usize) -> Block {
+    /// column inside the block. The first pass leaves out the columns before `first_coupled`, where the operator leaves
+    /// only rounding. The second pass works on unit vectors, so that even a direction that lost ten digits in the first
+    /// pass is orthogonal to rounding at the end. Only columns that are entirely rounding are dropped.
+    fn orthonormalise(&self, mut w: Mat<f64>, first_coupled: usize) -> Block {
         let pencil = &self.problem.pencil;
         let width = w.ncols();
         let basis = self.v.as_ref();
@@ -244,7 +244,7 @@ impl<'a> Krylov<'a> {
         self.context.count(|work| work.mass_columns += w.ncols() as u64);
         let mut mw = pencil.apply_mass(w.as_ref());
         let mut norms = sizes(&gram(w.as_ref(), mw.as_ref()));
-        for from in [reach, 0] {
+        for from in [first_coupled, 0] {
             let basis = basis.subcols(from, self.size() - from);
             // Projection off the rigid modes and the basis.
             let rigid = gram(self.problem.rigid, mw.as_ref());
@@ -256,9 +256,10 @@ impl<'a> Krylov<'a> {
             self.context.count(|work| work.mass_columns += w.ncols() as u64);
             pencil.mass_times(w.as_ref(), mw.as_mut());
             // Orthonormalisation inside the block, with M W carried along.
-            let unseen = |w: ColRef<'_, f64>| UNSEEN * weighted_square(w, &self.mass_diagonal);
-            let t = orthonormalise_at_once(&mut w, &mut mw, &norms, &unseen)
-                .unwrap_or_else(|| gram_schmidt(&mut w, &mut mw, &norms, &unseen));
+            let null_limit =
+                |w: ColRef<'_, f64>| NULL_SPACE_FRACTION * weighted_square(w, &self.mass_diagonal);
+            let t = orthonormalise_at_once(&mut w, &mut mw, &norms, &null_limit)
+                .unwrap_or_else(|| gram_schmidt(&mut w, &mut mw, &norms, &null_limit));
             // The carried products have lost a digit: they are computed again.
             if loses_digits(&t) {
                 self.context.count(|work| work.mass_columns += w.ncols() as u64);
@@ -268,11 +269,11 @@ impl<'a> Krylov<'a> {
             b = combine(t.as_ref(), b.as_ref());
         }
         // Columns beyond the capacity of the basis are left out.
-        let room = self.room();
-        if w.ncols() > room {
-            w = w.as_ref().subcols(0, room).to_owned();
-            mw = mw.as_ref().subcols(0, room).to_owned();
-            b = b.as_ref().subrows(0, room).to_owned();
+        let free_columns = self.free_columns();
+        if w.ncols() > free_columns {
+            w = w.as_ref().subcols(0, free_columns).to_owned();
+            mw = mw.as_ref().subcols(0, free_columns).to_owned();
+            b = b.as_ref().subrows(0, free_columns).to_owned();
         }
         Block { w, mw, h, b }
     }
@@ -284,7 +285,7 @@ fn loses_digits(t: &Mat<f64>) -> bool {
     (0..t.ncols()).any(|j| {
         let before = t.col(j).norm_l2();
         let left = (0..t.nrows()).rev().map(|i| t[(i, j)].abs()).find(|entry| *entry > 0.0);
-        left.is_some_and(|left| left < LEAST_KEPT * before)
+        left.is_some_and(|left| left < MIN_REMAINDER * before)
     })
 }
 
@@ -303,16 +304,18 @@ fn orthonormalise_at_once(
     w: &mut Mat<f64>,
     mw: &mut Mat<f64>,
     norms: &[f64],
-    unseen: &dyn Fn(ColRef<'_, f64>) -> f64,
+    null_limit: &dyn Fn(ColRef<'_, f64>) -> f64,
 ) -> Option<Mat<f64>> {
     let width = w.ncols();
     let g = gram(w.as_ref(), mw.as_ref());
     let sizes = sizes(&g);
-    let is_clear =
-        |j: usize| sizes[j] > FAR_ABOVE * VANISHED * norms[j] && g[(j, j)] > FAR_ABOVE * unseen(w.col(j));
+    let is_clear = |j: usize| {
+        sizes[j] > ONE_BY_ONE_MULTIPLE * DEPENDENT_FRACTION * norms[j]
+            && g[(j, j)] > ONE_BY_ONE_MULTIPLE * null_limit(w.col(j))
+    };
     let cosine = |i: usize, j: usize| 0.5 * (g[(i, j)] + g[(j, i)]) / (sizes[i] * sizes[j]);
     let l = (0..width).all(is_clear).then(|| dense_cholesky(Mat::from_fn(width, width, cosine)))??;
-    let keeps = |j: usize| l[(j, j)] >= LEAST_KEPT;
+    let keeps = |j: usize| l[(j, j)] >= MIN_REMAINDER;
     (0..width).all(keeps).then(|| {
         let inverse = solve_upper(&l, &Mat::identity(width, width));
         let inverse = Mat::from_fn(width, width, |i, j| inverse[(i, j)] / sizes[i]);
@@ -327,13 +330,13 @@ fn dot(w: &Mat<f64>, mw: &Mat<f64>, i: usize, j: usize) -> f64 {
 }
 
 /// M-orthonormalises the columns of W in place, and carries M W along. A column is dropped if it keeps less than
-/// [`VANISHED`] of its earlier norm, or if its square does not exceed `unseen`. Returns T (new x old) with W_old =
-/// W_new T.
+/// [`DEPENDENT_FRACTION`] of its earlier norm, or if its square does not exceed `null_limit`. Returns T (new x old)
+/// with W_old = W_new T.
 fn gram_schmidt(
     w: &mut Mat<f64>,
     mw: &mut Mat<f64>,
     norms: &[f64],
-    unseen: &dyn Fn(ColRef<'_, f64>) -> f64,
+    null_limit: &dyn Fn(ColRef<'_, f64>) -> f64,
 ) -> Mat<f64> {
     let width = w.ncols();
     let mut t = Mat::zeros(width, width);
@@ -355,7 +358,7 @@ fn gram_schmidt(
         }
         let square = dot(w, mw, j, j);
         let norm = square.max(0.0).sqrt();
-        if norm <= VANISHED * norms[j] || square <= unseen(w.col(j)) {
+        if norm <= DEPENDENT_FRACTION * norms[j] || square <= null_limit(w.col(j)) {
             continue;
         }
         t[(kept, j)] = norm;

@@ -10,7 +10,7 @@ use super::failure::EigenFailure;
 use super::krylov::Krylov;
 use super::problem::EigenProblem;
 use super::refine::{FoundModes, Refined, residuals};
-use super::zero_energy::NOISE_FACTOR;
+use super::zero_energy::NOISE_DEVIATIONS;
 use super::zero_energy::{energy_noise, is_noisy};
 use faer::Mat;
 use flexbody_linalg::context::Context;
@@ -20,45 +20,45 @@ use std::ops::RangeInclusive;
 /// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138 with 6, 88 to
 /// 160 with 8; a hexahedral bar of 100 000 rows takes 6.6 CPU s with 4, 7.0 with 5, 7.1 with 8. The value 4 is also one
 /// more than the multiplicity of an eigenvalue of an isotropic cube.
-const BLOCK: usize = 4;
+const COLUMNS_PER_STEP: usize = 4;
 
 /// Number of modes from which on twice as many columns per step take less time: most steps then work on a large basis,
 /// which each step reads from memory, as it does the factor. (Measured on a bar of 100,000 rows: no difference with 30
 /// modes, a tenth less time with 50, a fifth less with 200.)
-const MANY: usize = 40;
+const MIN_MODES_FOR_DOUBLE_STEPS: usize = 40;
 
 /// Returns the number of columns per step for `wanted` modes.
 pub(super) fn columns_per_step(wanted: usize) -> usize {
-    if wanted < MANY { BLOCK } else { 2 * BLOCK }
+    if wanted < MIN_MODES_FOR_DOUBLE_STEPS { COLUMNS_PER_STEP } else { 2 * COLUMNS_PER_STEP }
 }
 
 /// Largest number of restarts: ten times the number that any model needed so far.
 const MAX_RESTARTS: u64 = 100;
 
 /// Number of basis vectors beyond two for each wanted mode. With this value restarts are rare.
-const SPARE: usize = 128;
+const SPARE_VECTORS: usize = 128;
 
 /// Part of the tolerance that the estimates must keep where rounding hides the true residuals: the modes are then as
 /// accurate as the estimates say.
-const BELOW_NOISE: f64 = 1e-2;
+const NOISE_TOLERANCE_FRACTION: f64 = 1e-2;
 
 /// Smallest residual that is asked of an estimate: the solves have no more digits.
-const LEAST_ASKED: f64 = 1e-12;
+const MIN_RESIDUAL: f64 = 1e-12;
 
 /// Part of the shift below which the first flexible eigenvalue asks for a smaller shift: with a lower one the number of
 /// iterations grows.
-const SMALLEST_PART: f64 = 0.02;
+const MIN_EIGENVALUE_PER_SHIFT: f64 = 0.02;
 
 /// Smallest shift relative to the last wanted eigenvalue, however low the first eigenvalues are: with a smaller shift
 /// the last modes would lose as many digits. The refinement separates a few much softer modes.
-const DIGITS_PART: f64 = 1e-3;
+const MIN_SHIFT_FRACTION: f64 = 1e-3;
 
 /// Relative gap of two eigenvalues across which converged modes do not mix.
-const WIDE: f64 = 1e-3;
+const SEPARATING_GAP: f64 = 1e-3;
 
 /// Numbers of block steps after which the shift is judged. The lowest Ritz value is near the first eigenvalue after
 /// six. A Ritz value far below the shift can only fall further, so an early judgement saves steps.
-const STEPS_TO_JUDGE: RangeInclusive<usize> = 3..=6;
+const SHIFT_JUDGEMENT_STEPS: RangeInclusive<usize> = 3..=6;
 
 /// Judges the shift by the current Ritz values, which are upper bounds of the eigenvalues. Returns the shift to use
 /// instead if this one is far too large for them.
@@ -75,12 +75,13 @@ fn better_shift(
 ) -> Result<Option<f64>, EigenFailure> {
     let tau = factor.shift();
     let ritz = projected_pairs(krylov)?;
-    if ritz.values.last().is_none_or(|theta| theta.recip() - tau > SMALLEST_PART * tau) {
+    if ritz.values.last().is_none_or(|theta| theta.recip() - tau > MIN_EIGENVALUE_PER_SHIFT * tau) {
         return Ok(None);
     }
-    let (lambda, vectors) = best(krylov, &ritz, wanted.max(1), tau);
+    // The lowest eigenvalue is far below the shift: find out if it has strain energy.
+    let (lambda, vectors) = largest_pairs(krylov, &ritz, wanted.max(1), tau);
     let lowest = lambda[0];
-    let noise = NOISE_FACTOR
+    let noise = NOISE_DEVIATIONS
         * energy_noise(problem.pencil.stiffness(), vectors.as_ref().subcols(0, 1), problem.input_error)[0];
     if lowest.abs() <= noise {
         // The value is far below the shift and within noise. No shift can resolve it: the mode has no strain energy.
@@ -97,8 +98,8 @@ fn better_shift(
 
 /// Returns the shift for modes from `first` to `last` if it is much smaller than `tau`.
 fn suited_shift(first: f64, last: f64, tau: f64) -> Option<f64> {
-    let suited = (0.5 * first).max(DIGITS_PART * last);
-    (first < SMALLEST_PART * tau && suited < 0.1 * tau).then_some(suited)
+    let suited = (0.5 * first).max(MIN_SHIFT_FRACTION * last);
+    (first < MIN_EIGENVALUE_PER_SHIFT * tau && suited < 0.1 * tau).then_some(suited)
 }
 
 /// Size of the basis in which zero-energy modes are counted; at most half of its vectors can be such modes.
@@ -112,14 +113,16 @@ fn zero_energy(
     context: &Context<'_>,
 ) -> Result<EigenFailure, EigenFailure> {
     let mut krylov = Krylov::new(problem, ZERO_ENERGY_BASIS, context);
-    krylov.append_random(BLOCK, factor);
-    while krylov.room() >= BLOCK && !krylov.exhausted() {
+    krylov.append_random(COLUMNS_PER_STEP, factor);
+    // Fill the basis.
+    while krylov.free_columns() >= COLUMNS_PER_STEP && !krylov.exhausted() {
         krylov.step(factor);
     }
     let ritz = projected_pairs(&krylov)?;
-    let (lambda, vectors) = best(&krylov, &ritz, krylov.projected() / 2, tau);
+    let (lambda, vectors) = largest_pairs(&krylov, &ritz, krylov.projected() / 2, tau);
+    // Modes within the noise of K have no strain energy.
     let noise = energy_noise(problem.pencil.stiffness(), vectors.as_ref(), problem.input_error);
-    let count = lambda.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_FACTOR * **n).count().max(1);
+    let count = lambda.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_DEVIATIONS * **n).count().max(1);
     Ok(EigenFailure::ZeroEnergy {
         count,
         eigenvalues: lambda[..count].to_vec(),
@@ -158,7 +161,7 @@ pub(super) struct Iteration<'a> {
     /// Size of the projected eigenproblem from which on it is solved again.
     next_test: usize,
     /// K-residual that the estimates must keep before the true residuals are computed.
-    asked: f64,
+    requested: f64,
     /// Least excess of the true residuals so far.
     least_excess: f64,
 }
@@ -220,7 +223,8 @@ impl Ritz {
     /// -M r / theta^2; M-norms replace the Euclidean norms.
     fn estimate(&self, i: usize) -> f64 {
         let theta = self.theta[i];
-        0.5 * self.norms[i] / (theta * (1.0 - self.tau * theta)).abs().max(SMALLEST_PART * theta.abs())
+        0.5 * self.norms[i]
+            / (theta * (1.0 - self.tau * theta)).abs().max(MIN_EIGENVALUE_PER_SHIFT * theta.abs())
     }
 
     /// Returns true when the first pair beyond the modes is accurate enough to establish the gap below it.
@@ -233,21 +237,23 @@ impl Ritz {
     }
 
     /// Returns true when all modes have converged by their estimates and their cluster has ended.
-    fn all_there(&self) -> bool {
+    fn has_all_modes(&self) -> bool {
         self.converged == self.last && self.beyond
     }
 }
 
 impl<'a> Iteration<'a> {
-    /// Begins with a block of random vectors.
+    /// Begins with a block of `block` random vectors.
     pub(super) fn begin(
         problem: &'a EigenProblem<'a>,
         factor: &dyn Solve,
-        (goal, block): (&'a Goal, usize),
+        goal: &'a Goal,
+        block: usize,
         context: &Context<'a>,
     ) -> Self {
+        // The basis holds twice the wanted modes and some spare vectors.
         let free = problem.pencil.n() - problem.rigid.ncols();
-        let capacity = (2 * goal.wanted + SPARE).min(free + block);
+        let capacity = (2 * goal.wanted + SPARE_VECTORS).min(free + block);
         let mut krylov = Krylov::new(problem, capacity, context);
         krylov.choose_random(1000 * goal.round as u64);
         krylov.append_random(block.min(free), factor);
@@ -264,7 +270,7 @@ impl<'a> Iteration<'a> {
             restarts: 0,
             complete: false,
             next_test: 0,
-            asked: goal.tolerance,
+            requested: goal.tolerance,
             least_excess: f64::INFINITY,
         }
     }
@@ -299,7 +305,7 @@ impl<'a> Iteration<'a> {
                 continue;
             }
             let ritz = self.test()?;
-            if ritz.all_there() {
+            if ritz.has_all_modes() {
                 return Ok(Outcome::Reached(ritz));
             }
             if let Some(shift) = self.restart(&ritz)? {
@@ -347,7 +353,7 @@ impl<'a> Iteration<'a> {
         let Self { krylov, block, .. } = self;
         if krylov.exhausted() {
             // The basis is an invariant subspace: it continues with new directions, if there are any.
-            krylov.append_random((*block).min(krylov.room()), factor);
+            krylov.append_random((*block).min(krylov.free_columns()), factor);
         }
         self.complete = krylov.exhausted();
         if !self.complete {
@@ -357,13 +363,13 @@ impl<'a> Iteration<'a> {
     }
 
     /// Returns the Ritz values, ascending, and the converged modes that are kept when the shift changes.
-    pub(super) fn look_midway(&mut self) -> Result<Midway, EigenFailure> {
+    pub(super) fn midway(&mut self) -> Result<Midway, EigenFailure> {
         let mut ritz = self.test()?;
-        if self.asks_below_noise(&ritz) {
+        if self.tightens_below_noise(&ritz) {
             ritz = self.test()?;
         }
         let eigenvalues: Vec<f64> = (0..ritz.size()).map(|i| ritz.lambda(i)).collect();
-        let modes = self.vectors(&ritz, settled(&eigenvalues, ritz.converged));
+        let modes = self.vectors(&ritz, settled_count(&eigenvalues, ritz.converged));
         Ok(Midway { eigenvalues, modes })
     }
 
@@ -377,7 +383,7 @@ impl<'a> Iteration<'a> {
 
     /// Returns the shift to use instead of the current one, once the lowest Ritz value shows that it is too large.
     fn better_shift(&self, factor: &dyn Solve) -> Result<Option<f64>, EigenFailure> {
-        if self.first.is_some() || !STEPS_TO_JUDGE.contains(&self.steps) {
+        if self.first.is_some() || !SHIFT_JUDGEMENT_STEPS.contains(&self.steps) {
             return Ok(None);
         }
         better_shift(self.problem, &self.krylov, factor, self.goal.wanted, &self.context)
@@ -385,7 +391,7 @@ impl<'a> Iteration<'a> {
 
     /// Returns true when no further step fits before a restart.
     fn is_full(&self) -> bool {
-        self.krylov.room() < self.block
+        self.krylov.free_columns() < self.block
     }
 
     /// Returns true when solving the projected eigenproblem pays. It costs size^3: beyond some 100 vectors it is not
@@ -400,8 +406,10 @@ impl<'a> Iteration<'a> {
     fn test(&mut self) -> Result<Ritz, EigenFailure> {
         let (krylov, wanted) = (&self.krylov, self.goal.wanted);
         let tau = self.tau;
-        let (below, settled) = self.first.as_ref().map_or((0, 0), |first| (first.below, first.modes.ncols()));
+        let (below, settled_count) =
+            self.first.as_ref().map_or((0, 0), |first| (first.below, first.modes.ncols()));
         let size = krylov.projected();
+        // Eigenpairs of the projected operator; a negative theta without a second shift means an indefinite M.
         let found = projected_pairs(krylov)?;
         let is_negative = |theta: &f64| *theta < -1e-8 * found.values[size - 1].abs();
         if below == 0 && found.values.first().is_some_and(is_negative) {
@@ -412,13 +420,14 @@ impl<'a> Iteration<'a> {
         let order: Vec<usize> = (0..below).rev().chain((below..size).rev()).collect();
         let theta: Vec<f64> = order.iter().map(|&i| found.values[i]).collect();
         let s = Mat::from_fn(size, size, |i, j| found.vectors[(i, order[j])]);
-        let all_below_are_there = below == 0 || found.values[below - 1] < 0.0;
+        let has_all_below = below == 0 || found.values[below - 1] < 0.0;
+        // Residuals, and the end of the cluster of the last wanted mode.
         let norms = krylov.residual_norms(s.as_ref());
         let last = cluster_end(wanted, size, CLUSTER_GAP, |i| 1.0 / theta[i] - tau);
         let mut ritz = Ritz { theta, s, norms, tau, last, converged: 0, beyond: false };
         // A pair counts as a mode by its estimate; pairs that converged with the first shift count without one.
-        let is_mode = |i: &usize| self.complete || *i < settled || ritz.estimate(*i) <= self.asked;
-        let converged = if all_below_are_there { (0..last).take_while(is_mode).count() } else { settled };
+        let is_mode = |i: &usize| self.complete || *i < settled_count || ritz.estimate(*i) <= self.requested;
+        let converged = if has_all_below { (0..last).take_while(is_mode).count() } else { settled_count };
         ritz.converged = converged;
         ritz.beyond = self.complete || ritz.shows_gap();
         // Size of the basis at the next test: 4 % more, or a quarter of the missing modes more.
@@ -429,9 +438,10 @@ impl<'a> Iteration<'a> {
 
     /// Returns the modes if they keep the tolerance; otherwise lowers the residual asked of the estimates.
     fn hand_over(&mut self, ritz: &Ritz) -> Result<Option<FoundModes>, EigenFailure> {
-        if self.asks_below_noise(ritz) {
+        if self.tightens_below_noise(ritz) {
             return Ok(None);
         }
+        // True residuals of the modes.
         let (size, last) = (ritz.size(), ritz.last);
         let refined = Refined::new(self.problem, self.vectors(ritz, last), &self.context)?;
         let excess = refined.excess(self.goal.tolerance);
@@ -442,8 +452,9 @@ impl<'a> Iteration<'a> {
             let next = (last..size).take_while(is_known).map(|i| ritz.lambda(i)).collect();
             return Ok(Some(FoundModes { refined, next, tau: self.tau, finite: None }));
         }
+        // Continue with estimates that must be as much smaller as the true residuals are too large.
         self.least_excess = excess;
-        self.asked /= 1.2 * excess;
+        self.requested /= 1.2 * excess;
         Ok(None)
     }
 
@@ -460,19 +471,19 @@ impl<'a> Iteration<'a> {
 
     /// Lowers the residual asked of the estimates if rounding hides the true residual of the first mode, whose strain
     /// energy is least. Returns true when it lowered it.
-    fn asks_below_noise(&mut self, ritz: &Ritz) -> bool {
-        let below_noise = (BELOW_NOISE * self.goal.tolerance).max(LEAST_ASKED);
-        let may_ask = !self.complete && self.asked > below_noise;
-        let asks = may_ask && {
+    fn tightens_below_noise(&mut self, ritz: &Ritz) -> bool {
+        let below_noise = (NOISE_TOLERANCE_FRACTION * self.goal.tolerance).max(MIN_RESIDUAL);
+        let may_tighten = !self.complete && self.requested > below_noise;
+        let tightens = may_tighten && {
             let count = ritz.last.min(1);
             let (first, eigenvalues) = (self.vectors(ritz, count), &[ritz.lambda(0)][..count]);
             let (_, floors) = residuals(self.problem, eigenvalues, first.as_ref(), &self.context);
             is_noisy(&floors, self.goal.tolerance)
         };
-        if asks {
-            self.asked = below_noise;
+        if tightens {
+            self.requested = below_noise;
         }
-        asks
+        tightens
     }
 
     /// Restarts a full basis from the lowest Ritz pairs. Returns a shift if the search should begin again with that
@@ -482,6 +493,7 @@ impl<'a> Iteration<'a> {
     /// [`EigenFailure::NotConverged`] if the basis spans the whole space, or after too many restarts.
     fn restart(&mut self, ritz: &Ritz) -> Result<Option<f64>, EigenFailure> {
         let Ritz { last, converged, .. } = *ritz;
+        // Neither a complete basis nor the last restart can continue.
         if self.complete || self.restarts >= MAX_RESTARTS {
             return Err(EigenFailure::NotConverged { converged, wanted: self.goal.wanted });
         }
@@ -493,6 +505,7 @@ impl<'a> Iteration<'a> {
         }
         self.restarts += 1;
         self.context.count(|work| work.restarts += 1);
+        // Keep the wanted Ritz vectors and a third of the spare ones.
         let keep = (last + (self.capacity - last) / 3).min(ritz.size().saturating_sub(self.block));
         self.krylov.restart(ritz.s.as_ref().subcols(0, keep), &ritz.theta[..keep]);
         self.next_test = 0;
@@ -502,10 +515,10 @@ impl<'a> Iteration<'a> {
 
 /// Returns the number of modes that do not change when the search continues with another shift: the `converged` ones up
 /// to the last wide gap. Within a cluster modes may rotate.
-fn settled(eigenvalues: &[f64], converged: usize) -> usize {
+fn settled_count(eigenvalues: &[f64], converged: usize) -> usize {
     let is_end = |end: &usize| {
         let (last, next) = (eigenvalues[end - 1], eigenvalues.get(*end).copied());
-        next.is_some_and(|next| next - last > WIDE * next)
+        next.is_some_and(|next| next - last > SEPARATING_GAP * next)
     };
     (1..=converged).rev().find(is_end).unwrap_or(0)
 }
@@ -516,7 +529,7 @@ fn projected_pairs(krylov: &Krylov<'_>) -> Result<SymmetricEigen, EigenFailure> 
 }
 
 /// Returns the `count` Ritz pairs with the largest theta, as eigenvalues lambda, ascending, and vectors.
-fn best(krylov: &Krylov<'_>, ritz: &SymmetricEigen, count: usize, tau: f64) -> (Vec<f64>, Mat<f64>) {
+fn largest_pairs(krylov: &Krylov<'_>, ritz: &SymmetricEigen, count: usize, tau: f64) -> (Vec<f64>, Mat<f64>) {
     let size = ritz.values.len();
     let count = count.min(size);
     let lambda = (0..count).map(|i| 1.0 / ritz.values[size - 1 - i] - tau).collect();

@@ -3,7 +3,7 @@
 use super::completeness::Counting;
 use super::failure::EigenFailure;
 use super::problem::{EigenProblem, Task};
-use super::refine::TOGETHER;
+use super::refine::COLUMNS_PER_PRODUCT;
 use super::settings::{Accuracy, FactorChoice, Precision};
 
 /// Memory and time of an attempt.
@@ -60,7 +60,7 @@ impl Needs {
 }
 
 /// Operations per second that time estimates assume, for one processor and the mixed work of a search.
-const PACE: f64 = 4e9;
+const OPERATIONS_PER_SECOND: f64 = 4e9;
 
 /// Returns the needs of a search with a factor of this precision.
 pub(super) fn factor_needs(task: &Task<'_>, wanted: usize, precision: Precision) -> Result<Needs, Unusable> {
@@ -95,7 +95,7 @@ pub(super) fn basis_columns(wanted: usize) -> usize {
 /// and corrections.
 pub(super) fn vector_bytes(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u64 {
     let basis = basis_columns(wanted);
-    let found = wanted + 3 * wanted.min(TOGETHER) + 24;
+    let found = wanted + 3 * wanted.min(COLUMNS_PER_PRODUCT) + 24;
     let columns = match precision {
         Precision::Double => basis + found,
         // A span of three times its first size (1.5 for each wanted mode and 16) with its products with K and M, and
@@ -118,13 +118,13 @@ pub(super) fn search_seconds(n: usize, wanted: usize, factor: u64) -> f64 {
     let (rows, modes) = (n as f64, wanted as f64);
     let (basis, columns) = (basis_columns(wanted) as f64, 3.0 * modes + 100.0);
     let search = columns * (4.0 * factor as f64 + 8.0 * rows * basis) + 6.0 * rows * basis * modes;
-    (search + 20.0 * rows * modes * modes) / PACE
+    (search + 20.0 * rows * modes * modes) / OPERATIONS_PER_SECOND
 }
 
 /// Estimates the seconds of the dense path: two decompositions, and the products of all pairs of modes.
 pub(super) fn dense_seconds(n: usize, wanted: usize) -> f64 {
     let (rows, modes) = (n as f64, wanted as f64);
-    (30.0 * rows.powi(3) + 20.0 * rows * modes * modes) / PACE
+    (30.0 * rows.powi(3) + 20.0 * rows * modes * modes) / OPERATIONS_PER_SECOND
 }
 
 /// Returns the bytes by which a process grows that uses `bytes`. In addition to memory in use the allocator holds
@@ -147,7 +147,7 @@ pub(super) fn resident_for_count(task: &Task<'_>, found: usize) -> u64 {
 
 /// Returns the bytes of a count in single precision, with the vectors that measure its rounding.
 fn single_count_bytes(task: &Task<'_>, modes: usize) -> u64 {
-    4 * task.peaks.kept_inertia + 8 * ((3 * modes + PROBE_VECTORS) * task.problem.pencil.n()) as u64
+    4 * task.peaks.retained_inertia + 8 * ((3 * modes + PROBE_VECTORS) * task.problem.pencil.n()) as u64
 }
 
 /// Number of vectors in use while the rounding of a count in single precision is measured.
@@ -155,7 +155,7 @@ const PROBE_VECTORS: usize = 40;
 
 /// Part of [`EigenSettings::single_pays`](super::EigenSettings::single_pays) above which a count in single precision is
 /// faster, including the solutions that measure its rounding.
-const COUNT_PART: f64 = 0.15;
+const SINGLE_COUNT_FRACTION: f64 = 0.15;
 
 /// Plan of the count that proves completeness.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -188,7 +188,9 @@ impl CountPlan {
         let pays = match settings.factor {
             _ if settings.accuracy == Accuracy::Certified => false,
             FactorChoice::Always(precision) => precision == Precision::Single,
-            FactorChoice::Auto => !double_fits || analysis.flops() > COUNT_PART * settings.single_pays,
+            FactorChoice::Auto => {
+                !double_fits || analysis.flops() > SINGLE_COUNT_FRACTION * settings.single_pays
+            }
         };
         if pays && fits(single) {
             let bytes = if double_fits { single.max(double) } else { single };

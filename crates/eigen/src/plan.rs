@@ -149,14 +149,14 @@ impl std::fmt::Display for Plan {
         let PlannedAttempt { way, needs, .. } = self.current();
         let (factor, all) = (gigabytes(needs.factor_bytes), gigabytes(needs.bytes));
         let precision = match way {
-            Way::Dense => return write!(f, "dense eigenproblem, {all} in all"),
-            Way::Cycles => return write!(f, "no factor, cycles over groups of nodes, {all} in all"),
+            Way::Dense => return write!(f, "dense eigenproblem, {all} of memory"),
+            Way::Cycles => return write!(f, "multigrid cycles without a factor, {all} of memory"),
             Way::SinglePrecision => "single",
             Way::SecondShift | Way::DoublePrecision => "double",
         };
         write!(
             f,
-            "factor of {factor} in {precision} precision, {:.2e} operations, {all} in all",
+            "factor of {factor} in {precision} precision, {:.2e} operations, {all} of memory in total",
             self.flops
         )?;
         match (needs.seconds / 60.0).round() {

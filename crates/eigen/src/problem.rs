@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// Part of tr K / tr M by which a pencil without further information is shifted: far above the rounding of a factor in
 /// double precision, and far below the first eigenvalue of most pencils.
-const UNKNOWN_SHIFT: f64 = 1e-8;
+const DEFAULT_RELATIVE_SHIFT: f64 = 1e-8;
 
 /// Seed of the fixed numbers from which the first eigenvalue is estimated.
 const SEED: u64 = 7;
@@ -62,11 +62,13 @@ fn rayleigh_estimate(
     rigid: MatRef<'_, f64>,
     order: &EliminationOrder,
 ) -> Result<f64, EigenFailure> {
+    // Factor of K + tau M with a small shift.
     let trace = |diagonal: Vec<f64>| diagonal.into_iter().sum::<f64>();
-    let shift = UNKNOWN_SHIFT * trace(pencil.stiffness().diagonal()) / trace(pencil.mass_diagonal());
+    let shift = DEFAULT_RELATIVE_SHIFT * trace(pencil.stiffness().diagonal()) / trace(pencil.mass_diagonal());
     let analysis = order.of(pencil).ok_or(EigenFailure::TooLarge)?;
     let factor = Cholesky::<f64>::new(&analysis, pencil, shift);
     let factor = factor.ok_or(EigenFailure::NotPositiveDefinite { shift })?;
+    // Two inverse iterations from fixed numbers.
     let mut field = Mat::from_fn(pencil.n(), 1, |row, _| uniform(SEED, row as u64, 0));
     for _ in 0..2 {
         let mut solved = pencil.apply_mass(field.as_ref());
@@ -76,6 +78,7 @@ fn rayleigh_estimate(
         subtract_combination(solved.as_mut(), rigid, in_null_space.as_ref());
         field = solved;
     }
+    // The Rayleigh quotient is an upper bound.
     let energy = gram(field.as_ref(), pencil.apply_stiffness(field.as_ref()).as_ref())[(0, 0)];
     let mass = gram(field.as_ref(), pencil.apply_mass(field.as_ref()).as_ref())[(0, 0)];
     Ok(energy / mass)

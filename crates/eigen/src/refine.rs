@@ -61,19 +61,19 @@ fn inverse_iteration(
 }
 
 /// Squared M-norm, relative to that of the columns, below which a direction of their span counts as rounding.
-const DEPENDENT: f64 = 1e-8;
+const DEPENDENT_SQUARED_NORM: f64 = 1e-8;
 
 /// Largest number of modes whose projections are computed in double-double arithmetic. The time of such small
 /// eigenproblems grows with the third power, and is a second with 200.
-const SHARPENED_AT_MOST: usize = 200;
+const MAX_SHARPENED_MODES: usize = 200;
 
 /// Number of columns whose products with K and M are held at a time. The products of 200 modes would take twice the
 /// memory of the modes, and newly allocated memory is cleared first, which takes longer than the products.
-pub(super) const TOGETHER: usize = 32;
+pub(super) const COLUMNS_PER_PRODUCT: usize = 32;
 
-/// Returns ranges of `count` columns, [`TOGETHER`] at a time.
+/// Returns ranges of `count` columns, [`COLUMNS_PER_PRODUCT`] at a time.
 fn columns_together(count: usize) -> impl Iterator<Item = Range<usize>> {
-    (0..count).step_by(TOGETHER).map(move |first| first..count.min(first + TOGETHER))
+    (0..count).step_by(COLUMNS_PER_PRODUCT).map(move |first| first..count.min(first + COLUMNS_PER_PRODUCT))
 }
 
 /// Performs Rayleigh-Ritz on the span of X after projecting out the rigid modes. Returns the Ritz values, ascending,
@@ -90,12 +90,12 @@ pub(super) fn rayleigh_ritz(
     subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
     let [mut gm, mut gk] = [(); 2].map(|()| Mat::zeros(k, k));
     for columns in columns_together(k) {
-        let own = x.as_ref().subcols(columns.start, columns.len());
+        let block = x.as_ref().subcols(columns.start, columns.len());
         let above = x.as_ref().subcols(0, columns.end);
         let mut product = Tall::zeros(n, columns.len());
-        pencil.mass_times(own, product.as_mut());
+        pencil.mass_times(block, product.as_mut());
         mirror(&mut gm, columns.start, &gram(above, product.as_ref()));
-        pencil.stiffness_times(own, product.as_mut());
+        pencil.stiffness_times(block, product.as_mut());
         mirror(&mut gk, columns.start, &gram(above, product.as_ref()));
     }
     let (values, coefficients) = small_ritz(&gm, &gk)?;
@@ -156,7 +156,7 @@ fn scaled_rows(a: &Mat<f64>, scale: &[f64]) -> Mat<f64> {
 /// Returns V / sqrt(Lambda) of a Gram matrix with a diagonal of one, for the eigenvalues above rounding.
 fn independent_directions(gm: &Mat<f64>) -> Result<Mat<f64>, EigenFailure> {
     let eigen = symmetric_eigen(gm.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
-    let first = eigen.values.partition_point(|&v| v < DEPENDENT);
+    let first = eigen.values.partition_point(|&v| v < DEPENDENT_SQUARED_NORM);
     Ok(Mat::from_fn(gm.nrows(), gm.ncols() - first, |i, j| {
         eigen.vectors[(i, first + j)] / eigen.values[first + j].sqrt()
     }))
@@ -176,8 +176,8 @@ pub(super) fn residuals(
     let m_rigid = problem.pencil.apply_mass(problem.rigid);
     columns_together(x.ncols())
         .flat_map(|columns| {
-            let own = x.subcols(columns.start, columns.len());
-            residuals_together(problem, m_rigid.as_ref(), &eigenvalues[columns], own)
+            let block = x.subcols(columns.start, columns.len());
+            residuals_together(problem, m_rigid.as_ref(), &eigenvalues[columns], block)
         })
         .unzip()
 }
@@ -244,7 +244,7 @@ impl Refined {
         let given = x.ncols();
         let (eigenvalues, vectors) = rayleigh_ritz(problem, x, context)?;
         if vectors.ncols() < given {
-            return Err(EigenFailure::Inaccurate { residual: DEPENDENT });
+            return Err(EigenFailure::Inaccurate { residual: DEPENDENT_SQUARED_NORM });
         }
         let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), context);
         Ok(Self { eigenvalues, vectors, residuals, floors })
@@ -254,7 +254,7 @@ impl Refined {
     /// modes](SHARPENED_AT_MOST). The Ritz vectors are then those of the span up to the rounding of the vectors
     /// themselves. Their residuals remain those of double precision.
     pub(super) fn sharpened(self, problem: &EigenProblem<'_>, tolerance: f64, context: &Context<'_>) -> Self {
-        if !is_noisy(&self.floors, tolerance) || self.eigenvalues.len() > SHARPENED_AT_MOST {
+        if !is_noisy(&self.floors, tolerance) || self.eigenvalues.len() > MAX_SHARPENED_MODES {
             return self;
         }
         let (pencil, x) = (&problem.pencil, self.vectors.as_ref());

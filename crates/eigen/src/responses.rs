@@ -47,7 +47,7 @@ impl Complement {
 
 /// Largest number of iterations of one cycle. With lambda >= tau on the complement each reduces the error by a factor
 /// of six.
-const ITERATIONS: usize = 40;
+const MAX_ITERATIONS: usize = 40;
 
 /// Accuracy of responses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -194,7 +194,7 @@ impl StaticResponses<'_> {
         let mut direction = precondition(&residual);
         let start = column_products(residual.as_ref(), direction.as_ref());
         let mut energy = start.clone();
-        for _ in 0..ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             if energy.iter().zip(&start).all(|(e, s)| *e <= self.accuracy.reached.powi(2) * s) {
                 break;
             }
@@ -226,14 +226,14 @@ fn ratios(a: &[f64], b: &[f64]) -> Vec<f64> {
 }
 
 /// Largest number of refinements with the true residual.
-const REFINEMENTS: usize = 5;
+const MAX_REFINEMENTS: usize = 5;
 
 /// Backward error above which a factor is refused as a preconditioner.
-const GROWTH_LIMIT: f64 = 1e-4;
+const MAX_PRECONDITIONER_ERROR: f64 = 1e-4;
 
 /// Residual |f - (K - w^2 M) x| / |f| at which refinement ends, and the residual above which a response is refused.
-const REACHED: f64 = 1e-13;
-const ACCEPTED: f64 = 1e-9;
+const TARGET_RESIDUAL: f64 = 1e-13;
+const MAX_RESIDUAL: f64 = 1e-9;
 
 /// Returns for each load (column of `loads`, N x m) the part of (K - w^2 M)^-1 f outside `modes`. With P = \[R, Psi\]
 /// of rigid modes and eigenvectors (`modes`, M-orthonormal), (K - w^2 M) x = (I - M P P') f and P'M x = 0. The part of
@@ -286,7 +286,10 @@ fn with_dynamic_responses<T>(
     context.count(|work| work.factorizations += 1);
     let factor = Indefinite::<f64>::new(&analysis, pencil, square);
     let inertia = factor.inertia();
-    if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > GROWTH_LIMIT {
+    if inertia.zero > 0
+        || inertia.backward_error.is_nan()
+        || inertia.backward_error > MAX_PRECONDITIONER_ERROR
+    {
         return Err(EigenFailure::Inaccurate { residual: inertia.backward_error });
     }
     let complement = Complement::of(pencil, &[problem.rigid, modes]);
@@ -309,7 +312,7 @@ impl DynamicResponses<'_> {
         let mut x = Mat::zeros(loads.nrows(), loads.ncols());
         let mut residual = loads.clone();
         // Iterative refinement with the true residual.
-        for _ in 0..=REFINEMENTS {
+        for _ in 0..=MAX_REFINEMENTS {
             context.count(|work| work.solved_columns += loads.ncols() as u64);
             self.factor.solve_in_place(residual.as_mut());
             x += residual;
@@ -317,19 +320,19 @@ impl DynamicResponses<'_> {
             residual = &loads - self.pencil.apply_stiffness(x.as_ref())
                 + self.pencil.apply_mass(x.as_ref()) * Scale(self.square);
             self.complement.equilibrate(&mut residual);
-            if largest_part(&residual, &loads) <= REACHED {
+            if largest_ratio(&residual, &loads) <= TARGET_RESIDUAL {
                 break;
             }
         }
-        match largest_part(&residual, &loads) {
-            left if left <= ACCEPTED => Ok(x),
+        match largest_ratio(&residual, &loads) {
+            left if left <= MAX_RESIDUAL => Ok(x),
             residual => Err(EigenFailure::Inaccurate { residual }),
         }
     }
 }
 
 /// Returns the largest |residual| / |load| of all columns; NaN if one of them is NaN.
-fn largest_part(residual: &Mat<f64>, loads: &Mat<f64>) -> f64 {
+fn largest_ratio(residual: &Mat<f64>, loads: &Mat<f64>) -> f64 {
     let part = |j: usize| match (residual.col(j).norm_l2(), loads.col(j).norm_l2()) {
         (0.0, _) => 0.0,
         (left, load) => left / load,

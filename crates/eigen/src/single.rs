@@ -19,11 +19,11 @@ use flexbody_linalg::{Cholesky, Solve};
 
 /// Columns per step of Lanczos: the number that the solves handle together. In single precision four columns cost as
 /// much as eight.
-const BLOCK: usize = 8;
+const COLUMNS_PER_STEP: usize = 8;
 
 /// Ritz residual at which the corrections take over: further steps find no modes that the error of the factor does not
 /// hide.
-const HANDED_OVER: f64 = 1e-4;
+const HANDOVER_RESIDUAL: f64 = 1e-4;
 
 /// Lanczos with a factor in single precision, and corrections.
 pub(super) struct SinglePrecision;
@@ -42,9 +42,10 @@ impl Attempt for SinglePrecision {
     }
 
     fn search(&self, task: &Task<'_>, goal: &Goal) -> Result<FoundModes, EigenFailure> {
-        let rough = Goal { tolerance: HANDED_OVER, ..*goal };
+        let rough = Goal { tolerance: HANDOVER_RESIDUAL, ..*goal };
         with_suited_shift(task, |factor: Cholesky<'_, f32>| {
-            let mut iteration = Iteration::begin(task.problem, &factor, (&rough, BLOCK), task.context);
+            let mut iteration =
+                Iteration::begin(task.problem, &factor, &rough, COLUMNS_PER_STEP, task.context);
             let ritz = match iteration.estimate(&factor)? {
                 Outcome::Reached(ritz) => ritz,
                 Outcome::ShiftTooLarge(shift) => return Ok(Outcome::ShiftTooLarge(shift)),
@@ -55,7 +56,7 @@ impl Attempt for SinglePrecision {
             let (vectors, wanted) = (iteration.rough_modes(&ritz), ritz.last());
             drop(iteration);
             let factor: &dyn Solve = &factor;
-            Correction::begin(task, Corrector::Factor(factor), goal, (vectors, wanted))?
+            Correction::begin(task, Corrector::Factor(factor), goal, vectors, wanted)?
                 .modes()
                 .map(Outcome::Reached)
         })

@@ -3,7 +3,7 @@
 use super::attempt::Goal;
 use super::bounds::enclose;
 use super::canonical::{CLUSTER_GAP, canonical_basis, clusters};
-use super::completeness::{Completeness, Counting, NEAR, Proof, count, size_along};
+use super::completeness::{Completeness, Counting, Proof, SINGLE_COUNT_DISTANCE, count, size_along};
 use super::failure::EigenFailure;
 use super::needs::{CountPlan, gigabytes};
 use super::plan::{Plan, PlannedAttempt, Way};
@@ -19,14 +19,14 @@ use std::sync::Arc;
 
 /// Part of the guaranteed residual that the search aims at. The canonical basis of an eigenvalue with m copies mixes
 /// their residuals, up to the root of m times the largest.
-const SEARCHED: f64 = 0.4;
+const SEARCH_RESIDUAL_FRACTION: f64 = 0.4;
 
-/// Gap of eigenvalues that a count in single precision needs, over [`NEAR`]. The shift is in the middle of the gap,
-/// which gives a factor of 2; a fifth more, since the gap is not known yet.
-const SEPARATION: f64 = 2.4;
+/// Gap of eigenvalues that a count in single precision needs, over [`SINGLE_COUNT_DISTANCE`]. The shift is in the
+/// middle of the gap, which gives a factor of 2; a fifth more, since the gap is not known yet.
+const SINGLE_COUNT_GAP: f64 = 2.4;
 
 /// Largest number of searches for the same modes: a second one follows if the count finds missing modes.
-const ROUNDS: usize = 2;
+const MAX_SEARCHES: usize = 2;
 
 /// Computes the wanted flexible modes.
 ///
@@ -37,14 +37,16 @@ pub fn solve(
     settings: &EigenSettings,
     context: &Context<'_>,
 ) -> Result<EigenSolution, EigenFailure> {
+    // Structure of the factors, and the plan of attempts.
     let analysis = analyse(problem, context)?;
     let task = Task::new(problem, settings, &analysis, context);
-    let wanted = count_wanted(&task)?;
+    let wanted = wanted_count(&task)?;
     let mut plan = Plan::new(&task, wanted)?;
+    // Modes with the proof that none is missing, and their guaranteed bounds.
     let (found, completeness) = find_all(&task, &mut plan, wanted)?;
     let bounds = bounds(&task, &found.refined, &completeness)?;
     context.count(|work| work.factor_bytes = plan.current().needs.factor_bytes);
-    finish(&task, found, (completeness, bounds), (wanted, plan))
+    finish(&task, found, completeness, bounds, wanted, plan)
 }
 
 /// Returns the plan of [`solve`] without a search. A request for all flexible modes below an eigenvalue counts as
@@ -81,7 +83,7 @@ fn analyse(problem: &EigenProblem<'_>, context: &Context<'_>) -> Result<Arc<Anal
 }
 
 /// Returns the number of wanted modes, at most the number of flexible modes.
-fn count_wanted(task: &Task<'_>) -> Result<usize, EigenFailure> {
+fn wanted_count(task: &Task<'_>) -> Result<usize, EigenFailure> {
     match task.settings.wanted {
         Wanted::Lowest(count) => Ok(count.min(task.flexible_rows())),
         Wanted::Below(lambda) => {
@@ -101,33 +103,36 @@ fn find_all(
     wanted: usize,
 ) -> Result<(FoundModes, Completeness), EigenFailure> {
     let rigid = task.problem.rigid.ncols();
-    let (mut asked, mut round) = (wanted, 0);
+    let (mut requested, mut round) = (wanted, 0);
     loop {
-        let found = search(task, plan, (asked, round))?;
+        // Search, then count the modes below a shift above the last one.
+        let found = search(task, plan, requested, round)?;
         let completeness = prove(task, plan, &found)?;
-        let (there, counted) = (completeness.modes_below, completeness.counted(rigid));
+        let (found_below, counted) = (completeness.modes_below, completeness.counted(rigid));
         round += 1;
-        if there == counted {
+        if found_below == counted {
             return Ok((found, completeness));
         }
-        if there > counted || round == ROUNDS {
-            return Err(EigenFailure::CountDiffers { found: there, counted, shift: completeness.shift });
+        // More modes than counted, or still missing modes, cannot be repaired.
+        if found_below > counted || round == MAX_SEARCHES {
+            return Err(EigenFailure::CountDiffers {
+                found: found_below,
+                counted,
+                shift: completeness.shift,
+            });
         }
         // The next search asks for the missing modes as well.
-        asked = wanted + counted - there;
+        requested = wanted + counted - found_below;
     }
 }
 
 /// Makes the attempts of the plan in their order until one of them finds the modes.
-fn search(
-    task: &Task<'_>,
-    plan: &mut Plan,
-    (wanted, round): (usize, usize),
-) -> Result<FoundModes, EigenFailure> {
+fn search(task: &Task<'_>, plan: &mut Plan, wanted: usize, round: usize) -> Result<FoundModes, EigenFailure> {
     let Task { problem, settings, context, .. } = task;
-    let tolerance = SEARCHED * settings.accuracy.residual();
+    // The goal is stricter than the guarantee, and asks for a gap wide enough for a count in single precision.
+    let tolerance = SEARCH_RESIDUAL_FRACTION * settings.accuracy.residual();
     let separation = match plan.count.counting {
-        Some(Counting::Single { .. }) => SEPARATION * NEAR,
+        Some(Counting::Single { .. }) => SINGLE_COUNT_GAP * SINGLE_COUNT_DISTANCE,
         _ => 0.0,
     };
     let goal = Goal { wanted, tolerance, separation, round };
@@ -135,6 +140,7 @@ fn search(
     for number in 0..plan.attempts.len() {
         let PlannedAttempt { way, failure, .. } = &plan.attempts[number];
         let (way, attempt) = (*way, way.attempt());
+        // Skip attempts that failed before, and those that would only repeat themselves.
         if failure.is_some() || (round > 0 && !attempt.is_repeated()) {
             continue;
         }
@@ -142,6 +148,7 @@ fn search(
             context.plan(&plan.to_string());
         }
         match attempt.search(task, &goal) {
+            // Modes: sharpen their residuals and refuse those without strain energy.
             Ok(found) => {
                 let refined = found.refined.sharpened(problem, tolerance, context);
                 check_zero_energy(problem, &refined)?;
@@ -190,6 +197,7 @@ fn prove(task: &Task<'_>, plan: &Plan, search: &FoundModes) -> Result<Completene
         // No eigenvalue above: every finite mode was computed.
         (_, None) => 1.1 * last,
     };
+    // Without a count the modes are returned unproved, with the reason.
     let remark = match plan.count.too_large {
         _ if settings.accuracy == Accuracy::Fast => Some("accuracy `fast` leaves the count out".to_owned()),
         Some((needed, available)) => Some(format!(
@@ -205,12 +213,14 @@ fn prove(task: &Task<'_>, plan: &Plan, search: &FoundModes) -> Result<Completene
     }
     context.phase("completeness");
     let below = search.refined.eigenvalues.iter().filter(|&&l| l < shift).count();
+    // Count in double precision if the shift is too near to a mode for single precision.
     let counting = match plan.count.counting {
         Some(Counting::Single { double_fits: true }) if is_near(problem, &search.refined, shift) => {
             Counting::Double
         }
         counting => counting.unwrap_or(Counting::Double),
     };
+    // The inertia of K - shift M.
     let count = count(task, shift, counting)?;
     Ok(Completeness {
         proof: Proof::InertiaCount,
@@ -225,33 +235,39 @@ fn prove(task: &Task<'_>, plan: &Plan, search: &FoundModes) -> Result<Completene
 /// the rounding of a factor in single precision may move one across the other.
 fn is_near(problem: &EigenProblem<'_>, found: &Refined, shift: f64) -> bool {
     let Some(last) = found.eigenvalues.iter().rposition(|&lambda| lambda < shift) else { return false };
-    shift - found.eigenvalues[last] < NEAR * size_along(problem, shift, found.vectors.col(last))
+    shift - found.eigenvalues[last]
+        < SINGLE_COUNT_DISTANCE * size_along(problem, shift, found.vectors.col(last))
 }
 
 /// Puts the modes into canonical form, and returns the wanted ones with their final residuals.
 fn finish(
     task: &Task<'_>,
     search: FoundModes,
-    (completeness, mut bounds): (Completeness, Option<EigenvalueBounds>),
-    (wanted, plan): (usize, Plan),
+    completeness: Completeness,
+    mut bounds: Option<EigenvalueBounds>,
+    wanted: usize,
+    plan: Plan,
 ) -> Result<EigenSolution, EigenFailure> {
     let mut modes = search.refined;
-    // Rotated or moved modes get new residuals.
+    // Canonical basis of every cluster, and eigenvalues within their bounds.
     let groups = clusters(&modes.eigenvalues, CLUSTER_GAP);
     canonical_basis(modes.vectors.as_mut(), &groups);
     if let Some(bounds) = &bounds {
         bounds.clamp(&mut modes.eigenvalues);
     }
+    // Rotated or moved modes get new residuals.
     let is_changed = |group: &Range<usize>| bounds.is_some() || group.len() > 1;
     let changed: Vec<usize> = groups.into_iter().filter(is_changed).flatten().collect();
     modes.renew(task.problem, &changed, task.context);
     let Refined { eigenvalues, mut vectors, residuals, floors } = modes;
+    // Every mode keeps the guaranteed residual.
     let tolerance = task.settings.accuracy.residual();
-    let kept = |i: &usize| keeps(residuals[*i], floors[*i], tolerance);
-    let converged = (0..eigenvalues.len()).filter(kept).count();
+    let is_converged = |i: &usize| keeps(residuals[*i], floors[*i], tolerance);
+    let converged = (0..eigenvalues.len()).filter(is_converged).count();
     if converged < eigenvalues.len() {
         return Err(EigenFailure::NotConverged { converged, wanted });
     }
+    // Modes that only complete the last cluster are left out.
     let given = wanted.min(eigenvalues.len());
     let next_eigenvalue = eigenvalues.get(given).copied().or(search.next.first().copied());
     vectors.truncate(vectors.nrows(), given);

@@ -17,7 +17,7 @@ use flexbody_linalg::is_positive_semidefinite;
 
 /// Distances of the count's shift from the last eigenvector, relative to its eigenvalue. The second is used if the
 /// count with the first is too large, since the additional modes may lie beyond the given ones.
-const ABOVE: [f64; 2] = [1e-3, 1e-5];
+const SHIFT_DISTANCES: [f64; 2] = [1e-3, 1e-5];
 
 /// Returns the modes of the body in the span of `basis` (N x k, nearly M-orthonormal): mass-normalised Ritz vectors,
 /// M-orthogonal to the rigid modes, ascending.
@@ -48,7 +48,7 @@ pub fn modes_of_span(
     let task = analysis.as_deref().map(|analysis| Task::new(problem, settings, analysis, context));
     let completeness = match &task {
         Some(task) => count(task, &modes.eigenvalues[..exact])?,
-        None => uncounted(&modes, exact, settings.accuracy),
+        None => without_counter(&modes, exact, settings.accuracy),
     };
     let mut bounds = None;
     if settings.accuracy == Accuracy::Certified && !modes.eigenvalues.is_empty() {
@@ -112,12 +112,12 @@ impl Refined {
 }
 
 /// Returns the state of the proof without a count.
-fn uncounted(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness {
+fn without_counter(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness {
     let given = modes.eigenvalues.len();
     let remark = if exact < given {
         let pairs = modes.residuals.iter().zip(&modes.floors);
         let others = pairs.filter(|(r, f)| !keeps(**r, **f, accuracy.residual())).count();
-        format!("{others} of {given} modes of the given subspace are no eigenvectors")
+        format!("{others} of {given} modes of the given subspace are not eigenvectors")
     } else {
         "accuracy `fast` leaves the count out".to_owned()
     };
@@ -136,7 +136,7 @@ fn certifiable<'t>(
         return Err("not every mode of the subspace is an eigenvector to a K-residual of 1e-12");
     }
     if completeness.proof == Proof::NotProved {
-        return Err("modes are missing in the subspace");
+        return Err("the subspace does not contain all modes");
     }
     Ok(task.expect("a count needs the task"))
 }
@@ -163,8 +163,8 @@ fn count(task: &Task<'_>, eigenvalues: &[f64]) -> Result<Completeness, EigenFail
         return Err(EigenFailure::MassIndefinite);
     }
     // The smaller distance is used if the larger one counts too many.
-    let mut counted = (last, 0);
-    for above in ABOVE {
+    let mut last_count = (last, 0);
+    for above in SHIFT_DISTANCES {
         let shift = (1.0 + above) * last;
         let negative = count_below(problem, analysis, shift, context)?;
         if negative == rigid + found {
@@ -174,11 +174,12 @@ fn count(task: &Task<'_>, eigenvalues: &[f64]) -> Result<Completeness, EigenFail
             let counted = negative.saturating_sub(rigid);
             return Err(EigenFailure::CountDiffers { found, counted, shift });
         }
-        counted = (shift, negative);
+        last_count = (shift, negative);
     }
-    let (shift, negative) = counted;
-    let there = negative - rigid;
-    let remark =
-        format!("the body has {there} flexible modes below lambda = {shift:.6e}, the given subspace {found}");
+    let (shift, negative) = last_count;
+    let counted = negative - rigid;
+    let remark = format!(
+        "the body has {counted} flexible modes below lambda = {shift:.6e}, the given subspace has {found}"
+    );
     Ok(outcome(shift, Some(negative), remark))
 }

@@ -44,7 +44,7 @@ fn row_sums(k: &SymmetricMatrix, x: MatRef<'_, f64>, f: impl Fn(f64) -> f64 + Co
 }
 
 /// Number of standard deviations of the noise of K above which energy counts as real.
-pub(super) const NOISE_FACTOR: f64 = 30.0;
+pub(super) const NOISE_DEVIATIONS: f64 = 30.0;
 
 /// Refuses modes whose eigenvalues cannot be distinguished from zero (mechanisms), and clearly negative eigenvalues (an
 /// indefinite K).
@@ -52,12 +52,13 @@ pub(super) fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -
     let lowest = refined.vectors.as_ref().subcols(0, refined.vectors.ncols().min(32));
     let noise = energy_noise(problem.pencil.stiffness(), lowest, problem.input_error);
     if let Some(&lambda) = refined.eigenvalues.first()
-        && lambda < -NOISE_FACTOR * noise[0]
+        && lambda < -NOISE_DEVIATIONS * noise[0]
     {
         let vector = refined.vectors.as_ref().subcols(0, 1).to_owned();
         return Err(EigenFailure::NegativeEigenvalue { eigenvalue: lambda, vector });
     }
-    let count = refined.eigenvalues.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_FACTOR * **n).count();
+    let count =
+        refined.eigenvalues.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_DEVIATIONS * **n).count();
     if count > 0 {
         return Err(EigenFailure::ZeroEnergy {
             count,
@@ -78,10 +79,10 @@ pub struct Unresisted {
 }
 
 /// Largest number of vectors that are computed.
-const SHOWN: usize = 8;
+const MAX_VECTORS: usize = 8;
 
 /// Number of steps of inverse iteration. The first amplifies the motions relative to all others by the digits of K.
-const STEPS: usize = 2;
+const INVERSE_ITERATIONS: usize = 2;
 
 /// Returns the motions to which K + tau M gives no energy up to the digits of K (`input_error` is the relative error of
 /// its entries). Returns `None` if there is none, or if K + tau M is clearly indefinite.
@@ -89,7 +90,7 @@ const STEPS: usize = 2;
 /// The count is that of the eigenvalues mu of (K + tau M) x = mu diag(K) x within noise of zero, by the inertia of K +
 /// tau M -+ delta diag(K).
 pub fn unresisted_motions(pencil: &Pencil<'_>, tau: f64, input_error: f64) -> Option<Unresisted> {
-    let delta = NOISE_FACTOR * input_error.max(f64::EPSILON);
+    let delta = NOISE_DEVIATIONS * input_error.max(f64::EPSILON);
     let analysis = Analysis::new(pencil)?;
     let moved = |part: f64| pencil.stiffness().with_diagonal(|_, k| k + part * k);
     let with = |stiffness: &SymmetricMatrix| {
@@ -105,8 +106,8 @@ pub fn unresisted_motions(pencil: &Pencil<'_>, tau: f64, input_error: f64) -> Op
     let raised = Pencil::new(&raised, pencil.mass(), pencil.block());
     let factor = Cholesky::<f64>::new(&analysis, &raised, tau)?;
     let start = |i: usize, j: usize| ((i + 1) as f64 * (j as f64 + 1.37) * 0.754_877_666).fract() - 0.5;
-    let mut vectors = Mat::from_fn(pencil.n(), count.min(SHOWN), start);
-    for _ in 0..STEPS {
+    let mut vectors = Mat::from_fn(pencil.n(), count.min(MAX_VECTORS), start);
+    for _ in 0..INVERSE_ITERATIONS {
         factor.solve_in_place(vectors.as_mut());
         for column in vectors.col_iter_mut() {
             let size = column.norm_max();

@@ -7,7 +7,7 @@ use super::schema::{FORMAT, MAJOR};
 use super::value::Value;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_base::hdf5_file::{self as hdf5_file, open_sound};
+use flexbody_base::hdf5_file::{self as hdf5_file, open_with_checked_texts};
 use flexbody_body::flex_body::FlexBody;
 use hdf5_metno as hdf5;
 use std::path::Path;
@@ -85,7 +85,7 @@ fn without_digest(scan: &Scan) -> Diagnostic {
 
 /// Opens a file of this program with a format that this version can read. Returns also its size in bytes.
 pub(super) fn open_checked(path: &Path) -> Result<(hdf5::File, u64)> {
-    let (file, bytes) = open_sound(path, "flexible body", Code::BodyUnreadable)?;
+    let (file, bytes) = open_with_checked_texts(path, "flexible body", Code::BodyUnreadable)?;
     check_format(&file, path)?;
     Ok((file, bytes))
 }

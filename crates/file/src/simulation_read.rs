@@ -4,7 +4,9 @@ use super::recorded_motion::RecordedMotion;
 use super::simulation::{FORMAT, VERSION};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_base::hdf5_file::{self as hdf5_file, Stored, dataset, elements, open_group, open_sound};
+use flexbody_base::hdf5_file::{
+    self as hdf5_file, Stored, dataset, elements, open_group, open_with_checked_texts,
+};
 use flexbody_body::flex_body::Carrier;
 use hdf5_metno as hdf5;
 use std::path::Path;
@@ -15,7 +17,7 @@ use std::path::Path;
 /// FB101 if the file cannot be read; FB734 if it is another file, one of another version, or a damaged one.
 pub fn read_simulation(path: impl AsRef<Path>) -> Result<RecordedMotion> {
     let path = path.as_ref();
-    let (file, bytes) = open_sound(path, "motion", Code::MotionUnreadable)?;
+    let (file, bytes) = open_with_checked_texts(path, "motion", Code::MotionUnreadable)?;
     let mut reading = RecordingReader { file, stored: Stored::new(bytes) };
     reading
         .motion()

@@ -3,7 +3,7 @@
 
 use super::digits::significant_digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::memory::{left, or_go_without, refuse_beyond};
+use flexbody_base::memory::{allow_failure, left, refuse_beyond};
 use flexbody_linalg::{ColumnBlock, CscMatrix, split_columns};
 use flexbody_model::RawMatrix;
 use rayon::prelude::*;
@@ -46,10 +46,10 @@ impl StoredEntries {
 
 /// Largest number of entries per position of a matrix: contributions of many elements may be listed one by one. A
 /// larger number lets a compressed file unpack to more; every known file has less than 10.
-const ENTRIES_PER_PLACE: u128 = 64;
+const MAX_ENTRIES_PER_POSITION: u128 = 64;
 
 /// Number of entries that a matrix of any size may have.
-const ALWAYS_ENTRIES: u64 = 1_000_000;
+const ALWAYS_ALLOWED_ENTRIES: u64 = 1_000_000;
 
 /// Bytes per entry while a matrix is assembled: as it was read, and in a compressed column.
 const BYTES_PER_ENTRY: f64 = (size_of::<Entry>() + size_of::<u32>() + size_of::<f64>()) as f64;
@@ -57,7 +57,9 @@ const BYTES_PER_ENTRY: f64 = (size_of::<Entry>() + size_of::<u32>() + size_of::<
 /// Returns the largest number of entries of a matrix with `n` rows.
 pub(super) fn most_entries_of(n: u64) -> u64 {
     let places = u128::from(n) * u128::from(n);
-    u64::try_from(ENTRIES_PER_PLACE.saturating_mul(places)).unwrap_or(u64::MAX).max(ALWAYS_ENTRIES)
+    u64::try_from(MAX_ENTRIES_PER_POSITION.saturating_mul(places))
+        .unwrap_or(u64::MAX)
+        .max(ALWAYS_ALLOWED_ENTRIES)
 }
 
 /// Refuses a number of entries that does not fit the memory left.
@@ -264,11 +266,11 @@ impl Counted {
 
 /// Adds an entry to the last piece, or begins a new one. Small pieces cover few columns, so that most tasks skip them.
 pub(super) fn push(pieces: &mut Vec<Vec<Entry>>, entry: Entry) {
-    const PIECE: usize = 1 << 15;
+    const ENTRIES_PER_PIECE: usize = 1 << 15;
     match pieces.last_mut() {
-        Some(piece) if piece.len() < PIECE => piece.push(entry),
+        Some(piece) if piece.len() < ENTRIES_PER_PIECE => piece.push(entry),
         _ => {
-            let mut piece = Vec::with_capacity(PIECE);
+            let mut piece = Vec::with_capacity(ENTRIES_PER_PIECE);
             piece.push(entry);
             pieces.push(piece);
         }
@@ -285,10 +287,10 @@ pub(super) struct ColumnEntries {
 
 impl ColumnEntries {
     /// Creates an empty list for `n` columns, with capacity for about `entries`.
-    pub(super) fn with_room(n: usize, entries: usize) -> Self {
+    pub(super) fn with_capacity(n: usize, entries: usize) -> Self {
         let (mut row_idx, mut values) = (Vec::new(), Vec::new());
         // The number comes from a file. Without memory for it the lists grow as needed.
-        or_go_without(|| {
+        allow_failure(|| {
             if row_idx.try_reserve_exact(entries).is_ok() {
                 let _ = values.try_reserve_exact(entries);
             }
@@ -512,7 +514,7 @@ mod tests {
         let mut ordered: Vec<Entry> = list.into_iter().filter(|e| e.value != 0.0).collect();
         ordered.sort_by_key(|e| e.col);
         let columns = || {
-            let mut columns = ColumnEntries::with_room(n, ordered.len());
+            let mut columns = ColumnEntries::with_capacity(n, ordered.len());
             ordered.iter().for_each(|&e| columns.push(e));
             columns
         };

@@ -11,14 +11,14 @@ use apart::Apart;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 pub(super) use matrix_lines::MatrixLines;
-use replication::{Asked, Replication};
+use replication::{Replication, ReplicationRequest};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Depth of included files above which a file is taken to include itself.
-const DEEPEST: usize = 20;
+const MAX_INCLUDE_DEPTH: usize = 20;
 /// Largest number of files of a deck.
-const MOST_FILES: usize = 1000;
+const MAX_FILES: usize = 1000;
 
 /// Part of a deck, in the order of the deck.
 pub(super) enum Item<'a> {
@@ -114,12 +114,12 @@ impl Card {
 /// Returns the whole number in a field of a card; `None` if it is none.
 pub(super) fn whole(field: &[u8]) -> Option<i64> {
     /// Number of digits that fit into an i64, whichever digits they are.
-    const FIT: usize = 18;
+    const MAX_DIGITS: usize = 18;
     let digits = match field {
         [b'+' | b'-', digits @ ..] => digits,
         digits => digits,
     };
-    if digits.is_empty() || digits.len() > FIT {
+    if digits.is_empty() || digits.len() > MAX_DIGITS {
         return std::str::from_utf8(field).ok()?.parse().ok();
     }
     let mut number = 0;
@@ -236,12 +236,13 @@ impl<'t> BulkReader<'t> {
     }
 
     fn file(&mut self, path: &Path, file: &InputFile, depth: usize) -> Taken {
-        if depth > DEEPEST || self.files.len() >= MOST_FILES {
-            let message =
-                format!("files include one another more than {DEEPEST} levels deep, or {MOST_FILES} times");
+        if depth > MAX_INCLUDE_DEPTH || self.files.len() >= MAX_FILES {
+            let message = format!(
+                "included files are nested more than {MAX_INCLUDE_DEPTH} levels deep, or are more than {MAX_FILES}"
+            );
             return Err(Diagnostic::new(Code::DeckSyntax, message)
                 .in_file(path)
-                .with_help("a file includes itself: take the INCLUDE out"));
+                .with_help("remove the INCLUDE with which a file includes itself"));
         }
         self.files.push(file.seen()?);
         let before = std::mem::replace(&mut self.apart, Apart::of(file));
@@ -333,13 +334,13 @@ impl<'t> BulkReader<'t> {
         let head = line.head();
         let here = |diagnostic: Diagnostic| diagnostic.in_file(at.path).at_line(at.line);
         // A line of replication makes cards from the last one.
-        match Replication::asked(&line).map_err(here)? {
+        match Replication::request(&line).map_err(here)? {
             None => {}
-            Some(Asked::One(replication)) => {
+            Some(ReplicationRequest::One(replication)) => {
                 self.replication = replication;
                 return self.replicate(1, at);
             }
-            Some(Asked::Repeat(count)) => return self.replicate(count, at),
+            Some(ReplicationRequest::Repeat(count)) => return self.replicate(count, at),
         }
         if matches!(head.first(), None | Some(b'+' | b'*')) {
             let refused = |what: &str| {
@@ -439,9 +440,10 @@ impl<'a> Line<'a> {
 
     /// Returns the text before the fields: the name of the card, or a continuation.
     fn head(&self) -> &[u8] {
-        let head = match self.is_free {
-            true => self.text.split(|&b| b == b',').next().unwrap_or_default(),
-            false => &self.text[..self.text.len().min(8)],
+        let head = if self.is_free {
+            self.text.split(|&b| b == b',').next().unwrap_or_default()
+        } else {
+            &self.text[..self.text.len().min(8)]
         };
         head.trim_ascii()
     }

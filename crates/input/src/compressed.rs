@@ -34,7 +34,7 @@ impl Compressed<'_> {
     /// that are not finite, FB307 for a single triangle, FB312 if there is no nonzero entry.
     pub(super) fn assemble(self, path: &Path) -> Result<RawMatrix, Diagnostic> {
         self.check_pointers()?;
-        let mut columns = ColumnEntries::with_room(self.n, self.entries);
+        let mut columns = ColumnEntries::with_capacity(self.n, self.entries);
         let mut check = EntryCheck::new(self.n, self.help);
         for (column, pair) in self.pointers.windows(2).enumerate() {
             for k in pair[0]..pair[1] {

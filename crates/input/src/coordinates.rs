@@ -17,7 +17,7 @@ pub(crate) use line::{Limits, real};
 pub(crate) use text::{Blocks, line_aligned, most_entries};
 
 /// Number of bad lines that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN_LINES: usize = 5;
 
 /// Entries of a file, and the problems of its lines.
 pub(super) struct Coordinates {
@@ -112,8 +112,8 @@ impl Coordinates {
             let before = self.lines;
             self.count += (piece.entries.len() + piece.bad_count) as u64;
             self.bad_count += piece.bad_count;
-            let room = SHOWN.saturating_sub(self.bad.len());
-            self.bad.extend(piece.bad.into_iter().take(room).map(|(line, bad)| (line + before, bad)));
+            let remaining = MAX_SHOWN_LINES.saturating_sub(self.bad.len());
+            self.bad.extend(piece.bad.into_iter().take(remaining).map(|(line, bad)| (line + before, bad)));
             self.lower = self.lower.or(piece.lower.map(|line| line + before));
             self.upper = self.upper.or(piece.upper.map(|line| line + before));
             self.written = self.written.max(piece.written);
@@ -142,28 +142,28 @@ impl Coordinates {
     /// Returns diagnostics of the bad lines, the first few one by one.
     pub(super) fn bad_lines(&self, ends_with_newline: bool) -> Vec<Diagnostic> {
         let more = self.bad_count - self.bad.len();
-        let told = |(k, (line, bad)): (usize, &(usize, Diagnostic))| {
+        let located = |(k, (line, bad)): (usize, &(usize, Diagnostic))| {
             let mut message = bad.message().to_owned();
             if *line == self.lines && !ends_with_newline {
                 message += "; it is the last line and has no line end: the file may be cut off";
             }
-            if k + 1 == SHOWN && more > 0 {
-                message += &format!(" ({more} more lines are bad)");
+            if k + 1 == MAX_SHOWN_LINES && more > 0 {
+                message += &format!(" ({more} more lines have errors)");
             }
             Diagnostic::new(bad.code(), message).at_line(*line).with_help(bad.help())
         };
-        self.bad.iter().enumerate().map(told).collect()
+        self.bad.iter().enumerate().map(located).collect()
     }
 }
 
 /// Returns the line, or its beginning, in printable form.
 pub(crate) fn excerpt(line: &[u8]) -> String {
-    const SHOWN: usize = 60;
+    const MAX_CHARACTERS: usize = 60;
     match std::str::from_utf8(line) {
-        Ok(text) if text.len() <= SHOWN && !text.contains(|c: char| c.is_control() && c != '\t') => {
+        Ok(text) if text.len() <= MAX_CHARACTERS && !text.contains(|c: char| c.is_control() && c != '\t') => {
             text.to_owned()
         }
-        _ if line.len() <= SHOWN => line.escape_ascii().to_string(),
-        _ => format!("{}...", line[..SHOWN].escape_ascii()),
+        _ if line.len() <= MAX_CHARACTERS => line.escape_ascii().to_string(),
+        _ => format!("{}...", line[..MAX_CHARACTERS].escape_ascii()),
     }
 }

@@ -9,7 +9,7 @@ use std::collections::HashSet;
 const SAMPLES: usize = 20_000;
 
 /// Number of digits from which on the digits of the values are accepted without further evidence.
-const MANY: u8 = 10;
+const MIN_DIGITS: u8 = 10;
 
 /// Returns the number of significant decimal digits (1 to 17) of `count` values; `value(k)` returns the k-th. `written`
 /// is the largest number of digits with which the file writes a value (17 for binary files).
@@ -26,11 +26,11 @@ pub(super) fn significant_digits(count: usize, written: u8, value: impl Fn(usize
             digits = digits.max(shortest(v, &mut text));
         }
     }
-    let exact = (digits <= 4 && distinct.len() <= 32) || (written >= MANY && distinct.len() <= 256);
+    let exact = (digits <= 4 && distinct.len() <= 32) || (written >= MIN_DIGITS && distinct.len() <= 256);
     match digits {
-        MANY.. => digits,
+        MIN_DIGITS.. => digits,
         _ if exact => 17,
-        _ if written < MANY => written.max(digits),
+        _ if written < MIN_DIGITS => written.max(digits),
         _ => digits,
     }
 }

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 pub(super) use columns::Point;
 
 /// Number of bad cards that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN_CARDS: usize = 5;
 
 /// Form of rectangular matrices, such as loads.
 const RECTANGULAR: i64 = 9;
@@ -146,12 +146,12 @@ impl Dmigs {
         let numbered: Vec<Columns> = numbered.collect();
         for columns in numbered {
             for (matrix, entries, written) in columns.runs {
-                let own = &mut self.matrices[matrix];
-                own.written = own.written.max(written);
+                let dmig = &mut self.matrices[matrix];
+                dmig.written = dmig.written.max(written);
                 match entries.as_slice() {
                     // Columns that come one by one are collected in larger pieces.
-                    few if few.len() < 1 << 10 => few.iter().for_each(|entry| push(&mut own.pieces, *entry)),
-                    _ => own.pieces.push(entries),
+                    few if few.len() < 1 << 10 => few.iter().for_each(|entry| push(&mut dmig.pieces, *entry)),
+                    _ => dmig.pieces.push(entries),
                 }
             }
             columns.bad.into_iter().for_each(|bad| self.complain(Some(bad)));
@@ -159,7 +159,7 @@ impl Dmigs {
     }
 
     fn complain(&mut self, bad: Option<Diagnostic>) {
-        self.bad.extend(bad.filter(|_| self.bad.len() < SHOWN));
+        self.bad.extend(bad.filter(|_| self.bad.len() < MAX_SHOWN_CARDS));
     }
 
     /// Returns the index of a point, which is created if necessary.
@@ -184,7 +184,7 @@ impl Dmigs {
     /// Returns the indices of matrices that may be K or M: square ones with entries, or all if there are none.
     pub(super) fn candidates(&self) -> Vec<usize> {
         // Entries of complex matrices are not stored.
-        let has_entries = |own: &Dmig| own.count() > 0 || !own.is_real();
+        let has_entries = |dmig: &Dmig| dmig.count() > 0 || !dmig.is_real();
         let is_one = |k: &usize| self.matrices[*k].form != RECTANGULAR && has_entries(&self.matrices[*k]);
         let some: Vec<usize> = (0..self.matrices.len()).filter(is_one).collect();
         if some.is_empty() { (0..self.matrices.len()).collect() } else { some }
@@ -212,24 +212,25 @@ impl Dmigs {
     /// FB302 for complex matrices and other forms, FB307 for an undeclared triangle, FB309 for duplicate entries, FB301
     /// for more rows than the entries can fill, FB312 if there is no nonzero entry.
     pub(super) fn take_matrix(&mut self, k: usize, points: &[Point]) -> Result<RawMatrix, Diagnostic> {
-        let own = &mut self.matrices[k];
-        let (count, pieces) = (own.count(), std::mem::take(&mut own.pieces));
-        let own = &self.matrices[k];
+        let dmig = &mut self.matrices[k];
+        let (count, pieces) = (dmig.count(), std::mem::take(&mut dmig.pieces));
+        let dmig = &self.matrices[k];
         let about = |diagnostic: Diagnostic| {
-            diagnostic.about(format!("DMIG {}", own.name)).in_file(&own.path).at_line(own.line)
+            diagnostic.about(format!("DMIG {}", dmig.name)).in_file(&dmig.path).at_line(dmig.line)
         };
-        if !own.is_real() {
-            let message = format!("type {} is complex", own.kind);
+        if !dmig.is_real() {
+            let message = format!("type {} is complex", dmig.kind);
             let help = "write real matrices, without structural damping";
             return Err(about(Diagnostic::new(Code::MatrixKind, message).with_help(help)));
         }
-        let stored = match own.form {
+        let stored = match dmig.form {
             1 | 2 | 9 => StoredEntries::Full,
             6 => StoredEntries::Triangle,
             other => {
-                let message = format!("form {other} is none of a symmetric matrix");
+                let message = format!("form {other} is not that of a symmetric matrix");
                 return Err(about(
-                    Diagnostic::new(Code::MatrixKind, message).with_help("forms are 1, 2, 6, 9"),
+                    Diagnostic::new(Code::MatrixKind, message)
+                        .with_help("write a DMIG of form 6: forms are 1, 2, 6 and 9"),
                 ));
             }
         };
@@ -241,10 +242,10 @@ impl Dmigs {
             return Err(about(triangle));
         }
         let n = check_size(n, n, count).map_err(about)?;
-        assemble_distinct(n, pieces, stored, own.written, &own.path, |row, column| {
+        assemble_distinct(n, pieces, stored, dmig.written, &dmig.path, |row, column| {
             let [row, column] = [row, column].map(|row| named(points[row as usize]));
             let message = format!("the entry of {row} and {column} is given twice");
-            let help = "form 6 has one triangle; write the matrix again";
+            let help = "write the matrix again: form 6 has one triangle";
             about(Diagnostic::new(Code::MatrixTriangles, message).with_help(help))
         })
     }
@@ -257,10 +258,10 @@ impl Dmigs {
             let mut sides = Sides::default();
             piece.retain_mut(|entry| {
                 (entry.row, entry.col) = (row_of[entry.row as usize], row_of[entry.col as usize]);
-                let is_kept = entry.value != 0.0 && entry.row != u32::MAX && entry.col != u32::MAX;
-                sides.lower |= is_kept && entry.row > entry.col;
-                sides.upper |= is_kept && entry.row < entry.col;
-                is_kept
+                let is_entry = entry.value != 0.0 && entry.row != u32::MAX && entry.col != u32::MAX;
+                sides.lower |= is_entry && entry.row > entry.col;
+                sides.upper |= is_entry && entry.row < entry.col;
+                is_entry
             });
             sides
         };

@@ -27,8 +27,8 @@ pub(super) struct Hdf5;
 const NAMES: NamedMatrices = NamedMatrices { holder: "group", file: "FILE.h5", matrices: "sparse matrices" };
 
 /// Largest number of groups that are searched, and their largest depth: a file must not make the search endless.
-const GROUPS: usize = 1000;
-const DEPTH: usize = 6;
+const MAX_GROUPS: usize = 1000;
+const MAX_DEPTH: usize = 6;
 
 impl Reader for Hdf5 {
     fn name(&self) -> &'static str {
@@ -115,7 +115,7 @@ fn matrices(file: &File) -> Vec<(String, Group)> {
     let mut level: Vec<(String, Group)> =
         file.group("/").map(|root| (String::new(), root)).into_iter().collect();
     let mut visited = 0;
-    for _ in 0..DEPTH {
+    for _ in 0..MAX_DEPTH {
         let mut next = Vec::new();
         for (name, group) in level {
             let members = Members::of(&group);
@@ -127,7 +127,7 @@ fn matrices(file: &File) -> Vec<(String, Group)> {
             // MATLAB keeps internal data in groups that begin with `#`.
             for child in members.hard_links().filter(|child| !child.starts_with('#')) {
                 visited += 1;
-                if visited > GROUPS {
+                if visited > MAX_GROUPS {
                     return found;
                 }
                 if let Ok(inner) = group.group(child) {

@@ -136,9 +136,12 @@ pub(super) fn read_job(job: &JobFile) -> Found<JobModel> {
     };
     match reader {
         Some(reader) if job.matrices.is_some() && !reader.names_matrices() => {
-            let message = format!("the matrices of a job of {} have no names to choose by", reader.name());
+            let message =
+                format!("matrices are chosen by name, but those of a job of {} have no names", reader.name());
             Err(vec![
-                Diagnostic::new(Code::Usage, message).in_file(&job.path).with_help("leave the names out"),
+                Diagnostic::new(Code::Usage, message)
+                    .in_file(&job.path)
+                    .with_help("leave the names of the matrices out"),
             ])
         }
         Some(reader) => reader.read(job),
@@ -150,8 +153,10 @@ fn unknown(job: &JobFile) -> Diagnostic {
     let needed: Vec<String> =
         JOBS.iter().map(|reader| format!("{}: {}", reader.name(), reader.needs())).collect();
     let message = match &job.program {
-        Some(program) => format!("`{program}` is no program whose jobs are read"),
-        None => "neither a manifest nor the job of an FE program with its matrices beside it".to_owned(),
+        Some(program) => format!("jobs of `{program}` are not supported"),
+        None => {
+            "file is neither a manifest nor the job of an FE program with its matrices beside it".to_owned()
+        }
     };
     Diagnostic::new(Code::JobUnknown, message).in_file(&job.path).with_help(needed.join("; "))
 }
@@ -177,22 +182,22 @@ fn is_deck(path: &Path) -> bool {
 /// an underscore or the like, or a matrix name of Abaqus. Each comes as the rest of its name after the stem, in lower
 /// case, and the path.
 fn siblings(main: &Path) -> impl Iterator<Item = (String, PathBuf)> {
-    let own = beginning_alike(main).into_iter().filter(|file| file.is_own);
-    own.map(|Beside { rest, path, .. }| (rest, path))
+    let siblings = beginning_alike(main).into_iter().filter(|file| file.is_of_job);
+    siblings.map(|JobSibling { rest, path, .. }| (rest, path))
 }
 
 /// File in the folder of the main file of a job whose name begins with the stem of the job.
-struct Beside {
+struct JobSibling {
     /// Rest of the name, in lower case.
     rest: String,
     path: PathBuf,
     /// False for files of other decks, whose names continue the stem (`job_2.op4` beside `job_2.bdf`), and for files
     /// that a letter or a number distinguishes from the job (`job2.op4`, `job_2.op4`, `job_v2.op4`).
-    is_own: bool,
+    is_of_job: bool,
 }
 
 /// Returns the files in the folder of the main file of a job whose names begin with its stem, in any case.
-fn beginning_alike(main: &Path) -> Vec<Beside> {
+fn beginning_alike(main: &Path) -> Vec<JobSibling> {
     let Some(stem) = main.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()) else {
         return Vec::new();
     };
@@ -208,20 +213,20 @@ fn beginning_alike(main: &Path) -> Vec<Beside> {
     let all: Vec<(String, PathBuf)> = listed.filter_map(|file| rest_of(file.file_name())).collect();
     let decks: Vec<String> = all.iter().filter_map(|(rest, _)| stem_of_deck(rest)).collect();
     // A file belongs to another deck if its name continues the stem of that deck.
-    let goes_on = |rest: &str, deck: &String| {
+    let continues = |rest: &str, deck: &String| {
         rest.strip_prefix(deck.as_str()).is_some_and(|more| !more.starts_with(char::is_alphanumeric))
     };
     // A name that continues the stem by a letter or a version number belongs to another job, except for the matrices of
     // Abaqus.
-    let is_own = |rest: &str| {
+    let is_of_job = |rest: &str| {
         let name = rest.trim_start_matches(|c: char| !c.is_alphanumeric());
         let version = name.strip_prefix('v').unwrap_or(name);
         let is_of_abaqus = ["stif", "mass"].iter().any(|kind| rest.starts_with(kind));
         (is_of_abaqus || !rest.starts_with(char::is_alphanumeric))
             && !version.starts_with(|c: char| c.is_ascii_digit())
-            && !decks.iter().any(|deck| goes_on(rest, deck))
+            && !decks.iter().any(|deck| continues(rest, deck))
     };
-    let beside = |(rest, path): (String, PathBuf)| Beside { is_own: is_own(&rest), rest, path };
+    let beside = |(rest, path): (String, PathBuf)| JobSibling { is_of_job: is_of_job(&rest), rest, path };
     all.into_iter().map(beside).collect()
 }
 

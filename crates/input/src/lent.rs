@@ -15,7 +15,7 @@ use std::sync::Arc;
 use tempfile::tempfile_in;
 
 /// Number of bytes that are written at a time.
-const PIECE: usize = 1 << 20;
+const BYTES_PER_WRITE: usize = 1 << 20;
 
 /// Type of stored numbers.
 pub(super) trait Number: AnyBitPattern + NoUninit + Send + Sync + UnwindSafe + RefUnwindSafe {}
@@ -24,21 +24,21 @@ impl Number for u32 {}
 impl Number for f64 {}
 
 /// Numbers that are written to a file without a name, which disappears with its last use.
-pub(super) struct Kept<T> {
+pub(super) struct StoredNumbers<T> {
     out: BufWriter<File>,
     folder: PathBuf,
     count: usize,
     numbers: PhantomData<T>,
 }
 
-impl<T: Number> Kept<T> {
+impl<T: Number> StoredNumbers<T> {
     /// Creates a file in `folder`.
     ///
     /// # Errors
     /// FB104 if no file can be created.
     pub(crate) fn new(folder: &Path) -> Result<Self, Diagnostic> {
         let file = tempfile_in(folder).map_err(|e| unwritable(folder, &e))?;
-        let out = BufWriter::with_capacity(PIECE, file);
+        let out = BufWriter::with_capacity(BYTES_PER_WRITE, file);
         Ok(Self { out, folder: folder.to_owned(), count: 0, numbers: PhantomData })
     }
 
@@ -66,29 +66,29 @@ impl<T: Number> Kept<T> {
 }
 
 /// Compressed columns that are written to files.
-pub(super) struct KeptColumns {
+pub(super) struct StoredColumns {
     col_ptr: Vec<usize>,
-    rows: Kept<u32>,
-    values: Kept<f64>,
+    rows: StoredNumbers<u32>,
+    values: StoredNumbers<f64>,
     /// Column and row of the last entry.
     last: Option<(u32, u32)>,
     ascends: bool,
 }
 
-impl KeptColumns {
+impl StoredColumns {
     /// Creates the files in `folder` for a matrix of `n` columns.
     ///
     /// # Errors
-    /// The errors of [`Kept::new`].
+    /// The errors of [`StoredNumbers::new`].
     pub(crate) fn new(folder: &Path, n: usize) -> Result<Self, Diagnostic> {
-        let (rows, values) = (Kept::new(folder)?, Kept::new(folder)?);
+        let (rows, values) = (StoredNumbers::new(folder)?, StoredNumbers::new(folder)?);
         Ok(Self { col_ptr: vec![0; n + 1], rows, values, last: None, ascends: true })
     }
 
     /// Appends an entry.
     ///
     /// # Errors
-    /// The errors of [`Kept::push`].
+    /// The errors of [`StoredNumbers::push`].
     pub(crate) fn push(&mut self, entry: Entry) -> Result<(), Diagnostic> {
         let at = Some((entry.col, entry.row));
         self.ascends &= self.last < at;
@@ -101,7 +101,7 @@ impl KeptColumns {
     /// Returns the matrix; `None` if entries did not come sorted, or one came twice.
     ///
     /// # Errors
-    /// The errors of [`Kept::lend`].
+    /// The errors of [`StoredNumbers::lend`].
     pub(crate) fn compress(mut self) -> Result<Option<CscMatrix>, Diagnostic> {
         if !self.ascends {
             return Ok(None);
@@ -115,7 +115,7 @@ impl KeptColumns {
 }
 
 fn unwritable(folder: &Path, error: &std::io::Error) -> Diagnostic {
-    let message = format!("the numbers of a matrix cannot be kept in {}: {error}", folder.display());
+    let message = format!("the numbers of a matrix cannot be stored in {}: {error}", folder.display());
     Diagnostic::new(Code::OutputUnwritable, message)
 }
 

@@ -139,7 +139,7 @@ impl ManifestWalk<'_, '_> {
         });
         let names = names.and_then(|names| <[String; 2]>::try_from(names).ok());
         if names.is_none() {
-            let message = "`matrices` has to be two names, as in [\"KGG\", \"MGG\"]".to_owned();
+            let message = "`matrices` must be two names, as in [\"KGG\", \"MGG\"]".to_owned();
             self.complain(Code::ManifestSyntax, value.span(), message);
         }
         names
@@ -188,7 +188,7 @@ impl ManifestWalk<'_, '_> {
         let Some(value) = table.get(key) else {
             let message = format!("key `{key}` is missing in [model.units]");
             let diagnostic = self.at(Code::ManifestSyntax, span, message);
-            self.found.push(diagnostic.with_help("[model.units] states all three: length, mass, time"));
+            self.found.push(diagnostic.with_help("state all three in [model.units]: length, mass, time"));
             return None;
         };
         let name = match value.get_ref() {

@@ -67,9 +67,12 @@ fn node_array(file: &InputFile) -> Found<Vec<i64>> {
     if array.cols != 1 {
         return Err(wrong(format!("mapping has {} columns, expected one of node numbers", array.cols)));
     }
-    let whole = |value: &f64| match value.fract() == 0.0 && value.abs() < 9e15 {
-        true => Ok(*value as i64),
-        false => Err(wrong(format!("{value} is no node number"))),
+    let whole = |value: &f64| {
+        if value.fract() == 0.0 && value.abs() < 9e15 {
+            Ok(*value as i64)
+        } else {
+            Err(wrong(format!("{value} is not a node number")))
+        }
     };
     array.values.iter().map(whole).collect()
 }
@@ -89,7 +92,7 @@ fn named_directions(bytes: &[u8]) -> Option<Vec<DofLabel>> {
             return None;
         };
         let name = String::from_utf8_lossy(name).to_uppercase();
-        let direction = NAMES.iter().position(|own| *own == name);
+        let direction = NAMES.iter().position(|known| *known == name);
         match (integer(row), integer(node), direction) {
             (Some(row), Some(node), Some(at)) => rows.push((row, DofLabel { node, direction: at as u8 + 1 })),
             _ if rows.is_empty() => {}

@@ -43,7 +43,7 @@ impl Reader for Mat5 {
         let read = || {
             let bytes = source.not_packed("MATLAB file")?;
             let Some(order) = Order::of(bytes) else {
-                let message = "file is none of MATLAB's versions 5 to 7.3";
+                let message = "file is not of a MATLAB version from 5 to 7.3";
                 return Err(Diagnostic::new(Code::FileFormatUnknown, message)
                     .with_help("save it with the option -v7 or -v7.3"));
             };

@@ -74,15 +74,15 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnos
 /// Returns the largest number of entries that the file can hold, whatever it announces.
 fn possible_entries(source: &MatrixSource<'_>) -> u64 {
     /// Bytes of the shortest line, `1 1 1`, with its end.
-    const SHORTEST_LINE: u64 = 6;
+    const MIN_LINE_BYTES: u64 = 6;
     /// Largest ratio by which deflate shrinks data.
-    const GZIP_RATIO: u64 = 1032;
+    const MAX_DEFLATE_RATIO: u64 = 1032;
     let unpacked = match source.compression {
         Compression::None => source.file.length(),
-        Compression::Gzip => source.file.length().saturating_mul(GZIP_RATIO),
+        Compression::Gzip => source.file.length().saturating_mul(MAX_DEFLATE_RATIO),
         Compression::Zstd => u64::MAX,
     };
-    unpacked / SHORTEST_LINE + 1
+    unpacked / MIN_LINE_BYTES + 1
 }
 
 fn wrong_count(header: &Header, body: &Coordinates) -> Option<Diagnostic> {
@@ -92,9 +92,10 @@ fn wrong_count(header: &Header, body: &Coordinates) -> Option<Diagnostic> {
     let found = if body.stopped { "more".to_owned() } else { body.count.to_string() };
     let message = format!("header announces {} entries, the file has {found}", header.entries);
     let diagnostic = Diagnostic::new(Code::MatrixCount, message);
-    Some(match body.count > header.entries {
-        true => diagnostic.with_help("correct the size line, or write the file again"),
-        false => diagnostic,
+    Some(if body.count > header.entries {
+        diagnostic.with_help("correct the size line, or write the file again")
+    } else {
+        diagnostic
     })
 }
 

@@ -11,7 +11,7 @@ use std::path::Path;
 const APART: f64 = 1e-3;
 
 /// Number of kinds of elements that a message names.
-const NAMED: usize = 6;
+const MAX_NAMED: usize = 6;
 
 /// Sources of the surface of a model.
 pub(super) struct MeshReading<'m> {
@@ -53,10 +53,11 @@ impl MeshReading<'_> {
         let index: HashMap<i64, usize> = self.nodes.ids.iter().copied().zip(0..).collect();
         let allowed = APART * extents(&self.nodes.positions).into_iter().fold(0.0, f64::max);
         let elsewhere = |(id, x): (&i64, &[f64; 3])| {
-            let own = &self.nodes.positions[*index.get(id)?];
-            let apart = (0..3).map(|k| (x[k] - own[k]).powi(2)).sum::<f64>().sqrt();
-            (apart > allowed)
-                .then(|| format!("node {id} of the mesh lies at {x:?}, the node of the model at {own:?}"))
+            let in_model = &self.nodes.positions[*index.get(id)?];
+            let apart = (0..3).map(|k| (x[k] - in_model[k]).powi(2)).sum::<f64>().sqrt();
+            (apart > allowed).then(|| {
+                format!("node {id} of the mesh lies at {x:?}, the node of the model at {in_model:?}")
+            })
         };
         mesh.ids.iter().zip(&mesh.positions).find_map(elsewhere)
     }
@@ -70,14 +71,14 @@ impl MeshReading<'_> {
             partly.push(Diagnostic::new(Code::MeshPartial, message).in_file(path));
         };
         if !left_out.is_empty() {
-            let more = if left_out.len() > NAMED { ", and of other kinds" } else { "" };
-            let named = left_out[..left_out.len().min(NAMED)].join(", ");
+            let more = if left_out.len() > MAX_NAMED { ", and of other kinds" } else { "" };
+            let named = left_out[..left_out.len().min(MAX_NAMED)].join(", ");
             tell(format!("elements that are not drawn: {named}{more}"));
         }
         if without_nodes > 0 {
             let all = elements.len();
             tell(format!(
-                "{without_nodes} of {all} elements have nodes that the model lacks: they are not drawn"
+                "{without_nodes} of {all} elements have nodes that are not in the model: they are not drawn"
             ));
         }
         (mesh, partly)

@@ -198,13 +198,14 @@ impl ModelFiles {
         });
         let damping = self.damping.as_ref().and_then(Damping::matrix).map(|place| place.path.clone());
         let geometric = self.geometric_stiffness.iter().map(|one| one.matrix.path.clone());
-        let own = match &self.source {
+        let paths = match &self.source {
             ModelSource::Tables(TableFiles { stiffness, mass, nodes, dofs }) => {
                 [&stiffness.path, &mass.path, nodes].into_iter().chain(dofs).cloned().collect()
             }
             ModelSource::Job(job) => job.family(),
         };
-        own.into_iter()
+        paths
+            .into_iter()
             .chain(self.manifest.clone())
             .chain(self.mesh.clone())
             .chain(damping)
@@ -226,8 +227,8 @@ impl ModelFiles {
     ) -> Result<Self> {
         let path = path.into();
         let (name, job) = (stem(&path), JobFile { path, program, matrices: None });
-        let own = Self::of(name, ModelSource::Job(job), units)?;
-        Ok(Self { interfaces, ..own })
+        let files = Self::of(name, ModelSource::Job(job), units)?;
+        Ok(Self { interfaces, ..files })
     }
 
     fn of(name: String, source: ModelSource, units: Option<&str>) -> Result<Self> {

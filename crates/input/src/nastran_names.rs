@@ -61,12 +61,12 @@ pub(super) fn choose(names: &[String], role: MatrixRole, group: Option<&str>) ->
 }
 
 fn listing(names: &[String]) -> String {
-    const SHOWN: usize = 12;
+    const MAX_SHOWN: usize = 12;
     if names.is_empty() {
         return "write the matrix again".to_owned();
     }
-    let more = if names.len() > SHOWN { ", ..." } else { "" };
-    let shown = &names[..names.len().min(SHOWN)];
+    let more = if names.len() > MAX_SHOWN { ", ..." } else { "" };
+    let shown = &names[..names.len().min(MAX_SHOWN)];
     format!("name the matrix as FILE:/NAME; the file has {}{more}", shown.join(", "))
 }
 

@@ -30,11 +30,10 @@ pub(super) fn read_blocks(bytes: &[u8]) -> Result<Blocks, Diagnostic> {
     let (size, decode) = number_type(descr)?;
     let &[count, rows, columns] = shape.as_slice() else { return Err(other_extents(&shape, 3)) };
     let length = announced(&shape, size, data)?;
-    let own = rows * columns;
+    let per_array = rows * columns;
     // In Fortran order the first index varies fastest.
-    let at = |k: usize| match fortran {
-        true => k / own + count * (k % own / columns + rows * (k % columns)),
-        false => k,
+    let at = |k: usize| {
+        if fortran { k / per_array + count * (k % per_array / columns + rows * (k % columns)) } else { k }
     };
     let values = (0..length).map(|k| decode(&data[at(k) * size..(at(k) + 1) * size])).collect();
     Ok(Blocks { count, rows, columns, values, digits: if size == 4 { 7 } else { 17 } })
@@ -64,7 +63,7 @@ fn described(bytes: &[u8]) -> Result<(Header<'_>, &[u8]), Diagnostic> {
     let (header, data) = split(bytes)?;
     let text = header.escape_ascii().to_string();
     let shown = text.get(..100).unwrap_or(&text).trim_end();
-    let header = parse(header).ok_or_else(|| syntax(format!("header is not understood: `{shown}`")))?;
+    let header = parse(header).ok_or_else(|| syntax(format!("header cannot be parsed: `{shown}`")))?;
     Ok((header, data))
 }
 
@@ -89,7 +88,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
 pub(super) fn read_integers(bytes: &[u8]) -> Result<Vec<i64>, Diagnostic> {
     let (header, data) = split(bytes)?;
     let Header { descr, shape, .. } =
-        parse(header).ok_or_else(|| syntax("header is not understood".into()))?;
+        parse(header).ok_or_else(|| syntax("header cannot be parsed".into()))?;
     let digits = descr.get(1..).and_then(|size| size.strip_prefix(['i', 'u']));
     let Some(size) = digits.and_then(|digits| digits.parse().ok()).filter(|size| [1, 2, 4, 8].contains(size))
     else {
@@ -104,10 +103,7 @@ pub(super) fn read_integers(bytes: &[u8]) -> Result<Vec<i64>, Diagnostic> {
     let signed = descr.as_bytes()[1] == b'i';
     let decode = |bytes: &[u8]| {
         let digits = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
-        let number = match big {
-            true => bytes.iter().fold(0, digits),
-            false => bytes.iter().rev().fold(0, digits),
-        };
+        let number = if big { bytes.iter().fold(0, digits) } else { bytes.iter().rev().fold(0, digits) };
         let unused = 64 - 8 * size as u32;
         if signed { ((number << unused) as i64) >> unused } else { i64::try_from(number).unwrap_or(i64::MAX) }
     };

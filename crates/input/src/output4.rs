@@ -116,8 +116,11 @@ impl Contents {
         }
         let columns = columns(file, stored, *encoding)?;
         if !matches!(header.form, 1 | 2 | 6) {
-            let message = format!("form {} is none of a symmetric matrix", header.form);
-            return Err(about(Diagnostic::new(Code::MatrixKind, message).with_help("forms are 1, 2, 6")));
+            let message = format!("form {} is not that of a symmetric matrix", header.form);
+            return Err(about(
+                Diagnostic::new(Code::MatrixKind, message)
+                    .with_help("write a matrix of form 6: forms are 1, 2 and 6"),
+            ));
         }
         let n = check_size(header.rows, header.columns, columns.count() as u64).map_err(about)?;
         let triangle = undeclared_triangle(columns.sides(), |_| "write the whole matrix".into());
@@ -137,7 +140,7 @@ impl Contents {
 /// the next group, so that the entries are in memory once.
 fn columns(file: &InputFile, stored: &Stored, encoding: Encoding) -> Found<Columns> {
     let at_once = 8 * rayon::current_num_threads();
-    let mut all = Columns::with_room(stored.values);
+    let mut all = Columns::with_capacity(stored.values);
     for stretches in stored.stretches.chunks(at_once) {
         let read = |stretch: &Stretch| {
             let bytes = &file.bytes()[stretch.bytes.clone()];
@@ -196,11 +199,11 @@ mod tests {
     fn binary() -> Vec<u8> {
         let mut bytes = Vec::new();
         let mut record = |words: &[i32], name: &[u8], values: &[f64]| {
-            let mut own: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-            own.extend_from_slice(name);
-            own.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-            let length = (own.len() as i32).to_le_bytes();
-            bytes.extend([&length[..], &own, &length].concat());
+            let mut payload: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+            payload.extend_from_slice(name);
+            payload.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+            let length = (payload.len() as i32).to_le_bytes();
+            bytes.extend([&length[..], &payload, &length].concat());
         };
         let n = N as i32;
         record(&[n, -n, 6, 2], b"KGG     ", &[]);
@@ -255,8 +258,11 @@ mod tests {
     fn a_line_that_is_too_short_is_told_with_its_line_in_the_whole_file() {
         let text = text(0..N);
         let line = text.lines().count() - 4;
-        let short: Vec<&str> =
-            text.lines().enumerate().map(|(k, own)| if k == line { &own[..30] } else { own }).collect();
+        let short: Vec<&str> = text
+            .lines()
+            .enumerate()
+            .map(|(k, text_of_line)| if k == line { &text_of_line[..30] } else { text_of_line })
+            .collect();
         let found = read(short.join("\n").as_bytes(), 2).expect_err("refused");
         assert_eq!((found.code(), found.line()), (Code::MatrixSyntax, Some(line + 1)), "{found}");
     }

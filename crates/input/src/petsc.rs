@@ -55,7 +55,9 @@ impl Whole {
     /// Returns the size of the integers, if the file begins with the number of an object.
     fn of(head: &[u8]) -> Option<Self> {
         let known = |number: i64| {
-            u64::try_from(number).is_ok_and(|own| own == MATRIX || OTHERS.iter().any(|(id, _)| *id == own))
+            u64::try_from(number).is_ok_and(|id_of_file| {
+                id_of_file == MATRIX || OTHERS.iter().any(|(id, _)| *id == id_of_file)
+            })
         };
         [Self::Four, Self::Eight].into_iter().find(|whole| whole.get(head, 0).is_some_and(known))
     }
@@ -69,10 +71,10 @@ impl Whole {
 
     /// Returns the k-th number of a list.
     fn get(self, bytes: &[u8], k: usize) -> Option<i64> {
-        let own = bytes.get(k * self.bytes()..(k + 1) * self.bytes())?;
+        let bytes_of_number = bytes.get(k * self.bytes()..(k + 1) * self.bytes())?;
         Some(match self {
-            Self::Four => i64::from(i32::from_be_bytes(own.try_into().ok()?)),
-            Self::Eight => i64::from_be_bytes(own.try_into().ok()?),
+            Self::Four => i64::from(i32::from_be_bytes(bytes_of_number.try_into().ok()?)),
+            Self::Eight => i64::from_be_bytes(bytes_of_number.try_into().ok()?),
         })
     }
 
@@ -106,9 +108,12 @@ fn read(bytes: &[u8], source: &MatrixSource<'_>) -> std::result::Result<RawMatri
         let length = whole.get(lengths, k).and_then(|length| u64::try_from(length).ok()).unwrap_or(u64::MAX);
         pointers.push(pointers[k].saturating_add(length));
     }
-    let value = |k: usize| match single {
-        true => values[4 * k..].first_chunk().map_or(f64::NAN, |b| f64::from(f32::from_be_bytes(*b))),
-        false => values[8 * k..].first_chunk().map_or(f64::NAN, |b| f64::from_be_bytes(*b)),
+    let value = |k: usize| {
+        if single {
+            values[4 * k..].first_chunk().map_or(f64::NAN, |b| f64::from(f32::from_be_bytes(*b)))
+        } else {
+            values[8 * k..].first_chunk().map_or(f64::NAN, |b| f64::from_be_bytes(*b))
+        }
     };
     let compressed = Compressed {
         n,
@@ -153,8 +158,7 @@ fn wrong_size(values: &[u8], entries: u64, whole: Whole) -> Diagnostic {
     let following = entries.checked_mul(8).and_then(|end| values.get(usize::try_from(end).ok()?..));
     if following.is_some_and(|rest| Whole::of(rest) == Some(whole)) {
         let message = "file holds several objects of PETSc";
-        return Diagnostic::new(Code::Hdf5Layout, message)
-            .with_help("write every matrix to a file of its own");
+        return Diagnostic::new(Code::Hdf5Layout, message).with_help("write every matrix to a separate file");
     }
     if entries.checked_mul(16) == Some(bytes as u64) {
         let message = "values have 16 bytes: they are complex, or of quadruple precision";

@@ -44,7 +44,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let mut opened = OpenFiles::new(files);
     let read = read_opened_files(files, &opened);
     opened.refuse_changed()?;
-    let (model, of_job) = read.map_err(|error| told_to_users(files, error))?;
+    let (model, of_job) = read.map_err(|error| without_outside_quotes(files, error))?;
     of_job.iter().try_for_each(|(_, file)| file.refuse_changed())?;
     opened.forget_bytes();
     let given = files.clone();
@@ -52,7 +52,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
 }
 
 /// Returns the error without quotes from files that the manifest or the deck names outside the model.
-fn told_to_users(files: &ModelFiles, error: Error) -> Error {
+fn without_outside_quotes(files: &ModelFiles, error: Error) -> Error {
     let main = match (&files.manifest, &files.source) {
         (Some(manifest), _) => manifest,
         (None, ModelSource::Job(job)) => &job.path,
@@ -195,7 +195,7 @@ impl ModelMatrices {
 impl From<JobModel> for ModelMatrices {
     fn from(job: JobModel) -> Self {
         let path = |role: &str| {
-            let file = job.files.iter().find(|(own, _)| *own == role).or(job.files.first());
+            let file = job.files.iter().find(|(file_role, _)| *file_role == role).or(job.files.first());
             file.map(|(_, file)| file.path.clone()).unwrap_or_default()
         };
         Self {
@@ -350,25 +350,24 @@ impl<'m> NodeLookup<'m> {
     /// Returns the members of a node set, including those without rows.
     fn members(&self, name: &str) -> Option<&[i64]> {
         let sets = &self.matrices?.sets;
-        let known = sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name));
-        let known = known.or_else(|| sets.iter().find(|(own, _)| comparable(own) == comparable(name)));
+        let known = sets.iter().find(|(key, _)| key.eq_ignore_ascii_case(name));
+        let known = known.or_else(|| sets.iter().find(|(key, _)| comparable(key) == comparable(name)));
         known.map(|(_, nodes)| nodes.as_slice())
     }
 
     fn of_set(&self, interface: &InterfaceSource, name: &str, files: &ModelFiles) -> Found<Vec<i64>> {
         let Some(matrices) = self.matrices else { return Ok(Vec::new()) };
-        let refused = matrices.unresolved.iter().find(|(own, _)| comparable(own) == comparable(name));
+        let refused = matrices.unresolved.iter().find(|(key, _)| comparable(key) == comparable(name));
         if let Some((_, refused)) = refused {
             return Err(vec![refused.clone().about(format!("interface `{}`", interface.name))]);
         }
         let Some(nodes) = self.members(name) else {
-            let names: Vec<&str> = matrices.sets.iter().map(|(own, _)| own.as_str()).take(20).collect();
+            let names: Vec<&str> = matrices.sets.iter().map(|(key, _)| key.as_str()).take(20).collect();
             let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
-            let help = match names.is_empty() {
-                true => {
-                    "the files of the model have no node sets: list the nodes, or give a region".to_owned()
-                }
-                false => format!("node sets: {}", names.join(", ")),
+            let help = if names.is_empty() {
+                "list the nodes, or give a region: the files of the model have no node sets".to_owned()
+            } else {
+                format!("name one of the node sets: {}", names.join(", "))
             };
             return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message)).with_help(help)]);
         };
@@ -449,7 +448,7 @@ fn refuse_followers(followers: &[(String, Vec<DofLabel>)], labels: &[DofLabel], 
         return Ok(());
     }
     let message =
-        format!("rows of the matrices follow others by constraints of the deck: {}", names.join(", "));
+        format!("rows of the matrices depend on others by constraints of the deck: {}", names.join(", "));
     let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(deck);
     Err(vec![diagnostic.with_help("give the deck as the model, with its matrices beside it")])
 }
@@ -472,13 +471,12 @@ fn turned(
         return Ok(([stiffness, mass], GivenRows::default()));
     }
     let turn = Turn::new(labels, &axes).map_err(|node| {
-        let message = format!(
-            "rows of node {node} stand along axes of its own, but not each of its directions is there once"
-        );
+        let message =
+            format!("rows of node {node} are along local axes, but not each of its directions occurs once");
         vec![Diagnostic::new(Code::DofIncomplete, message).in_file(&stiffness.path)]
     })?;
-    let own = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
-    let matrices = [own(stiffness)?, own(mass)?];
+    let transformed = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
+    let matrices = [transformed(stiffness)?, transformed(mass)?];
     let rows = (0..labels.len() as u32).collect();
     let map = RowMap::new(turn.axes(), turn.axes(), rows);
     Ok((matrices, GivenRows::new(vec![map], axes)))
@@ -492,7 +490,9 @@ fn by_rows_of_model(raw: RawMatrix, rows: &GivenRows) -> Found<RawMatrix> {
         Err(LostRow) => {
             let message = "the matrix has entries in rows that K and M leave empty";
             let diagnostic = Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(path);
-            Err(vec![diagnostic.with_help("leave these rows out of it, or give them stiffness and mass")])
+            Err(vec![
+                diagnostic.with_help("remove these rows from the matrix, or give them stiffness and mass"),
+            ])
         }
     }
 }

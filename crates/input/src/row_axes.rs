@@ -38,7 +38,7 @@ impl Turn {
                 continue;
             }
             let number = groups.len() as u32;
-            let Some(own) = axes.get(&label.node) else {
+            let Some(axes_of_node) = axes.get(&label.node) else {
                 group_of[row] = (number, 0);
                 groups.push(RowTriple { rows: [row as u32; 3], axes: None });
                 continue;
@@ -51,7 +51,7 @@ impl Turn {
             for (k, &row) in rows.iter().enumerate() {
                 *group_of.get_mut(row as usize).ok_or(label.node)? = (number, k as u8);
             }
-            groups.push(RowTriple { rows, axes: Some(*own) });
+            groups.push(RowTriple { rows, axes: Some(*axes_of_node) });
         }
         Ok(Self { groups, group_of })
     }
@@ -98,7 +98,7 @@ impl Turn {
                 None => entries.push((row, row, 1.0)),
                 Some(axes) => {
                     let along = rows.iter().zip(axes[usize::from(k)]);
-                    entries.extend(along.map(|(&own, value)| (own, row, value)));
+                    entries.extend(along.map(|(&target, value)| (target, row, value)));
                 }
             }
         }

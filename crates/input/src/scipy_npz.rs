@@ -124,8 +124,8 @@ fn blocks(archive: &mut Archive<'_>, n: usize, path: &Path) -> std::result::Resu
     let (mut pieces, mut check) = (Vec::new(), EntryCheck::new(n, HELP));
     for (block_row, pair) in pointers.windows(2).enumerate() {
         for block in pair[0] as usize..pair[1] as usize {
-            let own = &values[block * rows * columns..(block + 1) * rows * columns];
-            for (k, &value) in own.iter().enumerate() {
+            let block_values = &values[block * rows * columns..(block + 1) * rows * columns];
+            for (k, &value) in block_values.iter().enumerate() {
                 // Zeros pad the blocks: they are no entries, but their indices must still lie within the matrix.
                 let row = (block_row * rows + k / columns) as i64;
                 let column =
@@ -193,7 +193,7 @@ impl<'a> Archive<'a> {
     fn open_member(&mut self, name: &str) -> std::result::Result<impl Read + use<'_, 'a>, Diagnostic> {
         self.0.by_name(&format!("{name}.npy")).map_err(|error| match error {
             zip::result::ZipError::FileNotFound => {
-                let message = format!("archive has no array `{name}`: it is no sparse matrix of SciPy");
+                let message = format!("archive has no array `{name}`: it is not a sparse matrix of SciPy");
                 Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP)
             }
             error => damaged(&error),

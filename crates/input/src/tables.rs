@@ -18,7 +18,7 @@ pub(super) fn read_nodes(file: &InputFile, dimension: u8) -> Found<Nodes> {
     let columns = [column("node", true), column("x", true), column("y", true), column("z", !plane)];
     let table = Table::open(file, &columns).map_err(|d| {
         vec![if d.message() == "column `z` is missing" {
-            d.with_help("the first line names the columns: `node,x,y,z`; a plane model says `dimension = 2` in [model]")
+            d.with_help("name the columns in the first line: `node,x,y,z`; in a plane model set `dimension = 2` in [model]")
         } else {
             d
         }]
@@ -32,7 +32,8 @@ pub(super) fn read_nodes(file: &InputFile, dimension: u8) -> Found<Nodes> {
         }
         if plane && position[2] != 0.0 {
             let message = format!("node {node} has z = {} in a plane model", position[2]);
-            return Err(Diagnostic::new(Code::TableRow, message).with_help("plane models lie in z = 0"));
+            return Err(Diagnostic::new(Code::TableRow, message)
+                .with_help("set z = 0 for all nodes of a plane model"));
         }
         Ok((node, line, position))
     })?;
@@ -44,7 +45,7 @@ pub(super) fn read_nodes(file: &InputFile, dimension: u8) -> Found<Nodes> {
 pub(super) fn read_dofs(file: &InputFile) -> Found<Vec<DofLabel>> {
     let columns = [column("node", true), column("dir", true), column("row", false)];
     let table = Table::open(file, &columns)
-        .map_err(|d| vec![d.with_help("the first line names the columns: `node,dir` or `row,node,dir`")])?;
+        .map_err(|d| vec![d.with_help("name the columns in the first line: `node,dir` or `row,node,dir`")])?;
     let numbered = table.has(2);
     let rows = table.rows(|line, fields| {
         let node = node_number(fields[0])?;
@@ -62,7 +63,7 @@ pub(super) fn read_dofs(file: &InputFile) -> Found<Vec<DofLabel>> {
             (true, None) => {
                 let message = format!("row number is `{}`", printable(fields[2]));
                 return Err(
-                    Diagnostic::new(Code::TableRow, message).with_help("rows are whole numbers from 0")
+                    Diagnostic::new(Code::TableRow, message).with_help("number the rows 0, 1, 2, ...")
                 );
             }
         };
@@ -90,7 +91,7 @@ fn by_row(file: &InputFile, rows: &[(i64, usize, DofLabel)]) -> Found<Vec<DofLab
         };
         let diagnostic = Diagnostic::new(Code::DofRowOrder, message).at_line(line);
         bad.add(if from_one {
-            diagnostic.with_help("the rows are numbered from 1: number them from 0")
+            diagnostic.with_help("number the rows from 0: they are numbered from 1")
         } else {
             diagnostic
         });
@@ -111,7 +112,7 @@ pub(super) fn read_node_list(file: &InputFile) -> Found<Vec<i64>> {
 pub(super) fn read_masses(file: &InputFile) -> Found<Vec<(i64, f64)>> {
     let columns = [column("node", true), column("mass", true)];
     let table = Table::open(file, &columns)
-        .map_err(|d| vec![d.with_help("the first line names the columns: `node,mass`")])?;
+        .map_err(|d| vec![d.with_help("name the columns in the first line: `node,mass`")])?;
     let rows = table.rows(|line, fields| {
         let node = node_number(fields[0])?;
         match fast_float2::parse::<f64, _>(fields[1]) {
@@ -157,7 +158,7 @@ fn no_duplicates(file: &InputFile, nodes: impl Iterator<Item = (i64, usize)>) ->
     let mut first: HashMap<i64, usize> = HashMap::with_capacity(nodes.size_hint().0);
     for (node, line) in nodes {
         if let Some(before) = first.insert(node, line) {
-            let message = format!("node {node} is given again, before on line {before}");
+            let message = format!("node {node} is given twice, first on line {before}");
             bad.add(Diagnostic::new(Code::NodeDuplicate, message).at_line(line));
         }
     }

@@ -44,6 +44,6 @@ pub(super) fn read_exodus(
 }
 
 fn left_out() -> Diagnostic {
-    let message = "file is HDF5, which this build of flexbody leaves out";
+    let message = "file is HDF5, which this build of flexbody does not read";
     Diagnostic::new(Code::FileFormatUnknown, message).with_help("build it with the feature `hdf5`")
 }

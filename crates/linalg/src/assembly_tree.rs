@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 /// Marks a root of a tree: no parent.
-const NONE: u32 = u32::MAX;
+const NO_PARENT: u32 = u32::MAX;
 
 /// Adjacency lists of a graph without self loops.
 #[derive(Debug)]
@@ -69,18 +69,18 @@ impl AssemblyTree {
         let mut roots = Vec::new();
         for (i, s) in supernodes.iter().enumerate().filter(|(_, s)| !s.columns.is_empty()) {
             match s.parent {
-                NONE => roots.push(i as u32),
+                NO_PARENT => roots.push(i as u32),
                 parent => children[parent as usize].push(i as u32),
             }
         }
         sort_for_memory(&supernodes, &mut children);
         let sequence = postorder(&roots, |s| &children[s as usize]);
-        let mut number = vec![NONE; count];
+        let mut number = vec![NO_PARENT; count];
         for (new, &old) in sequence.iter().enumerate() {
             number[old as usize] = new as u32;
         }
         // Number the columns supernode by supernode.
-        let mut renumbered = vec![NONE; vertices];
+        let mut renumbered = vec![NO_PARENT; vertices];
         let (mut order, mut begin) = (Vec::with_capacity(vertices), vec![0]);
         for &s in &sequence {
             for &column in &supernodes[s as usize].columns {
@@ -102,7 +102,7 @@ impl AssemblyTree {
             rows.extend(s.rows.iter().map(|&row| renumbered[row as usize]));
             rows[start..].sort_unstable();
             rows_at.push(rows.len());
-            parent.push(if s.parent == NONE { NONE } else { number[s.parent as usize] });
+            parent.push(if s.parent == NO_PARENT { NO_PARENT } else { number[s.parent as usize] });
         }
         let (children_at, children) = children_of(&parent);
         let mut tree =
@@ -156,7 +156,7 @@ impl AssemblyTree {
 
     /// Returns the supernode that receives the contribution of `s`; `None` for a root.
     pub(crate) fn parent(&self, s: usize) -> Option<usize> {
-        (self.parent[s] != NONE).then_some(self.parent[s] as usize)
+        (self.parent[s] != NO_PARENT).then_some(self.parent[s] as usize)
     }
 
     /// Returns the supernodes that contribute to `s`, ascending.
@@ -191,13 +191,13 @@ impl EliminationTree {
             position[vertex as usize] = place as u32;
         }
         // Liu's algorithm with path compression.
-        let (mut parent, mut ancestor) = (vec![NONE; n], vec![NONE; n]);
+        let (mut parent, mut ancestor) = (vec![NO_PARENT; n], vec![NO_PARENT; n]);
         for j in 0..n as u32 {
             for &neighbour in graph.neighbours(order[j as usize] as usize) {
                 let mut i = position[neighbour as usize];
                 while i < j {
                     let next = std::mem::replace(&mut ancestor[i as usize], j);
-                    if next == NONE {
+                    if next == NO_PARENT {
                         parent[i as usize] = j;
                         break;
                     }
@@ -207,13 +207,13 @@ impl EliminationTree {
         }
         // Renumber in postorder.
         let (at, children) = children_of(&parent);
-        let roots: Vec<u32> = (0..n as u32).filter(|&j| parent[j as usize] == NONE).collect();
+        let roots: Vec<u32> = (0..n as u32).filter(|&j| parent[j as usize] == NO_PARENT).collect();
         let sequence = postorder(&roots, |j| &children[at[j as usize] as usize..at[j as usize + 1] as usize]);
-        let mut number = vec![NONE; n];
+        let mut number = vec![NO_PARENT; n];
         for (new, &old) in sequence.iter().enumerate() {
             number[old as usize] = new as u32;
         }
-        let renumbered = |p: u32| if p == NONE { NONE } else { number[p as usize] };
+        let renumbered = |p: u32| if p == NO_PARENT { NO_PARENT } else { number[p as usize] };
         Self {
             order: sequence.iter().map(|&old| order[old as usize]).collect(),
             position: position.iter().map(|&old| number[old as usize]).collect(),
@@ -239,8 +239,8 @@ impl Supernode {
         let n = columns.order.len();
         let (children_at, children) = children_of(&columns.parent);
         let mut supernodes: Vec<Self> = Vec::new();
-        let mut supernode_of = vec![NONE; n];
-        let mut seen = vec![NONE; n];
+        let mut supernode_of = vec![NO_PARENT; n];
+        let mut seen = vec![NO_PARENT; n];
         for j in 0..n {
             let mut rows: Vec<u32> = Vec::new();
             seen[j] = j as u32;
@@ -277,7 +277,7 @@ impl Supernode {
             }
             supernode_of[j] = supernodes.len() as u32;
             rows.shrink_to_fit();
-            supernodes.push(Self { columns: vec![j as u32], rows, parent: NONE, zeros: 0.0 });
+            supernodes.push(Self { columns: vec![j as u32], rows, parent: NO_PARENT, zeros: 0.0 });
         }
         supernodes
     }
@@ -293,7 +293,7 @@ impl Supernode {
 /// Merges supernodes into their parents as long as explicit zeros are a small part of the block.
 fn amalgamate(mut supernodes: Vec<Supernode>, block: usize) -> Vec<Supernode> {
     let mut children: Vec<Vec<u32>> = vec![Vec::new(); supernodes.len()];
-    for (i, s) in supernodes.iter().enumerate().filter(|(_, s)| s.parent != NONE) {
+    for (i, s) in supernodes.iter().enumerate().filter(|(_, s)| s.parent != NO_PARENT) {
         children[s.parent as usize].push(i as u32);
     }
     for s in 0..supernodes.len() {
@@ -366,7 +366,7 @@ fn sort_for_memory(supernodes: &[Supernode], children: &mut [Vec<u32>]) {
 fn children_of(parent: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let n = parent.len();
     let mut at = vec![0u32; n + 1];
-    for &p in parent.iter().filter(|&&p| p != NONE) {
+    for &p in parent.iter().filter(|&&p| p != NO_PARENT) {
         at[p as usize + 1] += 1;
     }
     for j in 0..n {
@@ -374,7 +374,7 @@ fn children_of(parent: &[u32]) -> (Vec<u32>, Vec<u32>) {
     }
     let mut next = at.clone();
     let mut children = vec![0; at[n] as usize];
-    for (j, &p) in parent.iter().enumerate().filter(|(_, p)| **p != NONE) {
+    for (j, &p) in parent.iter().enumerate().filter(|(_, p)| **p != NO_PARENT) {
         children[next[p as usize] as usize] = j as u32;
         next[p as usize] += 1;
     }

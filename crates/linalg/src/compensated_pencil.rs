@@ -4,10 +4,10 @@ use super::compensated::DoubleDouble;
 use faer::Mat;
 
 /// Largest number of Jacobi sweeps. Convergence is quadratic and the input is nearly diagonal, so that few are needed.
-const SWEEPS: usize = 30;
+const MAX_JACOBI_SWEEPS: usize = 30;
 
 /// Off-diagonal entries count as zero below this part of the diagonal.
-const ZERO: f64 = 1e-33;
+const NEGLIGIBLE_OFF_DIAGONAL: f64 = 1e-33;
 
 /// Rows of a full matrix.
 type Rows = Vec<Vec<DoubleDouble>>;
@@ -100,7 +100,7 @@ fn cholesky(a: &Rows) -> Option<Rows> {
 /// not converge to positive numbers.
 fn jacobi(a: &mut Rows, turned: &mut Rows) -> Option<()> {
     let n = a.len();
-    for _ in 0..SWEEPS {
+    for _ in 0..MAX_JACOBI_SWEEPS {
         let mut rotated = false;
         for i in 0..n {
             for j in 0..i {
@@ -108,7 +108,7 @@ fn jacobi(a: &mut Rows, turned: &mut Rows) -> Option<()> {
                 if !(size > 0.0 && size.is_finite() && a[i][j].hi.is_finite()) {
                     return None;
                 }
-                if a[i][j].hi.abs() > ZERO * size {
+                if a[i][j].hi.abs() > NEGLIGIBLE_OFF_DIAGONAL * size {
                     let (c, s) = rotate(a, i, j);
                     let (above, below) = turned.split_at_mut(i);
                     for (x, y) in below[0].iter_mut().zip(&mut above[j]) {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 pub const LANES: usize = 8;
 
 /// Number of rows per parallel task and per partial sum. The partition fixes the order of the sums.
-const ROWS: usize = 1024;
+const ROWS_PER_TASK: usize = 1024;
 
 /// Block of n rows and up to [`LANES`] columns of double-double numbers; unused columns are zero.
 #[derive(Debug, Clone)]
@@ -53,20 +53,23 @@ pub fn multiply_compensated(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64
         }
     }
     let (mut hi, mut lo) = (vec![[0.0; LANES]; n], vec![[0.0; LANES]; n]);
-    hi.par_chunks_mut(ROWS).zip(lo.par_chunks_mut(ROWS)).enumerate().for_each(|(chunk, (hi, lo))| {
-        with_fma(
-            #[inline(always)]
-            || {
-                for (r, (hi, lo)) in hi.iter_mut().zip(lo).enumerate() {
-                    let (node, component) = ((chunk * ROWS + r) / block, (chunk * ROWS + r) % block);
-                    let (columns, values) = a.row(node);
-                    for (&j, &value) in columns.iter().zip(values) {
-                        accumulate(hi, lo, value, &packed[j as usize * block + component]);
+    hi.par_chunks_mut(ROWS_PER_TASK).zip(lo.par_chunks_mut(ROWS_PER_TASK)).enumerate().for_each(
+        |(chunk, (hi, lo))| {
+            with_fma(
+                #[inline(always)]
+                || {
+                    for (r, (hi, lo)) in hi.iter_mut().zip(lo).enumerate() {
+                        let (node, component) =
+                            ((chunk * ROWS_PER_TASK + r) / block, (chunk * ROWS_PER_TASK + r) % block);
+                        let (columns, values) = a.row(node);
+                        for (&j, &value) in columns.iter().zip(values) {
+                            accumulate(hi, lo, value, &packed[j as usize * block + component]);
+                        }
                     }
-                }
-            },
-        );
-    });
+                },
+            );
+        },
+    );
     CompensatedBlock { hi, lo }
 }
 
@@ -79,10 +82,10 @@ pub fn multiply_compensated(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64
 pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[DoubleDouble; LANES]> {
     let n = a.nrows();
     assert_eq!(n, y.hi.len(), "rows of a compensated Gram product");
-    let partial: Vec<Vec<[DoubleDouble; LANES]>> = (0..n.div_ceil(ROWS))
+    let partial: Vec<Vec<[DoubleDouble; LANES]>> = (0..n.div_ceil(ROWS_PER_TASK))
         .into_par_iter()
         .map(|chunk| {
-            let rows = chunk * ROWS..((chunk + 1) * ROWS).min(n);
+            let rows = chunk * ROWS_PER_TASK..((chunk + 1) * ROWS_PER_TASK).min(n);
             let column = |c: usize| {
                 let (mut hi, mut lo) = ([0.0; LANES], [0.0; LANES]);
                 let factors = contiguous(a.col(c));
@@ -135,5 +138,5 @@ pub fn projection_compensated(a: &SymmetricMatrix, x: MatRef<'_, f64>) -> Vec<Ve
 /// Returns an upper bound of the number of additions that affect a term of a sum over `n` rows, with a margin for the
 /// surrounding operations.
 pub fn sum_length(n: usize) -> f64 {
-    (ROWS.min(n) + n.div_ceil(ROWS) + 16) as f64
+    (ROWS_PER_TASK.min(n) + n.div_ceil(ROWS_PER_TASK) + 16) as f64
 }

@@ -78,12 +78,12 @@ impl Context<'static> {
 
 impl<'a> Context<'a> {
     /// Returns a context without limits or counter that reports to `watch`.
-    pub fn heard_by(watch: Watch<'a>) -> Self {
+    pub fn with_listener(watch: Watch<'a>) -> Self {
         Self { watch, ..Context::QUIET }
     }
 
     /// Returns this context with its work counted by `counter`.
-    pub fn counted_by<'b>(&self, counter: &'b WorkCounter) -> Context<'b>
+    pub fn with_counter<'b>(&self, counter: &'b WorkCounter) -> Context<'b>
     where
         'a: 'b,
     {
@@ -91,12 +91,12 @@ impl<'a> Context<'a> {
     }
 
     /// Returns this context without a counter, for work that belongs to no result.
-    pub fn uncounted(&self) -> Self {
+    pub fn without_counter(&self) -> Self {
         Self { counter: None, ..*self }
     }
 
     /// Returns this context without a listener, for work that reports no progress.
-    pub fn unheard(&self) -> Self {
+    pub fn without_listener(&self) -> Self {
         Self { watch: Context::QUIET.watch, ..*self }
     }
 

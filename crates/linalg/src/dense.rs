@@ -15,7 +15,7 @@ use faer::linalg::qr::no_pivoting::factor as qr;
 use faer::{Auto, Col, Conj, Mat, MatRef, Par};
 
 /// Largest backward error |A V - V L| / |A| (maximum norms) of an accepted decomposition.
-const BACKWARD_ERROR: f64 = 3e-14;
+const MAX_BACKWARD_ERROR: f64 = 3e-14;
 
 /// Eigenvalues and orthonormal eigenvectors of a symmetric matrix.
 #[derive(Debug, Clone)]
@@ -42,10 +42,13 @@ pub fn symmetric_eigen(a: MatRef<'_, f64>) -> Option<SymmetricEigen> {
     if !(0..n).all(|j| (0..n).all(|i| full[(i, j)].is_finite())) {
         return None;
     }
+    // Divide and conquer, accepted if its backward error is small; otherwise the QR iteration.
     let automatic = <SelfAdjointEvdParams as Auto<f64>>::auto();
     let only_qr = SelfAdjointEvdParams { recursion_threshold: usize::MAX, ..automatic };
     decompose(&full, automatic)
-        .filter(|eigen| n < automatic.recursion_threshold || backward_error(&full, eigen) <= BACKWARD_ERROR)
+        .filter(|eigen| {
+            n < automatic.recursion_threshold || backward_error(&full, eigen) <= MAX_BACKWARD_ERROR
+        })
         .or_else(|| decompose(&full, only_qr))
 }
 
@@ -75,6 +78,7 @@ pub fn dense_cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
     let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(a.nrows(), Par::Seq, params));
     cholesky_in_place(a.as_mut(), LltRegularization::default(), Par::Seq, MemStack::new(&mut memory), params)
         .ok()?;
+    // The factor has zeros above the diagonal.
     for j in 1..a.ncols() {
         for i in 0..j {
             a[(i, j)] = 0.0;
@@ -114,7 +118,9 @@ pub fn full_qr(mut a: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
             householder::apply_block_householder_sequence_on_the_left_in_place_scratch::<f64>(n, block, n),
         ));
     let stack = MemStack::new(&mut memory);
+    // Householder vectors below the diagonal of `a`, R on and above it.
     qr::qr_in_place(a.as_mut(), factor.as_mut(), Par::Seq, stack, params);
+    // Q is the product of the reflections.
     let mut q = Mat::identity(n, n);
     householder::apply_block_householder_sequence_on_the_left_in_place_with_conj(
         a.as_ref(),
@@ -175,7 +181,7 @@ mod tests {
                 }
             }
             let eigen = symmetric_eigen(graded.as_ref()).expect("finite");
-            assert!(backward_error(&graded, &eigen) < BACKWARD_ERROR, "n = {n}");
+            assert!(backward_error(&graded, &eigen) < MAX_BACKWARD_ERROR, "n = {n}");
             assert!(eigen.values.windows(2).all(|w| w[0] <= w[1]));
         }
     }

@@ -5,7 +5,7 @@ use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
 /// Number of columns per parallel task.
-const COLUMNS: usize = 2048;
+const COLUMNS_PER_TASK: usize = 2048;
 
 /// Transformation T (N x m). The free rows of u are y, dependent rows are linear combinations of free ones, all others
 /// are zero.
@@ -171,9 +171,9 @@ impl Elimination {
         let chunk = |first: usize| {
             let mut column = ColumnSums { sums: vec![0.0; m], met: vec![false; m], rows: Vec::new() };
             let (mut lengths, mut row_idx, mut values) = (Vec::new(), Vec::new(), Vec::new());
-            let last = (first + COLUMNS).min(m);
-            for (&own, others) in self.free[first..last].iter().zip(&taken[first..last]) {
-                for (row, weight) in std::iter::once((own as usize, 1.0)).chain(others.iter().copied()) {
+            let last = (first + COLUMNS_PER_TASK).min(m);
+            for (&free_row, others) in self.free[first..last].iter().zip(&taken[first..last]) {
+                for (row, weight) in std::iter::once((free_row as usize, 1.0)).chain(others.iter().copied()) {
                     let (nodes, entries) = a.row(row / block);
                     for (&node, &value) in nodes.iter().zip(entries) {
                         self.add(&mut column, node as usize * block + row % block, weight * value);
@@ -190,7 +190,7 @@ impl Elimination {
             }
             (lengths, row_idx, values)
         };
-        let chunks: Vec<_> = (0..m).into_par_iter().step_by(COLUMNS).map(chunk).collect();
+        let chunks: Vec<_> = (0..m).into_par_iter().step_by(COLUMNS_PER_TASK).map(chunk).collect();
         let (mut col_ptr, mut row_idx, mut values) = (vec![0usize], Vec::new(), Vec::new());
         for (lengths, rows, entries) in chunks {
             for length in lengths {

@@ -80,10 +80,14 @@ impl Analysis {
         let numbers = |needs: &dyn Fn(usize) -> Needs| self.walk.peak(&self.tree, threads, needs) as u64;
         Peaks {
             factor: self.len as u64,
-            cholesky: numbers(&|s| Needs { kept: pivots(s), handed_on: rest(s), in_work: 0 }),
+            cholesky: numbers(&|s| Needs { retained: pivots(s), handed_on: rest(s), in_work: 0 }),
             // An inertia count holds L and L B.
-            inertia: numbers(&|s| Needs { kept: 0, handed_on: rest(s), in_work: 2 * pivots(s) }),
-            kept_inertia: numbers(&|s| Needs { kept: pivots(s), handed_on: rest(s), in_work: pivots(s) }),
+            inertia: numbers(&|s| Needs { retained: 0, handed_on: rest(s), in_work: 2 * pivots(s) }),
+            retained_inertia: numbers(&|s| Needs {
+                retained: pivots(s),
+                handed_on: rest(s),
+                in_work: pivots(s),
+            }),
         }
     }
 
@@ -121,7 +125,7 @@ pub struct Peaks {
     /// Entries during an inertia count that does not keep its factor.
     pub inertia: u64,
     /// Entries during an inertia count that keeps its factor.
-    pub kept_inertia: u64,
+    pub retained_inertia: u64,
 }
 
 /// Returns the multiplications and additions for the elimination of `width` columns with `rest` rows below them.
@@ -180,14 +184,14 @@ impl Scaled<'_> {
         let block = self.analysis.block;
         let vertex = places.vertex();
         let (copies, heavy) = (self.pencil.block(), block / self.pencil.block());
-        for own in 0..heavy {
-            let (others, masses) = self.pencil.mass().row(vertex * heavy + own);
+        for heavy_row in 0..heavy {
+            let (others, masses) = self.pencil.mass().row(vertex * heavy + heavy_row);
             let mut at = 0;
             for (&other, &mass) in others.iter().zip(masses) {
                 let (other, part) = (other as usize / heavy, other as usize % heavy);
                 let Some(place) = places.of(other, &mut at) else { continue };
                 for copy in 0..copies {
-                    let (b, c) = (part * copies + copy, own * copies + copy);
+                    let (b, c) = (part * copies + copy, heavy_row * copies + copy);
                     let (row, local) = (place * block + b, local + c);
                     if row >= local {
                         let scale = self.scale[other * block + b] * self.scale[vertex * block + c];
@@ -316,7 +320,7 @@ fn is_positive_definite<T: Real>(analysis: &Analysis, matrix: &SymmetricMatrix) 
 }
 
 /// Smallest number of rows that a task reorders, so that the work is far longer than the start of the task.
-const ROWS: usize = 4096;
+const MIN_ROWS_PER_TASK: usize = 4096;
 
 /// Substitutes upward and downward over the tree for the columns of `x`, at most `K`, with the `scale` of each row.
 /// `forward` eliminates the leading rows of the front of a supernode; `backward` computes them from the rows below.
@@ -329,18 +333,19 @@ pub(super) fn substitute<T: Real, const K: usize>(
 ) {
     let (tree, block) = (&analysis.tree, analysis.block);
     let mut values: Vec<[T; K]> = in_elimination_order(analysis, scale, x.as_ref());
+    // One slot of pivot rows for each supernode.
     let mut slots: Vec<&mut [[T; K]]> = Vec::with_capacity(tree.len());
     let mut rest = values.as_mut_slice();
     for s in 0..tree.len() {
-        let (own, tail) = rest.split_at_mut(tree.columns(s).len() * block);
-        slots.push(own);
+        let (pivots, tail) = rest.split_at_mut(tree.columns(s).len() * block);
+        slots.push(pivots);
         rest = tail;
     }
     // Upward: collect the contributions of the children, eliminate, hand on the rest.
-    let up = |s: usize, own: &mut &mut [[T; K]], children: Vec<Vec<[T; K]>>| {
+    let up = |s: usize, pivots: &mut &mut [[T; K]], children: Vec<Vec<[T; K]>>| {
         let (width, below) = tree.front(s, block);
         let mut front = vec![[T::default(); K]; width + below];
-        front[..own.len()].copy_from_slice(own);
+        front[..pivots.len()].copy_from_slice(pivots);
         for (&c, update) in tree.children(s).iter().zip(&children) {
             for (&place, update) in tree.places(c as usize).iter().zip(update.chunks_exact(block)) {
                 for (to, from) in front[place as usize * block..].iter_mut().zip(update) {
@@ -349,16 +354,16 @@ pub(super) fn substitute<T: Real, const K: usize>(
             }
         }
         forward(s, &mut front);
-        own.copy_from_slice(&front[..own.len()]);
-        Ok::<_, Infallible>(front.split_off(own.len()))
+        pivots.copy_from_slice(&front[..pivots.len()]);
+        Ok::<_, Infallible>(front.split_off(pivots.len()))
     };
     let Ok(()) = analysis.walk.up(tree, &mut slots, &up);
     // Downward: append the solution of the rows below, solve, and send each child its rows.
-    let down = |s: usize, own: &mut &mut [[T; K]], below: Option<Vec<[T; K]>>| {
-        let mut front = own.to_vec();
+    let down = |s: usize, pivots: &mut &mut [[T; K]], below: Option<Vec<[T; K]>>| {
+        let mut front = pivots.to_vec();
         front.extend(below.unwrap_or_default());
         backward(s, &mut front);
-        own.copy_from_slice(&front[..own.len()]);
+        pivots.copy_from_slice(&front[..pivots.len()]);
         let message = |c: u32| {
             let places = tree.places(c as usize);
             let mut rows = Vec::with_capacity(places.len() * block);
@@ -371,7 +376,7 @@ pub(super) fn substitute<T: Real, const K: usize>(
     };
     analysis.walk.down(tree, &mut slots, &down);
     // Back to the order and scale of the model.
-    let columns_per_task = (ROWS / x.nrows().max(1)).max(1);
+    let columns_per_task = (MIN_ROWS_PER_TASK / x.nrows().max(1)).max(1);
     let columns: Vec<_> = x.col_iter_mut().collect();
     columns.into_par_iter().with_min_len(columns_per_task).enumerate().for_each(|(j, mut to)| {
         for (&vertex, from) in tree.order().iter().zip(values.chunks_exact(block)) {
@@ -397,11 +402,11 @@ fn in_elimination_order<T: Real, const K: usize>(
         }
         values
     };
-    (0..x.nrows()).into_par_iter().with_min_len(ROWS).map(scaled).collect()
+    (0..x.nrows()).into_par_iter().with_min_len(MIN_ROWS_PER_TASK).map(scaled).collect()
 }
 
 /// Number of columns that are solved together: the factor is read from memory once for all of them.
-pub(super) const COLUMNS: usize = 8;
+pub(super) const COLUMNS_PER_SOLVE: usize = 8;
 
 impl<T: Real> Solve for Cholesky<'_, T> {
     fn shift(&self) -> f64 {
@@ -411,13 +416,13 @@ impl<T: Real> Solve for Cholesky<'_, T> {
     fn solve_in_place(&self, mut x: MatMut<'_, f64>) {
         let mut start = 0;
         while start < x.ncols() {
-            let width = COLUMNS.min(x.ncols() - start);
+            let width = COLUMNS_PER_SOLVE.min(x.ncols() - start);
             let columns = x.rb_mut().subcols_mut(start, width);
             // In single precision eight columns are one vector: four would not be faster.
-            if width > COLUMNS / 2 || size_of::<T>() < size_of::<f64>() {
-                self.solve_block::<COLUMNS>(columns);
+            if width > COLUMNS_PER_SOLVE / 2 || size_of::<T>() < size_of::<f64>() {
+                self.solve_block::<COLUMNS_PER_SOLVE>(columns);
             } else {
-                self.solve_block::<{ COLUMNS / 2 }>(columns);
+                self.solve_block::<{ COLUMNS_PER_SOLVE / 2 }>(columns);
             }
             start += width;
         }
@@ -426,16 +431,16 @@ impl<T: Real> Solve for Cholesky<'_, T> {
 
 /// Ratio of the number of entries of M to that of K, both counted in blocks of vertices, above which the factor of M
 /// uses the structure of the joint factor: computing its own structure would take longer than it saves.
-const NEARLY_FULL: f64 = 0.5;
+const SHARED_STRUCTURE_RATIO: f64 = 0.5;
 
 /// Part of the largest diagonal entry of M up to which entries of a row without a positive diagonal are rounding.
-const NO_MASS: f64 = 1e-14;
+const ROUNDING_MASS_FRACTION: f64 = 1e-14;
 
 /// Returns true when a row without a positive diagonal entry has entries beyond rounding: no semidefinite matrix has
 /// such a row, since m_ij^2 <= m_ii m_jj.
-fn has_row_without_mass_that_couples(mass: &SymmetricMatrix) -> bool {
+fn has_coupled_massless_row(mass: &SymmetricMatrix) -> bool {
     let diagonal = mass.diagonal();
-    let noise = NO_MASS * largest(diagonal.iter().copied());
+    let noise = ROUNDING_MASS_FRACTION * largest(diagonal.iter().copied());
     let couples = |row: usize| mass.row(row).1.iter().any(|entry| entry.abs() > noise);
     diagonal.iter().enumerate().any(|(row, entry)| *entry <= 0.0 && couples(row))
 }
@@ -448,16 +453,17 @@ fn has_row_without_mass_that_couples(mass: &SymmetricMatrix) -> bool {
 /// is that of `analysis`, which must belong to the pencil.
 pub fn is_positive_semidefinite(pencil: &Pencil<'_>, analysis: &Analysis) -> bool {
     let mass = pencil.mass();
-    if has_row_without_mass_that_couples(mass) {
+    if has_coupled_massless_row(mass) {
         return false;
     }
+    // The order by vertices of M, which may be coarser or finer than that of the pencil.
     let order = analysis.tree.order();
     let rows = (mass.n() / order.len().max(1)).max(1);
     // Count the entries of both matrices in blocks of vertices.
     let by_vertices =
         |matrix: &SymmetricMatrix, rows: usize| matrix.as_csc().nnz() as f64 / (rows * rows) as f64;
     let full = by_vertices(pencil.stiffness(), rows * pencil.block());
-    let tree = if by_vertices(mass, rows) >= NEARLY_FULL * full {
+    let tree = if by_vertices(mass, rows) >= SHARED_STRUCTURE_RATIO * full {
         Arc::clone(&analysis.tree)
     } else {
         let Some(graph) = vertex_graph(&Pencil::new(mass, mass, 1), rows) else { return false };

@@ -10,37 +10,37 @@ use pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
 
 /// Largest number of columns for which these products are faster than general ones.
-pub(super) const FEW: usize = 8;
+pub(super) const MAX_FEW_COLUMNS: usize = 8;
 
 /// Number of rows in a block: the rows of the few columns and of some others stay in the first-level cache.
-const ROWS: usize = 256;
+const ROWS_PER_BLOCK: usize = 256;
 
 /// Number of columns of the tall block in a tile of a product.
-const TOGETHER: usize = 3;
+const GRAM_TILE_COLUMNS: usize = 3;
 /// Number of columns of the tall block in a tile of a combination.
-const COMBINED: usize = 4;
+const COMBINATION_TILE_COLUMNS: usize = 4;
 
 /// Returns A' B (m x k) for A (n x m) and a few columns B (n x k).
 pub(super) fn gram_of_few(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut sums = Mat::zeros(a.ncols(), b.ncols());
-    Arch::new().dispatch(Tiles::<_, TOGETHER>(Gram { a, b, sums: sums.as_mut() }));
+    Arch::new().dispatch(Tiles::<_, GRAM_TILE_COLUMNS>(Gram { a, b, sums: sums.as_mut() }));
     sums
 }
 
 /// Adds alpha V H to W for V (n x m), a few columns W (n x k) and small H (m x k).
 pub(super) fn add_few_combinations(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>, alpha: f64) {
-    Arch::new().dispatch(Tiles::<_, COMBINED>(Combination { w, v, h, alpha }));
+    Arch::new().dispatch(Tiles::<_, COMBINATION_TILE_COLUMNS>(Combination { w, v, h, alpha }));
 }
 
 /// Returns the blocks of rows.
 fn blocks(rows: usize) -> impl Iterator<Item = Range<usize>> {
-    (0..rows).step_by(ROWS).map(move |first| first..rows.min(first + ROWS))
+    (0..rows).step_by(ROWS_PER_BLOCK).map(move |first| first..rows.min(first + ROWS_PER_BLOCK))
 }
 
 /// Returns the offset, in numbers, from the current rows of `columns` columns from `first` on to the rows that are read
 /// next: the current rows of the next columns, or the next rows of the first columns.
 fn ahead(a: MatRef<'_, f64>, first: usize, columns: usize) -> isize {
-    let next = if first + columns < a.ncols() { 0 } else { ROWS as isize };
+    let next = if first + columns < a.ncols() { 0 } else { ROWS_PER_BLOCK as isize };
     let moved = if next == 0 { columns as isize } else { -(first as isize) };
     moved * a.col_stride() + next
 }
@@ -239,8 +239,9 @@ impl Tiled for Combination<'_> {
             std::array::from_fn(|q| std::array::from_fn(|c| self.alpha * self.h[(first + q, column + c)]));
         let ahead = ahead(self.v, first, V);
         let v = columns_of::<V>(self.v, first, rows);
-        let mut own = self.w.rb_mut().subcols_mut(column, W).col_iter_mut();
-        let w = [(); W].map(|()| &mut contiguous_mut(own.next().expect("so many columns"))[rows.clone()]);
+        let mut columns_of_tile = self.w.rb_mut().subcols_mut(column, W).col_iter_mut();
+        let w = [(); W]
+            .map(|()| &mut contiguous_mut(columns_of_tile.next().expect("so many columns"))[rows.clone()]);
         add_multiples::<S, V, W>(simd, w, v, &factors, ahead);
     }
 }
@@ -328,7 +329,7 @@ mod tests {
     /// Both products match their definition, with full and partial vectors, tiles and blocks of rows.
     #[test]
     fn products_with_a_few_columns_match_their_definition() {
-        for rows in [0, 1, 7, 8, 29, ROWS, ROWS + 21] {
+        for rows in [0, 1, 7, 8, 29, ROWS_PER_BLOCK, ROWS_PER_BLOCK + 21] {
             for (m, k) in [(0, 2), (1, 1), (2, 3), (3, 4), (7, 5), (8, 8), (13, 8)] {
                 let (a, b) = (block(rows, m, 0.3), block(rows, k, 1.7));
                 let gram = gram_of_few(a.as_ref(), b.as_ref());

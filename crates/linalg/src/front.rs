@@ -11,13 +11,13 @@ use std::ops::{AddAssign, Mul, Neg};
 
 /// Number of columns of a panel: large enough for products at full speed, small enough for its triangles to cost
 /// little.
-pub(super) const PANEL: usize = 128;
+pub(super) const PANEL_COLUMNS: usize = 128;
 
 /// Number of rows in a piece of parallel work.
-pub(super) const ROWS: usize = 256;
+pub(super) const ROWS_PER_PIECE: usize = 256;
 
 /// Number of multiplications below which work is not divided into tasks.
-pub(super) const WORTH_A_TASK: usize = 4_000_000;
+pub(super) const MIN_PARALLEL_MULTIPLICATIONS: usize = 4_000_000;
 
 /// Number type of a factor.
 pub trait Real:
@@ -42,8 +42,8 @@ pub trait Real:
     fn of(x: f64) -> Self;
     /// Returns the number in double precision.
     fn wide(self) -> f64;
-    /// Returns the numbers in double precision: themselves, or converted into `room`.
-    fn all_wide<'a>(numbers: &'a [Self], room: &'a mut Vec<f64>) -> &'a [f64];
+    /// Returns the numbers in double precision: themselves, or converted into `buffer`.
+    fn all_wide<'a>(numbers: &'a [Self], buffer: &'a mut Vec<f64>) -> &'a [f64];
 }
 
 impl Real for f64 {
@@ -69,15 +69,16 @@ impl Real for f32 {
     fn wide(self) -> f64 {
         f64::from(self)
     }
-    fn all_wide<'a>(numbers: &'a [Self], room: &'a mut Vec<f64>) -> &'a [f64] {
-        room.clear();
-        room.extend(numbers.iter().map(|x| x.wide()));
-        room
+    fn all_wide<'a>(numbers: &'a [Self], buffer: &'a mut Vec<f64>) -> &'a [f64] {
+        buffer.clear();
+        buffer.extend(numbers.iter().map(|x| x.wide()));
+        buffer
     }
 }
 
 /// Columns 0..width of the lower triangle of a symmetric matrix with `height` rows. Panel p holds the columns from p
-/// [`PANEL`] and the rows from there down, row by row. The entries above the diagonal of its leading square are unused.
+/// [`PANEL_COLUMNS`] and the rows from there down, row by row. The entries above the diagonal of its leading square are
+/// unused.
 #[derive(Debug, Default)]
 pub(crate) struct Trapezoid<T> {
     height: usize,
@@ -87,8 +88,10 @@ pub(crate) struct Trapezoid<T> {
 
 impl<T: Real> Trapezoid<T> {
     pub(crate) fn zeros(height: usize, width: usize) -> Self {
-        let panel = |p: usize| vec![T::default(); (height - p * PANEL) * PANEL.min(width - p * PANEL)];
-        Self { height, width, panels: (0..width.div_ceil(PANEL)).map(panel).collect() }
+        let panel = |p: usize| {
+            vec![T::default(); (height - p * PANEL_COLUMNS) * PANEL_COLUMNS.min(width - p * PANEL_COLUMNS)]
+        };
+        Self { height, width, panels: (0..width.div_ceil(PANEL_COLUMNS)).map(panel).collect() }
     }
 
     pub(crate) fn height(&self) -> usize {
@@ -101,23 +104,25 @@ impl<T: Real> Trapezoid<T> {
 
     /// Returns the number of entries stored for this shape.
     pub(crate) fn stored(height: usize, width: usize) -> usize {
-        (0..width.div_ceil(PANEL)).map(|p| (height - p * PANEL) * PANEL.min(width - p * PANEL)).sum()
+        (0..width.div_ceil(PANEL_COLUMNS))
+            .map(|p| (height - p * PANEL_COLUMNS) * PANEL_COLUMNS.min(width - p * PANEL_COLUMNS))
+            .sum()
     }
 
     pub(super) fn panel_width(&self, p: usize) -> usize {
-        PANEL.min(self.width - p * PANEL)
+        PANEL_COLUMNS.min(self.width - p * PANEL_COLUMNS)
     }
 
     pub(crate) fn add(&mut self, row: usize, column: usize, value: T) {
-        let p = column / PANEL;
-        let at = (row - p * PANEL) * self.panel_width(p) + column - p * PANEL;
+        let p = column / PANEL_COLUMNS;
+        let at = (row - p * PANEL_COLUMNS) * self.panel_width(p) + column - p * PANEL_COLUMNS;
         self.panels[p][at] += value;
     }
 
     /// Returns the rows `from..` (counted in the trapezoid) of panel `p`.
     pub(super) fn below(&self, p: usize, from: usize) -> MatRef<'_, T> {
         let width = self.panel_width(p);
-        let skipped = from - p * PANEL;
+        let skipped = from - p * PANEL_COLUMNS;
         MatRef::from_row_major_slice(&self.panels[p][skipped * width..], self.height - from, width)
     }
 }
@@ -132,7 +137,8 @@ pub(super) fn extend_add<T: Real>(
 ) {
     let w = pivots.width;
     for (p, panel) in source.panels.iter().enumerate() {
-        let (first, width) = (p * PANEL, source.panel_width(p));
+        // Entries of the source panel go to the pivots or to the Schur complement of the front.
+        let (first, width) = (p * PANEL_COLUMNS, source.panel_width(p));
         // Columns that stay adjacent are added run by run.
         let runs = runs(&places[first..first + width], w);
         for (i, row) in panel.chunks_exact(width).enumerate() {
@@ -147,7 +153,7 @@ pub(super) fn extend_add<T: Real>(
                 let (target, row_place) =
                     if run.rest { (&mut *rest, place - w) } else { (&mut *pivots, place) };
                 let target_width = target.panel_width(run.panel);
-                let at = (row_place - run.panel * PANEL) * target_width + run.column;
+                let at = (row_place - run.panel * PANEL_COLUMNS) * target_width + run.column;
                 let to = &mut target.panels[run.panel][at..at + length];
                 for (to, from) in to.iter_mut().zip(&row[run.source..run.source + length]) {
                     *to += *from;
@@ -171,7 +177,7 @@ fn runs(places: &[usize], pivots: usize) -> Vec<Run> {
     for (source, &place) in places.iter().enumerate() {
         let rest = place >= pivots;
         let column = if rest { place - pivots } else { place };
-        let (panel, column) = (column / PANEL, column % PANEL);
+        let (panel, column) = (column / PANEL_COLUMNS, column % PANEL_COLUMNS);
         match runs.last_mut() {
             Some(run) if run.rest == rest && run.panel == panel && run.column + run.length == column => {
                 run.length += 1;
@@ -182,18 +188,18 @@ fn runs(places: &[usize], pivots: usize) -> Vec<Run> {
     runs
 }
 
-/// Runs `work(index, piece)` on pieces of [`ROWS`] rows of a row-major block, in parallel if `cost` multiplications are
-/// worth it.
+/// Runs `work(index, piece)` on pieces of [`ROWS_PER_PIECE`] rows of a row-major block, in parallel if `cost`
+/// multiplications are worth it.
 pub(super) fn by_rows<T: Real>(
     block: &mut [T],
     width: usize,
     cost: usize,
     work: impl Fn(usize, &mut [T]) + Sync,
 ) {
-    if cost < WORTH_A_TASK {
-        block.chunks_mut(ROWS * width).enumerate().for_each(|(i, piece)| work(i, piece));
+    if cost < MIN_PARALLEL_MULTIPLICATIONS {
+        block.chunks_mut(ROWS_PER_PIECE * width).enumerate().for_each(|(i, piece)| work(i, piece));
     } else {
-        block.par_chunks_mut(ROWS * width).enumerate().for_each(|(i, piece)| work(i, piece));
+        block.par_chunks_mut(ROWS_PER_PIECE * width).enumerate().for_each(|(i, piece)| work(i, piece));
     }
 }
 
@@ -227,12 +233,13 @@ pub(super) fn subtract_eliminated<T: Real>(
 ) {
     let depth: usize = left.iter().map(|l| l.ncols()).sum();
     let cost = target.len() * depth;
+    // Rows below the square, in pieces; then the lower triangle of the square.
     let (square, below) = target.split_at_mut(width * width);
     by_rows(below, width, cost, |piece, rows| {
         let count = rows.len() / width;
         let mut c = MatMut::from_row_major_slice_mut(rows, count, width);
         for (l, r) in left.iter().zip(right) {
-            subtract(c.as_mut(), l.subrows(width + piece * ROWS, count), r.subrows(0, width));
+            subtract(c.as_mut(), l.subrows(width + piece * ROWS_PER_PIECE, count), r.subrows(0, width));
         }
     });
     let mut c = MatMut::from_row_major_slice_mut(square, width, width);
@@ -273,12 +280,12 @@ pub(super) fn drop_negligible<T: Real>(entries: &mut [T]) {
 /// Returns `None` if a pivot is not positive.
 pub(super) fn cholesky<T: Real>(pivots: &mut Trapezoid<T>, rest: &mut Trapezoid<T>) -> Option<()> {
     let mut memory = dyn_stack::MemBuffer::new(llt::factor::cholesky_in_place_scratch::<T>(
-        PANEL.min(pivots.width),
+        PANEL_COLUMNS.min(pivots.width),
         Par::Seq,
         Spec::default(),
     ));
     for p in 0..pivots.panels.len() {
-        let (first, width) = (p * PANEL, pivots.panel_width(p));
+        let (first, width) = (p * PANEL_COLUMNS, pivots.panel_width(p));
         let mut panel = std::mem::take(&mut pivots.panels[p]);
         let left: Vec<MatRef<'_, T>> = (0..p).map(|q| pivots.below(q, first)).collect();
         // Panel p: subtract the panels before it, factor its square, divide the rows below.
@@ -316,12 +323,12 @@ pub(super) fn subtract_from_rest<T: Real>(
 ) {
     let (w, total) = (left.width, rest.width);
     let work = |p: usize, panel: &mut Vec<T>| {
-        let from = w + p * PANEL;
+        let from = w + p * PANEL_COLUMNS;
         let l: Vec<MatRef<'_, T>> = (0..left.panels.len()).map(|q| left.below(q, from)).collect();
         let r: Vec<MatRef<'_, T>> = (0..right.panels.len()).map(|q| right.below(q, from)).collect();
-        subtract_eliminated(panel, PANEL.min(total - p * PANEL), &l, &r);
+        subtract_eliminated(panel, PANEL_COLUMNS.min(total - p * PANEL_COLUMNS), &l, &r);
     };
-    if total * total * w / 2 < WORTH_A_TASK {
+    if total * total * w / 2 < MIN_PARALLEL_MULTIPLICATIONS {
         rest.panels.iter_mut().enumerate().for_each(|(p, panel)| work(p, panel));
     } else {
         rest.panels.par_iter_mut().enumerate().for_each(|(p, panel)| work(p, panel));

@@ -3,12 +3,12 @@
 
 use super::Pencil;
 use super::contiguous::contiguous_mut;
-use super::factor::{Analysis, COLUMNS, Solve, substitute};
-use super::front::{PANEL, ROWS, Real, Trapezoid};
+use super::factor::{Analysis, COLUMNS_PER_SOLVE, Solve, substitute};
+use super::front::{PANEL_COLUMNS, ROWS_PER_PIECE, Real, Trapezoid};
 use super::inertia::{Blocks, Contribution, Inertia, eliminate_front};
 use super::random::normal;
 use super::substitution::{
-    WORTH_TASKS, solve_lower, solve_transposed, subtract_product, subtract_transposed,
+    MIN_PARALLEL_ENTRIES, solve_lower, solve_transposed, subtract_product, subtract_transposed,
 };
 use super::tall::{Tall, column_norms, subtract_columns};
 use faer::MatMut;
@@ -53,11 +53,11 @@ impl<'a, T: Real> Indefinite<'a, T> {
 
     /// Replaces X (n x k) by (K - sigma M)^-1 X.
     pub fn solve_in_place(&self, mut x: MatMut<'_, f64>) {
-        let forward = |s: usize, front: &mut [[f64; COLUMNS]]| forward(&self.fronts[s], front);
-        let backward = |s: usize, front: &mut [[f64; COLUMNS]]| backward(&self.fronts[s], front);
+        let forward = |s: usize, front: &mut [[f64; COLUMNS_PER_SOLVE]]| forward(&self.fronts[s], front);
+        let backward = |s: usize, front: &mut [[f64; COLUMNS_PER_SOLVE]]| backward(&self.fronts[s], front);
         let mut start = 0;
         while start < x.ncols() {
-            let width = COLUMNS.min(x.ncols() - start);
+            let width = COLUMNS_PER_SOLVE.min(x.ncols() - start);
             substitute(self.analysis, &self.scale, x.rb_mut().subcols_mut(start, width), forward, backward);
             start += width;
         }
@@ -69,33 +69,33 @@ impl<'a, T: Real> Indefinite<'a, T> {
     /// A. A matrix (1 - t) F + t A between the two is singular only if 1/t is an eigenvalue of G. A therefore has the
     /// inertia of F if no eigenvalue of G reaches one, which holds if the norm of some power of G is less than one. The
     /// mean square of G^p z over normal vectors z has the squared Frobenius norm of G^p as its expectation: if that
-    /// were one, the mean square over `COLUMNS` vectors would be less than 1 / `MARGIN`^2 with a probability of 10^-15.
-    /// Powers are sharper than G itself, whose norm comes from the part of all other modes that it maps into the modes
-    /// next to sigma, and is much larger than its eigenvalues.
+    /// were one, the mean square over `COLUMNS_PER_SOLVE` vectors would be less than 1 / `PERTURBATION_MARGIN`^2 with a
+    /// probability of 10^-15. Powers are sharper than G itself, whose norm comes from the part of all other modes that
+    /// it maps into the modes next to sigma, and is much larger than its eigenvalues.
     ///
-    /// The bound is the measured norm times `MARGIN`. Returns `None` if no power is small enough.
+    /// The bound is the measured norm times `PERTURBATION_MARGIN`. Returns `None` if no power is small enough.
     pub fn perturbation(&self, pencil: &Pencil<'_>) -> Option<f64> {
         let n = pencil.n();
-        let [mut z, mut x, mut product, mut heavy] = [(); 4].map(|()| Tall::zeros(n, COLUMNS));
+        let [mut z, mut x, mut product, mut heavy] = [(); 4].map(|()| Tall::zeros(n, COLUMNS_PER_SOLVE));
         for_columns(&mut z, |i, j, z| *z = normal(i as u64, j as u64));
         let mut before = f64::INFINITY;
-        for _ in 0..POWERS {
+        for _ in 0..MAX_POWER {
             // z <- G z = z - S^-1 (K - sigma M)^-1 (K - sigma M) S z, with the solution by the factor.
             let (given, scale) = (z.as_ref(), &self.scale);
             for_columns(&mut x, |i, j, x| *x = scale[i] * given[(i, j)]);
             pencil.stiffness_times(x.as_ref(), product.as_mut());
             pencil.mass_times(x.as_ref(), heavy.as_mut());
-            subtract_columns(product.as_mut(), &[self.sigma; COLUMNS], heavy.as_ref());
+            subtract_columns(product.as_mut(), &[self.sigma; COLUMNS_PER_SOLVE], heavy.as_ref());
             self.solve_in_place(product.as_mut());
             let solved = product.as_ref();
             for_columns(&mut z, |i, j, z| *z -= solved[(i, j)] / scale[i]);
             let squares = column_norms(z.as_ref()).into_iter().map(|norm| norm * norm);
-            let bound = MARGIN * (squares.sum::<f64>() / COLUMNS as f64).sqrt();
+            let bound = PERTURBATION_MARGIN * (squares.sum::<f64>() / COLUMNS_PER_SOLVE as f64).sqrt();
             if bound < 1.0 {
                 return Some(bound);
             }
             // The comparison also fails for NaN.
-            let falls = bound < FALLING * before;
+            let falls = bound < MAX_BOUND_RATIO * before;
             if !falls {
                 return None;
             }
@@ -125,15 +125,15 @@ fn for_columns(block: &mut Tall, change: impl Fn(usize, usize, &mut f64) + Sync)
 
 /// Factor from the measured norm to the bound of [`Indefinite::perturbation`]. The mean square of eight normal numbers
 /// is less than 10^-4 with a probability of 10^-15; a smaller margin is less certain.
-const MARGIN: f64 = 100.0;
+const PERTURBATION_MARGIN: f64 = 100.0;
 
 /// Largest power of G that is evaluated.
-const POWERS: usize = 12;
+const MAX_POWER: usize = 12;
 /// Largest ratio of successive bounds at which the next power is evaluated.
-const FALLING: f64 = 0.5;
+const MAX_BOUND_RATIO: f64 = 0.5;
 
 /// Number of rows of L that are converted to double precision together: they stay in the first-level cache.
-const TOGETHER: usize = 32;
+const ROWS_CONVERTED_TOGETHER: usize = 32;
 
 /// Calls `work` with a few rows of L in double precision, and the matching item of `below`.
 fn for_rows<T: Real, B>(
@@ -142,8 +142,8 @@ fn for_rows<T: Real, B>(
     below: impl Iterator<Item = B>,
     mut work: impl FnMut(&[f64], B),
 ) {
-    let mut wide = Vec::with_capacity(TOGETHER * width);
-    for (l, below) in l.chunks(TOGETHER * width).zip(below) {
+    let mut wide = Vec::with_capacity(ROWS_CONVERTED_TOGETHER * width);
+    for (l, below) in l.chunks(ROWS_CONVERTED_TOGETHER * width).zip(below) {
         work(T::all_wide(l, &mut wide), below);
     }
 }
@@ -155,19 +155,21 @@ fn forward<T: Real, const K: usize>(
     values: &mut [[f64; K]],
 ) {
     for (p, block) in blocks.iter().enumerate() {
-        let (first, width) = (p * PANEL, columns.panel_width(p));
-        let (own, below) = values[first..].split_at_mut(width);
-        let mut y: Vec<[f64; K]> = block.order.iter().map(|&row| own[row]).collect();
+        let (first, width) = (p * PANEL_COLUMNS, columns.panel_width(p));
+        let (pivots, below) = values[first..].split_at_mut(width);
+        let mut y: Vec<[f64; K]> = block.order.iter().map(|&row| pivots[row]).collect();
         let (triangle, l) = columns.panels[p].split_at(width * width);
         solve_lower(T::all_wide(triangle, &mut Vec::new()), &mut y);
-        own.copy_from_slice(&y);
+        pivots.copy_from_slice(&y);
         let piece = |l: &[T], below: &mut [[f64; K]]| {
-            for_rows(l, width, below.chunks_mut(TOGETHER), |l, below| subtract_product(l, &y, below));
+            for_rows(l, width, below.chunks_mut(ROWS_CONVERTED_TOGETHER), |l, below| {
+                subtract_product(l, &y, below)
+            });
         };
-        if l.len() < WORTH_TASKS {
+        if l.len() < MIN_PARALLEL_ENTRIES {
             piece(l, below);
         } else {
-            let pieces = l.par_chunks(ROWS * width).zip(below.par_chunks_mut(ROWS));
+            let pieces = l.par_chunks(ROWS_PER_PIECE * width).zip(below.par_chunks_mut(ROWS_PER_PIECE));
             pieces.for_each(|(l, below)| piece(l, below));
         }
     }
@@ -179,10 +181,10 @@ fn backward<T: Real, const K: usize>(
     values: &mut [[f64; K]],
 ) {
     for (p, block) in blocks.iter().enumerate().rev() {
-        let (first, width) = (p * PANEL, columns.panel_width(p));
-        let (own, below) = values[first..].split_at_mut(width);
+        let (first, width) = (p * PANEL_COLUMNS, columns.panel_width(p));
+        let (pivots, below) = values[first..].split_at_mut(width);
         // Blocks of B: y <- B^-1 y, one column at a time.
-        let mut y = own.to_vec();
+        let mut y = pivots.to_vec();
         let mut column = vec![0.0; width];
         for k in 0..K {
             column.iter_mut().zip(&y).for_each(|(to, from)| *to = from[k]);
@@ -191,13 +193,15 @@ fn backward<T: Real, const K: usize>(
         }
         // Rows below: y <- y - L_below' x_below. Parts of parallel tasks are added in the order of the rows.
         let piece = |l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]| {
-            for_rows(l, width, below.chunks(TOGETHER), |l, below| subtract_transposed(l, below, y));
+            for_rows(l, width, below.chunks(ROWS_CONVERTED_TOGETHER), |l, below| {
+                subtract_transposed(l, below, y)
+            });
         };
         let (triangle, l) = columns.panels[p].split_at(width * width);
-        if l.len() < WORTH_TASKS {
+        if l.len() < MIN_PARALLEL_ENTRIES {
             piece(l, below, &mut y);
         } else {
-            let pieces = l.par_chunks(ROWS * width).zip(below.par_chunks(ROWS));
+            let pieces = l.par_chunks(ROWS_PER_PIECE * width).zip(below.par_chunks(ROWS_PER_PIECE));
             let parts = pieces.map(|(l, below)| {
                 let mut part = vec![[0.0; K]; width];
                 piece(l, below, &mut part);
@@ -212,7 +216,7 @@ fn backward<T: Real, const K: usize>(
         // Unit triangle of the panel: L' x = y, then back from the order of the pivots.
         solve_transposed(T::all_wide(triangle, &mut Vec::new()), &mut y);
         for (&row, x) in block.order.iter().zip(&y) {
-            own[row] = *x;
+            pivots[row] = *x;
         }
     }
 }
@@ -350,7 +354,7 @@ mod tests {
         let double = Indefinite::<f64>::new(&analysis, &pencil, sigma);
         assert!(double.perturbation(&pencil).expect("sure") < 1e-9);
         let single = Indefinite::<f32>::new(&analysis, &pencil, sigma);
-        let measured = single.perturbation(&pencil).expect("sure") / MARGIN;
+        let measured = single.perturbation(&pencil).expect("sure") / PERTURBATION_MARGIN;
         let scale = |i: usize| single.scale[i];
         let unit = Mat::from_fn(60, 60, |i, j| if i == j { scale(i) } else { 0.0 });
         let mut g =

@@ -4,8 +4,8 @@
 use super::Pencil;
 use super::factor::{Analysis, Scaled};
 use super::front::{
-    PANEL, ROWS, Real, Trapezoid, WORTH_A_TASK, divide_rows, drop_negligible, extend_add,
-    subtract_eliminated, subtract_from_rest,
+    MIN_PARALLEL_MULTIPLICATIONS, PANEL_COLUMNS, ROWS_PER_PIECE, Real, Trapezoid, divide_rows,
+    drop_negligible, extend_add, subtract_eliminated, subtract_from_rest,
 };
 use super::largest::largest;
 use dyn_stack::{MemBuffer, MemStack};
@@ -88,9 +88,9 @@ pub(super) fn eliminate_front<T: Real>(
     }
     let width = columns.width();
     let blocks = eliminate(&mut columns, &mut rest, &mut growth);
-    let own = largest(growth[..width].iter().copied());
+    let pivot_growth = largest(growth[..width].iter().copied());
     let handed_on = Contribution { schur: rest, growth: growth.split_off(width) };
-    (Eliminated { columns, blocks, growth: own }, handed_on)
+    (Eliminated { columns, blocks, growth: pivot_growth }, handed_on)
 }
 
 impl Inertia {
@@ -131,7 +131,7 @@ fn eliminate<T: Real>(
     let mut scaled = Trapezoid::zeros(height, width);
     let mut squares = Vec::with_capacity(pivots.panels.len());
     for p in 0..pivots.panels.len() {
-        let (first, width) = (p * PANEL, pivots.panel_width(p));
+        let (first, width) = (p * PANEL_COLUMNS, pivots.panel_width(p));
         let mut panel = std::mem::take(&mut pivots.panels[p]);
         let left: Vec<MatRef<'_, T>> = (0..p).map(|q| pivots.below(q, first)).collect();
         let right: Vec<MatRef<'_, T>> = (0..p).map(|q| scaled.below(q, first)).collect();
@@ -139,11 +139,11 @@ fn eliminate<T: Real>(
         subtract_eliminated(&mut panel, width, &left, &right);
         let (square, below) = panel.split_at_mut(width * width);
         let blocks = Blocks::new(MatRef::from_row_major_slice(&*square, width, width));
-        let (own, later) = growth[first..].split_at_mut(width);
+        let (in_block, later) = growth[first..].split_at_mut(width);
         blocks.divide_below(below, &mut scaled.panels[p][width * width..], later);
         for (i, &place) in blocks.order.iter().enumerate() {
             let row: Vec<T> = blocks.row(i).collect();
-            own[place] += blocks.growth(&row);
+            in_block[place] += blocks.growth(&row);
         }
         pivots.panels[p] = panel;
         squares.push(blocks);
@@ -153,7 +153,7 @@ fn eliminate<T: Real>(
 }
 
 /// Number of sums that are computed side by side.
-const LANES: usize = 8;
+const SUM_LANES: usize = 8;
 
 /// Factorisation P A P' = L B L' of the leading square of a panel.
 pub(super) struct Blocks<T> {
@@ -231,16 +231,16 @@ impl<T: Real> Blocks<T> {
             }
             drop_negligible(rows);
         };
-        let length = ROWS * width;
-        if below.len() * width < WORTH_A_TASK {
+        let length = ROWS_PER_PIECE * width;
+        if below.len() * width < MIN_PARALLEL_MULTIPLICATIONS {
             let pieces = below.chunks_mut(length).zip(scaled.chunks_mut(length));
             pieces
-                .zip(growth.chunks_mut(ROWS))
+                .zip(growth.chunks_mut(ROWS_PER_PIECE))
                 .for_each(|((rows, scaled), growth)| piece(rows, scaled, growth));
         } else {
             let pieces = below.par_chunks_mut(length).zip(scaled.par_chunks_mut(length));
             pieces
-                .zip(growth.par_chunks_mut(ROWS))
+                .zip(growth.par_chunks_mut(ROWS_PER_PIECE))
                 .for_each(|((rows, scaled), growth)| piece(rows, scaled, growth));
         }
     }
@@ -271,11 +271,11 @@ impl<T: Real> Blocks<T> {
 
     /// Returns |l|' |B| |l| of a row of L.
     fn growth(&self, row: &[T]) -> f64 {
-        let (lanes, rest) = row.as_chunks::<LANES>();
-        let (diagonal, last) = self.diagonal.as_chunks::<LANES>();
-        let mut sums = [0.0; LANES];
+        let (lanes, rest) = row.as_chunks::<SUM_LANES>();
+        let (diagonal, last) = self.diagonal.as_chunks::<SUM_LANES>();
+        let mut sums = [0.0; SUM_LANES];
         for (l, d) in lanes.iter().zip(diagonal) {
-            (0..LANES).for_each(|w| sums[w] += l[w].wide() * l[w].wide() * d[w].abs());
+            (0..SUM_LANES).for_each(|w| sums[w] += l[w].wide() * l[w].wide() * d[w].abs());
         }
         let rest = rest.iter().zip(last).map(|(l, d)| l.wide() * l.wide() * d.abs());
         let squares = sums.iter().sum::<f64>() + rest.sum::<f64>();

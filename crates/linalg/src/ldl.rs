@@ -7,7 +7,7 @@ use super::ordering::{nested_dissection, node_graph};
 use super::{Pencil, SymmetricMatrix};
 
 /// Marks a root of the elimination tree: no parent.
-const NONE: u32 = u32::MAX;
+const NO_PARENT: u32 = u32::MAX;
 
 /// Factor A = P' L D L' P. If A is singular, it is the factor of A with some diagonal entries doubled.
 #[derive(Debug, Clone)]
@@ -105,6 +105,7 @@ impl<T: Scalar> SparseLdl<T> {
         let n = self.n();
         assert!(x.len() == n * B && scratch.len() == n * B, "sizes of a solve");
         let (x, y) = (x.as_chunks_mut::<B>().0, scratch.as_chunks_mut::<B>().0);
+        // To elimination order.
         for (y, &row) in y.iter_mut().zip(&self.order) {
             *y = x[row as usize];
         }
@@ -124,6 +125,7 @@ impl<T: Scalar> SparseLdl<T> {
             }
             y[j] = sum;
         }
+        // Back to the order of the rows.
         for (y, &row) in y.iter().zip(&self.order) {
             x[row as usize] = *y;
         }
@@ -146,12 +148,13 @@ impl Structure {
     fn new<T: Scalar>(a: &MatrixSum<'_, T>, pencil: &Pencil<'_>) -> Option<Self> {
         let n = a.n();
         let block = pencil.block() as u32;
+        // Elimination order of the rows, and its inverse.
         let nodes = nested_dissection(&mut node_graph(pencil)?)?;
         let order: Vec<u32> =
             nodes.iter().flat_map(|&node| (0..block).map(move |k| block * node + k)).collect();
         let mut place = vec![0u32; n];
         order.iter().enumerate().for_each(|(k, &row)| place[row as usize] = k as u32);
-        let (mut parent, mut met) = (vec![NONE; n], vec![NONE; n]);
+        let (mut parent, mut met) = (vec![NO_PARENT; n], vec![NO_PARENT; n]);
         let mut col_ptr = vec![0usize; n + 1];
         // The entries of row k of L are the paths in the tree from the entries of row k of A.
         for k in 0..n as u32 {
@@ -162,13 +165,14 @@ impl Structure {
                     let at = i as usize;
                     col_ptr[at + 1] += 1;
                     met[at] = k;
-                    if parent[at] == NONE {
+                    if parent[at] == NO_PARENT {
                         parent[at] = k;
                     }
                     i = parent[at];
                 }
             });
         }
+        // Counts of the columns become their starts.
         (0..n).for_each(|j| col_ptr[j + 1] += col_ptr[j]);
         Some(Self { order, place, parent, col_ptr })
     }
@@ -203,7 +207,7 @@ impl<'a, T: Scalar> RowByRow<'a, T> {
             pivots: vec![T::ZERO; n],
             sums: vec![T::ZERO; n],
             reach: Vec::new(),
-            met: vec![NONE; n],
+            met: vec![NO_PARENT; n],
             path: Vec::new(),
             structure,
         }
@@ -242,12 +246,12 @@ impl<'a, T: Scalar> RowByRow<'a, T> {
         let diagonal = std::mem::replace(&mut sums[k], T::ZERO);
         let mut pivot = diagonal;
         for &i in reach.iter().rev() {
-            let own = std::mem::replace(&mut sums[i], T::ZERO);
+            let sum = std::mem::replace(&mut sums[i], T::ZERO);
             for at in structure.col_ptr[i]..end[i] {
-                sums[row_idx[at] as usize] -= values[at] * own;
+                sums[row_idx[at] as usize] -= values[at] * sum;
             }
-            let entry = own / pivots[i];
-            pivot -= entry * own;
+            let entry = sum / pivots[i];
+            pivot -= entry * sum;
             (row_idx[end[i]], values[end[i]]) = (k as u32, entry);
             end[i] += 1;
         }

@@ -3,7 +3,7 @@
 use faer::Mat;
 
 /// Cosine between two columns up to which they count as orthogonal. A smaller value may prevent convergence.
-const ORTHOGONAL: f64 = 4.0 * f64::EPSILON;
+const ORTHOGONAL_COSINE: f64 = 4.0 * f64::EPSILON;
 
 /// Largest number of sweeps. Graded matrices of 500 columns take 7 to 10.
 const MAX_SWEEPS: usize = 60;
@@ -41,7 +41,7 @@ fn sweep(g: &mut Mat<f64>) -> bool {
         for q in p + 1..g.ncols() {
             let (a, b) = (g.col(p).squared_norm_l2(), g.col(q).squared_norm_l2());
             let mixed: f64 = g.col(p).iter().zip(g.col(q).iter()).map(|(x, y)| x * y).sum();
-            if mixed.abs() <= ORTHOGONAL * (a.sqrt() * b.sqrt()) || !mixed.is_finite() {
+            if mixed.abs() <= ORTHOGONAL_COSINE * (a.sqrt() * b.sqrt()) || !mixed.is_finite() {
                 continue;
             }
             rotated = true;

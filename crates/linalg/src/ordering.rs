@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::sync::Mutex;
 
 /// Lock for METIS, which has one random state per process: one call at a time keeps the ordering reproducible.
-static METIS: Mutex<()> = Mutex::new(());
+static METIS_LOCK: Mutex<()> = Mutex::new(());
 
 /// Calls `take` with every neighbour of a vertex of `S` rows, ascending: the vertices that K or M couples to it. The
 /// vertex has `H` rows of Ms.
@@ -55,7 +55,7 @@ pub(super) fn node_graph(pencil: &Pencil<'_>) -> Option<Graph> {
 /// K. Rows with individual couplings are better as separate vertices. Three rows, however, are the displacements or the
 /// rotations of a node, which elimination couples soon: frames along the axes have three times the entries, but less
 /// work than with single rows, which take ten times as long to be ordered.
-const NODE_ROWS: [(usize, f64); 3] = [(6, 1.6), (3, 4.0), (2, 1.6)];
+const NODE_SIZES: [(usize, f64); 3] = [(6, 1.6), (3, 4.0), (2, 1.6)];
 
 /// Returns a graph whose vertices are nodes, also if the pencil has single rows, and the number of rows per vertex.
 /// Consecutive rows with common couplings belong to a node. The graph of the rows of shells has 36 times the edges, and
@@ -63,7 +63,7 @@ const NODE_ROWS: [(usize, f64); 3] = [(6, 1.6), (3, 4.0), (2, 1.6)];
 pub(super) fn smallest_graph(pencil: &Pencil<'_>) -> Option<(Graph, usize)> {
     if pencil.block() == 1 {
         let (n, entries) = (pencil.n(), pencil.stiffness().as_csc().nnz() as f64);
-        for (size, most) in NODE_ROWS.into_iter().filter(|(size, _)| n > 0 && n % size == 0) {
+        for (size, most) in NODE_SIZES.into_iter().filter(|(size, _)| n > 0 && n % size == 0) {
             let graph = vertex_graph(pencil, size)?;
             let coupled = (size * size * (graph.neighbours.len() + graph.len())) as f64;
             if coupled <= most * entries {
@@ -89,10 +89,10 @@ pub(super) fn vertex_graph(pencil: &Pencil<'_>, size: usize) -> Option<Graph> {
 
 fn graph<const S: usize, const H: usize>(pencil: &Pencil<'_>) -> Option<Graph> {
     /// Number of vertices per parallel task.
-    const VERTICES: usize = 1024;
+    const VERTICES_PER_TASK: usize = 1024;
     let vertices = pencil.n() / S;
     let mut pointers = vec![0i32; vertices + 1];
-    pointers[1..].par_iter_mut().with_min_len(VERTICES).enumerate().for_each(|(vertex, count)| {
+    pointers[1..].par_iter_mut().with_min_len(VERTICES_PER_TASK).enumerate().for_each(|(vertex, count)| {
         neighbours::<S, H>(pencil, vertex as u32, |_| *count += 1);
     });
     for vertex in 0..vertices {
@@ -100,10 +100,10 @@ fn graph<const S: usize, const H: usize>(pencil: &Pencil<'_>) -> Option<Graph> {
     }
     // Count first, then fill: each task writes the neighbours of its vertices.
     let mut lists = vec![0i32; pointers[vertices] as usize];
-    let mut shares = Vec::with_capacity(vertices / VERTICES + 1);
+    let mut shares = Vec::with_capacity(vertices / VERTICES_PER_TASK + 1);
     let mut rest = lists.as_mut_slice();
-    for first in (0..vertices).step_by(VERTICES) {
-        let end = (first + VERTICES).min(vertices);
+    for first in (0..vertices).step_by(VERTICES_PER_TASK) {
+        let end = (first + VERTICES_PER_TASK).min(vertices);
         let (share, after) = rest.split_at_mut((pointers[end] - pointers[first]) as usize);
         shares.push((first as u32..end as u32, share));
         rest = after;
@@ -133,7 +133,7 @@ pub(super) fn nested_dissection(graph: &mut Graph) -> Option<Vec<u32>> {
 /// Largest imbalance of the halves of a graph, in thousandths: half the default of METIS. Measured on bars, cubes,
 /// tetrahedra, plates, shells and frames of 50,000 to 200,000 rows: down to half the time, with factors equal to within
 /// a hundredth.
-const UNBALANCED: i32 = 100;
+const MAX_IMBALANCE_THOUSANDTHS: i32 = 100;
 
 // The only call of the C library; the arrays outlive the call and have the lengths that its manual requires.
 #[allow(unsafe_code)]
@@ -142,10 +142,10 @@ fn metis(pointers: &mut [i32], neighbours: &mut [i32]) -> Option<Vec<i32>> {
     let mut order = vec![0i32; pointers.len() - 1];
     let mut inverse = order.clone();
     let mut options = [0i32; metis_sys::METIS_NOPTIONS as usize];
-    let _one_at_a_time = METIS.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let _one_at_a_time = METIS_LOCK.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let status = unsafe {
         metis_sys::METIS_SetDefaultOptions(options.as_mut_ptr());
-        options[metis_sys::moptions_et_METIS_OPTION_UFACTOR as usize] = UNBALANCED;
+        options[metis_sys::moptions_et_METIS_OPTION_UFACTOR as usize] = MAX_IMBALANCE_THOUSANDTHS;
         metis_sys::METIS_NodeND(
             &mut vertices,
             pointers.as_mut_ptr(),

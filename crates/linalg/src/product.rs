@@ -12,9 +12,9 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Number of rows per parallel task.
-const ROWS: usize = 1024;
+const ROWS_PER_TASK: usize = 1024;
 /// Number of rows of a task that are written at a time.
-const TILE: usize = 32;
+const ROWS_PER_TILE: usize = 32;
 
 /// Computes y = (A kron I_block) x for x, y of `block * A.n()` rows and any number of columns.
 ///
@@ -96,15 +96,15 @@ impl WithSimd for QuadraticForm<'_> {
 /// Returns the product of a row, with several independent sums to hide the latency.
 #[inline(always)] // compiled once per instruction set
 fn row_times<const B: usize>(columns: &[u32], values: &[f64], x: &[[f64; B]]) -> [f64; B] {
-    const SUMS: usize = 4;
-    let mut sums = [[0.0; B]; SUMS];
+    const INDEPENDENT_SUMS: usize = 4;
+    let mut sums = [[0.0; B]; INDEPENDENT_SUMS];
     let mut add = |sum: usize, column: u32, value: f64| {
         sums[sum].iter_mut().zip(&x[column as usize]).for_each(|(sum, x)| *sum += value * x);
     };
-    let (columns, last_columns) = columns.as_chunks::<SUMS>();
-    let (values, last_values) = values.as_chunks::<SUMS>();
+    let (columns, last_columns) = columns.as_chunks::<INDEPENDENT_SUMS>();
+    let (values, last_values) = values.as_chunks::<INDEPENDENT_SUMS>();
     for (columns, values) in columns.iter().zip(values) {
-        (0..SUMS).for_each(|k| add(k, columns[k], values[k]));
+        (0..INDEPENDENT_SUMS).for_each(|k| add(k, columns[k], values[k]));
     }
     last_columns.iter().zip(last_values).for_each(|(column, value)| add(0, *column, *value));
     std::array::from_fn(|b| sums.iter().map(|sum| sum[b]).sum())
@@ -165,17 +165,17 @@ fn pass<const B: usize, const W: usize>(
     let arch = Arch::new();
     let columns: [&[f64]; W] = std::array::from_fn(|c| contiguous(x.col(c)));
     // Pack the columns row by row.
-    let rows = (0..a.n()).into_par_iter().with_min_len(ROWS);
+    let rows = (0..a.n()).into_par_iter().with_min_len(ROWS_PER_TASK);
     let packed: Vec<[[f64; W]; B]> =
         rows.map(|i| std::array::from_fn(|b| columns.map(|column| column[i * B + b]))).collect();
     // Give each task its rows of all columns.
     let mut targets: Vec<_> =
-        y.col_iter_mut().map(|column| contiguous_mut(column).chunks_mut(ROWS * B)).collect();
-    let shares: Vec<[&mut [f64]; W]> = (0..a.n().div_ceil(ROWS))
+        y.col_iter_mut().map(|column| contiguous_mut(column).chunks_mut(ROWS_PER_TASK * B)).collect();
+    let shares: Vec<[&mut [f64]; W]> = (0..a.n().div_ceil(ROWS_PER_TASK))
         .map(|_| std::array::from_fn(|c| targets[c].next().expect("as many chunks as tasks")))
         .collect();
     shares.into_par_iter().enumerate().for_each(|(chunk, share)| {
-        arch.dispatch(RowProducts { a, first: chunk * ROWS, x: &packed, y: share, f });
+        arch.dispatch(RowProducts { a, first: chunk * ROWS_PER_TASK, x: &packed, y: share, f });
     });
 }
 
@@ -196,10 +196,10 @@ impl<F: Fn(f64) -> f64, const B: usize, const W: usize> WithSimd for RowProducts
         let Self { a, first, x, mut y, f } = self;
         // Rows are collected in a small tile: written to the columns one by one, the vectors would be split in the
         // inner loop.
-        let mut tile = [[[0.0f64; W]; B]; TILE];
+        let mut tile = [[[0.0f64; W]; B]; ROWS_PER_TILE];
         let rows = y[0].len() / B;
-        for start in (0..rows).step_by(TILE) {
-            let tile = &mut tile[..TILE.min(rows - start)];
+        for start in (0..rows).step_by(ROWS_PER_TILE) {
+            let tile = &mut tile[..ROWS_PER_TILE.min(rows - start)];
             for (r, target) in tile.iter_mut().enumerate() {
                 let (columns, values) = a.row(first + start + r);
                 let mut sum = [[0.0f64; W]; B];
@@ -231,7 +231,7 @@ mod tests {
 
     #[test]
     fn every_block_and_width_is_the_sum_in_storage_order() {
-        let n = ROWS + 77; // two tasks
+        let n = ROWS_PER_TASK + 77; // two tasks
         let mut entries: Vec<(u32, u32, f64)> = (0..n as u32).map(|i| (i, i, f64::from(i) + 0.1)).collect();
         for i in 0..n as u32 - 40 {
             let v = f64::from(i).sin();

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of columns per parallel task.
-const COLUMNS: usize = 4096;
+const COLUMNS_PER_TASK: usize = 4096;
 
 /// Sparse matrix in compressed column form. Rows ascend within each column, without duplicates. Zeros are stored only
 /// if [`CscMatrix::from_parts`] received them. The default has no rows and no columns.
@@ -42,7 +42,7 @@ impl CscMatrix {
         assert_eq!(col_ptr[0], 0, "first column pointer");
         assert_eq!(*col_ptr.last().expect("n_cols + 1 >= 1"), row_idx.len(), "entries");
         assert_eq!(row_idx.len(), values.len(), "values");
-        (0..n_cols).into_par_iter().with_min_len(COLUMNS).for_each(|j| {
+        (0..n_cols).into_par_iter().with_min_len(COLUMNS_PER_TASK).for_each(|j| {
             let rows = &row_idx[col_ptr[j]..col_ptr[j + 1]];
             assert!(rows.is_sorted_by(|a, b| a < b), "rows of column {j} not ascending");
             assert!(rows.last().is_none_or(|&r| (r as usize) < n_rows), "row out of range");
@@ -173,7 +173,7 @@ impl CscMatrix {
             col_ptr[new + 1] = col_ptr[new] + self.column(old as usize).0.len();
         }
         let (mut row_idx, mut values) = (vec![0u32; self.nnz()], vec![0.0; self.nnz()]);
-        let cuts: Vec<usize> = (0..n).step_by(COLUMNS).chain([n]).collect();
+        let cuts: Vec<usize> = (0..n).step_by(COLUMNS_PER_TASK).chain([n]).collect();
         split_columns(&col_ptr, &cuts, &mut row_idx, &mut values).into_par_iter().for_each(|block| {
             let mut entries: Vec<(u32, f64)> = Vec::new();
             let mut at = 0;
@@ -196,7 +196,7 @@ impl CscMatrix {
     pub fn is_symmetric(&self) -> bool {
         let n = self.n_cols;
         // Each task has one cursor per column, so that few long ranges are best.
-        let length = n.div_ceil(16).max(COLUMNS);
+        let length = n.div_ceil(16).max(COLUMNS_PER_TASK);
         let surplus = |first: usize| self.lower_surplus(first..(first + length).min(n));
         self.n_rows == n
             && (0..n).into_par_iter().step_by(length).map(surplus).try_reduce(|| 0, |a, b| Some(a + b))
@@ -260,7 +260,7 @@ impl CscMatrix {
         if self.values.iter().all(|value| *value != 0.0) {
             return;
         }
-        let (row_idx, values) = (self.row_idx.own(), self.values.own());
+        let (row_idx, values) = (self.row_idx.to_mut(), self.values.to_mut());
         let (mut from, mut to) = (0, 0);
         for j in 0..self.n_cols {
             let end = self.col_ptr[j + 1];
@@ -310,7 +310,7 @@ impl SymmetricMatrix {
                     return Self::symmetrised_by_transpose(&matrix);
                 }
                 cursor[i] += 1;
-                let values = matrix.values.own();
+                let values = matrix.values.to_mut();
                 let mean = 0.5 * (values[at] + values[mirrored]);
                 (values[at], values[mirrored]) = (mean, mean);
             }
@@ -377,7 +377,7 @@ impl SymmetricMatrix {
 
     /// Returns the diagonal.
     pub fn diagonal(&self) -> Vec<f64> {
-        (0..self.n()).into_par_iter().with_min_len(COLUMNS).map(|i| self.0.get(i, i)).collect()
+        (0..self.n()).into_par_iter().with_min_len(COLUMNS_PER_TASK).map(|i| self.0.get(i, i)).collect()
     }
 
     /// Returns the submatrix of some rows, ascending, and the corresponding columns.
@@ -408,7 +408,7 @@ impl SymmetricMatrix {
     pub fn scaled(&self, diagonal: &[f64]) -> Self {
         assert_eq!(diagonal.len(), self.n(), "one factor per row");
         let mut matrix = self.0.clone();
-        let values = matrix.values.own();
+        let values = matrix.values.to_mut();
         for j in 0..self.n() {
             let range = self.0.col_ptr[j]..self.0.col_ptr[j + 1];
             for (&i, v) in self.0.row_idx[range.clone()].iter().zip(&mut values[range]) {
@@ -423,7 +423,7 @@ impl SymmetricMatrix {
     /// not stored.
     pub fn with_diagonal(&self, f: impl Fn(usize, f64) -> f64) -> Option<Self> {
         let mut matrix = self.clone();
-        let values = matrix.0.values.own();
+        let values = matrix.0.values.to_mut();
         for i in 0..self.n() {
             let at = self.0.col_ptr[i] + self.row(i).0.binary_search(&(i as u32)).ok()?;
             values[at] = f(i, self.0.values[at]);
@@ -536,12 +536,18 @@ mod tests {
 
     #[test]
     fn symmetry_is_found_and_every_single_flaw_is_too() {
-        const N: usize = 3 * COLUMNS + 17;
+        const N: usize = 3 * COLUMNS_PER_TASK + 17;
         let entries = banded(N);
         let matrix = CscMatrix::from_triplets(N, N, &entries);
         assert!(matrix.is_symmetric());
         assert_eq!(matrix, matrix.transpose());
-        for at in [(1, 0), (N - 1, N - 2), (3000 + 4095, 4095), (4096, 4096 + 5), (COLUMNS, COLUMNS - 1)] {
+        for at in [
+            (1, 0),
+            (N - 1, N - 2),
+            (3000 + 4095, 4095),
+            (4096, 4096 + 5),
+            (COLUMNS_PER_TASK, COLUMNS_PER_TASK - 1),
+        ] {
             let at = (at.0 as u32, at.1 as u32);
             let missing: Vec<_> = entries.iter().filter(|e| (e.0, e.1) != at).copied().collect();
             assert!(!CscMatrix::from_triplets(N, N, &missing).is_symmetric(), "{at:?} missing");
@@ -559,7 +565,7 @@ mod tests {
 
     #[test]
     fn a_permuted_matrix_has_its_entries_where_they_belong() {
-        const N: usize = COLUMNS + 100;
+        const N: usize = COLUMNS_PER_TASK + 100;
         let matrix = CscMatrix::from_triplets(N, N, &banded(N));
         let to: Vec<u32> = (0..N).map(|i| (i * 3001 % N) as u32).collect(); // 3001 is prime to N
         let permuted = matrix.permuted(&to);

@@ -14,19 +14,19 @@ impl<T, L: AsRef<[T]> + Send + Sync + UnwindSafe + RefUnwindSafe> Lender<T> for 
 #[derive(Clone)]
 pub enum Stored<T: 'static> {
     /// Owned numbers.
-    Own(Vec<T>),
+    Owned(Vec<T>),
     /// Numbers borrowed from a lender.
     Lent(Arc<dyn Lender<T>>),
 }
 
 impl<T: Clone> Stored<T> {
     /// Returns the numbers for writing; copies borrowed ones first.
-    pub(super) fn own(&mut self) -> &mut Vec<T> {
+    pub(super) fn to_mut(&mut self) -> &mut Vec<T> {
         if let Self::Lent(lent) = self {
-            *self = Self::Own((**lent).as_ref().to_vec());
+            *self = Self::Owned((**lent).as_ref().to_vec());
         }
         match self {
-            Self::Own(own) => own,
+            Self::Owned(values) => values,
             Self::Lent(_) => unreachable!("a copy was taken"),
         }
     }
@@ -37,15 +37,15 @@ impl<T> Deref for Stored<T> {
 
     fn deref(&self) -> &[T] {
         match self {
-            Self::Own(own) => own,
+            Self::Owned(values) => values,
             Self::Lent(lent) => (**lent).as_ref(),
         }
     }
 }
 
 impl<T> From<Vec<T>> for Stored<T> {
-    fn from(own: Vec<T>) -> Self {
-        Self::Own(own)
+    fn from(values: Vec<T>) -> Self {
+        Self::Owned(values)
     }
 }
 

@@ -2,7 +2,7 @@
 //! factor from memory. Panels and right-hand sides are row-major; several rows of the panel are processed together and
 //! read once. Large panels are cut into fixed pieces of rows.
 
-use super::front::{PANEL, Real, Trapezoid};
+use super::front::{PANEL_COLUMNS, Real, Trapezoid};
 use super::instructions::{instructions_for_rows, prefetch};
 use faer::traits::ComplexField;
 use faer::traits::math_utils::recip;
@@ -11,10 +11,10 @@ use pulp::{Scalar, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Number of rows in a piece of parallel work.
-const ROWS: usize = 512;
+const ROWS_PER_TASK: usize = 512;
 
 /// Number of entries of a panel below which it is not divided into tasks.
-pub(super) const WORTH_TASKS: usize = 300_000;
+pub(super) const MIN_PARALLEL_ENTRIES: usize = 300_000;
 
 /// Forward substitution with the columns of a Cholesky factor. `front` holds a row of `K` right-hand sides for every
 /// row of the front. The leading rows become the solution; the contribution of these is subtracted from the rows below.
@@ -22,14 +22,14 @@ pub(super) fn forward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T
     let arch = instructions_for_rows(size_of::<[T; K]>());
     for (p, panel) in l.panels.iter().enumerate() {
         let width = l.panel_width(p);
-        let (x, below) = front[p * PANEL..].split_at_mut(width);
+        let (x, below) = front[p * PANEL_COLUMNS..].split_at_mut(width);
         let (square, rest) = panel.split_at(width * width);
         arch.dispatch(Step::SolveLower(square, x));
         let x = &*x;
-        if rest.len() < WORTH_TASKS {
+        if rest.len() < MIN_PARALLEL_ENTRIES {
             arch.dispatch(Step::SubtractProduct(rest, x, below));
         } else {
-            let pieces = rest.par_chunks(ROWS * width).zip(below.par_chunks_mut(ROWS));
+            let pieces = rest.par_chunks(ROWS_PER_TASK * width).zip(below.par_chunks_mut(ROWS_PER_TASK));
             pieces.for_each(|(l, y)| arch.dispatch(Step::SubtractProduct(l, x, y)));
         }
     }
@@ -40,12 +40,12 @@ pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[
     let arch = instructions_for_rows(size_of::<[T; K]>());
     for (p, panel) in l.panels.iter().enumerate().rev() {
         let width = l.panel_width(p);
-        let (x, below) = front[p * PANEL..].split_at_mut(width);
+        let (x, below) = front[p * PANEL_COLUMNS..].split_at_mut(width);
         let (square, rest) = panel.split_at(width * width);
-        if rest.len() < WORTH_TASKS {
+        if rest.len() < MIN_PARALLEL_ENTRIES {
             arch.dispatch(Step::SubtractTransposed(rest, below, x));
         } else {
-            let pieces = rest.par_chunks(ROWS * width).zip(below.par_chunks(ROWS));
+            let pieces = rest.par_chunks(ROWS_PER_TASK * width).zip(below.par_chunks(ROWS_PER_TASK));
             let sums: Vec<Vec<[T; K]>> = pieces
                 .map(|(l, y)| {
                     let mut sum = vec![[T::default(); K]; width];
@@ -118,13 +118,13 @@ impl<T: Real, const K: usize> WithSimd for Step<'_, T, K> {
 }
 
 /// Number of columns of L between two calls of [`fetch`].
-const STEP: usize = 8;
+const FETCHED_COLUMNS: usize = 8;
 
-/// Prefetches the `R` [`STEP`] numbers of L from `from` on. The hardware does not recognise several rows read side by
-/// side as a stream; these requests, one row group ahead and in the order of memory, form one.
+/// Prefetches the `R` [`FETCHED_COLUMNS`] numbers of L from `from` on. The hardware does not recognise several rows
+/// read side by side as a stream; these requests, one row group ahead and in the order of memory, form one.
 #[inline(always)]
 fn fetch<T: Real, const R: usize>(l: &[T], from: usize) {
-    for at in (from..from + R * STEP).step_by(64 / size_of::<T>()) {
+    for at in (from..from + R * FETCHED_COLUMNS).step_by(64 / size_of::<T>()) {
         prefetch(l.as_ptr().wrapping_add(at));
     }
 }
@@ -200,15 +200,15 @@ impl<T: Real, S: Simd, const N: usize> Kernels<T, S, N> {
         let width = x.len();
         let l = &l[base * width..];
         let (open, rest) = x.split_at_mut(base);
-        let Some(own) = rest.first_chunk_mut::<R>() else { return };
+        let Some(block) = rest.first_chunk_mut::<R>() else { return };
         for i in (0..R).rev() {
-            self.divide(&mut own[i], l[i * width + base + i]);
-            let solved = own[i];
+            self.divide(&mut block[i], l[i * width + base + i]);
+            let solved = block[i];
             for j in 0..i {
-                self.add_multiple(&mut own[j], -l[i * width + base + j], &solved);
+                self.add_multiple(&mut block[j], -l[i * width + base + j], &solved);
             }
         }
-        self.subtract_rows(l, width, own, open);
+        self.subtract_rows(l, width, block, open);
     }
 
     #[inline(always)]
@@ -233,9 +233,9 @@ impl<T: Real, S: Simd, const N: usize> Kernels<T, S, N> {
     fn products<const R: usize>(&self, l: &[T], stride: usize, x: &[Row<T, S, N>]) -> [Row<T, S, N>; R] {
         let rows: [&[T]; R] = std::array::from_fn(|q| &l[q * stride..][..x.len()]);
         let mut sums = [[T::simd_splat(&self.0, &T::default()); N]; R];
-        for (i, part) in x.chunks(STEP).enumerate() {
-            fetch::<T, R>(l, R * stride + i * STEP * R);
-            for (j, x) in (i * STEP..x.len()).zip(part) {
+        for (i, part) in x.chunks(FETCHED_COLUMNS).enumerate() {
+            fetch::<T, R>(l, R * stride + i * FETCHED_COLUMNS * R);
+            for (j, x) in (i * FETCHED_COLUMNS..x.len()).zip(part) {
                 for q in 0..R {
                     self.add_multiple(&mut sums[q], rows[q][j], x);
                 }
@@ -259,9 +259,9 @@ impl<T: Real, S: Simd, const N: usize> Kernels<T, S, N> {
         for y in minus.as_flattened_mut() {
             *y = T::simd_neg(&self.0, *y);
         }
-        for (i, part) in x.chunks_mut(STEP).enumerate() {
-            fetch::<T, R>(l, R * stride + i * STEP * R);
-            for (j, x) in (i * STEP..width).zip(part) {
+        for (i, part) in x.chunks_mut(FETCHED_COLUMNS).enumerate() {
+            fetch::<T, R>(l, R * stride + i * FETCHED_COLUMNS * R);
+            for (j, x) in (i * FETCHED_COLUMNS..width).zip(part) {
                 for q in 0..R {
                     self.add_multiple(x, rows[q][j], &minus[q]);
                 }

@@ -2,7 +2,7 @@
 //! added in a fixed order, so that the bits do not depend on the number of threads.
 
 use super::contiguous::{contiguous, contiguous_mut};
-use super::few_columns::{FEW, add_few_combinations, gram_of_few};
+use super::few_columns::{MAX_FEW_COLUMNS, add_few_combinations, gram_of_few};
 use faer::linalg::matmul::matmul;
 use faer::prelude::ReborrowMut;
 use faer::{Accum, ColMut, ColRef, Mat, MatMut, MatRef, Par};
@@ -11,10 +11,10 @@ use std::mem::MaybeUninit;
 use std::ops::Range;
 
 /// Number of rows per partial product.
-const ROWS: usize = 4096;
+const ROWS_PER_PARTIAL_PRODUCT: usize = 4096;
 
-/// Smallest number of pieces of [`ROWS`] numbers that one thread clears before the work is split.
-const PIECES: usize = 16;
+/// Smallest number of pieces of [`ROWS_PER_PARTIAL_PRODUCT`] numbers that one thread clears before the work is split.
+const MIN_PIECES_PER_TASK: usize = 16;
 
 /// Tall block that grows by columns. All threads take part in the first write to new memory.
 #[derive(Debug, Clone, Default)]
@@ -26,21 +26,21 @@ pub struct Tall {
 impl Tall {
     /// Creates a block of zeros.
     pub fn zeros(rows: usize, columns: usize) -> Self {
-        let mut own = Self::with_room(rows, columns);
-        own.add_zeros(columns);
-        own
+        let mut block = Self::with_capacity(rows, columns);
+        block.add_zeros(columns);
+        block
     }
 
     /// Creates a block without columns, with memory reserved for `columns`.
-    pub fn with_room(rows: usize, columns: usize) -> Self {
+    pub fn with_capacity(rows: usize, columns: usize) -> Self {
         Self { entries: Vec::with_capacity(rows * columns), rows }
     }
 
     /// Returns a copy, made by all threads.
     pub fn copied(x: MatRef<'_, f64>) -> Self {
-        let mut own = Self::with_room(x.nrows(), x.ncols());
-        own.push(x);
-        own
+        let mut block = Self::with_capacity(x.nrows(), x.ncols());
+        block.push(x);
+        block
     }
 
     /// Appends columns, copied by all threads.
@@ -58,12 +58,15 @@ impl Tall {
     /// If the row counts differ.
     pub fn push_multiple(&mut self, scale: f64, x: ColRef<'_, f64>) {
         assert_eq!(x.nrows(), self.rows, "rows of a column to append");
-        self.entries.par_extend(contiguous(x).par_iter().with_min_len(ROWS).map(|x| scale * x));
+        self.entries
+            .par_extend(contiguous(x).par_iter().with_min_len(ROWS_PER_PARTIAL_PRODUCT).map(|x| scale * x));
     }
 
     /// Appends columns of zeros.
     pub fn add_zeros(&mut self, columns: usize) {
-        self.entries.par_extend(rayon::iter::repeat_n(0.0, self.rows * columns).with_min_len(ROWS));
+        self.entries.par_extend(
+            rayon::iter::repeat_n(0.0, self.rows * columns).with_min_len(ROWS_PER_PARTIAL_PRODUCT),
+        );
     }
 
     /// Keeps at most the first `columns` columns. The memory of the others stays reserved.
@@ -116,17 +119,20 @@ impl Tall {
 /// memory at the first access, which takes longer than most computations with the block.
 #[allow(unsafe_code)]
 pub fn zeros(rows: usize, columns: usize) -> Mat<f64> {
-    let mut own = Mat::<f64>::with_capacity(rows, columns);
-    let stride = own.col_stride().unsigned_abs();
+    let mut block = Mat::<f64>::with_capacity(rows, columns);
+    let stride = block.col_stride().unsigned_abs();
     // SAFETY: faer reserves `stride` numbers for each of the requested columns, and no other reference to them exists;
     // uninitialised numbers are accessed as `MaybeUninit`.
-    let room = unsafe {
-        std::slice::from_raw_parts_mut(own.as_ptr_mut().cast::<MaybeUninit<f64>>(), stride * columns)
+    let spare = unsafe {
+        std::slice::from_raw_parts_mut(block.as_ptr_mut().cast::<MaybeUninit<f64>>(), stride * columns)
     };
-    room.par_chunks_mut(ROWS).with_min_len(PIECES).for_each(|part| part.fill(MaybeUninit::new(0.0)));
+    spare
+        .par_chunks_mut(ROWS_PER_PARTIAL_PRODUCT)
+        .with_min_len(MIN_PIECES_PER_TASK)
+        .for_each(|part| part.fill(MaybeUninit::new(0.0)));
     // SAFETY: all numbers have been written.
-    unsafe { own.set_dims(rows, columns) };
-    own
+    unsafe { block.set_dims(rows, columns) };
+    block
 }
 
 /// Returns a copy, made by all threads.
@@ -141,14 +147,14 @@ pub fn copied(x: MatRef<'_, f64>) -> Mat<f64> {
 pub fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     assert_eq!(a.nrows(), b.nrows(), "rows of a Gram product");
     let n = a.nrows();
-    let chunks = n.div_ceil(ROWS).max(1);
+    let chunks = n.div_ceil(ROWS_PER_PARTIAL_PRODUCT).max(1);
     let partial: Vec<Mat<f64>> = (0..chunks)
         .into_par_iter()
         .map(|chunk| {
-            let start = chunk * ROWS;
-            let rows = ROWS.min(n - start);
+            let start = chunk * ROWS_PER_PARTIAL_PRODUCT;
+            let rows = ROWS_PER_PARTIAL_PRODUCT.min(n - start);
             let (a, b) = (a.subrows(start, rows), b.subrows(start, rows));
-            if b.ncols() <= FEW {
+            if b.ncols() <= MAX_FEW_COLUMNS {
                 return gram_of_few(a, b);
             }
             let mut part = Mat::zeros(a.ncols(), b.ncols());
@@ -169,24 +175,28 @@ pub fn column_products(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Vec<f64> {
 }
 
 /// Range of norms that are computed from sums of squares without overflow or underflow.
-const SQUARES: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
+const SAFE_NORMS: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
 
 /// Returns the Euclidean norms of the columns of a tall block.
 pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
-    let chunks = a.nrows().div_ceil(ROWS);
+    let chunks = a.nrows().div_ceil(ROWS_PER_PARTIAL_PRODUCT);
     let squares = |k: usize| -> f64 {
         let (chunk, column) = (k % chunks, k / chunks);
-        let part = a.col(column).subrows(chunk * ROWS, ROWS.min(a.nrows() - chunk * ROWS));
+        let part = a.col(column).subrows(
+            chunk * ROWS_PER_PARTIAL_PRODUCT,
+            ROWS_PER_PARTIAL_PRODUCT.min(a.nrows() - chunk * ROWS_PER_PARTIAL_PRODUCT),
+        );
         // Eight sums side by side over each chunk of rows.
         let (lanes, rest) = contiguous(part).as_chunks::<8>();
         let mut sums = [0.0; 8];
         lanes.iter().for_each(|x| (0..8).for_each(|w| sums[w] += x[w] * x[w]));
         sums.iter().sum::<f64>() + rest.iter().map(|x| x * x).sum::<f64>()
     };
+    // Sums of squares in fixed order; norms outside the safe range are computed with scaling.
     let parts: Vec<f64> = (0..chunks * a.ncols()).into_par_iter().map(squares).collect();
     let norm = |j: usize| {
         let norm = parts[j * chunks..(j + 1) * chunks].iter().sum::<f64>().sqrt();
-        if SQUARES.contains(&norm) { norm } else { a.col(j).norm_l2() }
+        if SAFE_NORMS.contains(&norm) { norm } else { a.col(j).norm_l2() }
     };
     (0..a.ncols()).map(norm).collect()
 }
@@ -198,13 +208,19 @@ pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
 pub fn weighted_square(x: ColRef<'_, f64>, weights: &[f64]) -> f64 {
     assert_eq!(x.nrows(), weights.len(), "one weight for each row");
     let part = |(x, w): (&[f64], &[f64])| x.iter().zip(w).map(|(x, w)| x * x * w).sum::<f64>();
-    let parts: Vec<f64> = contiguous(x).par_chunks(ROWS).zip(weights.par_chunks(ROWS)).map(part).collect();
+    let parts: Vec<f64> = contiguous(x)
+        .par_chunks(ROWS_PER_PARTIAL_PRODUCT)
+        .zip(weights.par_chunks(ROWS_PER_PARTIAL_PRODUCT))
+        .map(part)
+        .collect();
     parts.iter().sum()
 }
 
 /// Divides x by `size`.
 pub fn divide(x: ColMut<'_, f64>, size: f64) {
-    contiguous_mut(x).par_chunks_mut(ROWS).for_each(|x| x.iter_mut().for_each(|x| *x /= size));
+    contiguous_mut(x)
+        .par_chunks_mut(ROWS_PER_PARTIAL_PRODUCT)
+        .for_each(|x| x.iter_mut().for_each(|x| *x /= size));
 }
 
 /// Returns the pairwise sum of equal-shaped matrices: its error grows with the logarithm of their number.
@@ -259,7 +275,7 @@ pub fn combine_into(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>) 
 /// If the shapes do not match.
 pub fn combine_in_place(v: MatMut<'_, f64>, h: MatRef<'_, f64>) {
     assert!(v.ncols() == h.nrows() && h.ncols() <= h.nrows(), "tall product in place");
-    let chunks = v.nrows().div_ceil(ROWS);
+    let chunks = v.nrows().div_ceil(ROWS_PER_PARTIAL_PRODUCT);
     split_rows(v, chunks).into_par_iter().for_each(|mut part| {
         let mut combined = Mat::zeros(part.nrows(), h.ncols());
         add_product_of_rows(combined.as_mut(), Accum::Replace, part.as_ref(), h, 1.0);
@@ -290,17 +306,17 @@ pub fn side_by_side(blocks: &[MatRef<'_, f64>]) -> Mat<f64> {
     let n = blocks.first().map_or(0, |block| block.nrows());
     assert!(blocks.iter().all(|block| block.nrows() == n), "rows of blocks side by side");
     let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
-    let mut own = zeros(n, columns.len());
-    let pairs: Vec<_> = own.col_iter_mut().zip(columns).collect();
+    let mut joined = zeros(n, columns.len());
+    let pairs: Vec<_> = joined.col_iter_mut().zip(columns).collect();
     pairs.into_par_iter().for_each(|(mut to, from)| to.copy_from(from));
-    own
+    joined
 }
 
 fn add_product(w: MatMut<'_, f64>, accum: Accum, v: MatRef<'_, f64>, h: MatRef<'_, f64>, alpha: f64) {
     assert!(w.nrows() == v.nrows() && v.ncols() == h.nrows() && w.ncols() == h.ncols(), "tall product");
-    let chunks = w.nrows().div_ceil(ROWS);
+    let chunks = w.nrows().div_ceil(ROWS_PER_PARTIAL_PRODUCT);
     split_rows(w, chunks).into_par_iter().enumerate().for_each(|(chunk, part)| {
-        let v = v.subrows(chunk * ROWS, part.nrows());
+        let v = v.subrows(chunk * ROWS_PER_PARTIAL_PRODUCT, part.nrows());
         add_product_of_rows(part, accum, v, h, alpha);
     });
 }
@@ -313,7 +329,7 @@ fn add_product_of_rows(
     h: MatRef<'_, f64>,
     alpha: f64,
 ) {
-    if w.ncols() > FEW {
+    if w.ncols() > MAX_FEW_COLUMNS {
         return matmul(w, accum, v, h, alpha, Par::Seq);
     }
     if accum == Accum::Replace {
@@ -322,11 +338,11 @@ fn add_product_of_rows(
     add_few_combinations(w, v, h, alpha);
 }
 
-/// Cuts a block into `chunks` pieces of [`ROWS`] rows; the last one may be shorter.
+/// Cuts a block into `chunks` pieces of [`ROWS_PER_PARTIAL_PRODUCT`] rows; the last one may be shorter.
 fn split_rows(mut w: MatMut<'_, f64>, chunks: usize) -> Vec<MatMut<'_, f64>> {
     let mut pieces = Vec::with_capacity(chunks);
     for _ in 0..chunks {
-        let rows = ROWS.min(w.nrows());
+        let rows = ROWS_PER_PARTIAL_PRODUCT.min(w.nrows());
         let (head, tail) = w.split_at_row_mut(rows);
         pieces.push(head);
         w = tail;
@@ -347,7 +363,7 @@ mod tests {
 
     #[test]
     fn norms_are_those_of_the_columns_at_any_size() {
-        let rows = ROWS + 13;
+        let rows = ROWS_PER_PARTIAL_PRODUCT + 13;
         for size in [1.0, 1e-200, 1e200] {
             let mut a = block(rows, 3);
             a.as_mut().col_iter_mut().for_each(|mut column| column *= faer::Scale(size));
@@ -363,8 +379,8 @@ mod tests {
 
     #[test]
     fn columns_come_and_go() {
-        let given = block(ROWS + 3, 3);
-        let mut grown = Tall::with_room(ROWS + 3, 4);
+        let given = block(ROWS_PER_PARTIAL_PRODUCT + 3, 3);
+        let mut grown = Tall::with_capacity(ROWS_PER_PARTIAL_PRODUCT + 3, 4);
         assert_eq!(grown.ncols(), 0);
         grown.push(given.first(2));
         grown.push(given.columns(2..3));
@@ -379,9 +395,9 @@ mod tests {
 
     #[test]
     fn blocks_of_any_shape_are_zeros_and_copies() {
-        for (rows, columns) in [(0, 0), (0, 3), (5, 0), (1, 1), (7, 3), (ROWS + 3, 5)] {
-            let own = zeros(rows, columns);
-            assert_eq!(own, Mat::<f64>::zeros(rows, columns), "{rows} {columns}");
+        for (rows, columns) in [(0, 0), (0, 3), (5, 0), (1, 1), (7, 3), (ROWS_PER_PARTIAL_PRODUCT + 3, 5)] {
+            let block = zeros(rows, columns);
+            assert_eq!(block, Mat::<f64>::zeros(rows, columns), "{rows} {columns}");
             let given = Mat::from_fn(rows, columns, |i, j| (i + 10 * j) as f64);
             assert_eq!(copied(given.as_ref()), given);
             // Copied by columns and by rows.
@@ -391,7 +407,7 @@ mod tests {
 
     #[test]
     fn combinations_in_place_are_combinations() {
-        let mut v = block(2 * ROWS + 5, 4);
+        let mut v = block(2 * ROWS_PER_PARTIAL_PRODUCT + 5, 4);
         let h = Mat::from_fn(4, 3, |i, j| (i as f64 - 1.5) * (j as f64 + 0.5));
         let expected = combine(v.as_ref(), h.as_ref());
         let last = v.columns(3..4).to_owned();

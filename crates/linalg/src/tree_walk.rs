@@ -7,10 +7,10 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Smallest part of all work in a heavy subtree: enough subtrees for eight threads.
-const HEAVY_PART: f64 = 1.0 / 32.0;
+const HEAVY_WORK_FRACTION: f64 = 1.0 / 32.0;
 
 /// Amount of work below which a subtree is not divided.
-const HEAVY_WORK: f64 = 1e7;
+const MIN_DIVIDED_OPERATIONS: f64 = 1e7;
 
 /// Subtree with the heavy subtrees below its lowest branching. These run in parallel, the rest after them.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ struct Segment {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Needs {
     /// Memory held until the end of the walk.
-    pub kept: usize,
+    pub retained: usize,
     /// Memory held until the parent has been visited.
     pub handed_on: usize,
     /// Memory held during the visit only.
@@ -52,7 +52,7 @@ impl TreeWalk {
         }
         let roots: Vec<usize> = (0..tree.len()).filter(|&s| tree.parent(s).is_none()).collect();
         let all: f64 = roots.iter().map(|&r| below[r]).sum();
-        let heavy = (HEAVY_PART * all).max(HEAVY_WORK);
+        let heavy = (HEAVY_WORK_FRACTION * all).max(MIN_DIVIDED_OPERATIONS);
         // Parents come after children, so that the branches of their segments exist already.
         let mut branches: Vec<Vec<Segment>> = (0..tree.len()).map(|_| Vec::new()).collect();
         let gather = |children: Vec<usize>, branches: &mut Vec<Vec<Segment>>| -> Vec<Segment> {
@@ -112,15 +112,15 @@ fn split<'a, 'b, S>(segment: &'a Segment, slots: &'b mut [S]) -> Vec<(&'a Segmen
     let mut parts = Vec::with_capacity(segment.branches.len());
     for branch in &segment.branches {
         let (_, tail) = rest.split_at_mut(branch.supernodes.start - at);
-        let (own, tail) = tail.split_at_mut(branch.supernodes.len());
-        parts.push((branch, own));
+        let (of_branch, tail) = tail.split_at_mut(branch.supernodes.len());
+        parts.push((branch, of_branch));
         (rest, at) = (tail, branch.supernodes.end);
     }
     parts
 }
 
 /// Returns the supernodes of a segment outside its branches, ascending.
-fn own(segment: &Segment) -> impl DoubleEndedIterator<Item = usize> {
+fn supernodes_of(segment: &Segment) -> impl DoubleEndedIterator<Item = usize> {
     let ends = segment.branches.iter().map(|b| b.supernodes.end);
     let starts = segment.branches.iter().map(|b| b.supernodes.start).chain([segment.supernodes.end]);
     let begins: Vec<usize> = std::iter::once(segment.supernodes.start).chain(ends).collect();
@@ -142,9 +142,9 @@ fn peak(
     let mut beyond: Vec<usize> = branches.iter().map(|b| b.0 - b.1).collect();
     beyond.sort_unstable();
     let mut most = held + beyond.iter().rev().take(threads).sum::<usize>();
-    for s in own(segment) {
-        let Needs { kept, handed_on, in_work } = needs(s);
-        held += kept + handed_on;
+    for s in supernodes_of(segment) {
+        let Needs { retained, handed_on, in_work } = needs(s);
+        held += retained + handed_on;
         most = most.max(held + in_work);
         held -= tree.children(s).iter().map(|&c| needs(c as usize).handed_on).sum::<usize>();
     }
@@ -170,7 +170,7 @@ fn up<S: Send, U: Send, E: Send>(
             pending[s - start] = Some(value);
         }
     }
-    for s in own(segment) {
+    for s in supernodes_of(segment) {
         let children = tree.children(s).iter();
         let below =
             children.map(|&c| pending[c as usize - start].take().expect("children come first")).collect();
@@ -192,7 +192,7 @@ fn down<S: Send, D: Send>(
     for (s, message) in messages {
         pending[s - start] = Some(message);
     }
-    for s in own(segment).rev() {
+    for s in supernodes_of(segment).rev() {
         let message = pending[s - start].take();
         let below = visit(s, &mut slots[s - start], message);
         for (&c, message) in tree.children(s).iter().zip(below) {

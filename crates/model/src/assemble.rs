@@ -17,7 +17,7 @@ use flexbody_linalg::SymmetricMatrix;
 use std::collections::HashSet;
 
 /// Name of geometric stiffness in messages.
-const GEOMETRIC: &str = "geometric stiffness";
+const GEOMETRIC_STIFFNESS: &str = "geometric stiffness";
 
 /// Checks the matrices and tables by themselves and converts them to the internal order; also returns the
 /// warnings and notes so far.
@@ -71,7 +71,7 @@ fn check_as_read(raw: &RawModel, found: &mut Vec<Diagnostic>) {
         found.push(Diagnostic::new(Code::ManifestSyntax, problem));
     }
     let damping = raw.damping.as_ref().and_then(Damping::matrix).map(|matrix| (matrix, "damping"));
-    let geometric = raw.geometric_stiffness.iter().map(|one| (&one.matrix, GEOMETRIC));
+    let geometric = raw.geometric_stiffness.iter().map(|one| (&one.matrix, GEOMETRIC_STIFFNESS));
     for (other, name) in damping.into_iter().chain(geometric) {
         check_matrix(other, name, found);
         let rows = other.matrix.n_cols();
@@ -183,7 +183,7 @@ impl InternalOrder<'_> {
         given: &mut [GeometricStiffness<RawMatrix>],
     ) -> Vec<GeometricStiffness<SymmetricMatrix>> {
         let ordered = |one: &mut GeometricStiffness<RawMatrix>| {
-            let matrix = self.symmetric(&mut one.matrix, GEOMETRIC)?;
+            let matrix = self.symmetric(&mut one.matrix, GEOMETRIC_STIFFNESS)?;
             Some(GeometricStiffness { load: one.load.clone(), matrix })
         };
         given.iter_mut().filter_map(ordered).collect()

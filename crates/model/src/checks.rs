@@ -101,7 +101,7 @@ pub(super) fn check_body(
     let [first, second] = [form.worst.0, form.worst.1].map(|row| body.rows.label(&body.nodes, row));
     let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
     model.find_fixed_mass(mass_rounding);
-    let kept = mass_that_does_not_turn(&model, mass_rounding, [first, second]);
+    let kept = unrotated_mass_note(&model, mass_rounding, [first, second]);
     found.extend(kept.map(|note| note.in_file(&mass_path)));
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
     stop_on_error(&mut found)?;
@@ -134,8 +134,9 @@ fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Res
         found.push(diagnostic.in_file(&body.raw.stiffness.path));
     }
     let written = body.raw.stiffness.digits;
-    let limits = (rounding(written, 1).max(1e-9), rounding(written, 3).max(1e-6));
-    let rigid_residual = check_rigid_motion(body, limits, found);
+    let rounded = rounding(written, 1).max(1e-9);
+    let limit = rounding(written, 3).max(1e-6);
+    let rigid_residual = check_rigid_motion(body, rounded, limit, found);
     check_rigid_damping(body, found);
     found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
     Ok(rigid_residual)
@@ -171,7 +172,7 @@ fn is_diagonal(m: &SymmetricMatrix) -> bool {
 fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnostic>) {
     let (raw, rows) = (&body.raw, &body.rows);
     if diagonal_mass {
-        let message = "mass matrix is diagonal: it was lumped before it came here";
+        let message = "mass matrix is diagonal: the program that wrote it lumped the mass";
         found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));
     }
     let [vectors, others] = rows.without_place();
@@ -192,19 +193,20 @@ fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnos
 
 /// Returns a note about the part of the mass that keeps the axes of the body while its nodes turn; `worst`
 /// labels the rows of the displacement block that differs most by direction.
-fn mass_that_does_not_turn(model: &FeModel, rounding: f64, worst: [DofLabel; 2]) -> Option<Diagnostic> {
+fn unrotated_mass_note(model: &FeModel, rounding: f64, worst: [DofLabel; 2]) -> Option<Diagnostic> {
     let share = model.fixed_mass_share();
     let deviation = model.mass_deviation();
     (share > 0.0).then(|| {
         let [a, b] = worst;
         let place = if a == b { format!("at {a}") } else { format!("between {a} and {b}") };
-        let why = match deviation > rounding {
-            true => format!(
+        let why = if deviation > rounding {
+            format!(
                 "blocks of displacements deviate by {deviation:.1e} from multiples of the identity, most {place}"
-            ),
-            false => format!("displacements and rotations share symmetric blocks of up to {share:.1e}"),
+            )
+        } else {
+            format!("displacements and rotations share symmetric blocks of up to {share:.1e}")
         };
-        let message = format!("part of the mass matrix does not turn with the nodes: {why}");
+        let message = format!("part of the mass matrix does not rotate with the nodes: {why}");
         Diagnostic::new(Code::MassBlockStructure, message)
     })
 }
@@ -212,12 +214,12 @@ fn mass_that_does_not_turn(model: &FeModel, rounding: f64, worst: [DofLabel; 2])
 /// Adds a warning if D damps rigid motion: forces on the motion of the whole body are not in the modes.
 fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     /// Residual due to node tables with few digits.
-    const LIMIT: f64 = 1e-6;
+    const MAX_RIGID_DAMPING: f64 = 1e-6;
     let Some(damping) = body.damping.as_ref().and_then(Damping::matrix) else { return };
     let (centre, length) = centre_and_length(&body.nodes.positions);
     let fields = body.rows.rigid_fields(&body.nodes.positions, centre, length);
     let residuals = rigid_residuals(damping, &fields, &body.rows.field_sizes(length));
-    let damped = residuals.iter().filter(|r| r.is_nan() || **r > LIMIT).count();
+    let damped = residuals.iter().filter(|r| r.is_nan() || **r > MAX_RIGID_DAMPING).count();
     if damped > 0 {
         let worst = largest(residuals.iter().copied());
         let message = format!(
@@ -230,7 +232,7 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
 
 /// Range of plausible densities in kg/m^3, from aerogel to osmium, for the bounding box of the nodes; used
 /// for bodies other than solids.
-const DENSITY: (f64, f64) = (0.1, 30_000.0);
+const PLAUSIBLE_DENSITY: (f64, f64) = (0.1, 30_000.0);
 
 fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, found: &mut Vec<Diagnostic>) {
     if !raw.has_units() {
@@ -243,7 +245,7 @@ fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, fou
         return;
     }
     let density = total / volume;
-    if !(DENSITY.0..=DENSITY.1).contains(&density) {
+    if !(PLAUSIBLE_DENSITY.0..=PLAUSIBLE_DENSITY.1).contains(&density) {
         let message =
             format!("{total:.3e} kg in a box of {x:.3e} x {y:.3e} x {z:.3e} m is {density:.1e} kg/m^3");
         found.push(Diagnostic::new(Code::InertiaImplausible, message));

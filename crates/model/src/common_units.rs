@@ -2,17 +2,15 @@
 
 /// Returns advice on numbers without stated units, with the units in which they are plausible.
 pub(super) fn state_units(fitting: &str) -> String {
-    let those = match fitting {
-        "" => "state the units".to_owned(),
-        fitting => format!("the numbers are those of matter in {fitting}: state the units"),
-    };
+    let reason =
+        if fitting.is_empty() { String::new() } else { format!(": the numbers fit materials in {fitting}") };
     format!(
-        "{those} with --units LENGTH,MASS,TIME, or [model.units] in the manifest; --allow-implausible (or allow_implausible in [model]) if m, kg, s are meant"
+        "state the units with --units LENGTH,MASS,TIME, or [model.units] in the manifest{reason}; use --allow-implausible (or allow_implausible in [model]) if m, kg, s are intended"
     )
 }
 
 /// Common units: their names, length in m and mass in kg; time is in s.
-const COMMON: [(&str, f64, f64); 5] = [
+const COMMON_UNITS: [(&str, f64, f64); 5] = [
     ("m, kg, s", 1.0, 1.0),
     ("mm, t, s", 1e-3, 1e3),
     ("cm, g, s", 1e-2, 1e-3),
@@ -26,11 +24,11 @@ pub(super) fn fitting_units(density: f64, speed: f64) -> Vec<&'static str> {
     let fits = |&&(name, length, mass): &&(&str, f64, f64)| {
         (500.0..20_000.0).contains(&(density * mass / length.powi(3))) && of_speed.contains(&name)
     };
-    COMMON.iter().filter(fits).map(|&(name, ..)| name).collect()
+    COMMON_UNITS.iter().filter(fits).map(|&(name, ..)| name).collect()
 }
 
 /// Returns the common units in which a speed of sound is plausible.
 pub(super) fn units_of_speed(speed: f64) -> Vec<&'static str> {
     let fits = |&&(_, length, _): &&(&str, f64, f64)| (500.0..20_000.0).contains(&(speed * length));
-    COMMON.iter().filter(fits).map(|&(name, ..)| name).collect()
+    COMMON_UNITS.iter().filter(fits).map(|&(name, ..)| name).collect()
 }

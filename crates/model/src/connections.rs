@@ -21,7 +21,7 @@ pub(super) fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
     // K R = 0 holds for each part by itself: each has rigid motions of its own for any mass coupling.
     let parts = groups(&component, rows, nodes);
     let message = format!(
-        "stiffness leaves {} parts that only the mass couples, each with rigid motions of its own: {}",
+        "the stiffness matrix separates {} parts that only the mass matrix couples, each with its rigid motions: {}",
         parts.len(),
         in_words(&parts)
     );

@@ -16,29 +16,30 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 /// Range of densities of materials in kg/m^3, from light foams to osmium.
-const DENSITIES: (f64, f64) = (10.0, 25_000.0);
+const MATERIAL_DENSITIES: (f64, f64) = (10.0, 25_000.0);
 
 /// Largest number of sampled nodes, at equal distances in the node table.
-const SAMPLED: usize = 400;
+const MAX_SAMPLED_NODES: usize = 400;
 
 /// Largest number of nodes coupled with a sampled node: the bits of a word.
-const COUPLED: usize = 63;
+const MAX_COUPLED_NODES: usize = 63;
 
 /// Largest number of cliques of one node; elements of a mesh are fewer.
-const CLIQUES: usize = 200;
+const MAX_CLIQUES: usize = 200;
 
 /// Root of the determinant of the covariance, relative to that of a ball with equal trace, below which
 /// nodes lie in a plane.
-const FLAT: f64 = 1e-6;
-/// Limit in place of [`FLAT`] for linear elements of four nodes: those of a curved membrane come close to a plane.
-const FLAT_FOUR: f64 = 0.02;
+const FLAT_VOLUME: f64 = 1e-6;
+/// Limit in place of [`FLAT_VOLUME`] for linear elements of four nodes: those of a curved membrane come close
+/// to a plane.
+const FLAT_TETRAHEDRON: f64 = 0.02;
 
 /// Largest deviation of the squared Mahalanobis distance of a corner from that of an affine element.
-const CORNER: f64 = 1.0;
+const MAX_CORNER_DEVIATION: f64 = 1.0;
 
 /// Distance of a mid-edge node of a curved element from the middle between the ends of the edge, relative
 /// to the length of the edge.
-const CURVED: f64 = 0.2;
+const MAX_CURVED_OFFSET: f64 = 0.2;
 
 /// Solid element with `nodes` nodes, `corners` of them corners and the others mid-edge nodes. Its volume is
 /// `volume` times the root of the determinant of the covariance of the corners, and the row sums of the
@@ -76,7 +77,7 @@ impl Densities {
         if body.rows.dimension != 3 {
             return None;
         }
-        let count = n.min(SAMPLED);
+        let count = n.min(MAX_SAMPLED_NODES);
         let sampled = (0..count).into_par_iter().map(|s| s * n / count);
         let density = |i: usize| Some(local.mass[i] / around(body, i, diagonal_mass)?);
         let mut densities: Vec<f64> =
@@ -97,14 +98,14 @@ fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Option<f64> {
     let Assembled { nodes, rows, stiffness, .. } = body;
     let coupled = |i: usize| neighbours(stiffness, rows, i, |_, _, value| value != 0.0);
     let n = nodes.len();
-    let turns = |i: u32| rows.rotations().binary_search_by_key(&i, |&(own, _)| own).is_ok();
+    let turns = |i: u32| rows.rotations().binary_search_by_key(&i, |&(row, _)| row).is_ok();
     let mut near = coupled(node);
     near.retain(|&j| (j as usize) < n);
     // Nodes with rotations, bars and crowded nodes are not evaluated.
     if turns(node as u32) || near.iter().any(|&j| turns(j)) || near.is_empty() {
         return None;
     }
-    if near.len() > COUPLED || near.iter().all(|&j| is_bar(body, node, j as usize)) {
+    if near.len() > MAX_COUPLED_NODES || near.iter().all(|&j| is_bar(body, node, j as usize)) {
         return None;
     }
     // Coupling among the neighbours as bit masks.
@@ -151,7 +152,7 @@ fn maximal_cliques(
 ) -> bool {
     if candidates | excluded == 0 {
         found.push(chosen);
-        return found.len() <= CLIQUES;
+        return found.len() <= MAX_CLIQUES;
     }
     let bits = |set: u64| (0..adjacent.len()).filter(move |bit| set >> bit & 1 == 1);
     let pivot = bits(candidates | excluded)
@@ -188,11 +189,11 @@ fn part_of_first(positions: &[Vector3<f64>], diagonal_mass: bool) -> Option<f64>
     let covariance = arms.iter().map(|r| r * r.transpose()).sum::<Matrix3<f64>>() / count;
     let root = covariance.determinant().max(0.0).sqrt();
     let ball = (covariance.trace() / 3.0).powf(1.5);
-    if root <= ball * if linear && corners.len() == 4 { FLAT_FOUR } else { FLAT } {
+    if root <= ball * if linear && corners.len() == 4 { FLAT_TETRAHEDRON } else { FLAT_VOLUME } {
         return None;
     }
     let inverse = covariance.try_inverse()?;
-    if arms.iter().any(|r| (r.dot(&(inverse * r)) - 3.0).abs() > CORNER) {
+    if arms.iter().any(|r| (r.dot(&(inverse * r)) - 3.0).abs() > MAX_CORNER_DEVIATION) {
         return None;
     }
     let part = if at_corner(&0) { element.corner } else { element.middle };
@@ -205,7 +206,7 @@ fn is_middle(positions: &[Vector3<f64>], node: usize) -> bool {
     let others = |i: usize| (i + 1..positions.len()).map(move |j| (i, j));
     (0..positions.len()).flat_map(others).filter(|&(i, j)| i != node && j != node).any(|(i, j)| {
         let (a, b) = (positions[i], positions[j]);
-        ((a + b) / 2.0 - x).norm() < CURVED * (a - b).norm()
+        ((a + b) / 2.0 - x).norm() < MAX_CURVED_OFFSET * (a - b).norm()
     })
 }
 
@@ -222,12 +223,12 @@ pub(super) fn check_density(
     let Densities { quartiles, nodes } = densities?;
     let to_si = units.mass.to_si() / units.length.to_si().powi(3);
     let [lower, median, upper] = quartiles.map(|density| density * to_si);
-    if upper >= DENSITIES.0 && lower <= DENSITIES.1 {
+    if upper >= MATERIAL_DENSITIES.0 && lower <= MATERIAL_DENSITIES.1 {
         return Some(median);
     }
-    let said = if units.stated { "" } else { ", which nothing states" };
+    let assumption = if units.stated { "" } else { ", assumed since no units are given" };
     let message = format!(
-        "the elements have a density of {median:.3e} kg/m^3 (median of {nodes} nodes; half of them between {lower:.3e} and {upper:.3e}), with length in {}, mass in {}{said}",
+        "the elements have a density of {median:.3e} kg/m^3 (median of {nodes} nodes; half of them between {lower:.3e} and {upper:.3e}), with length in {}, mass in {}{assumption}",
         units.length.name(),
         units.mass.name()
     );
@@ -242,7 +243,7 @@ pub(super) fn check_density(
         diagnostic = diagnostic.with_help(state_units(&fitting));
     } else if !fitting.is_empty() {
         diagnostic = diagnostic.with_help(format!(
-            "the numbers are those of matter in {fitting}: check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant"
+            "check the units of the manifest and of the coordinates: the numbers fit materials in {fitting}; use --allow-implausible (or allow_implausible in [model]) if the density is intended"
         ));
     }
     found.push(diagnostic);

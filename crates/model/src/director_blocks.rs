@@ -8,13 +8,13 @@ use std::ops::Range;
 
 /// Part of sqrt(M_ii M_jj) below which an entry of the rest is the rounding of the values that it is a
 /// difference of.
-pub(super) const ROUNDING: f64 = 1e-14;
+pub(super) const ROUNDING_ENTRY: f64 = 1e-14;
 
 /// Number of vertices per parallel task.
-const CHUNK: usize = 1024;
+const VERTICES_PER_TASK: usize = 1024;
 
 /// Marks a vertex without directors.
-const NONE: u32 = u32::MAX;
+const NO_DIRECTORS: u32 = u32::MAX;
 
 /// M by blocks of vertices.
 pub(super) struct Blocks<'a> {
@@ -22,7 +22,7 @@ pub(super) struct Blocks<'a> {
     rows: &'a Rows,
     /// Nodes whose rotations carry mass, ascending.
     nodes: Vec<u32>,
-    /// Index in `nodes` of every vertex, or [`NONE`].
+    /// Index in `nodes` of every vertex, or [`NO_DIRECTORS`].
     place_of: Vec<u32>,
     points: usize,
 }
@@ -38,7 +38,7 @@ fn symmetric(n: usize, parts: Vec<Columns>) -> SymmetricMatrix {
 
 /// Columns of a range of vertices.
 #[derive(Default)]
-struct Part {
+struct Partial {
     points: Columns,
     directors: Columns,
     rest_of_points: Columns,
@@ -57,7 +57,7 @@ impl<'a> Blocks<'a> {
             }
         }
         let points = first / rows.dimension;
-        let mut place_of = vec![NONE; points];
+        let mut place_of = vec![NO_DIRECTORS; points];
         nodes.iter().zip(0..).for_each(|(&node, place)| place_of[node as usize] = place);
         (!nodes.is_empty()).then_some(Self { m, rows, nodes, place_of, points })
     }
@@ -69,7 +69,7 @@ impl<'a> Blocks<'a> {
 
     /// Returns the index of a vertex among the nodes whose rotations carry mass.
     pub(crate) fn place(&self, q: usize) -> Option<u32> {
-        Some(self.place_of[q]).filter(|place| *place != NONE)
+        Some(self.place_of[q]).filter(|place| *place != NO_DIRECTORS)
     }
 
     /// Returns the nodes whose rotations carry mass, ascending.
@@ -81,7 +81,7 @@ impl<'a> Blocks<'a> {
     pub(crate) fn split(&self) -> (SymmetricMatrix, Option<SymmetricMatrix>) {
         let d = self.rows.dimension;
         let sizes = self.sizes();
-        let parts: Vec<Part> =
+        let parts: Vec<Partial> =
             self.chunks().into_par_iter().map(|vertices| self.part(vertices, &sizes)).collect();
         let (mut points, mut directors, mut share) = (Vec::new(), Vec::new(), 0.0f64);
         let (mut rest_of_points, mut rest_of_rotations) = (Vec::new(), Vec::new());
@@ -95,7 +95,7 @@ impl<'a> Blocks<'a> {
         // Columns in the order of the extended rows: points, then directors, then rotations.
         points.append(&mut directors);
         let scalar = symmetric(self.points + d * self.nodes.len(), points);
-        if share <= ROUNDING {
+        if share <= ROUNDING_ENTRY {
             return (scalar, None);
         }
         let empty = d * d * self.nodes.len();
@@ -108,7 +108,10 @@ impl<'a> Blocks<'a> {
 
     /// Returns the vertices of every parallel task.
     fn chunks(&self) -> Vec<Range<usize>> {
-        (0..self.points).step_by(CHUNK).map(|i| i..(i + CHUNK).min(self.points)).collect()
+        (0..self.points)
+            .step_by(VERTICES_PER_TASK)
+            .map(|i| i..(i + VERTICES_PER_TASK).min(self.points))
+            .collect()
     }
 
     /// Returns the largest entry of the rest relative to sqrt(M_ii M_jj).
@@ -124,8 +127,8 @@ impl<'a> Blocks<'a> {
     }
 
     /// Returns the columns of these vertices.
-    fn part(&self, vertices: Range<usize>, sizes: &[[f64; 2]]) -> Part {
-        let mut part = Part::default();
+    fn part(&self, vertices: Range<usize>, sizes: &[[f64; 2]]) -> Partial {
+        let mut part = Partial::default();
         for p in vertices {
             let blocks = self.neighbours(p);
             self.point_column(&blocks, &mut part.points);
@@ -147,7 +150,7 @@ impl<'a> Blocks<'a> {
         };
         let mut blocks: Vec<(usize, Block)> = Vec::new();
         for row in self.rows.of_vertex(p) {
-            let own = local(row);
+            let local_row = local(row);
             let (columns, values) = self.m.row(row);
             let mut at = 0;
             for (&column, &value) in columns.iter().zip(values) {
@@ -163,7 +166,7 @@ impl<'a> Blocks<'a> {
                         }
                     },
                 };
-                blocks[at].1[own][local(column as usize)] = value;
+                blocks[at].1[local_row][local(column as usize)] = value;
             }
         }
         blocks
@@ -265,10 +268,7 @@ impl<'a> Blocks<'a> {
             for (l, value) in row.iter_mut().enumerate() {
                 let size = sizes[p][0] * sizes[q][usize::from(l >= 3)];
                 let share = value.abs() / size;
-                match share > ROUNDING {
-                    true => largest = largest.max(share),
-                    false => *value = 0.0,
-                }
+                if share > ROUNDING_ENTRY { largest = largest.max(share) } else { *value = 0.0 }
             }
         }
         (rest, largest)

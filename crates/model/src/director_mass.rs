@@ -15,7 +15,7 @@
 //! of the body; they are called the rest. For a plane body, with the directors e_x, e_y, h = (M_y, -M_x) of
 //! the column M_tr, P = M_rr/2 I and N = 0.
 
-use super::director_blocks::{Blocks, ROUNDING};
+use super::director_blocks::{Blocks, ROUNDING_ENTRY};
 use super::node_moments::NodeMoments;
 use super::rows::Rows;
 use faer::{Mat, MatMut, MatRef};
@@ -81,7 +81,7 @@ impl DirectorMass {
     /// carries mass.
     pub(super) fn rest_share(m: &SymmetricMatrix, rows: &Rows) -> Option<f64> {
         let share = Blocks::new(m, rows)?.share();
-        Some(if share > ROUNDING { share } else { 0.0 })
+        Some(if share > ROUNDING_ENTRY { share } else { 0.0 })
     }
 
     /// Returns the nodes with directors, ascending.

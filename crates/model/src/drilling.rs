@@ -24,7 +24,7 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// Area of the triangle of three nodes, projected across the direction and relative to the square of its
 /// longest side, below which the nodes determine no rotation about it.
-const NARROW: f64 = 1e-3;
+const MIN_TRIANGLE_AREA: f64 = 1e-3;
 
 /// Number of digits of M below which rounding entries along a direction without mass are removed: they
 /// would make M indefinite.
@@ -98,8 +98,8 @@ fn rest(mass: &SymmetricMatrix, follower: &Follower) -> Vec<(u32, u32, f64)> {
         let (rows, values) = mass.row(column as usize);
         product.extend(rows.iter().zip(values).map(|(&row, &value)| (row, part * value)));
     }
-    let own = |row: u32| v.iter().find(|(other, _)| *other == row).map_or(0.0, |(_, part)| *part);
-    let along: f64 = product.iter().map(|&(row, value)| own(row) * value).sum();
+    let weight = |row: u32| v.iter().find(|(other, _)| *other == row).map_or(0.0, |(_, part)| *part);
+    let along: f64 = product.iter().map(|&(row, value)| weight(row) * value).sum();
     let crossed = product.iter().flat_map(|&(row, value)| {
         v.iter().flat_map(move |&(other, part)| [(row, other, -part * value), (other, row, -part * value)])
     });
@@ -109,11 +109,11 @@ fn rest(mass: &SymmetricMatrix, follower: &Follower) -> Vec<(u32, u32, f64)> {
 /// Returns a matrix with further entries added.
 fn sum(matrix: &SymmetricMatrix, added: &[(u32, u32, f64)]) -> SymmetricMatrix {
     let n = matrix.n();
-    let own = (0..n).flat_map(|row| {
+    let unchanged = (0..n).flat_map(|row| {
         let (columns, values) = matrix.row(row);
         columns.iter().zip(values).map(move |(&column, &value)| (row as u32, column, value))
     });
-    let all: Vec<(u32, u32, f64)> = own.chain(added.iter().copied()).collect();
+    let all: Vec<(u32, u32, f64)> = unchanged.chain(added.iter().copied()).collect();
     SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &all))
 }
 
@@ -133,12 +133,12 @@ impl Shell<'_> {
         let mut found = Vec::new();
         let mut first = self.rows.displacements();
         for of_node in self.rows.rotations().chunk_by(|a, b| a.0 == b.0) {
-            let own: Vec<usize> = (first..first + of_node.len()).collect();
+            let rows: Vec<usize> = (first..first + of_node.len()).collect();
             first += of_node.len();
             let node = of_node[0].0 as usize;
             let axes: Vec<usize> = of_node.iter().map(|&(_, axis)| usize::from(axis)).collect();
-            for (direction, stiffness) in self.empty_directions(&own, tolerances) {
-                let direction: Vec<(u32, f64)> = own.iter().map(|&row| row as u32).zip(direction).collect();
+            for (direction, stiffness) in self.empty_directions(&rows, tolerances) {
+                let direction: Vec<(u32, f64)> = rows.iter().map(|&row| row as u32).zip(direction).collect();
                 let term = self.term(node, &axes, &direction);
                 found.extend(term.map(|term| Follower { node, direction, term, stiffness }));
             }
@@ -149,18 +149,18 @@ impl Shell<'_> {
     /// Returns unit vectors in the rotations `own` of a node along which neither K nor M has entries, and
     /// the largest stiffness of these rotations. `tolerances` are the relative rounding errors due to the
     /// digits of K and M.
-    fn empty_directions(&self, own: &[usize], tolerances: [f64; 2]) -> Vec<(Vec<f64>, f64)> {
-        let block = DMatrix::from_fn(own.len(), own.len(), |i, j| entry(self.stiffness, own[i], own[j]));
+    fn empty_directions(&self, rows: &[usize], tolerances: [f64; 2]) -> Vec<(Vec<f64>, f64)> {
+        let block = DMatrix::from_fn(rows.len(), rows.len(), |i, j| entry(self.stiffness, rows[i], rows[j]));
         let eigen = block.symmetric_eigen();
         let largest = eigen.eigenvalues.max();
-        if own.len() < 2 || largest.is_nan() || largest <= 0.0 {
+        if rows.len() < 2 || largest.is_nan() || largest <= 0.0 {
             return Vec::new();
         }
-        let small = (0..own.len()).filter(|&j| eigen.eigenvalues[j] <= 1e-3 * largest);
+        let small = (0..rows.len()).filter(|&j| eigen.eigenvalues[j] <= 1e-3 * largest);
         let vectors = small.map(|j| eigen.eigenvectors.column(j).iter().copied().collect::<Vec<f64>>());
         let is_empty = |vector: &Vec<f64>| {
             let matrices = [self.stiffness, self.mass].into_iter().zip(tolerances);
-            matrices.into_iter().all(|(matrix, tolerance)| vanishes(matrix, own, vector, tolerance))
+            matrices.into_iter().all(|(matrix, tolerance)| vanishes(matrix, rows, vector, tolerance))
         };
         vectors.filter(is_empty).map(|vector| (vector, largest)).collect()
     }
@@ -203,7 +203,7 @@ impl Shell<'_> {
                 let (x, y) = (arm(a), arm(b));
                 let longest = x.norm_squared().max(y.norm_squared());
                 let area = x.cross(&y).dot(normal).abs();
-                if area > NARROW * longest && best.is_none_or(|(largest, _)| area > largest) {
+                if area > MIN_TRIANGLE_AREA * longest && best.is_none_or(|(largest, _)| area > largest) {
                     best = Some((area, [node, a, b]));
                 }
             }
@@ -217,12 +217,12 @@ fn entry(matrix: &SymmetricMatrix, row: usize, column: usize) -> f64 {
     columns.binary_search(&(column as u32)).map_or(0.0, |at| values[at])
 }
 
-/// Returns true if the combination `vector` of the columns `own` is zero within `tolerance` of the largest
+/// Returns true if the combination `vector` of the columns `columns` is zero within `tolerance` of the largest
 /// of them.
-fn vanishes(matrix: &SymmetricMatrix, own: &[usize], vector: &[f64], tolerance: f64) -> bool {
+fn vanishes(matrix: &SymmetricMatrix, columns: &[usize], vector: &[f64], tolerance: f64) -> bool {
     let mut entries: Vec<(u32, f64)> = Vec::new();
     let mut largest = 0.0f64;
-    for (&column, &part) in own.iter().zip(vector) {
+    for (&column, &part) in columns.iter().zip(vector) {
         let (rows, values) = matrix.row(column);
         largest = largest.max(values.iter().map(|value| value * value).sum::<f64>());
         entries.extend(rows.iter().zip(values).map(|(&row, &value)| (row, part * value)));

@@ -7,7 +7,7 @@ use flexbody_linalg::SymmetricMatrix;
 
 /// Row sum of a stiffness, relative to that of its absolute values, below which translations leave the row
 /// free.
-const FREE: f64 = 1e-6;
+const FREE_ROW_SUM: f64 = 1e-6;
 
 /// Returns an error if translations leave M free but not K.
 pub(super) fn check_exchanged_matrices(body: &Assembled) -> Option<Diagnostic> {
@@ -15,7 +15,7 @@ pub(super) fn check_exchanged_matrices(body: &Assembled) -> Option<Diagnostic> {
     let (free_in_mass, free_in_stiffness) = (free_rows(mass, rows), free_rows(stiffness, rows));
     (free_in_mass > 0.5 && free_in_stiffness < 0.1).then(|| {
         let message = format!(
-            "the matrix given as mass ({}) resists no translation, as a stiffness; the one given as stiffness ({}) does, as a mass: they are exchanged",
+            "the matrix given as mass ({}) does not resist translations, like a stiffness matrix, and the one given as stiffness ({}) does, like a mass matrix: they are exchanged",
             raw.mass.path.display(),
             raw.stiffness.path.display()
         );
@@ -36,7 +36,7 @@ fn free_rows(matrix: &SymmetricMatrix, rows: &Rows) -> f64 {
             sums[column as usize % d] += value;
             size += value.abs();
         }
-        match sums.iter().all(|sum: &f64| sum.abs() <= FREE * size) {
+        match sums.iter().all(|sum: &f64| sum.abs() <= FREE_ROW_SUM * size) {
             _ if size == 0.0 => {}
             true => free += 1,
             false => held += 1,

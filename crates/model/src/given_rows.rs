@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 pub type NodeAxes = [[f64; 3]; 3];
 
 /// Largest allowed entry in rows that the model does not have, relative to the largest entry of the matrix.
-const ROUNDING: f64 = 1e-12;
+const MAX_FOREIGN_ENTRY: f64 = 1e-12;
 
 /// Maps from data given by rows, or along the axes of nodes, to the rows of the model.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -38,7 +38,7 @@ impl RowMap {
     /// # Panics
     /// If the shapes of `follows` and `picks` differ.
     pub fn new(follows: CscMatrix, picks: CscMatrix, kept: Vec<u32>) -> Self {
-        let shape = |own: &CscMatrix| (own.n_rows(), own.n_cols());
+        let shape = |matrix: &CscMatrix| (matrix.n_rows(), matrix.n_cols());
         assert_eq!(shape(&follows), shape(&picks), "shapes of a map of rows");
         Self { follows, picks, kept }
     }
@@ -68,9 +68,9 @@ impl RowMap {
         let all = CscMatrix::from_triplets(n, n, &entries);
         let lost = (0..n).find(|&column| {
             let (rows, values) = all.column(column);
-            let own = self.place(column as u32);
+            let target = self.place(column as u32);
             let is_lost = |row: u32, value: f64| {
-                (own.is_none() || self.place(row).is_none()) && value.abs() > ROUNDING * largest
+                (target.is_none() || self.place(row).is_none()) && value.abs() > MAX_FOREIGN_ENTRY * largest
             };
             rows.iter().zip(values).any(|(row, value)| is_lost(*row, *value))
         });
@@ -163,7 +163,7 @@ impl GivenRows {
     pub fn forces(&self, columns: Mat<f64>) -> Result<Mat<f64>, LostRow> {
         let Some(map) = self.map(columns.nrows()) else { return Ok(columns) };
         let (forces, lost) = map.columns(&map.follows, &columns);
-        if lost > ROUNDING * columns.norm_max() { Err(LostRow) } else { Ok(forces) }
+        if lost > MAX_FOREIGN_ENTRY * columns.norm_max() { Err(LostRow) } else { Ok(forces) }
     }
 
     /// Turns displacements given along the axes of the nodes to the axes of the model: rows by `labels`,
@@ -173,7 +173,9 @@ impl GivenRows {
     /// The number of a node with some but not all three of its displacements, or of its rotations.
     pub fn turn(&self, labels: &[DofLabel], columns: &mut Mat<f64>) -> Result<(), i64> {
         let mut vectors: BTreeMap<(i64, bool), [Option<usize>; 3]> = BTreeMap::new();
-        for (row, label) in labels.iter().enumerate().filter(|(_, own)| self.axes.contains_key(&own.node)) {
+        for (row, label) in
+            labels.iter().enumerate().filter(|(_, label_of_row)| self.axes.contains_key(&label_of_row.node))
+        {
             let vector = vectors.entry((label.node, label.direction > 3)).or_default();
             vector[usize::from(label.direction - 1) % 3] = Some(row);
         }
@@ -181,9 +183,9 @@ impl GivenRows {
             let [Some(x), Some(y), Some(z)] = rows else { return Err(node) };
             let (axes, rows) = (self.axes[&node], [x, y, z]);
             for j in 0..columns.ncols() {
-                let own = rows.map(|row| columns[(row, j)]);
+                let local = rows.map(|row| columns[(row, j)]);
                 for (k, row) in rows.into_iter().enumerate() {
-                    columns[(row, j)] = (0..3).map(|axis| axes[axis][k] * own[axis]).sum();
+                    columns[(row, j)] = (0..3).map(|axis| axes[axis][k] * local[axis]).sum();
                 }
             }
         }
@@ -191,7 +193,7 @@ impl GivenRows {
     }
 
     /// Returns only the axes of nodes, for a part of the model: no file has the rows of a part.
-    pub(super) fn of_part(&self) -> Self {
+    pub(super) fn of_body(&self) -> Self {
         Self { maps: Vec::new(), axes: self.axes.clone() }
     }
 }

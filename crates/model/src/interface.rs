@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Width of a node set across its best-fit line, relative to its length, below which it determines no
 /// rotation about that line.
-const COLLINEAR: f64 = 1e-6;
+const COLLINEAR_WIDTH: f64 = 1e-6;
 
 /// Coupling between the nodes of an interface and its reference point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -135,7 +135,7 @@ impl MeanTurning {
             positions.iter().map(|&x| (Vector3::from(x) - centre) / length).collect();
         let inertia: Matrix3<f64> =
             arms.iter().map(|r| Matrix3::identity() * r.norm_squared() - r * r.transpose()).sum();
-        let threshold = COLLINEAR * COLLINEAR * inertia.trace();
+        let threshold = COLLINEAR_WIDTH * COLLINEAR_WIDTH * inertia.trace();
         let (mut inverse, mut moment) = (Matrix3::zeros(), 0.0);
         if threshold.is_finite() {
             // Nodes on one line determine no rotation about it, a single node none at all.

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 /// Part of the nodes of an interface above which its faces (or edges) must reach for their centre to be
 /// used.
-const REACHED: f64 = 0.5;
+const MIN_COVERED_NODES: f64 = 0.5;
 
 /// Nodes of an interface, by indices of `positions`, at least one.
 pub(super) struct InterfaceNodes<'n> {
@@ -34,9 +34,13 @@ impl InterfaceCentre {
     /// of the nodes along it. Otherwise it is the centre of the triangles of the surface `mesh` whose nodes
     /// all belong to the outline of the interface, weighted by area, or that of the edges, weighted by
     /// length; either must reach more than half of the outline. Otherwise it is the mean of the nodes.
-    pub(crate) fn new(own: &InterfaceNodes<'_>, mesh: Option<&SurfaceMesh>, reference: &Reference) -> Self {
-        let members = Members::new(own.nodes, own.positions);
-        let outline = Members::new(own.outline, own.positions);
+    pub(crate) fn new(
+        interface: &InterfaceNodes<'_>,
+        mesh: Option<&SurfaceMesh>,
+        reference: &Reference,
+    ) -> Self {
+        let members = Members::new(interface.nodes, interface.positions);
+        let outline = Members::new(interface.outline, interface.positions);
         let by_mesh = || {
             let mesh = mesh?;
             let faces = outline.centre(mesh.triangles().iter().copied());
@@ -121,7 +125,7 @@ impl<'m> Members<'m> {
             total += size;
         }
         let reached = is_reached.iter().filter(|reached| **reached).count();
-        let is_enough = reached as f64 > REACHED * self.nodes.len() as f64;
+        let is_enough = reached as f64 > MIN_COVERED_NODES * self.nodes.len() as f64;
         (is_enough && total > 0.0).then(|| self.first + moment / total)
     }
 }
@@ -140,8 +144,8 @@ mod tests {
     ];
 
     fn of(nodes: &[u32], mesh: Option<&SurfaceMesh>) -> [f64; 3] {
-        let own = InterfaceNodes { nodes, outline: nodes, positions: &SQUARE };
-        InterfaceCentre::new(&own, mesh, &Reference::Centre).point
+        let interface = InterfaceNodes { nodes, outline: nodes, positions: &SQUARE };
+        InterfaceCentre::new(&interface, mesh, &Reference::Centre).point
     }
 
     #[test]
@@ -168,8 +172,8 @@ mod tests {
     fn an_axis_has_its_point_in_the_middle_of_the_nodes() {
         let axis = Reference::Axis { point: [1.0, 7.0, 1.0], direction: [0.0, 0.0, -3.0] };
         let nodes = [0, 1, 5, 2];
-        let own = InterfaceNodes { nodes: &nodes, outline: &nodes, positions: &SQUARE };
-        let found = InterfaceCentre::new(&own, None, &axis);
+        let interface = InterfaceNodes { nodes: &nodes, outline: &nodes, positions: &SQUARE };
+        let found = InterfaceCentre::new(&interface, None, &axis);
         assert_eq!(found.point, [1.0, 7.0, 7.0]);
         assert_eq!(found.mean, [1.25, 0.75, 6.0]);
     }

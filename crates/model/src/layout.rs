@@ -35,7 +35,7 @@ impl Layout {
 }
 
 /// Marks a missing row.
-const NONE: u32 = u32::MAX;
+const MISSING_ROW: u32 = u32::MAX;
 
 /// Assigns the rows to nodes and directions; all errors are collected in `found`.
 pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layout> {
@@ -113,7 +113,7 @@ fn check_plane(raw: &RawModel, labels: &[DofLabel], found: &mut Vec<Diagnostic>)
     let outside: Vec<DofLabel> = labels.iter().filter(leads_out).copied().collect();
     if !outside.is_empty() {
         let message = format!(
-            "{} degrees of freedom of a plane model lead out of the plane: {}",
+            "{} degrees of freedom of a plane model are out of the plane: {}",
             outside.len(),
             name_some(&outside)
         );
@@ -121,7 +121,7 @@ fn check_plane(raw: &RawModel, labels: &[DofLabel], found: &mut Vec<Diagnostic>)
     }
 }
 
-/// Matrix row of each direction of each node; [`NONE`] for missing directions.
+/// Matrix row of each direction of each node; [`MISSING_ROW`] for missing directions.
 struct RowsOfNodes {
     /// Rows of the nodes of the node table, in its order.
     placed: Vec<[u32; 6]>,
@@ -140,7 +140,7 @@ impl RowsOfNodes {
         // Look up in parallel: there are several labels per node.
         let places: Vec<Option<usize>> =
             labels.par_iter().map(|label| index.get(&label.node).copied()).collect();
-        let mut all = Self { placed: vec![[NONE; 6]; raw.nodes.len()], without_place: Vec::new() };
+        let mut all = Self { placed: vec![[MISSING_ROW; 6]; raw.nodes.len()], without_place: Vec::new() };
         let mut twice = Vec::new();
         let mut later = HashMap::new();
         for (row, (label, place)) in labels.iter().zip(places).enumerate() {
@@ -149,14 +149,14 @@ impl RowsOfNodes {
                 None => {
                     let without_place = &mut all.without_place;
                     let at = *later.entry(label.node).or_insert_with(|| {
-                        without_place.push((label.node, [NONE; 6]));
+                        without_place.push((label.node, [MISSING_ROW; 6]));
                         without_place.len() - 1
                     });
                     &mut without_place[at].1
                 }
             };
             let slot = &mut rows[usize::from(label.direction) - 1];
-            if *slot == NONE {
+            if *slot == MISSING_ROW {
                 *slot = row as u32;
             } else {
                 twice.push(format!("{label} in rows {} and {row}", *slot));
@@ -186,17 +186,17 @@ impl RowsOfNodes {
         let placed = raw.nodes.ids.iter().copied().zip(&mut self.placed);
         let without_place = self.without_place.iter_mut().map(|(node, rows)| (*node, rows));
         for (node, rows) in placed.chain(without_place) {
-            let is_empty = |row: u32| row != NONE && !filled[row as usize];
-            let moves = rows.iter().any(|&row| row != NONE && !is_empty(row));
-            let given = rows.iter().filter(|row| **row != NONE).count();
+            let is_empty = |row: u32| row != MISSING_ROW && !filled[row as usize];
+            let moves = rows.iter().any(|&row| row != MISSING_ROW && !is_empty(row));
+            let given = rows.iter().filter(|row| **row != MISSING_ROW).count();
             if !moves && given > 0 {
                 left_out.nodes.push(node);
                 left_out.of_nodes += given;
-                *rows = [NONE; 6];
+                *rows = [MISSING_ROW; 6];
             }
             for row in rows[3..].iter_mut().filter(|row| is_empty(**row)) {
                 left_out.rotations += 1;
-                *row = NONE;
+                *row = MISSING_ROW;
             }
         }
         left_out
@@ -246,10 +246,10 @@ impl Occupied {
         let mut sorted = Self { used: Vec::new(), unused: Vec::new() };
         let mut incomplete = Vec::new();
         for (i, (rows, &node)) in placed.iter().zip(&raw.nodes.ids).enumerate() {
-            let missing = |k: &usize| rows[*k] == NONE;
+            let missing = |k: &usize| rows[*k] == MISSING_ROW;
             match (0..dimension).filter(missing).count() {
                 0 => sorted.used.push(i),
-                _ if rows.iter().all(|&row| row == NONE) => sorted.unused.push(node),
+                _ if rows.iter().all(|&row| row == MISSING_ROW) => sorted.unused.push(node),
                 _ => {
                     let missing = (0..dimension).filter(missing);
                     incomplete.extend(missing.map(|k| DofLabel { node, direction: k as u8 + 1 }));
@@ -268,10 +268,10 @@ impl Occupied {
         sorted
     }
 
-    /// Adds a note about nodes that are left out, except those whose rows a note already reports (`told`).
-    fn note_unused(&self, raw: &RawModel, told: &[i64], found: &mut Vec<Diagnostic>) {
-        let told: HashSet<i64> = told.iter().copied().collect();
-        let unused: Vec<i64> = self.unused.iter().copied().filter(|node| !told.contains(node)).collect();
+    /// Adds a note about nodes that are left out, except those whose rows a note already reports (`reported`).
+    fn note_unused(&self, raw: &RawModel, reported: &[i64], found: &mut Vec<Diagnostic>) {
+        let reported: HashSet<i64> = reported.iter().copied().collect();
+        let unused: Vec<i64> = self.unused.iter().copied().filter(|node| !reported.contains(node)).collect();
         if !unused.is_empty() {
             let message = format!(
                 "{} nodes have no degree of freedom and are left out: {}",
@@ -292,13 +292,13 @@ fn in_order(raw: &RawModel, placed: &[[u32; 6]], used: Vec<usize>, placeless: Wi
     order.extend(placeless.vectors.iter().flat_map(|(_, rows)| &rows[..dimension]));
     let mut rotations = Vec::new();
     for (internal, &node) in used.iter().enumerate() {
-        for (axis, &row) in placed[node][3..].iter().enumerate().filter(|(_, row)| **row != NONE) {
+        for (axis, &row) in placed[node][3..].iter().enumerate().filter(|(_, row)| **row != MISSING_ROW) {
             rotations.push((internal as u32, axis as u8));
             order.push(row);
         }
     }
     order.extend(placeless.others.iter().map(|(_, row)| row));
-    let mut row_to_internal = vec![NONE; raw.stiffness.matrix.n_cols()];
+    let mut row_to_internal = vec![MISSING_ROW; raw.stiffness.matrix.n_cols()];
     for (internal, row) in order.into_iter().enumerate() {
         row_to_internal[row as usize] = internal as u32;
     }
@@ -335,8 +335,8 @@ fn sort_without_place(
     let mut sorted = WithoutPlace::default();
     let mut missing = Vec::new();
     for &(node, rows) in nodes {
-        let given = || (0..6).filter(|&k| rows[k] != NONE).map(|k| (k, rows[k]));
-        let is_vector = rows[..dimension].iter().all(|&row| row != NONE);
+        let given = || (0..6).filter(|&k| rows[k] != MISSING_ROW).map(|k| (k, rows[k]));
+        let is_vector = rows[..dimension].iter().all(|&row| row != MISSING_ROW);
         let carried = given().filter(|&(_, row)| !massless(row));
         if !is_vector && carried.clone().next().is_some() || carried.clone().any(|(k, _)| k >= dimension) {
             missing.push(node);

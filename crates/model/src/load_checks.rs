@@ -5,7 +5,7 @@ use super::{GeometricStiffness, LoadKind, NodeSet, RawMatrix, UnitLoad};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
 /// Longest name of a load in bytes, since the name becomes a group name in the file.
-const LONGEST: usize = 200;
+const MAX_NAME_BYTES: usize = 200;
 
 /// Adds errors about the loads by themselves.
 pub(super) fn check_loads(
@@ -28,7 +28,7 @@ pub(super) fn check_loads(
                     "geometric stiffness is given for {name}; a body of dimension {dimension} has {have}"
                 ),
             );
-        } else if matches!(kind, LoadKind::Named(name) if name.is_empty() || name.len() > LONGEST || name.contains('\0'))
+        } else if matches!(kind, LoadKind::Named(name) if name.is_empty() || name.len() > MAX_NAME_BYTES || name.contains('\0'))
         {
             let message =
                 "a load of geometric stiffness has no name, or one that is too long or has a NUL in it";

@@ -19,23 +19,23 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Range of plausible speeds of sound in m/s with a margin: the softest foams have about 30, beryllium and
 /// diamond 15,000 to 20,000.
-const SPEEDS: (f64, f64) = (20.0, 25_000.0);
+const PLAUSIBLE_SPEEDS: (f64, f64) = (20.0, 25_000.0);
 
-/// Density (kg/m^3) above which no material has a speed of sound below [`SLOWEST_OF_HEAVY`]: filled rubbers
+/// Density (kg/m^3) above which no material has a speed of sound below [`MIN_HEAVY_SPEED`]: filled rubbers
 /// are lighter.
-const HEAVY: f64 = 2500.0;
+const MIN_HEAVY_DENSITY: f64 = 2500.0;
 /// Lower bound of that speed of sound (m/s): lead has 3500, aluminium 8000.
-const SLOWEST_OF_HEAVY: f64 = 1000.0;
+const MIN_HEAVY_SPEED: f64 = 1000.0;
 
 /// Row sum of a node, relative to its diagonal entry, below which it is too small to divide by.
-const MASSLESS: f64 = 0.01;
+const MIN_ROW_SUM: f64 = 0.01;
 
 /// Largest difference of the mass of a node from the mass expected from its stiffness, relative to the
 /// largest expected mass of its group, for a mass that fits. Nodes of equal elements stay within 0.12 on all
 /// models in docs/plausibility.md.
-const FITS: f64 = 0.15;
+const MAX_FITTING_DIFFERENCE: f64 = 0.15;
 /// Smallest such difference that is reported.
-const MISFITS: f64 = 0.3;
+const MIN_REPORTED_DIFFERENCE: f64 = 0.3;
 
 /// Stiffness and mass of every node.
 pub(super) struct LocalMass {
@@ -77,9 +77,9 @@ impl LocalMass {
                 dilation -= 0.5 * sum;
             }
             let (columns, values) = scalar_mass.row(i);
-            let own = columns.iter().zip(values).take_while(|(j, _)| (**j as usize) < n);
+            let entries = columns.iter().zip(values).take_while(|(j, _)| (**j as usize) < n);
             let (mut mass, mut diagonal) = (0.0, 0.0);
-            for (&j, &value) in own {
+            for (&j, &value) in entries {
                 mass += value;
                 if j as usize == i {
                     diagonal = value;
@@ -95,7 +95,7 @@ impl LocalMass {
     pub(crate) fn sound_speed(&self, dimension: usize) -> Option<SoundSpeed> {
         let d = dimension as f64;
         let mut ratios: Vec<f64> = (0..self.mass.len())
-            .filter(|&i| self.mass[i].abs() > MASSLESS * self.diagonal[i].abs())
+            .filter(|&i| self.mass[i].abs() > MIN_ROW_SUM * self.diagonal[i].abs())
             .map(|i| self.dilation[i] / self.mass[i])
             .filter(|ratio| ratio.is_finite())
             .collect();
@@ -122,9 +122,13 @@ impl LocalMass {
             let size =
                 group.iter().fold(0.0f64, |size, &i| size.max(self.mass[i].abs()).max(expected(i).abs()));
             let off = |mass: f64, i: usize| (mass - expected(i)).abs() / size;
-            let wrong: Vec<usize> = group.into_iter().filter(|&i| off(self.mass[i], i) > MISFITS).collect();
+            let wrong: Vec<usize> =
+                group.into_iter().filter(|&i| off(self.mass[i], i) > MIN_REPORTED_DIFFERENCE).collect();
             for (at, &i) in wrong.iter().enumerate() {
-                let fits = |j: &&usize| off(self.mass[**j], i) < FITS && off(self.mass[i], **j) < FITS;
+                let fits = |j: &&usize| {
+                    off(self.mass[**j], i) < MAX_FITTING_DIFFERENCE
+                        && off(self.mass[i], **j) < MAX_FITTING_DIFFERENCE
+                };
                 pairs.extend(wrong[at + 1..].iter().find(fits).map(|&j| [i, j]));
             }
         }
@@ -186,22 +190,25 @@ pub(super) fn check_speed(
     };
     let to_si = units.length.to_si() / units.time.to_si();
     let (whole, median) = (speeds.whole * to_si, speeds.median * to_si);
-    let heavy = density.filter(|density| *density > HEAVY);
-    let slowest = if heavy.is_some() { SLOWEST_OF_HEAVY } else { SPEEDS.0 };
-    if whole.min(median) > SPEEDS.1 || whole.max(median) < slowest {
-        let matter = heavy.map_or(String::new(), |density| format!(" in matter of {density:.0} kg/m^3"));
+    let heavy = density.filter(|density| *density > MIN_HEAVY_DENSITY);
+    let slowest = if heavy.is_some() { MIN_HEAVY_SPEED } else { PLAUSIBLE_SPEEDS.0 };
+    if whole.min(median) > PLAUSIBLE_SPEEDS.1 || whole.max(median) < slowest {
+        let matter = heavy.map_or(String::new(), |density| format!(" in a material of {density:.0} kg/m^3"));
         let message = format!(
             "stiffness, mass and coordinates give a speed of sound of {median:.3e} m/s{matter} (median of the nodes; {whole:.3e} m/s of the whole body)"
         );
         let fitting = units_of_speed(speeds.median).join(", or in ");
         let unstated = !units.stated && !body.raw.allow_implausible && !fitting.is_empty();
-        found.push(match unstated && !found.iter().any(|own| own.code() == Code::DensityImplausible) {
-            true => Diagnostic::new(
-                Code::DensityImplausible,
-                format!("{message}, with numbers in m, kg, s, which nothing states"),
-            )
-            .with_help(state_units(&fitting)),
-            false => Diagnostic::new(Code::SpeedImplausible, message),
-        });
+        found.push(
+            if unstated && !found.iter().any(|diagnostic| diagnostic.code() == Code::DensityImplausible) {
+                Diagnostic::new(
+                    Code::DensityImplausible,
+                    format!("{message}, with numbers in m, kg, s, assumed since no units are given"),
+                )
+                .with_help(state_units(&fitting))
+            } else {
+                Diagnostic::new(Code::SpeedImplausible, message)
+            },
+        );
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 /// Largest size, and reciprocal of the smallest, of a quantity: squares of all quantities then stay
 /// twenty-eight decades within the range of double precision, a margin for modes and rounding errors.
-const LARGEST: f64 = 1e140;
+const MAX_MAGNITUDE: f64 = 1e140;
 
 /// Returns an error if K, M, the size of the body, or quantities derived from them are so large or small
 /// that products overflow or vanish.
@@ -35,11 +35,11 @@ pub(super) fn check_magnitudes(
         ("stiffness / mass", k / m, mass_file),
         ("mass length^2", m * size * size, mass_file),
     ];
-    let fits = |value: f64| (LARGEST.recip()..=LARGEST).contains(&value);
+    let fits = |value: f64| (MAX_MAGNITUDE.recip()..=MAX_MAGNITUDE).contains(&value);
     let (name, value, file) = quantities.into_iter().find(|&(_, value, _)| !fits(value))?;
     let message = format!(
-        "{name} is of the order of {value:.0e}, not within {:.0e} and {LARGEST:.0e}",
-        LARGEST.recip()
+        "{name} is of the order of {value:.0e}, not within {:.0e} and {MAX_MAGNITUDE:.0e}",
+        MAX_MAGNITUDE.recip()
     );
     Some(Diagnostic::new(Code::MagnitudeExtreme, message).in_file(file))
 }

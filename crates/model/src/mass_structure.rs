@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of nodes per parallel task: sums have fixed partitions.
-const NODES: usize = 2048;
+const NODES_PER_TASK: usize = 2048;
 
 /// Form of the mass matrix.
 pub(super) struct MassForm {
@@ -35,8 +35,9 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
     let dimension = rows.dimension;
     let displacements = rows.displacements();
     let n = displacements / dimension;
-    let chunks =
-        |n: usize| -> Vec<Range<usize>> { (0..n).step_by(NODES).map(|i| i..(i + NODES).min(n)).collect() };
+    let chunks = |n: usize| -> Vec<Range<usize>> {
+        (0..n).step_by(NODES_PER_TASK).map(|i| i..(i + NODES_PER_TASK).min(n)).collect()
+    };
     let parts: Vec<([f64; 3], f64)> = chunks(rows.nodes)
         .into_par_iter()
         .map(|nodes| directional_mass(m, dimension, dimension * rows.nodes, nodes))
@@ -67,7 +68,7 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
     // Massless nodes have no scale of their own: compare with the mean nodal mass.
     let smallest = f64::EPSILON * mean / n as f64;
     let scale = |a: usize, b: usize| (sizes[a] * sizes[b]).max(smallest);
-    let parts: Vec<Part> =
+    let parts: Vec<Partial> =
         chunks(n).into_par_iter().map(|nodes| reduce(m, dimension, displacements, nodes, scale)).collect();
     let mut form = joined(n, parts);
     form.commutes = form.deviation <= tolerance && (displacements..m.n()).all(|row| m.row(row).0.is_empty());
@@ -76,7 +77,7 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
 
 /// Joins Ms (n x n) from its column parts and finds the largest deviation of a block with its position;
 /// `commutes` is still to be set.
-fn joined(n: usize, parts: Vec<Part>) -> MassForm {
+fn joined(n: usize, parts: Vec<Partial>) -> MassForm {
     let (mut deviation, mut worst, mut exact) = (0.0f64, (0, 0), true);
     let mut columns = Vec::with_capacity(parts.len());
     for part in parts {
@@ -116,7 +117,7 @@ fn directional_mass(
 
 /// Some columns of Ms, and the largest deviation of their blocks with its position in M.
 #[derive(Default)]
-struct Part {
+struct Partial {
     columns: Columns,
     worst: f64,
     worst_at: (usize, usize),
@@ -132,9 +133,9 @@ fn reduce(
     end: usize,
     nodes: Range<usize>,
     scale: impl Fn(usize, usize) -> f64,
-) -> Part {
+) -> Partial {
     let d = dimension as u32;
-    let mut part = Part::default();
+    let mut part = Partial::default();
     for node in nodes {
         let row = |k: usize| {
             let (columns, values) = m.row(dimension * node + k);
@@ -182,7 +183,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-impl Part {
+impl Partial {
     fn deviates(&mut self, by: f64, row: usize, column: usize) {
         if by > self.worst {
             (self.worst, self.worst_at) = (by, (row, column));

@@ -60,7 +60,7 @@ pub(super) fn symmetric(
         );
         let mut diagnostic = Diagnostic::new(Code::MatrixAsymmetric, message).in_file(&raw.path);
         if one_sided * 2 >= ordered.nnz().saturating_sub(n) * 2 && one_sided > 0 {
-            diagnostic = diagnostic.with_help("only one triangle is stored: declare the matrix symmetric");
+            diagnostic = diagnostic.with_help("declare the matrix symmetric: only one triangle is stored");
         }
         found.push(diagnostic);
         return None;
@@ -82,27 +82,27 @@ struct Asymmetry {
 impl Asymmetry {
     fn of(matrix: &CscMatrix) -> Self {
         /// Number of columns per parallel task.
-        const COLUMNS: usize = 256;
+        const COLUMNS_PER_TASK: usize = 256;
         let n = matrix.n_cols();
         let size: Vec<f64> = (0..n).map(|i| matrix.get(i, i).abs().sqrt()).collect();
         let of_column = |j: usize| {
-            let mut own = Self::default();
+            let mut task = Self::default();
             let (rows, values) = matrix.column(j);
             for (&i, &v) in rows.iter().zip(values) {
                 let i = i as usize;
                 let other = matrix.get(j, i);
-                own.one_sided += usize::from(other == 0.0);
+                task.one_sided += usize::from(other == 0.0);
                 // An entry larger than the root of its diagonal entries, which occurs in indefinite
                 // matrices only, is compared with itself.
                 let scale = (size[i] * size[j]).max(v.abs()).max(other.abs());
                 let difference = (v - other).abs() / scale;
-                if difference > own.worst {
-                    (own.worst, own.at) = (difference, (i, j));
+                if difference > task.worst {
+                    (task.worst, task.at) = (difference, (i, j));
                 }
             }
-            own
+            task
         };
-        let columns = (0..n).into_par_iter().with_min_len(COLUMNS);
+        let columns = (0..n).into_par_iter().with_min_len(COLUMNS_PER_TASK);
         columns.map(of_column).reduce(Self::default, Self::and)
     }
 

@@ -11,10 +11,10 @@ use std::collections::HashMap;
 
 /// Mass between two rows, relative to the root of their diagonal entries, below which it is the rounding of
 /// zero.
-const NOTHING: f64 = 1e-10;
+const ROUNDING_MASS: f64 = 1e-10;
 
 /// Number of vertices per parallel task.
-const VERTICES: usize = 2048;
+const VERTICES_PER_TASK: usize = 2048;
 
 /// Pairs of vertices ([`Rows::vertex`]) coupled by the mass.
 #[derive(Default)]
@@ -29,9 +29,9 @@ impl MassPairs {
     /// Finds all pairs in matrices in the internal order.
     pub(crate) fn new(stiffness: &SymmetricMatrix, mass: &SymmetricMatrix, rows: &Rows) -> Self {
         let diagonal = mass.diagonal();
-        let own = |first: usize| {
+        let pairs_of_chunk = |first: usize| {
             let mut part = Self::default();
-            for vertex in first..(first + VERTICES).min(rows.vertices()) {
+            for vertex in first..(first + VERTICES_PER_TASK).min(rows.vertices()) {
                 let mut coupled = by_mass(mass, &diagonal, rows, vertex);
                 coupled.retain(|&other| other as usize > vertex);
                 part.count += coupled.len();
@@ -44,9 +44,9 @@ impl MassPairs {
             }
             part
         };
-        let starts = (0..rows.vertices()).into_par_iter().step_by(VERTICES);
+        let starts = (0..rows.vertices()).into_par_iter().step_by(VERTICES_PER_TASK);
         let mut all = Self::default();
-        for part in starts.map(own).collect::<Vec<_>>() {
+        for part in starts.map(pairs_of_chunk).collect::<Vec<_>>() {
             all.count += part.count;
             all.foreign.extend(part.foreign);
         }
@@ -80,7 +80,7 @@ pub(super) fn neighbours(
 
 fn by_mass(mass: &SymmetricMatrix, diagonal: &[f64], rows: &Rows, vertex: usize) -> Vec<u32> {
     let counts = |i: usize, j: usize, value: f64| {
-        value != 0.0 && value * value > NOTHING * NOTHING * (diagonal[i] * diagonal[j]).abs()
+        value != 0.0 && value * value > ROUNDING_MASS * ROUNDING_MASS * (diagonal[i] * diagonal[j]).abs()
     };
     neighbours(mass, rows, vertex, counts)
 }
@@ -112,7 +112,7 @@ pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) ->
     } else if let Some(order) = other_order(body) {
         found.push(report(Code::MassOrder).with_help(order));
     } else if are_mass_elements(mass, rows, count, &foreign) {
-        let help = "each of these nodes shares mass with each other, as of a mass element or a mass spread over nodes: nothing to do if the model has one";
+        let help = "nothing to do if the model has a mass element or a mass spread over nodes: each of these nodes shares mass with each other";
         found.push(report(Code::MassPairs).with_help(help));
     } else {
         found.push(report(Code::MassOrder));
@@ -141,25 +141,25 @@ fn are_mass_elements(mass: &SymmetricMatrix, rows: &Rows, count: usize, foreign:
         if seen.contains_key(&first) {
             continue;
         }
-        let mut own = vec![first];
+        let mut clique = vec![first];
         seen.insert(first, group);
         let mut at = 0;
-        while at < own.len() {
-            for &other in &pairs_of[&own[at]] {
+        while at < clique.len() {
+            for &other in &pairs_of[&clique[at]] {
                 if seen.insert(other, group).is_none() {
-                    own.push(other);
+                    clique.push(other);
                 }
             }
             at += 1;
         }
-        let pairs = own.iter().map(|vertex| pairs_of[vertex].len()).sum::<usize>() / 2;
+        let pairs = clique.iter().map(|vertex| pairs_of[vertex].len()).sum::<usize>() / 2;
         let single = pairs == 1 && foreign.len() > 1;
-        let star = pairs > 1 && own.iter().any(|vertex| pairs_of[vertex].len() == pairs);
+        let star = pairs > 1 && clique.iter().any(|vertex| pairs_of[vertex].len() == pairs);
         let complete = |&vertex: &u32| {
             let coupled = by_mass(mass, &diagonal, rows, vertex as usize);
-            coupled.iter().filter(|other| seen.get(other) == Some(&group)).count() == own.len() - 1
+            coupled.iter().filter(|other| seen.get(other) == Some(&group)).count() == clique.len() - 1
         };
-        if single || star || !own.iter().all(complete) {
+        if single || star || !clique.iter().all(complete) {
             return false;
         }
     }
@@ -193,27 +193,27 @@ fn other_order(body: &Assembled) -> Option<&'static str> {
         (
             true,
             &|row| by_label[row],
-            "the rows of the mass matrix follow ascending node numbers, those of the stiffness matrix another order: write both in one",
+            "write both matrices in one order: the rows of the mass matrix follow ascending node numbers, those of the stiffness matrix do not",
         ),
         (
             true,
             &|row| row,
-            "the rows of the mass matrix follow the node table, those of the stiffness matrix another order: write both in one",
+            "write both matrices in one order: the rows of the mass matrix follow the node table, those of the stiffness matrix do not",
         ),
         (
             true,
             &|row| internal(n - 1 - row),
-            "the rows of the mass matrix stand in the reverse order of those of the stiffness matrix: write both in one",
+            "write both matrices in one order: the rows of the mass matrix are in the reverse order of those of the stiffness matrix",
         ),
         (
             per_node * rows.nodes == n,
             &|row| internal(blocked(row)),
-            "the rows of the mass matrix are those of the first direction for all nodes, then the second, and so on; those of the stiffness matrix go node by node: write both in one order",
+            "write both matrices in one order: the rows of the mass matrix go direction by direction, those of the stiffness matrix node by node",
         ),
         (
             per_node * rows.nodes == n,
             &|row| internal(transposed(row)),
-            "the rows of the mass matrix go node by node, those of the stiffness matrix direction by direction: write both in one order",
+            "write both matrices in one order: the rows of the mass matrix go node by node, those of the stiffness matrix direction by direction",
         ),
     ];
     orders.iter().find(|(possible, to, _)| *possible && fits(body, &row_of, to)).map(|(.., help)| *help)
@@ -226,11 +226,12 @@ fn fits(body: &Assembled, row_of: &[usize], to: &dyn Fn(usize) -> usize) -> bool
     let place: Vec<usize> = row_of.iter().map(|&row| rows.vertex(to(row))).collect();
     let mut tied: HashMap<usize, Vec<u32>> = HashMap::new();
     (0..rows.len()).all(|row| {
-        let own = place[row];
-        let near = tied.entry(own).or_insert_with(|| neighbours(stiffness, rows, own, |_, _, v| v != 0.0));
+        let target = place[row];
+        let near =
+            tied.entry(target).or_insert_with(|| neighbours(stiffness, rows, target, |_, _, v| v != 0.0));
         mass.row(row).0.iter().all(|&column| {
             let other = place[column as usize];
-            other == own || near.binary_search(&(other as u32)).is_ok()
+            other == target || near.binary_search(&(other as u32)).is_ok()
         })
     })
 }

@@ -9,19 +9,19 @@ use std::collections::HashMap;
 
 /// Distance of a reference point from the middle of the nodes, relative to the largest distance of a node,
 /// above which it is an error, usually of units. Rotations about a point this far away lose four digits.
-const FARTHEST: f64 = 100.0;
+const MAX_RELATIVE_DISTANCE: f64 = 100.0;
 
 /// Distance of a reference point from the middle of its nodes, relative to the extent of the nodes, above
 /// which a warning is given.
-const REACH: f64 = 3.0;
-/// Smallest extent of the nodes of an interface, relative to the body, that [`REACH`] is applied to.
-const SMALLEST: f64 = 0.05;
+const WARNING_DISTANCE: f64 = 3.0;
+/// Smallest extent of the nodes of an interface, relative to the body, that [`WARNING_DISTANCE`] is applied to.
+const MIN_RELATIVE_EXTENT: f64 = 0.05;
 
 /// Distance of the default point of an interface from the mean of its nodes, relative to the largest
 /// distance between two of them, above which a warning is given.
-const ASIDE: f64 = 0.01;
+const MEAN_POINT_DISTANCE: f64 = 0.01;
 /// Length, relative to the body, below which a distance or a coordinate counts as rounding.
-const ROUNDING: f64 = 1e-9;
+const ROUNDING_LENGTH: f64 = 1e-9;
 
 /// Replaces the definitions of reference points by positions, and adds errors for invalid ones.
 pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut Vec<Diagnostic>) {
@@ -37,7 +37,7 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
         }
         let places = |ids: &[i64]| ids.iter().filter_map(|id| index.get(id)).copied().collect::<Vec<u32>>();
         let nodes = places(&set.nodes);
-        let own: Vec<[f64; 3]> = nodes.iter().map(|&node| positions[node as usize]).collect();
+        let member_positions: Vec<[f64; 3]> = nodes.iter().map(|&node| positions[node as usize]).collect();
         match set.reference {
             Reference::Node(id) => match index.get(&id) {
                 Some(&node) => set.reference = Reference::Point(positions[node as usize]),
@@ -52,14 +52,14 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
                 outline.dedup();
                 let members = InterfaceNodes { nodes: &nodes, outline: &outline, positions };
                 let centre = InterfaceCentre::new(&members, raw.mesh.as_ref(), &set.reference);
-                found.extend(beside_the_mean(&set.name, &centre, &own, body.size));
+                found.extend(beside_the_mean(&set.name, &centre, &member_positions, body.size));
                 set.reference = Reference::Default(centre.point);
             }
             _ => {}
         }
         if let Some(x) = set.reference.point() {
             let problem = impossible(&set.name, x, raw.dimension, &body);
-            found.extend(problem.or_else(|| far_reference(&set.name, x, &own, body.size)));
+            found.extend(problem.or_else(|| far_reference(&set.name, x, &member_positions, body.size)));
         }
     }
 }
@@ -82,11 +82,11 @@ fn impossible(name: &str, reference: [f64; 3], dimension: u8, body: &Extent) -> 
         return Some(Diagnostic::new(Code::DirectionOutOfPlane, message));
     }
     let away = (Vector3::from(reference) - Vector3::from(body.centre)).norm() / body.size;
-    (away.is_nan() || away > FARTHEST).then(|| {
+    (away.is_nan() || away > MAX_RELATIVE_DISTANCE).then(|| {
         let message = format!(
             "reference point of interface `{name}` is {away:.1e} times the size of the body away from its middle"
         );
-        let help = "it is in model axes and in the unit of length of the nodes";
+        let help = "give the reference point in model axes and in the unit of length of the nodes";
         Diagnostic::new(Code::InterfaceCoupling, message).with_help(help)
     })
 }
@@ -101,11 +101,11 @@ fn beside_the_mean(
 ) -> Option<Diagnostic> {
     let away = (Vector3::from(centre.point) - Vector3::from(centre.mean)).norm();
     let extent = span(nodes);
-    (away > ASIDE * extent && away > ROUNDING * size).then(|| {
+    (away > MEAN_POINT_DISTANCE * extent && away > ROUNDING_LENGTH * size).then(|| {
         let [point, mean] = [centre.point, centre.mean].map(|x| in_words(x, size));
         let away = significant(away, 4);
         let message = format!(
-            "interface `{name}`: the reference point is {}, at ({point}); the mean of its nodes, ({mean}), is {away} beside it, with an extent of {}",
+            "interface `{name}`: the reference point is {}, at ({point}); the mean of its nodes, ({mean}), is {away} away from it, and the nodes extend over {}",
             centre.origin,
             significant(extent, 4)
         );
@@ -115,7 +115,7 @@ fn beside_the_mean(
 
 /// Formats a point as `120, 0, -3.25`, with six digits; rounding relative to `size` becomes zero.
 fn in_words(point: [f64; 3], size: f64) -> String {
-    point.map(|x| significant(if x.abs() <= ROUNDING * size { 0.0 } else { x }, 6)).join(", ")
+    point.map(|x| significant(if x.abs() <= ROUNDING_LENGTH * size { 0.0 } else { x }, 6)).join(", ")
 }
 
 /// Returns a warning for a reference point that is far from its nodes compared with their extent, in a body
@@ -127,8 +127,8 @@ fn far_reference(name: &str, reference: [f64; 3], nodes: &[[f64; 3]], size: f64)
         _ => centre_and_length(nodes),
     };
     let away = (Vector3::from(reference) - Vector3::from(centre)).norm();
-    let reach = radius.max(SMALLEST * size);
-    (away > REACH * reach).then(|| {
+    let reach = radius.max(MIN_RELATIVE_EXTENT * size);
+    (away > WARNING_DISTANCE * reach).then(|| {
         let message = format!(
             "reference point of interface `{name}` is {away:.3e} away from the middle of its nodes, which reach {radius:.3e} from there, in a body of {size:.3e}"
         );

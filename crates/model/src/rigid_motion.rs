@@ -9,11 +9,12 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{Pencil, gram, largest};
 
 /// Returns max |K R|_i / sum_j |K_ij| over the rows. Adds an error if rigid motion strains the body, above
-/// the second limit: node tables with few digits leave up to 1e-6, supports 0.01 to 1. Above the first
-/// limit a note reports the accuracy of the positions, since the invariants have no more digits.
+/// `limit`: node tables with few digits leave up to 1e-6, supports 0.01 to 1. Above `rounded` a note
+/// reports the accuracy of the positions, since the invariants have no more digits.
 pub(super) fn check_rigid_motion(
     body: &Assembled,
-    (rounded, limit): (f64, f64),
+    rounded: f64,
+    limit: f64,
     found: &mut Vec<Diagnostic>,
 ) -> f64 {
     let Assembled { raw, nodes, rows, stiffness, .. } = body;
@@ -36,20 +37,20 @@ pub(super) fn check_rigid_motion(
         let help = match mislabelled(body, limit) {
             Some(help) => help,
             None if is_stressed(body, &fields, &strained, limit) => {
-                "at these nodes K turns forces with rotations and lets translations free: it holds the stress of a preload (pretension of a member, contact, pressure); write K of the unloaded body, and give the stress stiffness as [[geometric_stiffness]]"
+                "write K of the unloaded body, and give the stress stiffness as [[geometric_stiffness]]: at these nodes K resists rotations but not translations, so that it contains the stress of a preload (pretension of a member, contact, pressure)"
             }
             None if strained.len() * 2 < residuals.len() => {
-                "these degrees of freedom are supported or tied to ground: export the free body"
+                "export the free body: these degrees of freedom are supported or tied to ground"
             }
             None => {
-                "nearly all rows fail: coordinates in other units or another node order than the matrices, or rotations labelled as displacements"
+                "check units and order of the coordinates, and the labels of rotations: nearly all rows fail"
             }
         };
         let diagnostic = Diagnostic::new(Code::RigidMotionStrained, message);
         found.push(diagnostic.in_file(&raw.stiffness.path).with_help(help));
     } else if worst > rounded {
         let message = format!(
-            "|K R| reaches {worst:.1e} of the row sum of |K|: node positions and stiffness agree to about as much of the size of the body"
+            "|K R| reaches {worst:.1e} of the row sum of |K|: node positions fit the stiffness to about this part of the size of the body"
         );
         found.push(Diagnostic::new(Code::NodesRounded, message).in_file(&raw.nodes_path));
     }
@@ -61,7 +62,7 @@ pub(super) fn check_rigid_motion(
 /// stress. `fields` are the rigid motions, with rotations divided by a length.
 fn is_stressed(body: &Assembled, fields: &Mat<f64>, strained: &[usize], limit: f64) -> bool {
     /// Part of the forces that may deviate from theta x F.
-    const OTHER: f64 = 1e-3;
+    const MAX_FORCE_DEVIATION: f64 = 1e-3;
     let d = body.rows.dimension;
     let force = |row: usize, field: usize| {
         let (columns, values) = body.stiffness.row(row);
@@ -78,7 +79,7 @@ fn is_stressed(body: &Assembled, fields: &Mat<f64>, strained: &[usize], limit: f
             let block = [0, 1, 2].map(|k| [3, 4, 5].map(|field| force(3 * vertex + k, field)));
             let pairs = || (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
             let largest = pairs().map(|(k, l)| block[k][l].abs()).fold(0.0, f64::max);
-            pairs().all(|(k, l)| (block[k][l] + block[l][k]).abs() <= OTHER * largest)
+            pairs().all(|(k, l)| (block[k][l] + block[l][k]).abs() <= MAX_FORCE_DEVIATION * largest)
         })
 }
 
@@ -131,15 +132,15 @@ impl<'a> Readings<'a> {
         let readings = [
             (
                 [0, 1, 5],
-                "rows are ux, uy, rz of a plane frame: set `dimension = 2` and label the rotations with direction 6",
+                "set `dimension = 2` and label the rotations with direction 6: the rows are ux, uy, rz of a plane frame",
             ),
             (
                 [0, 2, 4],
-                "rows are ux, uz, ry of a plane frame: label them 1, 3, 5 in space, or turn its plane to x, y and set `dimension = 2`",
+                "label the rows 1, 3, 5 in space, or rotate the model to the plane x, y and set `dimension = 2`: the rows are ux, uz, ry of a plane frame",
             ),
             (
                 [2, 3, 4],
-                "rows are uz, rx, ry of a plate in bending: label them 3, 4, 5 and give the displacements in its plane as well",
+                "label the rows 3, 4, 5 and give the displacements in the plane as well: the rows are uz, rx, ry of a plate in bending",
             ),
         ];
         let n = self.body.nodes.len();
@@ -151,7 +152,7 @@ impl<'a> Readings<'a> {
         }
         let blocked = Mat::from_fn(3 * n, 6, |row, c| self.fields[(3 * (row % n) + row / n, c)]);
         self.are_free(&blocked, |_| false)
-            .then_some("rows are those of x for all nodes, then y, then z: give a dofs table that says so")
+            .then_some("give a dofs table: the rows are those of x for all nodes, then y, then z")
     }
 
     /// Tests if displacements and rotations of every node are labelled as each other.
@@ -166,7 +167,7 @@ impl<'a> Readings<'a> {
             Some(turn) => self.motion(turn / 3, turn % 3, c),
         });
         self.are_free(&swapped, |row| row < 3 * n).then_some(
-            "rotations are labelled as displacements and displacements as rotations: 1, 2, 3 are ux, uy, uz and 4, 5, 6 are rx, ry, rz",
+            "label ux, uy, uz as 1, 2, 3 and rx, ry, rz as 4, 5, 6: here rotations are labelled as displacements and displacements as rotations",
         )
     }
 }

@@ -11,7 +11,7 @@ use flexbody_linalg::{SymmetricMatrix, connected_components};
 use std::ops::Range;
 
 /// Largest rigid motion of a row at rest, relative to a unit translation: rounding of the stiffness.
-const STILL: f64 = 1e-9;
+const MAX_MOTION_AT_REST: f64 = 1e-9;
 
 /// Rows of a model beyond its plain displacements, and the order of all rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,7 +99,7 @@ impl Rows {
     /// Returns the rows of a [`vertex`](Self::vertex), ascending.
     pub(super) fn of_vertex(&self, vertex: usize) -> impl Iterator<Item = usize> {
         let (after, d) = (self.displacements(), self.dimension);
-        let up_to = |node: usize| after + self.rotations.partition_point(|&(own, _)| (own as usize) < node);
+        let up_to = |node: usize| after + self.rotations.partition_point(|&(row, _)| (row as usize) < node);
         let (first, second) = match vertex.checked_sub(self.nodes + self.vectors.len()) {
             Some(other) => {
                 (after + self.rotations.len() + other..after + self.rotations.len() + other + 1, 0..0)
@@ -139,7 +139,7 @@ impl Rows {
     pub(super) fn are_still(&self) -> bool {
         let known = &self.recovered.fields;
         let rows = self.dimension * self.vectors.len();
-        (0..known.ncols()).all(|c| (0..rows).all(|row| known[(row, c)].abs() < STILL))
+        (0..known.ncols()).all(|c| (0..rows).all(|row| known[(row, c)].abs() < MAX_MOTION_AT_REST))
     }
 
     /// Returns the connected component of every vertex, numbered from 0 in the order of their first
@@ -172,12 +172,12 @@ impl Rows {
         let mut number = vec![usize::MAX; root.len()];
         let mut count = 0;
         let numbered = |&c: &usize| {
-            let own = &mut number[find(&root, c)];
-            if *own == usize::MAX {
-                *own = count;
+            let component = &mut number[find(&root, c)];
+            if *component == usize::MAX {
+                *component = count;
                 count += 1;
             }
-            *own
+            *component
         };
         first.iter().map(numbered).collect()
     }

@@ -46,8 +46,8 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
         let number = BodyNumber { number: i + 1, of: count };
         match check_body(body, Some(number), Vec::new()) {
             Ok(mut one) => {
-                let own = one.diagnostics.into_iter().map(|diagnostic| diagnostic.about(number));
-                one.diagnostics = shared.iter().cloned().chain(own).collect();
+                let numbered = one.diagnostics.into_iter().map(|diagnostic| diagnostic.about(number));
+                one.diagnostics = shared.iter().cloned().chain(numbered).collect();
                 checked.push(one);
             }
             Err(error) => failed.push(error.about(number)),
@@ -76,7 +76,7 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
     let parts = members.into_iter().zip(nodes.into_iter().zip(interfaces));
     let mut bodies = Vec::with_capacity(parts.len());
     for (i, ((kept, rows), (nodes, interfaces))) in parts.enumerate() {
-        bodies.push(part(&whole, i + 1, &kept, rows, nodes, interfaces));
+        bodies.push(body_model(&whole, i + 1, &kept, rows, nodes, interfaces));
     }
     Ok(bodies)
 }
@@ -85,7 +85,7 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
 fn too_small(whole: &Assembled, component: &[usize], members: &[(Vec<usize>, Rows)]) -> Option<Diagnostic> {
     let bodies = groups(component, &whole.rows, &whole.nodes);
     let rigid = rigid_count(whole.rows.dimension);
-    let few = bodies.iter().zip(members).filter(|(_, (own, _))| own.len() <= rigid);
+    let few = bodies.iter().zip(members).filter(|(_, (body_rows, _))| body_rows.len() <= rigid);
     let small: Vec<Vec<i64>> = few.map(|(numbers, _)| numbers.clone()).collect();
     (!small.is_empty()).then(|| {
         let message = format!(
@@ -122,9 +122,10 @@ fn check_loads_of_others(
     let body_of = |row: usize| component[rows.vertex(row)];
     for GeometricStiffness { load, matrix } in geometric_stiffness {
         let at = load.kind.interface();
-        let own = interfaces.iter().position(|sets| sets.iter().any(|set| at == Some(set.name.as_str())));
+        let body_of_load =
+            interfaces.iter().position(|sets| sets.iter().any(|set| at == Some(set.name.as_str())));
         let elsewhere = |b| (0..matrix.n()).find(|&row| body_of(row) != b && !matrix.row(row).0.is_empty());
-        if let Some((body, row)) = own.and_then(|b| Some((b + 1, elsewhere(b)?))) {
+        if let Some((body, row)) = body_of_load.and_then(|b| Some((b + 1, elsewhere(b)?))) {
             let (node, other) = (rows.label(nodes, row).node, body_of(row) + 1);
             let message = format!(
                 "geometric stiffness for {load} has entries at node {node} of body {other}, the interface belongs to body {body}"
@@ -136,16 +137,16 @@ fn check_loads_of_others(
 
 /// Returns the nodes of each body, in the order of the node table.
 fn nodes_of_bodies(nodes: &Nodes, component: &[usize], bodies: usize) -> Vec<Nodes> {
-    let mut own = vec![Nodes::default(); bodies];
+    let mut nodes_of_body = vec![Nodes::default(); bodies];
     for (node, &body) in component.iter().enumerate().take(nodes.len()) {
-        own[body].ids.push(nodes.ids[node]);
-        own[body].positions.push(nodes.positions[node]);
+        nodes_of_body[body].ids.push(nodes.ids[node]);
+        nodes_of_body[body].positions.push(nodes.positions[node]);
     }
-    own
+    nodes_of_body
 }
 
 /// Returns the body with this number, made of the rows `kept`.
-fn part(
+fn body_model(
     whole: &Assembled,
     number: usize,
     kept: &[usize],
@@ -155,8 +156,8 @@ fn part(
 ) -> Assembled {
     let damping = whole.damping.as_ref().map(|damping| {
         let principal = |matrix: &SymmetricMatrix| Ok::<_, Infallible>(matrix.principal(kept));
-        let Ok(own) = damping.borrowed().try_map(principal);
-        own
+        let Ok(restricted) = damping.borrowed().try_map(principal);
+        restricted
     });
     // Drop loads that have no entries in rows of this body.
     let geometric_stiffness = whole
@@ -167,7 +168,7 @@ fn part(
         .collect();
     let name = format!("{}-{number}", whole.raw.name);
     Assembled {
-        raw: RawModel { name, interfaces, given_rows: whole.raw.given_rows.of_part(), ..whole.raw.clone() },
+        raw: RawModel { name, interfaces, given_rows: whole.raw.given_rows.of_body(), ..whole.raw.clone() },
         mesh: whole.mesh.as_ref().and_then(|mesh| mesh.among(&whole.nodes.ids, &nodes.ids)),
         nodes,
         rows,
@@ -187,7 +188,7 @@ fn distribute(
     found: &mut Vec<Diagnostic>,
 ) -> Vec<Vec<NodeSet>> {
     let body: HashMap<i64, usize> = nodes.ids.iter().copied().zip(component.iter().copied()).collect();
-    let mut own = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
+    let mut sets_of_body = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
     for set in interfaces {
         let mut first: BTreeMap<usize, i64> = BTreeMap::new();
         for id in &set.nodes {
@@ -204,10 +205,10 @@ fn distribute(
             );
             found.push(Diagnostic::new(Code::InterfaceAcross, message));
         } else if let Some((&b, _)) = first.first_key_value() {
-            own[b].push(set.clone());
+            sets_of_body[b].push(set.clone());
         }
     }
-    own
+    sets_of_body
 }
 
 /// Returns an error if an entry of the matrix called `name` couples two bodies.

@@ -11,11 +11,11 @@ use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMat
 
 /// Eigenvalue of a stiffness with unit diagonal below which the stiffness does not resist a motion:
 /// rounding of sums leaves 1e-14.
-const LOOSE: f64 = 1e-12;
+const ZERO_EIGENVALUE: f64 = 1e-12;
 
 /// Largest deviation of the motion of a vector from a unit translation for a node whose coordinates are
 /// missing.
-const NODE: f64 = 1e-6;
+const MAX_NODE_DEVIATION: f64 = 1e-6;
 
 /// Finds the rigid motion R_p of the rows without a position, K_pp R_p = -K_pn R_n: the null space of K
 /// from its values R_n at all other rows. Exact if K R = 0 holds, which is checked for these rows with all
@@ -31,7 +31,7 @@ pub(super) fn recover(stiffness: &SymmetricMatrix, rows: &mut Rows, nodes: &Node
     let (centre, length) = centre_and_length(&nodes.positions);
     let known = rows.rigid_fields(&nodes.positions, centre, length);
     let count = rigid_count(rows.dimension);
-    let own = Restricted::new(stiffness, &placeless);
+    let restricted = Restricted::new(stiffness, &placeless);
     let mut fields = Mat::zeros(placeless.len(), count);
     for (to, &row) in placeless.iter().enumerate() {
         let (columns, values) = stiffness.row(row);
@@ -42,7 +42,7 @@ pub(super) fn recover(stiffness: &SymmetricMatrix, rows: &mut Rows, nodes: &Node
             }
         }
     }
-    own.solve(&mut fields).map_err(|free| {
+    restricted.solve(&mut fields).map_err(|free| {
         let labels: Vec<DofLabel> = free.iter().map(|&i| rows.label(nodes, placeless[i])).collect();
         let message = format!("stiffness does not hold rows without coordinates: {}", name_some(&labels));
         Diagnostic::new(Code::RowsUnheld, message)
@@ -58,7 +58,9 @@ pub(super) fn misplaced(rows: &Rows) -> Option<Diagnostic> {
     let known = &rows.recovered;
     let is_node = |at: &usize| {
         (0..d).all(|k| {
-            (0..d).all(|c| (known.fields[(d * at + k, c)] - f64::from(u8::from(k == c))).abs() < NODE)
+            (0..d).all(|c| {
+                (known.fields[(d * at + k, c)] - f64::from(u8::from(k == c))).abs() < MAX_NODE_DEVIATION
+            })
         })
     };
     // e_z x r moves along y by r_x and along x by -r_y; e_x x r along y by -r_z.
@@ -118,10 +120,10 @@ struct Restricted {
 impl Restricted {
     fn new(stiffness: &SymmetricMatrix, rows: &[usize]) -> Self {
         let n = rows.len();
-        let own = stiffness.principal(rows);
+        let block = stiffness.principal(rows);
         let inverse_root = |d: f64| if d > 0.0 { d.sqrt().recip() } else { 0.0 };
-        let scale: Vec<f64> = own.diagonal().into_iter().map(inverse_root).collect();
-        let matrix = own.scaled(&scale);
+        let scale: Vec<f64> = block.diagonal().into_iter().map(inverse_root).collect();
+        let matrix = block.scaled(&scale);
         let unit: Vec<(u32, u32, f64)> = (0..n as u32).map(|i| (i, i, 1.0)).collect();
         let one = SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &unit)).expect("diagonal");
         Self { matrix, one, scale }
@@ -138,7 +140,9 @@ impl Restricted {
         let pencil = Pencil::new(&self.matrix, &self.one, 1);
         // If the matrix is too large for an ordering, or indefinite, the search for modes reports it.
         let Some(analysis) = Analysis::new(&pencil) else { return Ok(()) };
-        let Some(factor) = Cholesky::<f64>::new(&analysis, &pencil, 1e3 * LOOSE) else { return Ok(()) };
+        let Some(factor) = Cholesky::<f64>::new(&analysis, &pencil, 1e3 * ZERO_EIGENVALUE) else {
+            return Ok(());
+        };
         // Inverse iterations: in each of them loose motions grow by 1e9 relative to held ones.
         let mut x = Mat::from_fn(n, 1, |i, _| 1.0 + 0.5 * (i as f64 * 0.7).sin());
         for _ in 0..3 {
@@ -146,7 +150,7 @@ impl Restricted {
             x /= faer::Scale(x.norm_l2());
         }
         let energy = (x.transpose() * pencil.apply_stiffness(x.as_ref()))[(0, 0)];
-        if energy > LOOSE {
+        if energy > ZERO_EIGENVALUE {
             return Ok(());
         }
         let largest = x.norm_max();

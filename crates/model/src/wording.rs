@@ -1,12 +1,12 @@
 //! Lists in messages, limited to a few items.
 
 /// Largest number of items named in a message.
-const NAMED: usize = 5;
+const MAX_NAMED: usize = 5;
 
 /// Joins items as `a, b, c and 7 more`.
 pub(super) fn name_some<T: std::fmt::Display>(items: &[T]) -> String {
-    let named: Vec<String> = items.iter().take(NAMED).map(T::to_string).collect();
-    match items.len().saturating_sub(NAMED) {
+    let named: Vec<String> = items.iter().take(MAX_NAMED).map(T::to_string).collect();
+    match items.len().saturating_sub(MAX_NAMED) {
         0 => named.join(", "),
         more => format!("{} and {more} more", named.join(", ")),
     }

@@ -266,7 +266,7 @@ pub fn convert_for(
         // Only the products of M with rigid motion are computed before the scenes rule out groups.
         let linear = modal.condense_linear();
         let terms = rule_out(&modal.body(&linear)?, cases, context)?;
-        Ok(modal.condense_kept(linear, terms))
+        Ok(modal.condense_selected(linear, terms))
     };
     let mut enriched = tailoring.enriched(model, cases, false, context, condense)?;
     if tailoring.of_motion {

@@ -86,7 +86,7 @@ def model(
     residual_vectors: str | Sequence[str] = (),
     allow_implausible: bool = False,
 ) -> Model:
-    """Makes a finite element model of matrices, and checks it.
+    """Creates a finite element model from matrices and checks it.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def model(
         `numpy.flatnonzero` has them); in both cases also by a boolean mask (n).
     units
         Units of length, mass and time, as in ("mm", "t", "s"); a number is a factor to SI. Without, they are
-        m, kg, s; a density that no matter has in these is a warning.
+        m, kg, s; an implausible density in these units is a warning.
     damping
         A damping ratio for all modes (1 is critical), a tuple (alpha, beta) for D = alpha M + beta K in 1/time
         and time, ratios by frequency as a list of tuples (end of the band in Hz, ratio), the last with the end
@@ -117,12 +117,12 @@ def model(
     residual_vectors
         Loads whose static responses join free modes: "interfaces", "centrifugal", or both in a list.
     allow_implausible
-        Takes densities that no matter has, and mass between nodes that no stiffness joins, as warnings.
+        True to treat implausible densities, and mass coupling between nodes without stiffness, as warnings.
 
     Raises
     ------
     InputError
-        All that is wrong with matrices, nodes and interfaces.
+        If matrices, nodes or interfaces are invalid; has all findings.
     ValueError, TypeError
         For arrays of the wrong shape or kind.
     """
@@ -151,13 +151,13 @@ def read_model(
     units: Sequence[object] | None = None,
     interfaces: Mapping[str, str | tuple[str, str]] | None = None,
 ) -> Model:
-    """Reads a model: a manifest (`model.toml`, docs/input.md), or what an FE program has written
-    (docs/fe_programs.md), of which `path` is the deck.
+    """Reads a model: a manifest (`model.toml`, docs/input.md), or the files of an FE program
+    (docs/fe_programs.md), whose deck is `path`.
 
     Parameters
     ----------
     program
-        Name of the FE program as on the command line; without, it goes by the files.
+        Name of the FE program as on the command line; by default it is detected from the files.
     units
         Units of length, mass and time of a job, as in ("mm", "t", "s").
     interfaces
@@ -166,7 +166,7 @@ def read_model(
     Raises
     ------
     InputError
-        All that is wrong with the files and the model.
+        If the files or the model are invalid; has all findings.
     """
     sets = [
         (name, *given) if isinstance(given, tuple) else (name, given, None) for name, given in (interfaces or {}).items()
@@ -188,7 +188,7 @@ def convert(
     scene: Any = None,
     **of_model: Any,
 ) -> Body:
-    """Makes a flexible body of a model.
+    """Converts a model to a flexible body.
 
     The model is that of K, M and nodes, as `flexbody.model` takes them, or of a file, as
     `flexbody.read_model` reads it: `convert(K, M, nodes)` or `convert("model.toml")`. Further keywords are
@@ -209,7 +209,7 @@ def convert(
         principal axes of inertia), "model", or "interface=NAME" (on the reference point of an interface, which
         then rests in every mode).
     comparators
-        Whether to compute what lumped masses would have given.
+        True to compute the results of lumped masses for comparison.
     scene
         A Scene, a list of load cases, or the path of a scene file, for a body with the terms and modes alone
         that it needs.
@@ -217,17 +217,17 @@ def convert(
     Raises
     ------
     InputError, NumericalError, ResourceError
-        As `flexbody.model`; where the modes cannot be trusted; where memory does not suffice.
+        Invalid input, as for `flexbody.model`; modes that cannot be trusted; not enough memory.
     """
     if mass is None and nodes is None:
         if isinstance(stiffness, Model):
             if of_model:
-                raise TypeError(f"a model has its own {', '.join(of_model)}")
+                raise TypeError(f"{', '.join(of_model)} cannot be given together with a Model, which states them")
             made = stiffness
         else:
             made = read_model(stiffness, **of_model)
     elif mass is None or nodes is None:
-        raise TypeError("convert takes K, M and nodes, or a file or a model alone")
+        raise TypeError("give convert either K, M and nodes, or one file or Model")
     else:
         made = model(stiffness, mass, nodes, **of_model)
     return made.convert(

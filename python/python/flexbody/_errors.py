@@ -9,12 +9,12 @@ import warnings
 from typing import NamedTuple
 
 
-# Turn the direction of writing.
+# Characters that change the direction of writing.
 _DIRECTIONS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u200e\u200f"
 
 
 def _printable(text: str) -> str:
-    """The text with characters that a terminal takes as commands shown by their numbers, as the command shows them."""
+    """Returns the text with control characters replaced by their numbers, as the command prints them."""
 
     def is_command(c: str) -> bool:
         return unicodedata.category(c) == "Cc" and c not in "\n\t" or c in _DIRECTIONS
@@ -23,20 +23,20 @@ def _printable(text: str) -> str:
 
 
 class Diagnostic(NamedTuple):
-    """One finding: what, where, and what to do. docs/codes.md lists the codes."""
+    """One finding: message, place and help. docs/codes.md lists the codes."""
 
     code: str
     """Identity, as in "FB307"."""
     severity: str
     """"note", "warning" or "error"."""
     message: str
-    """What is wrong, with the facts."""
+    """Message with the facts."""
     file: str | None
-    """The file that it is about."""
+    """File that the message is about."""
     line: int | None
     """Line of that file, from 1."""
     help: str
-    """What to do."""
+    """Next step, in the imperative."""
 
     def __str__(self) -> str:
         name = _printable((self.file or "").replace("\n", "\\n"))
@@ -46,12 +46,12 @@ class Diagnostic(NamedTuple):
 
 
 class FlexbodyError(Exception):
-    """What the library could not do. Its subclasses go by the exit code of the command."""
+    """An error of the library. Each exit code of the command has one subclass."""
 
     exit_code: int
     """Exit code of the command `flexbody` for the same error."""
     diagnostics: tuple[Diagnostic, ...]
-    """All that was found until the work had to stop, warnings and notes included."""
+    """All findings up to the error, warnings and notes included."""
 
     def __init__(self, diagnostics: tuple[Diagnostic, ...] = (), exit_code: int = 70) -> None:
         super().__init__(diagnostics, exit_code)
@@ -104,12 +104,12 @@ _CLASSES = {1: CheckError, 2: InputError, 3: NumericalError, 4: ResourceError, 7
 
 
 def error_of(exit_code: int, diagnostics: tuple[Diagnostic, ...]) -> FlexbodyError:
-    """The exception for an error of the library, whose class goes by its exit code."""
+    """Returns the exception of the class that belongs to the exit code."""
     return _CLASSES.get(exit_code, FlexbodyError)(diagnostics, exit_code)
 
 
 def warn(warning: Warning) -> None:
-    """Warns in the name of the first caller that is not of this package."""
+    """Issues a warning that points to the first caller outside of this package."""
     here, level = os.path.dirname(__file__), 1
     frame = sys._getframe()
     while frame.f_back is not None and os.path.dirname(frame.f_code.co_filename) == here:

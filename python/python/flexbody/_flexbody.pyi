@@ -1,4 +1,4 @@
-"""Types of the extension module; what each item is stands in its docstring."""
+"""Types of the extension module; the docstrings of the module describe each item."""
 
 import os
 from collections.abc import Mapping, Sequence

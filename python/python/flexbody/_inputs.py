@@ -1,4 +1,4 @@
-"""Matrices, nodes and the like, as Python codes have them, in the form that the extension takes."""
+"""Conversion of matrices, nodes and other arguments to the types of the extension module."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ _DIRECTIONS = {2: (1, 2), 3: (1, 2, 3), 6: (1, 2, 3, 4, 5, 6)}
 
 
 def compressed(matrix: Any, name: str) -> Compressed:
-    """A square matrix with both triangles by compressed columns: rows, pointers, rows of entries, values.
+    """Returns a square matrix with both triangles by compressed columns: rows, pointers, rows of entries, values.
 
-    Takes every sparse matrix and array of scipy, and what numpy makes a dense matrix of.
+    Accepts every sparse matrix and array of scipy, and everything that numpy converts to a dense matrix.
     """
     if hasattr(matrix, "tocsc"):
-        own = matrix.tocsc()
-        _check(own.shape, own.dtype, name)
-        if not own.has_canonical_format:
-            # Not in the caller's matrix.
-            own = own.copy() if own is matrix else own
-            own.sum_duplicates()
-        pointers, rows = own.indptr.astype(np.int64), own.indices.astype(np.int64)
-        values = np.ascontiguousarray(own.data, dtype=np.float64)
+        columns = matrix.tocsc()
+        _check(columns.shape, columns.dtype, name)
+        if not columns.has_canonical_format:
+            # The matrix of the caller stays unchanged.
+            columns = columns.copy() if columns is matrix else columns
+            columns.sum_duplicates()
+        pointers, rows = columns.indptr.astype(np.int64), columns.indices.astype(np.int64)
+        values = np.ascontiguousarray(columns.data, dtype=np.float64)
     else:
         dense = np.asarray(matrix)
         _check(dense.shape, dense.dtype, name)
@@ -54,12 +54,12 @@ def _refuse_one_triangle(pointers: NDArray[np.int64], rows: NDArray[np.int64], n
     if above != below:
         side = "upper" if above else "lower"
         raise ValueError(
-            f"{name} has its {side} triangle only: give both, {name} + {name}.T - scipy.sparse.diags({name}.diagonal())"
+            f"{name} has only its {side} triangle: give both, {name} + {name}.T - scipy.sparse.diags({name}.diagonal())"
         )
 
 
 def coordinates(nodes: ArrayLike) -> tuple[NDArray[np.float64], bool]:
-    """Positions (n x 3), and whether they were those of a plane model (n x 2)."""
+    """Returns positions (n x 3), and True if they were given for a plane model (n x 2)."""
     positions = np.array(nodes, dtype=np.float64)
     if positions.ndim != 2 or positions.shape[1] not in (2, 3):
         raise ValueError(f"nodes have the shape {positions.shape}, expected n x 3, or n x 2 of a plane model")
@@ -70,7 +70,7 @@ def coordinates(nodes: ArrayLike) -> tuple[NDArray[np.float64], bool]:
 
 
 def numbers(node_ids: ArrayLike | None, count: int) -> NDArray[np.int64]:
-    """Node numbers; positions from 0 where none are given."""
+    """Returns node numbers; positions from 0 if none are given."""
     if node_ids is None:
         return np.arange(count, dtype=np.int64)
     ids = _integers(node_ids, "node_ids")
@@ -87,7 +87,7 @@ def _integers(given: ArrayLike, name: str) -> NDArray[np.int64]:
 
 
 def labels(dofs: ArrayLike | int | None, node_ids: NDArray[np.int64]) -> NDArray[np.int64] | None:
-    """Node number and direction of every row (N x 2); None where the rows are x, y, z of each node."""
+    """Returns node number and direction of every row (N x 2); None if the rows are x, y, z of each node."""
     if dofs is None:
         return None
     if isinstance(dofs, (int, np.integer)):
@@ -105,7 +105,7 @@ def labels(dofs: ArrayLike | int | None, node_ids: NDArray[np.int64]) -> NDArray
 
 
 def _members(nodes: ArrayLike, name: str, node_ids: NDArray[np.int64], numbered: bool) -> list[int]:
-    """Numbers of the nodes of an interface, which are given by a mask, by numbers, or (not `numbered`) by positions."""
+    """Returns the node numbers of an interface, given by a mask, by numbers, or (not `numbered`) by positions."""
     array = np.asarray(nodes)
     if array.dtype == np.bool_:
         if array.shape != node_ids.shape:
@@ -135,7 +135,7 @@ def _members(nodes: ArrayLike, name: str, node_ids: NDArray[np.int64], numbered:
 def interface_list(
     interfaces: Mapping[str, Any] | None, node_ids: NDArray[np.int64], numbered: bool
 ) -> list[tuple[str, list[int], str | None, tuple[float, float, float] | None]]:
-    """Name, nodes, coupling and reference point of every interface."""
+    """Returns name, nodes, coupling and reference point of every interface."""
     found = []
     for name, given in (interfaces or {}).items():
         nodes, coupling, reference = given, None, None
@@ -153,7 +153,7 @@ def interface_list(
 
 
 def unit_names(units: Sequence[object] | None) -> tuple[str, str, str] | None:
-    """Units of length, mass and time; a number is a factor to SI."""
+    """Returns units of length, mass and time; a number is a factor to SI."""
     if units is None:
         return None
     if isinstance(units, str):
@@ -165,7 +165,7 @@ def unit_names(units: Sequence[object] | None) -> tuple[str, str, str] | None:
 
 
 def damping_of(damping: Any) -> Any:
-    """A ratio, the two numbers of Rayleigh damping, bands of ratios, or a compressed matrix."""
+    """Returns a ratio, the two numbers of Rayleigh damping, bands of ratios, or a compressed matrix."""
     if damping is None or isinstance(damping, (float, int)):
         return None if damping is None else float(damping)
     if isinstance(damping, tuple) and len(damping) == 2:
@@ -176,7 +176,7 @@ def damping_of(damping: Any) -> Any:
 
 
 def residual_loads(names: Sequence[str]) -> tuple[bool, bool]:
-    """Whether the loads of residual vectors are those at interfaces, and the centrifugal ones."""
+    """Returns two flags for residual vectors: loads at interfaces, and centrifugal loads."""
     names = [names] if isinstance(names, str) else list(names)
     unknown = set(names) - {"interfaces", "centrifugal"}
     if unknown:

@@ -12,22 +12,22 @@ class Interface(NamedTuple):
     """A set of nodes that joints and loads act on, along body axes."""
 
     node_ids: NDArray[np.int64]
-    """Numbers of its nodes."""
+    """Node numbers."""
     coupling: str | None
-    """"rigid", "averaging", "free", or None where it was not stated."""
+    """"rigid", "averaging", "free", or None if it was not stated."""
     reference: NDArray[np.float64] | None
     """Reference point (3); None of a free interface. Unit: length."""
     translation: NDArray[np.float64] | None
     """Displacement of the reference point in each mode (3 x nf). Unit: 1/sqrt(mass)."""
     rotation: NDArray[np.float64] | None
-    """Its rotation (3 x nf); None where the nodes determine none. Unit: 1/(length sqrt(mass))."""
+    """Rotation of the reference point (3 x nf); None if the nodes determine none. Unit: 1/(length sqrt(mass))."""
 
 
 class InterfaceCoordinates(NamedTuple):
     """K and M in the coordinates of a Craig-Bampton body at its interfaces, along body axes."""
 
     names: list[str]
-    """What each of the nc coordinates is."""
+    """Names of the nc coordinates."""
     stiffness: NDArray[np.float64]
     """K (nc x nc)."""
     mass: NDArray[np.float64]
@@ -50,11 +50,11 @@ class PointPath(NamedTuple):
 
 
 class Identity(NamedTuple):
-    """Something that must hold of the numbers of a body (docs/theory.md, section 10)."""
+    """An identity that the numbers of every body fulfil (docs/theory.md, section 10)."""
 
     name: str
     value: float
-    """By how much it is missed, relative."""
+    """Relative deviation."""
     limit: float
-    """By how much it may be missed."""
+    """Largest allowed deviation."""
     holds: bool

@@ -8,7 +8,7 @@ use flexbody_body::basis::{BasisChoice, CraigBampton};
 use flexbody_body::convert::{Conversion, ConvertSettings, convert};
 use flexbody_body::flex_body::{FlexBody, ReferenceConditions};
 use flexbody_body::invariants::{BodyFrame, FrameChoice};
-use flexbody_body::verification::{own_identities, verify};
+use flexbody_body::verification::{body_identities, verify};
 use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel};
@@ -67,9 +67,9 @@ fn with_all_modes_the_eigenvalues_are_those_of_the_held_model() {
     for (own, expected) in body.modes().eigenvalue.iter().zip(held.eigenvalues()) {
         assert!((own / expected - 1.0).abs() < 1e-8, "{own:e}, {expected:e}");
     }
-    assert_eq!(failed(own_identities(&body)), Vec::<String>::new());
+    assert_eq!(failed(body_identities(&body)), Vec::<String>::new());
     assert_eq!(failed(verify(&body, &model).expect("comparable")), Vec::<String>::new());
-    let names: Vec<&str> = own_identities(&body).iter().map(|check| check.name).collect();
+    let names: Vec<&str> = body_identities(&body).iter().map(|check| check.name).collect();
     assert!(names.contains(&"frame_on_interface") && !names.contains(&"c1_zero"), "{names:?}");
 }
 
@@ -96,7 +96,7 @@ fn every_identity_holds_for_every_kind_of_model() {
         for basis in [BasisChoice::default(), BasisChoice::CraigBampton(CraigBampton)] {
             let what = format!("{name}, {basis:?}");
             let body = on_interface(&model, &interface, basis.clone(), 8).expect(&what).body;
-            assert_eq!(failed(own_identities(&body)), Vec::<String>::new(), "{what}");
+            assert_eq!(failed(body_identities(&body)), Vec::<String>::new(), "{what}");
             assert_eq!(failed(verify(&body, &model).expect("comparable")), Vec::<String>::new(), "{what}");
             is_the_body_in_mean_axes(&body, &model, basis, &what);
             // The file stores the body bit by bit.

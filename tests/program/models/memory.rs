@@ -93,7 +93,7 @@ fn where_nothing_fits_the_numbers_are_told_before_any_work() {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(ExitCode::Resources as i32), "{said}");
     assert!(said.contains("error[FB601]: the factor and the vectors need 0."), "{said}");
-    assert!(said.contains(" GB on top of the matrices, 0.") && said.contains(" GB are left"), "{said}");
+    assert!(said.contains(" GB on top of the matrices, 0.") && said.contains(" GB are available"), "{said}");
     assert_eq!(members(folder.path()), before);
 
     let model = check(block([9; 3], [1.0; 3]).raw_model()).expect("a sound model").model;
@@ -104,7 +104,7 @@ fn where_nothing_fits_the_numbers_are_told_before_any_work() {
         }
     };
     let settings = ModeSettings { method: Method::Lanczos, ..ModeSettings::default() };
-    let little = Context { memory: Some(1_000_000), ..Context::heard_by(&watch) };
+    let little = Context { memory: Some(1_000_000), ..Context::with_listener(&watch) };
     let error = free_surface(&model, &settings, &little).expect_err("too little memory");
     assert_eq!(error.diagnostics()[0].code(), Code::MemoryShort);
     assert_eq!(*phases.lock().expect("one thread"), ["ordering"], "nothing was factored");

@@ -245,7 +245,7 @@ fn replicated_cards_are_those_that_they_stand_for() {
         ("=,*(1)\n", "continuations is not read"),
         ("=(0)\n", "number of repetitions"),
         ("CHEXA,9,1,11,23,29,17,14,26\n,32,20\n=,*(1),==\n", "continuations is not read"),
-        ("GRID,90,,0.,0.,0.\n=,*(x),==\n", "no number to add to"),
+        ("GRID,90,,0.,0.,0.\n=,*(x),==\n", "not a number that can be incremented"),
     ] {
         let (_folder, path) = copied("nastran_op4");
         replace(&path, "ENDDATA", &format!("{new}ENDDATA"));

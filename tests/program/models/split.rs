@@ -140,7 +140,7 @@ fn mass_coupling_joins_bodies_and_a_part_that_only_mass_holds_is_a_mechanism() {
         [FeModel::from_raw(raw.clone()).unwrap_err(), FeModel::bodies_from_raw(raw).map(|_| ()).unwrap_err()]
     {
         assert!(error.has(Code::Mechanism) && !error.has(Code::BodiesSeveral), "{error}");
-        assert!(error.to_string().contains("2 parts that only the mass couples"), "{error}");
+        assert!(error.to_string().contains("2 parts that only the mass matrix couples"), "{error}");
     }
 }
 

@@ -288,7 +288,7 @@ fn a_recording_that_does_not_fit_is_refused_before_any_work() {
     assert_eq!(error.diagnostics()[0].code(), Code::MemoryShort);
     assert_eq!(
         error.diagnostics()[0].message(),
-        "recording 1000001 instants takes 1.683 GB, 1.000 GB are left"
+        "recording 1000001 instants takes 1.683 GB of memory, 1.000 GB are available"
     );
 }
 

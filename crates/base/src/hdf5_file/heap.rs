@@ -9,20 +9,20 @@
 use std::io::{Read, Result, Seek, SeekFrom};
 
 const MAGIC: [u8; 8] = *b"GCOL\x01\0\0\0";
-const HEADER: u64 = 16;
-const BLOCK: usize = 1 << 20;
+const HEADER_BYTES: u64 = 16;
+const BLOCK_BYTES: usize = 1 << 20;
 
 /// Largest number of objects that are checked, as a multiple of those that fit into the file. Heaps do not overlap;
 /// only bytes that happen to look like a heap are checked repeatedly.
-const LOOKS: u64 = 4;
+const MAX_CHECKS_PER_OBJECT: u64 = 4;
 
 /// Returns the position of the first broken global heap: its objects do not fit into it, or too many objects were
 /// checked because heaps are nested. Returns `None` if all heaps are sound.
 pub fn first_broken(file: &mut (impl Read + Seek)) -> Result<Option<u64>> {
     let end = file.seek(SeekFrom::End(0))?;
-    let mut looks = LOOKS * end.div_ceil(HEADER);
+    let mut looks = MAX_CHECKS_PER_OBJECT * end.div_ceil(HEADER_BYTES);
     for position in collections(file)? {
-        if !sound(file, position, end, &mut looks)? {
+        if !is_sound(file, position, end, &mut looks)? {
             return Ok(Some(position));
         }
     }
@@ -33,7 +33,7 @@ pub fn first_broken(file: &mut (impl Read + Seek)) -> Result<Option<u64>> {
 fn collections(file: &mut (impl Read + Seek)) -> Result<Vec<u64>> {
     file.seek(SeekFrom::Start(0))?;
     let (mut found, mut window, mut start) = (Vec::new(), Vec::new(), 0u64);
-    while file.by_ref().take(BLOCK as u64).read_to_end(&mut window)? > 0 {
+    while file.by_ref().take(BLOCK_BYTES as u64).read_to_end(&mut window)? > 0 {
         let hits = window.windows(MAGIC.len()).enumerate().filter(|(_, bytes)| *bytes == MAGIC);
         found.extend(hits.map(|(i, _)| start + i as u64));
         // A match may begin at the end of this block.
@@ -46,21 +46,21 @@ fn collections(file: &mut (impl Read + Seek)) -> Result<Vec<u64>> {
 
 /// Returns true if the objects of the collection at `position` fill it. Returns false if they do not, or if no `looks`
 /// are left.
-fn sound(file: &mut (impl Read + Seek), position: u64, end: u64, looks: &mut u64) -> Result<bool> {
+fn is_sound(file: &mut (impl Read + Seek), position: u64, end: u64, looks: &mut u64) -> Result<bool> {
     let Some((_, size)) = header(file, position)? else { return Ok(false) };
-    if size < HEADER || size > end - position {
+    if size < HEADER_BYTES || size > end - position {
         return Ok(false);
     }
-    let mut at = HEADER;
-    while size - at >= HEADER {
+    let mut at = HEADER_BYTES;
+    while size - at >= HEADER_BYTES {
         let Some(left) = looks.checked_sub(1) else { return Ok(false) };
         *looks = left;
         let Some((object, length)) = header(file, position + at)? else { return Ok(false) };
         let rest = size - at;
         at += match object {
-            0 if length >= HEADER && length <= rest => length,
+            0 if length >= HEADER_BYTES && length <= rest => length,
             0 => return Ok(false),
-            _ if length <= rest - HEADER => HEADER + length.next_multiple_of(8),
+            _ if length <= rest - HEADER_BYTES => HEADER_BYTES + length.next_multiple_of(8),
             _ => return Ok(false),
         };
         if at > size {
@@ -73,7 +73,7 @@ fn sound(file: &mut (impl Read + Seek), position: u64, end: u64, looks: &mut u64
 /// Returns the first two and the last eight bytes of a header of 16 bytes: index (objects) and size. Returns `None` at
 /// the end of the file.
 fn header(file: &mut (impl Read + Seek), position: u64) -> Result<Option<(u16, u64)>> {
-    let mut bytes = [0; HEADER as usize];
+    let mut bytes = [0; HEADER_BYTES as usize];
     file.seek(SeekFrom::Start(position))?;
     match file.read_exact(&mut bytes) {
         Ok(()) => {}
@@ -103,7 +103,9 @@ mod tests {
     /// The free space is at 40 + 8 of the collection only for objects of 1 to 8 bytes.
     #[test]
     fn sound_heaps_pass_wherever_they_lie() {
-        for position in (BLOCK - 9..BLOCK + 3).chain([0, 1, 2 * BLOCK - 14, 3 * BLOCK]) {
+        for position in
+            (BLOCK_BYTES - 9..BLOCK_BYTES + 3).chain([0, 1, 2 * BLOCK_BYTES - 14, 3 * BLOCK_BYTES])
+        {
             assert_eq!(collections(&mut file(position, 5, 24)).unwrap(), [position as u64]);
             assert_eq!(first_broken(&mut file(position, 5, 24)).unwrap(), None, "{position}");
         }

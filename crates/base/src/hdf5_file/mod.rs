@@ -11,7 +11,7 @@ mod value;
 pub use create::{create, library_version, make, put_text};
 pub use heap::first_broken as first_broken_heap;
 pub use names::by_utf8_name;
-pub use open::{open_kept, open_sound};
+pub use open::{open_unrecorded, open_with_checked_texts};
 pub use plugins::without_plugins;
 pub use record::{Record, attribute_record, dataset_record};
 pub use value::{

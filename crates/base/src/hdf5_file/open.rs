@@ -12,13 +12,13 @@ use std::path::Path;
 
 /// Opens an HDF5 input file whose texts are safe to read. `what` names the expected file in messages; `foreign` is the
 /// code for a file that is not HDF5. Returns the file and its size in bytes.
-pub fn open_sound(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
+pub fn open_with_checked_texts(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
     note_read(path);
-    open_kept(path, what, foreign)
+    open_unrecorded(path, what, foreign)
 }
 
 /// Opens a file that the run itself writes and replaces, without recording it as an input.
-pub fn open_kept(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
+pub fn open_unrecorded(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
     let unreadable = |code, why: String| {
         Error::from(Diagnostic::new(code, format!("cannot read the {what}: {why}")).in_file(path))
     };
@@ -40,7 +40,7 @@ pub fn open_kept(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, 
     // The check of the heaps supports 8-byte sizes only, which all files in use have.
     let sizes = file.create_plist().and_then(|p| p.get_sizes());
     if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (Sizeof::Bytes8, Sizeof::Bytes8)) {
-        let why = "its addresses or sizes do not have 8 bytes".to_owned();
+        let why = "its addresses or sizes have another width than 8 bytes".to_owned();
         return Err(unreadable(foreign, why));
     }
     Ok((file, meta.len()))

@@ -16,7 +16,7 @@ pub struct Record {
 }
 
 /// Reason why an entry has no record.
-const OTHER_TYPE: &str = "it has a type that no flex-body file has";
+const OTHER_TYPE: &str = "its type does not occur in flex-body files";
 
 /// Returns the record of a dataset of numbers. Its stored bytes are subtracted from `stored`.
 pub fn dataset_record(dataset: &hdf5::Dataset, stored: &mut Stored) -> Result<Record, String> {

@@ -3,20 +3,20 @@
 //! Functions return `Ok(None)` for a missing entry, and `Err` for an unexpected one; the text reads `expected ...,
 //! found ...`.
 
-use crate::memory::{left, or_go_without};
+use crate::memory::{allow_failure, left};
 use hdf5::dataset::Layout;
 use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
 use hdf5::{IndexType, IterationOrder, LinkType};
 use hdf5_metno as hdf5;
 
 /// Largest compression ratio of deflate.
-const HIGHEST_COMPRESSION: u64 = 1032;
+const MAX_DEFLATE_RATIO: u64 = 1032;
 
 /// Longest text attribute of fixed length: the limit of HDF5 for an attribute.
-const LONGEST_FIXED_TEXT: usize = 65536;
+const MAX_FIXED_TEXT_BYTES: usize = 65536;
 
 /// Number of elements up to which a chunk may exceed its dataset. The library reserves memory for one whole chunk.
-const SMALL_CHUNK: usize = 1 << 20;
+const MAX_EXCESS_CHUNK_ELEMENTS: usize = 1 << 20;
 
 /// Bytes of the file that the datasets read so far do not account for. Together datasets cannot exceed the file, so
 /// that many links to one dataset are detected.
@@ -132,7 +132,7 @@ pub fn dataset<T: Element>(
     let elements = fit(&dims)?;
     storage(&dataset, elements, size_of::<T>(), stored)?;
     let mut values = Vec::new();
-    or_go_without(|| values.try_reserve_exact(elements))
+    allow_failure(|| values.try_reserve_exact(elements))
         .map_err(|_| format!("expected an array that fits into memory, found {elements} values"))?;
     values.resize(elements, T::default());
     dataset.read_into_raw(&mut values).map_err(|e| format!("expected readable data, found {e}"))?;
@@ -163,7 +163,7 @@ pub(super) fn storage(
     }
     let bytes = dataset.storage_size();
     // The values must be possible for the stored bytes, and fit into memory.
-    let most = if layout == Layout::Chunked { bytes.saturating_mul(HIGHEST_COMPRESSION) } else { bytes };
+    let most = if layout == Layout::Chunked { bytes.saturating_mul(MAX_DEFLATE_RATIO) } else { bytes };
     let unpacked = (elements as u64).saturating_mul(size as u64);
     if unpacked > most {
         return Err(format!("expected stored data for {elements} values, found {bytes} bytes"));
@@ -182,7 +182,7 @@ pub(super) fn storage(
         let chunk =
             plist.get_chunk().map_err(|e| format!("expected a chunk shape, found {e}"))?.unwrap_or_default();
         let size = chunk.iter().try_fold(1usize, |product, &d| product.checked_mul(d));
-        if size.is_none_or(|size| size > elements.max(SMALL_CHUNK)) {
+        if size.is_none_or(|size| size > elements.max(MAX_EXCESS_CHUNK_ELEMENTS)) {
             return Err(format!("expected chunks within the dataset, found chunks of {chunk:?}"));
         }
     }
@@ -215,11 +215,11 @@ pub fn text(place: &hdf5::Location, name: &str) -> Result<Option<String>, String
             attribute.read_scalar::<VarLenUnicode>().map(|t| t.as_bytes().to_vec())
         }
         TypeDescriptor::VarLenAscii => attribute.read_scalar::<VarLenAscii>().map(|t| t.as_bytes().to_vec()),
-        TypeDescriptor::FixedUnicode(n) if n <= LONGEST_FIXED_TEXT => {
-            attribute.read_scalar::<FixedUnicode<LONGEST_FIXED_TEXT>>().map(|t| t.as_bytes().to_vec())
+        TypeDescriptor::FixedUnicode(n) if n <= MAX_FIXED_TEXT_BYTES => {
+            attribute.read_scalar::<FixedUnicode<MAX_FIXED_TEXT_BYTES>>().map(|t| t.as_bytes().to_vec())
         }
-        TypeDescriptor::FixedAscii(n) if n <= LONGEST_FIXED_TEXT => {
-            attribute.read_scalar::<FixedAscii<LONGEST_FIXED_TEXT>>().map(|t| t.as_bytes().to_vec())
+        TypeDescriptor::FixedAscii(n) if n <= MAX_FIXED_TEXT_BYTES => {
+            attribute.read_scalar::<FixedAscii<MAX_FIXED_TEXT_BYTES>>().map(|t| t.as_bytes().to_vec())
         }
         other => return Err(format!("expected {EXPECTED}, found type {other}")),
     };

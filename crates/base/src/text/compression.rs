@@ -69,7 +69,7 @@ pub fn refuse_packed(file: &InputFile, what: &str) -> Result<(), Diagnostic> {
         Compression::Gzip => "gzip",
         Compression::Zstd => "Zstandard",
     };
-    let message = format!("{what} is compressed ({kind}); only matrices are read so");
+    let message = format!("{what} is compressed ({kind}), but only matrix files may be compressed");
     Err(Diagnostic::new(Code::FileFormatUnknown, message).in_file(file.path()).with_help("unpack it"))
 }
 

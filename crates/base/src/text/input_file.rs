@@ -5,7 +5,7 @@
 //! they are read; a file that changes meanwhile is refused.
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::memory::{left, or_go_without, refuse_beyond};
+use crate::memory::{allow_failure, left, refuse_beyond};
 use crate::provenance::Fingerprint;
 use crate::read_files::note_read;
 use std::fs::{File, Metadata};
@@ -100,7 +100,7 @@ impl InputFile {
         let mut bytes = Vec::new();
         // One byte more than expected: the end of the file is detected without growing the buffer.
         let size = usize::try_from(length).unwrap_or(usize::MAX).saturating_add(1);
-        if or_go_without(|| bytes.try_reserve_exact(size)).is_err() {
+        if allow_failure(|| bytes.try_reserve_exact(size)).is_err() {
             refuse(Some(0))?;
         }
         self.reader().read_to_end(&mut bytes).map_err(|e| self.failed(&e))?;
@@ -163,7 +163,7 @@ impl InputFile {
             while reader.read(&mut piece).map_err(|e| self.failed(&e))? > 0 {}
             self.refuse_changed()?;
         }
-        self.sha256.get().cloned().ok_or_else(|| self.changed("its length is another one"))
+        self.sha256.get().cloned().ok_or_else(|| self.changed("its length has changed"))
     }
 
     /// Returns the path of the file with its fingerprint and its state, to detect later changes.
@@ -189,8 +189,8 @@ impl InputFile {
 
     /// Returns the diagnostic of an error of reading this file.
     pub fn failed(&self, error: &std::io::Error) -> Diagnostic {
-        let own = || Diagnostic::new(Code::FileUnreadable, reason(error)).in_file(&self.path);
-        reading_error(error).unwrap_or_else(own)
+        let other_failure = || Diagnostic::new(Code::FileUnreadable, reason(error)).in_file(&self.path);
+        reading_error(error).unwrap_or_else(other_failure)
     }
 }
 
@@ -249,7 +249,7 @@ impl Read for FileReader<'_> {
         let length = self.file.state.length;
         let at = self.at + count as u64;
         if at > length || count == 0 && !buffer.is_empty() && at < length {
-            return Err(failed(self.file.changed("its length is another one")));
+            return Err(failed(self.file.changed("its length has changed")));
         }
         self.at = at;
         if let Some(hashed) = &mut self.hashed {
@@ -324,9 +324,9 @@ impl FileState {
         let what = if now.length != self.length {
             format!("it had {} bytes, now it has {}", self.length, now.length)
         } else if now.number != self.number {
-            "another file has its name now".to_owned()
+            "its name now belongs to another file".to_owned()
         } else {
-            "it was written to".to_owned()
+            "it was modified".to_owned()
         };
         Err(changed(path, &what))
     }

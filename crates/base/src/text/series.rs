@@ -10,18 +10,18 @@ use crate::diagnostic::{Code, Diagnostic};
 use std::borrow::Cow;
 
 /// Number of bad rows that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN_ROWS: usize = 5;
 
 /// Smallest number of rows.
-const LEAST_ROWS: usize = 2;
+const MIN_ROWS: usize = 2;
 
 /// Distance of two rows, relative to the largest time of a table, below which they may differ by rounding only: times
 /// that are summed over ten thousand steps have this error.
-const ROUNDING: f64 = 1e-12;
+const ROUNDING_DISTANCE: f64 = 1e-12;
 
-/// Smallest distance of rows within [`ROUNDING`] of each other, relative to the usual distance of rows, that is still
-/// accepted: dates in seconds may have rows every millisecond.
-const UNUSUAL: f64 = 1e-3;
+/// Smallest distance of rows within [`ROUNDING_DISTANCE`] of each other, relative to the usual distance of rows, that
+/// is still accepted: dates in seconds may have rows every millisecond.
+const MIN_ROW_DISTANCE: f64 = 1e-3;
 
 /// Returns the first row whose time differs from the one before by rounding only; `None` if there is none. Between such
 /// rows a history would change at an arbitrary rate.
@@ -31,10 +31,11 @@ pub fn closer_than_rounding(times: &[f64]) -> Option<usize> {
     let largest = times.iter().fold(0.0f64, |most, time| most.max(time.abs()));
     let mut apart: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let ulps = 4.0 * f64::EPSILON * largest;
-    let is_close =
-        |apart: f64, usual: f64| apart <= ulps || (apart < ROUNDING * largest && apart < UNUSUAL * usual);
+    let is_close = |apart: f64, usual: f64| {
+        apart <= ulps || (apart < ROUNDING_DISTANCE * largest && apart < MIN_ROW_DISTANCE * usual)
+    };
     let shortest = apart.iter().copied().fold(f64::INFINITY, f64::min);
-    if shortest >= ROUNDING * largest {
+    if shortest >= ROUNDING_DISTANCE * largest {
         return None;
     }
     let middle = apart.len() / 2;
@@ -167,9 +168,10 @@ fn has_decimal_comma(field: &[u8]) -> bool {
 
 /// Parses a number. The exponent may have the letter D, as Fortran writes it.
 fn number(field: &[u8]) -> Option<f64> {
-    let text: Cow<'_, [u8]> = match field.iter().any(|byte| matches!(byte, b'D' | b'd')) {
-        true => field.iter().map(|&byte| if matches!(byte, b'D' | b'd') { b'e' } else { byte }).collect(),
-        false => field.into(),
+    let text: Cow<'_, [u8]> = if field.iter().any(|byte| matches!(byte, b'D' | b'd')) {
+        field.iter().map(|&byte| if matches!(byte, b'D' | b'd') { b'e' } else { byte }).collect()
+    } else {
+        field.into()
     };
     fast_float2::parse(text.as_ref()).ok()
 }
@@ -269,8 +271,8 @@ impl<'f> Layout<'f> {
             return Err((message, format!("give its number, 1 to {}", self.fields)));
         }
         // The whole name first, then the name without its unit: "Fx [N]" is found by "Fx".
-        let whole = |own: &[u8]| own == name;
-        let without_unit = |own: &[u8]| before_unit(own) == name;
+        let whole = |column: &[u8]| column == name;
+        let without_unit = |column: &[u8]| before_unit(column) == name;
         for matches in [&whole as &dyn Fn(&[u8]) -> bool, &without_unit] {
             let places: Vec<usize> = (0..self.names.len()).filter(|&at| matches(self.names[at])).collect();
             match places[..] {
@@ -278,7 +280,7 @@ impl<'f> Layout<'f> {
                 [] => (),
                 [first, second, ..] => {
                     let name = printable(name);
-                    let message = format!("columns {} and {} are both `{name}`", first + 1, second + 1);
+                    let message = format!("columns {} and {} are both named `{name}`", first + 1, second + 1);
                     return Err((message, "give the number of the column".to_owned()));
                 }
             }
@@ -289,10 +291,10 @@ impl<'f> Layout<'f> {
     /// Returns a help with the most similar name, and all names.
     fn nearest(&self, name: &[u8]) -> String {
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).to_lowercase();
-        let distance = |own: &&&[u8]| strsim::damerau_levenshtein(&text(name), &text(before_unit(own)));
-        let near = |own: &&&[u8]| distance(own) <= 2 && distance(own) < before_unit(own).len();
+        let distance = |column: &&&[u8]| strsim::damerau_levenshtein(&text(name), &text(before_unit(column)));
+        let near = |column: &&&[u8]| distance(column) <= 2 && distance(column) < before_unit(column).len();
         match self.names.iter().filter(near).min_by_key(distance) {
-            Some(own) => format!("did you mean `{}`? {}", printable(own), self.all()),
+            Some(column) => format!("did you mean `{}`? {}", printable(column), self.all()),
             None => self.all(),
         }
     }
@@ -300,9 +302,10 @@ impl<'f> Layout<'f> {
     /// Returns a help with all columns.
     fn all(&self) -> String {
         let names: Vec<String> = self.names.iter().map(|name| printable(name)).collect();
-        match names.is_empty() {
-            true => format!("the columns have the numbers 1 to {}", self.fields),
-            false => format!("the columns are: {}", names.join(", ")),
+        if names.is_empty() {
+            format!("use a number from 1 to {}", self.fields)
+        } else {
+            format!("use one of the columns {}", names.join(", "))
         }
     }
 }
@@ -350,7 +353,7 @@ impl<'r> SeriesReader<'r> {
         if let Err(diagnostic) = self.row(line, text) {
             self.bad += 1;
             match self.bad {
-                bad if bad <= SHOWN => self.shown.push(diagnostic),
+                bad if bad <= MAX_SHOWN_ROWS => self.shown.push(diagnostic),
                 _ => self.first_not_shown = self.first_not_shown.or(Some(line)),
             }
         }
@@ -376,7 +379,7 @@ impl<'r> SeriesReader<'r> {
             && time <= before
         {
             let message = format!("time {time} does not increase: line {above} has {before}");
-            let help = "times must ascend: leave one row of an instant, and one of several runs in a file";
+            let help = "write ascending times: keep one row for each instant, and one run in each file";
             return Err(row_error(self.file, line, message).with_help(help));
         }
         self.series.times.push(time);
@@ -387,7 +390,7 @@ impl<'r> SeriesReader<'r> {
 
     /// Returns the number in a field.
     fn cell(&self, line: usize, place: usize, field: &[u8]) -> Result<f64, Diagnostic> {
-        let told = |what: &str| {
+        let cell_error = |what: &str| {
             let column = match self.layout.names.get(place) {
                 Some(name) => format!("`{}`", printable(name)),
                 None => format!("{}", place + 1),
@@ -396,11 +399,11 @@ impl<'r> SeriesReader<'r> {
         };
         match number(field) {
             Some(value) if value.is_finite() => Ok(value),
-            Some(_) => Err(told("is not a finite number")),
+            Some(_) => Err(cell_error("is not a finite number")),
             None if has_decimal_comma(field) => {
-                Err(told("has a decimal comma").with_help("write numbers with decimal points"))
+                Err(cell_error("has a decimal comma").with_help("write numbers with decimal points"))
             }
-            None => Err(told("is not a number")),
+            None => Err(cell_error("is not a number")),
         }
     }
 
@@ -409,23 +412,23 @@ impl<'r> SeriesReader<'r> {
         let Series { times, lines, .. } = &self.series;
         let [before, time] = [times[row - 1], times[row]];
         let message = format!(
-            "time {time:?} is the time of line {} ({before:?}) but for rounding: between the two rows the history would change without time",
+            "time {time:?} differs from that of line {} ({before:?}) by rounding only: the history would change in no time between the two rows",
             lines[row - 1]
         );
-        let help = "leave one of the two rows out; a jump needs rows that are further apart";
+        let help = "remove one of the two rows, or write a jump with rows that are further apart";
         row_error(self.file, lines[row], message).with_help(help)
     }
 
     fn finish(mut self) -> Result<Series, Vec<Diagnostic>> {
         let more = self.bad - self.shown.len();
         if let Some(line) = self.first_not_shown {
-            let message = format!("{more} more rows are bad, from this one on");
+            let message = format!("{more} more rows have errors, the first of them in this line");
             self.shown.push(row_error(self.file, line, message));
         }
         let rows = self.series.times.len();
-        if self.bad == 0 && rows < LEAST_ROWS {
+        if self.bad == 0 && rows < MIN_ROWS {
             let count = if rows == 0 { "no rows" } else { "only one row" };
-            let message = format!("file has {count}, a history needs two at least");
+            let message = format!("file has {count}, a history needs at least two");
             self.shown.push(Diagnostic::new(Code::SeriesRow, message).in_file(self.file.path()));
         }
         if let (0, Some(row)) = (self.bad, closer_than_rounding(&self.series.times)) {

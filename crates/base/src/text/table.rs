@@ -6,7 +6,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use std::path::Path;
 
 /// Number of bad rows that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN: usize = 5;
 
 /// Column that a table may have.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +49,7 @@ impl<'a> Table<'a> {
             Diagnostic::new(Code::TableHeader, message)
                 .in_file(path)
                 .at_line(line)
-                .with_help(format!("the first line names the columns: `{}`", names.join(",")))
+                .with_help(format!("name the columns in the first line: `{}`", names.join(",")))
         };
         if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
             return Err(header_error(1, "file is UTF-16".into()).with_help("save it as UTF-8 or ASCII text"));
@@ -69,7 +69,7 @@ impl<'a> Table<'a> {
             let known = columns.iter().position(|column| column.name == name);
             match known {
                 Some(column) if order.contains(&column) => {
-                    return Err(header_error(header_line, format!("column `{name}` is there twice")));
+                    return Err(header_error(header_line, format!("column `{name}` occurs twice")));
                 }
                 Some(column) => order.push(column),
                 None if fast_float2::parse::<f64, _>(field).is_ok() => {
@@ -158,7 +158,7 @@ impl<'a> BadRows<'a> {
     /// Adds the error of a row.
     pub fn add(&mut self, diagnostic: Diagnostic) {
         self.count += 1;
-        if self.shown.len() < SHOWN {
+        if self.shown.len() < MAX_SHOWN {
             self.shown.push(diagnostic.in_file(self.path));
         }
     }
@@ -170,7 +170,7 @@ impl<'a> BadRows<'a> {
     pub fn finish(mut self) -> Result<(), Vec<Diagnostic>> {
         let more = self.count - self.shown.len();
         if more > 0 {
-            let message = format!("{more} more rows are bad");
+            let message = format!("{more} more rows have errors");
             self.shown.push(Diagnostic::new(Code::TableRow, message).in_file(self.path));
         }
         if self.shown.is_empty() { Ok(()) } else { Err(self.shown) }
@@ -231,9 +231,9 @@ pub fn integer(field: &[u8]) -> Option<i64> {
 
 /// Returns text of a file in a form that can be shown in a message.
 pub fn printable(text: &[u8]) -> String {
-    const SHOWN: usize = 60;
-    let end = if text.len() > SHOWN { "..." } else { "" };
-    format!("{}{end}", text[..text.len().min(SHOWN)].escape_ascii())
+    const MAX_CHARACTERS: usize = 60;
+    let end = if text.len() > MAX_CHARACTERS { "..." } else { "" };
+    format!("{}{end}", text[..text.len().min(MAX_CHARACTERS)].escape_ascii())
 }
 
 #[cfg(test)]

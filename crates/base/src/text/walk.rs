@@ -41,7 +41,7 @@ pub fn read_toml<T>(
     let read = if errors.is_empty() { walk(&mut tables, document.get_ref()) } else { None };
     match read {
         Some(read) if tables.found.is_empty() => Ok(read),
-        _ => Err(Error::new(tables.told())),
+        _ => Err(Error::new(tables.into_findings())),
     }
 }
 
@@ -77,12 +77,12 @@ pub struct Walk<'a> {
 
 impl Walk<'_> {
     /// Returns the findings in the order of lines, up to a limit.
-    fn told(mut self) -> Vec<Diagnostic> {
+    fn into_findings(mut self) -> Vec<Diagnostic> {
         /// Largest number of findings that are listed.
-        const SHOWN: usize = 200;
+        const MAX_SHOWN: usize = 200;
         self.found.sort_by_key(Diagnostic::line);
-        let more = self.found.len().saturating_sub(SHOWN);
-        self.found.truncate(SHOWN);
+        let more = self.found.len().saturating_sub(MAX_SHOWN);
+        self.found.truncate(MAX_SHOWN);
         if more > 0 {
             let message = format!("{more} more findings are not shown");
             self.found.push(Diagnostic::new(self.syntax, message).in_file(self.path));
@@ -129,7 +129,7 @@ impl Walk<'_> {
             let unknown = self.at(self.syntax, key.span(), unknown);
             let help = match nearest {
                 Some((_, candidate)) => format!("did you mean `{candidate}`?"),
-                None => format!("known keys: {}", known.join(", ")),
+                None => format!("use one of the keys {}", known.join(", ")),
             };
             self.found.push(unknown.with_help(help));
         }

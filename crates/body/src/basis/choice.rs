@@ -50,8 +50,8 @@ impl BasisChoice {
     /// Returns this basis with residual vectors for the forces that a motion leaves unbalanced at the nodes
     /// (N x m); `None` for a basis without residual vectors.
     pub fn with_motion(&self, loads: &Mat<f64>) -> Option<Self> {
-        let mut own = self.clone();
-        let residual_vectors = match &mut own {
+        let mut choice = self.clone();
+        let residual_vectors = match &mut choice {
             Self::Free(FreeSurface { residual_vectors })
             | Self::CraigChang(CraigChang { residual_vectors }) => residual_vectors,
             Self::Imported(_) | Self::Solved(_) | Self::CraigBampton(_) => return None,
@@ -59,7 +59,7 @@ impl BasisChoice {
         if loads.ncols() > 0 {
             residual_vectors.push(Loads::Motion(loads.clone()));
         }
-        Some(own)
+        Some(choice)
     }
 
     /// Returns the eigen-solver that found the modes, if it was not this program.

@@ -16,7 +16,7 @@ use std::ops::Range;
 
 /// Largest deformation of a rigid interface, relative to the largest motion of any node, that rounding of
 /// single-precision modes explains.
-const RIGID: f64 = 1e-6;
+const MAX_RIGID_DEFORMATION: f64 = 1e-6;
 
 /// Model whose rigid interfaces move as rigid bodies: u = T y, with the pencil (T'KT, T'MT). Forces and
 /// displacements refer to all rows of the model. Without rigid interfaces T = 1.
@@ -53,7 +53,7 @@ impl<'m> CoupledModel<'m> {
         };
         let joints: Vec<CoupledInterface> = coupled_sets(model, &rigid)
             .into_iter()
-            .filter(|joint| deformation(model, joint, vectors) <= RIGID && is_apart(joint))
+            .filter(|joint| deformation(model, joint, vectors) <= MAX_RIGID_DEFORMATION && is_apart(joint))
             .collect();
         if joints.is_empty() {
             return Self::uncoupled(model);
@@ -71,18 +71,18 @@ impl<'m> CoupledModel<'m> {
 
     /// Returns the names of the interfaces that move as rigid bodies.
     pub fn rigid_interfaces(&self) -> Vec<String> {
-        self.coupling.iter().flat_map(|own| &own.joints).map(|joint| joint.name.clone()).collect()
+        self.coupling.iter().flat_map(|coupling| &coupling.joints).map(|joint| joint.name.clone()).collect()
     }
 
     /// Returns the pencil (T'KT, T'MT).
     pub fn pencil(&self) -> Pencil<'_> {
-        self.coupling.as_ref().map_or_else(|| self.model.pencil(), |own| own.reduced.pencil())
+        self.coupling.as_ref().map_or_else(|| self.model.pencil(), |coupling| coupling.reduced.pencil())
     }
 
     /// Returns T'f (m x k), the loads on the remaining degrees of freedom due to nodal forces f (N x k).
     pub fn restrict(&self, forces: Mat<f64>) -> Mat<f64> {
         match &self.coupling {
-            Some(own) => own.elimination.restrict(forces.as_ref()),
+            Some(coupling) => coupling.elimination.restrict(forces.as_ref()),
             None => forces,
         }
     }
@@ -90,7 +90,7 @@ impl<'m> CoupledModel<'m> {
     /// Returns T y (N x k).
     pub fn expand<'y>(&self, y: &'y Mat<f64>) -> Cow<'y, Mat<f64>> {
         match &self.coupling {
-            Some(own) => Cow::Owned(own.elimination.expand(y.as_ref())),
+            Some(coupling) => Cow::Owned(coupling.elimination.expand(y.as_ref())),
             None => Cow::Borrowed(y),
         }
     }
@@ -103,7 +103,7 @@ impl<'m> CoupledModel<'m> {
     pub fn rigid_modes(&self) -> Result<Mat<f64>> {
         let rigid = rigid_modes(self.model, &self.model.pencil())?;
         Ok(match &self.coupling {
-            Some(own) => own.elimination.free_rows(rigid.as_ref()),
+            Some(coupling) => coupling.elimination.free_rows(rigid.as_ref()),
             None => rigid,
         })
     }
@@ -112,7 +112,7 @@ impl<'m> CoupledModel<'m> {
     /// with the rigid motions R of the interface and their averages A. Self-equilibrated forces on a rigid
     /// interface cause no motion.
     pub fn without_inner_forces(&self, forces: &mut Mat<f64>) {
-        for joint in self.coupling.iter().flat_map(|own| &own.joints) {
+        for joint in self.coupling.iter().flat_map(|coupling| &coupling.joints) {
             let resultant = gram(joint.motion(), joint.gather(forces.as_ref()).as_ref());
             let spread = combine(joint.measure(), resultant.as_ref());
             for (i, &row) in joint.rows.iter().enumerate() {
@@ -125,7 +125,7 @@ impl<'m> CoupledModel<'m> {
     pub(super) fn problem<'a>(&'a self, rigid: MatRef<'a, f64>) -> EigenProblem<'a> {
         let whole = problem_of_span(self.model, rigid);
         match &self.coupling {
-            Some(own) => EigenProblem { pencil: own.reduced.pencil(), order: None, ..whole },
+            Some(coupling) => EigenProblem { pencil: coupling.reduced.pencil(), order: None, ..whole },
             None => whole,
         }
     }
@@ -134,11 +134,10 @@ impl<'m> CoupledModel<'m> {
 /// Returns the difference of the motion of an interface in the modes from the best-fitting rigid motion.
 /// Displacements and rotations are each relative to the largest of any node in any mode.
 fn deformation(model: &FeModel, joint: &CoupledInterface, vectors: MatRef<'_, f64>) -> f64 {
-    let own = joint.gather(vectors);
-    let left = &own - combine(joint.motion(), gram(joint.measure(), own.as_ref()).as_ref());
-    let largest = |a: MatRef<'_, f64>, rows: Range<usize>| match rows.is_empty() {
-        true => 0.0,
-        false => a.subrows(rows.start, rows.len()).norm_max(),
+    let at_joint = joint.gather(vectors);
+    let left = &at_joint - combine(joint.motion(), gram(joint.measure(), at_joint.as_ref()).as_ref());
+    let largest = |a: MatRef<'_, f64>, rows: Range<usize>| {
+        if rows.is_empty() { 0.0 } else { a.subrows(rows.start, rows.len()).norm_max() }
     };
     let part = |of_joint: Range<usize>, of_all: Range<usize>| match largest(left.as_ref(), of_joint) {
         0.0 => 0.0,
@@ -146,7 +145,7 @@ fn deformation(model: &FeModel, joint: &CoupledInterface, vectors: MatRef<'_, f6
     };
     let (displaced, all) = (joint.displaced_rows(), model.rows().displacements());
     let rotations = all..all + model.rows().rotations().len();
-    larger(part(0..displaced, 0..all), part(displaced..own.nrows(), rotations))
+    larger(part(0..displaced, 0..all), part(displaced..at_joint.nrows(), rotations))
 }
 
 /// Solves u = R q of a rigid interface for its dependent rows. As many rows as there are rigid motions

@@ -33,10 +33,10 @@ use flexbody_model::{Coupling, FeModel, rigid_count};
 
 /// Smallest relative M-norm that a shape must keep after projection against the shapes before it. Shapes
 /// below this limit are removed as dependent.
-const LEFT: f64 = 1e-8;
+const MIN_SHAPE_REMAINDER: f64 = 1e-8;
 
 /// Number of copies of the shapes held at once while they are made independent (measured: 18).
-const COPIES: u64 = 20;
+const SHAPE_COPIES: u64 = 20;
 
 /// Craig-Bampton basis: modes with all interfaces held, and constraint modes of all interfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -60,25 +60,25 @@ impl Basis for CraigBampton {
         let failed = |failure| explain(model, failure);
         // Remove rigid motion and dependent shapes.
         let shapes = side_by_side(&[parts.fixed_shapes().as_ref(), parts.constraint.as_ref()]);
-        let found = independent(&problem.pencil, rigid.as_ref(), shapes, LEFT)
+        let found = independent(&problem.pencil, rigid.as_ref(), shapes, MIN_SHAPE_REMAINDER)
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
         let mut notes = parts.notes(model, settings);
         notes.extend(parts.removed(&found, rigid_count(model.dimension())));
-        if found.kept.is_empty() {
+        if found.retained.is_empty() {
             return Err(nothing_deforms().into());
         }
         // Solve the small eigenproblem in the span.
         let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
-        let whole = parts.lacks_rigid_motion_only(&found, rigid_count(model.dimension()));
+        let whole = parts.misses_only_rigid_motions(&found, rigid_count(model.dimension()));
         let span = found.vectors;
         let mut solution = modes_of_span(&problem, span.clone(), &all, context).map_err(failed)?;
         let parted = gram(span.as_ref(), problem.pencil.apply_mass(solution.vectors.as_ref()).as_ref());
-        let provenance = parts.provenance(&found.kept, parted.as_ref());
+        let provenance = parts.provenance(&found.retained, parted.as_ref());
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
         let fixed_interface = parts.fixed_interface(rigid.as_ref(), &solution, whole);
         solution.completeness = parts.completeness(model, &solution);
         // Memory of the dense shapes counts if it exceeds that of the search.
-        let bytes = shape_bytes(problem.pencil.n(), found.kept.len());
+        let bytes = shape_bytes(problem.pencil.n(), found.retained.len());
         solution.plan = parts.fixed.plan.map(|plan| plan.with_bytes(|search| search.max(bytes)));
         let mut basis = ModalBasis::new(model, &problem, settings, solution, "")?;
         basis.provenance = provenance;
@@ -93,7 +93,7 @@ impl Basis for CraigBampton {
 /// are made.
 fn check_possible(model: &FeModel, settings: &ModeSettings, context: &Context<'_>) -> Result<()> {
     if settings.accuracy == Accuracy::Certified {
-        let message = "modes of a Craig-Bampton basis are no eigenvectors and cannot be certified";
+        let message = "modes of a Craig-Bampton basis are not eigenvectors and cannot be certified";
         return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
     }
     let coordinates = model.interfaces().iter().map(|set| match set.coupling() {
@@ -109,7 +109,7 @@ fn check_possible(model: &FeModel, settings: &ModeSettings, context: &Context<'_
 }
 
 fn nothing_deforms() -> Diagnostic {
-    let message = "no shape deforms the body: one interface alone has no constraint modes, and no fixed-interface mode was asked for";
+    let message = "no shape deforms the body: one interface alone has no constraint modes, and no fixed-interface mode was requested";
     Diagnostic::new(Code::ShapesNone, message).with_help("ask for more modes, or raise --max-frequency")
 }
 
@@ -125,7 +125,7 @@ struct Parts<'a> {
     /// interfaces, (T'KT) Y = -T'K D.
     constraint: Mat<f64>,
     /// Part of the responses to the inertia of the constraint modes outside the basis.
-    lacking: MissingResponses,
+    missing_responses: MissingResponses,
 }
 
 impl<'a> Parts<'a> {
@@ -140,7 +140,7 @@ impl<'a> Parts<'a> {
         let failed = |failure| explain(model, failure);
         let elimination = hold(pencil.n(), joints, context.memory).map_err(failed)?;
         if elimination.is_empty() {
-            let message = "the interfaces hold every node of the body: nothing is left to deform";
+            let message = "the interfaces contain every node of the body: no node is left that can deform";
             return Err(Diagnostic::new(Code::InterfaceCoupling, message)
                 .with_help("give the interfaces fewer nodes")
                 .into());
@@ -164,10 +164,11 @@ impl<'a> Parts<'a> {
             order: None,
         };
         let in_model = |failure| failed(expanded(failure, &elimination));
-        let own = reduced.bytes();
-        let left = Context { memory: context.memory.map(|bytes| bytes.saturating_sub(own)), ..*context };
+        let reduced_bytes = reduced.bytes();
+        let left =
+            Context { memory: context.memory.map(|bytes| bytes.saturating_sub(reduced_bytes)), ..*context };
         let mut fixed = fixed_modes(&problem, settings, &left).map_err(in_model)?;
-        fixed.plan = fixed.plan.map(|plan| plan.with_bytes(|search| search + own));
+        fixed.plan = fixed.plan.map(|plan| plan.with_bytes(|search| search + reduced_bytes));
         context.phase("constraint modes");
         let lowest = fixed.eigenvalues.first().copied().or(fixed.next_eigenvalue).unwrap_or(first_estimate);
         let precision = fixed.plan.as_ref().map_or(Precision::Double, Plan::precision);
@@ -181,11 +182,19 @@ impl<'a> Parts<'a> {
         let [interior, correction] =
             static_responses_twice(&problem, loads, inertia, lowest, precision, accuracy, context)
                 .map_err(in_model)?;
-        let lacking = lacking(&problem, correction, &fixed);
+        let missing_responses = missing_responses(&problem, correction, &fixed);
         let mut constraint = moved + elimination.expand(interior.as_ref());
         restore_rigid_motion(joints, rigid.as_ref(), &mut constraint)
             .ok_or_else(|| failed(EigenFailure::Inaccurate { residual: f64::NAN }))?;
-        Ok(Self { joints, names: names.collect(), elimination, reduced, fixed, constraint, lacking })
+        Ok(Self {
+            joints,
+            names: names.collect(),
+            elimination,
+            reduced,
+            fixed,
+            constraint,
+            missing_responses,
+        })
     }
 
     fn fixed_shapes(&self) -> Mat<f64> {
@@ -210,30 +219,30 @@ impl<'a> Parts<'a> {
 
     /// Returns true if the removed shapes are constraint modes and as many as the rigid motions, which the
     /// constraint modes contain.
-    fn lacks_rigid_motion_only(&self, found: &Independent, rigid: usize) -> bool {
+    fn misses_only_rigid_motions(&self, found: &Independent, rigid: usize) -> bool {
         let removed = Self::removed_shapes(found);
         removed.len() == rigid && removed[0] >= self.fixed.eigenvalues.len()
     }
 
     /// Returns the shape with the largest share in each mode. `parted` holds the products of the shapes
-    /// `kept` with the modes.
-    fn provenance(&self, kept: &[usize], parted: MatRef<'_, f64>) -> Vec<String> {
-        let told = |(j, share): (usize, f64)| {
-            let (kind, name) = self.name(kept[j]);
+    /// `retained` with the modes.
+    fn provenance(&self, retained: &[usize], parted: MatRef<'_, f64>) -> Vec<String> {
+        let described = |(j, share): (usize, f64)| {
+            let (kind, name) = self.name(retained[j]);
             format!("{kind}: {:.0} % {name}", 100.0 * share)
         };
-        largest_shares(parted).into_iter().map(told).collect()
+        largest_shares(parted).into_iter().map(described).collect()
     }
 
     /// Returns the diagnostics about removed shapes.
     fn removed(&self, found: &Independent, rigid: usize) -> Vec<Diagnostic> {
         let removed = Self::removed_shapes(found);
-        let all = found.kept.len() + removed.len();
-        let note = if self.lacks_rigid_motion_only(found, rigid) {
+        let all = found.retained.len() + removed.len();
+        let note = if self.misses_only_rigid_motions(found, rigid) {
             let (fixed, motions) = (self.fixed.eigenvalues.len(), self.constraint.ncols());
             let message = format!(
-                "the {motions} interface motions contain the {rigid} rigid-body motions, which the body frame carries out: with {fixed} fixed-interface modes that leaves {} ways to deform",
-                found.kept.len()
+                "the {motions} interface motions contain the {rigid} rigid-body motions, which the body frame performs: with {fixed} fixed-interface modes the body has {} modes",
+                found.retained.len()
             );
             Diagnostic::new(Code::ShapesRigid, message)
                 .with_help("nothing to do: every Craig-Bampton body is counted in this way")
@@ -241,7 +250,7 @@ impl<'a> Parts<'a> {
             let which = removed.iter().map(|&j| self.name(j)).map(|(kind, name)| format!("{kind} {name}"));
             let which = named(which.collect());
             let message = format!(
-                "{} of {all} shapes are left out, they are rigid motions, move no mass, or add less than {LEFT:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
+                "{} of {all} shapes are left out since they are rigid motions, move no mass, or add less than {MIN_SHAPE_REMAINDER:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
                 removed.len()
             );
             Diagnostic::new(Code::ShapesDependent, message)
@@ -262,14 +271,14 @@ impl<'a> Parts<'a> {
         let counted = negative_pivots.filter(|_| proof == Proof::InertiaCount);
         // A mode below the shift that is left out is known by its eigenvalue.
         let next = self.fixed.next_eigenvalue.filter(|_| counted.is_some_and(|counted| counted > modes));
-        let cut = counted.and(next.map(|next| next * (1.0 - KNOWN)).or(Some(shift)));
+        let cut = counted.and(next.map(|next| next * (1.0 - MAX_FIXED_EIGENVALUE_ERROR)).or(Some(shift)));
         let (of_rigid, of_modes) =
             (coordinates_of(self.joints, rigid), coordinates_of(self.joints, solution.vectors.as_ref()));
         let FreeEstimate { estimate, lower } = free_estimate(
             &solution.eigenvalues,
             of_rigid.as_ref(),
             of_modes.as_ref(),
-            &self.lacking,
+            &self.missing_responses,
             cut.filter(|_| whole),
         )?;
         Some(FixedInterface {
@@ -292,7 +301,7 @@ impl<'a> Parts<'a> {
             && given < wanted
             && wanted < usize::MAX
         {
-            let message = format!("{wanted} fixed-interface modes were asked for, there are {given}");
+            let message = format!("{wanted} fixed-interface modes were requested, the model has {given}");
             notes.push(Diagnostic::new(Code::ModesClamped, message));
         }
         let completeness = &self.fixed.completeness;
@@ -309,7 +318,7 @@ impl<'a> Parts<'a> {
             let hertz =
                 self.fixed.eigenvalues.last().map_or(0.0, |&lambda| model.units().frequency_of(lambda));
             let message = format!(
-                "fixed-interface mode {given} ({hertz:.6} Hz) shares its eigenvalue with {more} that are left out"
+                "fixed-interface mode {given} ({hertz:.6} Hz) shares its eigenvalue with other modes that are left out (number: {more})"
             );
             notes.push(
                 Diagnostic::new(Code::RepeatedSplit, message)
@@ -409,7 +418,7 @@ impl<'a> Parts<'a> {
 
 /// Bound of the relative error of a computed fixed-interface eigenvalue, far above the effect of its
 /// residual.
-const KNOWN: f64 = 1e-8;
+const MAX_FIXED_EIGENVALUE_ERROR: f64 = 1e-8;
 
 /// Computes the wanted fixed-interface modes. If none are wanted (static condensation), the first is
 /// computed nevertheless, since its eigenvalue limits the frequency range of the basis.
@@ -435,7 +444,11 @@ fn fixed_modes(
 
 /// Returns G and H of the responses y to the inertia of the constraint modes, after removal of the part
 /// along the fixed-interface modes.
-fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolution) -> MissingResponses {
+fn missing_responses(
+    problem: &EigenProblem<'_>,
+    mut response: Mat<f64>,
+    fixed: &EigenSolution,
+) -> MissingResponses {
     let pencil = &problem.pencil;
     let whole = column_products(response.as_ref(), pencil.apply_stiffness(response.as_ref()).as_ref());
     for _ in 0..2 {
@@ -520,5 +533,5 @@ fn expanded(failure: EigenFailure, elimination: &Elimination) -> EigenFailure {
 
 /// Returns the bytes needed for `count` shapes of n rows.
 fn shape_bytes(n: usize, count: usize) -> u64 {
-    8 * COPIES * (n as u64) * (count as u64)
+    8 * SHAPE_COPIES * (n as u64) * (count as u64)
 }

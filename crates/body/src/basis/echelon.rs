@@ -14,7 +14,7 @@ pub(super) struct Echelon {
 
 impl Echelon {
     /// Pivots below this part of the first pivot count as rounding.
-    const ROUNDING: f64 = 1e-9;
+    const ROUNDING_PIVOT: f64 = 1e-9;
 
     /// Computes the echelon form of `a`.
     pub(super) fn new(mut a: Mat<f64>) -> Self {
@@ -29,7 +29,7 @@ impl Echelon {
             if step == 0 {
                 first = a[(i, j)].abs();
             }
-            if a[(i, j)].abs() <= Self::ROUNDING * first {
+            if a[(i, j)].abs() <= Self::ROUNDING_PIVOT * first {
                 break;
             }
             // Exchange rows, scale the pivot row, and eliminate its column in all other rows.

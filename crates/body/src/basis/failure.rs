@@ -27,7 +27,7 @@ fn too_poor(failure: &EigenFailure) -> Option<Diagnostic> {
     let message = format!("the modes cannot be found with a single-precision factor: {why}");
     Some(
         Diagnostic::new(code, message)
-            .with_help("use --factor auto or f64: the model may be too thin, or unsound"),
+            .with_help("use --factor auto or f64: the model may be too thin for single precision"),
     )
 }
 
@@ -87,7 +87,7 @@ fn not_positive_definite(model: &FeModel, shift: f64) -> Diagnostic {
         _ => format!("{count} motions have neither strain energy nor mass: they move nodes {moved} most"),
     };
     Diagnostic::new(Code::Mechanism, message).with_help(
-        "elements with reduced integration (C3D20R, C3D8R) have such motions in meshes one element across: take more elements across, or full integration",
+        "use more elements across, or full integration: elements with reduced integration (C3D20R, C3D8R) have such motions in meshes one element across",
     )
 }
 
@@ -120,11 +120,11 @@ fn mechanism(model: &FeModel, count: usize, vectors: &Mat<f64>) -> Diagnostic {
     if all % rigid == 0 {
         let message = format!("{message}; {} separate bodies have as many", all / rigid);
         Diagnostic::new(Code::Mechanism, message).with_help(
-            "bodies that are joined by negligible entries only: remove these entries and use --split, or connect the bodies",
+            "remove the negligible entries that join the bodies and use --split, or connect the bodies",
         )
     } else {
         Diagnostic::new(Code::Mechanism, message).with_help(
-            "connect the parts or remove the free degree of freedom; meshes one element across of elements with reduced integration need more elements across; of a body very thin, or with stiffnesses far apart, K has lost its softest ones to rounding",
+            "connect the parts or remove the free degree of freedom; use more elements across where a mesh of elements with reduced integration is one element across; in a very thin body, or with large stiffness contrasts, rounding has removed the softest stiffnesses from K",
         )
     }
 }
@@ -136,7 +136,7 @@ fn not_certified(why: &str) -> Diagnostic {
 
 fn memory_short(bytes: u64, available: u64) -> Diagnostic {
     let message = format!(
-        "the factor and the vectors need {:.3} GB on top of the matrices, {:.3} GB are left",
+        "the factor and the vectors need {:.3} GB on top of the matrices, {:.3} GB are available",
         bytes as f64 * 1e-9,
         available as f64 * 1e-9
     );
@@ -151,5 +151,5 @@ fn too_long(model: &FeModel, wanted: usize, seconds: f64, bytes: u64) -> Diagnos
         bytes as f64 * 1e-9
     );
     Diagnostic::new(Code::WorkLong, message)
-        .with_help("ask for fewer modes or a lower frequency, or say --allow-long")
+        .with_help("ask for fewer modes or a lower frequency, or use --allow-long")
 }

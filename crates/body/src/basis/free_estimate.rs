@@ -17,11 +17,11 @@ use flexbody_linalg::{combine, gram, symmetric_eigen};
 use nalgebra::DMatrix;
 
 /// Relative energy below which a response outside the basis is rounding.
-const COUPLED: f64 = 1e-14;
+const ROUNDING_ENERGY: f64 = 1e-14;
 
 /// Largest number of dense eigenproblems solved for the lower bounds; with more modes, several modes share
 /// one problem.
-const PROBLEMS: usize = 64;
+const MAX_EIGENPROBLEMS: usize = 64;
 
 /// Static responses to the inertia of the interface motions (c of them), without their part in the basis.
 #[derive(Debug, Clone)]
@@ -53,18 +53,18 @@ pub(super) fn free_estimate(
     theta: &[f64],
     rigid: MatRef<'_, f64>,
     q: MatRef<'_, f64>,
-    lacking: &MissingResponses,
+    missing: &MissingResponses,
     cut: Option<f64>,
 ) -> Option<FreeEstimate> {
-    let mut estimate = corrected(theta, rigid, q, lacking)?;
+    let mut estimate = corrected(theta, rigid, q, missing)?;
     let coupling =
-        |a: MatRef<'_, f64>, b: MatRef<'_, f64>| gram(a, combine(lacking.stiffness.as_ref(), b).as_ref());
+        |a: MatRef<'_, f64>, b: MatRef<'_, f64>| gram(a, combine(missing.stiffness.as_ref(), b).as_ref());
     let blocks = [coupling(rigid, rigid), coupling(rigid, q), coupling(q, q)];
     let mut lower = vec![0.0; theta.len()];
     if let Some(cut) = cut {
         // Relative distance 1e-5 from the cut: closer to the cut the bound has no meaning.
         let below = theta.partition_point(|t| *t < cut * (1.0 - 1e-5));
-        for chunk in (0..below).collect::<Vec<_>>().chunks(below.div_ceil(PROBLEMS).max(1)) {
+        for chunk in (0..below).collect::<Vec<_>>().chunks(below.div_ceil(MAX_EIGENPROBLEMS).max(1)) {
             let highest = theta[chunk[chunk.len() - 1]];
             let bounds = weighed_down(theta, &blocks, highest * cut / (cut - highest))?;
             for &j in chunk {
@@ -83,21 +83,21 @@ fn corrected(
     theta: &[f64],
     rigid: MatRef<'_, f64>,
     q: MatRef<'_, f64>,
-    lacking: &MissingResponses,
+    missing: &MissingResponses,
 ) -> Option<Vec<f64>> {
-    let (nf, c) = (theta.len(), lacking.stiffness.nrows());
+    let (nf, c) = (theta.len(), missing.stiffness.nrows());
     // Scale the responses to one size, then make the corrections K-orthonormal.
-    let size: Vec<f64> = lacking.whole.iter().map(|energy| energy.max(0.0).sqrt()).collect();
+    let size: Vec<f64> = missing.whole.iter().map(|energy| energy.max(0.0).sqrt()).collect();
     let unit = |i: usize| if size[i] > 0.0 { 1.0 / size[i] } else { 0.0 };
-    let scaled = Mat::from_fn(c, c, |i, j| unit(i) * lacking.stiffness[(i, j)] * unit(j));
+    let scaled = Mat::from_fn(c, c, |i, j| unit(i) * missing.stiffness[(i, j)] * unit(j));
     let eigen = symmetric_eigen(scaled.as_ref())?;
-    let kept: Vec<usize> = (0..c).filter(|&i| eigen.values[i] > COUPLED).collect();
+    let kept: Vec<usize> = (0..c).filter(|&i| eigen.values[i] > ROUNDING_ENERGY).collect();
     let k = kept.len();
     let corrections =
         Mat::from_fn(c, k, |i, j| unit(i) * eigen.vectors[(i, kept[j])] / eigen.values[kept[j]].sqrt());
-    let along = combine(lacking.stiffness.as_ref(), corrections.as_ref());
+    let along = combine(missing.stiffness.as_ref(), corrections.as_ref());
     let (of_rigid, of_modes) = (gram(rigid, along.as_ref()), gram(q, along.as_ref()));
-    let mass = gram(corrections.as_ref(), combine(lacking.mass.as_ref(), corrections.as_ref()).as_ref());
+    let mass = gram(corrections.as_ref(), combine(missing.mass.as_ref(), corrections.as_ref()).as_ref());
     let held = gram(of_rigid.as_ref(), of_rigid.as_ref());
     let root = |i: usize| if i < nf { theta[i].sqrt() } else { 1.0 };
     let pencil = Mat::from_fn(nf + k, nf + k, |i, j| {
@@ -159,15 +159,15 @@ mod tests {
         let q = Mat::from_fn(1, 1, |_, _| -0.5 * s / norm);
         // b of the unit interface motion (1, 1, 1) along the truncated mode.
         let coupled = 2.0 * left[0] + left[1];
-        let lacking = MissingResponses {
+        let missing = MissingResponses {
             whole: vec![coupled * coupled / b],
             stiffness: Mat::from_fn(1, 1, |_, _| coupled * coupled / b),
             mass: Mat::from_fn(1, 1, |_, _| coupled * coupled / (b * b)),
         };
-        let found = free_estimate(&[theta], rigid.as_ref(), q.as_ref(), &lacking, Some(b)).expect("finite");
+        let found = free_estimate(&[theta], rigid.as_ref(), q.as_ref(), &missing, Some(b)).expect("finite");
         assert!((found.estimate[0] - 1.0).abs() < 1e-14, "{found:?}, theta {theta}");
         assert!(theta > 1.0 && found.lower[0] <= 1.0 && found.lower[0] > 0.9, "{found:?}, theta {theta}");
-        let unknown = free_estimate(&[theta], rigid.as_ref(), q.as_ref(), &lacking, None).expect("finite");
+        let unknown = free_estimate(&[theta], rigid.as_ref(), q.as_ref(), &missing, None).expect("finite");
         assert_eq!(unknown.lower, [0.0]);
         // A response inside the basis leaves rounding, which is no correction.
         let noise = |size: f64| Mat::from_fn(1, 1, |_, _| 1e-30 * size);

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 /// Number of columns multiplied by K or M at a time if only products with other columns are needed; equals
 /// the width of one product.
-const PANEL: usize = 8;
+const PANEL_COLUMNS: usize = 8;
 
 /// Basis of the lowest free-surface modes.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -82,16 +82,16 @@ pub(super) fn single_precision_note(solution: &EigenSolution, settings: &ModeSet
     let plan = solution.plan.as_ref().filter(|_| settings.factor == FactorChoice::Auto)?;
     let message = match plan.current().way {
         Way::Cycles => {
-            "no factor: the modes are found by cycles over levels of groups of nodes, and corrected in double precision"
+            "the modes were found by multigrid cycles without a factor, and corrected in double precision"
         }
         _ if plan.has_failed(Way::Cycles) => {
-            "cycles over levels of groups of nodes do not converge for this model: factored instead"
+            "multigrid cycles did not converge for this model: a factor was used instead"
         }
         Way::SinglePrecision => {
-            "the factor is in single precision; the modes are corrected in double precision"
+            "the factor was computed in single precision, and the modes were corrected in double precision"
         }
         _ if plan.has_failed(Way::SinglePrecision) => {
-            "a single-precision factor is too poor for the conditioning of this model: factored in double precision"
+            "a factor in single precision is too inaccurate for the conditioning of this model: the factor was computed in double precision"
         }
         _ => return None,
     };
@@ -112,7 +112,7 @@ fn describe(
         && given < wanted
     {
         let message = format!(
-            "{wanted} modes were asked for, the model has {given} flexible modes with finite frequency"
+            "{wanted} modes were requested, the model has {given} flexible modes with finite frequency"
         );
         notes.push(Diagnostic::new(Code::ModesClamped, message));
         finite = finite.or(Some(given));
@@ -120,7 +120,10 @@ fn describe(
     notes.extend(singular_mass_note(problem, finite));
     let below = solution.completeness.modes_below;
     if matches!(settings.wanted, Wanted::Lowest(_)) && below > given {
-        let message = format!("mode {given} shares its eigenvalue with {} that are left out", below - given);
+        let message = format!(
+            "mode {given} shares its eigenvalue with other modes that are left out (number: {})",
+            below - given
+        );
         notes.push(
             Diagnostic::new(Code::RepeatedSplit, message)
                 .with_help(format!("ask for {below} modes to keep the body's symmetry")),
@@ -133,7 +136,7 @@ fn describe(
         notes.push(match settings.accuracy {
             Accuracy::Fast => note,
             _ => note.with_help(
-                "the modes keep their accuracy; a larger --memory-limit or machine allows the proof",
+                "raise --memory-limit or use a larger machine for the proof; the modes keep their accuracy",
             ),
         });
     }
@@ -185,6 +188,7 @@ pub fn search_plan(model: &FeModel, settings: &ModeSettings, context: &Context<'
 pub(super) fn polynomial_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
     let has_rotations = !model.rows().rotations().is_empty();
     let monomials = if has_rotations { [QUADRATIC, CUBIC].concat() } else { QUADRATIC.to_vec() };
+    // Polynomial fields, M-orthogonal to rigid motion (twice, against rounding).
     let mut fields = polynomial_fields(model, pencil.n(), &monomials);
     let mass = |x: MatRef<'_, f64>| pencil.apply_mass(x);
     let before = gram_in_panels(fields.as_ref(), mass);
@@ -268,18 +272,19 @@ fn slope(monomial: &[usize], r: &[f64; 3], along: usize) -> f64 {
 fn resolved_ratio(pencil: &Pencil<'_>, x: MatRef<'_, f64>) -> Option<f64> {
     let energy = gram(x, pencil.apply_stiffness(x).as_ref())[(0, 0)];
     let noise = energy_noise(pencil.stiffness(), x, f64::EPSILON)[0];
-    (energy > RESOLVED * noise).then(|| energy / gram(x, pencil.apply_mass(x).as_ref())[(0, 0)])
+    (energy > MIN_ENERGY_PER_ROUNDING * noise)
+        .then(|| energy / gram(x, pencil.apply_mass(x).as_ref())[(0, 0)])
 }
 
 /// Ratio of energy to its rounding error above which a field gives a valid estimate of the first
 /// eigenvalue.
-const RESOLVED: f64 = 1e3;
+const MIN_ENERGY_PER_ROUNDING: f64 = 1e3;
 
 /// Returns X' f(X), where f takes a few columns at a time, so that f(X) is never stored as a whole.
 fn gram_in_panels(x: MatRef<'_, f64>, product: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> Mat<f64> {
     let mut whole = Mat::zeros(x.ncols(), x.ncols());
-    for start in (0..x.ncols()).step_by(PANEL) {
-        let width = PANEL.min(x.ncols() - start);
+    for start in (0..x.ncols()).step_by(PANEL_COLUMNS) {
+        let width = PANEL_COLUMNS.min(x.ncols() - start);
         let panel = gram(x, product(x.subcols(start, width)).as_ref());
         whole.as_mut().subcols_mut(start, width).copy_from(&panel);
     }
@@ -289,6 +294,7 @@ fn gram_in_panels(x: MatRef<'_, f64>, product: impl Fn(MatRef<'_, f64>) -> Mat<f
 /// Returns the smallest eigenvalue of the small pencil (K, M) and its eigenvector (one column), restricted
 /// to eigenvectors of M above `kept_above` times its largest eigenvalue.
 fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>, kept_above: f64) -> Option<(f64, Mat<f64>)> {
+    // Scale the fields to unit mass.
     let scale: Vec<f64> =
         (0..m.nrows()).map(|i| if m[(i, i)] > 0.0 { m[(i, i)].sqrt().recip() } else { 0.0 }).collect();
     let scaled = |a: &Mat<f64>| {
@@ -296,11 +302,13 @@ fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>, kept_above: f64) -> Option<(f64, M
     };
     let eigen = symmetric_eigen(scaled(m).as_ref())?;
     let largest = *eigen.values.last()?;
+    // Directions of M above rounding.
     let kept: Vec<usize> =
         (0..eigen.values.len()).filter(|&i| eigen.values[i] > kept_above * largest).collect();
     let root = Mat::from_fn(m.nrows(), kept.len(), |i, c| {
         eigen.vectors[(i, kept[c])] / eigen.values[kept[c]].sqrt()
     });
+    // Lowest eigenpair of K in these directions, back in the unscaled fields.
     let projected = gram(root.as_ref(), combine(scaled(k).as_ref(), root.as_ref()).as_ref());
     let ratios = symmetric_eigen(projected.as_ref())?;
     let ratio = *ratios.values.first()?;

@@ -20,7 +20,7 @@ use std::collections::HashMap;
 /// Smallest singular value of the conditions of averaging interfaces that share nodes, each interface
 /// orthonormal by itself, above which the conditions count as independent. The static shapes lose as many
 /// digits as this value lies below one.
-const INDEPENDENT: f64 = 1e-4;
+const MIN_SINGULAR_VALUE: f64 = 1e-4;
 
 /// Checks that the coordinates of all `joints` can be prescribed at once, and that the body is held if they
 /// are zero.
@@ -54,7 +54,7 @@ fn determining(dimension: usize) -> (&'static str, &'static str) {
 fn undetermined(model: &FeModel, joint: &CoupledInterface) -> Diagnostic {
     if joint.coupling == Coupling::Free {
         let message =
-            format!("nodes of the free interface `{}` have a part of their rotations only", joint.name);
+            format!("nodes of the free interface `{}` have only some of their rotations", joint.name);
         let help = "give it nodes with all rotations, nodes with none, or another coupling";
         return Diagnostic::new(Code::InterfaceCoupling, message).with_help(help);
     }
@@ -85,10 +85,10 @@ impl Conditions {
         let prescribed = prescribed_rows(joints);
         let mut groups: Vec<Self> = Vec::new();
         for j in (0..joints.len()).filter(|&j| is_averaging(j)) {
-            let own: Vec<usize> =
+            let unshared: Vec<usize> =
                 joints[j].rows.iter().copied().filter(|row| !prescribed.contains_key(row)).collect();
-            let alone = own.len() == joints[j].rows.len();
-            let mut group = Self { joints: vec![j], rows: own, alone };
+            let alone = unshared.len() == joints[j].rows.len();
+            let mut group = Self { joints: vec![j], rows: unshared, alone };
             // Merge with every group that shares a row.
             let (touched, others): (Vec<_>, Vec<_>) = groups
                 .into_iter()
@@ -129,9 +129,9 @@ impl Conditions {
 
     /// Returns the coordinates of displacements `u` (N x k), taken about the means of the nodes.
     fn coordinates(&self, joints: &[CoupledInterface], u: MatRef<'_, f64>) -> Mat<f64> {
-        let own = self.joints.iter().map(|&j| gram(joints[j].centred(), joints[j].gather(u).as_ref()));
-        let own: Vec<Mat<f64>> = own.collect();
-        let rows: Vec<_> = own.iter().flat_map(|block| block.row_iter()).collect();
+        let motions = self.joints.iter().map(|&j| gram(joints[j].centred(), joints[j].gather(u).as_ref()));
+        let motions: Vec<Mat<f64>> = motions.collect();
+        let rows: Vec<_> = motions.iter().flat_map(|block| block.row_iter()).collect();
         Mat::from_fn(rows.len(), u.ncols(), |i, j| rows[i][j])
     }
 
@@ -143,8 +143,8 @@ impl Conditions {
         let mut first = 0;
         for &j in &self.joints {
             let column: usize = (0..j).map(size).sum();
-            let own = gram(joints[j].centred(), joints[j].motion());
-            wanted.as_mut().submatrix_mut(first, column, size(j), size(j)).copy_from(&own);
+            let unit = gram(joints[j].centred(), joints[j].motion());
+            wanted.as_mut().submatrix_mut(first, column, size(j), size(j)).copy_from(&unit);
             first += size(j);
         }
         wanted
@@ -182,12 +182,14 @@ impl Conditions {
         for joint in self.joints.iter().map(|&j| &joints[j]) {
             let count = joint.coordinates.len();
             let Some(root) = inverse_root(joint.centred()) else { return false };
-            let own = combine(weights.as_ref().subcols(first, count), root.as_ref());
-            scaled.as_mut().subcols_mut(first, count).copy_from(&own);
+            let scaled_weights = combine(weights.as_ref().subcols(first, count), root.as_ref());
+            scaled.as_mut().subcols_mut(first, count).copy_from(&scaled_weights);
             first += count;
         }
         let eigen = symmetric_eigen(gram(scaled.as_ref(), scaled.as_ref()).as_ref());
-        eigen.is_some_and(|eigen| eigen.values.first().is_some_and(|least| *least > INDEPENDENT.powi(2)))
+        eigen.is_some_and(|eigen| {
+            eigen.values.first().is_some_and(|least| *least > MIN_SINGULAR_VALUE.powi(2))
+        })
     }
 }
 

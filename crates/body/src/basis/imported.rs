@@ -112,7 +112,7 @@ impl Basis for ImportedShapes {
         let independent = independent(&problem.pencil, rigid.as_ref(), self.shapes.clone(), criterion)
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
         let notes = independent.notes(several, criterion, |j| format!("shape {}", j + 1));
-        if independent.kept.is_empty() {
+        if independent.retained.is_empty() {
             let message = format!("none of {} {several} deforms the body", self.shapes.ncols());
             return Err(Error::new([vec![Diagnostic::new(Code::ShapesNone, message)], notes].concat()));
         }
@@ -121,14 +121,14 @@ impl Basis for ImportedShapes {
         let compared = self
             .stated
             .as_ref()
-            .map(|stated| stated.beside(model, self.shapes.as_ref(), &independent.kept, &basis.solution));
+            .map(|stated| stated.beside(model, self.shapes.as_ref(), &independent.retained, &basis.solution));
         basis.diagnostics.extend(self.notes.iter().cloned().chain(compared.flatten()).chain(notes));
         let given = basis.solution.eigenvalues.len();
         if let Wanted::Lowest(wanted) = settings.wanted
             && wanted > given
             && wanted < usize::MAX
         {
-            let message = format!("{wanted} modes were asked for, the shapes give {given}");
+            let message = format!("{wanted} modes were requested, the shapes give {given}");
             basis.diagnostics.push(Diagnostic::new(Code::ModesClamped, message));
         }
         basis.describe_span(settings.accuracy);
@@ -147,7 +147,7 @@ impl ModalBasis {
         let others = solution.residuals.len() - solution.eigenvectors(accuracy);
         if others > 0 {
             let message = format!(
-                "{others} of {} modes are no eigenvectors but the best that the span of the shapes has: K-residual up to {worst:.0e}, eigenvectors have {promised:.0e}",
+                "{others} of {} modes are not eigenvectors but the best approximations in the span of the shapes: K-residual up to {worst:.0e}, expected at most {promised:.0e}",
                 residuals.len()
             );
             self.diagnostics.push(Diagnostic::new(Code::ShapesSpan, message));

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Part of the rotational mass of a node that counts as rounding. Since M is positive semidefinite, the
 /// coupling of such a direction with other rows is at most the root of this part.
-const NOTHING: f64 = 1e-13;
+const ROUNDING_MASS: f64 = 1e-13;
 
 /// Rows of the model and the components of a motion that moves no mass.
 type LocalMotion = Vec<(usize, f64)>;
@@ -33,8 +33,8 @@ pub(super) fn on_mass(model: &FeModel, mut loads: Mat<f64>) -> Result<Mat<f64>> 
     }
     let stiffness = model.stiffness();
     // Factor Z'K Z; it must be regular.
-    let factor =
-        SparseLdl::new(&stiffness_of(stiffness, &motions), 0.0).filter(|own| own.null_rows().is_empty());
+    let factor = SparseLdl::new(&stiffness_of(stiffness, &motions), 0.0)
+        .filter(|factor| factor.null_rows().is_empty());
     let Some(factor) = factor else {
         let message =
             format!("loads act on {} motions without mass that the stiffness does not hold", motions.len());
@@ -94,10 +94,10 @@ fn massless_rotations(model: &FeModel, first: usize, count: usize) -> Vec<LocalM
     if rows.clone().all(|row| mass.row(row).0.is_empty()) {
         return rows.map(|row| vec![(row, 1.0)]).collect();
     }
-    let own = DMatrix::from_fn(count, count, |i, j| mass.as_csc().get(first + i, first + j));
-    let SymmetricEigen { eigenvectors, eigenvalues } = own.clone().symmetric_eigen();
-    let size = own.trace();
-    let is_massless = |&at: &usize| eigenvalues[at].abs() <= NOTHING * size;
+    let block = DMatrix::from_fn(count, count, |i, j| mass.as_csc().get(first + i, first + j));
+    let SymmetricEigen { eigenvectors, eigenvalues } = block.clone().symmetric_eigen();
+    let size = block.trace();
+    let is_massless = |&at: &usize| eigenvalues[at].abs() <= ROUNDING_MASS * size;
     let motion = |at: usize| rows.clone().zip(eigenvectors.column(at).iter().copied()).collect();
     (0..count).filter(is_massless).map(motion).collect()
 }
@@ -109,7 +109,7 @@ fn stiffness_of(stiffness: &SymmetricMatrix, motions: &[LocalMotion]) -> Symmetr
         motion.iter().for_each(|&(row, part)| parts[row].push((at as u32, part)));
     }
     let mut entries = Vec::new();
-    for (row, of_row) in parts.iter().enumerate().filter(|(_, own)| !own.is_empty()) {
+    for (row, of_row) in parts.iter().enumerate().filter(|(_, row_parts)| !row_parts.is_empty()) {
         let (columns, values) = stiffness.row(row);
         for (&column, value) in columns.iter().zip(values) {
             for &(j, second) in &parts[column as usize] {

@@ -74,13 +74,13 @@ pub struct ModalBasis {
 
 /// Relative energy of rigid motion above which the first mode is not a free mode: the body has a weak tie
 /// to ground.
-const RIGID_ENERGY: f64 = 0.05;
+const MAX_RIGID_ENERGY: f64 = 0.05;
 
 /// Decimal digits of numbers written without loss.
 const ALL_DIGITS: u8 = 17;
 
 /// Relative noise of lambda above which a diagnostic reports the noise.
-const NOISE_TOLD: f64 = 1e-6;
+const REPORTED_NOISE: f64 = 1e-6;
 
 /// Returns the relative error of the entries of K: half a unit of the last digit.
 pub(super) fn input_error(model: &FeModel) -> f64 {
@@ -116,7 +116,7 @@ impl ModalBasis {
         let (pencil, rigid) = (&problem.pencil, problem.rigid);
         let energy = gram(rigid, pencil.apply_stiffness(rigid).as_ref());
         let rigid_noise = energy.norm_l2() / first;
-        if rigid_noise > RIGID_ENERGY {
+        if rigid_noise > MAX_RIGID_ENERGY {
             return Err(rigid_motion_strained(rigid_noise).into());
         }
         let noise = energy_noise(pencil.stiffness(), solution.vectors.as_ref(), problem.input_error);
@@ -140,13 +140,13 @@ impl ModalBasis {
 /// Returns the error for a solution without modes, with the reason.
 fn no_modes(model: &FeModel, settings: &ModeSettings, solution: &EigenSolution) -> Diagnostic {
     if settings.wanted == Wanted::Lowest(0) {
-        let message = "no mode is asked for, and a body without modes is rigid".to_owned();
+        let message = "no mode is requested, and a body without modes is rigid".to_owned();
         return Diagnostic::new(Code::NoModes, message).with_help("ask for one mode or more");
     }
     let message = match (settings.wanted, solution.next_eigenvalue) {
         (Wanted::Below(_), Some(next)) => {
             let hertz = model.units().frequency_of(next);
-            format!("the first flexible mode has {hertz:.6} Hz, above the limit that was given")
+            format!("the first flexible mode has {hertz:.6} Hz, above the given limit")
         }
         _ => "no flexible mode has a finite frequency".to_owned(),
     };
@@ -159,13 +159,13 @@ fn rigid_motion_strained(rigid_noise: f64) -> Diagnostic {
         100.0 * rigid_noise
     );
     Diagnostic::new(Code::RigidMotionStrained, message)
-        .with_help("soft ties to ground, or a thin body whose matrices carry too few digits")
+        .with_help("remove soft ties to ground; of a thin body write the matrices with more digits")
 }
 
 /// Returns a diagnostic about the noise of the eigenvalues due to the digits of the input, if the noise is
 /// large enough.
 fn noise_note(model: &FeModel, noise: f64) -> Option<Diagnostic> {
-    if noise <= NOISE_TOLD {
+    if noise <= REPORTED_NOISE {
         return None;
     }
     let message = format!(
@@ -177,7 +177,7 @@ fn noise_note(model: &FeModel, noise: f64) -> Option<Diagnostic> {
         diagnostic
     } else {
         diagnostic.with_help(
-            "double precision holds no more digits: expect no better of a body as thin or stiff as this",
+            "nothing to do: double precision has no more digits for a body as thin or stiff as this",
         )
     })
 }

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// Backward error of a factorisation above which missing rows are not completed with it. It corresponds to
 /// the digits of the shapes.
-const INACCURATE: f64 = 1e-7;
+const MAX_BACKWARD_ERROR: f64 = 1e-7;
 
 /// Returns the modes with their values along the axes of the model.
 ///
@@ -23,7 +23,7 @@ pub(super) fn along_the_model(model: &FeModel, mut raw: RawModes) -> Result<RawM
     if std::mem::take(&mut raw.along_nodes) {
         model.given_rows().turn(&raw.labels, &mut raw.matrix).map_err(|node| {
             let message = format!(
-                "values of node {node} stand along axes of its own, and the file does not have all three directions of them"
+                "values of node {node} are along local axes, and the file does not have all three directions"
             );
             Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path)
         })?;
@@ -36,12 +36,14 @@ pub(super) fn along_the_model(model: &FeModel, mut raw: RawModes) -> Result<RawM
 /// # Errors
 /// [`ShapesSize`](Code::ShapesSize), [`ShapesZero`](Code::ShapesZero).
 pub(super) fn by_rows(model: &FeModel, raw: &RawModes) -> Result<(Mat<f64>, Vec<Diagnostic>)> {
+    // Place of each row in the file.
     let places: HashMap<_, usize> =
         raw.labels.iter().enumerate().map(|(place, label)| (*label, place)).collect();
     let n = model.stiffness().n();
     let place: Vec<Option<usize>> = (0..n).map(|row| places.get(&model.label(row)).copied()).collect();
     let missing: Vec<usize> = (0..n).filter(|row| place[*row].is_none()).collect();
     refuse_too_few(model, raw, &missing)?;
+    // Values of the file; missing rows are zero until they are completed.
     let value = |row: usize, mode: usize| place[row].map_or(0.0, |at| raw.matrix[(at, mode)]);
     let mut shapes = Mat::from_fn(n, raw.matrix.ncols(), value);
     if let Some(mode) = (0..shapes.ncols()).find(|mode| shapes.col(*mode).norm_max() == 0.0) {
@@ -52,7 +54,11 @@ pub(super) fn by_rows(model: &FeModel, raw: &RawModes) -> Result<(Mat<f64>, Vec<
         return Ok((shapes, Vec::new()));
     }
     complete(model, &mut shapes, &missing, raw)?;
-    let message = format!("the file lacks {} of {n} rows, of {}", missing.len(), some_nodes(model, &missing));
+    let message = format!(
+        "the file has no values for {} of {n} rows, of {}",
+        missing.len(),
+        some_nodes(model, &missing)
+    );
     Ok((shapes, vec![Diagnostic::new(Code::ModesCompleted, message).in_file(&raw.path)]))
 }
 
@@ -85,26 +91,30 @@ fn some_nodes(model: &FeModel, rows: &[usize]) -> String {
 /// x_b.
 fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &RawModes) -> Result<()> {
     let whole = model.pencil();
+    // Submatrices of the missing rows.
     let stiffness = whole.stiffness().principal(missing);
     let mass = principal_mass(&whole, missing);
-    let own = Pencil::new(&stiffness, &mass, 1);
+    let pencil = Pencil::new(&stiffness, &mass, 1);
     let refuse = |why: &str| {
-        let message = format!("the file lacks rows of {}, and {why}", some_nodes(model, missing));
+        let message = format!("the file has no values for rows of {}, and {why}", some_nodes(model, missing));
         let help = "write the modes of all nodes, with their rotations where the model has them";
         Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path).with_help(help)
     };
-    let analysis =
-        Analysis::new(&own).ok_or_else(|| refuse("they are too many to follow from the others"))?;
+    let analysis = Analysis::new(&pencil)
+        .ok_or_else(|| refuse("there are too many to compute them from the other rows"))?;
     for (mode, eigenvalue) in raw.eigenvalues.iter().enumerate() {
         let lambda = eigenvalue.unwrap_or(0.0).max(0.0);
         let shape = shapes.as_ref().subcols(mode, 1);
+        // Force of the known rows on the missing ones.
         let (elastic, inertial) = (whole.apply_stiffness(shape), whole.apply_mass(shape));
         let force = |i: usize, _| lambda * inertial[(missing[i], 0)] - elastic[(missing[i], 0)];
         let mut values = Mat::from_fn(missing.len(), 1, force);
-        let factor = Indefinite::<f64>::new(&analysis, &own, lambda);
+        // Solve for the missing rows, unless the factor is inaccurate.
+        let factor = Indefinite::<f64>::new(&analysis, &pencil, lambda);
         let inertia = factor.inertia();
-        if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > INACCURATE {
-            return Err(refuse("they do not follow from the others").into());
+        if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > MAX_BACKWARD_ERROR
+        {
+            return Err(refuse("they cannot be computed from the other rows").into());
         }
         factor.solve_in_place(values.as_mut());
         missing.iter().enumerate().for_each(|(i, row)| shapes[(*row, mode)] = values[(i, 0)]);
@@ -141,14 +151,14 @@ pub(super) struct StatedModes {
 }
 
 /// Share of a mode, in the M-norm, that must lie in modes of its frequency.
-const ASSURED: f64 = 0.99;
+const MIN_FREQUENCY_SHARE: f64 = 0.99;
 
 /// Relative distance of eigenvalues below which modes count as one frequency: any mixture of their shapes
 /// is valid.
-const CLOSE: f64 = 1e-3;
+const SAME_FREQUENCY_DISTANCE: f64 = 1e-3;
 
 /// Largest number of modes that a message names one by one.
-const NAMED: usize = 3;
+const MAX_NAMED_MODES: usize = 3;
 
 /// Mode that differs from the data in its file.
 struct Difference {
@@ -181,15 +191,19 @@ impl StatedModes {
         let worst = different.first()?;
         let hertz = |eigenvalue: f64| model.units().frequency_of(eigenvalue.max(0.0));
         let said = |one: &Difference| {
-            let (stated, own) = (hertz(one.stated), hertz(one.rayleigh));
-            let assurance = match one.assurance < ASSURED {
-                true => format!(", MAC {:.2}", one.assurance),
-                false => String::new(),
+            let (stated, computed) = (hertz(one.stated), hertz(one.rayleigh));
+            let assurance = if one.assurance < MIN_FREQUENCY_SHARE {
+                format!(", MAC {:.2}", one.assurance)
+            } else {
+                String::new()
             };
-            format!("mode {} has {stated:.6} Hz in the file, {own:.6} Hz by K and M{assurance}", one.mode + 1)
+            format!(
+                "mode {} has {stated:.6} Hz in the file, {computed:.6} Hz by K and M{assurance}",
+                one.mode + 1
+            )
         };
-        let named: Vec<String> = different.iter().take(NAMED).map(said).collect();
-        let more = if different.len() > NAMED { "; ..." } else { "" };
+        let named: Vec<String> = different.iter().take(MAX_NAMED_MODES).map(said).collect();
+        let more = if different.len() > MAX_NAMED_MODES { "; ..." } else { "" };
         let message = format!(
             "{} of {} flexible modes differ: {}{more}",
             different.len(),
@@ -197,12 +211,13 @@ impl StatedModes {
             named.join("; ")
         );
         let diagnostic = Diagnostic::new(Code::ModesDiffer, message).in_file(&self.path);
-        Some(match worst.rounded && different.iter().all(|one| one.rounded) {
-            true => diagnostic.with_help(format!(
-                "the {} digits of the shapes explain it: write them with more, or compute the modes here",
+        Some(if worst.rounded && different.iter().all(|one| one.rounded) {
+            diagnostic.with_help(format!(
+                "write the shapes with more than {} digits, which explain the difference, or compute the modes here",
                 self.digits
-            )),
-            false => diagnostic,
+            ))
+        } else {
+            diagnostic
         })
     }
 
@@ -227,11 +242,12 @@ impl StatedModes {
             let rayleigh = energies[mode] / masses[mode];
             let square = |p: usize| shares[(p, mode)].powi(2);
             let all: f64 = (0..solution.eigenvalues.len()).map(square).sum();
-            let is_close = |p: &usize| (solution.eigenvalues[*p] - rayleigh).abs() <= CLOSE * rayleigh;
+            let is_close =
+                |p: &usize| (solution.eigenvalues[*p] - rayleigh).abs() <= SAME_FREQUENCY_DISTANCE * rayleigh;
             let close = (0..solution.eigenvalues.len()).filter(is_close).map(square).fold(0.0, |a, b| a + b);
             let assurance = if is_whole && all > 0.0 { close / all } else { 1.0 };
             let difference = (stated - rayleigh).abs();
-            if difference <= precision * stated.abs().max(rayleigh) && assurance >= ASSURED {
+            if difference <= precision * stated.abs().max(rayleigh) && assurance >= MIN_FREQUENCY_SHARE {
                 return None;
             }
             let noise = self.rounding_energy(&stiffness, shapes, mode) / masses[mode];
@@ -244,9 +260,12 @@ impl StatedModes {
     /// Returns twice the strain energy expected from rounding the values of a shape to their digits: the
     /// sum of K_ii u_i^2 / 12, where u_i is one unit of the last digit of the value.
     fn rounding_energy(&self, stiffness: &[f64], shapes: MatRef<'_, f64>, mode: usize) -> f64 {
-        let unit = |value: f64| match value == 0.0 {
-            true => 0.0,
-            false => 10f64.powi(value.abs().log10().floor() as i32 + 1 - i32::from(self.digits)),
+        let unit = |value: f64| {
+            if value == 0.0 {
+                0.0
+            } else {
+                10f64.powi(value.abs().log10().floor() as i32 + 1 - i32::from(self.digits))
+            }
         };
         let column = shapes.col(mode);
         stiffness.iter().zip(column.iter()).map(|(k, value)| k * unit(*value).powi(2) / 12.0).sum()

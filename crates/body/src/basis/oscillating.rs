@@ -62,7 +62,8 @@ fn hold(x: &mut Mat<f64>, conditions: &Mat<f64>, to_conditions: &Mat<f64>) {
     }
     let product = gram(conditions.as_ref(), to_conditions.as_ref());
     let inverse = DMatrix::from_fn(count, count, |i, j| product[(i, j)]).try_inverse();
-    let inverse = Mat::from_fn(count, count, |i, j| inverse.as_ref().map_or(f64::NAN, |own| own[(i, j)]));
+    let inverse =
+        Mat::from_fn(count, count, |i, j| inverse.as_ref().map_or(f64::NAN, |inverse| inverse[(i, j)]));
     let moved = combine(inverse.as_ref(), gram(conditions.as_ref(), x.as_ref()).as_ref());
     subtract_combination(x.as_mut(), to_conditions.as_ref(), moved.as_ref());
 }

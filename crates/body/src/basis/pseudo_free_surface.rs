@@ -10,20 +10,20 @@ use flexbody_linalg::{
 
 /// Relative M-norm after removal of rigid motion below which a shape counts as a rigid motion. Rigid
 /// motions from eigen-solvers leave 1e-6 and less.
-const RIGID: f64 = 1e-5;
+const RIGID_REMAINDER: f64 = 1e-5;
 
 /// Squared M-norm of a shape relative to sum_i M_ii psi_i^2 below which the shape moves no mass: rounding
 /// leaves 1e-15.
-const MASSLESS: f64 = 1e-12;
+const MASSLESS_SHAPE: f64 = 1e-12;
 
 /// Limit of this ratio for the remainder of a shape after projection against others. With a singular M some
 /// combinations of shapes have almost no mass. Below the limit such a remainder, once normalised, would be
 /// so large and its eigenvalue so high that the other shapes lose their digits.
-const NEARLY_MASSLESS: f64 = 1e-4;
+const MASSLESS_REMAINDER: f64 = 1e-4;
 
 /// Elastic energy of the remainder of a shape, relative to that of the whole shape, above which the
 /// remainder is a massless motion and not the rounding error of a dependent shape.
-const ELASTIC: f64 = 1e-10;
+const MIN_ELASTIC_ENERGY: f64 = 1e-10;
 
 /// Linearly independent deformations in a set of shapes, and the removed shapes by reason (indices from 0).
 #[derive(Debug, Clone)]
@@ -31,7 +31,7 @@ pub(super) struct Independent {
     /// M-orthonormal up to rounding over the dependence limit, and M-orthogonal to the rigid modes.
     pub vectors: Mat<f64>,
     /// Indices of the kept shapes: column j lies in the span of the shapes up to kept\[j\].
-    pub kept: Vec<usize>,
+    pub retained: Vec<usize>,
     pub rigid: Vec<usize>,
     pub massless: Vec<usize>,
     /// Shapes that depend on the shapes before them, with the M-norm that projection leaves.
@@ -55,7 +55,7 @@ pub(super) fn independent(
     set.scale_to_unit_mass()?;
     // Remove rigid motion twice: a shape may differ from a rigid motion only in its last digits.
     set.remove_rigid(rigid);
-    set.leave_out_rigid(RIGID.max(dependent));
+    set.leave_out_rigid(RIGID_REMAINDER.max(dependent));
     set.remove_rigid(rigid);
     let (mut found, without_mass) = set.orthonormalised(dependent);
     found.vectors = in_equilibrium(pencil, rigid, found.vectors, &without_mass);
@@ -78,7 +78,7 @@ impl<'a> ShapeSet<'a> {
     fn new(pencil: &'a Pencil<'a>, shapes: Mat<f64>) -> Self {
         let outcome = Independent {
             vectors: Mat::zeros(0, 0),
-            kept: Vec::new(),
+            retained: Vec::new(),
             rigid: Vec::new(),
             massless: Vec::new(),
             dependent: Vec::new(),
@@ -108,10 +108,10 @@ impl<'a> ShapeSet<'a> {
     fn scale_to_unit_mass(&mut self) -> Option<()> {
         for (j, square) in self.squares().into_iter().enumerate() {
             let bound = diagonal_square(&self.mass_diagonal, &self.shapes, j);
-            if square < -MASSLESS.sqrt() * bound {
+            if square < -MASSLESS_SHAPE.sqrt() * bound {
                 return None;
             }
-            if square <= MASSLESS * bound {
+            if square <= MASSLESS_SHAPE * bound {
                 self.outcome.massless.push(j);
                 self.without_mass.push(self.shapes.as_ref().subcols(j, 1).to_owned());
                 self.is_in[j] = false;
@@ -147,7 +147,7 @@ impl<'a> ShapeSet<'a> {
         let Self { pencil, mass_diagonal, mut shapes, is_in, mut without_mass, mut outcome } = self;
         let mut products = pencil.apply_mass(shapes.as_ref());
         for j in (0..shapes.ncols()).filter(|&j| is_in[j]) {
-            let found = outcome.kept.len();
+            let found = outcome.retained.len();
             let (vector, product) = beside_first(found, &shapes, &products, j);
             let left = column_products(vector.as_ref(), product.as_ref())[0].max(0.0).sqrt();
             if left < dependent {
@@ -162,9 +162,9 @@ impl<'a> ShapeSet<'a> {
             let square = column_products(vector.as_ref(), product.as_ref())[0];
             // With a singular M the remainder of shapes that have mass may have none.
             let bound = diagonal_square(&mass_diagonal, &vector, 0);
-            if square <= NEARLY_MASSLESS * bound {
+            if square <= MASSLESS_REMAINDER * bound {
                 outcome.massless.push(j);
-                if square <= MASSLESS * bound {
+                if square <= MASSLESS_SHAPE * bound {
                     without_mass.push(vector);
                 }
                 continue;
@@ -174,9 +174,9 @@ impl<'a> ShapeSet<'a> {
                 shapes[(i, found)] = vector[(i, 0)] / norm;
                 products[(i, found)] = product[(i, 0)] / norm;
             }
-            outcome.kept.push(j);
+            outcome.retained.push(j);
         }
-        outcome.vectors = shapes.as_ref().subcols(0, outcome.kept.len()).to_owned();
+        outcome.vectors = shapes.as_ref().subcols(0, outcome.retained.len()).to_owned();
         (outcome, without_mass)
     }
 }
@@ -184,7 +184,7 @@ impl<'a> ShapeSet<'a> {
 /// Returns true if the remainder `left` of a shape has elastic energy of its own.
 fn is_elastic(pencil: &Pencil<'_>, left: &Mat<f64>, shape: MatRef<'_, f64>) -> bool {
     let energy = |x: MatRef<'_, f64>| column_products(x, pencil.apply_stiffness(x).as_ref())[0];
-    energy(left.as_ref()) > ELASTIC * energy(shape)
+    energy(left.as_ref()) > MIN_ELASTIC_ENERGY * energy(shape)
 }
 
 /// Moves the massless motions Z `without_mass` in the vectors V to elastic equilibrium, V - Z (Z'K Z)^-1
@@ -206,9 +206,10 @@ fn in_equilibrium(
     let sizes: Vec<f64> = (0..energy.nrows()).map(|j| energy[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
     let scaled = Mat::from_fn(sizes.len(), sizes.len(), |i, j| energy[(i, j)] / (sizes[i] * sizes[j]));
     let Some(eigen) = symmetric_eigen(scaled.as_ref()) else { return vectors };
-    let kept: Vec<usize> = (0..sizes.len()).filter(|&k| eigen.values[k] > ELASTIC).collect();
-    let unit = |j: usize, k: usize| eigen.vectors[(j, kept[k])] / (sizes[j] * eigen.values[kept[k]].sqrt());
-    let unit = Mat::from_fn(sizes.len(), kept.len(), unit);
+    let retained: Vec<usize> = (0..sizes.len()).filter(|&k| eigen.values[k] > MIN_ELASTIC_ENERGY).collect();
+    let unit =
+        |j: usize, k: usize| eigen.vectors[(j, retained[k])] / (sizes[j] * eigen.values[retained[k]].sqrt());
+    let unit = Mat::from_fn(sizes.len(), retained.len(), unit);
     let (motions, forces) =
         (combine(motions.as_ref(), unit.as_ref()), combine(forces.as_ref(), unit.as_ref()));
     // V - Z Z'K V.
@@ -257,7 +258,7 @@ impl Independent {
         criterion: f64,
         name: impl Fn(usize) -> String,
     ) -> Vec<Diagnostic> {
-        let all = self.kept.len() + self.rigid.len() + self.massless.len() + self.dependent.len();
+        let all = self.retained.len() + self.rigid.len() + self.massless.len() + self.dependent.len();
         let mut notes = Vec::new();
         if !self.rigid.is_empty() {
             let which = named(self.rigid.iter().map(|&j| name(j)).collect());
@@ -272,7 +273,7 @@ impl Independent {
             notes.push(Diagnostic::new(Code::ShapesDependent, message));
         }
         if !self.dependent.is_empty() {
-            let left = |&(j, left): &(usize, f64)| format!("{} ({})", name(j), part_in_words(left));
+            let left = |&(j, left): &(usize, f64)| format!("{} ({})", name(j), norm_in_words(left));
             let which = named(self.dependent.iter().map(left).collect());
             let message = format!(
                 "{} of {all} {what} depend on those before them (less than {criterion:.0e} of the M-norm is left) and are left out: {which}",
@@ -285,7 +286,7 @@ impl Independent {
 }
 
 /// Returns a relative norm as text for messages: values below the rounding of one have no digits.
-pub(super) fn part_in_words(left: f64) -> String {
+pub(super) fn norm_in_words(left: f64) -> String {
     if left < f64::EPSILON { "rounding".to_owned() } else { format!("{left:.0e}") }
 }
 

@@ -7,7 +7,7 @@ use super::failure::explain;
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
 use super::massless::on_mass;
 use super::modal_basis::{ModalBasis, problem_of_span};
-use super::pseudo_free_surface::{independent, part_in_words};
+use super::pseudo_free_surface::{independent, norm_in_words};
 use super::rigid_modes::rigid_modes;
 use super::{ModeSettings, Truncation};
 use faer::{Mat, MatRef};
@@ -26,11 +26,11 @@ use nalgebra::Vector3;
 /// Smallest relative M-norm that a response must keep after projection against the modes and the residual
 /// vectors before it. Responses below this limit are dropped. A larger value drops more loads; a smaller
 /// value admits vectors that consist of rounding errors.
-const LEFT: f64 = 1e-8;
+const MIN_RESPONSE_REMAINDER: f64 = 1e-8;
 
 /// Smallest norm of a self-equilibrated load relative to the norm of the load. A load below this limit
 /// moves the body only as a rigid body and needs no residual vector.
-const SELF_EQUILIBRATED: f64 = 1e-10;
+const MIN_SELF_EQUILIBRATED_NORM: f64 = 1e-10;
 
 /// Returns the static responses K^+ f to all columns of `loads` (N x m), made self-equilibrated by inertia
 /// relief. The accuracy is that of an estimate ([`ResponseAccuracy::ROUGH`]).
@@ -232,7 +232,7 @@ impl NamedLoads {
     /// `certified`: residual vectors have no guaranteed bounds.
     pub(super) fn new(model: &FeModel, loads: &[Loads], what: &str, settings: &ModeSettings) -> Result<Self> {
         if settings.accuracy == Accuracy::Certified {
-            let message = format!("{what}s are no eigenvectors and cannot be certified");
+            let message = format!("{what}s are not eigenvectors and cannot be certified");
             return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
         }
         Self::of(model, loads, what)
@@ -328,9 +328,9 @@ pub(super) fn interface_truncation(
         let rigid = rigid_modes(model, &model.pencil())?;
         let problem = problem_of_span(model, rigid.as_ref());
         let loads = NamedLoads::of(model, &[Loads::Interfaces], "interface load")?;
-        let uncounted = context.uncounted();
-        let beside = beside_modes(model, &problem, free, &loads, ResponseAccuracy::ROUGH, &uncounted)?;
-        Ok(Responses::new(&problem, free, &loads, beside).lacking())
+        let without_counter = context.without_counter();
+        let beside = beside_modes(model, &problem, free, &loads, ResponseAccuracy::ROUGH, &without_counter)?;
+        Ok(Responses::new(&problem, free, &loads, beside).truncations())
     };
     found().unwrap_or_default()
 }
@@ -339,10 +339,10 @@ pub(super) fn interface_truncation(
 /// the modal search used.
 fn responses_fit(model: &FeModel, free: &EigenSolution, context: &Context<'_>) -> bool {
     /// Number of blocks of all loads held at once: forces, responses, and their products with K and M.
-    const BLOCKS: usize = 5;
+    const LOAD_BLOCKS: usize = 5;
     let loads = |set: &NodeSet| if set.coupling() == Coupling::Free { 3 * set.nodes.len() } else { 6 };
     let columns: usize = model.interfaces().iter().map(loads).sum();
-    let bytes = (BLOCKS * columns * free.vectors.nrows() * size_of::<f64>()) as u64;
+    let bytes = (LOAD_BLOCKS * columns * free.vectors.nrows() * size_of::<f64>()) as u64;
     let factor = free.plan.as_ref().map_or(0, Plan::bytes);
     bytes.saturating_add(factor) <= context.available()
 }
@@ -360,6 +360,7 @@ fn beside_modes(
     let precision = free.plan.as_ref().map_or(Precision::Double, Plan::precision);
     let mut beside = Mat::zeros(loads.forces.nrows(), loads.forces.ncols());
     for ((hertz, square), columns) in loads.by_frequency() {
+        // Loads of one frequency are solved together.
         let forces = Mat::from_fn(beside.nrows(), columns.len(), |i, c| loads.forces[(i, columns[c])]);
         let responses = if square == 0.0 {
             static_responses(problem, modes, forces, first, precision, accuracy, context)
@@ -381,7 +382,7 @@ fn no_response(model: &FeModel, hertz: f64, failure: EigenFailure) -> Error {
     let message =
         format!("the responses at {hertz} Hz are found with a relative residual of {residual:.1e} only");
     Diagnostic::new(Code::FactorizationFailed, message)
-        .with_help("a natural frequency beyond the modes may be too near: name another frequency")
+        .with_help("name another frequency: a natural frequency beyond the modes may be too near")
         .into()
 }
 
@@ -418,6 +419,7 @@ impl<'a> Responses<'a> {
         let in_stiffness =
             |x: &Mat<f64>| column_products(x.as_ref(), pencil.apply_stiffness(x.as_ref()).as_ref());
         let in_mass = |x: &Mat<f64>| column_products(x.as_ref(), pencil.apply_mass(x.as_ref()).as_ref());
+        // Energies of the whole responses and of their parts outside the modes.
         let energy = in_stiffness(&whole);
         let deforms = deforming(problem, forces, &energy);
         Self {
@@ -438,36 +440,39 @@ impl<'a> Responses<'a> {
         let names = &self.loads.names;
         let mut dropped: Vec<String> = Vec::new();
         let mut used = Vec::new();
+        // Drop loads that deform nothing, and responses that the modes already contain.
         for (j, name) in names.iter().enumerate() {
             let left = self.mass_beside[j].max(0.0);
             if !self.deforms[j] {
                 dropped.push(format!("{name} (deforms nothing)"));
-            } else if left.sqrt() < LEFT * self.mass[j].sqrt() {
-                dropped.push(format!("{name} ({})", part_in_words((left / self.mass[j]).sqrt())));
+            } else if left.sqrt() < MIN_RESPONSE_REMAINDER * self.mass[j].sqrt() {
+                dropped.push(format!("{name} ({})", norm_in_words((left / self.mass[j]).sqrt())));
             } else {
                 used.push(j);
             }
         }
+        // M-orthonormalise the others against rigid motions, modes and each other.
         let candidates = Mat::from_fn(self.beside.nrows(), used.len(), |i, j| self.beside[(i, used[j])]);
         let known = side_by_side(&[problem.rigid, modes]);
-        let found = independent(&problem.pencil, known.as_ref(), candidates, LEFT)?;
+        let found = independent(&problem.pencil, known.as_ref(), candidates, MIN_RESPONSE_REMAINDER)?;
         let name = |j: usize| &names[used[j]];
         dropped.extend(
-            found.dependent.iter().map(|&(j, left)| format!("{} ({})", name(j), part_in_words(left))),
+            found.dependent.iter().map(|&(j, left)| format!("{} ({})", name(j), norm_in_words(left))),
         );
         dropped.extend(found.massless.iter().map(|&j| format!("{} (moves no mass)", name(j))));
         dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", name(j))));
-        let kept = found.kept.iter().map(|&j| used[j]).collect();
-        Some(Added { vectors: found.vectors, kept, dropped })
+        // The load of each vector.
+        let retained = found.retained.iter().map(|&j| used[j]).collect();
+        Some(Added { vectors: found.vectors, retained, dropped })
     }
 
     /// Returns the truncated part of each static response for the free modes alone.
-    fn lacking(&self) -> Vec<Truncation> {
-        let lacking = |(j, load): (usize, &String)| {
+    fn truncations(&self) -> Vec<Truncation> {
+        let truncations = |(j, load): (usize, &String)| {
             let error = self.error(self.energy_beside[j], j);
             Truncation { load: load.clone(), before: error, after: error }
         };
-        self.loads.names.iter().enumerate().map(lacking).collect()
+        self.loads.names.iter().enumerate().map(truncations).collect()
     }
 
     /// Returns the K-norm of a part of the response `j`, given by its square, relative to the K-norm of the
@@ -479,6 +484,7 @@ impl<'a> Responses<'a> {
     /// Returns the relative truncation error of each static response, for the free modes alone and for the
     /// modes of the extended span.
     fn truncation(mut self, problem: &EigenProblem<'_>, ritz: &EigenSolution) -> Vec<Truncation> {
+        // Whole response minus its part in the extended span.
         let modal = gram(ritz.vectors.as_ref(), self.loads.forces.as_ref());
         let amplitudes =
             Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| -modal[(p, j)] / ritz.eigenvalues[p]);
@@ -497,10 +503,12 @@ impl<'a> Responses<'a> {
 
 /// Returns, for every load, true if the load does more than move the body as a rigid body.
 fn deforming(problem: &EigenProblem<'_>, forces: &Mat<f64>, energy: &[f64]) -> Vec<bool> {
+    // Loads in equilibrium with the inertia forces of rigid motion.
     let resultants = gram(problem.rigid, forces.as_ref());
     let equilibrated = forces - problem.pencil.apply_mass(problem.rigid) * resultants;
     let deforms = |j: usize| {
-        equilibrated.col(j).norm_l2() > SELF_EQUILIBRATED * forces.col(j).norm_l2() && energy[j] > 0.0
+        equilibrated.col(j).norm_l2() > MIN_SELF_EQUILIBRATED_NORM * forces.col(j).norm_l2()
+            && energy[j] > 0.0
     };
     (0..forces.ncols()).map(deforms).collect()
 }
@@ -510,7 +518,7 @@ struct Added {
     /// M-orthonormal, M-orthogonal to rigid motions and free modes.
     vectors: Mat<f64>,
     /// Index of the load of each vector.
-    kept: Vec<usize>,
+    retained: Vec<usize>,
     /// Names of the dropped loads, each with the reason.
     dropped: Vec<String>,
 }
@@ -527,7 +535,7 @@ impl Added {
             }
             let largest = (free..parts.nrows()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
             let largest = largest.expect("the span is more than the free modes");
-            let name = &loads.names[self.kept[largest - free]];
+            let name = &loads.names[self.retained[largest - free]];
             format!("{}: {:.0} % {name}", loads.what, 100.0 * share(largest))
         };
         (0..parts.ncols()).map(origin).collect()
@@ -539,7 +547,7 @@ impl Added {
         let dropped = &self.dropped;
         (!dropped.is_empty()).then(|| {
             let message = format!(
-                "{} of {} {what}s are left out, they add less than {LEFT:.0e} of their M-norm: {}",
+                "{} of {} {what}s are left out since they add less than {MIN_RESPONSE_REMAINDER:.0e} of their M-norm: {}",
                 dropped.len(),
                 names.len(),
                 dropped.join(", ")

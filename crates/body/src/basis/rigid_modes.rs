@@ -36,7 +36,7 @@ pub fn rigid_modes(model: &FeModel, pencil: &Pencil<'_>) -> Result<Mat<f64>> {
 /// Returns the error FB416, which says if the nodes lie on one line, or only their mass.
 fn degenerate(model: &FeModel, centre: [f64; 3], length: f64) -> Diagnostic {
     /// Distance from a line, relative to the extent of the body, below which nodes lie on it.
-    const ON_LINE: f64 = 1e-7;
+    const COLLINEAR_DISTANCE: f64 = 1e-7;
     let positions = &model.nodes().positions;
     let nodes = positions.len();
     if model.dimension() == 2 {
@@ -47,13 +47,13 @@ fn degenerate(model: &FeModel, centre: [f64; 3], length: f64) -> Diagnostic {
     }
     let from_centre = Mat::from_fn(positions.len(), 3, |node, k| (positions[node][k] - centre[k]) / length);
     let spread = symmetric_eigen(gram(from_centre.as_ref(), from_centre.as_ref()).as_ref());
-    let is_line = spread.is_none_or(|eigen| eigen.values[1] <= ON_LINE.powi(2) * eigen.values[2]);
+    let is_line = spread.is_none_or(|eigen| eigen.values[1] <= COLLINEAR_DISTANCE.powi(2) * eigen.values[2]);
     if is_line {
         let message = format!("the {nodes} nodes lie on one line, and nothing has inertia about it");
         return Diagnostic::new(Code::BodyDegenerate, message);
     }
     let message =
         format!("the {nodes} nodes do not lie on one line, but all mass does: nothing has inertia about it");
-    let help = "elements of reduced integration (C3D8R, hourglass modes) have their mass in their middles: a bar of one row of them has none beside its axis; use C3D8 or C3D20, or two rows; else look for nodes without mass";
+    let help = "use C3D8 or C3D20, or two rows of elements, in a bar of one row of elements of reduced integration (C3D8R), which have their mass in their middles; else look for nodes without mass";
     Diagnostic::new(Code::BodyDegenerate, message).with_help(help)
 }

@@ -83,16 +83,19 @@ impl SolvedModes {
         if exact < given {
             let worst = solution.residuals.iter().copied().fold(0.0, larger);
             return inaccurate(format!(
-                "{} of {given} modes are no eigenvectors of the model: K-residual up to {worst:.0e}, accuracy `{}` promises {:.0e}",
+                "{} of {given} modes are not eigenvectors of the model: K-residual up to {worst:.0e}, accuracy `{}` requires {:.0e}",
                 given - exact,
                 accuracy.name(),
                 accuracy.residual()
             ));
         }
         let pairs = self.eigenvalues.iter().zip(&solution.eigenvalues);
-        match pairs.enumerate().find(|(_, (own, ours))| (*own - *ours).abs() > SAME_EIGENVALUE * ours.abs()) {
-            Some((j, (own, ours))) => inaccurate(format!(
-                "the result states the eigenvalue {own:.9e} for mode {}, its Rayleigh quotient is {ours:.9e}",
+        match pairs
+            .enumerate()
+            .find(|(_, (stated, quotient))| (*stated - *quotient).abs() > SAME_EIGENVALUE * quotient.abs())
+        {
+            Some((j, (stated, quotient))) => inaccurate(format!(
+                "the result states the eigenvalue {stated:.9e} for mode {}, its Rayleigh quotient is {quotient:.9e}",
                 j + 1
             )),
             None => Ok(()),
@@ -101,7 +104,7 @@ impl SolvedModes {
 
     /// Returns the completeness by the built-in count if it was made, otherwise by the count of the solver,
     /// whose name then appears.
-    fn completeness(&self, model: &FeModel, rigid: usize, own: Completeness) -> Result<Completeness> {
+    fn completeness(&self, model: &FeModel, rigid: usize, stated: Completeness) -> Result<Completeness> {
         let missing = |message: String| {
             let found = Diagnostic::new(Code::CompletenessFailed, message);
             Err(Error::from(
@@ -109,14 +112,14 @@ impl SolvedModes {
             ))
         };
         if self.prove {
-            return match (own.proof, own.negative_pivots) {
-                (Proof::NotProved, Some(_)) => missing(own.remark),
-                _ => Ok(own),
+            return match (stated.proof, stated.negative_pivots) {
+                (Proof::NotProved, Some(_)) => missing(stated.remark),
+                _ => Ok(stated),
             };
         }
         let Some(CountElsewhere { negative, zero, shift, by }) = &self.count else {
             let remark = "the solver made no inertia count".to_owned();
-            return Ok(Completeness { proof: Proof::NotProved, negative_pivots: None, remark, ..own });
+            return Ok(Completeness { proof: Proof::NotProved, negative_pivots: None, remark, ..stated });
         };
         let below = self.eigenvalues.iter().filter(|lambda| *lambda < shift).count();
         let hertz = model.units().frequency_of(*shift);
@@ -142,7 +145,7 @@ impl SolvedModes {
             && count > given
             && count < usize::MAX
         {
-            let message = format!("{count} modes were asked for, the result has {given}");
+            let message = format!("{count} modes were requested, the result has {given}");
             notes.push(Diagnostic::new(Code::ModesClamped, message));
         }
         let end = match wanted {
@@ -150,8 +153,10 @@ impl SolvedModes {
             Wanted::Below(_) => given,
         };
         if end > given {
-            let message =
-                format!("mode {given} shares its eigenvalue with {} that are left out", end - given);
+            let message = format!(
+                "mode {given} shares its eigenvalue with other modes that are left out (number: {})",
+                end - given
+            );
             notes.push(
                 Diagnostic::new(Code::RepeatedSplit, message)
                     .with_help(format!("ask for {end} modes to keep the body's symmetry")),
@@ -162,15 +167,15 @@ impl SolvedModes {
         solution.residuals.truncate(given);
         solution.rounding_floors.truncate(given);
         solution.vectors = solution.vectors.as_ref().subcols(0, given).to_owned();
-        notes.extend(self.told(model, &solution.completeness));
+        notes.extend(self.completeness_note(model, &solution.completeness));
         notes
     }
 
     /// Returns a diagnostic about the program that counted the modes, unless the built-in count proved
     /// them.
-    fn told(&self, model: &FeModel, completeness: &Completeness) -> Option<Diagnostic> {
+    fn completeness_note(&self, model: &FeModel, completeness: &Completeness) -> Option<Diagnostic> {
         let Completeness { proof, negative_pivots, remark, .. } = completeness;
-        let help = "flexbody assemble --prove counts once more, where its factor fits the memory";
+        let help = "count again with flexbody assemble --prove, if the factor fits the memory";
         match (proof, negative_pivots) {
             (Proof::InertiaCount, _) => None,
             (_, Some(_)) => Some(Diagnostic::new(Code::CompletenessElsewhere, remark).with_help(help)),

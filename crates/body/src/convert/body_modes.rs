@@ -77,6 +77,7 @@ impl BodyModes {
     pub fn new(model: &FeModel, place: &NodesInFrame, mut vectors: Mat<f64>) -> Self {
         let rows = model.rows();
         let (nodes, nf) = (model.nodes().len(), vectors.ncols());
+        // Displacements and rotations along the body axes.
         let mut displacements =
             in_space(vectors.as_ref().subrows(0, rows.displacements()), model.dimension());
         place.frame.rotate_shapes(&mut displacements);
@@ -90,6 +91,7 @@ impl BodyModes {
             place.frame.rotate_shapes(&mut rotations);
             rotations
         });
+        // Sign of each mode by its largest component; rotations count times the size of the body.
         let size = place.positions.iter().map(|x| Vector3::from(*x).norm()).fold(0.0, f64::max);
         let sign = |j: usize| {
             let moved = displacements.col_as_slice(j)[..3 * nodes].iter().copied();
@@ -97,6 +99,7 @@ impl BodyModes {
             canonical_sign(moved.chain(turned))
         };
         let signs: Vec<f64> = (0..nf).into_par_iter().map(sign).collect();
+        // Turn the modes with a negative sign.
         for shapes in [&mut vectors, &mut displacements].into_iter().chain(&mut rotations) {
             let columns: Vec<_> =
                 shapes.col_iter_mut().zip(&signs).filter(|(_, sign)| **sign < 0.0).collect();
@@ -149,8 +152,8 @@ impl BodyModes {
         frame.rotate_rigid(&mut fields);
         let nothing = NodeMoments { first: Vector3::zeros(), second: nalgebra::Matrix3::zeros() };
         let mut moments = vec![nothing; self.nodes];
-        for (&node, own) in mass.nodes().iter().zip(mass.moments(fields.as_ref(), &frame.axes)) {
-            moments[node as usize] = own;
+        for (&node, moment) in mass.nodes().iter().zip(mass.moments(fields.as_ref(), &frame.axes)) {
+            moments[node as usize] = moment;
         }
         Some(InertiaStiffness::new(moments, rotations.as_ref(), model.dimension()))
     }
@@ -210,7 +213,7 @@ impl BodyModes {
         let motion =
             RigidMotion { fields: fields.as_ref(), displacements: mass.turning_rows(), axes: frame.axes };
         let shapes = mass.extend(self.vectors.as_ref());
-        condensed(mass, &motion, shapes.as_ref()).without_feeling_of_flight().shifted(-offset)
+        condensed(mass, &motion, shapes.as_ref()).with_w0_of_c1().shifted(-offset)
     }
 }
 

@@ -7,7 +7,7 @@ use flexbody_model::rigid_count;
 
 /// Number of standard deviations of its rounding error that an entry of Psi' K Psi may deviate: large
 /// enough for all of many entries.
-const ROUNDINGS: f64 = 10.0;
+const ROUNDING_DEVIATIONS: f64 = 10.0;
 
 impl ModalModel<'_> {
     /// Returns the certificate of the body.
@@ -41,6 +41,6 @@ impl ModalModel<'_> {
         let noise = energy_noise(self.model.stiffness(), self.modes.vectors.as_ref(), f64::EPSILON);
         let relative =
             noise.iter().zip(&self.found.solution.eigenvalues).map(|(noise, lambda)| noise / lambda);
-        ROUNDINGS * relative.fold(0.0, f64::max)
+        ROUNDING_DEVIATIONS * relative.fold(0.0, f64::max)
     }
 }

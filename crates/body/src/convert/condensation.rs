@@ -47,17 +47,16 @@ impl ModalModel<'_> {
 
     /// Condenses the groups that `terms` keep; `linear` holds the data already known. Accuracy `certified`
     /// condenses everything first, since its digits refer to all data.
-    pub fn condense_kept(&self, linear: Condensation, terms: Vec<TermDecision>) -> Condensation {
+    pub fn condense_selected(&self, linear: Condensation, terms: Vec<TermDecision>) -> Condensation {
         let dropped = terms.iter().filter(|term| !term.kept);
         let groups =
             dropped.fold(TermGroups::ALL, |groups, term| groups.and(TermGroups::without(term.group)));
         let is_enough = !groups.w2 && !groups.w3 && self.found.solution.bounds.is_none();
-        let condensed = match is_enough {
-            true => linear,
-            false => {
-                let whole = self.condense();
-                Condensation { columns: linear.columns + whole.columns, ..whole }
-            }
+        let condensed = if is_enough {
+            linear
+        } else {
+            let whole = self.condense();
+            Condensation { columns: linear.columns + whole.columns, ..whole }
         };
         Condensation { invariants: condensed.invariants.with_groups(groups), terms, ..condensed }
     }
@@ -68,16 +67,16 @@ impl ModalModel<'_> {
         let (bounds, mass) = (self.found.solution.bounds.as_ref()?, self.model.scalar_mass()?);
         let shapes = self.modes.displacements.as_ref();
         let (positions, axes) = (&self.place.positions, &self.place.frame.axes);
-        let own = condense_certified(mass, positions, shapes, self.model.stiffness(), axes);
+        let certified = condense_certified(mass, positions, shapes, self.model.stiffness(), axes);
         let guarantee = Guarantee {
             shift_below: bounds.shift_below,
             pivots_below: bounds.pivots_below,
             eigenvalue_lower: bounds.lower.clone(),
             eigenvalue_upper: bounds.upper.clone(),
             shape_error: bounds.shape_error.clone(),
-            digits: own.digits,
+            digits: certified.digits,
         };
-        Some((own.invariants, guarantee))
+        Some((certified.invariants, guarantee))
     }
 }
 

@@ -62,11 +62,11 @@ impl ModalModel<'_> {
         let exact = &condensed.invariants;
         context.phase("lumped comparison");
         let lumped = self.schemes.iter().map(|masses| lumped::comparator(&self, masses, exact)).collect();
-        let uncounted = context.uncounted();
+        let without_counter = context.without_counter();
         let pipelines = if self.settings.lumped_modes { self.schemes.as_slice() } else { &[] };
         let lumped_modes = pipelines
             .iter()
-            .map(|masses| lumped::pipeline(&self, masses, exact, &uncounted))
+            .map(|masses| lumped::pipeline(&self, masses, exact, &without_counter))
             .collect::<Result<_>>()?;
         let (parts, overdamped) = self.parts(&condensed, lumped)?;
         let body = FlexBody::new(parts)?;
@@ -168,9 +168,9 @@ impl ModalModel<'_> {
 
     /// Returns K and M in interface coordinates, in body axes, for bases that have them.
     fn coordinates(&self) -> Option<InterfaceCoordinates> {
-        let own = self.found.coordinates.as_ref()?;
+        let coordinates = self.found.coordinates.as_ref()?;
         let axes = &self.place.frame.axes;
-        Some(own.in_axes(axes, self.model.dimension(), &self.modes.signs))
+        Some(coordinates.in_axes(axes, self.model.dimension(), &self.modes.signs))
     }
 
     /// Returns warnings and notes about the finished body.

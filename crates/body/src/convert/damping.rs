@@ -10,10 +10,10 @@ use flexbody_linalg::{SymmetricMatrix, symmetric_eigen};
 use flexbody_model::{Damping, FeModel, ratio_at};
 
 /// Number of standard deviations of the noise due to the digits of D that count as rounding.
-const NOISE_FACTOR: f64 = 30.0;
+const NOISE_DEVIATIONS: f64 = 30.0;
 
 /// Smallest eigenvalue of the damping, scaled to a unit diagonal, that counts as rounding.
-const SEMIDEFINITE: f64 = -1e-8;
+const MIN_SCALED_EIGENVALUE: f64 = -1e-8;
 
 /// Damping of modes.
 pub struct ModalDamping {
@@ -89,7 +89,7 @@ fn check_semidefinite(
 ) -> Result<()> {
     let input_error = 0.5 * 10f64.powi(1 - i32::from(model.digits()));
     let noise = energy_noise(d, vectors, input_error);
-    let raised = |j: usize| reduced[(j, j)] + NOISE_FACTOR * noise[j];
+    let raised = |j: usize| reduced[(j, j)] + NOISE_DEVIATIONS * noise[j];
     let refuse = |message: String| Err(Diagnostic::new(Code::DampingIndefinite, message).into());
     if let Some(j) = (0..noise.len()).find(|&j| raised(j).is_nan() || raised(j) < 0.0) {
         return refuse(format!(
@@ -104,7 +104,7 @@ fn check_semidefinite(
         if i == j { raised(j) / size[j] / size[j] } else { reduced[(i, j)] / size[i] / size[j] }
     });
     match symmetric_eigen(scaled.as_ref()) {
-        Some(eigen) if eigen.values[0] >= SEMIDEFINITE => Ok(()),
+        Some(eigen) if eigen.values[0] >= MIN_SCALED_EIGENVALUE => Ok(()),
         Some(eigen) => {
             let most = (0..size.len()).fold(0, |w, j| {
                 if eigen.vectors[(j, 0)].abs() > eigen.vectors[(w, 0)].abs() { j } else { w }

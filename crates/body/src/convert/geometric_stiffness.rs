@@ -11,10 +11,10 @@ use flexbody_model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
 use nalgebra::{Matrix3, Vector3};
 
 /// Direction cosines up to this magnitude are rounding and count as zero.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
+const ROUNDING_COSINE: f64 = 4.0 * f64::EPSILON;
 
 /// Largest entry whose products stay finite.
-const LARGEST: f64 = 1e290;
+const MAX_ENTRY: f64 = 1e290;
 
 /// Returns Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body) for unit
 /// loads along the columns of `axes`. Components that are not given count as zero, so that K_geo of any
@@ -34,15 +34,16 @@ pub fn modal_geometric_stiffness(
 ) -> Result<Vec<GeometricStiffness<Mat<f64>>>> {
     let mut out: Vec<GeometricStiffness<Mat<f64>>> = Vec::new();
     for GeometricStiffness { load, matrix } in model.geometric_stiffness() {
-        let own = reduced(matrix, vectors);
-        if own.col_iter().any(|column| column.iter().any(|v| v.is_nan() || v.abs() > LARGEST)) {
+        let reduced_matrix = reduced(matrix, vectors);
+        if reduced_matrix.col_iter().any(|column| column.iter().any(|v| v.is_nan() || v.abs() > MAX_ENTRY)) {
             let message = format!("geometric stiffness for {load} overflows on the modes");
             return Err(Diagnostic::new(Code::MatrixNotFinite, message).into());
         }
-        let along = load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING);
+        let along =
+            load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING_COSINE);
         for (component, factor) in along {
             let load = UnitLoad { kind: load.kind.clone(), component };
-            let part = &own * Scale(factor);
+            let part = &reduced_matrix * Scale(factor);
             match out.iter_mut().find(|known| known.load == load) {
                 Some(sum) => sum.matrix += part,
                 None => out.push(GeometricStiffness { load, matrix: part }),

@@ -121,13 +121,13 @@ fn motion_of_interface(
     modes: &BodyModes,
 ) -> Result<Mat<f64>> {
     let interfaces = interfaces_in_frame(model, &place.frame, coupled);
-    let own = interfaces.iter().find(|interface| interface.name == name);
+    let interface = interfaces.iter().find(|interface| interface.name == name);
     let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
     let rows = |interface: &Interface| {
         let rotations = modes.rotations.as_ref().map(Mat::as_ref);
         interface.rows(&nodes, modes.of_nodes(), rotations, model.dimension())
     };
-    let Some(motion) = own.and_then(rows).and_then(|rows| rows.rigid_motion()) else {
+    let Some(motion) = interface.and_then(rows).and_then(|rows| rows.rigid_motion()) else {
         return Err(impossible(format!(
             "the nodes of interface `{name}` lie on one line: its orientation is not known, no frame can stand on it"
         )));

@@ -37,11 +37,11 @@ pub struct LumpedPipeline {
 /// Relative difference of eigenvalues up to which modes count as one group with one frequency.
 /// Discretisation splits the pairs of symmetric parts by less, and any vectors of the group may be its
 /// modes. A larger value also warns about neighbours that are distinct.
-const SAME_FREQUENCY: f64 = 1e-3;
+const SAME_EIGENVALUE_DIFFERENCE: f64 = 1e-3;
 
 /// Cosine below which a direction of one subspace is closer to the complement of the other than to the
 /// other itself (45 degrees).
-const NEARLY_DISJOINT: f64 = std::f64::consts::FRAC_1_SQRT_2;
+const MIN_SUBSPACE_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 impl Lumping {
     /// Returns the masses of the nodes of `model`.
@@ -75,11 +75,12 @@ impl Lumping {
 /// Returns the invariants of `masses` on the modes of the body, and their error norms.
 pub(super) fn comparator(modal: &ModalModel<'_>, masses: &LumpedMasses, exact: &Invariants) -> LumpedBody {
     let shapes = modal.modes.of_nodes();
-    let own = lumped_invariants(modal, masses, shapes, exact.modal_stiffness().clone(), exact.groups());
+    let invariants =
+        lumped_invariants(modal, masses, shapes, exact.modal_stiffness().clone(), exact.groups());
     LumpedBody {
         scheme: masses.scheme().name().to_owned(),
-        comparison: error_norms(exact, &own),
-        invariants: own,
+        comparison: error_norms(exact, &invariants),
+        invariants,
         negative_masses: masses.negative(),
     }
 }
@@ -95,8 +96,8 @@ fn lumped_invariants(
 ) -> Invariants {
     let only_about_z = modal.model.dimension() == 2 && modal.model.scalar_mass().is_none();
     let condense = if groups.w2 || groups.w3 { condense_lumped } else { condense_lumped_linear };
-    let own = condense(masses, &modal.place.positions, shapes, modal_stiffness);
-    if only_about_z { own.about_z() } else { own }.with_groups(groups)
+    let invariants = condense(masses, &modal.place.positions, shapes, modal_stiffness);
+    if only_about_z { invariants.about_z() } else { invariants }.with_groups(groups)
 }
 
 /// Computes modes and invariants from the lumped mass, aligned with the exact subspace before the
@@ -108,17 +109,17 @@ pub(super) fn pipeline(
     context: &Context<'_>,
 ) -> Result<LumpedPipeline> {
     let scheme = masses.scheme().name().to_owned();
-    let EigenSolution { eigenvalues, vectors, next_eigenvalue, .. } = match own_modes(modal, masses, context)
-    {
-        Ok(found) => found,
-        Err(remark) => return Ok(LumpedPipeline::without_result(scheme, remark)),
-    };
+    let EigenSolution { eigenvalues, vectors, next_eigenvalue, .. } =
+        match lumped_modes(modal, masses, context) {
+            Ok(found) => found,
+            Err(remark) => return Ok(LumpedPipeline::without_result(scheme, remark)),
+        };
     let modes = BodyModes::new(modal.model, &modal.place, vectors);
     let mass_times_modes = modal.model.pencil().apply_mass(modes.vectors.as_ref());
     let cross = gram(modal.modes.vectors.as_ref(), mass_times_modes.as_ref());
     let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..modal.n_modes())));
     let stiffness = reduced(modal.model.stiffness(), modes.vectors.as_ref());
-    let own = lumped_invariants(modal, masses, modes.of_nodes(), stiffness, exact.groups());
+    let invariants = lumped_invariants(modal, masses, modes.of_nodes(), stiffness, exact.groups());
     let exact_modes = &modal.found.solution;
     let cuts = [
         ("model", exact_modes.eigenvalues.last().copied(), exact_modes.next_eigenvalue),
@@ -129,7 +130,7 @@ pub(super) fn pipeline(
         scheme,
         eigenvalues,
         subspace_cosine: alignment.agreement,
-        comparison: error_norms(exact, &own.with_basis(alignment.basis.as_ref())),
+        comparison: error_norms(exact, &invariants.with_basis(alignment.basis.as_ref())),
         remark: String::new(),
     })
 }
@@ -145,11 +146,11 @@ fn caution(
     let hertz = |lambda: f64| format!("{:.5} Hz", modal.model.units().frequency_of(lambda));
     let cut = cuts.iter().filter_map(|&(whose, last, next)| {
         let (last, next) = (last?, next?);
-        (next - last <= SAME_FREQUENCY * next).then(|| {
-            format!("{count} modes cut a group of equal frequencies of the {whose} at {}", hertz(last))
+        (next - last <= SAME_EIGENVALUE_DIFFERENCE * next).then(|| {
+            format!("{count} modes divide a group of equal frequencies of the {whose} at {}", hertz(last))
         })
     });
-    let disjoint = (subspace_cosine < NEARLY_DISJOINT).then(|| {
+    let disjoint = (subspace_cosine < MIN_SUBSPACE_COSINE).then(|| {
         let angle = subspace_cosine.clamp(0.0, 1.0).acos().to_degrees();
         format!("the subspaces differ by {angle:.0} degrees: other modes are among the lowest {count}")
     });
@@ -157,11 +158,11 @@ fn caution(
     if found.is_empty() {
         return String::new();
     }
-    format!("{}; errors of invariants are arbitrary, take another --modes", found.join("; "))
+    format!("{}; the errors of the invariants are arbitrary: choose another --modes", found.join("; "))
 }
 
 /// Returns as many modes of the lumped mass as the body has, or the reason why there are none.
-fn own_modes(
+fn lumped_modes(
     modal: &ModalModel<'_>,
     masses: &LumpedMasses,
     context: &Context<'_>,
@@ -181,7 +182,7 @@ fn own_modes(
         .map_err(|error| error.first_error().message().to_owned())?
         .solution;
     if found.eigenvalues.len() < modal.n_modes() {
-        return Err(format!("the lumped mass has {} modes only", found.eigenvalues.len()));
+        return Err(format!("the lumped mass has only {} modes", found.eigenvalues.len()));
     }
     Ok(found)
 }

@@ -48,28 +48,33 @@ impl<'m> ModalModel<'m> {
     /// [`LumpedMassTable`](Code::LumpedMassTable) if user masses do not fit the nodes (checked before any
     /// work).
     pub fn find(model: &'m FeModel, settings: &'m ConvertSettings, context: &Context<'_>) -> Result<Self> {
+        // Settings that the model cannot fulfil are refused before any work.
         refuse_uncertifiable(model, settings.modes.accuracy)?;
         let schemes =
             settings.lumped.iter().map(|lumping| lumping.masses(model)).collect::<Result<Vec<_>>>()?;
-        let own_frame = own_frame(model, settings)?;
+        let given_frame = given_frame(model, settings)?;
+        // Modes of the basis.
         let counter = WorkCounter::default();
-        let task = Task { model, settings: &settings.modes, context: &context.counted_by(&counter) };
+        let task = Task { model, settings: &settings.modes, context: &context.with_counter(&counter) };
         let mut found = settings.basis.basis().modes(&task)?;
         context.phase("invariants");
+        // Body frame: requested one in mean axes, or the one on an interface, which then constrains the modes.
         let (frame, mass_properties) = body_frame(model, &settings.frame)?;
-        let frame = own_frame.unwrap_or(frame);
+        let frame = given_frame.unwrap_or(frame);
         let place = NodesInFrame::new(model, frame);
         let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
         if let Some(name) = settings.frame.interface() {
             interface_frame::constrain(model, &place, name, coupled, &mut found)?;
         }
+        // Modes with canonical signs along the body axes.
         let modes = BodyModes::new(model, &place, std::mem::replace(&mut found.solution.vectors, Mat::new()));
         // Accuracy `certified` computes its own K_ff.
         let twice = found.solution.is_noisy() && settings.modes.accuracy == Accuracy::Standard;
         let reduced = if twice { reduced_in_twice_the_precision } else { reduced };
         let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
-        let shift = match own_frame {
-            Some(own) => own.origin - mass_properties.centre_of_mass,
+        // Stiffness of the modes under unit loads, and of their inertia.
+        let shift = match given_frame {
+            Some(frame) => frame.origin - mass_properties.centre_of_mass,
             None => Vector3::zeros(),
         };
         let geometric_stiffness =
@@ -125,7 +130,7 @@ fn refuse_uncertifiable(model: &FeModel, accuracy: Accuracy) -> Result<()> {
 /// # Errors
 /// [`Usage`](Code::Usage) together with settings that need free modes; the errors of
 /// [`frame_of_interface`](interface_frame::frame_of_interface).
-fn own_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame>> {
+fn given_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame>> {
     let Some(name) = settings.frame.interface() else { return Ok(None) };
     let refuse = |message: &str, help: &str| {
         Err(Diagnostic::new(Code::Usage, message.to_owned()).with_help(help.to_owned()).into())

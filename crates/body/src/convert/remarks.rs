@@ -6,13 +6,13 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_model::Coupling;
 
 /// Relative error of a frequency above which a note reports it.
-const TOO_HIGH: f64 = 0.01;
+const REPORTED_FREQUENCY_ERROR: f64 = 0.01;
 
 /// Returns a note about the frequencies of the free body that a Craig-Bampton body does not reproduce.
 pub(super) fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
     let fixed = body.certificate().fixed_interface.as_ref()?;
     let (theta, hertz) = (&body.modes().eigenvalue, body.frequencies_hz());
-    let holding = fixed.holding(theta, TOO_HIGH);
+    let holding = fixed.holding(theta, REPORTED_FREQUENCY_ERROR);
     let first = *theta.get(holding)?;
     let kept = if body.has_rigid_interfaces() { " with the same rigid interfaces" } else { "" };
     let holds = match holding {
@@ -36,7 +36,7 @@ pub(super) fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
 }
 
 /// Part of the static compliance at an interface above which a note reports it.
-const COMPLIANCE: f64 = 0.01;
+const REPORTED_COMPLIANCE: f64 = 0.01;
 
 /// Returns a note about the truncated part of the static compliance at each interface, if it is known and
 /// above one percent. Compliance is f'K^+ f of a unit force or moment f, the square of the norm in
@@ -49,14 +49,14 @@ pub fn interface_compliance(body: &FlexBody) -> Option<Diagnostic> {
             let direction = one.load.strip_prefix(interface.name.as_str())?.strip_prefix(' ')?;
             Some((one.after.powi(2), direction))
         });
-        let (lacking, direction) = of_interface.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
-        let named = || format!("`{}` {:.0} % ({direction})", interface.name, 100.0 * lacking);
-        (lacking > COMPLIANCE).then(named)
+        let (missing, direction) = of_interface.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
+        let named = || format!("`{}` {:.0} % ({direction})", interface.name, 100.0 * missing);
+        (missing > REPORTED_COMPLIANCE).then(named)
     };
     let found: Vec<String> = body.interfaces().iter().filter_map(worst).collect();
     (!found.is_empty()).then(|| {
         let message = format!(
-            "of the static compliance at the interfaces the {} modes lack {}",
+            "the {} modes do not contain the whole static compliance at the interfaces: missing {}",
             body.n_modes(),
             found.join(", ")
         );
@@ -65,7 +65,7 @@ pub fn interface_compliance(body: &FlexBody) -> Option<Diagnostic> {
 }
 
 /// Deformation of an interface, relative to its motion, that counts as rounding.
-const RIGID_FIT: f64 = 1e-8;
+const ROUNDING_DEFORMATION: f64 = 1e-8;
 
 /// Returns warnings about interfaces that are declared rigid but deform in the modes of the body.
 pub fn poor_fits(body: &FlexBody) -> Vec<Diagnostic> {
@@ -80,9 +80,9 @@ fn poor_fit(interface: &Interface, body: &FlexBody) -> Option<Diagnostic> {
     let rotations = modes.rotation.as_ref().map(Mat::as_ref);
     let rows = interface.rows(body.nodes(), modes.shape.as_ref(), rotations, body.dimension())?;
     let (mode, part) = rows.deformation();
-    (part > RIGID_FIT + 4.0 * body.storage().rounding()).then(|| {
+    (part > ROUNDING_DEFORMATION + 4.0 * body.storage().rounding()).then(|| {
         let message = format!(
-            "interface `{}` was declared rigid, but deforms by {:.2} % of its largest motion in mode {}: its rows are its mean rigid motion",
+            "interface `{}` was declared rigid, but deforms by {:.2} % of its largest motion in mode {}: its mean rigid motion is used",
             interface.name,
             100.0 * part,
             mode + 1

@@ -52,9 +52,9 @@ impl InertiaRates {
                     .map(|a| format!("an angular acceleration of {} 1/{time}^2", significant(a, 3))),
             ),
         ];
-        let told: Vec<String> =
-            all.into_iter().filter(|(kind, _)| asked(kind)).filter_map(|(_, told)| told).collect();
-        told.join(", ")
+        let described: Vec<String> =
+            all.into_iter().filter(|(kind, _)| asked(kind)).filter_map(|(_, described)| described).collect();
+        described.join(", ")
     }
 }
 
@@ -196,7 +196,7 @@ impl FlexBody {
     /// Returns the stiffness of inertia plus the geometric stiffness for a unit of `load`, to be added to
     /// K_ff. Returns `None` if the body has neither.
     pub fn stiffness_under(&self, load: &UnitLoad) -> Option<Mat<f64>> {
-        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness);
         let all = of_inertia.chain(self.geometric_stiffness()).filter(|one| one.load == *load);
         all.fold(None, |sum: Option<Mat<f64>>, one| match sum {
             None => Some(one.matrix.clone()),
@@ -219,7 +219,7 @@ impl FlexBody {
 
     /// Returns the loads that the body has a [stiffness](FlexBody::stiffness_under) for, each once.
     pub fn stiffening_loads(&self) -> Vec<UnitLoad> {
-        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness);
         let mut loads: Vec<UnitLoad> = Vec::new();
         for one in self.geometric_stiffness().iter().chain(of_inertia) {
             if !loads.contains(&one.load) {
@@ -293,7 +293,7 @@ impl FlexBody {
             eigenvalue_rounding: self.parts.certificate.eigenvalue_rounding,
             turning: match (&self.parts.inertia_stiffness, &self.parts.source.approximation) {
                 (None, _) => Turning::None,
-                (Some(_), Some(_)) => Turning::InPart,
+                (Some(_), Some(_)) => Turning::Partial,
                 (Some(_), None) => Turning::Whole,
             },
         };

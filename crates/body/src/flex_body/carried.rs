@@ -21,15 +21,15 @@ use flexbody_model::{Coupling, DampingRatios};
 use nalgebra::{Matrix3, Vector3};
 
 /// Largest truncation error of the static response of a carried body that passes without a warning.
-const RESOLVED: f64 = 0.01;
+const MAX_TRUNCATION: f64 = 0.01;
 
 /// Largest deformation of an interface declared rigid, relative to its motion, that passes without a
 /// warning.
-const DEFORMED: f64 = 1e-4;
+const MAX_RIGID_DEFORMATION: f64 = 1e-4;
 
 /// Motion of the interface, relative to the largest displacement of a mode, below which the motion is taken
 /// for rounding.
-const AT_REST: f64 = 1e-12;
+const ROUNDING_MOTION: f64 = 1e-12;
 
 /// Carrier of a body: the place that its frame is fixed to.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -82,14 +82,14 @@ impl FlexBody {
     /// or no orientation, or if the body does not hold all groups of the kinetic energy.
     pub fn carried(&self, carrier: &Carrier) -> Result<Self> {
         if self.groups() != TermGroups::ALL {
-            let lacking: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
+            let dropped: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
             return Err(refused(format!(
-                "the body lacks {}, without which its terms about {carrier} are not known",
-                lacking.join(", ")
+                "the body does not have {}, which its terms about {carrier} require",
+                dropped.join(", ")
             )));
         }
         let along_model = self.frame().axes == nalgebra::Matrix3::identity();
-        if along_model && self.rests_on(carrier)? {
+        if along_model && self.has_carrier_at_rest(carrier)? {
             let mut parts = self.clone().into_parts();
             parts.geometric_stiffness.retain(|one| matches!(one.load.kind, LoadKind::Named(_)));
             return Self::new(parts);
@@ -111,7 +111,9 @@ impl FlexBody {
         parts.geometric_stiffness.retain(|one| matches!(one.load.kind, LoadKind::Named(_)));
         // The nodes turn relative to the carrier, which turns the frame.
         parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
-            (Some(own), Some(rotation)) => Some(own.with_rotations(rotation.as_ref(), parts.dimension)),
+            (Some(inertia), Some(rotation)) => {
+                Some(inertia.with_rotations(rotation.as_ref(), parts.dimension))
+            }
             _ => None,
         };
         Self::new(parts)
@@ -170,11 +172,11 @@ impl FlexBody {
                 modes.clone().map(|j| loads[(a, j)] * loads[(b, j)] / stiffness[(j, j)]).sum::<f64>()
             })
         };
-        let missing = |loads: &Mat<f64>| largest_part(&energy(loads, nf / 2..nf), &energy(loads, 0..nf));
+        let missing = |loads: &Mat<f64>| largest_ratio(&energy(loads, nf / 2..nf), &energy(loads, 0..nf));
         let worst = missing(c1).max(missing(&c2));
-        (worst > RESOLVED).then(|| {
+        (worst > MAX_TRUNCATION).then(|| {
             let message = format!(
-                "the {nf} modes resolve {carrier} badly: where it is accelerated, about {:.0} % of the elastic energy of the body that hangs from it are missing in the worst direction",
+                "the {nf} modes resolve {carrier} poorly: when it is accelerated, up to about {:.0} % of the elastic energy is missing, depending on the direction",
                 100.0 * worst
             );
             Diagnostic::new(Code::CarrierUnresolved, message)
@@ -190,7 +192,7 @@ impl FlexBody {
         let rotation = modes.rotation.as_ref().map(Mat::as_ref);
         let rows = interface.rows(self.nodes(), modes.shape.as_ref(), rotation, self.dimension())?;
         let (mode, misfit) = rows.deformation();
-        (interface.coupling == Some(Coupling::Rigid) && misfit > DEFORMED).then(|| {
+        (interface.coupling == Some(Coupling::Rigid) && misfit > MAX_RIGID_DEFORMATION).then(|| {
             let message = format!(
                 "interface `{name}` is rigid, but the modes deform it, mode {} by {:.1} % of its motion: its mean motion is carried, the nodes around it are free",
                 mode + 1,
@@ -213,7 +215,7 @@ impl FlexBody {
         complete
             || self.coordinates().is_some_and(|all| all.names.iter().any(|coordinate| named(coordinate)))
             || modes.truncation.iter().any(|one| named(&one.load))
-                && modes.truncation.iter().all(|one| !named(&one.load) || one.after < RESOLVED)
+                && modes.truncation.iter().all(|one| !named(&one.load) || one.after < MAX_TRUNCATION)
             || modes.provenance.iter().any(|one| made_for(one))
     }
 
@@ -229,21 +231,22 @@ impl FlexBody {
     ///
     /// # Errors
     /// The errors FB212 and FB214 of [`FlexBody::carried`].
-    fn rests_on(&self, carrier: &Carrier) -> Result<bool> {
-        if let (ReferenceConditions::Interface(own), Carrier::Interface(name)) = (self.conditions(), carrier)
-            && own == name
+    fn has_carrier_at_rest(&self, carrier: &Carrier) -> Result<bool> {
+        if let (ReferenceConditions::Interface(frame_interface), Carrier::Interface(name)) =
+            (self.conditions(), carrier)
+            && frame_interface == name
         {
             return Ok(true);
         }
         let at = self.place_of(carrier)?;
-        Ok(at.reference == Vector3::zeros() && self.rests(&at.motion))
+        Ok(at.reference == Vector3::zeros() && self.is_at_rest(&at.motion))
     }
 
     /// Returns true if a point with `motion` (6 x nf) moves in no mode.
-    fn rests(&self, motion: &Mat<f64>) -> bool {
+    fn is_at_rest(&self, motion: &Mat<f64>) -> bool {
         let extent = self.extent();
         (0..self.n_modes()).all(|j| {
-            let size = AT_REST * self.largest_displacement(j);
+            let size = ROUNDING_MOTION * self.largest_displacement(j);
             (0..3).all(|k| motion[(k, j)].abs() <= size && motion[(3 + k, j)].abs() * extent <= size)
         })
     }
@@ -297,14 +300,14 @@ fn refused(message: String) -> Error {
 
 /// Relative energy of a direction, compared with the largest, below which the direction counts as free of
 /// energy.
-const NO_ENERGY: f64 = 1e-9;
+const ROUNDING_ENERGY: f64 = 1e-9;
 
 /// Returns the largest b'P b / b'W b over all directions b in which `whole` = W has energy.
-fn largest_part(part: &Matrix3<f64>, whole: &Matrix3<f64>) -> f64 {
+fn largest_ratio(part: &Matrix3<f64>, whole: &Matrix3<f64>) -> f64 {
     let eigen = whole.symmetric_eigen();
     let most = eigen.eigenvalues.max();
     let unit = Matrix3::from_fn(|i, k| match eigen.eigenvalues[k] {
-        energy if energy > NO_ENERGY * most => eigen.eigenvectors[(i, k)] / energy.sqrt(),
+        energy if energy > ROUNDING_ENERGY * most => eigen.eigenvectors[(i, k)] / energy.sqrt(),
         _ => 0.0,
     });
     (unit.transpose() * part * unit).symmetric_eigenvalues().max().max(0.0)

@@ -61,7 +61,7 @@ impl FlexBody {
         }
         self.refuse_changed_frame(&format!("the frame on interface `{name}`"))?;
         let carried = self.carried(&Carrier::Interface(name.to_owned()))?;
-        let change = ModalChange::in_own_frame(carried.invariants(), carried.dimension())
+        let change = ModalChange::in_present_frame(carried.invariants(), carried.dimension())
             .map_err(|reason| impossible(format!("no frame can stand on interface `{name}`: {reason}")))?;
         let mut parts = carried.changed(&change, conditions)?.into_parts();
         parts.source.settings["frame"] = FrameChoice::Interface(name.to_owned()).text().into();
@@ -93,8 +93,8 @@ impl FlexBody {
         if self.groups() != TermGroups::ALL {
             let dropped: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
             return refuse(
-                &format!("{} would be needed, which the body does not have", dropped.join(", ")),
-                "take a body with all terms",
+                &format!("{} are needed, which the body does not have", dropped.join(", ")),
+                "use a body with all terms",
             );
         }
         let convert = "convert the FE model with the frame that is needed (--frame)";
@@ -113,7 +113,9 @@ impl FlexBody {
         let invariants = change.invariants(&parts.invariants);
         parts.modes = self.changed_modes(change, &invariants);
         parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
-            (Some(own), Some(rotation)) => Some(own.with_rotations(rotation.as_ref(), parts.dimension)),
+            (Some(inertia), Some(rotation)) => {
+                Some(inertia.with_rotations(rotation.as_ref(), parts.dimension))
+            }
             _ => None,
         };
         let stiffness = |one: &GeometricStiffness<Mat<f64>>| GeometricStiffness {
@@ -121,7 +123,8 @@ impl FlexBody {
             matrix: change.congruent(&one.matrix),
         };
         parts.geometric_stiffness = parts.geometric_stiffness.iter().map(stiffness).collect();
-        parts.lumped = parts.lumped.iter().map(|own| changed_lumped(own, change, &invariants)).collect();
+        parts.lumped =
+            parts.lumped.iter().map(|lumped| changed_lumped(lumped, change, &invariants)).collect();
         parts.certificate = unproved(&parts);
         (parts.invariants, parts.conditions, parts.coordinates) = (invariants, conditions, None);
         Self::new(parts)
@@ -154,23 +157,27 @@ fn impossible(message: String) -> Error {
 }
 
 /// Applies the change of modes to lumped invariants and compares them again.
-fn changed_lumped(own: &LumpedBody, change: &ModalChange, exact: &Invariants) -> LumpedBody {
-    let invariants = change.invariants(&own.invariants);
-    LumpedBody { comparison: error_norms(exact, &invariants), invariants, ..own.clone() }
+fn changed_lumped(lumped: &LumpedBody, change: &ModalChange, exact: &Invariants) -> LumpedBody {
+    let invariants = change.invariants(&lumped.invariants);
+    LumpedBody { comparison: error_norms(exact, &invariants), invariants, ..lumped.clone() }
 }
 
 /// Returns the certificate of a body whose modes are combinations of modes with a proof: the proof does not
 /// carry over.
 fn unproved(parts: &Parts) -> Certificate {
-    let own = &parts.certificate;
+    let certificate = &parts.certificate;
     let about = "combinations of the modes of a body with other reference conditions";
-    let remark = if own.remark.is_empty() { about.to_owned() } else { format!("{about}; {}", own.remark) };
+    let remark = if certificate.remark.is_empty() {
+        about.to_owned()
+    } else {
+        format!("{about}; {}", certificate.remark)
+    };
     Certificate {
         proved_modes: None,
         negative_pivots: None,
         guarantee: None,
         fixed_interface: None,
         remark,
-        ..own.clone()
+        ..certificate.clone()
     }
 }

@@ -77,9 +77,9 @@ impl Change {
     }
 
     fn inertia_stiffness(self, given: &InertiaStiffness) -> InertiaStiffness {
-        let moments = |own: &NodeMoments| NodeMoments {
-            first: own.first * self.of(2, 1, 0),
-            second: own.second * self.of(2, 2, 0),
+        let moments = |node: &NodeMoments| NodeMoments {
+            first: node.first * self.of(2, 1, 0),
+            second: node.second * self.of(2, 2, 0),
         };
         InertiaStiffness {
             moments: given.moments.iter().map(moments).collect(),
@@ -168,7 +168,8 @@ impl FlexBody {
         parts.invariants = change.invariants(&parts.invariants);
         parts.geometric_stiffness =
             parts.geometric_stiffness.iter().map(|one| change.geometric(one)).collect();
-        parts.inertia_stiffness = parts.inertia_stiffness.as_ref().map(|own| change.inertia_stiffness(own));
+        parts.inertia_stiffness =
+            parts.inertia_stiffness.as_ref().map(|inertia| change.inertia_stiffness(inertia));
         let lumped =
             |one: &LumpedBody| LumpedBody { invariants: change.invariants(&one.invariants), ..one.clone() };
         parts.lumped = parts.lumped.iter().map(lumped).collect();

@@ -20,7 +20,7 @@ pub struct Interface {
 
 /// Displacement relative to the largest of the modes below which an interface counts as at rest, such as
 /// the interface that carries the frame: its rounding errors are no deformation.
-const AT_REST: f64 = 1e-6;
+const MAX_MOTION_AT_REST: f64 = 1e-6;
 
 /// Motion of the reference point of an interface in the modes, body axes: the rigid motion that best fits
 /// the motion of the nodes.
@@ -81,7 +81,7 @@ impl Interface {
         let left = &u - combine(motion.rigid().subrows(0, d * k), q.as_ref());
         let root_mean_square = |a: &Mat<f64>, j: usize| a.col(j).norm_l2() / (k as f64).sqrt();
         let misfit: Vec<f64> = (0..nf).map(|j| root_mean_square(&left, j)).collect();
-        let at_rest = AT_REST * shape.norm_max();
+        let at_rest = MAX_MOTION_AT_REST * shape.norm_max();
         let largest = (0..nf).map(|j| root_mean_square(&u, j)).fold(at_rest, f64::max);
         let translation = Mat::from_fn(3, nf, |i, j| if i < d { q[(i, j)] } else { 0.0 });
         let rotation = Mat::from_fn(3, nf, |i, j| match (d, i) {

@@ -9,16 +9,16 @@ use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
 
 /// Allowed difference of an energy computed in two ways.
-const ENERGY: f64 = 1e-9;
+const MAX_ENERGY_DIFFERENCE: f64 = 1e-9;
 
 /// Rounding error of B'M B, relative to the sum of the magnitudes of its summands, which cancel in slender
 /// bodies with many modes. Measured: 1e-16 to 2.8e-16 of these sums, which reach 2.5e9 for a bar of five
 /// thousand times its width with 240 fixed-interface modes.
-const SUMMANDS: f64 = 4.0 * f64::EPSILON;
+const SUMMAND_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Allowed motion of the interface that carries the frame, relative to the largest displacement of the
 /// mode; rounding causes it.
-const AT_REST: f64 = 1e-9;
+const MAX_MOTION_AT_REST: f64 = 1e-9;
 
 impl Parts {
     /// Checks a frame on an interface: the reference point is the origin and is at rest in every mode.
@@ -31,8 +31,8 @@ impl Parts {
         // A rotation displaces the nodes of the interface by their distances; for a single node the extent
         // of the body counts.
         let places: Vec<[f64; 3]> = interface.nodes.iter().map(|&i| self.nodes.positions[i]).collect();
-        let (extent, own) = (span(&self.nodes.positions), span(&places));
-        let arm = if own > 0.0 { own } else { extent };
+        let (extent, interface_extent) = (span(&self.nodes.positions), span(&places));
+        let arm = if interface_extent > 0.0 { interface_extent } else { extent };
         // Rotations of a single node at rest are zeros, as for nodes without rotations.
         let unknown = if self.modes.rotation.is_some() { 0.0 } else { f64::INFINITY };
         let moved = |j: usize| {
@@ -45,7 +45,7 @@ impl Parts {
             "frame_on_interface",
             "the reference point is the origin and rests in every mode",
             largest(modes.chain(displaced)),
-            AT_REST + 4.0 * self.storage.rounding(),
+            MAX_MOTION_AT_REST + 4.0 * self.storage.rounding(),
         ))
     }
 
@@ -70,29 +70,33 @@ impl Parts {
                 worst(&|i, j| energy[(i, j)] / (root[i] * root[j]) - identity(i, j), nf, nf),
                 // The shapes contain the strain energy of rigid motion due to rounding of K, the modes do
                 // not.
-                ENERGY + 10.0 * self.certificate.rigid_noise + self.certificate.eigenvalue_rounding,
+                MAX_ENERGY_DIFFERENCE
+                    + 10.0 * self.certificate.rigid_noise
+                    + self.certificate.eigenvalue_rounding,
             ),
             interface_mass(&inertia, &twice(&magnitudes(mass), &magnitudes(of_modes))),
         ];
         if let Some(rigid) = self.rigid_coordinates() {
-            let (expected, own) = (self.rigid_mass(), twice(mass, &rigid));
+            let (expected, found) = (self.rigid_mass(), twice(mass, &rigid));
             let r = rigid.ncols();
             checks.push(IdentityCheck::new(
                 "interface_rigid_mass",
                 "R' M R = [m, -c~; c~, I0]",
                 worst(
-                    &|i, j| (own[(i, j)] - expected[(i, j)]) / (expected[(i, i)] * expected[(j, j)]).sqrt(),
+                    &|i, j| (found[(i, j)] - expected[(i, j)]) / (expected[(i, i)] * expected[(j, j)]).sqrt(),
                     r,
                     r,
                 ),
-                ENERGY,
+                MAX_ENERGY_DIFFERENCE,
             ));
             let (energy, first) = (twice(stiffness, &rigid), root.first().map_or(1.0, |root| root * root));
             checks.push(IdentityCheck::new(
                 "interface_rigid_motion",
                 "R' K R = 0 beside lambda_1 R' M R",
                 worst(&|i, j| energy[(i, j)] / (first * (expected[(i, i)] * expected[(j, j)]).sqrt()), r, r),
-                ENERGY + 10.0 * self.certificate.rigid_noise + self.certificate.eigenvalue_rounding,
+                MAX_ENERGY_DIFFERENCE
+                    + 10.0 * self.certificate.rigid_noise
+                    + self.certificate.eigenvalue_rounding,
             ));
         }
         checks
@@ -158,12 +162,17 @@ fn interface_mass(product: &Mat<f64>, sums: &Mat<f64>) -> IdentityCheck {
     let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
     let check = |(i, j): (usize, usize)| {
         let value = (product[(i, j)] - f64::from(i == j)).abs();
-        IdentityCheck::new("interface_mass", "B' M B = I", value, ENERGY + SUMMANDS * sums[(i, j)])
+        IdentityCheck::new(
+            "interface_mass",
+            "B' M B = I",
+            value,
+            MAX_ENERGY_DIFFERENCE + SUMMAND_ROUNDING * sums[(i, j)],
+        )
     };
     let worse = |a: IdentityCheck, b: IdentityCheck| {
         let is_worse = b.value.is_nan() || b.value / b.limit > a.value / a.limit;
         if is_worse { b } else { a }
     };
-    let none = IdentityCheck::new("interface_mass", "B' M B = I", 0.0, ENERGY);
+    let none = IdentityCheck::new("interface_mass", "B' M B = I", 0.0, MAX_ENERGY_DIFFERENCE);
     entries.map(check).fold(none, worse)
 }

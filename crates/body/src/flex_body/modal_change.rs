@@ -8,7 +8,7 @@ use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen}
 
 /// Part of the squared M-norm left after removal of rigid motion, below which a combination of modes is a
 /// rigid motion.
-const RIGID: f64 = 1e-10;
+const RIGID_REMAINDER: f64 = 1e-10;
 
 /// New modes psi' = (Psi - R(x) A) X with the rigid motions R about the origin of the frame. The span of
 /// frame motion and modes does not change.
@@ -41,7 +41,9 @@ impl RigidMotions {
         match (self.count, self.modes.len()) {
             (0, _) => None,
             (1, 1) => Some(format!("mode {} is a rigid motion", named(&self.modes))),
-            (count, own) if count == own => Some(format!("modes {} are rigid motions", named(&self.modes))),
+            (count, rigid) if count == rigid => {
+                Some(format!("modes {} are rigid motions", named(&self.modes)))
+            }
             (1, _) => Some("a combination of the modes is a rigid motion".to_owned()),
             (count, 0) => Some(format!("{count} combinations of the modes are rigid motions")),
             (count, _) => Some(format!(
@@ -86,10 +88,10 @@ impl Split {
         let beside = |i: usize, j: usize| {
             modal[(i, j)] - (0..axes.len()).map(|k| whitened[(k, i)] * whitened[(k, j)]).sum::<f64>()
         };
-        let own = |j: usize| beside(j, j) / modal[(j, j)];
-        if let Some(j) = (0..nf).find(|&j| own(j) < -RIGID) {
+        let remainder = |j: usize| beside(j, j) / modal[(j, j)];
+        if let Some(j) = (0..nf).find(|&j| remainder(j) < -RIGID_REMAINDER) {
             return Err(format!(
-                "mode {} and rigid motion together have negative kinetic energy: mass, coupling and modal mass do not belong together",
+                "mode {} and rigid motion together have negative kinetic energy: mass, coupling and modal mass contradict each other",
                 j + 1
             ));
         }
@@ -103,7 +105,7 @@ impl Split {
         let Some(eigen) = symmetric_eigen(relative.as_ref()) else {
             return Err("the modal mass holds numbers that are not finite".to_owned());
         };
-        let count = eigen.values.iter().filter(|left| **left <= RIGID).count();
+        let count = eigen.values.iter().filter(|left| **left <= RIGID_REMAINDER).count();
         if count == nf {
             return Err("all modes are rigid motions: nothing deforms the body".to_owned());
         }
@@ -114,7 +116,10 @@ impl Split {
             rigid: Mat::from_fn(6, nf, |k, j| row(k).map_or(0.0, |row| nearest[(row, j)])),
             deforming: solve_upper(&modal_lower, &vectors),
             left: eigen.values[count..].to_vec(),
-            rigid_motions: RigidMotions { count, modes: (0..nf).filter(|&j| own(j) <= RIGID).collect() },
+            rigid_motions: RigidMotions {
+                count,
+                modes: (0..nf).filter(|&j| remainder(j) <= RIGID_REMAINDER).collect(),
+            },
         })
     }
 }
@@ -148,7 +153,7 @@ impl ModalChange {
     ///
     /// # Errors
     /// The errors of `ModalChange::to_mean_axes`.
-    pub fn in_own_frame(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
+    pub fn in_present_frame(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
         let split = Split::new(invariants, dimension)?;
         let modes = eigenmodes(invariants, &split.deforming)?;
         Ok(Self { modes, taken: None, left_out: split.rigid_motions })

@@ -8,7 +8,7 @@ use flexbody_model::LoadKind;
 use nalgebra::{Matrix3, Vector3};
 
 /// Direction cosines up to this magnitude are rounding and count as zero.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
+const ROUNDING_COSINE: f64 = 4.0 * f64::EPSILON;
 
 impl FlexBody {
     /// Returns this body in a frame along the axes of the model with its origin at `origin` (body frame).
@@ -79,12 +79,12 @@ impl FlexBody {
     /// Returns the stiffness of inertia about the point `d` and along the columns of `axes`, both in the
     /// body frame; `None` if the body has none.
     pub fn inertia_stiffness_in(&self, d: &Vector3<f64>, axes: &Matrix3<f64>) -> Option<InertiaStiffness> {
-        let (own, rotation) = (self.inertia_stiffness()?, self.modes().rotation.as_ref()?);
+        let (inertia, rotation) = (self.inertia_stiffness()?, self.modes().rotation.as_ref()?);
         if *d == Vector3::zeros() && *axes == Matrix3::identity() {
-            return Some(own.clone());
+            return Some(inertia.clone());
         }
         let rotation = turned(rotation.as_ref(), &axes.transpose(), usize::MAX);
-        Some(own.in_frame(d, axes, rotation.as_ref(), self.dimension()))
+        Some(inertia.in_frame(d, axes, rotation.as_ref(), self.dimension()))
     }
 }
 
@@ -153,7 +153,8 @@ pub fn stiffness_about(
 fn along(given: &[GeometricStiffness<Mat<f64>>], axes: &Matrix3<f64>) -> Vec<GeometricStiffness<Mat<f64>>> {
     let mut all = Vec::new();
     for GeometricStiffness { load, matrix } in given {
-        let factors = load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING);
+        let factors =
+            load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING_COSINE);
         for (component, factor) in factors {
             add(&mut all, UnitLoad { kind: load.kind.clone(), component }, matrix * Scale(factor));
         }

@@ -49,8 +49,8 @@ impl FlexBody {
     /// Returns Psi'K Psi_r (nf x nr) with the modes Psi_r of another body of the same model: the elastic
     /// coupling of the two bases. Returns `None` in the cases of [`FlexBody::vectors_of`].
     pub fn stiffness_beside(&self, other: &Self, model: &FeModel) -> Option<Mat<f64>> {
-        let (own, others) = (self.vectors_of(model)?, other.vectors_of(model)?);
-        Some(gram(own.as_ref(), model.pencil().apply_stiffness(others.as_ref()).as_ref()))
+        let (vectors, others) = (self.vectors_of(model)?, other.vectors_of(model)?);
+        Some(gram(vectors.as_ref(), model.pencil().apply_stiffness(others.as_ref()).as_ref()))
     }
 
     /// Returns the displacements of the modes in body axes, three per node, then three per vector without a

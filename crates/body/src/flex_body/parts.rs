@@ -85,11 +85,12 @@ pub struct Modes {
 }
 
 /// Origins of modes that are static shapes and not modes of the free body.
-const STATIC: [&str; 4] = ["residual vector", "attachment mode", "constraint mode", "fixed-interface mode"];
+const STATIC_ORIGINS: [&str; 4] =
+    ["residual vector", "attachment mode", "constraint mode", "fixed-interface mode"];
 
 /// Returns true if a mode of this origin ([`Modes::provenance`]) is a static shape.
 pub fn is_static(origin: &str) -> bool {
-    STATIC.contains(&origin.split_once(':').map_or(origin, |(kind, _)| kind))
+    STATIC_ORIGINS.contains(&origin.split_once(':').map_or(origin, |(kind, _)| kind))
 }
 
 /// Rows of the modes that belong to no node.

@@ -33,15 +33,15 @@ impl FlexBody {
         let invariants = parts.invariants.with_modes(modes).with_groups(groups);
         let unchanged = all && invariants.groups() == parts.invariants.groups();
         let lumped = |lumped: &LumpedBody| {
-            let own = lumped.invariants.with_modes(modes).with_groups(groups);
+            let reduced = lumped.invariants.with_modes(modes).with_groups(groups);
             LumpedBody {
                 // Another program may use other norms: recompute them only if the data changed.
                 comparison: if unchanged {
                     lumped.comparison.clone()
                 } else {
-                    error_norms(&invariants, &own)
+                    error_norms(&invariants, &reduced)
                 },
-                invariants: own,
+                invariants: reduced,
                 scheme: lumped.scheme.clone(),
                 negative_masses: lumped.negative_masses,
             }
@@ -61,9 +61,9 @@ impl FlexBody {
             mesh: parts.mesh.clone(),
             modes: parts.modes.some(modes),
             geometric_stiffness: parts.geometric_stiffness.iter().map(stiffness).collect(),
-            inertia_stiffness: parts.inertia_stiffness.as_ref().map(|own| InertiaStiffness {
-                moments: own.moments.clone(),
-                stiffness: own.stiffness.iter().map(stiffness).collect(),
+            inertia_stiffness: parts.inertia_stiffness.as_ref().map(|inertia| InertiaStiffness {
+                moments: inertia.moments.clone(),
+                stiffness: inertia.stiffness.iter().map(stiffness).collect(),
             }),
             lumped: parts.lumped.iter().map(lumped).collect(),
             certificate: parts.certificate.of_some(modes, &parts.modes),

@@ -9,9 +9,9 @@ use nalgebra::{Matrix3, Vector3};
 pub const SOFTENING: f64 = 0.01;
 
 /// Limit of the steps of the search for the worst axis.
-const STEPS: usize = 40;
+const MAX_AXIS_STEPS: usize = 40;
 /// Relative growth of the softened part below which the search ends.
-const GROWTH: f64 = 1e-9;
+const MIN_GROWTH: f64 = 1e-9;
 
 impl FlexBody {
     /// Returns the largest part of the stiffness that any motion loses by the centrifugal terms at the
@@ -44,10 +44,11 @@ impl FlexBody {
         let from_axis = |axis: usize| -> Option<(Vector3<f64>, f64)> {
             let mut omega = Vector3::ith(axis, 1.0);
             let (mut part, mut motion) = self.softest_motion(&omega)?;
-            for _ in 0..STEPS {
+            for _ in 0..MAX_AXIS_STEPS {
+                // Spin axis that softens the present motion most, then the motion that it softens most.
                 let next = largest_direction(&self.softening_of(&motion)?);
                 let (greater, other) = self.softest_motion(&next)?;
-                let is_done = greater <= part * (1.0 + GROWTH);
+                let is_done = greater <= part * (1.0 + MIN_GROWTH);
                 if greater > part {
                     (omega, part, motion) = (next, greater, other);
                 }
@@ -57,22 +58,25 @@ impl FlexBody {
             }
             Some((omega, part))
         };
+        // The best of the three searches.
         let all = (0..3).map(from_axis).collect::<Option<Vec<_>>>()?;
-        let (omega, part) = all.into_iter().reduce(|a, b| if b.1 > a.1 * (1.0 + GROWTH) { b } else { a })?;
+        let (omega, part) =
+            all.into_iter().reduce(|a, b| if b.1 > a.1 * (1.0 + MIN_GROWTH) { b } else { a })?;
         let omega = self.frame().axes * omega;
         Some((if omega[omega.iamax()] < 0.0 { -omega } else { omega }, part))
     }
 
     /// Returns the softened part at `omega`, and the most softened motion, scaled to unit stiffness.
     fn softest_motion(&self, omega: &Vector3<f64>) -> Option<(f64, Vec<f64>)> {
-        let own = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
-        let spins = own.filter(|one| one.load.kind == LoadKind::Spin);
+        // Stiffness of inertia at this spin, from its six components.
+        let inertia = self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness);
+        let spins = inertia.filter(|one| one.load.kind == LoadKind::Spin);
         let of_inertia = spins.fold(None, |sum: Option<Mat<f64>>, one| {
             let (k, l) = LoadKind::SPIN[one.load.component];
-            let own = &one.matrix * Scale(omega[k] * omega[l]);
+            let term = &one.matrix * Scale(omega[k] * omega[l]);
             Some(match sum {
-                Some(sum) => sum + own,
-                None => own,
+                Some(sum) => sum + term,
+                None => term,
             })
         });
         self.invariants().softening(omega, of_inertia.as_ref())
@@ -84,8 +88,9 @@ impl FlexBody {
         let quadratic = |entry: &dyn Fn(usize, usize) -> f64| -> f64 {
             (0..nf).map(|i| motion[i] * (0..nf).map(|j| entry(i, j) * motion[j]).sum::<f64>()).sum()
         };
+        // W2 contributes w_a w_b q'W2_ab q, the stiffness of inertia is subtracted.
         let mut parts = Matrix3::from_fn(|a, b| quadratic(&|i, j| w2[(a * nf + i, b * nf + j)]));
-        for one in self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness) {
+        for one in self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness) {
             if one.load.kind == LoadKind::Spin {
                 let (k, l) = LoadKind::SPIN[one.load.component];
                 parts[(k, l)] -= quadratic(&|i, j| one.matrix[(i, j)]);
@@ -96,12 +101,12 @@ impl FlexBody {
 }
 
 /// Cosine of the angle to a coordinate axis above which a direction gets the name of that axis.
-const ALONG: f64 = 1.0 - 1e-9;
+const AXIS_COSINE: f64 = 1.0 - 1e-9;
 
 /// Returns `z` for a coordinate axis, or `(0.707, 0.707, 0)` for another direction.
 pub fn axis_in_words(axis: &Vector3<f64>) -> String {
     let unit = axis.normalize();
-    match (0..3).find(|&k| unit[k].abs() >= ALONG) {
+    match (0..3).find(|&k| unit[k].abs() >= AXIS_COSINE) {
         Some(k) => ["x", "y", "z"][k].to_owned(),
         None => {
             let [x, y, z] = [0, 1, 2].map(|k| format!("{:.3}", unit[k] + 0.0));

@@ -2,7 +2,7 @@
 
 use super::{MassStructure, Parts, ReferenceConditions, SurfaceMesh, TermGroup};
 use crate::invariants::{DIGITS, InertiaStiffness};
-use crate::problems::{LARGEST, Problems};
+use crate::problems::{MAX_NUMBER, Problems};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_model::{Coupling, UnitLoad};
 use nalgebra::Matrix3;
@@ -22,7 +22,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.nodes(parts);
     check.mesh(parts, n);
     check.modes(parts, n, nf);
-    if !(parts.units.hertz().is_finite() && parts.units.hertz() * LARGEST.sqrt() <= LARGEST) {
+    if !(parts.units.hertz().is_finite() && parts.units.hertz() * MAX_NUMBER.sqrt() <= MAX_NUMBER) {
         check.add(format!(
             "`units.time` is {} s, too short for frequencies in hertz",
             parts.units.time.name()
@@ -176,11 +176,11 @@ impl Problems {
         let general = parts.source.mass_structure == MassStructure::General;
         if general != parts.invariants.general().is_some() {
             self.add(
-                "`invariants.W0` is there for the mass structure `general`, and only for that".to_owned(),
+                "`invariants.W0` must exist for the mass structure `general`, and only for it".to_owned(),
             );
         }
         if parts.invariants.general().as_ref().is_some_and(|terms| terms.plane != (parts.dimension == 2)) {
-            self.add(format!("general terms of another dimension than {}", parts.dimension));
+            self.add(format!("`invariants` has general terms of another dimension than {}", parts.dimension));
         }
         if parts.lumped.iter().any(|lumped| lumped.invariants.general().is_some()) {
             self.add("lumped masses have `W0`, expected none: they commute with rotations".to_owned());
@@ -189,20 +189,20 @@ impl Problems {
 
     /// Checks that the stiffness of inertia is complete or absent.
     fn inertia_stiffness(&mut self, parts: &Parts, n: usize, nf: usize) {
-        let Some(own) = &parts.inertia_stiffness else { return };
+        let Some(inertia) = &parts.inertia_stiffness else { return };
         if parts.modes.rotation.is_none() {
-            self.add("inertia stiffness of a body whose nodes have no rotations".to_owned());
+            self.add("`inertia_stiffness` exists, but the nodes have no rotations".to_owned());
         }
-        self.length("inertia_stiffness.moments", own.moments.len(), n, "node");
-        let numbers = own.moments.iter().flat_map(|m| m.first.iter().chain(m.second.iter()).copied());
+        self.length("inertia_stiffness.moments", inertia.moments.len(), n, "node");
+        let numbers = inertia.moments.iter().flat_map(|m| m.first.iter().chain(m.second.iter()).copied());
         self.finite("inertia_stiffness.moments", numbers);
-        for one in &own.stiffness {
+        for one in &inertia.stiffness {
             self.matrix(&format!("inertia_stiffness `{}`", one.load.label()), &one.matrix, nf, nf);
         }
         let wanted: Vec<_> = InertiaStiffness::loads(parts.dimension).collect();
-        if !own.stiffness.iter().map(|one| &one.load).eq(&wanted) {
+        if !inertia.stiffness.iter().map(|one| &one.load).eq(&wanted) {
             let wanted: Vec<String> = wanted.iter().map(UnitLoad::label).collect();
-            self.add(format!("inertia stiffness of other loads than {}", wanted.join(", ")));
+            self.add(format!("`inertia_stiffness` has other loads than {}", wanted.join(", ")));
         }
     }
 

@@ -148,9 +148,10 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
         ("first_moment", pair.first_moment()),
         ("second_moment", pair.second_moment()),
         ("C1", entries(&a.0.c1, &b.0.c1, |_, p| bound.c1(p))),
-        match groups.w1 {
-            true => ("Ibar", pair.ibar()),
-            false => ("C2", entries(&a.c2(), &b.c2(), |k, p| bound.c2(k, p))),
+        if groups.w1 {
+            ("Ibar", pair.ibar())
+        } else {
+            ("C2", entries(&a.c2(), &b.c2(), |k, p| bound.c2(k, p)))
         },
     ];
     if groups.w2 {
@@ -162,7 +163,7 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
         table.push(("W0", entries(&a.w0(), &b.w0(), |_, column| bound.c1(column % nf))));
     }
     if pair.general || !groups.w2 {
-        table.extend(a.w3().zip(b.w3()).map(|(own, other)| ("W3", entries(&own, &other, by_modes))));
+        table.extend(a.w3().zip(b.w3()).map(|(w3, other)| ("W3", entries(&w3, &other, by_modes))));
         table.push(("modal_mass", entries(&a.modal_mass(), &b.modal_mass(), by_modes)));
     }
     table.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()

@@ -3,7 +3,9 @@
 //! The guarantee covers the numbers in a flex-body file: nodes, modes and axes as stored, M and K as given.
 //! The distance of these modes from the exact ones is a separate bound (`/modes/shape_error`).
 
-use super::condense::{CHUNK, MAX_GROUPS, SolidColumns, fill_symmetric, from_gram, group_length};
+use super::condense::{
+    MAX_PARTIAL_SUMS, ROWS_PER_PRODUCT, SolidColumns, fill_symmetric, from_gram, group_length,
+};
 use super::derived::CYCLIC;
 use super::{CauchySchwarz, Invariants};
 use faer::{Mat, MatMut, MatRef};
@@ -16,13 +18,13 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of columns per pass over the mass matrix: their sums fill half of the vector registers.
-const WIDTH: usize = 16;
+const COLUMNS_PER_PASS: usize = 16;
 
 /// Unit roundoff of f64.
-const U: f64 = f64::EPSILON / 2.0;
+const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
 
 /// Factor that covers the rounding of the bounds themselves.
-const ROOM: f64 = 1.0 + 1e-6;
+const ROUNDING_MARGIN: f64 = 1.0 + 1e-6;
 
 /// Invariants with guaranteed digits, by their names in the file.
 pub const DIGITS: [&str; 13] = [
@@ -85,9 +87,9 @@ pub fn condense_certified(
 fn mass_gram(mass: &SymmetricMatrix, columns: SolidColumns<'_>) -> (Mat<f64>, Mat<f64>) {
     let (n, count) = (mass.n(), columns.count());
     let mut gram = Mat::<f64>::zeros(count, count);
-    for start in (0..count).step_by(WIDTH) {
+    for start in (0..count).step_by(COLUMNS_PER_PASS) {
         // Rows of X' beyond the block are the transpose of a later block.
-        let end = (start + WIDTH).min(count);
+        let end = (start + COLUMNS_PER_PASS).min(count);
         let block = gram_block(mass, columns, start..end);
         fill_symmetric(&mut gram, start..end, |row, column| block[row][column - start].hi);
     }
@@ -99,17 +101,18 @@ fn mass_gram(mass: &SymmetricMatrix, columns: SolidColumns<'_>) -> (Mat<f64>, Ma
         .collect();
     let longest = (0..n).map(|i| mass.row(i).0.len()).max().unwrap_or(0);
     let group = group_length(n);
-    let terms = 8.0 * U * U * (group + MAX_GROUPS + longest + 16) as f64;
-    let error =
-        Mat::from_fn(count, count, |i, j| ROOM * (U * gram[(i, j)].abs() + terms * size[i] * size[j]));
+    let terms = 8.0 * UNIT_ROUNDOFF * UNIT_ROUNDOFF * (group + MAX_PARTIAL_SUMS + longest + 16) as f64;
+    let error = Mat::from_fn(count, count, |i, j| {
+        ROUNDING_MARGIN * (UNIT_ROUNDOFF * gram[(i, j)].abs() + terms * size[i] * size[j])
+    });
     (gram, error)
 }
 
-/// Returns a node-wise copy of a block of at most [`WIDTH`] columns, padded with zeros.
-fn by_node(columns: SolidColumns<'_>, block: Range<usize>) -> Vec<[f64; WIDTH]> {
-    let mut rows = vec![[0.0; WIDTH]; columns.rows()];
-    rows.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
-        columns.by_node(CHUNK * chunk, block.clone(), WIDTH, rows.as_flattened_mut());
+/// Returns a node-wise copy of a block of at most [`COLUMNS_PER_PASS`] columns, padded with zeros.
+fn by_node(columns: SolidColumns<'_>, block: Range<usize>) -> Vec<[f64; COLUMNS_PER_PASS]> {
+    let mut rows = vec![[0.0; COLUMNS_PER_PASS]; columns.rows()];
+    rows.par_chunks_mut(ROWS_PER_PRODUCT).enumerate().for_each(|(chunk, rows)| {
+        columns.by_node(ROWS_PER_PRODUCT * chunk, block.clone(), COLUMNS_PER_PASS, rows.as_flattened_mut());
     });
     rows
 }
@@ -128,19 +131,19 @@ fn gram_block(
     mass: &SymmetricMatrix,
     columns: SolidColumns<'_>,
     block: Range<usize>,
-) -> Vec<[DoubleDouble; WIDTH]> {
+) -> Vec<[DoubleDouble; COLUMNS_PER_PASS]> {
     let (n, n_left) = (mass.n(), block.end);
     let x = by_node(columns, block);
     let group = group_length(n);
-    let partial: Vec<Vec<[[f64; WIDTH]; 2]>> = (0..n.div_ceil(group))
+    let partial: Vec<Vec<[[f64; COLUMNS_PER_PASS]; 2]>> = (0..n.div_ceil(group))
         .into_par_iter()
         .map(|g| {
-            let mut left = Mat::<f64>::zeros(CHUNK, n_left);
-            let mut sums = vec![[[0.0; WIDTH]; 2]; n_left];
-            let mut product = vec![[[0.0; WIDTH]; 2]; CHUNK];
+            let mut left = Mat::<f64>::zeros(ROWS_PER_PRODUCT, n_left);
+            let mut sums = vec![[[0.0; COLUMNS_PER_PASS]; 2]; n_left];
+            let mut product = vec![[[0.0; COLUMNS_PER_PASS]; 2]; ROWS_PER_PRODUCT];
             let nodes = g * group..((g + 1) * group).min(n);
-            for first in nodes.clone().step_by(CHUNK) {
-                let chunk = first..(first + CHUNK).min(nodes.end);
+            for first in nodes.clone().step_by(ROWS_PER_PRODUCT) {
+                let chunk = first..(first + ROWS_PER_PRODUCT).min(nodes.end);
                 let rows = chunk.len();
                 // Rows of the chunk of X, column-wise.
                 by_column(columns, chunk.clone(), left.subrows_mut(0, rows));
@@ -149,7 +152,7 @@ fn gram_block(
                     || {
                         // Ms X of the chunk in double-double arithmetic.
                         for (target, i) in product.iter_mut().zip(chunk) {
-                            let (mut hi, mut lo) = ([0.0; WIDTH], [0.0; WIDTH]);
+                            let (mut hi, mut lo) = ([0.0; COLUMNS_PER_PASS], [0.0; COLUMNS_PER_PASS]);
                             let (neighbours, values) = mass.row(i);
                             for (&j, &value) in neighbours.iter().zip(values) {
                                 accumulate(&mut hi, &mut lo, value, &x[j as usize]);
@@ -171,10 +174,10 @@ fn gram_block(
         })
         .collect();
     // Add the groups in a fixed order: the result does not depend on the number of threads.
-    let mut total = vec![[DoubleDouble::default(); WIDTH]; n_left];
+    let mut total = vec![[DoubleDouble::default(); COLUMNS_PER_PASS]; n_left];
     for part in &partial {
         for (sum, [hi, lo]) in total.iter_mut().zip(part) {
-            for w in 0..WIDTH {
+            for w in 0..COLUMNS_PER_PASS {
                 sum[w] = sum[w] + DoubleDouble { hi: hi[w], lo: lo[w] };
             }
         }
@@ -211,7 +214,7 @@ fn modal_stiffness(
         size[p] = size[p].sqrt();
     }
     let longest = (0..n).map(|i| stiffness.row(i).0.len()).max().unwrap_or(0);
-    let terms = 16.0 * U * U * (sum_length(n) + longest as f64 + 32.0);
+    let terms = 16.0 * UNIT_ROUNDOFF * UNIT_ROUNDOFF * (sum_length(n) + longest as f64 + 32.0);
     let mut value = Mat::<f64>::zeros(nf, nf);
     for start in (0..nf).step_by(LANES) {
         let width = LANES.min(nf - start);
@@ -224,7 +227,9 @@ fn modal_stiffness(
             (large[row][column - start] + small[row][column - start]).hi
         });
     }
-    let error = Mat::from_fn(nf, nf, |i, j| ROOM * (U * value[(i, j)].abs() + terms * size[i] * size[j]));
+    let error = Mat::from_fn(nf, nf, |i, j| {
+        ROUNDING_MARGIN * (UNIT_ROUNDOFF * value[(i, j)].abs() + terms * size[i] * size[j])
+    });
     (value, error)
 }
 
@@ -280,7 +285,7 @@ struct EntryErrors<'a> {
 
 /// Returns the error of a sum of rounded data: the sum of their errors plus the rounding of the sum itself.
 fn error_of_sum(errors: f64, magnitudes: f64) -> f64 {
-    ROOM * (errors + 2.0 * U * magnitudes)
+    ROUNDING_MARGIN * (errors + 2.0 * UNIT_ROUNDOFF * magnitudes)
 }
 
 impl EntryErrors<'_> {

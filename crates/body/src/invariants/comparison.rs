@@ -70,9 +70,9 @@ pub fn error_norms(exact: &Invariants, other: &Invariants) -> Vec<(String, f64)>
                 None => [None; 3],
             });
         };
-    let (own, others) = (matrix(&a.inertia), matrix(&b.inertia));
+    let (inertia, others) = (matrix(&a.inertia), matrix(&b.inertia));
     group(Some(&a.modal_mass), Some(&b.modal_mass), 0.0, &by_modes);
-    group(Some(&own), Some(&others), 0.0, &|k, l| bound.inertia(k, l));
+    group(Some(&inertia), Some(&others), 0.0, &|k, l| bound.inertia(k, l));
     let w1_bound = |k: usize, column: usize| bound.w1(k, column / nf, column % nf);
     group(a.w1.as_ref(), b.w1.as_ref(), 2.0 * rotation, &w1_bound);
     group(a.w2.as_ref(), b.w2.as_ref(), 0.0, &by_modes);

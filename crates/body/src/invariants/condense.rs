@@ -18,19 +18,19 @@ use std::ops::Range;
 
 /// Number of rows per dense product, the longest plain sum. Shorter chunks cost time, longer chunks lose
 /// digits.
-pub(super) const CHUNK: usize = 128;
+pub(super) const ROWS_PER_PRODUCT: usize = 128;
 /// Upper bound of the number of partial sums kept until they are added in order.
-pub(super) const MAX_GROUPS: usize = 64;
+pub(super) const MAX_PARTIAL_SUMS: usize = 64;
 /// Number of columns per pass over the mass matrix.
-const PANEL: usize = 64;
+const PANEL_COLUMNS: usize = 64;
 /// Number of columns per pass if there are more than twice as many. Each pass gathers all earlier columns
 /// once more, so wider panels save work on many columns.
-const WIDE_PANEL: usize = 192;
+const WIDE_PANEL_COLUMNS: usize = 192;
 /// Number of columns of a panel summed at a time, in registers.
-pub(super) const LANE: usize = 16;
+pub(super) const LANE_COLUMNS: usize = 16;
 
 /// One lane of a row of a panel.
-pub(super) type Lane = [f64; LANE];
+pub(super) type Lane = [f64; LANE_COLUMNS];
 
 /// Symmetric mass on the nodes, equal for all directions.
 pub(super) trait NodalMass: Sync {
@@ -49,7 +49,7 @@ impl NodalMass for SymmetricMatrix {
 
     #[inline(always)] // compiled once per instruction set
     fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane {
-        let mut sum = [0.0; LANE];
+        let mut sum = [0.0; LANE_COLUMNS];
         let (columns, values) = self.row(i);
         for (&j, &value) in columns.iter().zip(values) {
             for (s, x) in sum.iter_mut().zip(&x[j as usize * lanes + lane]) {
@@ -240,7 +240,7 @@ impl Aligned {
 fn weighted_gram<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) -> Mat<f64> {
     let n_columns = columns.count();
     let mut gram = Mat::<f64>::zeros(n_columns, n_columns);
-    let width = if n_columns > 2 * WIDE_PANEL { WIDE_PANEL } else { PANEL };
+    let width = if n_columns > 2 * WIDE_PANEL_COLUMNS { WIDE_PANEL_COLUMNS } else { PANEL_COLUMNS };
     for start in (0..n_columns).step_by(width) {
         // Rows of X' beyond the panel are the transpose of a later panel.
         let end = (start + width).min(n_columns);
@@ -266,7 +266,7 @@ pub(super) fn fill_symmetric(
 
 /// Returns the number of nodes per group, which depends on the number of nodes `n` only.
 pub(super) fn group_length(n: usize) -> usize {
-    CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1)
+    ROWS_PER_PRODUCT * n.div_ceil(ROWS_PER_PRODUCT).div_ceil(MAX_PARTIAL_SUMS).max(1)
 }
 
 /// Sums the contributions of the groups of `n` nodes to a matrix of the given size, in the order of the
@@ -291,35 +291,38 @@ pub(super) fn sum_of_groups(
 /// Returns X[0..panel.end]' Ms X[panel]: at least panel.end rows, and one column per column of the panel.
 fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel: Range<usize>) -> Mat<f64> {
     let n = columns.rows();
-    let lanes = panel.len().div_ceil(LANE);
-    let (before, width) = (panel.start, lanes * LANE);
+    let lanes = panel.len().div_ceil(LANE_COLUMNS);
+    let (before, width) = (panel.start, lanes * LANE_COLUMNS);
+    // Columns of the panel, node by node.
     let mut x = Aligned::zeros(n * width);
-    x.get_mut().par_chunks_mut(CHUNK * width).enumerate().for_each(|(chunk, rows)| {
-        columns.by_node(chunk * CHUNK, panel.clone(), width, rows);
+    x.get_mut().par_chunks_mut(ROWS_PER_PRODUCT * width).enumerate().for_each(|(chunk, rows)| {
+        columns.by_node(chunk * ROWS_PER_PRODUCT, panel.clone(), width, rows);
     });
     let x = x.get();
-    let x_lanes = x.as_chunks::<LANE>().0;
+    let x_lanes = x.as_chunks::<LANE_COLUMNS>().0;
     let arch = Arch::new();
     sum_of_groups(n, (before + width, width), |nodes| {
-        let mut product = Aligned::zeros(CHUNK * width);
-        let mut earlier = Aligned::zeros(CHUNK * before);
+        let mut product = Aligned::zeros(ROWS_PER_PRODUCT * width);
+        let mut earlier = Aligned::zeros(ROWS_PER_PRODUCT * before);
         let mut sum = Mat::<f64>::zeros(before + width, width);
-        for first in nodes.clone().step_by(CHUNK) {
-            let rows = CHUNK.min(nodes.end - first);
+        for first in nodes.clone().step_by(ROWS_PER_PRODUCT) {
+            let rows = ROWS_PER_PRODUCT.min(nodes.end - first);
+            // Ms X of a chunk of rows.
             let product = &mut product.get_mut()[..rows * width];
-            let targets = product.as_chunks_mut::<LANE>().0;
+            let targets = product.as_chunks_mut::<LANE_COLUMNS>().0;
             arch.dispatch(MassTimes { mass, first, x: x_lanes, lanes, targets });
             // Rows of nodes are columns of the transpose.
             let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
             let product = transposed(product, width).transpose();
             let (top, bottom) = sum.as_mut().split_at_row_mut(before);
+            // Products of the earlier columns, and of the panel itself, with this chunk.
             if before > 0 {
                 let earlier = &mut earlier.get_mut()[..rows * before];
                 columns.by_node(first, 0..before, before, earlier);
                 matmul(top, Accum::Add, transposed(earlier, before), product, 1.0, Par::Seq);
             }
-            let own = transposed(&x[first * width..][..rows * width], width);
-            matmul(bottom, Accum::Add, own, product, 1.0, Par::Seq);
+            let rows_of_x = transposed(&x[first * width..][..rows * width], width);
+            matmul(bottom, Accum::Add, rows_of_x, product, 1.0, Par::Seq);
         }
         sum
     })

@@ -2,7 +2,8 @@
 //! nor W3.
 
 use super::condense::{
-    Aligned, CHUNK, LANE, Lane, MassTimes, NodalMass, SolidColumns, rigid_part, sum_of_groups,
+    Aligned, LANE_COLUMNS, Lane, MassTimes, NodalMass, ROWS_PER_PRODUCT, SolidColumns, rigid_part,
+    sum_of_groups,
 };
 use super::{Invariants, LumpedMasses, PrimaryData, TermGroups, s_of_modal_mass};
 use faer::linalg::matmul::matmul;
@@ -76,25 +77,25 @@ fn of_rigid_products<M: NodalMass + ?Sized>(
 /// meaning.
 fn rigid_products<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) -> Mat<f64> {
     let (n, count) = (columns.rows(), columns.count());
-    let mut x: Vec<Lane> = vec![[0.0; LANE]; n];
-    x.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
-        columns.by_node(chunk * CHUNK, 0..4, LANE, rows.as_flattened_mut());
+    let mut x: Vec<Lane> = vec![[0.0; LANE_COLUMNS]; n];
+    x.par_chunks_mut(ROWS_PER_PRODUCT).enumerate().for_each(|(chunk, rows)| {
+        columns.by_node(chunk * ROWS_PER_PRODUCT, 0..4, LANE_COLUMNS, rows.as_flattened_mut());
     });
     let arch = Arch::new();
-    sum_of_groups(n, (count, LANE), |nodes| {
-        let mut own = Aligned::zeros(CHUNK * count);
-        let mut product = [[0.0; LANE]; CHUNK];
-        let mut sum = Mat::<f64>::zeros(count, LANE);
-        for first in nodes.clone().step_by(CHUNK) {
-            let rows = CHUNK.min(nodes.end - first);
+    sum_of_groups(n, (count, LANE_COLUMNS), |nodes| {
+        let mut block = Aligned::zeros(ROWS_PER_PRODUCT * count);
+        let mut product = [[0.0; LANE_COLUMNS]; ROWS_PER_PRODUCT];
+        let mut sum = Mat::<f64>::zeros(count, LANE_COLUMNS);
+        for first in nodes.clone().step_by(ROWS_PER_PRODUCT) {
+            let rows = ROWS_PER_PRODUCT.min(nodes.end - first);
             let product = &mut product[..rows];
             arch.dispatch(MassTimes { mass, first, x: &x, lanes: 1, targets: product });
-            let own = &mut own.get_mut()[..rows * count];
-            columns.by_node(first, 0..count, count, own);
+            let block = &mut block.get_mut()[..rows * count];
+            columns.by_node(first, 0..count, count, block);
             // Rows of nodes are columns of the transpose.
             let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
-            let product = transposed(product.as_flattened(), LANE).transpose();
-            matmul(&mut sum, Accum::Add, transposed(own, count), product, 1.0, Par::Seq);
+            let product = transposed(product.as_flattened(), LANE_COLUMNS).transpose();
+            matmul(&mut sum, Accum::Add, transposed(block, count), product, 1.0, Par::Seq);
         }
         sum
     })
@@ -138,7 +139,7 @@ mod tests {
         let linear = of_rigid_products(&mass, columns, stiffness(), &Mat::identity(nf, nf));
         assert_eq!(mass.1.swap(0, Ordering::Relaxed), n, "one lane holds four columns");
         let whole = condense_with(&mass, &positions, shapes.as_ref(), stiffness());
-        assert_eq!(mass.1.load(Ordering::Relaxed), n * (4 + 3 * nf).div_ceil(LANE));
+        assert_eq!(mass.1.load(Ordering::Relaxed), n * (4 + 3 * nf).div_ceil(LANE_COLUMNS));
         let near = |a: f64, b: f64, size: f64| assert!((a - b).abs() <= 1e-13 * size, "{a} is not {b}");
         near(linear.mass(), whole.mass(), whole.mass());
         for k in 0..3 {

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of columns of X multiplied by M at a time. A larger block needs more memory.
-const BLOCK: usize = 32;
+const COLUMNS_PER_BLOCK: usize = 32;
 
 /// Product of a symmetric mass matrix with columns.
 pub trait MassProduct: Sync {
@@ -171,12 +171,15 @@ impl<'a> GeneralColumns<'a> {
     /// elsewhere.
     fn rigid_gram(&self, mass: &(impl MassProduct + ?Sized)) -> Mat<f64> {
         let (count, r) = (self.count(), self.rigid());
+        // M times the rigid motion only.
         let mut y = Mat::zeros(self.shapes.nrows(), r);
         mass.times(self.motion.fields, y.as_mut());
+        // Modes are M-orthonormal: the identity in their block.
         let first_mode = count - self.shapes.ncols();
         let mut all = Mat::from_fn(count, count, |i, j| if i == j && i >= first_mode { 1.0 } else { 0.0 });
-        for start in (0..count).step_by(BLOCK) {
-            let columns = start..(start + BLOCK).min(count);
+        for start in (0..count).step_by(COLUMNS_PER_BLOCK) {
+            let columns = start..(start + COLUMNS_PER_BLOCK).min(count);
+            // X' M R, mirrored.
             let part = gram(self.block(columns.clone()).as_ref(), y.as_ref());
             for (k, column) in columns.enumerate() {
                 for row in 0..r.min(column + 1) {
@@ -191,10 +194,13 @@ impl<'a> GeneralColumns<'a> {
     /// Returns X' M X, exactly symmetric.
     fn gram(&self, mass: &(impl MassProduct + ?Sized)) -> Mat<f64> {
         let count = self.count();
-        let blocks: Vec<Range<usize>> =
-            (0..count).step_by(BLOCK).map(|start| start..(start + BLOCK).min(count)).collect();
+        let blocks: Vec<Range<usize>> = (0..count)
+            .step_by(COLUMNS_PER_BLOCK)
+            .map(|start| start..(start + COLUMNS_PER_BLOCK).min(count))
+            .collect();
         let mut all = Mat::zeros(count, count);
         for (right, columns) in blocks.iter().enumerate() {
+            // M times a block of columns, then its products with all blocks up to it.
             let x = self.block(columns.clone());
             let mut y = Tall::zeros(self.shapes.nrows(), x.ncols());
             mass.times(x.as_ref(), y.as_mut());
@@ -296,6 +302,7 @@ impl Products {
         let (mass, first_moment, second_moment) = self.rigid_inertia();
         let ibar: Vec<Matrix3<f64>> =
             (0..nf).map(|j| plane_ibar(g[(2, self.turned(0, j))], g[(2, self.mode(j))])).collect();
+        // S from W2 about z: equal halves for the two axes in the plane.
         let w2 = |i: usize, j: usize| g[(self.turned(0, i), self.turned(0, j))];
         let half = || Mat::from_fn(nf, nf, |i, j| 0.5 * w2(i, j));
         let zero = || Mat::zeros(nf, nf);

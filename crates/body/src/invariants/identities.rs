@@ -8,19 +8,19 @@ use nalgebra::Vector3;
 
 /// Limit of identities that hold for the Gram matrix of any vectors: rounding of its sums, 1e-15 relative
 /// to the Cauchy-Schwarz bounds, with a margin for data that were rotated or shifted after condensation.
-const ROUNDING: f64 = 1e-12;
+const GRAM_LIMIT: f64 = 1e-12;
 /// Limit of these identities if M does not commute with rotations. Such matrices often come condensed:
 /// their entries are larger than the mass they add up to, and the sums for different directions agree to
 /// fewer digits (6.5e-12 of the mass in an external superelement of NX Nastran with entries of 1e4 times
 /// the mass; its body missed this identity by 1.3e-12 to 3.5e-12).
-const CONDENSED: f64 = 1e-10;
+const GENERAL_MASS_LIMIT: f64 = 1e-10;
 /// Limit of identities that hold for modes. The solver separates modes from each other and from rigid
 /// motion to 1e-13; a residual of 1e-10 leaves 1e-10 in close pairs. Larger deviations mean that the
 /// columns are not modes.
-const MODAL: f64 = 1e-9;
+const MODE_LIMIT: f64 = 1e-9;
 /// Limit of the products of inertia about principal axes: moments within 1e-9 of each other count as equal
 /// and keep the model axes.
-const PRINCIPAL: f64 = 2e-9;
+const PRINCIPAL_AXES_LIMIT: f64 = 2e-9;
 
 /// One identity with its formula, the deviation of the body from it, and the result.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,7 +76,7 @@ pub enum Turning {
     #[default]
     None,
     /// Points and directors, and a part of the mass that does not turn: W0 = -C1~.
-    InPart,
+    Partial,
     /// Points and directors only: every formula of M = Ms kron I3 holds, except for signs of products,
     /// since the mass of directors may belong to no position.
     Whole,
@@ -92,7 +92,7 @@ pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityChe
     let mut checks = vec![
         check("finite", "no NaN, no infinity", terms::not_finite(body), 0.0),
         check("mass_positive", "m > 0", if body.0.mass > 0.0 { 0.0 } else { 1.0 }, 0.0),
-        check("second_moment_symmetric", "J = J'", terms::second_moment_asymmetry(body, &bound), ROUNDING),
+        check("second_moment_symmetric", "J = J'", terms::second_moment_asymmetry(body, &bound), GRAM_LIMIT),
     ];
     checks.extend(rigid_identities(body));
     checks.extend(gram_identities(body, &bound, expected.turning));
@@ -106,15 +106,15 @@ fn gram_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -
     let (check, groups) = (IdentityCheck::new, body.0.groups);
     let mut checks = Vec::new();
     if groups.w2 || groups.w3 {
-        checks.push(check("s_transposed", "S_lk = S_kl'", terms::s_asymmetry(body, bound), ROUNDING));
+        checks.push(check("s_transposed", "S_lk = S_kl'", terms::s_asymmetry(body, bound), GRAM_LIMIT));
     }
     checks.extend([
-        check("c1_bounded", "|C1_kp| <= sqrt(m) |psi_p|", terms::c1_ratio(body, bound) - 1.0, ROUNDING),
+        check("c1_bounded", "|C1_kp| <= sqrt(m) |psi_p|", terms::c1_ratio(body, bound) - 1.0, GRAM_LIMIT),
         check(
             "motion_gram_psd",
             "[rigid Psi]' M [rigid Psi] positive semidefinite",
             terms::motion_gram_negative(body, bound),
-            ROUNDING,
+            GRAM_LIMIT,
         ),
     ]);
     if turning != Turning::None {
@@ -126,7 +126,7 @@ fn gram_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -
             "velocity_gram_psd",
             "[Phi_t B Psi]' M [Phi_t B Psi] positive semidefinite",
             terms::velocity_gram_negative(body, &w2, &w3, bound),
-            CONDENSED,
+            GENERAL_MASS_LIMIT,
         )),
         None if body.0.general.is_some() => {}
         None => checks.extend(scalar_identities(body, bound)),
@@ -138,16 +138,16 @@ fn gram_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -
 fn turning_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -> Vec<IdentityCheck> {
     let (check, nf, solid) = (IdentityCheck::new, body.n_modes(), body.as_solid());
     let difference = terms::difference(&solid.w0(), &body.w0(), &|_, column| bound.c1(column % nf));
-    let mut checks = vec![check("w0_of_c1", "W0 = -C1~", difference, ROUNDING)];
-    if turning == Turning::InPart {
+    let mut checks = vec![check("w0_of_c1", "W0 = -C1~", difference, GRAM_LIMIT)];
+    if turning == Turning::Partial {
         return checks;
     }
     let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
-    if let (Some(own), Some(of_s), true) = (body.w3(), solid.w3(), body.0.groups.w2) {
-        let value = terms::difference(&of_s, &own, &by_modes);
-        checks.push(check("w3_of_s", "W3_k = S_lm - S_ml", value, CONDENSED));
+    if let (Some(w3), Some(of_s), true) = (body.w3(), solid.w3(), body.0.groups.w2) {
+        let value = terms::difference(&of_s, &w3, &by_modes);
+        checks.push(check("w3_of_s", "W3_k = S_lm - S_ml", value, GENERAL_MASS_LIMIT));
         let value = terms::difference(&solid.modal_mass(), &body.modal_mass(), &by_modes);
-        checks.push(check("modal_mass_of_s", "m_ff = S11 + S22 + S33", value, CONDENSED));
+        checks.push(check("modal_mass_of_s", "m_ff = S11 + S22 + S33", value, GENERAL_MASS_LIMIT));
     }
     checks
 }
@@ -158,20 +158,20 @@ fn mode_identities(body: &Invariants, expected: &Expected<'_>, bound: &CauchySch
     let mut checks = Vec::new();
     if expected.mass_normalised {
         let value = terms::modal_mass_deviation(body);
-        checks.push(check("modal_mass_identity", "S11 + S22 + S33 = I", value, MODAL));
+        checks.push(check("modal_mass_identity", "S11 + S22 + S33 = I", value, MODE_LIMIT));
     }
     if expected.free_surface {
-        checks.push(check("c1_zero", "C1 = 0", terms::c1_ratio(body, bound), MODAL));
-        checks.push(check("c2_zero", "C2 = 0", terms::c2_ratio(body, bound), MODAL));
+        checks.push(check("c1_zero", "C1 = 0", terms::c1_ratio(body, bound), MODE_LIMIT));
+        checks.push(check("c2_zero", "C2 = 0", terms::c2_ratio(body, bound), MODE_LIMIT));
         if body.0.groups.w1 {
             let value = terms::ibar_asymmetry(body, bound);
-            checks.push(check("ibar_symmetric", "Ibar_kl = Ibar_lk", value, MODAL));
+            checks.push(check("ibar_symmetric", "Ibar_kl = Ibar_lk", value, MODE_LIMIT));
         }
     }
     if let Some(eigenvalues) = expected.eigenvalues {
         let value = terms::stiffness_deviation(body, eigenvalues);
         // `eigenvalue_noise` was measured on rigid motion; the noise of the modes is of similar size.
-        let limit = MODAL + 10.0 * expected.eigenvalue_noise + expected.eigenvalue_rounding;
+        let limit = MODE_LIMIT + 10.0 * expected.eigenvalue_noise + expected.eigenvalue_rounding;
         checks.push(check("modal_stiffness_diagonal", "Psi' K Psi = diag(lambda)", value, limit));
     }
     checks
@@ -184,12 +184,12 @@ fn frame_identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityC
     if expected.frame != BodyFrame::Model {
         let radius = (body.0.second_moment.trace() / body.0.mass).sqrt();
         let value = scaled(body.0.first_moment.norm(), body.0.mass * radius);
-        let limit = ROUNDING + 4.0 * f64::EPSILON * scaled(expected.origin.norm(), radius);
+        let limit = GRAM_LIMIT + 4.0 * f64::EPSILON * scaled(expected.origin.norm(), radius);
         checks.push(check("first_moment_zero", "c = 0: origin at the centre of mass", value, limit));
     }
     if expected.frame == BodyFrame::Principal {
         let value = terms::products_of_inertia(body);
-        checks.push(check("inertia_diagonal", "I0 diagonal: principal axes", value, PRINCIPAL));
+        checks.push(check("inertia_diagonal", "I0 diagonal: principal axes", value, PRINCIPAL_AXES_LIMIT));
     }
     checks
 }
@@ -202,20 +202,20 @@ fn rigid_identities(body: &Invariants) -> Vec<IdentityCheck> {
     if body.0.general.is_some() {
         let value = terms::inertia_negative(body);
         let formula = "I0 about the centre of mass positive semidefinite";
-        return vec![check("inertia_psd", formula, value, ROUNDING)];
+        return vec![check("inertia_psd", formula, value, GRAM_LIMIT)];
     }
     vec![
         check(
             "second_moment_psd",
             "J - c c'/m positive semidefinite",
             terms::second_moment_negative(body),
-            ROUNDING,
+            GRAM_LIMIT,
         ),
         check(
             "inertia_triangle",
             "I_3 <= I_1 + I_2 about the centre of mass",
             terms::triangle_excess(body),
-            ROUNDING,
+            GRAM_LIMIT,
         ),
     ]
 }
@@ -226,30 +226,30 @@ fn scalar_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCh
     let (check, groups) = (IdentityCheck::new, body.0.groups);
     let mut checks = Vec::new();
     if groups.w2 {
-        checks.push(check("s_psd", "S_kk positive semidefinite", terms::s_negative(body), ROUNDING));
+        checks.push(check("s_psd", "S_kk positive semidefinite", terms::s_negative(body), GRAM_LIMIT));
         checks.push(check(
             "s_bounded",
             "|S_kl,pq| <= |psi_p| |psi_q|",
             terms::s_excess(body, bound),
-            ROUNDING,
+            GRAM_LIMIT,
         ));
     }
     if groups.w1 {
         let value = terms::ibar_excess(body, bound);
-        checks.push(check("ibar_bounded", "|Ibar_kl,p| <= sqrt(J_kk) |psi_p|", value, ROUNDING));
+        checks.push(check("ibar_bounded", "|Ibar_kl,p| <= sqrt(J_kk) |psi_p|", value, GRAM_LIMIT));
     }
     if let Some(w3) = body.w3() {
         let value = terms::w3_symmetric_part(&w3, bound);
-        checks.push(check("w3_skew", "every block of W3 skew", value, ROUNDING));
+        checks.push(check("w3_skew", "every block of W3 skew", value, GRAM_LIMIT));
         let value = terms::w3_excess(&w3, &body.modal_mass());
-        checks.push(check("w3_bounded", "|block of W3|_2 <= |m_ff|_2", value, ROUNDING));
+        checks.push(check("w3_bounded", "|block of W3|_2 <= |m_ff|_2", value, GRAM_LIMIT));
     }
     if groups.w1 && groups.w2 {
         checks.push(check(
             "scalar_gram_psd",
             "[1 x Psi_1 Psi_2 Psi_3]' Ms [...] positive semidefinite",
             terms::scalar_gram_negative(body, bound),
-            ROUNDING,
+            GRAM_LIMIT,
         ));
     }
     checks
@@ -263,17 +263,23 @@ fn scalar_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCh
 pub fn derived_identities(body: &Invariants, stored: &Derived) -> Vec<IdentityCheck> {
     let nf = body.n_modes();
     let bound = CauchySchwarz::of(body);
-    let own = body.derived();
+    let computed = body.derived();
     let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
     let check = |name, formula, a: &Mat<f64>, b: &Mat<f64>, bound: &dyn Fn(usize, usize) -> f64| {
-        IdentityCheck::new(name, formula, terms::difference(a, b, bound), ROUNDING)
+        IdentityCheck::new(name, formula, terms::difference(a, b, bound), GRAM_LIMIT)
     };
-    let (i0, stored_i0) = (terms::matrix(&own.inertia), terms::matrix(&stored.inertia));
+    let (i0, stored_i0) = (terms::matrix(&computed.inertia), terms::matrix(&stored.inertia));
     let w1 = |k: usize, column: usize| bound.w1(k, column / nf, column % nf);
     let mut checks = vec![
         check("i0_of_j", "I0 = tr(J) I - J", &i0, &stored_i0, &|k, l| bound.inertia(k, l)),
-        check("c2_of_ibar", "C2_k = Ibar_lm - Ibar_ml", &own.c2, &stored.c2, &|k, p| bound.c2(k, p)),
-        check("modal_mass_of_s", "m_ff = S11 + S22 + S33", &own.modal_mass, &stored.modal_mass, &by_modes),
+        check("c2_of_ibar", "C2_k = Ibar_lm - Ibar_ml", &computed.c2, &stored.c2, &|k, p| bound.c2(k, p)),
+        check(
+            "modal_mass_of_s",
+            "m_ff = S11 + S22 + S33",
+            &computed.modal_mass,
+            &stored.modal_mass,
+            &by_modes,
+        ),
     ];
     let none = Mat::new();
     let mut group =
@@ -291,12 +297,12 @@ pub fn derived_identities(body: &Invariants, stored: &Derived) -> Vec<IdentityCh
     group(
         "w1_of_ibar",
         "W1_kl = -(Ibar_kl + Ibar_lk), W1_kk = 2 (Ibar_ll + Ibar_mm)",
-        &own.w1,
+        &computed.w1,
         &stored.w1,
         &w1,
     );
-    group("w2_of_s", "W2_kl = -S_lk, W2_kk = S_ll + S_mm", &own.w2, &stored.w2, &by_modes);
-    group("w3_of_s", "W3_k = S_lm - S_ml", &own.w3, &stored.w3, &by_modes);
+    group("w2_of_s", "W2_kl = -S_lk, W2_kk = S_ll + S_mm", &computed.w2, &stored.w2, &by_modes);
+    group("w3_of_s", "W3_k = S_lm - S_ml", &computed.w3, &stored.w3, &by_modes);
     if let Some((w2, w3)) = stored.w2.as_ref().zip(stored.w3.as_ref()).filter(|_| body.0.general.is_none()) {
         let expected = terms::w3_of_w2(w2, nf);
         checks.push(check("w3_of_w2", "W3_k = W2_lm - W2_ml", &expected, w3, &by_modes));

@@ -243,21 +243,21 @@ pub(super) fn matrix(a: &Matrix3<f64>) -> Mat<f64> {
 
 /// Number of rows above which definiteness is tested by a Cholesky factorisation: eigenvalues take a
 /// hundred times as long.
-const MANY_ROWS: usize = 400;
+const MIN_CHOLESKY_ROWS: usize = 400;
 
 /// Diagonal shift of a large matrix before its factorisation, relative to its scale: a part of the rounding
 /// error that is allowed.
-const SHIFT: f64 = 2e-13;
+const RELATIVE_SHIFT: f64 = 2e-13;
 
 /// Returns the magnitude of a negative smallest eigenvalue of a symmetric matrix, relative to `scale`; for
 /// a large matrix an upper bound.
 fn negative(a: &Mat<f64>, scale: f64) -> f64 {
     let shifted = || {
-        let entry = |i: usize, j: usize| a[(i, j)] + if i == j { SHIFT * scale } else { 0.0 };
+        let entry = |i: usize, j: usize| a[(i, j)] + if i == j { RELATIVE_SHIFT * scale } else { 0.0 };
         Mat::from_fn(a.nrows(), a.ncols(), entry)
     };
-    if a.nrows() > MANY_ROWS && scale.is_finite() && dense_cholesky(shifted()).is_some() {
-        return SHIFT;
+    if a.nrows() > MIN_CHOLESKY_ROWS && scale.is_finite() && dense_cholesky(shifted()).is_some() {
+        return RELATIVE_SHIFT;
     }
     let smallest = symmetric_eigenvalues(a.as_ref()).map(|values| values.first().copied().unwrap_or(0.0));
     smallest.map_or(f64::NAN, |value| scaled(value.min(0.0), scale))

@@ -75,9 +75,9 @@ impl InertiaStiffness {
         rotation: MatRef<'_, f64>,
         dimension: usize,
     ) -> Self {
-        let moved = |own: &NodeMoments| NodeMoments {
-            first: axes.tr_mul(&own.first),
-            second: axes.transpose() * (own.second - own.first * d.transpose()) * axes,
+        let moved = |node: &NodeMoments| NodeMoments {
+            first: axes.tr_mul(&node.first),
+            second: axes.transpose() * (node.second - node.first * d.transpose()) * axes,
         };
         Self::new(self.moments.iter().map(moved).collect(), rotation, dimension)
     }
@@ -98,7 +98,7 @@ impl InertiaStiffness {
     /// # Panics
     /// When `rotation` does not have three rows for each of the moments.
     pub fn deviation(&self, rotation: MatRef<'_, f64>, dimension: usize) -> f64 {
-        let own = self.with_rotations(rotation, dimension);
+        let expected = self.with_rotations(rotation, dimension);
         let magnitudes = Mat::from_fn(rotation.nrows(), rotation.ncols(), |i, j| rotation[(i, j)].abs());
         let turning = TurningNodes::new(&self.moments, magnitudes.as_ref());
         let size = |load: &UnitLoad| turning.sum(|moments| moments.of(&motion_of(load)).abs()).norm_max();
@@ -106,7 +106,7 @@ impl InertiaStiffness {
             let loads = Self::loads(dimension).filter(|load| load.kind == *kind);
             loads.map(|load| size(&load)).fold(0.0, f64::max)
         };
-        self.difference_of_stiffness(&own, &largest)
+        self.difference_of_stiffness(&expected, &largest)
     }
 
     /// Returns the largest difference of moments and stiffnesses from `other`, relative to the largest
@@ -122,8 +122,8 @@ impl InertiaStiffness {
             pairs.for_each(|(a, b)| (difference, size) = (difference.max((a - b).abs()), size.max(a.abs())));
             if difference == 0.0 { 0.0 } else { difference / size }
         };
-        let first = relative(&|own| own.first.iter().copied().collect());
-        let second = relative(&|own| own.second.iter().copied().collect());
+        let first = relative(&|node| node.first.iter().copied().collect());
+        let second = relative(&|node| node.second.iter().copied().collect());
         let size = |kind: &LoadKind| {
             let of_kind = self.stiffness.iter().filter(|one| one.load.kind == *kind);
             of_kind.map(|one| one.matrix.norm_max()).fold(0.0, f64::max)
@@ -133,12 +133,12 @@ impl InertiaStiffness {
 
     /// Returns the largest difference of the stiffnesses, relative to the `size` of their kind of load.
     fn difference_of_stiffness(&self, other: &Self, size: &dyn Fn(&LoadKind) -> f64) -> f64 {
-        let differences = self.stiffness.iter().zip(&other.stiffness).map(|(own, other)| {
-            if own.matrix.nrows() != other.matrix.nrows() {
+        let differences = self.stiffness.iter().zip(&other.stiffness).map(|(one, other)| {
+            if one.matrix.nrows() != other.matrix.nrows() {
                 return f64::INFINITY;
             }
-            let difference = (&own.matrix - &other.matrix).norm_max();
-            if difference == 0.0 { 0.0 } else { difference / size(&own.load.kind) }
+            let difference = (&one.matrix - &other.matrix).norm_max();
+            if difference == 0.0 { 0.0 } else { difference / size(&one.load.kind) }
         });
         differences.fold(0.0, f64::max)
     }
@@ -161,9 +161,9 @@ impl InertiaStiffness {
     /// to the stiffness K_ff of any deformation. Returns `None` if K_ff is not positive definite.
     pub fn shares(&self, modal_stiffness: MatRef<'_, f64>) -> Option<InertiaShares> {
         let of_kind = |kind: LoadKind| {
-            let own = self.stiffness.iter().filter(|one| one.load.kind == kind);
+            let of_kind = self.stiffness.iter().filter(|one| one.load.kind == kind);
             // w'K w contains both orders of a pair of axes, and the stored matrix is their sum.
-            let matrices: Vec<Mat<f64>> = own
+            let matrices: Vec<Mat<f64>> = of_kind
                 .map(|one| match (&kind, one.load.component) {
                     (LoadKind::Spin, 3..) => &one.matrix * faer::Scale(0.5f64.sqrt()),
                     _ => one.matrix.clone(),

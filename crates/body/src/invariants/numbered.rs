@@ -96,16 +96,16 @@ impl Invariants {
         // Compare I6 and I5 with the values that follow from S.
         let solid = (body.modal_mass(), body.w3());
         let bound = CauchySchwarz::of(&body);
-        let apart = |own: &Mat<f64>, told: &Mat<f64>| {
-            let scale = |i: usize, j: usize| bound.s(i % nf, j).max(told[(i % nf, j)].abs() * f64::EPSILON);
-            let places = (0..told.nrows()).flat_map(|i| (0..nf).map(move |j| (i, j)));
+        let apart = |computed: &Mat<f64>, stated: &Mat<f64>| {
+            let scale = |i: usize, j: usize| bound.s(i % nf, j).max(stated[(i % nf, j)].abs() * f64::EPSILON);
+            let places = (0..stated.nrows()).flat_map(|i| (0..nf).map(move |j| (i, j)));
             let worst = places
-                .map(|(i, j)| super::cauchy_schwarz::scaled(own[(i, j)] - told[(i, j)], scale(i, j)))
+                .map(|(i, j)| super::cauchy_schwarz::scaled(computed[(i, j)] - stated[(i, j)], scale(i, j)))
                 .fold(0.0, larger);
             worst.is_nan() || worst > rounding
         };
-        let differs =
-            apart(&solid.0, i6) || solid.1.zip(i5.as_ref()).is_some_and(|(own, told)| apart(&own, told));
+        let differs = apart(&solid.0, i6)
+            || solid.1.zip(i5.as_ref()).is_some_and(|(computed, stated)| apart(&computed, stated));
         // The mass does not commute with rotations: store I5 and I6 themselves.
         if differs {
             body.0.general = Some(GeneralTerms {

@@ -58,7 +58,7 @@ impl Invariants {
     /// When the shapes of the arrays differ from the shapes stated by [`PrimaryData`].
     pub fn new(data: PrimaryData) -> Self {
         let invariants = Self(data);
-        assert!(invariants.has_its_shapes(), "arrays of shapes that do not belong together");
+        assert!(invariants.has_its_shapes(), "arrays of shapes of different sizes");
         invariants
     }
 

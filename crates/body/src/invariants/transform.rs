@@ -45,7 +45,7 @@ impl Invariants {
     /// the motion of the body. For a mass of points and directors W0 has this value already. A mass that
     /// does not turn with the nodes has other products Phi_t' M B_j, which are errors of the order of its
     /// approximation (theory section 6).
-    pub(crate) fn without_feeling_of_flight(mut self) -> Self {
+    pub(crate) fn with_w0_of_c1(mut self) -> Self {
         let w0 = self.as_solid().w0();
         if let Some(general) = &mut self.0.general {
             let nf = w0.ncols() / 3;

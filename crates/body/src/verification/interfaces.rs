@@ -8,30 +8,33 @@ use std::collections::BTreeSet;
 
 /// Allowed difference of reference points, relative to the coordinates of the nodes: the rounding of the
 /// change of frame.
-const PLACE: f64 = 1e-12;
+const MAX_POINT_DIFFERENCE: f64 = 1e-12;
 
 /// Compares names, nodes, couplings and reference points; empty if neither has interfaces. Bodies from
 /// files of versions without reference points have none. A body of an earlier version has the mean of the
 /// nodes as reference point if the model states none; this is accepted.
 pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<IdentityCheck> {
-    let (stored, own) = (body.interfaces(), interfaces_in_frame(model, body.frame(), false));
-    if stored.is_empty() && own.is_empty() {
+    let (stored, in_model) = (body.interfaces(), interfaces_in_frame(model, body.frame(), false));
+    if stored.is_empty() && in_model.is_empty() {
         return Vec::new();
     }
     let of = |name: &str| stored.iter().find(|interface| interface.name == name);
     let unknown =
-        stored.iter().filter(|interface| own.iter().all(|other| other.name != interface.name)).count();
-    let differing =
-        own.iter().filter(|own| of(&own.name).is_none_or(|stored| !is_same(stored, own, model))).count();
+        stored.iter().filter(|interface| in_model.iter().all(|other| other.name != interface.name)).count();
+    let differing = in_model
+        .iter()
+        .filter(|in_model| of(&in_model.name).is_none_or(|stored| !is_same(stored, in_model, model)))
+        .count();
     let positions = body.nodes().positions.iter().flatten();
     let size = positions.fold(body.frame().origin.amax().max(f64::MIN_POSITIVE), |m, x| m.max(x.abs()));
     let apart = |x: [f64; 3], y: [f64; 3]| (0..3).map(|k| (x[k] - y[k]).abs()).fold(0.0, f64::max) / size;
-    let moved = own.iter().filter_map(|own| {
-        let (x, y) = (own.reference?, of(&own.name)?.reference?);
+    let moved = in_model.iter().filter_map(|in_model| {
+        let (x, y) = (in_model.reference?, of(&in_model.name)?.reference?);
         let away = apart(x, y);
-        let set = model.interfaces().iter().find(|set| set.name == own.name)?;
+        let set = model.interfaces().iter().find(|set| set.name == in_model.name)?;
         let mean = || {
-            let positions: Vec<[f64; 3]> = own.nodes.iter().map(|&i| body.nodes().positions[i]).collect();
+            let positions: Vec<[f64; 3]> =
+                in_model.nodes.iter().map(|&i| body.nodes().positions[i]).collect();
             centre_and_length(&positions).0
         };
         Some(if set.reference.is_stated() { away } else { away.min(apart(mean(), y)) })
@@ -47,18 +50,18 @@ pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<Identity
             "reference_points",
             "x_ref = A' (x_model - origin)",
             moved.fold(0.0, f64::max),
-            PLACE,
+            MAX_POINT_DIFFERENCE,
         ),
     ]
 }
 
-/// Returns true if `stored` has the nodes, the coupling and the kind of reference point of `own`. A basis
+/// Returns true if `stored` has the nodes, the coupling and the kind of reference point of `in_model`. A basis
 /// that needs a coupling uses `averaging` if the model states none.
-fn is_same(stored: &Interface, own: &Interface, model: &FeModel) -> bool {
-    let set = model.interfaces().iter().find(|set| set.name == own.name);
+fn is_same(stored: &Interface, in_model: &Interface, model: &FeModel) -> bool {
+    let set = model.interfaces().iter().find(|set| set.name == in_model.name);
     let taken = set.map(|set| set.coupling());
     let nodes = |interface: &Interface| interface.nodes.iter().copied().collect::<BTreeSet<_>>();
-    nodes(stored) == nodes(own)
-        && (stored.coupling == own.coupling || stored.coupling == taken)
-        && (stored.reference.is_some() == own.reference.is_some())
+    nodes(stored) == nodes(in_model)
+        && (stored.coupling == in_model.coupling || stored.coupling == taken)
+        && (stored.reference.is_some() == in_model.reference.is_some())
 }

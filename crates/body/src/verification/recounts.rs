@@ -8,11 +8,11 @@ use flexbody_linalg::{combine, gram, larger, largest};
 use flexbody_model::{Coupling, rigid_count};
 
 /// Allowed rounding error of a rigid motion of the nodes of an interface, relative to its largest motion.
-const RIGID: f64 = 1e-8;
+const MAX_RIGID_ROUNDING: f64 = 1e-8;
 /// Allowed rounding error of error norms, which are relative differences of nearly equal numbers.
-const NORMS: f64 = 1e-9;
+const MAX_NORM_ROUNDING: f64 = 1e-9;
 /// Allowed rounding error between coordinates computed from the shapes in two ways.
-const COORDINATES: f64 = 1e-9;
+const MAX_COORDINATE_ROUNDING: f64 = 1e-9;
 
 /// Returns the checks of all statements that the body makes.
 pub(super) fn recounts(body: &FlexBody) -> Vec<IdentityCheck> {
@@ -48,7 +48,8 @@ fn fixed_interface_modes(body: &FlexBody) -> Option<IdentityCheck> {
     let lambda = fixed_eigenvalues(coordinates);
     let below = lambda.iter().filter(|lambda| **lambda < *shift).count();
     let count = counted.map_or(0.0, |counted| apart(below, counted.min(*modes)));
-    let order = next.is_some_and(|next| lambda.iter().any(|lambda| *lambda > next * (1.0 + RIGID)));
+    let order =
+        next.is_some_and(|next| lambda.iter().any(|lambda| *lambda > next * (1.0 + MAX_RIGID_ROUNDING)));
     let value = apart(lambda.len(), *modes)
         + apart(coordinates.names.len(), modes.saturating_add(*interface_motions))
         + count
@@ -77,7 +78,7 @@ fn rigid_interfaces(body: &FlexBody) -> Option<IdentityCheck> {
     }
     let rigid = body.interfaces().iter().filter(|one| one.coupling == Some(Coupling::Rigid));
     let value = largest(rigid.map(|interface| deformation(body, interface)));
-    let limit = RIGID + 4.0 * body.storage().rounding();
+    let limit = MAX_RIGID_ROUNDING + 4.0 * body.storage().rounding();
     let formula = "nodes of rigid interfaces move as their reference points";
     Some(IdentityCheck::new("rigid_interfaces", formula, value, limit))
 }
@@ -96,10 +97,10 @@ fn deformation(body: &FlexBody, interface: &Interface) -> f64 {
     for &node in &interface.nodes {
         for k in 0..3 {
             let row = rotation.as_ref().subrows(3 * node + k, 1);
-            let own = row.norm_max();
+            let row_size = row.norm_max();
             // Nodes may have some rotations, or none.
-            if own > 0.0 {
-                size = larger(size, own);
+            if row_size > 0.0 {
+                size = larger(size, row_size);
                 left = larger(left, (row.to_owned() - turns.as_ref().subrows(k, 1)).norm_max());
             }
         }
@@ -121,7 +122,7 @@ fn coordinates_of_modes(body: &FlexBody) -> Option<IdentityCheck> {
     });
     let value = larger(largest(momentum), reference_difference(body, b));
     let certificate = body.certificate();
-    let limit = COORDINATES
+    let limit = MAX_COORDINATE_ROUNDING
         + 10.0 * certificate.rigid_noise
         + certificate.eigenvalue_rounding
         + body.storage().rounding();
@@ -145,14 +146,14 @@ fn reference_difference(body: &FlexBody, b: &Mat<f64>) -> f64 {
             return f64::INFINITY;
         };
         let turns = rigid_count(d) - d;
-        let own = |rows: &Mat<f64>, from: usize, count: usize, at: usize| {
+        let difference_at = |rows: &Mat<f64>, from: usize, count: usize, at: usize| {
             let stored = b.as_ref().subrows(at, count);
             let difference = (stored.to_owned() - rows.as_ref().subrows(from, count)).norm_max();
             if difference == 0.0 { 0.0 } else { difference / stored.norm_max() }
         };
-        worst = larger(worst, own(&rows.translation, 0, d, first));
+        worst = larger(worst, difference_at(&rows.translation, 0, d, first));
         if let Some(rotation) = &rows.rotation {
-            worst = larger(worst, own(rotation, 3 - turns, turns, first + d));
+            worst = larger(worst, difference_at(rotation, 3 - turns, turns, first + d));
         }
         first += rigid_count(d);
     }
@@ -162,7 +163,7 @@ fn reference_difference(body: &FlexBody, b: &Mat<f64>) -> f64 {
 /// Compares the error norms of lumped comparators with norms recomputed from their invariants; norms of
 /// other programs are not checked.
 fn lumped_errors(body: &FlexBody) -> Option<IdentityCheck> {
-    let own = |lumped: &LumpedBody| {
+    let recount = |lumped: &LumpedBody| {
         let norms = error_norms(body.invariants(), &lumped.invariants);
         let differences: Vec<f64> = lumped
             .comparison
@@ -177,7 +178,7 @@ fn lumped_errors(body: &FlexBody) -> Option<IdentityCheck> {
     if body.lumped().is_empty() {
         return None;
     }
-    let limit = NORMS + 100.0 * body.storage().rounding();
+    let limit = MAX_NORM_ROUNDING + 100.0 * body.storage().rounding();
     let formula = "error norms of the lumped comparators";
-    Some(IdentityCheck::new("lumped_errors", formula, largest(body.lumped().iter().map(own)), limit))
+    Some(IdentityCheck::new("lumped_errors", formula, largest(body.lumped().iter().map(recount)), limit))
 }

@@ -8,7 +8,7 @@ use flexbody_body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, I
 use flexbody_body::convert::{Conversion, ConvertSettings, convert};
 use flexbody_body::flex_body::{FlexBody, MassStructure, Parts};
 use flexbody_body::invariants::BodyFrame;
-use flexbody_body::verification::{accept, own_identities};
+use flexbody_body::verification::{accept, body_identities};
 use flexbody_eigen::{Accuracy, Method, Wanted};
 use flexbody_linalg::CscMatrix;
 use flexbody_linalg::context::Context;
@@ -37,7 +37,7 @@ fn assert_accepted(conversion: &Conversion, about: &str) {
     let body = &conversion.body;
     let short = body.rounded_to_f32().expect("32-bit floats hold it");
     for (kind, body) in [("f64", body), ("f32", &short)] {
-        for check in own_identities(body) {
+        for check in body_identities(body) {
             let (name, value, limit) = (check.name, check.value, check.limit);
             assert!(check.passed, "{about} {kind} {name}: {value:e} > {limit:e}");
         }
@@ -197,7 +197,7 @@ fn a_body_that_breaks_an_identity_is_refused() {
             error.has(Code::BodyUntrustworthy) && error.exit_code() == ExitCode::Untrustworthy,
             "{error}"
         );
-        let failed = own_identities(&changed).into_iter().filter(|check| !check.passed);
+        let failed = body_identities(&changed).into_iter().filter(|check| !check.passed);
         failed.map(|check| check.name).collect()
     };
     assert_eq!(broken(&|parts| parts.invariants.primary_mut().mass *= 1.5), ["row_sums", "lumped_errors"]);
@@ -216,6 +216,6 @@ fn inertia_that_is_negative_about_an_axis_is_no_body() {
     parts.invariants.primary_mut().second_moment = Matrix3::identity() * (0.5 * turned.trace()) - turned;
     let changed = FlexBody::new(parts).expect("no shape changed");
     let failed: Vec<_> =
-        own_identities(&changed).into_iter().filter(|check| !check.passed).map(|check| check.name).collect();
+        body_identities(&changed).into_iter().filter(|check| !check.passed).map(|check| check.name).collect();
     assert!(failed.contains(&"inertia_psd"), "{failed:?}");
 }

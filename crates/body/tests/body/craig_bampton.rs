@@ -12,7 +12,7 @@ use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::{BasisChoice, CraigBampton, CraigChang, Loads, ModalBasis, ModeSettings};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
-use flexbody_body::verification::{own_identities, verify};
+use flexbody_body::verification::{body_identities, verify};
 use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
 use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::context::Context;
@@ -320,7 +320,7 @@ fn every_identity_holds() {
             let basis = BasisChoice::CraigBampton(CraigBampton);
             let body = converted(&model, basis, 7, frame).body;
             assert_eq!(body.parts().interface_identities().len(), 4);
-            let mut checks = own_identities(&body);
+            let mut checks = body_identities(&body);
             checks.extend(verify(&body, &model).expect("the same nodes"));
             for check in checks {
                 assert!(check.passed, "{}: {:e} > {:e}", check.name, check.value, check.limit);

@@ -6,7 +6,7 @@ use faer::{Mat, MatRef};
 use flexbody_body::basis::{BasisChoice, CraigBampton, ModeSettings};
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
-use flexbody_body::verification::{own_identities, verify};
+use flexbody_body::verification::{body_identities, verify};
 use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::context::Context;
@@ -73,7 +73,7 @@ fn close(found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
 
 fn all_hold(body: &FlexBody, model: &FeModel, what: &str) {
     let mut checks = verify(body, model).expect("the same nodes");
-    checks.extend(own_identities(body));
+    checks.extend(body_identities(body));
     for check in checks {
         assert!(check.passed, "{what}, {}: {:e} > {:e}", check.name, check.value, check.limit);
     }

@@ -7,7 +7,7 @@ use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_body::basis::{ModeSettings, UserLoads};
 use flexbody_body::convert::{Conversion, ConvertSettings, convert};
-use flexbody_body::verification::{own_identities, verify};
+use flexbody_body::verification::{body_identities, verify};
 use flexbody_eigen::{Method, Wanted};
 use flexbody_linalg::CscMatrix;
 use flexbody_linalg::context::Context;
@@ -229,7 +229,7 @@ fn rotations_about_a_normal_that_is_no_axis_follow_the_nodes_around() {
         for (found, expected) in body.modes().eigenvalue.iter().zip(&expected) {
             assert!((found / expected - 1.0).abs() < 1e-9, "{method:?}: {found} {expected}");
         }
-        let checks = own_identities(&body).into_iter().chain(verify(&body, model).expect("the same model"));
+        let checks = body_identities(&body).into_iter().chain(verify(&body, model).expect("the same model"));
         let broken: Vec<_> = checks.filter(|check| !check.passed).collect();
         assert!(broken.is_empty(), "{method:?}: {broken:?}");
         let mut own: Vec<f64> = body.invariants().inertia().symmetric_eigenvalues().iter().copied().collect();

@@ -30,8 +30,9 @@ fn a_count_that_cuts_a_pair_of_equal_frequencies_is_named() {
         let cut = (lambda[count] - lambda[count - 1]) / lambda[count] < 1e-6;
         let (found, _) = pipeline(&model, Lumping::RowSum, count);
         assert!(found.remark.is_empty());
-        let said =
-            found.caution.contains(&format!("{count} modes cut a group of equal frequencies of the model"));
+        let said = found
+            .caution
+            .contains(&format!("{count} modes divide a group of equal frequencies of the model"));
         assert_eq!(said, cut, "{count} modes: {}", found.caution);
         assert_eq!(found.caution.contains("of the lumped mass"), cut, "{count} modes: {}", found.caution);
         // Six modes differ in one: the lumped mass changes the order of the next two.

@@ -290,7 +290,7 @@ fn archives_of_ansys_give_the_surface() {
         told,
         [
             "elements that are not drawn: 1 of element type 9999",
-            "1 of 5 elements have nodes that the model lacks: they are not drawn",
+            "1 of 5 elements have nodes that are not in the model: they are not drawn",
         ]
     );
     // Unreadable elements are no reason to refuse the nodes.

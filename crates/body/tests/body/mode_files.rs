@@ -153,7 +153,7 @@ fn too_few_digits_are_told_from_another_model() {
     modes.digits = 2;
     let done = imported(&model, modes);
     let told = done.diagnostics.iter().find(|d| d.code() == Code::ModesDiffer).expect("a difference");
-    assert!(told.help().starts_with("the 2 digits of the shapes explain it"), "{}", told.help());
+    assert!(told.help().starts_with("write the shapes with more than 2 digits"), "{}", told.help());
 }
 
 proptest! {

@@ -78,7 +78,7 @@ fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
         let name = format!("{kind:?}");
         let [_, found] = both(&name, &cube(kind, cells), 20);
         assert_eq!(way(&found), Way::Cycles, "{name}");
-        assert!(said(&found)[0].starts_with("no factor"), "{:?}", said(&found));
+        assert!(said(&found)[0].contains("without a factor"), "{:?}", said(&found));
         let work = found.work;
         assert_eq!((work.factorizations, work.factor_bytes), (0, 0), "{name}");
         // Number of columns of cycles, and of products with K in double precision. Second-order elements need
@@ -139,7 +139,7 @@ fn a_thin_plate_is_factored_after_all_with_a_note() {
     let plate = steel(&Mesh::block(ElementKind::Hex8, [40, 30, 1], [1.0, 0.7, 1e-3]));
     let [factored, found] = both("plate", &plate, 10);
     assert!(plan(&found).has_failed(Way::Cycles));
-    assert!(said(&found)[0].starts_with("cycles over levels"), "{:?}", said(&found));
+    assert!(said(&found)[0].starts_with("multigrid cycles did not converge"), "{:?}", said(&found));
     assert_eq!(factored.body.modes().eigenvalue, found.body.modes().eigenvalue, "the same search");
 }
 

@@ -2,7 +2,7 @@
 
 use flexbody_base::diagnostic::{Code, Severity};
 use flexbody_base::error::Error;
-use flexbody_body::verification::own_identities;
+use flexbody_body::verification::body_identities;
 use flexbody_input::{MatrixLocation, MatrixRole, ModelFiles, read_matrix, read_model};
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{FeModel, RawModel};
@@ -77,7 +77,7 @@ fn a_superelement_whose_directions_differ_in_the_last_digits_of_the_mass_is_a_bo
         .collect();
     let n = raw.mass.matrix.n_cols();
     raw.mass.matrix = CscMatrix::from_triplets(n, n, &entries);
-    let identities = own_identities(&body(raw, 14));
+    let identities = body_identities(&body(raw, 14));
     let gram = identities.iter().find(|check| check.name == "velocity_gram_psd").expect("a general mass");
     assert!(gram.value > 1e-12, "the case is one: {gram:?}");
     assert!(identities.iter().all(|check| check.passed), "{identities:?}");
@@ -181,7 +181,7 @@ fn decks_that_cannot_be_read_are_refused_where_they_cannot() {
             Code::MatrixKind,
             "type 4",
         ),
-        ("job.pch", "DMIG    MAAX ", "DMIG    XAAX ", Code::MatrixSyntax, "above its header"),
+        ("job.pch", "DMIG    MAAX ", "DMIG    XAAX ", Code::MatrixSyntax, "before its header"),
         (
             "job.pch",
             "$TITLE",

@@ -27,7 +27,7 @@ fn fixture(name: &str) -> FeModel {
 
 fn decided(model: &FeModel, settings: &ConvertSettings, terms: &[TermDecision]) -> Conversion {
     let modal = ModalModel::find(model, settings, &Context::QUIET).expect("modes");
-    let condensed = modal.condense_kept(modal.condense_linear(), terms.to_vec());
+    let condensed = modal.condense_selected(modal.condense_linear(), terms.to_vec());
     modal.finish(condensed, &Context::QUIET).expect("converts")
 }
 
@@ -111,7 +111,7 @@ fn a_decision_is_made_on_what_the_body_will_have() {
         for (found, expected) in early.modes().damping_ratio.iter().zip(&body.modes().damping_ratio) {
             near(*found, *expected);
         }
-        let condensed = modal.condense_kept(linear, Vec::new());
+        let condensed = modal.condense_selected(linear, Vec::new());
         let found = modal.finish(condensed, &Context::QUIET).expect("converts");
         assert_eq!(found.body, body, "nothing was decided");
     }

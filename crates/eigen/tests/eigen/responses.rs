@@ -53,7 +53,7 @@ fn static_responses_are_the_sum_over_all_modes() {
 fn further_responses_take_no_further_factor() {
     let grid = Grid::new([17, 12], 3.0, 0.5);
     let counter = WorkCounter::default();
-    let context = Context::QUIET.counted_by(&counter);
+    let context = Context::QUIET.with_counter(&counter);
     let first = grid.exact()[0].eigenvalue;
     let [x, y] = static_responses_twice(
         &grid.problem(),

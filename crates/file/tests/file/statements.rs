@@ -5,7 +5,7 @@ use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::{BasisChoice, CraigBampton};
 use flexbody_body::convert::{ConvertSettings, convert, poor_fits};
 use flexbody_body::flex_body::{Certificate, FixedInterface, FlexBody, InterfaceCoordinates, Parts};
-use flexbody_body::verification::{own_identities, verify};
+use flexbody_body::verification::{body_identities, verify};
 use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, RawModel};
@@ -39,7 +39,7 @@ fn changed(body: &FlexBody, change: &dyn Fn(&mut Parts)) -> FlexBody {
 }
 
 fn failing(body: &FlexBody) -> Vec<&'static str> {
-    own_identities(body).into_iter().filter(|check| !check.passed).map(|check| check.name).collect()
+    body_identities(body).into_iter().filter(|check| !check.passed).map(|check| check.name).collect()
 }
 
 type Change<'a> = (&'a str, &'a dyn Fn(&mut Parts));

@@ -102,7 +102,7 @@ fn what_is_not_a_flex_body_file() {
     assert_says(&refusal(&path), Code::BodyUnreadable, &["HDF5 file without the attribute `format`"]);
     let small = hdf5::file::SizeofInfo { sizeof_addr: Sizeof::Bytes8, sizeof_size: Sizeof::Bytes4 };
     hdf5::File::with_options().with_fcpl(|p| p.sizes(small)).create(&path).unwrap().close().unwrap();
-    assert_says(&refusal(&path), Code::BodyUnreadable, &["sizes do not have 8 bytes"]);
+    assert_says(&refusal(&path), Code::BodyUnreadable, &["another width than 8 bytes"]);
     let other = damaged(|f| set_text(f, "format", "SDynPy"));
     assert_says(&other, Code::BodyUnreadable, &["attribute `format` is \"SDynPy\", expected `flexbody`"]);
 }
@@ -285,7 +285,7 @@ fn a_body_in_space_is_no_plane_body() {
             "`frame.axes` of a plane body have the third axis",
             "`nodes.positions` of a plane body has z = ",
             "`modes.shape` of a plane body has components along z",
-            "inertia stiffness of other loads than acceleration_x, acceleration_y, angular_acceleration_z, spin_zz",
+            "`inertia_stiffness` has other loads than acceleration_x, acceleration_y, angular_acceleration_z, spin_zz",
         ],
     );
     let error = damaged(|f| set_int(f, "/", "dimension", 4));

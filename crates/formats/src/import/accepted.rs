@@ -3,7 +3,7 @@
 use super::Imported;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_body::verification::own_identities;
+use flexbody_body::verification::body_identities;
 
 /// Returns an error for an imported body that violates an identity of theory section 10: its file contradicts
 /// itself.
@@ -11,7 +11,7 @@ use flexbody_body::verification::own_identities;
 /// # Errors
 /// [`ForeignUnsound`](Code::ForeignUnsound), one diagnostic for every violated identity.
 pub fn accept_imported(imported: &Imported) -> Result<()> {
-    let broken = own_identities(&imported.body).into_iter().filter(|check| !check.passed);
+    let broken = body_identities(&imported.body).into_iter().filter(|check| !check.passed);
     let found: Vec<Diagnostic> = broken
         .map(|check| {
             let message = format!(

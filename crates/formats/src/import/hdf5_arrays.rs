@@ -3,7 +3,9 @@
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_base::hdf5_file::{Element, Stored, dataset, elements, members, open_dataset, open_sound, text};
+use flexbody_base::hdf5_file::{
+    Element, Stored, dataset, elements, members, open_dataset, open_with_checked_texts, text,
+};
 use flexbody_base::text::InputFile;
 use hdf5_metno as hdf5;
 use std::path::PathBuf;
@@ -27,7 +29,7 @@ impl Hdf5Arrays {
     /// # Errors
     /// [`ForeignUnreadable`](Code::ForeignUnreadable) if the file is no HDF5 file or damaged.
     pub(crate) fn open(file: &InputFile) -> Result<Self> {
-        let (opened, bytes) = open_sound(file.path(), "flexible body", Code::ForeignUnreadable)?;
+        let (opened, bytes) = open_with_checked_texts(file.path(), "flexible body", Code::ForeignUnreadable)?;
         let root = opened.as_group().map_err(|e| {
             let message = format!("the root group cannot be read: {e}");
             Error::from(Diagnostic::new(Code::ForeignUnreadable, message).in_file(file.path()))

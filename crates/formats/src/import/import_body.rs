@@ -92,7 +92,7 @@ fn normalising(invariants: &Invariants) -> Result<Option<(ModalChange, Diagnosti
     if beside.is_none() && rigid.count == 0 {
         return Ok(None);
     }
-    let change = ModalChange::in_own_frame(invariants, 3).map_err(refuse)?;
+    let change = ModalChange::in_present_frame(invariants, 3).map_err(refuse)?;
     let message = match (change.left_out().in_words(), beside) {
         (Some(rigid), _) => format!("{rigid}: these modes were removed and the others normalised"),
         (None, by) => format!(

@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Line of a continuation.
-struct OwnLine {
+struct NumberedLine {
     text: Vec<u8>,
     number: usize,
 }
@@ -19,7 +19,7 @@ struct OwnLine {
 pub(super) struct Apart {
     /// Names of these continuations, in upper case.
     names: HashSet<Vec<u8>>,
-    lines: HashMap<Vec<u8>, Vec<OwnLine>>,
+    lines: HashMap<Vec<u8>, Vec<NumberedLine>>,
     /// Last continuation that was read, and the name that a line must have to continue it.
     last: Option<(Vec<u8>, Vec<u8>)>,
     cards: Vec<(Card, PathBuf)>,
@@ -66,7 +66,7 @@ impl Apart {
             _ if self.contains(name) => name.to_vec(),
             _ => return false,
         };
-        self.lines.entry(first.clone()).or_default().push(OwnLine { text: line.to_vec(), number });
+        self.lines.entry(first.clone()).or_default().push(NumberedLine { text: line.to_vec(), number });
         self.last = Some((first, end_of(line)));
         true
     }
@@ -89,7 +89,7 @@ impl Apart {
         let mut cards = std::mem::take(&mut self.cards);
         for (card, path) in &mut cards {
             while let Some(lines) = self.lines.remove(&card.continuation) {
-                for OwnLine { text, number } in lines {
+                for NumberedLine { text, number } in lines {
                     card_fields(card, &Line::of(&text), number)
                         .map_err(|diagnostic| diagnostic.in_file(&*path).at_line(number))?;
                 }
@@ -99,7 +99,7 @@ impl Apart {
         match stray {
             None => Ok(cards),
             Some(line) => {
-                let message = format!("`{}` continues no card", excerpt(&line.text));
+                let message = format!("`{}` does not continue any card", excerpt(&line.text));
                 Err(Diagnostic::new(Code::DeckSyntax, message).in_file(path).at_line(line.number))
             }
         }
@@ -124,13 +124,12 @@ fn is_named(line: &[u8]) -> bool {
 /// Returns the name that the continuation of a line must have, in upper case; empty if the line gives none.
 fn end_of(line: &[u8]) -> Vec<u8> {
     let line = Line::of(line);
-    let end = match line.is_free {
-        true => {
-            let is_large = line.head().ends_with(b"*") || line.head().starts_with(b"*");
-            let fields = if is_large { 4 } else { 8 };
-            line.text.split(|&b| b == b',').nth(fields + 1).unwrap_or_default()
-        }
-        false => line.text.get(72..line.text.len().min(80)).unwrap_or_default(),
+    let end = if line.is_free {
+        let is_large = line.head().ends_with(b"*") || line.head().starts_with(b"*");
+        let fields = if is_large { 4 } else { 8 };
+        line.text.split(|&b| b == b',').nth(fields + 1).unwrap_or_default()
+    } else {
+        line.text.get(72..line.text.len().min(80)).unwrap_or_default()
     };
     bare(end.trim_ascii()).to_ascii_uppercase()
 }

@@ -5,19 +5,19 @@ use flexbody_base::text::InputFile;
 use std::ops::Range;
 
 /// Bytes of cards that one thread reads at a time.
-const PART: usize = 1 << 20;
+const BYTES_PER_TASK: usize = 1 << 20;
 
 /// Lines of consecutive DMIG cards.
 pub(crate) struct MatrixLines<'a> {
     pub file: &'a InputFile,
     /// Parts in the order of the file.
-    pub parts: Vec<Part>,
+    pub parts: Vec<LineRange>,
     /// Last line of the last card, from 1.
     last_line: usize,
 }
 
 /// Part of whole cards: the headers of matrices, or columns.
-pub(crate) struct Part {
+pub(crate) struct LineRange {
     pub bytes: Range<usize>,
     /// Number of lines above the part.
     pub above: usize,
@@ -29,7 +29,7 @@ impl<'a> MatrixLines<'a> {
     /// `None` if that line begins another card.
     pub(super) fn at(file: &'a InputFile, start: usize, above: usize) -> Option<Self> {
         let bytes = file.bytes();
-        let (mut parts, mut last_line): (Vec<Part>, usize) = (Vec::new(), above);
+        let (mut parts, mut last_line): (Vec<LineRange>, usize) = (Vec::new(), above);
         let mut at = start;
         while at < bytes.len() {
             let end = memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |length| at + length + 1);
@@ -37,14 +37,14 @@ impl<'a> MatrixLines<'a> {
             if begins_matrix(line) {
                 let is_header = is_header(line);
                 match parts.last_mut() {
-                    Some(part) if !is_header && !part.is_header && part.bytes.len() < PART => {
+                    Some(part) if !is_header && !part.is_header && part.bytes.len() < BYTES_PER_TASK => {
                         part.bytes.end = end;
                     }
-                    _ => parts.push(Part { bytes: at..end, above: last_line, is_header }),
+                    _ => parts.push(LineRange { bytes: at..end, above: last_line, is_header }),
                 }
             } else {
                 match parts.last_mut() {
-                    Some(part) if goes_on(line) => part.bytes.end = end,
+                    Some(part) if continues(line) => part.bytes.end = end,
                     _ => break,
                 }
             }
@@ -75,18 +75,17 @@ fn begins_matrix(line: &[u8]) -> bool {
 /// Returns true when a card of a matrix is its header: the second field is 0.
 fn is_header(line: &[u8]) -> bool {
     let line = Line::of(without_comment(line));
-    let field = match line.is_free {
-        true => line.text.split(|&b| b == b',').nth(2),
-        false => {
-            let columns = if line.head().ends_with(b"*") { 24..40 } else { 16..24 };
-            line.text.get(columns.start..line.text.len().min(columns.end))
-        }
+    let field = if line.is_free {
+        line.text.split(|&b| b == b',').nth(2)
+    } else {
+        let columns = if line.head().ends_with(b"*") { 24..40 } else { 16..24 };
+        line.text.get(columns.start..line.text.len().min(columns.end))
     };
     field.is_some_and(|field| field.trim_ascii() == b"0")
 }
 
 /// Returns true when a line continues a card, is empty or is a comment.
-fn goes_on(line: &[u8]) -> bool {
+fn continues(line: &[u8]) -> bool {
     if matches!(line.first(), Some(b'*' | b'+' | b'$')) {
         return true;
     }

@@ -6,7 +6,7 @@ use crate::coordinates::real;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
 /// Largest number of cards that one line may represent.
-const MOST_REPEATED: i64 = 1_000_000;
+const MAX_REPEATED_CARDS: i64 = 1_000_000;
 
 /// Change of a field from card to card.
 #[derive(Clone)]
@@ -25,7 +25,7 @@ pub(super) struct Replication {
 }
 
 /// Request of a line that begins with `=`.
-pub(super) enum Asked {
+pub(super) enum ReplicationRequest {
     /// One card.
     One(Replication),
     /// Number of cards, each made by the preceding replication.
@@ -37,17 +37,19 @@ impl Replication {
     ///
     /// # Errors
     /// FB110 for invalid counts, and fields beyond the line.
-    pub(super) fn asked(line: &Line<'_>) -> Result<Option<Asked>, Diagnostic> {
+    pub(super) fn request(line: &Line<'_>) -> Result<Option<ReplicationRequest>, Diagnostic> {
         let Some(rest) = line.head().strip_prefix(b"=") else { return Ok(None) };
         if !rest.is_empty() && rest != b"=" {
-            let count = whole(without_brackets(rest)).filter(|count| (1..=MOST_REPEATED).contains(count));
+            let count =
+                whole(without_brackets(rest)).filter(|count| (1..=MAX_REPEATED_CARDS).contains(count));
             let message = "expected a number of repetitions, as in =(4)";
-            return count.map(|count| Some(Asked::Repeat(count))).ok_or_else(|| bad(message));
+            return count.map(|count| Some(ReplicationRequest::Repeat(count))).ok_or_else(|| bad(message));
         }
         let mut given = Card::default();
-        match line.is_free {
-            true => free_fields(&mut given, &line.text, 8)?,
-            false => fixed_fields(&mut given, &line.text, 8),
+        if line.is_free {
+            free_fields(&mut given, &line.text, 8)?
+        } else {
+            fixed_fields(&mut given, &line.text, 8)
         }
         let mut changes = Vec::new();
         let mut all_same = rest == b"=";
@@ -61,7 +63,7 @@ impl Replication {
                 text => Change::Text(text.to_vec()),
             });
         }
-        Ok(Some(Asked::One(Self { changes })))
+        Ok(Some(ReplicationRequest::One(Self { changes })))
     }
 
     /// Returns the card that follows `card`.
@@ -83,7 +85,11 @@ impl Replication {
                 Change::Same => card.field(k).to_vec(),
                 Change::Text(text) => text.clone(),
                 Change::More(more) => sum(card.field(k), more).ok_or_else(|| {
-                    bad(&format!("field {} of the {} is no number to add to", k + 1, card.name))
+                    bad(&format!(
+                        "field {} of the {} is not a number that can be incremented",
+                        k + 1,
+                        card.name
+                    ))
                 })?,
             };
             next.push(&field);

@@ -46,7 +46,7 @@ pub(super) fn parse(text: &[u8], limits: Limits) -> EntryLines {
                 Ok((entry, number)) => piece.push(entry, number),
                 Err(bad) => {
                     piece.bad_count += 1;
-                    if piece.bad.len() < super::SHOWN {
+                    if piece.bad.len() < super::MAX_SHOWN_LINES {
                         piece.bad.push((piece.lines, bad));
                     }
                 }

@@ -24,7 +24,7 @@ pub(super) struct Columns {
     pub bad: Vec<Diagnostic>,
     recent: Recent<Point>,
     /// Capacity in entries of the next run.
-    room: usize,
+    capacity: usize,
 }
 
 impl Columns {
@@ -33,13 +33,13 @@ impl Columns {
         /// Bytes of an entry in large fields.
         const ENTRY: usize = 56;
         let (points, runs, bad) = (Vec::new(), Vec::new(), Vec::new());
-        Self { points, runs, bad, recent: Recent::new(), room: bytes / ENTRY }
+        Self { points, runs, bad, recent: Recent::new(), capacity: bytes / ENTRY }
     }
 
     /// Adds the entries of a card; for a bad card those before the error.
     pub(super) fn card(&mut self, card: &Card, path: &Path, heads: &Heads) {
         if let Err(bad) = self.column(card, path, heads)
-            && self.bad.len() < super::SHOWN
+            && self.bad.len() < super::MAX_SHOWN_CARDS
         {
             self.bad.push(bad);
         }
@@ -56,7 +56,7 @@ impl Columns {
     fn column(&mut self, card: &Card, path: &Path, heads: &Heads) -> Result<(), Diagnostic> {
         let field = card.field(0);
         let Some(at) = heads.iter().rposition(|(name, _)| field.eq_ignore_ascii_case(name.as_bytes())) else {
-            let message = format!("a column of DMIG {} stands above its header", upper(field));
+            let message = format!("a column of DMIG {} comes before its header", upper(field));
             return Err(bad_card(card, 0, path, message));
         };
         let (name, is_real) = &heads[at];
@@ -64,7 +64,7 @@ impl Columns {
             return Ok(());
         }
         if self.runs.last().is_none_or(|(matrix, ..)| *matrix != at) {
-            self.runs.push((at, Vec::with_capacity(std::mem::take(&mut self.room)), 0));
+            self.runs.push((at, Vec::with_capacity(std::mem::take(&mut self.capacity)), 0));
         }
         let col = self.point(card, 1, path)?;
         for k in (4..card.len()).step_by(4) {

@@ -2,7 +2,7 @@
 
 use super::members::Members;
 use super::values::{Found, Numbers, refuse_beyond_memory};
-use super::{DEPTH, GROUPS, layout, opened};
+use super::{MAX_DEPTH, MAX_GROUPS, layout, opened};
 use crate::array::Array;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
@@ -39,8 +39,9 @@ fn named(file: &File, name: &str) -> Found<Numbers> {
     let mut group = root(file)?;
     let mut path = String::new();
     for part in groups {
-        let missing =
-            || vec![layout(format!("`{part}` of `{name}` is no group of the file")).with_help(listing(file))];
+        let missing = || {
+            vec![layout(format!("`{part}` of `{name}` is not a group of the file")).with_help(listing(file))]
+        };
         if !Members::of(&group).is_here(part) {
             return Err(missing());
         }
@@ -88,13 +89,13 @@ fn arrays(file: &File) -> Vec<(Group, String, String)> {
     let mut found = Vec::new();
     let mut level: Vec<(String, Group)> = root(file).map(|root| (String::new(), root)).into_iter().collect();
     let mut visited = 0;
-    for _ in 0..DEPTH {
+    for _ in 0..MAX_DEPTH {
         let mut next = Vec::new();
         for (path, group) in level {
             let members = Members::of(&group);
             for child in members.hard_links().filter(|child| !child.starts_with('#')) {
                 visited += 1;
-                if visited > GROUPS {
+                if visited > MAX_GROUPS {
                     return found;
                 }
                 if let Ok(inner) = group.group(child) {

@@ -40,9 +40,10 @@ struct Mesh<'f> {
 impl Mesh<'_> {
     fn read(&self) -> Found<(Nodes, NamedSets, Elements)> {
         let positions = self.positions()?;
-        let ids = match self.has("node_num_map") {
-            true => self.whole_numbers("node_num_map")?,
-            false => (1..=positions.len() as i64).collect(),
+        let ids = if self.has("node_num_map") {
+            self.whole_numbers("node_num_map")?
+        } else {
+            (1..=positions.len() as i64).collect()
         };
         if ids.len() != positions.len() {
             let message = format!("`node_num_map` has {} numbers for {} nodes", ids.len(), positions.len());
@@ -74,7 +75,7 @@ impl Mesh<'_> {
         } else if self.has("coord") {
             self.rows_of("coord")?
         } else {
-            return Err(wrong("file has neither `coordx` nor `coord`: it is no Exodus mesh".to_owned()));
+            return Err(wrong("file has neither `coordx` nor `coord`: it is not an Exodus mesh".to_owned()));
         };
         let count = axes.first().map_or(0, Vec::len);
         if axes.len() > 3 || axes.iter().any(|axis| axis.len() != count) {
@@ -114,10 +115,8 @@ impl Mesh<'_> {
 
     /// Returns the node sets, which list node positions from 1. A set without a name is named by its number.
     fn sets(&self, ids: &[i64]) -> Found<NamedSets> {
-        let names = match self.has("ns_names") {
-            true => names_of(&self.root, &self.members, "ns_names")?,
-            false => Vec::new(),
-        };
+        let names =
+            if self.has("ns_names") { names_of(&self.root, &self.members, "ns_names")? } else { Vec::new() };
         let numbers = if self.has("ns_prop1") { self.whole_numbers("ns_prop1")? } else { Vec::new() };
         let mut sets = Vec::new();
         for k in 0.. {
@@ -143,7 +142,7 @@ fn nodes_at(dataset: &str, ids: &[i64], places: impl Iterator<Item = Option<i64>
         ids.get(at).copied()
     };
     let nodes: Option<Vec<i64>> = places.map(node).collect();
-    nodes.ok_or_else(|| wrong(format!("`{dataset}` names a node that there is not")))
+    nodes.ok_or_else(|| wrong(format!("`{dataset}` names a node that does not exist")))
 }
 
 /// Adds an element of a type with an Exodus name (`HEX8`, `TETRA`, `SHELL4`). Points are not drawn.

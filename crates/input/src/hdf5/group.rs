@@ -7,7 +7,7 @@ use super::super::assemble::{
 };
 use super::members::{Members, POINTERS};
 use super::values::{Found, Heaps, Vector, integers_of, text_of, truth_of};
-use crate::lent::KeptColumns;
+use crate::lent::StoredColumns;
 use crate::reader::MatrixSource;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
@@ -17,7 +17,7 @@ use hdf5_metno::Group;
 use std::path::Path;
 
 /// Number of entries read at a time.
-const PIECE: usize = 1 << 20;
+const ENTRIES_PER_READ: usize = 1 << 20;
 
 /// Reads the matrix in `group`, which messages call `name`.
 pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Found<RawMatrix> {
@@ -53,7 +53,7 @@ pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Foun
         _ => StoredEntries::Full,
     };
     let made = match (parsed.entries, stored) {
-        (Entries::Kept(matrix), _) => assembled(matrix, 17, file.path()),
+        (Entries::Stored(matrix), _) => assembled(matrix, 17, file.path()),
         (Entries::Columns(columns), StoredEntries::Full) => assemble_columns(columns, 17, file.path()),
         (Entries::Columns(columns), StoredEntries::Triangle) => {
             assemble(parsed.n, columns.into_entries(), stored, 17, file.path())
@@ -89,7 +89,7 @@ struct Parsed {
 /// Entries of a matrix, in the order in which its group stores them.
 enum Entries {
     /// Sorted columns of both triangles, in files.
-    Kept(CscMatrix),
+    Stored(CscMatrix),
     Columns(ColumnEntries),
     Listed(Vec<Vec<Entry>>),
 }
@@ -150,12 +150,12 @@ impl GroupReader<'_> {
             ]);
         }
         if let Some(folder) = self.keep_in
-            && let Some(parsed) = self.kept(folder, (&values, &indices, &pointer_values), n)?
+            && let Some(parsed) = self.stored_in_files(folder, (&values, &indices, &pointer_values), n)?
         {
             return Ok(parsed);
         }
         // Compressed rows are read as columns: symmetric matrices have equal rows and columns.
-        let mut columns = ColumnEntries::with_room(n, entries);
+        let mut columns = ColumnEntries::with_capacity(n, entries);
         let place = by_major(&pointer_values);
         let sides = self.visit(&values, &[&indices], n, place, |entry| columns.push(entry))?;
         let single_precision = values.is_single_precision();
@@ -163,13 +163,13 @@ impl GroupReader<'_> {
     }
 
     /// Returns the matrix in files of `folder`; `None` if its columns are not sorted or one triangle is missing.
-    fn kept(
+    fn stored_in_files(
         &self,
         folder: &Path,
         (values, indices, pointers): (&Vector, &Vector, &[i64]),
         n: usize,
     ) -> Found<Option<Parsed>> {
-        let mut columns = KeptColumns::new(folder, n).map_err(|d| vec![d])?;
+        let mut columns = StoredColumns::new(folder, n).map_err(|d| vec![d])?;
         let mut wrong = None;
         let sides = self.visit(values, &[indices], n, by_major(pointers), |entry| {
             if wrong.is_none() {
@@ -184,7 +184,7 @@ impl GroupReader<'_> {
         }
         let matrix = columns.compress().map_err(|d| vec![d])?;
         let single_precision = values.is_single_precision();
-        Ok(matrix.map(|matrix| Parsed { n, entries: Entries::Kept(matrix), sides, single_precision }))
+        Ok(matrix.map(|matrix| Parsed { n, entries: Entries::Stored(matrix), sides, single_precision }))
     }
 
     fn coordinates(&self, (values, rows, columns): (&str, &str, &str)) -> Found<Parsed> {
@@ -217,7 +217,7 @@ impl GroupReader<'_> {
         mut keep: impl FnMut(Entry),
     ) -> Found<Sides> {
         // Pieces consist of whole chunks, so that no chunk is unpacked twice.
-        let step = indices.iter().map(|v| v.chunk).fold(PIECE.max(values.chunk), usize::max);
+        let step = indices.iter().map(|v| v.chunk).fold(ENTRIES_PER_READ.max(values.chunk), usize::max);
         let mut sides = Sides::default();
         let mut bad = Bad { n, shown: Vec::new(), count: 0 };
         for start in (0..values.len).step_by(step) {
@@ -247,7 +247,7 @@ impl GroupReader<'_> {
         }
         let message =
             format!("{} has {} values, {} has {}", values.name, values.len, indices.name, indices.len);
-        let help = "both have one value per entry: write the matrix again";
+        let help = "write the matrix again: both must have one value per entry";
         Err(vec![Diagnostic::new(Code::MatrixCount, message).with_help(help)])
     }
 
@@ -283,7 +283,7 @@ impl GroupReader<'_> {
             Some(false) => return Ok(Declared::No),
             None => text_of(&attribute, &Heaps::of(self.file)),
         };
-        let help = "it may be true, false, \"lower\" or \"upper\"";
+        let help = "set it to true, false, \"lower\" or \"upper\"";
         let refuse = |what: String| {
             let message = format!("attribute `symmetric` of group `{}` {what}", self.name);
             Diagnostic::new(Code::MatrixKind, message).with_help(help)
@@ -331,7 +331,7 @@ impl Bad {
     fn finish(mut self, group: &str) -> Vec<Diagnostic> {
         let more = self.count - self.shown.len();
         if more > 0 {
-            let message = format!("{more} more entries of group `{group}` are bad");
+            let message = format!("{more} more entries of group `{group}` have errors");
             self.shown.push(Diagnostic::new(Code::MatrixIndex, message));
         }
         self.shown

@@ -14,10 +14,10 @@ pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
 
 /// Number of values per stored byte above which values of a dataset must be missing from the file: no filter reaches it
 /// on real data (deflate: 1032).
-const RATIO: u64 = 1100;
+const MAX_VALUES_PER_BYTE: u64 = 1100;
 
 /// Number of values up to which a chunk may be larger than its dataset.
-const SMALL_CHUNK: u64 = 1 << 20;
+const MAX_EXCESS_CHUNK_VALUES: u64 = 1 << 20;
 
 /// Type of the numbers of a dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,13 +121,13 @@ fn check_stored(dataset: &Dataset) -> Result<(), String> {
     let declared =
         dataset.shape().iter().fold(1u64, |product, &extent| product.saturating_mul(extent as u64));
     let stored = dataset.storage_size();
-    if declared > stored.saturating_mul(RATIO) {
+    if declared > stored.saturating_mul(MAX_VALUES_PER_BYTE) {
         return Err(format!("declares {declared} values, but only {stored} bytes are stored"));
     }
     // The library unpacks whole chunks.
     let chunk = dataset.chunk().unwrap_or_default();
     let values = chunk.iter().fold(1u64, |product, &extent| product.saturating_mul(extent as u64));
-    if values > declared.max(SMALL_CHUNK) {
+    if values > declared.max(MAX_EXCESS_CHUNK_VALUES) {
         return Err(format!("has chunks of {values} values for {declared} values"));
     }
     Ok(())
@@ -248,18 +248,18 @@ pub(super) fn truth_of(attribute: &Attribute) -> Option<bool> {
 /// Global heaps of a file, which hold texts of variable length. The HDF5 library walks damaged ones endlessly.
 pub(super) struct Heaps<'f> {
     file: &'f InputFile,
-    are_sound: OnceCell<bool>,
+    are_checked: OnceCell<bool>,
 }
 
 impl<'f> Heaps<'f> {
     pub(super) fn of(file: &'f InputFile) -> Self {
-        Self { file, are_sound: OnceCell::new() }
+        Self { file, are_checked: OnceCell::new() }
     }
 
     /// Returns true when walking the heaps comes to an end. The first call examines the file.
-    fn are_sound(&self) -> bool {
+    fn are_checked(&self) -> bool {
         let look = || first_broken_heap(&mut self.file.reader()).is_ok_and(|broken| broken.is_none());
-        *self.are_sound.get_or_init(look)
+        *self.are_checked.get_or_init(look)
     }
 }
 
@@ -270,10 +270,10 @@ pub(super) fn text_of(attribute: &Attribute, heaps: &Heaps<'_>) -> Option<String
         return None;
     }
     let text = match attribute.dtype().ok()?.to_descriptor().ok()? {
-        TypeDescriptor::VarLenUnicode if heaps.are_sound() => {
+        TypeDescriptor::VarLenUnicode if heaps.are_checked() => {
             attribute.read_raw::<VarLenUnicode>().ok()?.first()?.as_bytes().to_vec()
         }
-        TypeDescriptor::VarLenAscii if heaps.are_sound() => {
+        TypeDescriptor::VarLenAscii if heaps.are_checked() => {
             attribute.read_raw::<VarLenAscii>().ok()?.first()?.as_bytes().to_vec()
         }
         TypeDescriptor::FixedAscii(_) => {

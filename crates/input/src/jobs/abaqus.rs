@@ -109,8 +109,7 @@ impl Rows {
             let message = format!(
                 "node {node} of the substructure is not in the deck: the shape of a retained mode is not in the matrices"
             );
-            let help =
-                "leave *SELECT EIGENMODES out, or give K and M of all nodes with --basis craig-bampton";
+            let help = "remove *SELECT EIGENMODES, or give K and M of all nodes with --basis craig-bampton";
             let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(file);
             return Err(vec![diagnostic.with_help(help)]);
         }
@@ -130,8 +129,8 @@ fn turned(deck: &Deck, mesh: &DeckMesh, retained: &BTreeSet<i64>) -> Option<Diag
     let transforms = deck.cards().iter().filter(|card| card.keyword == "TRANSFORM");
     transforms.filter_map(|card| Some((card, card.parameter("NSET")?))).find_map(|(card, set)| {
         let node = members(set).into_iter().find(|node| retained.contains(node))?;
-        let message = format!("*TRANSFORM turns the rows of node {node}, which is retained");
-        let help = "take *TRANSFORM off the retained nodes";
+        let message = format!("*TRANSFORM rotates the rows of node {node}, which is retained");
+        let help = "remove *TRANSFORM from the retained nodes";
         Some(deck.about(card, Code::DeckUnsupported, message).with_help(help))
     })
 }
@@ -165,13 +164,15 @@ impl Matrices {
                 (true, false) => "the stiffness matrix (job_STIF1.mtx)",
                 _ => "a pair of matrices (job_STIF1.mtx, job_MASS1.mtx)",
             };
-            return Err(vec![missing(deck, &format!("beside the deck {what}"), HELP)]);
+            return Err(vec![missing(deck, &format!("beside the deck, {what}"), HELP)]);
         };
         let message = match (k == m, stiffness.len()) {
             (true, 1) => None,
-            (true, steps) => Some(format!("of {steps} steps with matrices the last one, {k}, is taken")),
+            (true, steps) => {
+                Some(format!("{steps} steps have matrices: those of the last one, {k}, are used"))
+            }
             (false, _) => Some(format!(
-                "no step has both matrices: the stiffness of step {k} and the mass of step {m} are taken"
+                "no step has both matrices: the stiffness of step {k} and the mass of step {m} are used"
             )),
         };
         let note = message.map(|message| Diagnostic::new(Code::JobStep, message).in_file(&stiffness[k]));

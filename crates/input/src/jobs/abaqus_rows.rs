@@ -32,7 +32,7 @@ pub(super) fn labels(mesh: &DeckMesh, deck: &Path) -> Found<Vec<DofLabel>> {
         unknown.sort_unstable();
         unknown.dedup();
         let message = format!(
-            "what the nodes of {} can do is not known here, and the matrices do not say",
+            "the degrees of freedom of the nodes of {} are not known, and the matrices do not name them",
             unknown.join(", ")
         );
         return Err(vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(deck).with_help(HELP)]);
@@ -48,17 +48,21 @@ pub(super) fn labels(mesh: &DeckMesh, deck: &Path) -> Found<Vec<DofLabel>> {
 
 /// Returns FB112: the matrix has other rows than the deck.
 pub(super) fn other_rows(mesh: &DeckMesh, labels: usize, rows: usize, matrix: &Path) -> Diagnostic {
-    let mut internal: Vec<&str> =
-        mesh.elements.iter().map(|own| own.kind.as_str()).filter(|kind| has_internal_nodes(kind)).collect();
+    let mut internal: Vec<&str> = mesh
+        .elements
+        .iter()
+        .map(|elements| elements.kind.as_str())
+        .filter(|kind| has_internal_nodes(kind))
+        .collect();
     internal.sort_unstable();
     internal.dedup();
     let mut message = format!(
-        "matrix has {rows} rows, the elements of the deck give their nodes {labels} degrees of freedom"
+        "matrix has {rows} rows, but the elements of the deck give their nodes {labels} degrees of freedom"
     );
     if !internal.is_empty() {
         let kinds = internal.join(", ");
         message +=
-            &format!("; elements {kinds} have internal nodes as well, whose rows only labels tell apart");
+            &format!("; elements {kinds} have internal nodes as well, whose rows only labels identify");
     }
     Diagnostic::new(Code::DeckRows, message).in_file(matrix).with_help(HELP)
 }

@@ -38,7 +38,8 @@ pub(super) fn file_of(deck: &Deck, path: &Path) -> Option<(PathBuf, Option<Diagn
     let name = requests().next_back()?;
     let file = path.with_file_name(format!("{name}.mtx"));
     let note = (requests().count() > 1).then(|| {
-        let message = format!("of {} substructures the last one, {name}, is taken", requests().count());
+        let message =
+            format!("the file has {} substructures: the last one, {name}, is used", requests().count());
         Diagnostic::new(Code::JobStep, message).in_file(&file)
     });
     Some((file, note))
@@ -141,7 +142,7 @@ impl SubstructureFile<'_> {
         let direction = |&number: &i64| match number {
             1..=6 => Ok(number as u8),
             other => {
-                let message = format!("degree of freedom {other} is no displacement or rotation");
+                let message = format!("degree of freedom {other} is not a displacement or rotation");
                 let help = "retain displacements and rotations alone (*RETAINED NODAL DOFS, 1 to 6)";
                 Err(self.deck.at(self.element, line, Code::DeckUnsupported, message).with_help(help))
             }
@@ -152,7 +153,7 @@ impl SubstructureFile<'_> {
     /// Returns the matrix of a type with `n` rows.
     fn matrix(&self, kind: &str, n: usize, stored: StoredEntries) -> Found<RawMatrix> {
         let is_meant =
-            |card: &&Card| card.keyword == "MATRIX" && card.name("TYPE").is_some_and(|own| own == kind);
+            |card: &&Card| card.keyword == "MATRIX" && card.name("TYPE").is_some_and(|stated| stated == kind);
         let Some(card) = self.deck.cards().iter().find(is_meant) else {
             return Err(vec![missing(self.path, &format!("*MATRIX, TYPE={kind}"), HELP)]);
         };

@@ -56,9 +56,9 @@ impl JobReader for Calculix {
         let stiffness = read(&sti);
         let ((stiffness, stiffness_file), (mass, mass_file)) = both(stiffness, read(&mas))?;
         let Once { labels, places } = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
-        let label = |own: &DofLabel| match rotations.get(&own.node) {
-            Some(reference) => DofLabel { node: *reference, direction: own.direction + 3 },
-            None => *own,
+        let label = |label: &DofLabel| match rotations.get(&label.node) {
+            Some(reference) => DofLabel { node: *reference, direction: label.direction + 3 },
+            None => *label,
         };
         let dofs: Vec<DofLabel> = labels.iter().map(label).collect();
         // Nodes that only carry rotations have no position.
@@ -101,7 +101,7 @@ fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
         });
         let Some(label) = label else {
             let diagnostic = expected(Code::TableRow, "a node and a direction as in `17.3`", line);
-            let help = "structures have the directions 1 to 3: write the file again";
+            let help = "write the file again: structures have the directions 1 to 3";
             return Err(vec![diagnostic.in_file(path).at_line(number).with_help(help)]);
         };
         labels.push(label);

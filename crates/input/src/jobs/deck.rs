@@ -9,10 +9,10 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Depth of included files above which a file is taken to include itself.
-const DEEPEST: usize = 20;
+const MAX_INCLUDE_DEPTH: usize = 20;
 
 /// Largest number of included files, each counted as often as it is included.
-const MOST_FILES: usize = 1000;
+const MAX_FILES: usize = 1000;
 
 /// Deck with all files that it includes.
 pub(super) struct Deck {
@@ -40,7 +40,7 @@ pub(super) struct Card {
 impl Card {
     /// Returns the value of a parameter, without quotes; empty if it has none, `None` without the parameter.
     pub(super) fn parameter(&self, name: &str) -> Option<&str> {
-        self.parameters.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str())
+        self.parameters.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 
     /// Returns the value of a parameter in the form in which names are compared.
@@ -107,12 +107,13 @@ impl Deck {
 
     fn include(&mut self, path: &Path, depth: usize) -> Result<(), Diagnostic> {
         let file = InputFile::open(path)?;
-        if depth > DEEPEST || self.files.len() >= MOST_FILES {
-            let message =
-                format!("files include one another more than {DEEPEST} levels deep, or {MOST_FILES} times");
+        if depth > MAX_INCLUDE_DEPTH || self.files.len() >= MAX_FILES {
+            let message = format!(
+                "included files are nested more than {MAX_INCLUDE_DEPTH} levels deep, or are more than {MAX_FILES}"
+            );
             return Err(Diagnostic::new(Code::DeckSyntax, message)
                 .in_file(path)
-                .with_help("a file includes itself: take the *INCLUDE out"));
+                .with_help("remove the *INCLUDE with which a file includes itself"));
         }
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let at = self.files.len();
@@ -134,7 +135,7 @@ impl Deck {
                 let path = path?;
                 self.include(&path, depth + 1).map_err(|diagnostic| match diagnostic.file() {
                     // A missing file is reported at the card that includes it.
-                    Some(own) if own == path && diagnostic.code() == Code::FileUnreadable => self.about(
+                    Some(file) if file == path && diagnostic.code() == Code::FileUnreadable => self.about(
                         &card,
                         Code::FileUnreadable,
                         format!("{} is included: {}", path.display(), diagnostic.message()),
@@ -196,8 +197,8 @@ impl Deck {
                 let text = String::from_utf8_lossy(&bytes[end..stop]);
                 head.push_str(text.trim());
                 (end, number) = (stop.min(bytes.len()), number + 1);
-                let goes_on = head.ends_with(',') && end < bytes.len() && !is_keyword(&bytes[end..]);
-                if !goes_on {
+                let continues = head.ends_with(',') && end < bytes.len() && !is_keyword(&bytes[end..]);
+                if !continues {
                     break;
                 }
             }
@@ -226,11 +227,11 @@ impl Deck {
             }
             (Some((line, text)), _) => Err(Diagnostic::new(
                 Code::DeckSyntax,
-                format!("`{}` stands before the first keyword", excerpt(text)),
+                format!("`{}` comes before the first keyword", excerpt(text)),
             )
             .in_file(self.files[at].path())
             .at_line(line)
-            .with_help("a deck begins with a keyword line such as *NODE")),
+            .with_help("begin the deck with a keyword line such as *NODE")),
         }
     }
 }

@@ -11,13 +11,13 @@ use nalgebra::{Rotation3, Unit, Vector3};
 use std::collections::{BTreeMap, HashMap};
 
 /// Number of bad lines of a deck that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN_LINES: usize = 5;
 
 /// Largest number of members of a line of a generated set.
-const MOST_GENERATED: i64 = 100_000_000;
+const MAX_GENERATED: i64 = 100_000_000;
 
 /// Upper limit of the numbers of renumbered nodes.
-const LARGEST: i64 = 1_000_000_000_000;
+const MAX_NODE_NUMBER: i64 = 1_000_000_000_000;
 
 /// Nodes, elements and node sets in the numbering of the whole model.
 #[derive(Debug, Default)]
@@ -71,7 +71,7 @@ impl DeckMesh {
 struct Instance {
     name: String,
     /// Nodes, elements and sets of the part, and those defined within the instance.
-    own: Scope,
+    scope: Scope,
     moved: Placement,
 }
 
@@ -111,14 +111,14 @@ impl Scopes {
     fn instances(&self) -> Instances<'_> {
         let is_assembly = self.part.is_none() && !self.in_instance;
         let some = if is_assembly { self.instances.as_slice() } else { &[] };
-        Instances::new(some.iter().map(|own| (own.name.as_str(), &own.own)).collect())
+        Instances::new(some.iter().map(|one| (one.name.as_str(), &one.scope)).collect())
     }
 
     /// Returns the scope to which cards belong; `None` for a part without content.
     fn open(&self) -> Option<&Scope> {
         match (&self.part, self.in_instance) {
             (Some(part), _) => self.parts.get(part),
-            (None, true) => self.instances.last().map(|instance| &instance.own),
+            (None, true) => self.instances.last().map(|instance| &instance.scope),
             _ => Some(&self.top),
         }
     }
@@ -126,7 +126,7 @@ impl Scopes {
     fn current(&mut self) -> &mut Scope {
         match (&self.part, self.in_instance) {
             (Some(part), _) => self.parts.entry(part.clone()).or_default(),
-            (None, true) => &mut self.instances.last_mut().expect("an instance is open").own,
+            (None, true) => &mut self.instances.last_mut().expect("an instance is open").scope,
             _ => &mut self.top,
         }
     }
@@ -134,12 +134,12 @@ impl Scopes {
     /// Returns the model of all instances. Node numbers are kept if no two instances share one; else every instance
     /// gets a separate range of numbers.
     fn assembled(self) -> Found<DeckMesh> {
-        let placed: Vec<(&Instance, &Scope)> = self.instances.iter().map(|one| (one, &one.own)).collect();
+        let placed: Vec<(&Instance, &Scope)> = self.instances.iter().map(|one| (one, &one.scope)).collect();
         let mut taken: std::collections::HashSet<i64> = self.top.nodes.keys().copied().collect();
         let unique = placed.iter().all(|(_, scope)| scope.nodes.keys().all(|id| taken.insert(*id)));
         let keys = placed.iter().map(|(_, scope)| &scope.nodes).chain([&self.top.nodes]);
         let highest = keys.filter_map(|nodes| nodes.keys().next_back().copied()).max().unwrap_or(0);
-        if !unique && highest > LARGEST / placed.len() as i64 {
+        if !unique && highest > MAX_NODE_NUMBER / placed.len() as i64 {
             let message =
                 format!("instances share node numbers, which are too large ({highest}) to be changed");
             return Err(vec![Diagnostic::new(Code::DeckUnsupported, message)]);
@@ -187,7 +187,7 @@ impl DeckMesh {
     /// Returns the nodes of a set.
     pub(super) fn set(&self, name: &str) -> Option<&[i64]> {
         let name = comparable(name);
-        self.sets.iter().find(|(own, _)| comparable(own) == name).map(|(_, nodes)| nodes.as_slice())
+        self.sets.iter().find(|(key, _)| comparable(key) == name).map(|(_, nodes)| nodes.as_slice())
     }
 }
 
@@ -216,8 +216,8 @@ impl DeckMeshReader<'_> {
                 let moved = self.placement(card);
                 let name = card.parameter("NAME").unwrap_or_default().to_owned();
                 let part = card.name("PART").unwrap_or_default();
-                let own = scopes.parts.get(&part).cloned().unwrap_or_default();
-                scopes.instances.push(Instance { name, own, moved });
+                let scope = scopes.parts.get(&part).cloned().unwrap_or_default();
+                scopes.instances.push(Instance { name, scope, moved });
                 scopes.in_instance = true;
             }
             "ENDINSTANCE" => scopes.in_instance = false,
@@ -236,14 +236,14 @@ impl DeckMeshReader<'_> {
 
     fn complain(&mut self, diagnostic: Diagnostic) {
         self.bad_count += 1;
-        if self.bad.len() < SHOWN {
+        if self.bad.len() < MAX_SHOWN_LINES {
             self.bad.push(diagnostic);
         }
     }
 
     fn finish(mut self) -> Vec<Diagnostic> {
         if self.bad_count > self.bad.len() {
-            let message = format!("{} more lines are bad", self.bad_count - self.bad.len());
+            let message = format!("{} more lines have errors", self.bad_count - self.bad.len());
             self.bad.extend(
                 self.deck.path().map(|path| Diagnostic::new(Code::DeckSyntax, message).in_file(path)),
             );
@@ -314,7 +314,7 @@ impl DeckMeshReader<'_> {
             }
         }
         if let Some(name) = card.parameter("NSET") {
-            scope.sets.extend(name, Ok(ids.into_iter().map(Member::own).collect()));
+            scope.sets.extend(name, Ok(ids.into_iter().map(Member::of_scope).collect()));
         }
     }
 
@@ -324,21 +324,21 @@ impl DeckMeshReader<'_> {
             return self.complain(diagnostic.with_help("write *ELEMENT, TYPE=C3D20, for example"));
         };
         let mut members: Vec<(i64, Vec<i64>)> = Vec::new();
-        let mut goes_on = false;
+        let mut continues = false;
         for (line, text) in self.deck.data(card) {
             let ids: Option<Vec<i64>> = fields(text).filter(|field| !field.is_empty()).map(integer).collect();
             let Some(ids) = ids else {
                 self.syntax(card, line, "an element number and its nodes", text);
                 continue;
             };
-            match (goes_on, members.last_mut()) {
+            match (continues, members.last_mut()) {
                 (true, Some((_, nodes))) => nodes.extend(ids),
                 _ => members.extend(ids.split_first().map(|(id, nodes)| (*id, nodes.to_vec()))),
             }
             // A line that ends with a comma continues. Elements with many nodes continue without a comma as well.
             let wanted = super::element_kinds::n_nodes(&kind);
             let have = members.last().map_or(0, |(_, nodes)| nodes.len());
-            goes_on = wanted.map_or(text.ends_with(b","), |wanted| have < wanted);
+            continues = wanted.map_or(text.ends_with(b","), |wanted| have < wanted);
         }
         if let Some(name) = card.name("ELSET") {
             scope.element_sets.entry(name).or_default().extend(members.iter().map(|(id, _)| *id));
@@ -374,8 +374,11 @@ impl DeckMeshReader<'_> {
                 match integer(name.as_bytes()).map(|id| vec![number(id)]).or_else(|| known(name)) {
                     Some(more) => members.extend(more),
                     None => {
-                        let message = format!("*{}: `{name}` is no number and no set above", card.title);
-                        let help = "define the set above, or correct the name";
+                        let message = format!(
+                            "*{}: `{name}` is neither a number nor a set that is defined above",
+                            card.title
+                        );
+                        let help = "define the set before this line, or correct the name";
                         let refused = self.deck.at(card, line, Code::DeckSyntax, message).with_help(help);
                         unknown.get_or_insert(refused);
                     }
@@ -406,13 +409,13 @@ impl DeckMeshReader<'_> {
             Some(instance) => scopes.instances().nodes_of_elements(instance, elements),
             None => {
                 let nodes = scopes.open().and_then(|scope| scope.nodes_of_elements(elements));
-                nodes.map(|own| own.into_iter().map(Member::own).collect())
+                nodes.map(|ids| ids.into_iter().map(Member::of_scope).collect())
             }
         };
         nodes.ok_or_else(|| {
-            let message = format!("element set `{elements}` is not known here");
+            let message = format!("element set `{elements}` is not defined above");
             let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
-            diagnostic.with_help("define the element set above")
+            diagnostic.with_help("define the element set before this line")
         })
     }
 
@@ -421,10 +424,10 @@ impl DeckMeshReader<'_> {
         let instances = scopes.instances();
         let Some(instance) = card.parameter("INSTANCE") else {
             let known = |set: &str| {
-                let own = scopes.open().and_then(|scope| scope.sets.find(set)?.as_ref().ok());
-                own.cloned().or_else(|| instances.named(set))
+                let known_set = scopes.open().and_then(|scope| scope.sets.find(set)?.as_ref().ok());
+                known_set.cloned().or_else(|| instances.named(set))
             };
-            return self.members(card, Member::own, known);
+            return self.members(card, Member::of_scope, known);
         };
         match instances.find(instance) {
             Some(one) => self.members(card, |id| one.member(id), |set| one.set(set)),
@@ -456,7 +459,7 @@ fn range(bounds: &[i64]) -> Option<(i64, i64, i64)> {
         [first, last, step] if step > 0 => (first, last, step),
         _ => return None,
     };
-    let few = last.checked_sub(first).is_some_and(|length| length / step < MOST_GENERATED);
+    let few = last.checked_sub(first).is_some_and(|length| length / step < MAX_GENERATED);
     (first <= last && few).then_some((first, last, step))
 }
 

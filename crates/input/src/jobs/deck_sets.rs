@@ -8,7 +8,7 @@ use flexbody_base::text::table::integer;
 use std::collections::{BTreeMap, HashMap};
 
 /// Number of instances that a message names.
-const NAMED: usize = 5;
+const MAX_NAMED: usize = 5;
 
 /// Members of a set, or the reason why it cannot be resolved.
 pub(super) type Found<T> = Result<Vec<T>, Diagnostic>;
@@ -36,7 +36,7 @@ impl Scope {
     pub(super) fn nodes_of_elements(&self, set: &str) -> Option<Vec<i64>> {
         let wanted = self.element_sets.get(&comparable(set))?;
         let wanted: std::collections::HashSet<i64> = wanted.iter().copied().collect();
-        let members = self.elements.iter().flat_map(|own| &own.members);
+        let members = self.elements.iter().flat_map(|elements| &elements.members);
         let mut nodes: Vec<i64> = members
             .filter(|(id, _)| wanted.contains(id))
             .flat_map(|(_, nodes)| nodes.iter().copied())
@@ -57,7 +57,7 @@ pub(super) struct Member {
 
 impl Member {
     /// Returns a node of the scope that defines the set.
-    pub(super) fn own(id: i64) -> Self {
+    pub(super) fn of_scope(id: i64) -> Self {
         Self { instance: None, id }
     }
 }
@@ -71,19 +71,19 @@ pub(super) struct Sets {
 impl Sets {
     pub(super) fn find(&self, name: &str) -> Option<&Found<Member>> {
         let name = comparable(name);
-        self.all.iter().find(|(own, _)| comparable(own) == name).map(|(_, members)| members)
+        self.all.iter().find(|(key, _)| comparable(key) == name).map(|(_, members)| members)
     }
 
     /// Adds members to the set of this name, which is created if necessary. A set with members that cannot be resolved
     /// is an error as a whole.
     pub(super) fn extend(&mut self, name: &str, members: Found<Member>) {
         let wanted = comparable(name);
-        let Some((_, own)) = self.all.iter_mut().find(|(own, _)| comparable(own) == wanted) else {
+        let Some((_, set)) = self.all.iter_mut().find(|(key, _)| comparable(key) == wanted) else {
             return self.all.push((name.to_owned(), members));
         };
-        match (own.as_mut(), members) {
-            (Ok(own), Ok(members)) => own.extend(members),
-            (Ok(_), Err(refused)) => *own = Err(refused),
+        match (set.as_mut(), members) {
+            (Ok(set), Ok(members)) => set.extend(members),
+            (Ok(_), Err(refused)) => *set = Err(refused),
             (Err(_), _) => {}
         }
     }
@@ -94,7 +94,7 @@ impl Sets {
         let (mut sets, mut unresolved) = (NodeSets::new(), Unresolved::new());
         let mut add = |name: String, members: &Found<Member>, shift: i64| match members {
             Ok(members) => {
-                let of = |own: &Member| own.id + own.instance.map_or(shift, |k| instances[k].2);
+                let of = |member: &Member| member.id + member.instance.map_or(shift, |k| instances[k].2);
                 sets.push((name, members.iter().map(of).collect()));
             }
             Err(refused) => unresolved.push((name, refused.clone())),
@@ -114,7 +114,8 @@ impl Sets {
                     1 => add(name.clone(), members, *shift),
                     // The first of several instances reports the ambiguity.
                     _ if instances[..k].iter().all(|(_, scope, _)| scope.sets.find(name).is_none()) => {
-                        let names = others().take(NAMED).map(|(own, ..)| format!("{own}.{name}"));
+                        let names =
+                            others().take(MAX_NAMED).map(|(instance, ..)| format!("{instance}.{name}"));
                         add(name.clone(), &Err(ambiguous(name, &names.collect::<Vec<_>>())), 0);
                     }
                     _ => {}
@@ -148,7 +149,7 @@ impl<'s> Instances<'s> {
 
     pub(super) fn find(&self, name: &str) -> Option<OneInstance<'s>> {
         let name = comparable(name);
-        let place = self.all.iter().position(|(own, _)| comparable(own) == name)?;
+        let place = self.all.iter().position(|(key, _)| comparable(key) == name)?;
         Some(OneInstance { place, scope: self.all[place].1 })
     }
 
@@ -176,6 +177,6 @@ impl OneInstance<'_> {
     /// Returns the nodes of a set of the instance.
     pub(super) fn set(&self, name: &str) -> Option<Vec<Member>> {
         let members = self.scope.sets.find(name)?.as_ref().ok()?;
-        Some(members.iter().map(|own| self.member(own.id)).collect())
+        Some(members.iter().map(|member| self.member(member.id)).collect())
     }
 }

@@ -81,7 +81,11 @@ struct Solid<'m> {
 
 /// Returns every solid element by its number.
 fn solids(mesh: &DeckMesh) -> HashMap<i64, Solid<'_>> {
-    let members = mesh.elements.iter().filter(|own| own.kind.starts_with("C3D")).flat_map(|own| &own.members);
+    let members = mesh
+        .elements
+        .iter()
+        .filter(|element| element.kind.starts_with("C3D"))
+        .flat_map(|element| &element.members);
     let solid = |(id, nodes): &'_ (i64, Vec<i64>)| {
         let faces = match nodes.len() {
             4 | 10 => TETRAHEDRON,
@@ -91,7 +95,9 @@ fn solids(mesh: &DeckMesh) -> HashMap<i64, Solid<'_>> {
         };
         Some((*id, faces))
     };
-    members.filter_map(|own| solid(own).map(|(id, faces)| (id, Solid { faces, nodes: &own.1 }))).collect()
+    members
+        .filter_map(|element| solid(element).map(|(id, faces)| (id, Solid { faces, nodes: &element.1 })))
+        .collect()
 }
 
 #[cfg(test)]
@@ -115,7 +121,7 @@ mod tests {
         let deck = Deck::read(&path).expect("a deck");
         let mesh = DeckMesh::of(&deck).expect("a mesh");
         let nodes =
-            |name| nodes_of_surface(&deck, &mesh, name).map(|own| own.into_iter().collect::<Vec<_>>());
+            |name| nodes_of_surface(&deck, &mesh, name).map(|nodes| nodes.into_iter().collect::<Vec<_>>());
         assert_eq!(nodes("N"), Some(vec![1, 2, 3, 7]));
         assert_eq!(nodes("F"), Some(vec![1, 2, 5, 6, 9, 10, 31, 32, 33, 37, 38, 39]));
         assert_eq!(nodes("T"), Some(vec![21, 22, 24, 25, 28, 29]));

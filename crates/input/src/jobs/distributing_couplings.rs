@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-const HELP: &str = "write *DISTRIBUTING COUPLING, ELSET=E with one element of type DCOUP3D in E and lines `node or set, weight`; or take it out of the deck and name its nodes as an averaging interface: --interface NAME=SET,averaging";
+const HELP: &str = "write *DISTRIBUTING COUPLING, ELSET=E with one element of type DCOUP3D in E and lines `node or set, weight`; or remove it from the deck and name its nodes as an averaging interface: --interface NAME=SET,averaging";
 
 /// Returns the reference nodes of the couplings of a deck, each with the mean of the positions of its nodes.
 ///
@@ -90,8 +90,8 @@ fn reference_node(card: &Card, mesh: &DeckMesh) -> Result<i64, String> {
     let nodes: Vec<i64> = mesh
         .elements
         .iter()
-        .filter(|own| is_coupling(&own.kind))
-        .flat_map(|own| &own.members)
+        .filter(|elements| is_coupling(&elements.kind))
+        .flat_map(|elements| &elements.members)
         .filter(|(id, _)| members.contains(id))
         .flat_map(|(_, nodes)| nodes.iter().copied())
         .collect();

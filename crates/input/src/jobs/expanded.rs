@@ -57,43 +57,43 @@ pub(super) fn label_once(
         directions.sort_unstable();
         directions.windows(2).any(|pair| pair[0] == pair[1])
     };
-    rows.retain(|_, own| is_repeated(own));
-    let Some(first) = rows.values().map(|own| own[0]).min().map(|row| labels[row]) else {
+    rows.retain(|_, rows_of_node| is_repeated(rows_of_node));
+    let Some(first) = rows.values().map(|rows_of_node| rows_of_node[0]).min().map(|row| labels[row]) else {
         return Ok(Once { labels, places: BTreeMap::new() });
     };
     let kinds = expanded_kinds(mesh);
     let refuse = |why: &str| vec![refused(first, &kinds, why).in_file(path)];
     if kinds.is_empty() || !kinds.iter().all(|kind| SHELLS.contains(kind)) {
-        return Err(refuse("the deck does not say where their nodes lie"));
+        return Err(refuse("the deck does not determine the positions of their nodes"));
     }
     // Copies of each node from one face to the other, and the vector through the thickness from K.
     let offsets = offsets(deck, mesh, &rows).map_err(refuse)?;
     let mut all = Vec::new();
-    for (&node, own) in &rows {
-        let copies = copies(own, &labels, mass, offsets[&node]);
-        let copies = copies.ok_or_else(|| refuse("their rows cannot be told apart"))?;
+    for (&node, rows_of_node) in &rows {
+        let copies = copies(rows_of_node, &labels, mass, offsets[&node]);
+        let copies = copies.ok_or_else(|| refuse("their rows cannot be distinguished"))?;
         all.push(Expanded { node, copies });
     }
-    all.sort_by_key(|own| own.copies[0].0);
+    all.sort_by_key(|node| node.copies[0].0);
     let through = thickness(stiffness, &labels, &mesh.nodes, &all)
-        .ok_or_else(|| refuse("the stiffness does not say where their nodes lie"))?;
-    numbered(mesh, labels, &all, &through).ok_or_else(|| refuse("their nodes have no numbers left"))
+        .ok_or_else(|| refuse("the stiffness does not determine the positions of their nodes"))?;
+    numbered(mesh, labels, &all, &through).ok_or_else(|| refuse("no node numbers are left for their nodes"))
 }
 
 /// Returns the copies of a node with their distances from the node in units of d. `None` means that the rows are no
 /// points, or that no copy of three can be identified as the middle one.
 fn copies(rows: &[usize], labels: &[DofLabel], mass: &RawMatrix, offset: f64) -> Option<Vec<(usize, f64)>> {
-    let is_vector = |own: &[usize]| {
-        let direction = |k: usize| own.get(k).map(|row| (*row, labels[*row].direction));
-        (0..3).all(|k| direction(k) == Some((own[0] + k, k as u8 + 1)))
+    let is_vector = |triple: &[usize]| {
+        let direction = |k: usize| triple.get(k).map(|row| (*row, labels[*row].direction));
+        (0..3).all(|k| direction(k) == Some((triple[0] + k, k as u8 + 1)))
     };
-    let masses: Vec<f64> = rows.chunks(3).map(|own| mass.matrix.get(own[0], own[0])).collect();
+    let masses: Vec<f64> = rows.chunks(3).map(|triple| mass.matrix.get(triple[0], triple[0])).collect();
     let parts: &[f64] = match *masses.as_slice() {
         [_, _] => &[-0.5, 0.5],
         [below, middle, above] if middle > below.max(above) => &[-0.5, 0.0, 0.5],
         _ => return None,
     };
-    let place = |(own, part): (&[usize], &f64)| (own[0], part - offset);
+    let place = |(triple, part): (&[usize], &f64)| (triple[0], part - offset);
     rows.chunks(3).all(is_vector).then(|| rows.chunks(3).zip(parts).map(place).collect())
 }
 
@@ -119,9 +119,11 @@ fn offsets(
     }
     // Nodes take the OFFSET of their elements, which must agree.
     let mut of_nodes: BTreeMap<i64, f64> = BTreeMap::new();
-    for (element, own) in mesh.elements.iter().flat_map(|own| &own.members) {
+    for (element, nodes_of_element) in
+        mesh.elements.iter().flat_map(|nodes_of_element| &nodes_of_element.members)
+    {
         let offset = of_elements.get(element).copied().unwrap_or(0.0);
-        for node in own.iter().filter(|node| nodes.contains_key(node)) {
+        for node in nodes_of_element.iter().filter(|node| nodes.contains_key(node)) {
             if of_nodes.insert(*node, offset).is_some_and(|other| other != offset) {
                 return Err("sections with different OFFSET share a node");
             }
@@ -145,10 +147,10 @@ fn numbered(
     for (Expanded { node, copies }, d) in all.iter().zip(through) {
         let x = mesh.nodes[node];
         let at_node = copies.iter().position(|(_, part)| *part == 0.0);
-        let own = at_node.or((copies.len() == 3).then_some(1));
+        let middle = at_node.or((copies.len() == 3).then_some(1));
         for (copy, &(row, part)) in copies.iter().enumerate() {
             let place = [0, 1, 2].map(|k| x[k] + part * d[k]);
-            if own == Some(copy) {
+            if middle == Some(copy) {
                 if part != 0.0 {
                     places.insert(*node, place);
                 }
@@ -205,8 +207,9 @@ fn thickness(
             }
         }
     }
-    let own = SymmetricMatrix::symmetrised(CscMatrix::from_triplets(3 * all.len(), 3 * all.len(), &entries));
-    let turned = solved(&own, &load)?;
+    let matrix =
+        SymmetricMatrix::symmetrised(CscMatrix::from_triplets(3 * all.len(), 3 * all.len(), &entries));
+    let turned = solved(&matrix, &load)?;
     let vector = |at: usize| {
         let entry = |k: usize, axis: usize| turned[(3 * at + k, axis)];
         // Each coordinate of d appears in two entries; the other entries measure the deviation of the rows from those
@@ -219,11 +222,11 @@ fn thickness(
 }
 
 /// Solves A X = B for a positive definite matrix, with one step of refinement; returns `None` for another matrix.
-fn solved(own: &SymmetricMatrix, load: &Mat<f64>) -> Option<Mat<f64>> {
-    let n = own.n();
+fn solved(matrix: &SymmetricMatrix, load: &Mat<f64>) -> Option<Mat<f64>> {
+    let n = matrix.n();
     let unit: Vec<_> = (0..n as u32).map(|i| (i, i, 1.0)).collect();
     let unit = SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &unit))?;
-    let pencil = Pencil::new(own, &unit, 1);
+    let pencil = Pencil::new(matrix, &unit, 1);
     let analysis = Analysis::new(&pencil)?;
     let factor = Cholesky::<f64>::new(&analysis, &pencil, 0.0)?;
     let mut solution = load.clone();
@@ -237,7 +240,8 @@ fn solved(own: &SymmetricMatrix, load: &Mat<f64>) -> Option<Mat<f64>> {
 /// Returns the types of the expanded elements of a deck.
 fn expanded_kinds(mesh: &DeckMesh) -> Vec<&str> {
     let expanded = |kind: &&str| EXPANDED.iter().any(|head| kind.starts_with(head));
-    let mut kinds: Vec<&str> = mesh.elements.iter().map(|own| own.kind.as_str()).filter(expanded).collect();
+    let mut kinds: Vec<&str> =
+        mesh.elements.iter().map(|elements| elements.kind.as_str()).filter(expanded).collect();
     kinds.sort_unstable();
     kinds.dedup();
     kinds
@@ -246,6 +250,7 @@ fn expanded_kinds(mesh: &DeckMesh) -> Vec<&str> {
 fn refused(label: DofLabel, kinds: &[&str], why: &str) -> Diagnostic {
     let kinds = if kinds.is_empty() { "elements".to_owned() } else { kinds.join(", ") };
     let message = format!("{label} labels several rows: CalculiX expands {kinds} into solids, and {why}");
-    Diagnostic::new(Code::DeckUnsupported, message)
-        .with_help("model the part with solid elements, C3D4, C3D8, C3D10, C3D20 and their kin, or with the shells S6, S8, S8R alone")
+    Diagnostic::new(Code::DeckUnsupported, message).with_help(
+        "use solid elements only (C3D4, C3D8, C3D10, C3D20 and their variants), or shells S6, S8, S8R only",
+    )
 }

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// Number of bad lines of a file that are reported one by one.
-const SHOWN: usize = 5;
+const MAX_SHOWN_LINES: usize = 5;
 
 /// Reads two matrices and the labels of their rows.
 ///
@@ -26,7 +26,7 @@ const SHOWN: usize = 5;
 /// [`assemble`].
 pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
     let ((k, k_file), (m, m_file)) = both(LabelledLines::read(paths[0]), LabelledLines::read(paths[1]))?;
-    let all = [&k, &m].into_iter().flat_map(|own| &own.pieces).flat_map(|piece| &piece.labels);
+    let all = [&k, &m].into_iter().flat_map(|lines| &lines.pieces).flat_map(|piece| &piece.labels);
     let mut labels: Vec<DofLabel> = all.copied().collect();
     labels.sort_unstable();
     labels.dedup();
@@ -92,13 +92,13 @@ impl LabelledLines {
 
 fn bad_lines(pieces: &[LabelledEntries], path: &Path) -> Vec<Diagnostic> {
     let mut before = 0;
-    let mut told = Vec::new();
+    let mut shown = Vec::new();
     for piece in pieces {
-        told.extend(piece.bad.iter().map(|(line, bad)| bad.clone().in_file(path).at_line(before + line)));
+        shown.extend(piece.bad.iter().map(|(line, bad)| bad.clone().in_file(path).at_line(before + line)));
         before += piece.lines;
     }
-    told.truncate(SHOWN);
-    told
+    shown.truncate(MAX_SHOWN_LINES);
+    shown
 }
 
 /// Entries of some lines. Rows and columns are indices in `labels`, where a label may occur more than once.
@@ -133,7 +133,7 @@ impl LabelledEntries {
                     let (row, col) = (place(row), place(col));
                     piece.entries.push(Entry { row, col, value });
                 }
-                None if piece.bad.len() < SHOWN => {
+                None if piece.bad.len() < MAX_SHOWN_LINES => {
                     const LINE: &str = "node, direction, node, direction, value";
                     piece.bad.push((number, expected(Code::MatrixSyntax, LINE, line)));
                 }
@@ -206,9 +206,9 @@ mod tests {
         let row = |node, direction| labels.binary_search(&DofLabel { node, direction }).expect("labelled");
         for (at, &id) in ids.iter().enumerate().step_by(97) {
             for direction in 1..=3u8 {
-                let (own, next) = (row(id, direction), row(ids[(at + 1) % ids.len()], direction));
-                assert_eq!(k.matrix.get(own, own), 2.0 + at as f64);
-                assert_eq!(k.matrix.get(next, own), -1.0 - f64::from(direction));
+                let (this, next) = (row(id, direction), row(ids[(at + 1) % ids.len()], direction));
+                assert_eq!(k.matrix.get(this, this), 2.0 + at as f64);
+                assert_eq!(k.matrix.get(next, this), -1.0 - f64::from(direction));
             }
         }
     }

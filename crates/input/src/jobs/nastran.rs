@@ -59,7 +59,7 @@ impl JobReader for Nastran {
         let dmigs = std::mem::take(&mut bulk.dmigs);
         let places = GridPlaces::new(&nodes, &axes);
         let matrices = Matrices::of(&bulk, dmigs, job, &places)?;
-        let mut diagnostics = told(&bulk, path);
+        let mut diagnostics = deck_notes(&bulk, path);
         let matrices = matrices.without_followers(&mut diagnostics).turned(&axes)?;
         let matrices = matrices.without_empty_rows(&mut diagnostics);
         matrices.refuse_modal(&bulk)?;
@@ -93,20 +93,20 @@ impl JobReader for Nastran {
 /// Returns the positions of the grids in the basic system, and the row axes of grids with other axes than the basic
 /// ones.
 fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
-    const SHOWN: usize = 5;
+    const MAX_SHOWN: usize = 5;
     let mut systems = Systems::new(&bulk.systems, &bulk.grids);
     let (mut nodes, mut axes, mut bad) = (Nodes::default(), HashMap::new(), Vec::new());
     for (&id, grid) in &bulk.grids {
         let found = systems.position(grid).and_then(|x| Ok((x, systems.axes(grid, x)?)));
         match found {
-            Ok((x, own)) => {
+            Ok((x, axes_of_grid)) => {
                 nodes.ids.push(id);
                 nodes.positions.push(x);
                 if grid.axes.is_some_and(|system| system != 0) {
-                    axes.insert(id, own);
+                    axes.insert(id, axes_of_grid);
                 }
             }
-            Err(diagnostic) if bad.len() < SHOWN => bad.push(match diagnostic.file() {
+            Err(diagnostic) if bad.len() < MAX_SHOWN => bad.push(match diagnostic.file() {
                 None => diagnostic
                     .about(format!("grid {id}"))
                     .in_file(&bulk.card_files[grid.file])
@@ -129,7 +129,7 @@ pub(crate) fn nodes_of_bulk(path: &Path) -> Found<NodeFile> {
     let (nodes, axes) = places(&bulk)?;
     if let Some(grid) = axes.keys().min() {
         let message = format!(
-            "rows of {} grids stand along the axes of their CD, the first of them grid {grid}: matrices from elsewhere cannot be turned with them",
+            "rows of {} grids are along the axes of their CD, the first of them grid {grid}: matrices that are not of this job cannot be transformed to the axes of the model",
             axes.len()
         );
         let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(path);
@@ -141,7 +141,7 @@ pub(crate) fn nodes_of_bulk(path: &Path) -> Found<NodeFile> {
 }
 
 /// Returns warnings and notes about the deck.
-fn told(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
+fn deck_notes(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     if bulk.has_elements && !bulk.coupled_mass {
         let message = "the deck does not ask for coupled masses (PARAM,COUPMASS,1): Nastran lumps them";

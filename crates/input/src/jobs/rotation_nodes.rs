@@ -33,17 +33,17 @@ pub(super) fn rotation_nodes(deck: &Deck, mesh: &DeckMesh, labels: &[DofLabel]) 
     for Rotation { node, reference, card } in rotations {
         // A rotation node belongs to one reference node, and a reference node has one rotation node.
         if let Some(other) = nodes.insert(node, reference).filter(|other| *other != reference) {
-            let message = format!("ROT NODE {node} is that of two reference nodes, {other} and {reference}");
+            let message = format!("ROT NODE {node} belongs to two reference nodes, {other} and {reference}");
             let diagnostic = deck.about(card, Code::DeckUnsupported, message);
-            return Err(vec![diagnostic.with_help("give each *RIGID BODY a ROT NODE of its own")]);
+            return Err(vec![diagnostic.with_help("give each *RIGID BODY a separate ROT NODE")]);
         }
         if with_rows.contains(&node) && turned.insert(reference, node).is_some_and(|other| other != node) {
             let message = format!(
-                "REF NODE {reference} of *{} is also the REF NODE of another coupling: it has two sets of rotations",
+                "REF NODE {reference} of *{} is also the REF NODE of another coupling: its rotations are not unique",
                 card.title
             );
             let diagnostic = deck.about(card, Code::DeckUnsupported, message);
-            return Err(vec![diagnostic.with_help("give each coupling a REF NODE of its own")]);
+            return Err(vec![diagnostic.with_help("give each coupling a separate REF NODE")]);
         }
     }
     Ok(nodes)
@@ -168,7 +168,7 @@ fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel])
         numbered.push(Numbered { coupling, reference, node });
     }
     let Some(last) = numbered.last() else { return Ok(Vec::new()) };
-    let expected: BTreeSet<i64> = numbered.iter().map(|own| own.node).collect();
+    let expected: BTreeSet<i64> = numbered.iter().map(|entry| entry.node).collect();
     // Nodes with rows but without a position in the deck: rotation nodes, and others with higher numbers.
     let made: BTreeSet<i64> =
         labels.iter().map(|label| label.node).filter(|node| !mesh.nodes.contains_key(node)).collect();
@@ -177,7 +177,7 @@ fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel])
     let n_internal = INTERNAL_NODES * n_with_internal_nodes(mesh);
     let is_explained = others.len() == n_internal;
     // A coupling has no rows if all its nodes follow another coupling, or if the deck is not the one that was run.
-    let absent = numbered.iter().find(|own| own.coupling.n_lines > 0 && !made.contains(&own.node));
+    let absent = numbered.iter().find(|entry| entry.coupling.n_lines > 0 && !made.contains(&entry.node));
     let Numbered { coupling, reference, node } = absent.unwrap_or(last);
     match stray {
         Some(stray) => {
@@ -192,11 +192,11 @@ fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel])
             coupling.refuse(deck, *reference, &why, HELP)
         }
         None => {
-            let with_rows = numbered.into_iter().filter(|own| made.contains(&own.node));
-            let rotation = |own: Numbered<'d>| Rotation {
-                node: own.node,
-                reference: own.reference,
-                card: own.coupling.card,
+            let with_rows = numbered.into_iter().filter(|entry| made.contains(&entry.node));
+            let rotation = |entry: Numbered<'d>| Rotation {
+                node: entry.node,
+                reference: entry.reference,
+                card: entry.coupling.card,
             };
             Ok(with_rows.map(rotation).collect())
         }
@@ -205,5 +205,9 @@ fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel])
 
 /// Returns the number of elements of a deck that have internal nodes.
 fn n_with_internal_nodes(mesh: &DeckMesh) -> usize {
-    mesh.elements.iter().filter(|own| own.kind == "C3D8I").map(|own| own.members.len()).sum()
+    mesh.elements
+        .iter()
+        .filter(|elements| elements.kind == "C3D8I")
+        .map(|elements| elements.members.len())
+        .sum()
 }

@@ -48,10 +48,10 @@ impl ManifestWalk<'_, '_> {
             };
             let Some(loads) = known else {
                 let message =
-                    format!("`{text}` is no set of loads for residual vectors, expected {EXPECTED}");
+                    format!("`{text}` is not a set of loads for residual vectors, expected {EXPECTED}");
                 let complaint = self.at(Code::ManifestSyntax, item.span(), message);
                 self.found.push(complaint.with_help(
-                    "nodal forces of your own go into `loads`, a file; \"loads@500\" names its responses at a frequency",
+                    "give other nodal forces in the file `loads`; \"loads@500\" names its responses at a frequency",
                 ));
                 continue;
             };

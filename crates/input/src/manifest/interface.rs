@@ -24,7 +24,7 @@ pub(super) const INTERFACE: &[&str] = &[
 ];
 
 /// Largest number of interfaces of a body: each takes sixteen entries of its file, which has at most 100,000.
-const MOST_INTERFACES: usize = 6000;
+const MAX_INTERFACES: usize = 6000;
 
 /// Keys of [`INTERFACE`] that select the nodes.
 const NODES: &[&str] = &["nodes", "nodes_file", "set", "box", "cylinder", "plane", "nearest"];
@@ -39,9 +39,9 @@ impl ManifestWalk<'_, '_> {
             self.mistyped("interface", value, "a list of tables: write [[interface]]");
             return None;
         };
-        if list.len() > MOST_INTERFACES {
+        if list.len() > MAX_INTERFACES {
             let message =
-                format!("the manifest has {} interfaces, a body has at most {MOST_INTERFACES}", list.len());
+                format!("the manifest has {} interfaces, a body has at most {MAX_INTERFACES}", list.len());
             self.complain(Code::ManifestSyntax, value.span(), message);
             return None;
         }

@@ -59,17 +59,17 @@ impl ManifestWalk<'_, '_> {
     ) -> Option<[f64; 3]> {
         match table.get(key) {
             Some(value) => self.point(key, value, dimension),
-            None => self.lacks(region, key, span),
+            None => self.missing_key(region, key, span),
         }
     }
 
-    fn lacks<T>(&mut self, region: &str, key: &str, span: &Range<usize>) -> Option<T> {
+    fn missing_key<T>(&mut self, region: &str, key: &str, span: &Range<usize>) -> Option<T> {
         self.complain(Code::ManifestSyntax, span.clone(), format!("key `{key}` is missing in `{region}`"));
         None
     }
 
     fn length(&mut self, table: &TomlTable, region: &str, key: &str, span: &Range<usize>) -> Option<f64> {
-        let Some(value) = table.get(key) else { return self.lacks(region, key, span) };
+        let Some(value) = table.get(key) else { return self.missing_key(region, key, span) };
         let length = real(value).filter(|length| length.is_finite() && *length >= 0.0);
         if length.is_none() {
             self.mistyped(key, value, "a length that is not negative");
@@ -79,7 +79,7 @@ impl ManifestWalk<'_, '_> {
 
     /// Reads the largest distance, or a list of the smallest and the largest.
     fn radius(&mut self, table: &TomlTable, span: &Range<usize>) -> Option<[f64; 2]> {
-        let Some(value) = table.get("radius") else { return self.lacks("cylinder", "radius", span) };
+        let Some(value) = table.get("radius") else { return self.missing_key("cylinder", "radius", span) };
         let given: Option<Vec<f64>> = match value.get_ref() {
             DeValue::Array(list) => list.iter().map(real).collect(),
             _ => real(value).map(|radius| vec![0.0, radius]),

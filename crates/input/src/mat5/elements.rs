@@ -68,13 +68,16 @@ impl<'a> Elements<'a> {
         // An element of up to four bytes is stored in the tag itself.
         if kind >> 16 != 0 {
             let bytes = tag[4..].get(..(kind >> 16) as usize).ok_or_else(|| {
-                Diagnostic::new(Code::MatrixSyntax, "an element within its tag is longer than that")
-                    .with_help(HELP)
+                Diagnostic::new(
+                    Code::MatrixSyntax,
+                    "an element that is stored in its tag is longer than 4 bytes",
+                )
+                .with_help(HELP)
             })?;
             return Ok(Numbers { kind: kind & 0xffff, bytes: bytes.to_vec(), order: self.order });
         }
         if u64::from(length) > most {
-            let message = format!("a variable has {length} bytes where its extents leave {most} at the most");
+            let message = format!("a variable has {length} bytes, but its extents allow at most {most}");
             return Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP));
         }
         let what = "reading a variable";

@@ -100,8 +100,8 @@ impl<'a> Variable<'a> {
             (VariableKind::Sparse, None) => {
                 let (indices, values) = (self.most_entries() * 4, self.most_entries() * 8);
                 let pointers = self.columns.saturating_add(1).saturating_mul(8);
-                let own = [elements.next(indices)?, elements.next(pointers)?, elements.next(values)?];
-                self.sparse(own, path)?
+                let arrays = [elements.next(indices)?, elements.next(pointers)?, elements.next(values)?];
+                self.sparse(arrays, path)?
             }
             (VariableKind::Full, None) => {
                 let places = self.rows.saturating_mul(self.columns);
@@ -123,8 +123,8 @@ impl<'a> Variable<'a> {
             .map(|k| pointers.whole(k).and_then(|at| u64::try_from(at).ok()).unwrap_or(u64::MAX))
             .collect();
         // The arrays may have capacity for more entries than are used.
-        let room = indices.len().min(values.len());
-        let entries = pointers.last().map_or(0, |last| (*last).min(room as u64) as usize);
+        let count = indices.len().min(values.len());
+        let entries = pointers.last().map_or(0, |last| (*last).min(count as u64) as usize);
         let compressed = Compressed {
             n,
             by_rows: false,

@@ -11,7 +11,7 @@ use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::{Compression, broken};
 
 /// Number of values whose written digits are counted.
-const COUNTED: usize = 4096;
+const MAX_COUNTED_VALUES: usize = 4096;
 
 const HELP: &str = "write the array as Matrix Market array real general: scipy.io.mmwrite of a numpy array";
 
@@ -102,7 +102,7 @@ impl ArrayReader {
                 let message = format!("header announces {count} values, the file has more");
                 return Err(Diagnostic::new(Code::MatrixCount, message));
             }
-            if self.values.len() < COUNTED && value != 0.0 {
+            if self.values.len() < MAX_COUNTED_VALUES && value != 0.0 {
                 self.written = self.written.max(written_digits(field));
             }
             self.values.push(value);

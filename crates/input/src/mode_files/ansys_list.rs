@@ -41,7 +41,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
                 let message = format!("the list is not along the axes of the model: `{}`", excerpt(line));
                 return Err(syntax(file, at, message)
                     .into_iter()
-                    .map(|d| d.with_help("RSYS,0 before PRNSOL"))
+                    .map(|d| d.with_help("set RSYS,0 before PRNSOL"))
                     .collect());
             }
         } else if let Some(node) = integer(first) {
@@ -52,7 +52,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     }
     let AnsysListReader { mut table, .. } = reading;
     if table.len() == 0 {
-        let help = "SET,1,K and PRNSOL,DOF for every mode K";
+        let help = "print SET,1,K and PRNSOL,DOF for every mode K";
         return Err(unreadable(file, "no displacements of modes are in the list", help));
     }
     table.digits = table.digits.max(1);
@@ -75,7 +75,7 @@ impl AnsysListReader {
             return Err(syntax(
                 file,
                 at,
-                "the list belongs to a time: the modes of a modal analysis are read",
+                "the list belongs to a time, expected the modes of a modal analysis",
             ));
         } else if let Some(text) = behind(line, b"FREQ=") {
             let Some(hertz) = real(text) else {
@@ -108,7 +108,7 @@ impl AnsysListReader {
 /// Returns the directions of the columns `UX UY UZ USUM`, `ROTX ROTY ROTZ RSUM`; `None` if no column has one.
 fn columns(names: &[Vec<u8>]) -> Option<Vec<Option<u8>>> {
     const NAMES: [&[u8]; 6] = [b"UX", b"UY", b"UZ", b"ROTX", b"ROTY", b"ROTZ"];
-    let direction = |name: &Vec<u8>| (1..).zip(NAMES).find(|(_, own)| name == own).map(|(k, _)| k);
+    let direction = |name: &Vec<u8>| (1..).zip(NAMES).find(|(_, known)| name == known).map(|(k, _)| k);
     let directions: Vec<Option<u8>> = names.iter().map(direction).collect();
     directions.iter().any(Option::is_some).then_some(directions)
 }
@@ -125,14 +125,14 @@ fn behind<'l>(line: &'l [u8], name: &[u8]) -> Option<&'l [u8]> {
 fn numbers_apart(line: &[u8]) -> Vec<Vec<u8>> {
     let mut apart: Vec<Vec<u8>> = Vec::new();
     for word in words(line) {
-        let mut own = Vec::new();
+        let mut number = Vec::new();
         for (at, &byte) in word.iter().enumerate() {
             if byte == b'-' && at > 0 && (word[at - 1].is_ascii_digit() || word[at - 1] == b'.') {
-                apart.push(std::mem::take(&mut own));
+                apart.push(std::mem::take(&mut number));
             }
-            own.push(byte);
+            number.push(byte);
         }
-        apart.push(own);
+        apart.push(number);
     }
     apart
 }

@@ -60,7 +60,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
                 return Err(syntax(
                     file,
                     at,
-                    "a block of displacements has another number of nodes than its head says",
+                    "a block of displacements has another number of nodes than its head states",
                 ));
             }
         }
@@ -72,7 +72,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
         } else if line.starts_with(b" -4") {
             let name = field(line, 5..13);
             if name.starts_with(b"DISPI") && pending.is_some() {
-                let help = "imported modes are real: a model without cyclic symmetry and damping has such";
+                let help = "give real modes: those of a model without cyclic symmetry and damping";
                 return Err(unreadable(file, "modes have imaginary parts", help));
             }
             block = pending.take().filter(|_| name == b"DISP");
@@ -85,12 +85,12 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
         Some(_) => Err(unreadable(
             file,
             "file ends within a block of displacements",
-            "it may be cut off: run the job again",
+            "run the job again: the file may be cut off",
         )),
         None if table.len() == 0 => Err(unreadable(
             file,
             "no displacements of modes are in the file",
-            "the step is *FREQUENCY, and *NODE FILE below it has the line U",
+            "write *NODE FILE with the line U in a step of *FREQUENCY",
         )),
         None => Ok(table),
     }
@@ -129,7 +129,7 @@ impl Head {
             b"0" => 8,
             b"1" => 13,
             _ => {
-                let help = "*NODE FILE writes text where *NODE OUTPUT writes binary";
+                let help = "use *NODE FILE, which writes text, instead of *NODE OUTPUT";
                 return Err(unreadable(file, "results are written in binary", help));
             }
         };

@@ -24,14 +24,14 @@ pub(super) fn recognises(head: &[u8]) -> bool {
 const DIGITS: [u8; 2] = [7, 15];
 
 /// Number of words of the head of a part.
-const IDENT: usize = 146;
+const HEAD_WORDS: usize = 146;
 
 /// Approach code of real eigenvalues, table codes of displacements and eigenvectors.
 const REAL_EIGENVALUES: i64 = 2;
 const SHAPES: [i64; 2] = [1, 7];
 
 /// Number of words per grid point: its number, its type, three displacements, three rotations.
-const WIDE: usize = 8;
+const WORDS_PER_POINT: usize = 8;
 
 /// Type of a grid point, unlike scalar points and others.
 const GRID: i64 = 1;
@@ -64,16 +64,20 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
 fn add_mode(table: &mut ModeTable, records: &Records<'_>, head: &[u64], values: &[u64]) -> Found<()> {
     let file = records.file;
     let whole = |at: usize| records.whole(head[at]);
-    if head.len() < IDENT || whole(0) / 10 != REAL_EIGENVALUES || !SHAPES.contains(&(whole(1) % 1000)) {
+    if head.len() < HEAD_WORDS || whole(0) / 10 != REAL_EIGENVALUES || !SHAPES.contains(&(whole(1) % 1000)) {
         return Ok(());
     }
-    if whole(1) / 1000 != 0 || whole(8) != 1 || whole(9) != WIDE as i64 || !values.len().is_multiple_of(WIDE)
+    if whole(1) / 1000 != 0
+        || whole(8) != 1
+        || whole(9) != WORDS_PER_POINT as i64
+        || !values.len().is_multiple_of(WORDS_PER_POINT)
     {
-        let message = "eigenvectors are complex, or not sorted by modes: real ones (SORT1) are read";
+        let message =
+            "eigenvectors are complex or not sorted by modes, expected real ones sorted by modes (SORT1)";
         return Err(unreadable(file, message, HELP));
     }
     table.begin(Some(records.real(head[5])));
-    for point in values.chunks_exact(WIDE) {
+    for point in values.chunks_exact(WORDS_PER_POINT) {
         if records.whole(point[1]) != GRID {
             continue;
         }

@@ -62,7 +62,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     }
     match node {
         Some(_) => {
-            Err(unreadable(file, "file ends within a grid point", "it may be cut off: write it again"))
+            Err(unreadable(file, "file ends within a grid point", "write the file again: it may be cut off"))
         }
         None if table.len() == 0 => Err(unreadable(
             file,
@@ -101,10 +101,10 @@ fn refuse_other_forms(file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
     } else {
         return Ok(());
     };
-    let message = format!("{what}: real ones, mode by mode, are read");
+    let message = format!("{what}, expected real eigenvectors, mode by mode");
     Err(syntax(file, at, message)
         .into_iter()
-        .map(|d| d.with_help("DISPLACEMENT(SORT1,REAL,PUNCH) = ALL"))
+        .map(|d| d.with_help("write DISPLACEMENT(SORT1,REAL,PUNCH) = ALL"))
         .collect())
 }
 

@@ -80,7 +80,7 @@ impl ModeTable {
             }])
         };
         let Some(mode) = self.modes.last_mut() else {
-            return wrong(Code::ModeFileSyntax, "values stand before the first mode".to_owned());
+            return wrong(Code::ModeFileSyntax, "values come before the first mode".to_owned());
         };
         if !value.is_finite() {
             return wrong(Code::MatrixNotFinite, format!("mode {number} has {value} at {label}"));
@@ -110,7 +110,7 @@ impl ModeTable {
     pub(super) fn into_modes(mut self, file: &InputFile, source: SourceFile) -> Found<RawModes> {
         let n = self.labels.len();
         if n == 0 {
-            let help = "write the displacements of the modes: docs/fe_programs.md says how";
+            let help = "write the displacements of the modes: see docs/fe_programs.md";
             return Err(unreadable(file, "the file has no modes", help));
         }
         for (number, mode) in self.modes.iter_mut().enumerate() {
@@ -121,7 +121,7 @@ impl ModeTable {
                     number + 1,
                     self.labels[row]
                 );
-                return Err(unreadable(file, message, "the file may be cut off: write it again"));
+                return Err(unreadable(file, message, "write the file again: it may be cut off"));
             }
         }
         let matrix = Mat::from_fn(n, self.modes.len(), |i, j| self.modes[j].values[i]);

@@ -21,10 +21,10 @@ mod tests {
     /// A quarter turn about z, then one about the rotated x, which points along y: z then points along x.
     #[test]
     fn angles_turn_about_axes_that_are_turned() {
-        let own = axes([90.0, 90.0, 0.0]).expect("turned");
+        let turned = axes([90.0, 90.0, 0.0]).expect("turned");
         let expected = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
-        for (own, expected) in own.iter().flatten().zip(expected.iter().flatten()) {
-            assert!((own - expected).abs() < 1e-15, "{own} {expected}");
+        for (turned, expected) in turned.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((turned - expected).abs() < 1e-15, "{turned} {expected}");
         }
         assert_eq!(axes([0.0; 3]), None);
     }

@@ -42,7 +42,7 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
         };
         let values: Option<Vec<f64>> = fields.take(if with_angles { 6 } else { 3 }).map(decimal).collect();
         let (Some(&[x, y, z, ref angles @ ..]), false) =
-            (values.as_deref(), with_angles && values.as_ref().is_some_and(|own| own.len() < 6))
+            (values.as_deref(), with_angles && values.as_ref().is_some_and(|values| values.len() < 6))
         else {
             return Err(unexpected(file, number, "a node and three coordinates", line));
         };

@@ -69,7 +69,7 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
     let format = text.get(head + 1).and_then(|line| widths(line));
     let Some([(count, width), (reals, length)]) = format.filter(|[whole, reals]| whole.1 > 0 && reals.1 > 0)
     else {
-        let message = "the line below NBLOCK is no format such as (3i9,6e21.13e3)".to_owned();
+        let message = "the line below NBLOCK is not a format such as (3i9,6e21.13e3)".to_owned();
         return Err(syntax(file, head + 2, message));
     };
     for (k, line) in text.iter().enumerate().skip(head + 2) {
@@ -86,10 +86,10 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
         let mut good = id.is_some();
         for (axis, value) in values.iter_mut().enumerate().take(reals) {
             let start = count * width + axis * length;
-            let own = field(line, start..start + length);
+            let text = field(line, start..start + length);
             // Zeros at the end of a line are left out.
-            match if own.is_empty() { Some(0.0) } else { real(own) } {
-                Some(own) => *value = own,
+            match if text.is_empty() { Some(0.0) } else { real(text) } {
+                Some(number) => *value = number,
                 None => good = false,
             }
         }

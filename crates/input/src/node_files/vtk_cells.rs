@@ -31,7 +31,7 @@ pub(super) fn elements_of(
         let points = points.ok_or("the ends of the cells do not ascend up to the number of their points")?;
         start += points.len();
         let nodes: Option<Vec<i64>> = points.iter().map(id).collect();
-        let nodes = nodes.ok_or("a cell has a point that there is not")?;
+        let nodes = nodes.ok_or("a cell has a point that does not exist")?;
         add(&mut elements, kind as u8, nodes);
     }
     Ok(elements)

@@ -50,7 +50,7 @@ impl Cursor<'_> {
             match words.as_slice() {
                 [] | ["DIMENSIONS" | "METADATA" | "INFORMATION" | "NAME" | "DATA", ..] => {}
                 ["DATASET", "UNSTRUCTURED_GRID" | "POLYDATA" | "STRUCTURED_GRID"] => {}
-                ["DATASET", kind] => return Err(format!("{kind} has no points of its own")),
+                ["DATASET", kind] => return Err(format!("a data set {kind} has no list of points")),
                 ["FIELD", _, count] => self.skip_fields(count)?,
                 ["POINTS", count, kind] => {
                     let (count, kind) = self.announced(count, "3", kind, begin)?;
@@ -105,10 +105,10 @@ impl Cursor<'_> {
 
     fn numbers(&mut self, count: usize, kind: NumberType) -> Result<Vec<f64>, String> {
         if self.binary {
-            let own = count.checked_mul(kind.bytes()).and_then(|length| self.text.rest().get(..length));
-            let own = own.ok_or_else(|| format!("file ends before its {count} numbers do"))?;
-            self.text.at += own.len();
-            return Ok(kind.decode(own, true));
+            let bytes = count.checked_mul(kind.bytes()).and_then(|length| self.text.rest().get(..length));
+            let bytes = bytes.ok_or_else(|| format!("file ends before its {count} numbers do"))?;
+            self.text.at += bytes.len();
+            return Ok(kind.decode(bytes, true));
         }
         let mut numbers = Vec::new();
         while numbers.len() < count {

@@ -48,7 +48,7 @@ impl NumberType {
 
     /// Returns the numbers in `bytes`; incomplete bytes at the end are left out.
     pub(super) fn decode(self, bytes: &[u8], big_endian: bool) -> Vec<f64> {
-        bytes.chunks_exact(self.bytes()).map(|own| self.number(digits(own, big_endian))).collect()
+        bytes.chunks_exact(self.bytes()).map(|chunk| self.number(digits(chunk, big_endian))).collect()
     }
 
     fn number(self, digits: u64) -> f64 {
@@ -66,10 +66,7 @@ impl NumberType {
 
 fn digits(bytes: &[u8], big_endian: bool) -> u64 {
     let append = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
-    match big_endian {
-        true => bytes.iter().fold(0, append),
-        false => bytes.iter().rev().fold(0, append),
-    }
+    if big_endian { bytes.iter().fold(0, append) } else { bytes.iter().rev().fold(0, append) }
 }
 
 /// Packing of the arrays of an XML file.
@@ -161,10 +158,10 @@ impl<'a> Base64<'a> {
                 b'/' => 63,
                 b'=' => 0,
                 _ if character.is_ascii_whitespace() => continue,
-                _ => return wrong("a character is none of base64"),
+                _ => return wrong("a character does not belong to base64"),
             };
             if padding > 0 && character != b'=' {
-                return wrong("padding of base64 stands within the text");
+                return wrong("padding of base64 is within the text");
             }
             padding += usize::from(character == b'=');
             bits = bits << 6 | u32::from(value);
@@ -188,9 +185,9 @@ impl Read for Base64<'_> {
             if self.given == self.count && !self.next_group()? {
                 break;
             }
-            let own = &self.group[self.given..self.count];
-            let length = own.len().min(out.len() - written);
-            out[written..written + length].copy_from_slice(&own[..length]);
+            let unread = &self.group[self.given..self.count];
+            let length = unread.len().min(out.len() - written);
+            out[written..written + length].copy_from_slice(&unread[..length]);
             (written, self.given) = (written + length, self.given + length);
         }
         Ok(written)

@@ -56,7 +56,7 @@ impl<'a> Mesh<'a> {
         let head = outermost.ok_or("file does not begin with VTKFile")?;
         let kind = head.attribute("type").unwrap_or_default();
         if !["UnstructuredGrid", "PolyData", "StructuredGrid"].contains(&kind) {
-            return Err(format!("file holds `{kind}`, which has no points of its own"));
+            return Err(format!("file holds `{kind}`, which has no list of points"));
         }
         let zlib = match head.attribute("compressor") {
             None | Some("") => false,
@@ -75,7 +75,7 @@ impl<'a> Mesh<'a> {
             return Err(format!("file has {} pieces, expected one", pieces.len()));
         };
         let points = piece.number("NumberOfPoints").or_else(|| extent(piece));
-        let points = points.ok_or("the piece does not say how many points it has")?;
+        let points = points.ok_or("the piece does not state its number of points")?;
         let cells = piece.number("NumberOfCells");
         Ok(Self { elements, packing, points, cells })
     }
@@ -86,7 +86,7 @@ impl<'a> Mesh<'a> {
         let numbers = self.numbers(array, self.points.saturating_mul(3))?;
         let (count, found) = (self.points, numbers.len());
         if array.number("NumberOfComponents") != Some(3) || count.checked_mul(3) != Some(found as u64) {
-            return Err(format!("file says {count} points, and has {found} numbers for them"));
+            return Err(format!("file states {count} points, but has {found} coordinates"));
         }
         Ok(numbers.chunks_exact(3).map(|x| [x[0], x[1], x[2]]).collect())
     }
@@ -99,7 +99,8 @@ impl<'a> Mesh<'a> {
 
     fn numbered_by(&self, name: &str) -> Unpacked<Vec<i64>> {
         let array = self.lists().find(|array| array.attribute("Name") == Some(name));
-        let array = array.ok_or_else(|| format!("the global ids `{name}` are no list of whole numbers"))?;
+        let array =
+            array.ok_or_else(|| format!("the global ids `{name}` are not a list of whole numbers"))?;
         let ids = self.list(array)?;
         // Larger numbers are not exact in f64.
         match ids.iter().find(|id| id.abs() > 9e15) {
@@ -149,7 +150,7 @@ impl<'a> Mesh<'a> {
 
     /// Returns the arrays within the elements named `parent`.
     fn arrays(&self, parent: &'static str) -> impl Iterator<Item = &Element<'a>> {
-        self.elements.iter().filter(move |own| own.name == "DataArray" && own.parent == parent)
+        self.elements.iter().filter(move |element| element.name == "DataArray" && element.parent == parent)
     }
 
     /// Returns the numbers of an array. A compressed array may have at most `most` of them.
@@ -167,7 +168,7 @@ impl<'a> Mesh<'a> {
         };
         let bytes = bytes.map_err(within)?;
         if bytes.len() % kind.bytes() != 0 {
-            return Err(within(format!("has {} bytes, which are no whole numbers of values", bytes.len())));
+            return Err(within(format!("has {} bytes, which is not a whole number of values", bytes.len())));
         }
         Ok(kind.decode(&bytes, self.packing.big_endian))
     }
@@ -178,11 +179,11 @@ impl<'a> Mesh<'a> {
         // The data begin after an underscore.
         let content = data.content.trim_ascii_start().strip_prefix(b"_").unwrap_or_default();
         let offset = array.number("offset").and_then(|offset| usize::try_from(offset).ok());
-        let own = offset.and_then(|offset| content.get(offset..));
-        let own = own.ok_or("begins behind the end of the file: it may be cut off")?;
+        let encoded = offset.and_then(|offset| content.get(offset..));
+        let encoded = encoded.ok_or("begins behind the end of the file: it may be cut off")?;
         match data.attribute("encoding") {
-            Some("raw") => self.packing.unpack(own, most),
-            Some("base64") | None => self.packing.unpack(Base64::new(own), most),
+            Some("raw") => self.packing.unpack(encoded, most),
+            Some("base64") | None => self.packing.unpack(Base64::new(encoded), most),
             Some(other) => Err(format!("is encoded by `{other}`, which is not read")),
         }
     }

@@ -17,7 +17,7 @@ impl Binary {
     /// Returns the storage of a file that begins with `head`; `None` if it is no binary OUTPUT4 file.
     pub(super) fn of(head: &[u8]) -> Option<Self> {
         let length: [u8; 4] = head.get(..4)?.try_into().ok()?;
-        let own = [(24, 4), (48, 8)].into_iter().find_map(|(bytes, word)| {
+        let layout = [(24, 4), (48, 8)].into_iter().find_map(|(bytes, word)| {
             let is_big_endian = match bytes {
                 _ if u32::from_le_bytes(length) == bytes => false,
                 _ if u32::from_be_bytes(length) == bytes => true,
@@ -25,11 +25,11 @@ impl Binary {
             };
             Some(Self { is_big_endian, word })
         })?;
-        let (record, _) = own.record(head, 0)?;
-        let [_, _, form, kind] = [0, 1, 2, 3].map(|k| own.integer(record, k));
-        let name = &record[4 * own.word..];
+        let (record, _) = layout.record(head, 0)?;
+        let [_, _, form, kind] = [0, 1, 2, 3].map(|k| layout.integer(record, k));
+        let name = &record[4 * layout.word..];
         let is_name = name.iter().all(|b| b.is_ascii_graphic() || matches!(b, b' ' | 0));
-        ((1..=15).contains(&form?) && (1..=4).contains(&kind?) && is_name).then_some(own)
+        ((1..=15).contains(&form?) && (1..=4).contains(&kind?) && is_name).then_some(layout)
     }
 
     /// Returns the positions of the columns of the matrices.
@@ -68,7 +68,7 @@ impl Binary {
     /// FB301 for records that cannot be parsed, FB303 for indices outside the matrix, FB306 for values that are not
     /// finite.
     pub(super) fn columns(self, bytes: &[u8], header: &Header) -> Result<Columns, Diagnostic> {
-        let mut columns = Columns::with_room(bytes.len() / self.size(header));
+        let mut columns = Columns::with_capacity(bytes.len() / self.size(header));
         columns.written = if self.size(header) == 4 { SINGLE_DIGITS } else { 17 };
         let mut at = 0;
         while let Some((record, next)) = self.record(bytes, at) {
@@ -107,12 +107,11 @@ impl Binary {
         let mut rest = data;
         while !rest.is_empty() {
             let first = self.integer(rest, 0).ok_or_else(misread)?;
-            let (start, length, head) = match header.is_big {
-                true => (self.integer(rest, 1).ok_or_else(misread)?, first.saturating_sub(1), 2),
-                false => {
-                    let (start, length) = Header::unpacked(first);
-                    (start, length, 1)
-                }
+            let (start, length, head) = if header.is_big {
+                (self.integer(rest, 1).ok_or_else(misread)?, first.saturating_sub(1), 2)
+            } else {
+                let (start, length) = Header::unpacked(first);
+                (start, length, 1)
             };
             let bytes = usize::try_from(length).ok().filter(|words| *words > 0);
             let bytes = bytes.and_then(|words| words.checked_mul(self.word)).ok_or_else(misread)?;
@@ -155,10 +154,10 @@ impl Binary {
             let length = if self.is_big_endian { i32::from_be_bytes(four) } else { i32::from_le_bytes(four) };
             usize::try_from(length).ok()
         };
-        let own = length(at)?;
-        let end = (at + 4).checked_add(own)?;
+        let record_length = length(at)?;
+        let end = (at + 4).checked_add(record_length)?;
         let record = bytes.get(at + 4..end)?;
-        (length(end)? == own).then_some((record, end + 4))
+        (length(end)? == record_length).then_some((record, end + 4))
     }
 
     /// Returns the k-th word as an integer.
@@ -182,6 +181,6 @@ impl Binary {
 }
 
 fn misread(header: &Header) -> Diagnostic {
-    let message = format!("a record of matrix {} is none of a column", header.name);
+    let message = format!("a record of matrix {} is not that of a column", header.name);
     Diagnostic::new(Code::MatrixSyntax, message).with_help("write the file again with OUTPUT4")
 }

@@ -2,7 +2,7 @@
 
 use crate::assemble::{ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, push};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::memory::or_go_without;
+use flexbody_base::memory::allow_failure;
 use flexbody_model::RawMatrix;
 use std::ops::Range;
 use std::path::Path;
@@ -11,7 +11,7 @@ use std::path::Path;
 pub(super) const SINGLE_DIGITS: u8 = 7;
 
 /// Number of rows from which on the start of a string does not fit into one word with its length.
-const BIG: u64 = 65_536;
+const MIN_ROWS_OF_TWO_WORDS: u64 = 65_536;
 
 /// Header of a matrix.
 #[derive(Debug, Clone)]
@@ -43,7 +43,7 @@ impl Header {
             || !(1..=4).contains(&kind)
             || !name.chars().all(is_name)
         {
-            let message = format!("header of a matrix says {columns} columns, {rows} rows, type {kind}");
+            let message = format!("header of a matrix states {columns} columns, {rows} rows, type {kind}");
             return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help("write the file again"));
         }
         Ok(Self {
@@ -52,7 +52,7 @@ impl Header {
             columns: columns.unsigned_abs(),
             form,
             kind,
-            is_big: rows < 0 || rows.unsigned_abs() >= BIG,
+            is_big: rows < 0 || rows.unsigned_abs() >= MIN_ROWS_OF_TWO_WORDS,
         })
     }
 
@@ -140,7 +140,7 @@ pub(super) struct Stretch {
 
 impl Stored {
     /// Bytes of columns that one thread reads at a time.
-    const STRETCH: usize = 1 << 20;
+    const BYTES_PER_TASK: usize = 1 << 20;
 
     pub(super) fn new(header: Header) -> Self {
         Self { header, stretches: Vec::new(), values: 0, ascending: true, last: None }
@@ -152,7 +152,7 @@ impl Stored {
         self.last = Some(column);
         self.values += values;
         match self.stretches.last_mut() {
-            Some(stretch) if stretch.bytes.len() < Self::STRETCH => stretch.bytes.end = bytes.end,
+            Some(stretch) if stretch.bytes.len() < Self::BYTES_PER_TASK => stretch.bytes.end = bytes.end,
             _ => self.stretches.push(Stretch { bytes, line }),
         }
     }
@@ -172,14 +172,14 @@ pub(super) struct Columns {
 
 impl Columns {
     /// Creates an empty list with capacity for `entries` entries, as far as memory allows.
-    pub(super) fn with_room(entries: usize) -> Self {
-        let mut own = Self::default();
-        or_go_without(|| {
-            if own.rows.try_reserve_exact(entries).is_ok() {
-                let _ = own.values.try_reserve_exact(entries);
+    pub(super) fn with_capacity(entries: usize) -> Self {
+        let mut columns_of_task = Self::default();
+        allow_failure(|| {
+            if columns_of_task.rows.try_reserve_exact(entries).is_ok() {
+                let _ = columns_of_task.values.try_reserve_exact(entries);
             }
         });
-        own
+        columns_of_task
     }
 
     /// Adds an entry unless it is zero.

@@ -108,7 +108,7 @@ pub(super) fn columns(
     format: Format,
 ) -> Result<Columns, Diagnostic> {
     let mut text = Text { lines: Lines::below(bytes, line) };
-    let mut columns = Columns::with_room(bytes.len() / format.width);
+    let mut columns = Columns::with_capacity(bytes.len() / format.width);
     columns.written = if header.is_single() { SINGLE_DIGITS } else { 0 };
     while !text.lines.is_at_end() && text.column(header, format, Some(&mut columns))?.is_some() {}
     Ok(columns)
@@ -135,9 +135,10 @@ impl<'a> Text<'a> {
             ColumnRecord::End => {
                 // The number after the last column has a separate format.
                 let lines = words.clamp(1, 1 << 20).unsigned_abs().div_ceil(format.per_line as u64);
-                return match (0..lines).all(|_| self.next_line().is_some()) {
-                    true => Ok(None),
-                    false => Err(cut_off(&header.name)),
+                return if (0..lines).all(|_| self.next_line().is_some()) {
+                    Ok(None)
+                } else {
+                    Err(cut_off(&header.name))
                 };
             }
             ColumnRecord::Number(column) if start != 0 => {
@@ -223,14 +224,14 @@ impl<'a> Text<'a> {
         columns: &mut Columns,
     ) -> Result<(), Diagnostic> {
         /// Number of values, for each of the [`Columns`], whose written digits are counted.
-        const COUNTED: usize = 512;
+        const MAX_COUNTED_VALUES: usize = 512;
         let number = field.trim_ascii();
         let value = real(number).ok_or_else(|| {
             let what = format!("a number of {} characters", field.len());
             let diagnostic = expected(Code::MatrixSyntax, &what, field).at_line(self.lines.number);
             diagnostic.with_help("write the file again")
         })?;
-        if columns.count() < COUNTED {
+        if columns.count() < MAX_COUNTED_VALUES {
             columns.written = columns.written.max(written_digits(number));
         }
         columns.push(row, column, value).map_err(|d| d.at_line(self.lines.number))

@@ -130,7 +130,11 @@ fn a_variable_of_matlab_has_no_more_bytes_than_its_extents_leave() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("K.mat");
     fs::write(&path, file).expect("written");
-    assert_refused(&path, Code::MatrixCount, "a variable has 32000000 bytes where its extents leave 4000000");
+    assert_refused(
+        &path,
+        Code::MatrixCount,
+        "a variable has 32000000 bytes, but its extents allow at most 4000000",
+    );
 }
 
 #[test]

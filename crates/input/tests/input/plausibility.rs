@@ -348,11 +348,12 @@ fn numbers_without_units_are_those_of_matter() {
         let error = refused(raw.clone());
         let found = error.diagnostics().iter().find(|d| d.code() == Code::DensityImplausible).expect("told");
         assert!(
-            found.message().contains(said) && found.message().contains("which nothing states"),
+            found.message().contains(said) && found.message().contains("assumed since no units are given"),
             "{error}"
         );
         assert!(
-            found.help().contains("those of matter in mm, t, s: state the units with --units"),
+            found.help().starts_with("state the units with --units")
+                && found.help().contains("the numbers fit materials in mm, t, s;"),
             "{error}"
         );
         let codes = told(RawModel { allow_implausible: true, ..raw.clone() });

@@ -2,7 +2,7 @@
 //! Computing 56 (1996) 179, section 5.1).
 
 /// Marks a node without a group.
-const FREE: u32 = u32::MAX;
+const UNASSIGNED: u32 = u32::MAX;
 
 /// Strongly coupled neighbours of each node, without the node itself, with the strength of the coupling.
 pub(super) struct Strong {
@@ -28,12 +28,12 @@ impl Strong {
 /// them. Other nodes join the neighbouring group with the strongest coupling. Nodes that touch no group form their own.
 pub(super) fn aggregates(strong: &Strong) -> (Vec<u32>, usize) {
     let n = strong.pointers.len() - 1;
-    let (mut group, mut count) = (vec![FREE; n], 0u32);
+    let (mut group, mut count) = (vec![UNASSIGNED; n], 0u32);
     // Groups of a node and its free neighbours.
     for node in 0..n {
         let around = strong.around(node);
-        let all_free = || around.iter().all(|&(other, _)| group[other as usize] == FREE);
-        if group[node] == FREE && !around.is_empty() && all_free() {
+        let all_free = || around.iter().all(|&(other, _)| group[other as usize] == UNASSIGNED);
+        if group[node] == UNASSIGNED && !around.is_empty() && all_free() {
             group[node] = count;
             around.iter().for_each(|&(other, _)| group[other as usize] = count);
             count += 1;
@@ -41,18 +41,18 @@ pub(super) fn aggregates(strong: &Strong) -> (Vec<u32>, usize) {
     }
     // Remaining nodes join the group of their strongest neighbour.
     let first = group.clone();
-    for (node, own) in group.iter_mut().enumerate().filter(|(_, own)| **own == FREE) {
-        let grouped = strong.around(node).iter().filter(|(other, _)| first[*other as usize] != FREE);
+    for (node, assigned) in group.iter_mut().enumerate().filter(|(_, assigned)| **assigned == UNASSIGNED) {
+        let grouped = strong.around(node).iter().filter(|(other, _)| first[*other as usize] != UNASSIGNED);
         if let Some(&(other, _)) = grouped.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0))) {
-            *own = first[other as usize];
+            *assigned = first[other as usize];
         }
     }
     // Nodes without a neighbouring group form new groups.
     for node in 0..n {
-        if group[node] == FREE {
+        if group[node] == UNASSIGNED {
             group[node] = count;
             for &(other, _) in strong.around(node) {
-                if group[other as usize] == FREE {
+                if group[other as usize] == UNASSIGNED {
                     group[other as usize] = count;
                 }
             }
@@ -74,8 +74,9 @@ mod tests {
             others.into_iter().flatten().map(|other| (other, 1.0)).collect()
         };
         let (group, count) = aggregates(&Strong::from_rows((0..n).map(row).collect()));
-        assert!(group.is_sorted() && group.iter().all(|own| (*own as usize) < count), "{group:?}");
-        let sizes = (0..count as u32).map(|own| group.iter().filter(|other| **other == own).count());
+        assert!(group.is_sorted() && group.iter().all(|assigned| (*assigned as usize) < count), "{group:?}");
+        let sizes =
+            (0..count as u32).map(|assigned| group.iter().filter(|other| **other == assigned).count());
         assert!(sizes.clone().all(|size| (2..=4).contains(&size)), "{group:?}");
     }
 

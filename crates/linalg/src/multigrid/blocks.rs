@@ -21,7 +21,7 @@ pub(super) fn noise(k: usize) -> f32 {
 pub(super) type Entries<const R: usize, const C: usize> = Vec<(u32, [[f32; C]; R])>;
 
 /// Number of block rows per parallel task.
-const NODES: usize = 512;
+const BLOCK_ROWS_PER_TASK: usize = 512;
 
 /// Matrix of blocks with `R` rows and `C` columns.
 #[derive(Debug, Clone)]
@@ -44,16 +44,18 @@ impl<const R: usize, const C: usize> BlockMatrix<R, C> {
         let (mut free_columns, mut free_blocks) = (&mut columns[..], &mut blocks[..]);
         let mut places = Vec::with_capacity(rows.len());
         for row in &rows {
-            let (own_columns, own_blocks);
-            (own_columns, free_columns) = free_columns.split_at_mut(row.len());
-            (own_blocks, free_blocks) = free_blocks.split_at_mut(row.len());
-            places.push((own_columns, own_blocks));
+            let (row_columns, row_blocks);
+            (row_columns, free_columns) = free_columns.split_at_mut(row.len());
+            (row_blocks, free_blocks) = free_blocks.split_at_mut(row.len());
+            places.push((row_columns, row_blocks));
         }
-        rows.into_par_iter().zip(places).with_min_len(NODES).for_each(|(row, (columns, blocks))| {
-            for ((entry, column), block) in row.into_iter().zip(columns).zip(blocks) {
-                (*column, *block) = entry;
-            }
-        });
+        rows.into_par_iter().zip(places).with_min_len(BLOCK_ROWS_PER_TASK).for_each(
+            |(row, (columns, blocks))| {
+                for ((entry, column), block) in row.into_iter().zip(columns).zip(blocks) {
+                    (*column, *block) = entry;
+                }
+            },
+        );
         Self { pointers, columns, blocks }
     }
 
@@ -96,7 +98,7 @@ impl<const R: usize, const C: usize> BlockMatrix<R, C> {
     ) -> Vec<Rows<R>> {
         let arch = Arch::new();
         let made = |row: usize| arch.dispatch(Dispatched(RowProduct { matrix: self, row, x, make: &make }));
-        (0..self.n_rows()).into_par_iter().with_min_len(NODES).map(made).collect()
+        (0..self.n_rows()).into_par_iter().with_min_len(BLOCK_ROWS_PER_TASK).map(made).collect()
     }
 }
 
@@ -105,7 +107,7 @@ impl<const B: usize> BlockMatrix<B, B> {
     pub(super) fn apply_pencil(&self, mass: &[f32], theta: &[f32; WIDTH], x: &[Rows<B>]) -> Vec<Rows<B>> {
         let arch = Arch::new();
         let made = |row: usize| arch.dispatch(Dispatched(PencilProduct { a: self, mass, theta, row, x }));
-        (0..self.n_rows()).into_par_iter().with_min_len(NODES).map(made).collect()
+        (0..self.n_rows()).into_par_iter().with_min_len(BLOCK_ROWS_PER_TASK).map(made).collect()
     }
 }
 
@@ -176,7 +178,7 @@ where
 }
 
 /// Number of vector registers for sums, of the 16 of most machines.
-const REGISTERS: usize = 12;
+const SUM_REGISTERS: usize = 12;
 
 /// Returns the product of a row. Short rows use several independent sums to hide the latency.
 #[inline(always)]
@@ -186,10 +188,10 @@ fn row_times<S: Simd, const N: usize, const R: usize, const C: usize>(
     row: usize,
     x: &[[Row<S, N>; C]],
 ) -> [Row<S, N>; R] {
-    const SUMS: usize = 3;
-    let sums = (REGISTERS / (R * N)).clamp(1, SUMS);
+    const INDEPENDENT_SUMS: usize = 3;
+    let sums = (SUM_REGISTERS / (R * N)).clamp(1, INDEPENDENT_SUMS);
     let range = matrix.pointers[row]..matrix.pointers[row + 1];
-    let mut parts = [[[simd.splat_f32s(0.0); N]; R]; SUMS];
+    let mut parts = [[[simd.splat_f32s(0.0); N]; R]; INDEPENDENT_SUMS];
     for (&column, block) in matrix.columns[range.clone()].iter().zip(&matrix.blocks[range]) {
         let x = &x[column as usize];
         for c in 0..C {

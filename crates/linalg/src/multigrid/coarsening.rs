@@ -5,16 +5,16 @@ use super::blocks::{BlockMatrix, Entries};
 use rayon::prelude::*;
 
 /// Number of nodes per parallel task.
-const NODES: usize = 256;
+const NODES_PER_TASK: usize = 256;
 /// Number of groups per parallel task.
-const GROUPS: usize = 16;
+const GROUPS_PER_TASK: usize = 16;
 
 /// Length of a motion of a group after orthogonalisation, relative to its full length, up to which it counts as
 /// dependent.
-const DEPENDENT: f64 = 1e-5;
+const DEPENDENT_MOTION_LENGTH: f64 = 1e-5;
 
 /// Size of a pivot of a node's diagonal block, relative to its diagonal entry, up to which it counts as zero.
-const NO_PIVOT: f64 = 1e-10;
+const ZERO_PIVOT_RATIO: f64 = 1e-10;
 
 /// Block in double precision.
 pub(super) type Block<const R: usize, const C: usize> = [[f64; C]; R];
@@ -55,21 +55,21 @@ pub(super) fn stored<const B: usize>(a: &impl SymmetricBlocks<B>) -> BlockMatrix
         a.visit(node, |column, block| row.push((column as u32, narrow(block))));
         row
     };
-    BlockMatrix::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES).map(row).collect())
+    BlockMatrix::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK).map(row).collect())
 }
 
 /// Returns the diagonal block of each node.
 pub(super) fn diagonal<const B: usize>(a: &impl SymmetricBlocks<B>) -> Vec<Block<B, B>> {
-    let own = |node: usize| {
-        let mut own = [[0.0; B]; B];
+    let block_of = |node: usize| {
+        let mut found = [[0.0; B]; B];
         a.visit(node, |column, block| {
             if column == node {
-                own = *block;
+                found = *block;
             }
         });
-        own
+        found
     };
-    (0..a.nodes()).into_par_iter().with_min_len(NODES).map(own).collect()
+    (0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK).map(block_of).collect()
 }
 
 /// Returns the inverse of a symmetric positive definite matrix by its Cholesky factor; `None` for any other matrix.
@@ -78,7 +78,7 @@ pub(super) fn inverse<const B: usize>(a: &Block<B, B>) -> Option<Block<B, B>> {
     for j in 0..B {
         // Cholesky factor L, column by column.
         let pivot = a[j][j] - l[j][..j].iter().map(|x| x * x).sum::<f64>();
-        if pivot.is_nan() || pivot <= NO_PIVOT * a[j][j] {
+        if pivot.is_nan() || pivot <= ZERO_PIVOT_RATIO * a[j][j] {
             return None;
         }
         l[j][j] = pivot.sqrt();
@@ -107,18 +107,18 @@ pub(super) fn strong_couplings<const B: usize>(
     least: f64,
 ) -> Strong {
     let square = |block: &Block<B, B>| block.iter().flatten().map(|x| x * x).sum::<f64>();
-    let own: Vec<f64> = diagonal.iter().map(|block| square(block).sqrt()).collect();
+    let sizes: Vec<f64> = diagonal.iter().map(|block| square(block).sqrt()).collect();
     let row = |node: usize| {
         let mut row = Vec::new();
         a.visit(node, |column, block| {
-            let strength = square(block) / (own[node] * own[column]);
+            let strength = square(block) / (sizes[node] * sizes[column]);
             if column != node && strength > least * least {
                 row.push((column as u32, strength as f32));
             }
         });
         row
     };
-    Strong::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES).map(row).collect())
+    Strong::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK).map(row).collect())
 }
 
 /// Groups of a level, with an orthonormal basis of the motions of each.
@@ -134,26 +134,29 @@ pub(super) struct Aggregates<const B: usize, const C: usize> {
 
 impl<const B: usize, const C: usize> Aggregates<B, C> {
     pub(super) fn new(strong: &Strong, motions: &Motions<B, C>) -> Self {
+        // Members of each group.
         let (of_node, count) = aggregates(strong);
         let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
-        of_node.iter().enumerate().for_each(|(node, &own)| members[own as usize].push(node as u32));
+        of_node.iter().enumerate().for_each(|(node, &group)| members[group as usize].push(node as u32));
         // Orthonormalise the motions of each group.
         let found: Vec<(Motions<B, C>, Block<C, C>)> = members
             .par_iter()
-            .with_min_len(GROUPS)
+            .with_min_len(GROUPS_PER_TASK)
             .map(|members| orthonormal(members.iter().map(|&node| motions[node as usize]).collect()))
             .collect();
+        // Rows of each node in the basis of its group.
         let mut basis = vec![[[0.0; C]; B]; of_node.len()];
-        for (members, (own, _)) in members.iter().zip(&found) {
-            members.iter().zip(own).for_each(|(&node, rows)| basis[node as usize] = *rows);
+        for (members, (rows_of_group, _)) in members.iter().zip(&found) {
+            members.iter().zip(rows_of_group).for_each(|(&node, rows)| basis[node as usize] = *rows);
         }
-        Self { count, of_node, basis, motions: found.into_iter().map(|(_, own)| own).collect() }
+        Self { count, of_node, basis, motions: found.into_iter().map(|(_, motions)| motions).collect() }
     }
 
     /// Returns the mass matrix of each group along its motions, from the masses of the nodes.
     pub(super) fn masses(&self, nodes: &[Block<B, B>]) -> Vec<Block<C, C>> {
         let mut masses = vec![[[0.0; C]; C]; self.count];
         for ((&group, basis), mass) in self.of_node.iter().zip(&self.basis).zip(nodes) {
+            // B' M B of the node, added to its group.
             let mut moved = [[0.0; C]; B];
             add_product(&mut moved, mass, basis);
             let transposed = std::array::from_fn(|c| std::array::from_fn(|b| basis[b][c]));
@@ -170,48 +173,52 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
         omega: f64,
     ) -> BlockMatrix<B, C> {
         let row = |sums: &mut Sums<B, C>, node: usize| {
+            // Row of A times the basis, summed by groups.
             a.visit(node, |column, block| {
                 add_product(sums.at(self.of_node[column]), block, &self.basis[column]);
             });
+            // Basis minus omega D^-1 times that row.
             sums.take(|column, force| {
                 let mut moved = [[0.0; C]; B];
                 add_product(&mut moved, &inverse[node], force);
-                let is_own = column == self.of_node[node];
+                let is_in_group = column == self.of_node[node];
                 let entry = |b: usize, c: usize| {
-                    let own = if is_own { self.basis[node][b][c] } else { 0.0 };
-                    (own - omega * moved[b][c]) as f32
+                    let tentative = if is_in_group { self.basis[node][b][c] } else { 0.0 };
+                    (tentative - omega * moved[b][c]) as f32
                 };
                 std::array::from_fn(|b| std::array::from_fn(|c| entry(b, c)))
             })
         };
-        let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES);
+        let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK);
         BlockMatrix::from_rows(nodes.map_init(|| Sums::new(self.count), row).collect())
     }
 }
 
 /// Orthonormalises the motions of some nodes by Gram-Schmidt, applied twice. Returns the basis, and the coefficients of
 /// the given motions in it. Motions that depend on earlier ones become zero.
-fn orthonormal<const B: usize, const C: usize>(mut own: Motions<B, C>) -> (Motions<B, C>, Block<C, C>) {
+fn orthonormal<const B: usize, const C: usize>(mut motions: Motions<B, C>) -> (Motions<B, C>, Block<C, C>) {
     let mut coefficients = [[0.0; C]; C];
-    let product = |own: &Motions<B, C>, i: usize, j: usize| -> f64 {
-        own.iter().flatten().map(|row| row[i] * row[j]).sum()
+    let product = |motions: &Motions<B, C>, i: usize, j: usize| -> f64 {
+        motions.iter().flatten().map(|row| row[i] * row[j]).sum()
     };
     for j in 0..C {
-        let before = product(&own, j, j).sqrt();
+        // Remove the parts along the motions before; twice, against rounding.
+        let before = product(&motions, j, j).sqrt();
         for _ in 0..2 {
             for i in 0..j {
-                let along = product(&own, i, j);
+                let along = product(&motions, i, j);
                 coefficients[i][j] += along;
-                own.iter_mut().flatten().for_each(|row| row[j] -= along * row[i]);
+                motions.iter_mut().flatten().for_each(|row| row[j] -= along * row[i]);
             }
         }
-        let length = product(&own, j, j).sqrt();
-        let is_new = length > DEPENDENT * before;
+        // Normalise, or drop a dependent motion.
+        let length = product(&motions, j, j).sqrt();
+        let is_new = length > DEPENDENT_MOTION_LENGTH * before;
         coefficients[j][j] = if is_new { length } else { 0.0 };
         let scale = if is_new { 1.0 / length } else { 0.0 };
-        own.iter_mut().flatten().for_each(|row| row[j] *= scale);
+        motions.iter_mut().flatten().for_each(|row| row[j] *= scale);
     }
-    (own, coefficients)
+    (motions, coefficients)
 }
 
 /// Returns P'AP, computed from A P. `empty` is the diagonal entry of rows that no motion reaches.
@@ -225,11 +232,11 @@ pub(super) fn galerkin<const B: usize, const C: usize>(
     // Rows of A P, then rows of P' (A P).
     let forces = |sums: &mut Sums<B, C>, node: usize| {
         a.visit(node, |column, block| {
-            p.row(column).for_each(|(group, own)| add_product(sums.at(group as u32), block, &wide(own)));
+            p.row(column).for_each(|(group, entry)| add_product(sums.at(group as u32), block, &wide(entry)));
         });
         sums.take(|_, sum| narrow(sum))
     };
-    let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES);
+    let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK);
     let ap = BlockMatrix::from_rows(nodes.map_init(|| Sums::new(count), forces).collect());
     let row = |sums: &mut Sums<C, C>, group: usize| {
         for (node, motion) in r.row(group) {
@@ -244,7 +251,7 @@ pub(super) fn galerkin<const B: usize, const C: usize>(
             block
         })
     };
-    let groups = (0..count).into_par_iter().with_min_len(GROUPS);
+    let groups = (0..count).into_par_iter().with_min_len(GROUPS_PER_TASK);
     BlockMatrix::from_rows(groups.map_init(|| Sums::new(count), row).collect())
 }
 
@@ -302,9 +309,9 @@ mod tests {
     #[test]
     fn an_inverse_is_one_and_an_indefinite_block_has_none() {
         let a = [[4.0, 1.0, -0.5], [1.0, 3.0, 0.25], [-0.5, 0.25, 2.0]];
-        let own = inverse(&a).expect("positive definite");
+        let inverted = inverse(&a).expect("positive definite");
         for (i, j) in (0..9).map(|at| (at / 3, at % 3)) {
-            let entry: f64 = (0..3).map(|k| a[i][k] * own[k][j]).sum();
+            let entry: f64 = (0..3).map(|k| a[i][k] * inverted[k][j]).sum();
             assert!((entry - f64::from(u8::from(i == j))).abs() < 1e-15, "({i}, {j}): {entry}");
         }
         assert_eq!(inverse(&[[1.0, 2.0], [2.0, 1.0]]), None);
@@ -318,9 +325,9 @@ mod tests {
             (0..3).map(|k| [[1.0, 0.0, 1.0], [0.0, f64::from(k), f64::from(k)]]).collect();
         let (basis, coefficients) = orthonormal(motions.clone());
         assert_eq!(coefficients[2][2], 0.0, "the sum depends on the others");
-        for (given, own) in motions.iter().flatten().zip(basis.iter().flatten()) {
+        for (given, basis_row) in motions.iter().flatten().zip(basis.iter().flatten()) {
             for j in 0..3 {
-                let combined: f64 = (0..3).map(|k| own[k] * coefficients[k][j]).sum();
+                let combined: f64 = (0..3).map(|k| basis_row[k] * coefficients[k][j]).sum();
                 assert!((combined - given[j]).abs() < 1e-14);
             }
         }

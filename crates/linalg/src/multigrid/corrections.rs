@@ -12,20 +12,20 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of nodes per parallel task.
-const NODES: usize = 512;
+const NODES_PER_TASK: usize = 512;
 
 /// Largest number of steps for which other columns wait for a column.
-const MOST_STEPS: usize = 6;
+const MAX_AWAITED_STEPS: usize = 6;
 
 /// Part of the error that the first step is expected to leave.
-const LEFT_AT_FIRST: f64 = 0.2;
+const FIRST_STEP_ERROR_FRACTION: f64 = 0.2;
 
 /// Part of the error below which single precision allows no further gain.
-const NOTHING_LEFT: f64 = 1e-4;
+const SINGLE_PRECISION_ERROR_FLOOR: f64 = 1e-4;
 
 /// Goal of a correction.
 #[derive(Debug, Clone, Copy)]
-pub struct Aim {
+pub struct CorrectionTarget {
     /// Index of the corrected pair among the modes [near](super::Near) it.
     pub pair: usize,
     /// Part of the error of the correction that may remain.
@@ -57,7 +57,7 @@ pub(super) struct Corrections<'a, F, const B: usize> {
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     column: usize,
-    aim: Aim,
+    target: CorrectionTarget,
     steps: usize,
     /// r'z of the first and of the last step.
     first: f64,
@@ -87,29 +87,29 @@ where
     /// Replaces each force, of about unit size, by its correction. Columns are processed side by side. Columns that
     /// have reached their goal continue as long as others are waited for, since this costs nothing. Returns the number
     /// of columns of cycles.
-    pub(super) fn solve(&self, aims: &[Aim], forces: MatMut<'_, f64>) -> u64 {
+    pub(super) fn solve(&self, targets: &[CorrectionTarget], forces: MatMut<'_, f64>) -> u64 {
         let mut work = Work::new(self.pencil.a.n_rows(), forces);
         let mut columns = 0;
         loop {
-            work.fill(aims);
+            work.fill_slots(targets);
             let active = work.slots.iter().flatten().count();
             if active == 0 {
                 return columns;
             }
             columns += active as u64;
             self.step(&mut work);
-            work.hand_out();
+            work.store_finished();
         }
     }
 
     /// Makes one step of conjugate gradients for all active columns.
     fn step(&self, work: &mut Work<'_, B>) {
-        let pairs = work.slots.map(|slot| slot.map(|slot| slot.aim.pair));
+        let pairs = work.slots.map(|slot| slot.map(|slot| slot.target.pair));
         // Precondition and project the residual, update the direction, step along it.
         let mut z = (self.cycle)(&work.r);
         self.deflation.project(&mut z, &pairs);
         let rz = products(&work.r, &z);
-        work.turn(&z, &rz);
+        work.update_directions(&z, &rz);
         let q = self.applied(&work.p, &pairs);
         let pq = products(&work.p, &q);
         work.advance(&q, &rz, &pq);
@@ -134,16 +134,16 @@ impl<'a, const B: usize> Work<'a, B> {
     }
 
     /// Fills free slots with waiting columns.
-    fn fill(&mut self, aims: &[Aim]) {
+    fn fill_slots(&mut self, targets: &[CorrectionTarget]) {
         let Self { columns, waiting, slots, r, t, p } = self;
         // Assign one waiting column to each free slot.
         let mut fresh: Vec<(usize, &[f64])> = Vec::new();
         for (w, slot) in slots.iter_mut().enumerate().filter(|(_, slot)| slot.is_none()) {
             let Some(column) = waiting.next() else { break };
-            let aim = aims[column];
+            let target = targets[column];
             *slot = Some(Slot {
                 column,
-                aim,
+                target,
                 steps: 0,
                 first: 0.0,
                 last: 0.0,
@@ -156,7 +156,7 @@ impl<'a, const B: usize> Work<'a, B> {
             return;
         }
         // Start from t = 0: the residual is the force, in single precision.
-        let blocks = r.par_iter_mut().zip(t).zip(p).enumerate().with_min_len(NODES);
+        let blocks = r.par_iter_mut().zip(t).zip(p).enumerate().with_min_len(NODES_PER_TASK);
         blocks.for_each(|(node, ((r, t), p))| {
             for &(w, force) in &fresh {
                 for b in 0..B {
@@ -168,11 +168,11 @@ impl<'a, const B: usize> Work<'a, B> {
     }
 
     /// Computes the next search direction: p <- z + beta p.
-    fn turn(&mut self, z: &[Rows<B>], rz: &[f64; WIDTH]) {
+    fn update_directions(&mut self, z: &[Rows<B>], rz: &[f64; WIDTH]) {
         let mut beta = [0.0f32; WIDTH];
         for ((slot, &rz), beta) in self.slots.iter_mut().zip(rz).zip(&mut beta) {
             let Some(slot) = slot else { continue };
-            let mut left = LEFT_AT_FIRST;
+            let mut left = FIRST_STEP_ERROR_FRACTION;
             if slot.steps == 0 {
                 slot.first = rz;
             } else {
@@ -182,12 +182,12 @@ impl<'a, const B: usize> Work<'a, B> {
             }
             slot.last = rz;
             slot.steps += 1;
-            slot.is_reached |= left <= slot.aim.left || slot.steps >= MOST_STEPS;
-            slot.is_at_end = left <= NOTHING_LEFT;
+            slot.is_reached |= left <= slot.target.left || slot.steps >= MAX_AWAITED_STEPS;
+            slot.is_at_end = left <= SINGLE_PRECISION_ERROR_FLOOR;
         }
         // A column with NaN gets a zero direction.
         let is_number = rz.map(f64::is_finite);
-        self.p.par_iter_mut().zip(z).with_min_len(NODES).for_each(|(p, z)| {
+        self.p.par_iter_mut().zip(z).with_min_len(NODES_PER_TASK).for_each(|(p, z)| {
             for b in 0..B {
                 for w in 0..WIDTH {
                     p[b][w] = if is_number[w] { z[b][w] + beta[w] * p[b][w] } else { 0.0 };
@@ -209,7 +209,7 @@ impl<'a, const B: usize> Work<'a, B> {
             alpha[w] = f32::from(u8::from(slot.steps == 1));
             (slot.is_reached, slot.is_at_end) = (true, true);
         }
-        let blocks = self.t.par_iter_mut().zip(&mut self.r).zip(&self.p).zip(q).with_min_len(NODES);
+        let blocks = self.t.par_iter_mut().zip(&mut self.r).zip(&self.p).zip(q).with_min_len(NODES_PER_TASK);
         blocks.for_each(|(((t, r), p), q)| {
             for b in 0..B {
                 for w in 0..WIDTH {
@@ -222,7 +222,7 @@ impl<'a, const B: usize> Work<'a, B> {
 
     /// Stores the columns that gain nothing more, those that have reached their goal if others wait for their slot, and
     /// all columns if all have reached their goals.
-    fn hand_out(&mut self) {
+    fn store_finished(&mut self) {
         let is_last = self.waiting.len() == 0 && self.slots.iter().flatten().all(|slot| slot.is_reached);
         let has_others = self.waiting.len() > 0;
         let ends = |slot: &Slot| is_last || slot.is_at_end || (slot.is_reached && has_others);
@@ -230,15 +230,15 @@ impl<'a, const B: usize> Work<'a, B> {
         let mut ended = Vec::new();
         for (w, slot) in slots.iter_mut().enumerate() {
             let Some(Slot { column, .. }) = slot.take_if(|slot| ends(slot)) else { continue };
-            columns[column].par_chunks_mut(B).zip(&*t).with_min_len(NODES).for_each(|(own, t)| {
-                own.iter_mut().zip(t).for_each(|(own, t)| *own = f64::from(t[w]));
+            columns[column].par_chunks_mut(B).zip(&*t).with_min_len(NODES_PER_TASK).for_each(|(rows, t)| {
+                rows.iter_mut().zip(t).for_each(|(rows, t)| *rows = f64::from(t[w]));
             });
             ended.push(w);
         }
         if ended.is_empty() || is_last {
             return;
         }
-        r.par_iter_mut().zip(p).with_min_len(NODES).for_each(|(r, p)| {
+        r.par_iter_mut().zip(p).with_min_len(NODES_PER_TASK).for_each(|(r, p)| {
             for &w in &ended {
                 (0..B).for_each(|b| (r[b][w], p[b][w]) = (0.0, 0.0));
             }

@@ -6,14 +6,14 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 /// Number of rows per partial product.
-const ROWS: usize = 4096;
+const ROWS_PER_PARTIAL_PRODUCT: usize = 4096;
 
 /// Distance of two eigenvalues, relative to one of them, up to which only M-orthogonality is applied: (K - theta
 /// M)-orthogonality would divide by a small number.
-const NEAR: f64 = 0.1;
+const NEAR_EIGENVALUE_DISTANCE: f64 = 0.1;
 
 /// Modes from which corrections are kept apart.
-pub struct Near<'a> {
+pub struct DeflationSpace<'a> {
     /// Rigid modes, M-orthonormal, and M times these.
     pub rigid: [MatRef<'a, f64>; 2],
     /// Approximate modes, M-orthonormal.
@@ -26,7 +26,7 @@ pub struct Near<'a> {
     pub eigenvalues: &'a [f64],
 }
 
-/// Modes of a [`Near`], in single precision.
+/// Modes of a [`DeflationSpace`], in single precision.
 pub(super) struct Deflation<'a> {
     rigid: usize,
     eigenvalues: &'a [f64],
@@ -41,7 +41,7 @@ pub(super) struct Deflation<'a> {
 }
 
 impl<'a> Deflation<'a> {
-    pub(super) fn new(near: &Near<'a>) -> Self {
+    pub(super) fn new(near: &DeflationSpace<'a>) -> Self {
         let [rigid, m_rigid] = near.rigid;
         let sizes: Vec<f64> =
             [rigid, near.modes].iter().flat_map(|x| x.col_iter()).map(|x| x.norm_max()).collect();
@@ -63,7 +63,8 @@ impl<'a> Deflation<'a> {
     /// to the correction (deflated conjugate gradients: Saad, Yeung, Erhel and Guyomarc'h, SIAM J. Sci. Comput. 21
     /// (2000) 1909).
     pub(super) fn project<const B: usize>(&self, z: &mut [Rows<B>], pairs: &[Option<usize>; WIDTH]) {
-        let nodes = ROWS / B;
+        let nodes = ROWS_PER_PARTIAL_PRODUCT / B;
+        // Partial products of a chunk of rows with M X and K X.
         let products = |(chunk, z): (usize, &[Rows<B>])| {
             let (start, rows) = (chunk * nodes * B, z.len() * B);
             let z = MatRef::from_row_major_slice(z.as_flattened().as_flattened(), rows, WIDTH);
@@ -79,16 +80,18 @@ impl<'a> Deflation<'a> {
         let sum = |block: usize, i: usize, w: usize| -> f64 {
             parts.iter().map(|part| f64::from(part[block][(i, w)])).sum()
         };
+        // Coefficients: conjugate for modes apart from the pair, M-orthogonal for all others.
         let along = Mat::from_fn(self.x.ncols(), WIDTH, |i, w| {
             let (heavy, mode) = (sum(0, i, w), i.checked_sub(self.rigid));
             let conjugate = mode.zip(pairs[w]).and_then(|(mode, pair)| {
                 let theta = self.eigenvalues[pair];
                 let distance = self.eigenvalues[mode] - theta;
-                let is_apart = mode != pair && distance.abs() > NEAR * theta.abs();
+                let is_apart = mode != pair && distance.abs() > NEAR_EIGENVALUE_DISTANCE * theta.abs();
                 is_apart.then(|| (self.unit * sum(1, mode, w) - theta * heavy) / distance)
             });
             conjugate.unwrap_or(heavy) as f32
         });
+        // z <- z - X times the coefficients.
         z.par_chunks_mut(nodes).enumerate().for_each(|(chunk, z)| {
             let (start, rows) = (chunk * nodes * B, z.len() * B);
             let z = MatMut::from_row_major_slice_mut(z.as_flattened_mut().as_flattened_mut(), rows, WIDTH);
@@ -100,11 +103,11 @@ impl<'a> Deflation<'a> {
 /// Returns the columns of the blocks, each multiplied by `scale(size)`; zero for columns of size zero.
 fn narrow(blocks: &[MatRef<'_, f64>], sizes: &[f64], scale: impl Fn(f64) -> f64 + Sync) -> Mat<f32> {
     let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
-    let mut own = Mat::zeros(blocks[0].nrows(), columns.len());
-    let pairs: Vec<_> = own.col_iter_mut().zip(columns).zip(sizes).collect();
+    let mut narrowed = Mat::zeros(blocks[0].nrows(), columns.len());
+    let pairs: Vec<_> = narrowed.col_iter_mut().zip(columns).zip(sizes).collect();
     pairs.into_par_iter().for_each(|((to, from), &size)| {
         let scale = if size > 0.0 { scale(size) } else { 0.0 };
         to.iter_mut().zip(from.iter()).for_each(|(to, from)| *to = (scale * from) as f32);
     });
-    own
+    narrowed
 }

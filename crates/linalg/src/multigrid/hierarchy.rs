@@ -2,8 +2,8 @@
 
 use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use super::coarsening::{Block, Motions, SymmetricBlocks};
-use super::corrections::{Aim, Corrections, SmallPencil};
-use super::deflation::{Deflation, Near};
+use super::corrections::{CorrectionTarget, Corrections, SmallPencil};
+use super::deflation::{Deflation, DeflationSpace};
 use super::level::{Coarse, Level};
 use crate::{
     Pencil, SymmetricMatrix, combine, contiguous_mut, dense_cholesky, dense_inverse, gram, largest,
@@ -14,24 +14,24 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Largest number of rows of a level that is solved with a dense matrix.
-const BOTTOM: usize = 1500;
+const MAX_COARSEST_ROWS: usize = 1500;
 
 /// Largest number of levels. Each has at most about a tenth of the rows of the finer one.
-const MOST_LEVELS: usize = 10;
+const MAX_LEVELS: usize = 10;
 
 /// Coupling, relative to the diagonal, above which neighbours on the finest level are strongly coupled.
-const STRONG: f64 = 0.02;
+const FINEST_STRONG_COUPLING: f64 = 0.02;
 /// Coupling, relative to the diagonal, above which neighbours on the coarser levels are strongly coupled.
-const STRONG_BELOW: f64 = 0.01;
+const COARSER_STRONG_COUPLING: f64 = 0.01;
 
 /// Number of inverse iterations for the rough modes of the coarsest level.
-const ROUGH_ROUNDS: usize = 6;
+const COARSEST_INVERSE_ITERATIONS: usize = 6;
 
 /// Number of inverse iterations, by cycles, for the rough modes on each level between the coarsest and the finest.
-const POLISHED: usize = 3;
+const LEVEL_INVERSE_ITERATIONS: usize = 3;
 
 /// Number of nodes per parallel task.
-const NODES: usize = 1024;
+const NODES_PER_TASK: usize = 1024;
 
 /// Hierarchy of levels, for nodes of any size.
 pub trait Levels {
@@ -45,7 +45,12 @@ pub trait Levels {
 
     /// Replaces the residual forces of approximate modes, columns of about unit size, by corrections of the modes.
     /// Returns the number of columns of cycles.
-    fn correct(&self, near: &Near<'_>, aims: &[Aim], forces: MatMut<'_, f64>) -> u64;
+    fn correct(
+        &self,
+        near: &DeflationSpace<'_>,
+        targets: &[CorrectionTarget],
+        forces: MatMut<'_, f64>,
+    ) -> u64;
 }
 
 /// Returns true if a pencil with this block size, of a body with `rigid_modes` rigid modes, can have levels.
@@ -104,11 +109,11 @@ impl<const B: usize> SymmetricBlocks<B> for Shifted<'_, B> {
             let heavy = others.first().map(|&other| other as usize);
             let Some(next) = stiff.into_iter().chain(heavy).min() else { return };
             let mut block = [[0.0; B]; B];
-            for (own, (columns, values)) in block.iter_mut().zip(&mut rows) {
+            for (block_row, (columns, values)) in block.iter_mut().zip(&mut rows) {
                 while let Some((&column, after)) = columns.split_first()
                     && column as usize / B == next
                 {
-                    own[column as usize % B] = self.scale * values[0];
+                    block_row[column as usize % B] = self.scale * values[0];
                     (*columns, *values) = (after, &values[1..]);
                 }
             }
@@ -123,6 +128,7 @@ impl<const B: usize> SymmetricBlocks<B> for Shifted<'_, B> {
 
 impl<const B: usize, const C: usize> Hierarchy<B, C> {
     fn new(pencil: &Pencil<'_>, rigid: MatRef<'_, f64>, tau: f64) -> Option<Self> {
+        // Scale of K + tau M, so that single precision holds the entries in any units.
         let size = largest(pencil.stiffness().diagonal());
         let has_size = size > 0.0 && size.is_finite();
         if !has_size {
@@ -137,19 +143,21 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
             block
         };
         let masses = pencil.mass().diagonal().into_iter().map(scaled).collect();
-        let (fine, mut next) = Level::new(&shifted, &unit_motions(rigid), masses, STRONG)?;
+        // The finest level, with its masses in the order of its blocks.
+        let (fine, mut next) = Level::new(&shifted, &unit_motions(rigid), masses, FINEST_STRONG_COUPLING)?;
         let mass = masses_beside(fine.matrix(), pencil.mass(), 1.0 / heaviest);
         let mut coarser = Vec::new();
         // Coarsen until a dense inverse is cheap.
-        while next.a.n_rows() * C > BOTTOM {
-            if coarser.len() == MOST_LEVELS {
+        while next.a.n_rows() * C > MAX_COARSEST_ROWS {
+            if coarser.len() == MAX_LEVELS {
                 return None;
             }
             let Coarse { a, motions, masses } = next;
-            let (level, after) = Level::new(&a, &motions, masses, STRONG_BELOW)?;
+            let (level, after) = Level::new(&a, &motions, masses, COARSER_STRONG_COUPLING)?;
             coarser.push(level);
             next = after;
         }
+        // The coarsest level is solved exactly.
         let inverse_of_bottom = dense_inverse(dense(&next.a))?;
         let masses = next.masses;
         Some(Self { fine, coarser, inverse_of_bottom, masses, mass, heaviest, size, tau })
@@ -173,11 +181,12 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
     /// Returns the lowest modes of the coarsest level, by inverse iterations from random vectors.
     fn bottom_modes(&self, count: usize) -> Option<Mat<f64>> {
         let n = self.inverse_of_bottom.nrows();
+        // Start from random vectors.
         let mut x = Mat::from_fn(n, count.min(n), |i, j| f64::from(noise(i * count + j)));
-        for _ in 0..ROUGH_ROUNDS {
+        for _ in 0..COARSEST_INVERSE_ITERATIONS {
             let product = |i: usize, j: usize| -> f64 {
-                let (group, own) = (i / C, &self.masses[i / C][i % C]);
-                (0..C).map(|c| own[c] * x[(group * C + c, j)]).sum()
+                let (group, masses) = (i / C, &self.masses[i / C][i % C]);
+                (0..C).map(|c| masses[c] * x[(group * C + c, j)]).sum()
             };
             // M-orthonormalise by Cholesky of X'MX, then solve.
             let force = Mat::from_fn(n, x.ncols(), product);
@@ -195,10 +204,12 @@ impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
     }
 
     fn rough_modes(&self, count: usize) -> Option<Mat<f64>> {
+        // Rough modes of the coarsest level.
         let mut x = self.bottom_modes(count)?;
         for (at, level) in self.coarser.iter().enumerate().rev() {
+            // Prolong to the next finer level, and improve there by inverse iterations.
             x = unit_columns(by_width(&x, level.nodes(), |x| level.prolonged(&x)));
-            for _ in 0..POLISHED {
+            for _ in 0..LEVEL_INVERSE_ITERATIONS {
                 let improved = |x: Vec<Rows<C>>| self.coarse_cycle(&self.coarser[at..], level.with_mass(&x));
                 x = unit_columns(by_width(&x, level.nodes(), improved));
             }
@@ -206,12 +217,18 @@ impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
         Some(by_width(&x, self.fine.nodes(), |x| self.fine.prolonged(&x)))
     }
 
-    fn correct(&self, near: &Near<'_>, aims: &[Aim], forces: MatMut<'_, f64>) -> u64 {
+    fn correct(
+        &self,
+        near: &DeflationSpace<'_>,
+        targets: &[CorrectionTarget],
+        forces: MatMut<'_, f64>,
+    ) -> u64 {
         let ratio = self.heaviest / self.size;
         let pencil = SmallPencil { a: self.fine.matrix(), mass: &self.mass, tau: self.tau, ratio };
+        // Conjugate gradients on the finest level, with one cycle as the preconditioner.
         let cycle = |b: &[Rows<B>]| self.cycle(b);
         let deflation = Deflation::new(near);
-        Corrections { pencil, cycle, deflation, eigenvalues: near.eigenvalues }.solve(aims, forces)
+        Corrections { pencil, cycle, deflation, eigenvalues: near.eigenvalues }.solve(targets, forces)
     }
 }
 
@@ -221,11 +238,11 @@ fn masses_beside<const B: usize>(a: &BlockMatrix<B, B>, mass: &SymmetricMatrix, 
         let (others, values) = mass.row(node);
         let mut entries = others.iter().zip(values).peekable();
         a.row(node).map(move |(column, _)| {
-            let own = entries.next_if(|(other, _)| **other as usize == column);
-            own.map_or(0.0, |(_, value)| (scale * value) as f32)
+            let entry = entries.next_if(|(other, _)| **other as usize == column);
+            entry.map_or(0.0, |(_, value)| (scale * value) as f32)
         })
     };
-    (0..a.n_rows()).into_par_iter().with_min_len(NODES).flat_map_iter(row).collect()
+    (0..a.n_rows()).into_par_iter().with_min_len(NODES_PER_TASK).flat_map_iter(row).collect()
 }
 
 /// Scales columns to a largest entry of one, within the range of single precision. Zero columns stay zero.
@@ -292,14 +309,14 @@ fn packed<const B: usize>(x: MatRef<'_, f64>) -> Vec<Rows<B>> {
         }
         rows
     };
-    (0..x.nrows() / B).into_par_iter().with_min_len(NODES).map(rows).collect()
+    (0..x.nrows() / B).into_par_iter().with_min_len(NODES_PER_TASK).map(rows).collect()
 }
 
 fn unpack<const B: usize>(rows: &[Rows<B>], x: MatMut<'_, f64>, scale: f64) {
     let mut columns: Vec<&mut [f64]> = x.col_iter_mut().map(contiguous_mut).collect();
     columns.par_iter_mut().enumerate().for_each(|(w, column)| {
-        for (own, rows) in column.chunks_exact_mut(B).zip(rows) {
-            own.iter_mut().zip(rows).for_each(|(x, row)| *x = scale * f64::from(row[w]));
+        for (node_rows, rows) in column.chunks_exact_mut(B).zip(rows) {
+            node_rows.iter_mut().zip(rows).for_each(|(x, row)| *x = scale * f64::from(row[w]));
         }
     });
 }

@@ -9,7 +9,7 @@ use super::smoother::Smoother;
 
 /// Factor of the prolongation smoother relative to the inverse of the largest eigenvalue: it gives the prolongation the
 /// least energy.
-const PROLONGATION: f64 = 4.0 / 3.0;
+const PROLONGATION_SMOOTHING: f64 = 4.0 / 3.0;
 
 /// Level with blocks of `B` rows, above a level whose groups have `C` motions.
 #[derive(Debug)]
@@ -48,7 +48,7 @@ impl<const B: usize, const C: usize> Level<B, C> {
         }
         // Smoothed prolongation P, and the coarse matrix P'AP.
         let smoother = Smoother::new(stored(matrix), inverse.iter().map(narrow).collect())?;
-        let p = groups.smoothed(matrix, &inverse, PROLONGATION / f64::from(smoother.largest));
+        let p = groups.smoothed(matrix, &inverse, PROLONGATION_SMOOTHING / f64::from(smoother.largest));
         let r = p.transposed(groups.count);
         let a = galerkin(matrix, &p, &r, diagonal[0][0][0] as f32);
         let coarse = Coarse { a, masses: groups.masses(&masses), motions: groups.motions };

@@ -11,6 +11,6 @@ mod hierarchy;
 mod level;
 mod smoother;
 
-pub use corrections::Aim;
-pub use deflation::Near;
+pub use corrections::CorrectionTarget;
+pub use deflation::DeflationSpace;
 pub use hierarchy::{Levels, can_have_levels, levels};

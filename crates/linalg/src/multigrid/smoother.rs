@@ -8,15 +8,15 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Number of nodes per parallel task.
-const NODES: usize = 1024;
+const NODES_PER_TASK: usize = 1024;
 
 /// Number of Lanczos steps for the bound of the spectrum.
 const LANCZOS_STEPS: usize = 10;
 /// Factor by which the result of the Lanczos steps is raised to become an upper bound.
-const RAISED: f64 = 1.05;
+const SPECTRAL_BOUND_FACTOR: f64 = 1.05;
 
 /// Lower end of the damped part of the spectrum, relative to its upper end.
-const DAMPED_FROM: f64 = 0.12;
+const DAMPED_SPECTRUM_START: f64 = 0.12;
 
 /// Symmetric positive definite A with the inverses of its diagonal blocks.
 #[derive(Debug)]
@@ -30,9 +30,9 @@ pub(super) struct Smoother<const B: usize> {
 impl<const B: usize> Smoother<B> {
     /// Creates the smoother; `None` if the largest eigenvalue of D^-1 A is not finite and positive.
     pub(super) fn new(a: BlockMatrix<B, B>, inverse: Vec<[[f32; B]; B]>) -> Option<Self> {
-        let mut own = Self { a, inverse, largest: 0.0 };
-        own.largest = (RAISED * own.largest_eigenvalue()?) as f32;
-        Some(own)
+        let mut smoother = Self { a, inverse, largest: 0.0 };
+        smoother.largest = (SPECTRAL_BOUND_FACTOR * smoother.largest_eigenvalue()?) as f32;
+        Some(smoother)
     }
 
     pub(super) fn nodes(&self) -> usize {
@@ -69,20 +69,26 @@ impl<const B: usize> Smoother<B> {
         let mut u_before = vec![[[0.0; WIDTH]; B]; u.len()];
         let (mut diagonals, mut lengths) = (Vec::new(), Vec::new());
         for _ in 0..LANCZOS_STEPS {
-            let mut v: Vec<Rows<B>> =
-                u.par_iter().with_min_len(NODES).enumerate().map(|(node, u)| self.divided(node, u)).collect();
+            let mut v: Vec<Rows<B>> = u
+                .par_iter()
+                .with_min_len(NODES_PER_TASK)
+                .enumerate()
+                .map(|(node, u)| self.divided(node, u))
+                .collect();
+            // Normalise in the inner product of D: v' D v = 1.
             let length = products(&v, &u).map(f64::sqrt);
             let scale = length.map(|length| if length > 0.0 { (1.0 / length) as f32 } else { 0.0 });
             [&mut u, &mut v].into_iter().for_each(|x| scale_columns(x, &scale));
+            // Next vector: A v without its parts along this vector and the one before.
             let mut next = self.a.apply(&v, |_, av| *av);
             let along = products(&v, &next);
-            let own = along.map(|along| along as f32);
+            let weights = along.map(|along| along as f32);
             // The first step has no predecessor.
             let before = length.map(|length| if diagonals.is_empty() { 0.0 } else { length as f32 });
-            next.par_iter_mut().with_min_len(NODES).enumerate().for_each(|(node, next)| {
+            next.par_iter_mut().with_min_len(NODES_PER_TASK).enumerate().for_each(|(node, next)| {
                 for b in 0..B {
                     for w in 0..WIDTH {
-                        next[b][w] -= own[w] * u[node][b][w] + before[w] * u_before[node][b][w];
+                        next[b][w] -= weights[w] * u[node][b][w] + before[w] * u_before[node][b][w];
                     }
                 }
             });
@@ -109,7 +115,7 @@ impl<const B: usize> Smoother<B> {
     pub(super) fn smoothed_from_zero(&self, b: &[Rows<B>]) -> Vec<Rows<B>> {
         let (arch, scale) = (Arch::new(), self.steps().first);
         let first = |(node, b)| arch.dispatch(FirstStep { smoother: self, scale, node, b });
-        let x: Vec<Rows<B>> = b.par_iter().with_min_len(NODES).enumerate().map(first).collect();
+        let x: Vec<Rows<B>> = b.par_iter().with_min_len(NODES_PER_TASK).enumerate().map(first).collect();
         self.second_step(b, &x, |node| x[node])
     }
 
@@ -130,23 +136,24 @@ impl<const B: usize> Smoother<B> {
         x: &[Rows<B>],
         step: impl Fn(usize) -> Rows<B> + Sync,
     ) -> Vec<Rows<B>> {
-        let Steps { kept, second, .. } = self.steps();
+        let Steps { momentum, second, .. } = self.steps();
         self.a.apply(x, |node, ax| {
             let (force, d) = (self.divided(node, &minus(&b[node], ax)), step(node));
-            let moved = |i: usize, w: usize| x[node][i][w] + kept * d[i][w] + second * force[i][w];
+            let moved = |i: usize, w: usize| x[node][i][w] + momentum * d[i][w] + second * force[i][w];
             std::array::from_fn(|i| std::array::from_fn(|w| moved(i, w)))
         })
     }
 
     /// Returns the factors of the Chebyshev iteration on the damped part of the spectrum.
     fn steps(&self) -> Steps {
+        // The damped part of the spectrum, by its middle and half its length.
         let high = f64::from(self.largest);
-        let low = DAMPED_FROM * high;
+        let low = DAMPED_SPECTRUM_START * high;
         let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
         let rho = 1.0 / (2.0 * middle / half - half / middle);
         Steps {
             first: (1.0 / middle) as f32,
-            kept: (rho * half / middle) as f32,
+            momentum: (rho * half / middle) as f32,
             second: (2.0 * rho / half) as f32,
         }
     }
@@ -179,7 +186,7 @@ impl<const B: usize> WithSimd for FirstStep<'_, B> {
 /// Factor of the first step, of its repetition in the second step, and of the second correction.
 struct Steps {
     first: f32,
-    kept: f32,
+    momentum: f32,
     second: f32,
 }
 
@@ -197,12 +204,13 @@ pub(super) fn products<const B: usize>(x: &[Rows<B>], y: &[Rows<B>]) -> [f64; WI
         }
         sums
     };
-    let pieces: Vec<[f64; WIDTH]> = x.par_chunks(NODES).zip(y.par_chunks(NODES)).map(piece).collect();
-    pieces.iter().fold([0.0; WIDTH], |all, own| std::array::from_fn(|w| all[w] + own[w]))
+    let pieces: Vec<[f64; WIDTH]> =
+        x.par_chunks(NODES_PER_TASK).zip(y.par_chunks(NODES_PER_TASK)).map(piece).collect();
+    pieces.iter().fold([0.0; WIDTH], |all, sums| std::array::from_fn(|w| all[w] + sums[w]))
 }
 
 fn scale_columns<const B: usize>(x: &mut [Rows<B>], scale: &[f32; WIDTH]) {
-    x.par_iter_mut().with_min_len(NODES).flatten_iter().for_each(|row| {
+    x.par_iter_mut().with_min_len(NODES_PER_TASK).flatten_iter().for_each(|row| {
         row.iter_mut().zip(scale).for_each(|(x, scale)| *x *= scale);
     });
 }

@@ -10,10 +10,10 @@ use std::path::Path;
 /// Largest accepted error of a relation: reduced integration leaves some tenths of a percent. A larger
 /// value would accept parts of the stiffness of initial displacements, which for a straight bar under
 /// tension breaks the relation of rotation by 30 %.
-const ALLOWED: f64 = 1e-2;
+const MAX_RELATION_ERROR: f64 = 1e-2;
 
 /// Errors up to this value are not reported: matrices written with ten digits leave 1e-8.
-const UNTOLD: f64 = 1e-6;
+const MIN_REPORTED_ERROR: f64 = 1e-6;
 
 /// Adds an error for each geometric stiffness that breaks a relation with rigid motion, or that belongs to
 /// another load.
@@ -55,7 +55,7 @@ impl Judged<'_> {
     fn motion(&self) -> Option<Diagnostic> {
         let Relations { translation, rotation, blocks, .. } = &self.relations;
         let (name, per_cent) = (self.load, |share: f64| format!("{:.2} %", 100.0 * share));
-        if translation.share > ALLOWED {
+        if translation.share > MAX_RELATION_ERROR {
             let labels: Vec<_> = translation.rows.iter().map(|&row| self.model.label(row)).collect();
             let message = format!(
                 "geometric stiffness for {name} resists translation: forces reach {} of the row sums (allowed 1 %), at {}",
@@ -65,14 +65,14 @@ impl Judged<'_> {
             let help = "give the matrix of the free body: rows and columns of supported nodes belong to it";
             return Some(Diagnostic::new(Code::GeometricStiffnessMotion, message).with_help(help));
         }
-        if *rotation > ALLOWED {
+        if *rotation > MAX_RELATION_ERROR {
             let message = format!(
-                "geometric stiffness for {name} does not turn the forces of its load under rigid rotation: {} of the forces that it gives are no turned forces (allowed 1 %)",
+                "geometric stiffness for {name} does not rotate the forces of its load with the body: {} of its forces under rigid rotation are not rotated forces (allowed 1 %)",
                 per_cent(*rotation)
             );
             return Some(Diagnostic::new(Code::GeometricStiffnessMotion, message));
         }
-        if *blocks > ALLOWED {
+        if *blocks > MAX_RELATION_ERROR {
             let message = format!(
                 "geometric stiffness for {name} depends on directions: {} of its entries are outside of multiples of the identity for each pair of nodes (allowed 1 %)",
                 per_cent(*blocks)
@@ -86,7 +86,7 @@ impl Judged<'_> {
     fn load(&self, loads: &UnitLoads<'_>) -> Option<Diagnostic> {
         let (name, relations) = (self.load, &self.relations);
         let other = loads.error(self.load, &relations.forces).unwrap_or(0.0);
-        if other > ALLOWED {
+        if other > MAX_RELATION_ERROR {
             let message = format!(
                 "geometric stiffness for {name} belongs to another load: the forces that it turns differ from those of {name} by {:.3} % (allowed 1 %), supports and inertia relief apart",
                 100.0 * other
@@ -100,7 +100,7 @@ impl Judged<'_> {
             ("the load", other),
         ];
         let (what, worst) = errors.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        (worst > UNTOLD.max(relations.rounding)).then(|| {
+        (worst > MIN_REPORTED_ERROR.max(relations.rounding)).then(|| {
             let message = format!(
                 "geometric stiffness for {name} fulfils its relations with rigid motion to {worst:.1e} (worst: {what})"
             );

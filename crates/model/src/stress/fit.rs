@@ -7,7 +7,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 const REWEIGHTINGS: usize = 40;
 
 /// Force relative to the mean below which all forces have equal weight.
-const SMALL: f64 = 1e-7;
+const EQUAL_WEIGHT_FORCE: f64 = 1e-7;
 
 /// Forces of the six unit rigid accelerations at one node; those out of the plane are zero.
 pub(super) type Relief = [Vector3<f64>; 6];
@@ -29,7 +29,7 @@ pub(super) fn least_lengths(forces: &[Vector3<f64>], relief: &[Relief]) -> Vecto
     for _ in 0..REWEIGHTINGS {
         let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
         for (f, unit) in forces.iter().zip(relief) {
-            let weight = 1.0 / (f - force(unit, &by)).norm().max(SMALL * mean);
+            let weight = 1.0 / (f - force(unit, &by)).norm().max(EQUAL_WEIGHT_FORCE * mean);
             for a in 0..6 {
                 right[a] += weight * unit[a].dot(f);
                 (0..6).for_each(|b| normal[(a, b)] += weight * unit[a].dot(&unit[b]));
@@ -43,7 +43,7 @@ pub(super) fn least_lengths(forces: &[Vector3<f64>], relief: &[Relief]) -> Vecto
 /// Returns the least-squares solution of normal equations; motions without effect get no acceleration.
 pub(super) fn solve(normal: Matrix6<f64>, right: &Vector6<f64>) -> Vector6<f64> {
     /// Squared size of a motion, relative to the largest, below which it has no effect.
-    const NOTHING: f64 = 1e-12;
+    const MIN_SQUARED_MOTION: f64 = 1e-12;
     // Scale to a unit diagonal: rotations and translations have different units.
     let scale =
         Vector6::from_fn(|k, _| if normal[(k, k)] > 0.0 { normal[(k, k)].sqrt().recip() } else { 0.0 });
@@ -53,7 +53,7 @@ pub(super) fn solve(normal: Matrix6<f64>, right: &Vector6<f64>) -> Vector6<f64> 
     let largest = eigen.eigenvalues.amax();
     let mut solution = Vector6::zeros();
     for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-        if *value > NOTHING * largest {
+        if *value > MIN_SQUARED_MOTION * largest {
             solution += vector * (vector.dot(&right) / value);
         }
     }

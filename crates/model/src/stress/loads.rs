@@ -9,21 +9,21 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// Largest difference between partial and full inertia relief, relative to the partial one, for a
 /// load that counts as balanced.
-const NEARLY_BALANCED: f64 = 1e-3;
+const MAX_BALANCED_DIFFERENCE: f64 = 1e-3;
 
 /// Part of the nodes, those with the smallest differences, that must carry the load: the others may be
 /// supported.
-const FREE_NODES: f64 = 0.5;
+const FREE_NODE_FRACTION: f64 = 0.5;
 
 /// Ratio of the difference of a node, relative to its force, to the usual one, above which the node counts
 /// as supported.
-const SUPPORTED: f64 = 10.0;
+const MIN_SUPPORTED_RATIO: f64 = 10.0;
 
 /// Smallest part of the load that the unsupported nodes must carry.
-const FREE_LOAD: f64 = 0.25;
+const MIN_FREE_LOAD: f64 = 0.25;
 
 /// Force, relative to the inertia of the body, below which it counts as rounding.
-const SMALL_LOAD: f64 = 1e-6;
+const ROUNDING_LOAD: f64 = 1e-6;
 
 /// Unit loads of a model as nodal forces.
 pub(super) struct UnitLoads<'m> {
@@ -131,7 +131,7 @@ impl<'m> UnitLoads<'m> {
         // Moments at nodal rotations are not among the forces: relief that nearly balances the load counts
         // as full relief.
         let is_balanced = self.rows.have_directors()
-            && product(&taken, &taken) <= NEARLY_BALANCED.powi(2) * product(&partly, &partly);
+            && product(&taken, &taken) <= MAX_BALANCED_DIFFERENCE.powi(2) * product(&partly, &partly);
         let error = if is_balanced || size == 0.0 { 0.0 } else { product(&taken, &partly).abs() / size };
         let all = [
             Explained { acceleration: Vector6::zeros(), error: 0.0 },
@@ -182,10 +182,11 @@ impl<'m> UnitLoads<'m> {
             let mut lengths: Vec<f64> =
                 (0..ids.len()).filter(|&i| !is_member[i]).map(|i| rest(i).norm()).collect();
             lengths.sort_by(f64::total_cmp);
-            let kept = (FREE_NODES * ids.len() as f64).ceil() as usize;
+            let kept = (FREE_NODE_FRACTION * ids.len() as f64).ceil() as usize;
             let elsewhere = lengths.iter().take(kept).sum::<f64>() / total;
-            let own: Vec<_> = (0..ids.len()).filter(|&i| is_member[i]).map(|i| (i, rest(i))).collect();
-            larger(elsewhere, self.resultant_error(&own, set, wanted, &is_member))
+            let rest_forces: Vec<_> =
+                (0..ids.len()).filter(|&i| is_member[i]).map(|i| (i, rest(i))).collect();
+            larger(elsewhere, self.resultant_error(&rest_forces, set, wanted, &is_member))
         };
         candidates.iter().map(error).fold(f64::INFINITY, f64::min)
     }
@@ -195,7 +196,7 @@ impl<'m> UnitLoads<'m> {
     /// compared if nodes have rotations.
     fn resultant_error(
         &self,
-        own: &[(usize, Vector3<f64>)],
+        rest_forces: &[(usize, Vector3<f64>)],
         set: &NodeSet,
         wanted: &Vector6<f64>,
         is_member: &[bool],
@@ -204,7 +205,7 @@ impl<'m> UnitLoads<'m> {
         let about = self.reference(set, is_member);
         let mut difference = -wanted.fixed_rows::<3>(0).into_owned();
         let mut moment = -wanted.fixed_rows::<3>(3).into_owned();
-        for (i, f) in own {
+        for (i, f) in rest_forces {
             difference += f;
             moment += (Vector3::from(positions[*i]) - about).cross(f);
         }
@@ -221,8 +222,9 @@ impl<'m> UnitLoads<'m> {
         if let Some(point) = set.reference.point() {
             return Vector3::from(point);
         }
-        let own: Vec<_> = self.model.nodes().positions.iter().zip(is_member).filter(|(_, m)| **m).collect();
-        own.iter().map(|(x, _)| Vector3::from(**x)).sum::<Vector3<f64>>() / own.len().max(1) as f64
+        let members: Vec<_> =
+            self.model.nodes().positions.iter().zip(is_member).filter(|(_, m)| **m).collect();
+        members.iter().map(|(x, _)| Vector3::from(**x)).sum::<Vector3<f64>>() / members.len().max(1) as f64
     }
 
     /// Returns the work of a force and moment at a point on the unit rigid motions.
@@ -249,23 +251,24 @@ impl<'m> UnitLoads<'m> {
             forces.iter().zip(&net).map(|(f, net)| (f - net).norm()).zip(0..).collect();
         nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
         let all: f64 = net.iter().map(Vector3::norm).sum();
-        let floor = SMALL_LOAD * self.inertia();
+        let floor = ROUNDING_LOAD * self.inertia();
         let size_of = |i: usize| larger(net[i].norm(), forces[i].norm());
         let largest = (0..net.len()).map(size_of).fold(0.0, larger);
-        let loaded = nodes.iter().filter(|one| size_of(one.1) > SMALL_LOAD * largest);
+        let loaded = nodes.iter().filter(|one| size_of(one.1) > ROUNDING_LOAD * largest);
         let mut ratios: Vec<f64> = loaded.map(|&(rest, i)| rest / size_of(i)).collect();
         ratios.sort_by(f64::total_cmp);
         let usual = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0);
         let (mut difference, mut size, mut carried) = (0.0, 0.0, 0.0);
         for (count, &(rest, i)) in nodes.iter().enumerate() {
-            let own = size_of(i);
-            let is_enough = count as f64 >= FREE_NODES * net.len() as f64 && carried >= FREE_LOAD * all;
-            if is_enough && rest > SUPPORTED * usual * own {
+            let force_size = size_of(i);
+            let is_enough =
+                count as f64 >= FREE_NODE_FRACTION * net.len() as f64 && carried >= MIN_FREE_LOAD * all;
+            if is_enough && rest > MIN_SUPPORTED_RATIO * usual * force_size {
                 continue;
             }
             carried += net[i].norm();
             difference += rest;
-            size += own;
+            size += force_size;
         }
         difference / larger(size, floor)
     }

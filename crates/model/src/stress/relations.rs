@@ -8,11 +8,11 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 /// Smallest size of a row relative to the largest one: forces of smaller rows are compared with this size.
-const SMALL_ROW: f64 = 1e-3;
+const MIN_ROW_SIZE: f64 = 1e-3;
 
 /// Smallest size of the turned forces relative to the entries times the distances of their nodes: the
 /// forces of a stress without load (self-stress) are rounding.
-const SMALL_FORCE: f64 = 1e-3;
+const MIN_FORCE_SIZE: f64 = 1e-3;
 
 /// Relations between a geometric stiffness and rigid motion: the forces that it turns, and relative errors.
 pub(super) struct Relations {
@@ -46,7 +46,7 @@ impl Relations {
             (0..model.nodes().len()).into_par_iter().map(|i| fields.of_node(matrix, i)).collect();
         let turned: f64 = nodes.iter().map(|node| node.turned.norm()).sum();
         let entries: f64 = nodes.iter().map(|node| node.entries).sum();
-        let size = larger(turned, SMALL_FORCE * entries);
+        let size = larger(turned, MIN_FORCE_SIZE * entries);
         let relative = |x: f64| if size > 0.0 { x / size } else { 0.0 };
         let skewed = |node: &NodeMotion| 0.5 * (node.turned + node.turned.transpose()).norm();
         let plain = model.rows().are_plain() && model.scalar_mass().is_some();
@@ -138,8 +138,9 @@ impl Translation {
         if largest == 0.0 {
             return Self { share: 0.0, rows: Vec::new() };
         }
-        let share =
-            |node: &NodeMotion, axis: usize| node.moved[axis] / larger(node.rows[axis], SMALL_ROW * largest);
+        let share = |node: &NodeMotion, axis: usize| {
+            node.moved[axis] / larger(node.rows[axis], MIN_ROW_SIZE * largest)
+        };
         let shares: Vec<f64> =
             nodes.iter().flat_map(|node| (0..dimension).map(move |axis| share(node, axis))).collect();
         let worst = shares.iter().copied().fold(0.0, larger);

@@ -14,13 +14,13 @@ use std::collections::{BinaryHeap, HashMap};
 
 /// Weight of the squared distance that a node moves, relative to its squared distance from the planes of
 /// its triangles. Up to triangles of eight tenths of the radius of curvature the moved distance dominates.
-const WAY: f64 = 0.01;
+const MOVED_DISTANCE_WEIGHT: f64 = 0.01;
 
 /// Weight of the planes that hold feature edges in place.
-const FEATURE: f64 = 10.0;
+const FEATURE_PLANE_WEIGHT: f64 = 10.0;
 
 /// Cosine of the largest rotation of a triangle in one move.
-const TURNED: f64 = 0.2;
+const MAX_ROTATION_COSINE: f64 = 0.2;
 
 impl SurfaceMesh {
     /// Returns the mesh with at most `most` triangles, on some of its nodes, whose positions are
@@ -57,7 +57,7 @@ struct Decimation {
     /// Number of changes of the error of each node.
     changes: Vec<u32>,
     /// Node that each node moved onto; itself if it did not move.
-    gone_to: Vec<u32>,
+    merged_into: Vec<u32>,
 }
 
 /// Move of the first node onto the second, ordered by its error (the bits of a non-negative number sort
@@ -71,7 +71,7 @@ impl Decimation {
         nodes.dedup();
         let index: HashMap<u32, u32> = nodes.iter().zip(0..).map(|(&node, i)| (node, i)).collect();
         let n = nodes.len();
-        let mut own = Self {
+        let mut decimation = Self {
             positions: nodes.iter().map(|&node| positions[node as usize]).collect(),
             triangles: mesh.triangles.iter().map(|corners| corners.map(|node| index[&node])).collect(),
             alive: mesh.triangles.len(),
@@ -79,21 +79,21 @@ impl Decimation {
             features: vec![Vec::new(); n],
             error: vec![Quadric::default(); n],
             changes: vec![0; n],
-            gone_to: (0..n as u32).collect(),
+            merged_into: (0..n as u32).collect(),
             nodes,
             index,
         };
-        for (t, corners) in (0..).zip(&own.triangles) {
-            corners.iter().for_each(|&node| own.at_node[node as usize].push(t));
+        for (t, corners) in (0..).zip(&decimation.triangles) {
+            corners.iter().for_each(|&node| decimation.at_node[node as usize].push(t));
         }
         for [a, b] in &mesh.edges {
-            if let (Some(&a), Some(&b)) = (own.index.get(a), own.index.get(b)) {
-                own.features[a as usize].push(b);
-                own.features[b as usize].push(a);
+            if let (Some(&a), Some(&b)) = (decimation.index.get(a), decimation.index.get(b)) {
+                decimation.features[a as usize].push(b);
+                decimation.features[b as usize].push(a);
             }
         }
-        own.measure();
-        own
+        decimation.measure();
+        decimation
     }
 
     fn x(&self, node: u32) -> Vector3<f64> {
@@ -111,14 +111,14 @@ impl Decimation {
             for (k, &node) in corners.iter().enumerate() {
                 let x = self.x(node);
                 self.error[node as usize] += Quadric::plane(normal, x, area);
-                self.error[node as usize] += Quadric::point(x, WAY * area);
+                self.error[node as usize] += Quadric::point(x, MOVED_DISTANCE_WEIGHT * area);
                 let next = corners[(k + 1) % 3];
                 if !self.features[node as usize].contains(&next) {
                     continue;
                 }
                 let along = self.x(next) - x;
                 let across = along.cross(&normal).try_normalize(0.0).unwrap_or_default();
-                let holding = Quadric::plane(across, x, FEATURE * along.norm_squared());
+                let holding = Quadric::plane(across, x, FEATURE_PLANE_WEIGHT * along.norm_squared());
                 self.error[node as usize] += holding;
                 self.error[next as usize] += holding;
             }
@@ -137,8 +137,8 @@ impl Decimation {
         while self.alive > most {
             let Some(Reverse((_, [from, to], changes))) = moves.pop() else { return };
             let current = [from, to].map(|node| self.changes[node as usize]);
-            let there = [from, to].iter().all(|&node| self.gone_to[node as usize] == node);
-            if there && current == changes && (!form || self.keeps_form(from, to)) {
+            let are_present = [from, to].iter().all(|&node| self.merged_into[node as usize] == node);
+            if are_present && current == changes && (!form || self.keeps_form(from, to)) {
                 self.collapse(from, to);
                 self.offer(to, &mut moves);
             }
@@ -183,7 +183,7 @@ impl Decimation {
         let shared = self.around(from).filter(|corners| corners.contains(&to)).count();
         let folds = |corners: [u32; 3]| {
             let moved = corners.map(|node| if node == from { to } else { node });
-            normal(corners, &self.positions).dot(&normal(moved, &self.positions)) < TURNED
+            normal(corners, &self.positions).dot(&normal(moved, &self.positions)) < MAX_ROTATION_COSINE
         };
         common == shared && !self.around(from).filter(|corners| !corners.contains(&to)).any(folds)
     }
@@ -218,23 +218,24 @@ impl Decimation {
         let error = self.error[from as usize];
         self.error[to as usize] += error;
         self.changes[to as usize] += 1;
-        self.gone_to[from as usize] = to;
+        self.merged_into[from as usize] = to;
     }
 
     /// Returns the remaining mesh, by the nodes of the body.
     fn mesh(&self, before: &SurfaceMesh) -> Option<SurfaceMesh> {
-        let there = |node: u32| {
-            let Some(&own) = self.index.get(&node) else { return node };
-            let mut at = own;
-            while self.gone_to[at as usize] != at {
-                at = self.gone_to[at as usize];
+        let are_present = |node: u32| {
+            let Some(&start) = self.index.get(&node) else { return node };
+            let mut at = start;
+            while self.merged_into[at as usize] != at {
+                at = self.merged_into[at as usize];
             }
             self.nodes[at as usize]
         };
         let left = self.triangles.iter().filter(|[a, b, c]| a != b && b != c && c != a);
         let triangles = left.map(|corners| corners.map(|node| self.nodes[node as usize])).collect();
         let ordered = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
-        let mut edges: Vec<[u32; 2]> = before.edges.iter().map(|ends| ordered(ends.map(there))).collect();
+        let mut edges: Vec<[u32; 2]> =
+            before.edges.iter().map(|ends| ordered(ends.map(are_present))).collect();
         edges.retain(|[a, b]| a != b);
         edges.sort_unstable();
         edges.dedup();

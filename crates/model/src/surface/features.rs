@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 /// Angle between two surfaces, in degrees, above which there is an edge between them.
-const SHARP: f64 = 30.0;
+const FEATURE_ANGLE_DEGREES: f64 = 30.0;
 
 /// Side of a triangle that is an edge of its element.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +35,7 @@ pub(super) fn feature_edges(
             let turned = if one.step == other.step { -1.0 } else { 1.0 };
             let cosine = turned * normal(one).dot(&normal(other));
             // Triangles without area have no normal, and no feature edge.
-            cosine < SHARP.to_radians().cos()
+            cosine < FEATURE_ANGLE_DEGREES.to_radians().cos()
                 && normal(one) != Vector3::zeros()
                 && normal(other) != Vector3::zeros()
         }

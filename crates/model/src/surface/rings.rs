@@ -39,11 +39,11 @@ impl Ring {
     /// that touch have equal keys, with or without mid-edge nodes.
     pub(super) fn key(&self) -> [u32; 4] {
         let mut corners: Vec<u32> =
-            self.nodes.iter().filter(|(_, corner)| *corner).map(|own| own.0).collect();
+            self.nodes.iter().filter(|(_, corner)| *corner).map(|member| member.0).collect();
         corners.sort_unstable();
         corners.dedup();
         let mut key = [u32::MAX; 4];
-        key.iter_mut().zip(corners).for_each(|(own, corner)| *own = corner);
+        key.iter_mut().zip(corners).for_each(|(slot, corner)| *slot = corner);
         key
     }
 
@@ -94,7 +94,7 @@ mod tests {
         let quadratic = triangles(ElementShape::Triangle, &[0, 1, 2, 10, 11, 12]);
         assert_eq!(quadratic, Some(vec![[12, 0, 10], [10, 1, 11], [11, 2, 12], [10, 11, 12]]));
         let quadratic = triangles(ElementShape::Quadrilateral, &[0, 1, 2, 3, 10, 11, 12, 13]);
-        assert_eq!(quadratic.map(|own| own.len()), Some(6));
+        assert_eq!(quadratic.map(|ring| ring.len()), Some(6));
         assert_eq!(triangles(ElementShape::Quadrilateral, &[0, 1, 2, 3]), Some(vec![[0, 1, 2], [0, 2, 3]]));
     }
 
@@ -105,7 +105,7 @@ mod tests {
         assert_eq!(triangles(ElementShape::Quadrilateral, &[0, 1, 2, 2]), Some(vec![[0, 1, 2]]));
         assert_eq!(triangles(ElementShape::Quadrilateral, &[0, 1, 2, 0]), Some(vec![[0, 1, 2]]));
         let with_middles = triangles(ElementShape::Quadrilateral, &[0, 1, 2, 2, 10, 11, 2, 13]);
-        assert_eq!(with_middles.map(|own| own.len()), Some(4));
+        assert_eq!(with_middles.map(|ring| ring.len()), Some(4));
         assert_eq!(triangles(ElementShape::Quadrilateral, &[0, 1, 1, 0]), None);
         assert_eq!(triangles(ElementShape::Quadrilateral, &[0, 0, 0, 0]), None);
     }

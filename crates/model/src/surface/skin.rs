@@ -36,8 +36,8 @@ pub fn skin(elements: &Elements, nodes: &Nodes) -> Skin {
     for ring in placed.outer_faces() {
         for (corners, on_ring) in ring.triangles() {
             let steps = [[corners[0], corners[1]], [corners[1], corners[2]], [corners[2], corners[0]]];
-            let own = steps.into_iter().zip(on_ring).filter(|(_, on)| *on);
-            sides.extend(own.map(|(step, _)| Side { step, triangle: triangles.len() as u32 }));
+            let steps_on_ring = steps.into_iter().zip(on_ring).filter(|(_, on)| *on);
+            sides.extend(steps_on_ring.map(|(step, _)| Side { step, triangle: triangles.len() as u32 }));
             triangles.push(corners);
         }
     }
@@ -86,14 +86,17 @@ impl Placed {
     /// the elements.
     fn outer_faces(&self) -> Vec<Ring> {
         let solids = self.faces(true);
-        let mut outer: Vec<Face> =
-            solids.chunk_by(|a, b| a.key == b.key).filter(|own| own.len() == 1).map(|own| own[0]).collect();
+        let mut outer: Vec<Face> = solids
+            .chunk_by(|a, b| a.key == b.key)
+            .filter(|faces| faces.len() == 1)
+            .map(|faces| faces[0])
+            .collect();
         let mut shells = self.faces(false);
         shells.dedup_by_key(|face| face.key);
         let on_solid = |shell: &Face| solids.binary_search_by_key(&shell.key, |face| face.key).is_ok();
         outer.extend(shells.into_iter().filter(|shell| !on_solid(shell)));
         outer.sort_unstable_by_key(|face| (face.start, face.face));
-        let ends: HashMap<usize, usize> = self.iter().map(|(_, start, own)| (start, own.len())).collect();
+        let ends: HashMap<usize, usize> = self.iter().map(|(_, start, nodes)| (start, nodes.len())).collect();
         let ring = |face: Face| {
             let nodes = &self.nodes[face.start..face.start + ends[&face.start]];
             Ring::of(face.shape, face.shape.faces()[usize::from(face.face)], nodes)

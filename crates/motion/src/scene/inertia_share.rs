@@ -19,7 +19,7 @@ pub fn inertia_share(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> R
     let Some(inertia) = framed.body.inertia_stiffness() else { return Ok(None) };
     let stiffness = framed.body.invariants().modal_stiffness();
     let Some(shares) = inertia.shares(stiffness.as_ref()) else { return Ok(None) };
-    let (motion, _) = trace(body, scene, &context.unheard())?;
+    let (motion, _) = trace(body, scene, &context.without_listener())?;
     let seen = instants(body, scene, &motion.time)?;
     let at = seen.iter().map(|now| {
         let acceleration = now.velocity_rate + now.omega.cross(&now.velocity) - now.gravity;

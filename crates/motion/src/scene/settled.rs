@@ -56,7 +56,7 @@ pub fn unsettled_rate(
     let framed = FramedScene::new(body, scene)?;
     let inertia = framed.body.invariants().inertia();
     let Some(finer) = finer(&inertia, scene, recording.scheme) else { return Ok(None) };
-    let Ok((finer, _)) = simulate(body, &finer, &context.unheard()) else { return Ok(None) };
+    let Ok((finer, _)) = simulate(body, &finer, &context.without_listener()) else { return Ok(None) };
     Ok(change(&inertia, recording, &finer))
 }
 

@@ -123,7 +123,8 @@ impl ReferenceError {
                 self.modes
             );
             return Some(
-                Diagnostic::new(Code::ReferenceLacks, message).with_help("simulate a shorter `duration`"),
+                Diagnostic::new(Code::ReferenceIncomplete, message)
+                    .with_help("simulate a shorter `duration`"),
             );
         }
         let message = format!(
@@ -132,7 +133,7 @@ impl ReferenceError {
             100.0 * self.worst,
             self.time
         );
-        let warning = Diagnostic::new(Code::ReferenceLacks, message);
+        let warning = Diagnostic::new(Code::ReferenceIncomplete, message);
         let begins_with_shock = scene.acting().any(|history| history.at(0.0).0.norm() != 0.0);
         Some(if begins_with_shock && !scene.initial.settled {
             warning.with_help(
@@ -184,7 +185,7 @@ impl Estimate {
         let view = |coupled| NodalView::new(coupled, body, loads.clone(), carrier.as_ref(), of_model);
         let Some(own) = view(coupled) else { return Ok(None) };
         // Simulate the motion and choose the instants at which the residual forces are evaluated.
-        let (motion, _) = trace(body, scene, &context.unheard())?;
+        let (motion, _) = trace(body, scene, &context.without_listener())?;
         let Some(grid) = Grid::new(body, scene, &motion, duration) else {
             let error = ReferenceError::unknown(body.n_modes(), TOO_MANY_INSTANTS);
             return Ok(Some(Self { error, missing: Mat::zeros(model.rows().len(), 0) }));

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 #[derive(Default)]
 pub(super) struct Assigned {
     statements: Vec<String>,
-    goes_on: bool,
+    continues: bool,
 }
 
 impl Assigned {
@@ -15,14 +15,14 @@ impl Assigned {
         let line = line.trim();
         let first = line.split([' ', '\t', ',']).next().unwrap_or_default();
         let is_assign = first.len() >= 4 && "ASSIGN".starts_with(&first.to_ascii_uppercase());
-        if self.goes_on
+        if self.continues
             && let Some(last) = self.statements.last_mut()
         {
             last.push_str(line);
         } else if is_assign {
             self.statements.push(line[first.len()..].to_owned());
         }
-        self.goes_on = (self.goes_on || is_assign) && line.ends_with(',');
+        self.continues = (self.continues || is_assign) && line.ends_with(',');
     }
 
     /// Returns the files of OUTPUT4, in the order of the deck at `deck`. A file that is missing at the path in the deck

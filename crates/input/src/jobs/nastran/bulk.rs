@@ -16,10 +16,10 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 /// Number of bad cards that are reported one by one.
-const SHOWN: usize = 5;
-/// Largest number of scalar points in a range; `MOST_SCALARS` is the largest number in a deck.
-const MOST_IN_RANGE: i64 = 1_000_000;
-const MOST_SCALARS: usize = 10_000_000;
+const MAX_SHOWN_CARDS: usize = 5;
+/// Largest number of scalar points in a range; `MAX_SCALARS` is the largest number in a deck.
+const MAX_RANGE: i64 = 1_000_000;
+const MAX_SCALARS: usize = 10_000_000;
 /// Elements with displacements only.
 const SOLIDS: &[&str] = &["CHEXA", "CTETRA", "CPENTA", "CPYRAM", "CPYRA", "CHEXA8", "CHEXA20"];
 /// Prefixes of cards that begin with C and are no elements.
@@ -105,7 +105,7 @@ impl Bulk {
         .map_err(|diagnostic| vec![diagnostic])?;
         let mut bad = std::mem::take(&mut bulk.bad);
         if bulk.bad_count > bad.len() {
-            let message = format!("{} more cards are bad", bulk.bad_count - bad.len());
+            let message = format!("{} more cards have errors", bulk.bad_count - bad.len());
             bad.push(Diagnostic::new(Code::DeckSyntax, message).in_file(path));
         }
         bad.extend(bulk.dmigs.take_bad());
@@ -132,7 +132,7 @@ impl Bulk {
 
     fn named(&self, members: &[Members]) -> BTreeSet<(i64, u8)> {
         let mut points = BTreeSet::new();
-        for Members { first, last, components } in members.iter().filter(|own| own.first <= own.last) {
+        for Members { first, last, components } in members.iter().filter(|range| range.first <= range.last) {
             for (&id, _) in self.grids.range(first..=last) {
                 points.extend(components.iter().filter(|c| **c > 0).map(|&c| (id, c)));
             }
@@ -143,7 +143,7 @@ impl Bulk {
 
     fn complain(&mut self, diagnostic: Diagnostic) {
         self.bad_count += 1;
-        if self.bad.len() < SHOWN {
+        if self.bad.len() < MAX_SHOWN_CARDS {
             self.bad.push(diagnostic);
         }
     }
@@ -253,10 +253,8 @@ impl Bulk {
     fn scalar_points(&mut self, card: &Card) -> Option<()> {
         if card.field(1).eq_ignore_ascii_case(b"THRU") {
             let (first, last) = (card.integer(0)?, card.integer(2)?);
-            let fits = first > 0
-                && first <= last
-                && last - first < MOST_IN_RANGE
-                && self.scalars.len() < MOST_SCALARS;
+            let fits =
+                first > 0 && first <= last && last - first < MAX_RANGE && self.scalars.len() < MAX_SCALARS;
             self.scalars.extend(fits.then_some(first..=last)?);
             return Some(());
         }
@@ -348,7 +346,7 @@ fn triples(card: &Card, members: &mut Vec<Members>) -> Option<()> {
 
 /// Adds the points of a card with components, then points or a range of them.
 fn list(card: &Card, at: usize, members: &mut Vec<Members>) -> Option<()> {
-    let own = components(card.field(at))?;
+    let components = components(card.field(at))?;
     let mut k = at + 1;
     while k < card.len() {
         let field = card.field(k);
@@ -363,7 +361,7 @@ fn list(card: &Card, at: usize, members: &mut Vec<Members>) -> Option<()> {
         } else {
             first
         };
-        members.push(Members { first, last, components: own.clone() });
+        members.push(Members { first, last, components: components.clone() });
     }
     Some(())
 }

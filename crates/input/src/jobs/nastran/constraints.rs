@@ -15,7 +15,7 @@ const NOT_READ: &[&str] = &[
 ];
 
 /// Largest number of points in a THRU of a rigid element.
-const MOST_IN_RANGE: i64 = 1_000_000;
+const MAX_RANGE: i64 = 1_000_000;
 
 /// Constraints of a deck.
 #[derive(Default)]
@@ -47,7 +47,7 @@ pub(super) enum Relation {
     /// Zero sum of components, solved for the first of them; `set` is the number of its set.
     Sum { set: i64, terms: Vec<(Point, f64)> },
     /// Unsupported card with the whole numbers on it, some of which are grids.
-    NotRead { numbers: Vec<i64> },
+    Unsupported { numbers: Vec<i64> },
 }
 
 impl Constraint {
@@ -60,7 +60,7 @@ impl Constraint {
                 components.iter().map(|component| (*reference, *component)).collect()
             }
             Relation::Sum { terms, .. } => vec![terms[0].0],
-            Relation::NotRead { .. } => Vec::new(),
+            Relation::Unsupported { .. } => Vec::new(),
         }
     }
 
@@ -74,7 +74,7 @@ impl Constraint {
             }
             Relation::Average { weighted, .. } => weighted.iter().map(|(point, _)| *point).collect(),
             Relation::Sum { terms, .. } => terms[1..].iter().map(|(point, _)| *point).collect(),
-            Relation::NotRead { .. } => Vec::new(),
+            Relation::Unsupported { .. } => Vec::new(),
         }
     }
 
@@ -130,7 +130,7 @@ impl Constraints {
     /// Returns the active constraints: rigid elements, and sums of the sets that the case control selects.
     fn holding(&self) -> impl Iterator<Item = &Constraint> {
         let sets = self.sets();
-        self.all.iter().filter(move |own| match &own.relation {
+        self.all.iter().filter(move |constraint| match &constraint.relation {
             Relation::Sum { set, .. } => sets.contains(set),
             _ => true,
         })
@@ -144,8 +144,9 @@ impl Constraints {
 
     /// Returns the dependent rows, by the names of the constraints.
     pub(super) fn followers(&self) -> Vec<(String, Vec<DofLabel>)> {
-        let of =
-            |own: &Constraint| (own.name.clone(), own.dependent().into_iter().map(label).collect::<Vec<_>>());
+        let of = |constraint: &Constraint| {
+            (constraint.name.clone(), constraint.dependent().into_iter().map(label).collect::<Vec<_>>())
+        };
         self.holding().map(of).collect()
     }
 
@@ -157,23 +158,27 @@ impl Constraints {
     pub(super) fn open(&self, has: impl Fn(&Point) -> bool) -> Result<Vec<&Constraint>, Diagnostic> {
         let sets = self.sets();
         let mut open = Vec::new();
-        for own in &self.all {
-            match &own.relation {
+        for constraint in &self.all {
+            match &constraint.relation {
                 // An unsupported card matters only if it connects grids with rows.
-                Relation::NotRead { numbers } => {
+                Relation::Unsupported { numbers } => {
                     let moves = |grid: i64| (0..=6).any(|component| has(&(grid, component)));
                     if numbers.iter().filter(|number| moves(**number)).count() > 1 {
                         let help = "write the matrices of the a-set (EXTOUT, EXTSEOUT), which contain it, or write it as RBE2, RBE3 without UM, RBAR or MPC";
-                        return Err(own.refused("the constraint is not read").with_help(help));
+                        return Err(constraint
+                            .refused("constraints of this kind are not supported")
+                            .with_help(help));
                     }
                 }
-                Relation::Sum { set, .. } if !sets.contains(set) && own.dependent().iter().any(&has) => {
-                    let why = "the case control does not select the set, so that it may hold or not";
+                Relation::Sum { set, .. }
+                    if !sets.contains(set) && constraint.dependent().iter().any(&has) =>
+                {
+                    let why = "the case control does not select the set, so that it is not known whether the constraint acts";
                     let help =
-                        format!("write MPC = {set} into the case control, or take the cards of the set out");
-                    return Err(own.refused(why).with_help(help));
+                        format!("write MPC = {set} into the case control, or remove the cards of the set");
+                    return Err(constraint.refused(why).with_help(help));
                 }
-                _ if own.dependent().iter().any(&has) => open.push(own),
+                _ if constraint.dependent().iter().any(&has) => open.push(constraint),
                 _ => {}
             }
         }
@@ -197,8 +202,8 @@ fn grid(card: &Card, k: usize) -> Option<i64> {
 
 /// Returns the points of a grid. Components of scalar points are 0 or none.
 fn points(grid: i64, field: &[u8]) -> Option<Vec<Point>> {
-    let own = components(field)?;
-    Some(if own.is_empty() { vec![(grid, 0)] } else { own.into_iter().map(|c| (grid, c)).collect() })
+    let listed = components(field)?;
+    Some(if listed.is_empty() { vec![(grid, 0)] } else { listed.into_iter().map(|c| (grid, c)).collect() })
 }
 
 fn all_of(grid: i64) -> impl Iterator<Item = Point> {
@@ -213,7 +218,7 @@ fn grids(card: &Card, from: usize) -> Option<(Vec<i64>, usize)> {
         let field = card.field(k);
         if field.eq_ignore_ascii_case(b"THRU") {
             let (first, last) = (*ids.last()?, grid(card, k + 1)?);
-            (last > first && last - first < MOST_IN_RANGE).then_some(())?;
+            (last > first && last - first < MAX_RANGE).then_some(())?;
             ids.extend(first + 1..=last);
             k += 1;
         } else if !field.is_empty() {
@@ -229,26 +234,26 @@ fn grids(card: &Card, from: usize) -> Option<(Vec<i64>, usize)> {
 }
 
 fn not_read(card: &Card) -> Relation {
-    Relation::NotRead { numbers: (1..card.len()).filter_map(|k| whole(card.field(k))).collect() }
+    Relation::Unsupported { numbers: (1..card.len()).filter_map(|k| whole(card.field(k))).collect() }
 }
 
 /// Reads RBE2 with the fields EID, GN, CM, GM1, GM2, ..., ALPHA.
 fn rbe2(card: &Card) -> Option<Relation> {
-    let own = components(card.field(2)).filter(|own| !own.is_empty() && !own.contains(&0))?;
+    let listed = components(card.field(2)).filter(|listed| !listed.is_empty() && !listed.contains(&0))?;
     let (followers, end) = grids(card, 3)?;
     (end >= card.len() || is_real(card.field(end))).then_some(())?;
-    let dependent = followers.iter().flat_map(|id| own.iter().map(|c| (*id, *c))).collect();
+    let dependent = followers.iter().flat_map(|id| listed.iter().map(|c| (*id, *c))).collect();
     Some(Relation::Rigid { independent: all_of(grid(card, 1)?).collect(), dependent })
 }
 
 /// Reads RBAR with the fields EID, GA, GB, CNA, CNB, CMA, CMB, ALPHA.
 fn rbar(card: &Card) -> Option<Relation> {
-    let own = |k: usize| -> Option<Vec<Point>> {
+    let points_of_end = |k: usize| -> Option<Vec<Point>> {
         let id = grid(card, 1 + k % 2)?;
         Some(components(card.field(3 + k))?.into_iter().map(|c| (id, c)).collect())
     };
-    let independent = [own(0)?, own(1)?].concat();
-    let stated = [own(2)?, own(3)?].concat();
+    let independent = [points_of_end(0)?, points_of_end(1)?].concat();
+    let stated = [points_of_end(2)?, points_of_end(3)?].concat();
     let others = || {
         let all = all_of(grid(card, 1)?).chain(all_of(grid(card, 2)?));
         Some(all.filter(|point| !independent.contains(point)).collect())
@@ -259,10 +264,10 @@ fn rbar(card: &Card) -> Option<Relation> {
 
 /// Reads RBAR1 with the fields EID, GA, GB, CB, ALPHA.
 fn rbar1(card: &Card) -> Option<Relation> {
-    let own = components(card.field(3))?;
-    let own = if own.is_empty() { vec![1, 2, 3, 4, 5, 6] } else { own };
+    let listed = components(card.field(3))?;
+    let listed = if listed.is_empty() { vec![1, 2, 3, 4, 5, 6] } else { listed };
     let follower = grid(card, 2)?;
-    let dependent = own.into_iter().map(|c| (follower, c)).collect();
+    let dependent = listed.into_iter().map(|c| (follower, c)).collect();
     Some(Relation::Rigid { independent: all_of(grid(card, 1)?).collect(), dependent })
 }
 
@@ -276,8 +281,8 @@ fn rbe1(card: &Card) -> Option<Relation> {
         } else if is_real(card.field(k)) {
             break;
         } else {
-            let own = points(grid(card, k)?, card.field(fields.next()?))?;
-            if follows { &mut dependent } else { &mut independent }.extend(own);
+            let listed = points(grid(card, k)?, card.field(fields.next()?))?;
+            if follows { &mut dependent } else { &mut independent }.extend(listed);
         }
     }
     Some(Relation::Rigid { independent, dependent })
@@ -286,8 +291,8 @@ fn rbe1(card: &Card) -> Option<Relation> {
 /// Reads RROD with the fields EID, GA, GB, CMA, CMB, ALPHA.
 fn rrod(card: &Card) -> Option<Relation> {
     let grids = [grid(card, 1)?, grid(card, 2)?];
-    let own = [components(card.field(3))?, components(card.field(4))?];
-    let dependent = match (own[0].as_slice(), own[1].as_slice()) {
+    let listed = [components(card.field(3))?, components(card.field(4))?];
+    let dependent = match (listed[0].as_slice(), listed[1].as_slice()) {
         (&[component @ 1..=3], []) => (grids[0], component),
         ([], &[component @ 1..=3]) => (grids[1], component),
         _ => return None,
@@ -298,7 +303,7 @@ fn rrod(card: &Card) -> Option<Relation> {
 /// Reads RBE3 with the fields EID, blank, REFGRID, REFC, then groups of weight, components and grids, UM, ALPHA.
 fn rbe3(card: &Card) -> Option<Relation> {
     let reference = grid(card, 2)?;
-    let own = components(card.field(3)).filter(|own| !own.is_empty() && !own.contains(&0))?;
+    let listed = components(card.field(3)).filter(|listed| !listed.is_empty() && !listed.contains(&0))?;
     let (mut weighted, mut k) = (Vec::new(), 4);
     while k < card.len() {
         let field = card.field(k);
@@ -318,7 +323,7 @@ fn rbe3(card: &Card) -> Option<Relation> {
             k = end;
         }
     }
-    Some(Relation::Average { reference, components: own, weighted })
+    Some(Relation::Average { reference, components: listed, weighted })
 }
 
 /// Reads MPC with the fields SID, then groups of grid, component and coefficient, two per line of eight fields.

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, HashMap};
 const SINGULAR: f64 = 1e-10;
 
 /// Number of constraints that a message names.
-const NAMED: usize = 8;
+const MAX_NAMED: usize = 8;
 
 /// Point as a weighted sum of others.
 type Sum = Vec<(Point, f64)>;
@@ -33,8 +33,8 @@ pub(super) struct GridPlaces<'b> {
 
 impl<'b> GridPlaces<'b> {
     pub(super) fn new(nodes: &Nodes, axes: &'b HashMap<i64, Axes>) -> Self {
-        let own = nodes.ids.iter().zip(&nodes.positions);
-        Self { positions: own.map(|(id, x)| (*id, Vector3::from(*x))).collect(), axes }
+        let grids = nodes.ids.iter().zip(&nodes.positions);
+        Self { positions: grids.map(|(id, x)| (*id, Vector3::from(*x))).collect(), axes }
     }
 
     /// Returns true when rows of the grid are along other axes than those of the model.
@@ -66,7 +66,7 @@ impl<'b> GridPlaces<'b> {
     ) -> Result<Vector6<f64>, Diagnostic> {
         let axis = self.axis(point);
         if point.1 == 0 {
-            return Err(of.refused(format!("scalar point {} has no place in it", point.0)));
+            return Err(of.refused(format!("scalar point {} cannot be a part of it", point.0)));
         }
         let (along, about) = if point.1 <= 3 {
             (axis, (self.position(point.0, of)? - origin).cross(&axis) / length)
@@ -87,12 +87,12 @@ impl Followers {
         for constraint in constraints {
             for (point, sum) in sums(constraint, places)? {
                 if let Some((_, other)) = direct.insert(point, (sum, constraint)) {
-                    let why = format!("{} follows by {} as well", named(point), other.name);
+                    let why = format!("{} is also dependent by {}", named(point), other.name);
                     return Err(constraint.refused(why));
                 }
             }
         }
-        let mut names: Vec<String> = constraints.iter().map(|own| own.name.clone()).collect();
+        let mut names: Vec<String> = constraints.iter().map(|constraint| constraint.name.clone()).collect();
         names.dedup();
         let mut all = Self { sums: BTreeMap::new(), names };
         // Every round solves the points whose sums have no unsolved dependent points.
@@ -102,7 +102,7 @@ impl Followers {
                 direct.iter().filter(|(_, (sum, _))| ready(sum)).map(|(point, _)| *point).collect();
             if solved.is_empty() {
                 let (point, (_, constraint)) = direct.first_key_value().expect("some are left");
-                let why = format!("{} follows itself through other constraints", named(*point));
+                let why = format!("{} depends on itself through other constraints", named(*point));
                 return Err(constraint.refused(why));
             }
             for point in solved {
@@ -116,8 +116,8 @@ impl Followers {
 
     /// Returns the first names of constraints, and the number of the others.
     pub(super) fn some_names(&self) -> String {
-        let some = self.names[..self.names.len().min(NAMED)].join(", ");
-        match self.names.len().saturating_sub(NAMED) {
+        let some = self.names[..self.names.len().min(MAX_NAMED)].join(", ");
+        match self.names.len().saturating_sub(MAX_NAMED) {
             0 => some,
             more => format!("{some} and {more} more"),
         }
@@ -129,7 +129,7 @@ impl Followers {
         for (point, factor) in sum {
             match self.sums.get(point) {
                 None => *free.entry(*point).or_default() += factor,
-                Some(own) => own.iter().for_each(|(p, f)| *free.entry(*p).or_default() += factor * f),
+                Some(sum) => sum.iter().for_each(|(p, f)| *free.entry(*p).or_default() += factor * f),
             }
         }
         free.into_iter().filter(|(_, factor)| *factor != 0.0).collect()
@@ -152,7 +152,7 @@ impl Followers {
         let left: Vec<Point> = points.iter().filter(|point| !self.contains(point)).copied().collect();
         let place = |point: &Point| {
             left.binary_search(point).map(|row| row as u32).map_err(|_| {
-                let message = format!("constraints let rows follow {}, which has none", named(*point));
+                let message = format!("rows depend by constraints on {}, which has no rows", named(*point));
                 Diagnostic::new(Code::DeckRows, message)
             })
         };
@@ -160,9 +160,9 @@ impl Followers {
         for (row, point) in (0u32..).zip(points) {
             match self.sums.get(point) {
                 None => {
-                    let own = (place(point)?, row, 1.0);
-                    follows.push(own);
-                    picks.push(own);
+                    let entry = (place(point)?, row, 1.0);
+                    follows.push(entry);
+                    picks.push(entry);
                 }
                 Some(sum) => {
                     for (leader, factor) in sum {
@@ -206,7 +206,7 @@ fn sums(of: &Constraint, places: &GridPlaces<'_>) -> Result<Vec<(Point, Sum)>, D
             let others = terms[1..].iter().filter(|(_, factor)| *factor != 0.0);
             Ok(vec![(point, others.map(|(other, factor)| (*other, -factor / first)).collect())])
         }
-        Relation::NotRead { .. } => Err(of.refused("the constraint is not read")),
+        Relation::Unsupported { .. } => Err(of.refused("constraints of this kind are not supported")),
     }
 }
 
@@ -225,16 +225,17 @@ fn rigid(
     }
     let origin = places.position(first.0, of)?;
     let length = longest(independent.iter().chain(dependent), origin, of, places)?;
-    let mut own = Matrix6::zeros();
+    let mut motions = Matrix6::zeros();
     for (k, point) in independent.iter().enumerate() {
-        own.set_row(k, &places.rigid(*point, origin, length, of)?.transpose());
+        motions.set_row(k, &places.rigid(*point, origin, length, of)?.transpose());
     }
-    let inverse = inverted(own).ok_or_else(|| of.refused("its independent components leave it a motion"))?;
+    let inverse = inverted(motions)
+        .ok_or_else(|| of.refused("its independent components do not prevent all rigid motions"))?;
     let follow = |point: &Point| {
         let factors = places.rigid(*point, origin, length, of)?.transpose() * inverse;
         Ok((
             *point,
-            independent.iter().copied().zip(factors.iter().copied()).filter(|own| own.1 != 0.0).collect(),
+            independent.iter().copied().zip(factors.iter().copied()).filter(|term| term.1 != 0.0).collect(),
         ))
     };
     dependent.iter().map(follow).collect()
@@ -253,12 +254,13 @@ fn rod(
         (1..=3).map(move |component| ((grid, component), sign * line.dot(&places.axis((grid, component)))))
     };
     let all: Sum = along(a, -1.0).chain(along(b, 1.0)).collect();
-    let own = all.iter().find(|(point, _)| *point == dependent).map_or(0.0, |(_, factor)| *factor);
-    if own.abs() <= SINGULAR * line.norm() {
+    let dependent_factor =
+        all.iter().find(|(point, _)| *point == dependent).map_or(0.0, |(_, factor)| *factor);
+    if dependent_factor.abs() <= SINGULAR * line.norm() {
         return Err(of.refused("its dependent component is perpendicular to the rod"));
     }
     let others = all.into_iter().filter(|(point, factor)| *point != dependent && *factor != 0.0);
-    Ok(vec![(dependent, others.map(|(point, factor)| (point, -factor / own)).collect())])
+    Ok(vec![(dependent, others.map(|(point, factor)| (point, -factor / dependent_factor)).collect())])
 }
 
 /// Returns the rigid motion q that fits the weighted motions best, q = (B' W B)^-1 B' W u. Weights of rotations are
@@ -287,14 +289,14 @@ fn average(
         normal += weight * row * row.transpose();
         rows.push((point, weight * row));
     }
-    let inverse =
-        inverted(normal).ok_or_else(|| of.refused("the components that it averages leave it a motion"))?;
+    let inverse = inverted(normal)
+        .ok_or_else(|| of.refused("the components that it averages do not determine all rigid motions"))?;
     // Each component of the reference grid follows the fitted motion b (B' W B)^-1 B' W u.
     let follow = |component: &u8| {
         let point = (reference, *component);
-        let own = places.rigid(point, origin, length, of)?.transpose() * inverse;
+        let weights = places.rigid(point, origin, length, of)?.transpose() * inverse;
         let mut sum: BTreeMap<Point, f64> = BTreeMap::new();
-        rows.iter().for_each(|(other, row)| *sum.entry(*other).or_default() += (own * row)[0]);
+        rows.iter().for_each(|(other, row)| *sum.entry(*other).or_default() += (weights * row)[0]);
         Ok((point, sum.into_iter().filter(|(_, factor)| *factor != 0.0).collect()))
     };
     components.iter().map(follow).collect()
@@ -314,7 +316,7 @@ fn longest<'p>(
 }
 
 /// Returns the inverse; `None` for a singular matrix.
-fn inverted(own: Matrix6<f64>) -> Option<Matrix6<f64>> {
-    let values = own.singular_values();
-    (values.min() > SINGULAR * values.max()).then(|| own.try_inverse()).flatten()
+fn inverted(matrix: Matrix6<f64>) -> Option<Matrix6<f64>> {
+    let values = matrix.singular_values();
+    (values.min() > SINGULAR * values.max()).then(|| matrix.try_inverse()).flatten()
 }

@@ -29,7 +29,7 @@ pub(super) struct Matrices {
     /// Rotation of the rows to the axes of the model, if they had others.
     turn: Option<CscMatrix>,
     /// Rows that were kept, if others were left out.
-    kept: Option<Vec<usize>>,
+    retained: Option<Vec<usize>>,
 }
 
 impl Matrices {
@@ -72,7 +72,7 @@ impl Matrices {
         let mut points: BTreeSet<Point> = dmigs.points(&[k, m]).into_iter().collect();
         // Rows that others follow must exist, even if they are zero.
         let followers = followers(bulk, |point| points.contains(point), places)?;
-        points.extend(followers.iter().flat_map(|own| own.leaders()));
+        points.extend(followers.iter().flat_map(|followed| followed.leaders()));
         // Rows that are rotated together must exist as well.
         let turned: Vec<Point> = points.iter().filter(|(id, _)| places.are_turned(*id)).copied().collect();
         for (id, component) in turned {
@@ -90,23 +90,23 @@ impl Matrices {
         let Read { stiffness, mass, points, files } = read;
         let followers = followers(bulk, |point| points.binary_search(point).is_ok(), places)?;
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(&stiffness.path)];
-        let eliminated = followers.map(|own| Ok((own.eliminate(&points)?, own.some_names())));
+        let eliminated = followers.map(|all| Ok((all.eliminate(&points)?, all.some_names())));
         let followers = eliminated.transpose().map_err(in_file)?;
         let n_given = points.len();
         let labels = points.into_iter().map(label).collect();
-        Ok(Self { stiffness, mass, labels, files, n_given, followers, turn: None, kept: None })
+        Ok(Self { stiffness, mass, labels, files, n_given, followers, turn: None, retained: None })
     }
 
     /// Returns the matrices without the rows that follow others by constraints of the deck.
     pub(super) fn without_followers(self, found: &mut Vec<Diagnostic>) -> Self {
-        let Some((own, names)) = &self.followers else { return self };
-        let followers = self.n_given - own.points.len();
-        let message = format!("{followers} rows follow others and are eliminated: {names}");
+        let Some((elimination, names)) = &self.followers else { return self };
+        let followers = self.n_given - elimination.points.len();
+        let message = format!("{followers} rows depend on others and are eliminated: {names}");
         found.push(Diagnostic::new(Code::DeckConstrained, message).in_file(&self.stiffness.path));
-        let all: Vec<u32> = (0..own.points.len() as u32).collect();
-        let map = RowMap::new(own.follows.clone(), own.picks.clone(), all);
+        let all: Vec<u32> = (0..elimination.points.len() as u32).collect();
+        let map = RowMap::new(elimination.follows.clone(), elimination.picks.clone(), all);
         let rows = GivenRows::new(vec![map], HashMap::new());
-        let labels = own.points.iter().copied().map(label).collect();
+        let labels = elimination.points.iter().copied().map(label).collect();
         let [stiffness, mass] = [&self.stiffness, &self.mass].map(|raw| {
             let matrix = rows.matrix(raw.matrix.clone()).expect("all rows are kept");
             RawMatrix { matrix, digits: raw.digits, path: raw.path.clone() }
@@ -121,7 +121,7 @@ impl Matrices {
         }
         let turn = Turn::new(&self.labels, axes).map_err(|node| {
             let message = format!(
-                "rows of grid {node} stand along the axes of its CD, but not each of its directions is there once"
+                "rows of grid {node} are along the axes of its CD, but not each of its directions occurs once"
             );
             vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(&self.stiffness.path)]
         })?;
@@ -142,20 +142,21 @@ impl Matrices {
         let keeps = |(label, filled): (&DofLabel, &bool)| {
             *filled || label.direction <= 3 && moving.contains(&label.node)
         };
-        let kept: Vec<usize> = (0..labels.len()).filter(|&row| keeps((&labels[row], &filled[row]))).collect();
-        if kept.len() == labels.len() {
+        let retained: Vec<usize> =
+            (0..labels.len()).filter(|&row| keeps((&labels[row], &filled[row]))).collect();
+        if retained.len() == labels.len() {
             return self;
         }
         let turning = rows().filter(|(label, filled)| !**filled && moving.contains(&label.node)).count();
-        let left_out = labels.len() - kept.len();
+        let left_out = labels.len() - retained.len();
         let message = format!(
             "{left_out} rows without stiffness and mass are left out: {turning} rotations, {} of points that nothing is fixed to",
             left_out - turning
         );
         found.push(Diagnostic::new(Code::RowsEmpty, message).in_file(&self.stiffness.path));
-        let labels = kept.iter().map(|&row| labels[row]).collect();
-        let [stiffness, mass] = [self.stiffness, self.mass].map(|raw| principal(raw, &kept));
-        Self { stiffness, mass, labels, kept: Some(kept), ..self }
+        let labels = retained.iter().map(|&row| labels[row]).collect();
+        let [stiffness, mass] = [self.stiffness, self.mass].map(|raw| principal(raw, &retained));
+        Self { stiffness, mass, labels, retained: Some(retained), ..self }
     }
 
     /// Returns FB111 for modal coordinates: rows of scalar points with mass. K and M do not contain their shapes, and
@@ -166,7 +167,7 @@ impl Matrices {
                 && bulk.scalars.contains(&label.node)
                 && !self.mass.matrix.column(row).0.is_empty()
         };
-        let modal = self.labels.iter().enumerate().filter(|own| is_modal(*own)).count();
+        let modal = self.labels.iter().enumerate().filter(|row| is_modal(*row)).count();
         if modal == 0 {
             return Ok(());
         }
@@ -187,22 +188,24 @@ impl Matrices {
     /// Returns the maps from data by rows of the files, or by the remaining rows, to data by rows of K and M in this
     /// model. `axes` are the row axes of the grids.
     pub(super) fn given_rows(&self, axes: HashMap<i64, Axes>) -> GivenRows {
-        let n = self.followers.as_ref().map_or(self.n_given, |(own, _)| own.points.len());
+        let n = self.followers.as_ref().map_or(self.n_given, |(elimination, _)| elimination.points.len());
         let all = || (0..n).collect::<Vec<usize>>();
-        let kept = self.kept.clone().unwrap_or_else(all);
-        if self.followers.is_none() && self.turn.is_none() && kept.len() == n {
+        let retained = self.retained.clone().unwrap_or_else(all);
+        if self.followers.is_none() && self.turn.is_none() && retained.len() == n {
             return GivenRows::default();
         }
         let turn = self.turn.clone().unwrap_or_else(|| columns_of_identity(n, &all()));
-        let rows = || kept.iter().map(|&row| row as u32).collect::<Vec<u32>>();
+        let rows = || retained.iter().map(|&row| row as u32).collect::<Vec<u32>>();
         // Maps for rows of the files, for rows without dependent ones, and for rows that are also not empty.
         let whole = match &self.followers {
-            Some((own, _)) => RowMap::new(product(&turn, &own.follows), product(&turn, &own.picks), rows()),
+            Some((elimination, _)) => {
+                RowMap::new(product(&turn, &elimination.follows), product(&turn, &elimination.picks), rows())
+            }
             None => RowMap::new(turn.clone(), turn.clone(), rows()),
         };
         let left = RowMap::new(turn.clone(), turn.clone(), rows());
-        let own = product(&turn, &columns_of_identity(n, &kept));
-        let least = RowMap::new(own.clone(), own, rows());
+        let turned = product(&turn, &columns_of_identity(n, &retained));
+        let least = RowMap::new(turned.clone(), turned, rows());
         let mut maps = vec![whole];
         for map in [left, least] {
             if maps.iter().all(|known| known.n_given() != map.n_given()) {
@@ -226,8 +229,10 @@ fn product(a: &CscMatrix, b: &CscMatrix) -> CscMatrix {
     for column in 0..b.n_cols() {
         let (rows, values) = b.column(column);
         for (row, factor) in rows.iter().zip(values) {
-            let (to, own) = a.column(*row as usize);
-            entries.extend(to.iter().zip(own).map(|(to, value)| (*to, column as u32, value * factor)));
+            let (to, values_of_column) = a.column(*row as usize);
+            entries.extend(
+                to.iter().zip(values_of_column).map(|(to, value)| (*to, column as u32, value * factor)),
+            );
         }
     }
     CscMatrix::from_triplets(a.n_rows(), b.n_cols(), &entries)
@@ -267,18 +272,18 @@ fn followers(bulk: &Bulk, has: impl Fn(&Point) -> bool, places: &GridPlaces<'_>)
     Followers::new(&open, places).map(Some).map_err(one)
 }
 
-/// Returns the rows `kept` (ascending) and the same columns of a matrix that has no entries elsewhere.
-fn principal(raw: RawMatrix, kept: &[usize]) -> RawMatrix {
+/// Returns the rows `retained` (ascending) and the same columns of a matrix that has no entries elsewhere.
+fn principal(raw: RawMatrix, retained: &[usize]) -> RawMatrix {
     let mut local = vec![u32::MAX; raw.matrix.n_rows()];
-    kept.iter().enumerate().for_each(|(to, &row)| local[row] = to as u32);
+    retained.iter().enumerate().for_each(|(to, &row)| local[row] = to as u32);
     let mut col_ptr = vec![0];
     let (mut row_idx, mut values) = (Vec::new(), Vec::new());
-    for &column in kept {
-        let (rows, own) = raw.matrix.column(column);
+    for &column in retained {
+        let (rows, values_of_column) = raw.matrix.column(column);
         row_idx.extend(rows.iter().map(|&row| local[row as usize]));
-        values.extend_from_slice(own);
+        values.extend_from_slice(values_of_column);
         col_ptr.push(row_idx.len());
     }
-    let matrix = CscMatrix::from_parts(kept.len(), kept.len(), col_ptr, row_idx, values);
+    let matrix = CscMatrix::from_parts(retained.len(), retained.len(), col_ptr, row_idx, values);
     RawMatrix { matrix, ..raw }
 }

@@ -3,7 +3,7 @@
 use super::bulk::Bulk;
 use super::rows;
 use crate::dmig::Point;
-use crate::jobs::{Beside, Found, beginning_alike, both, missing};
+use crate::jobs::{Found, JobSibling, beginning_alike, both, missing};
 use crate::nastran_names::{named_pair, pair};
 use crate::output4;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -64,7 +64,7 @@ impl Outputs {
             contents.matrix(file, at).map_err(|diagnostic| vec![diagnostic.in_file(file.path())])
         };
         let (stiffness, mass) = both(matrix(k), matrix(m))?;
-        let [rows, others] = [&stiffness, &mass].map(|own| own.matrix.n_cols());
+        let [rows, others] = [&stiffness, &mass].map(|raw| raw.matrix.n_cols());
         if rows != others {
             let message = format!("{} has {rows} rows, {} has {others}", self.names[k], self.names[m]);
             return Err(vec![Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&mass.path)]);
@@ -118,7 +118,7 @@ pub(super) fn no_pair(
         "name the pair: --matrices {},{}, or matrices = [\"{0}\", \"{1}\"] in [files] of a manifest",
         names[pairs[0].0], names[pairs[0].1]
     );
-    let message = format!("{} pairs of matrices stand to choose from: {}", pairs.len(), all.join("; "));
+    let message = format!("{} pairs of matrices can be used: {}", pairs.len(), all.join("; "));
     vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(path).with_help(help)]
 }
 
@@ -126,10 +126,11 @@ pub(super) fn no_pair(
 pub(super) fn no_files(path: &Path, absent: &[PathBuf]) -> Vec<Diagnostic> {
     let what = match absent.first() {
         Some(file) => format!("{}, which the deck assigns to OUTPUT4,", file.display()),
-        None => "beside the deck a file of matrices (job.pch, job.op4)".to_owned(),
+        None => "beside the deck, a file of matrices (job.pch, job.op4)".to_owned(),
     };
     // A file of another job may be the intended one.
-    let is_like = |file: &Beside| !file.is_own && [".pch", ".op4"].iter().any(|end| file.rest.ends_with(end));
+    let is_like =
+        |file: &JobSibling| !file.is_of_job && [".pch", ".op4"].iter().any(|end| file.rest.ends_with(end));
     let mut others: Vec<String> = beginning_alike(path)
         .iter()
         .filter(|file| is_like(file))

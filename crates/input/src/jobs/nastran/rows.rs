@@ -20,8 +20,8 @@ pub(super) fn is_set(bulk: &Bulk, n: usize) -> bool {
 /// FB112 if no set has this number.
 pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<Vec<Point>, Diagnostic> {
     if bulk.resequenced {
-        let message = "SEQGP changes the order of the rows, which OUTPUT4 does not name";
-        let help = "take the SEQGP cards out, or write the matrices as DMIG";
+        let message = "SEQGP changes the order of the rows, which OUTPUT4 does not record";
+        let help = "remove the SEQGP cards, or write the matrices as DMIG";
         return Err(Diagnostic::new(Code::DeckUnsupported, message).in_file(path).with_help(help));
     }
     // The g-set.
@@ -46,7 +46,7 @@ pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<V
     let (followers, followed) = bulk.constraints.points();
     let left: BTreeSet<Point> = all().difference(&followers).copied().collect();
     if !followers.is_empty() {
-        counted.push(("without what follows by constraints".to_owned(), left.len()));
+        counted.push(("without rows dependent by constraints".to_owned(), left.len()));
         if left.len() == n {
             return Ok(left.into_iter().collect());
         }
@@ -70,7 +70,7 @@ pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<V
         }
     }
     let counted: Vec<String> = counted.into_iter().map(|(what, rows)| format!("{what} {rows}")).collect();
-    let message = format!("matrix {name} has {n} rows; of the deck {}", counted.join(", "));
+    let message = format!("matrix {name} has {n} rows, the deck gives other numbers: {}", counted.join(", "));
     let help = "write KGG and MGG, or the matrices of the a-set that ASET cards of the deck name";
     Err(Diagnostic::new(Code::DeckRows, message).in_file(path).with_help(help))
 }

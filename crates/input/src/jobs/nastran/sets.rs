@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Default)]
 pub(super) struct SetLines {
     lines: Vec<String>,
-    goes_on: bool,
+    continues: bool,
 }
 
 impl SetLines {
@@ -16,7 +16,7 @@ impl SetLines {
         let line = line.trim();
         let words: Vec<&str> = line.split_whitespace().collect();
         let is_set = words.first().is_some_and(|word| word.eq_ignore_ascii_case("SET")) && line.contains('=');
-        if self.goes_on
+        if self.continues
             && let Some(last) = self.lines.last_mut()
         {
             last.push(' ');
@@ -24,7 +24,7 @@ impl SetLines {
         } else if is_set {
             self.lines.push(line.to_owned());
         }
-        self.goes_on = (self.goes_on || is_set) && line.ends_with(',');
+        self.continues = (self.continues || is_set) && line.ends_with(',');
     }
 
     /// Returns the sets with those members that are nodes, each by its number and as `SET5`.
@@ -34,7 +34,7 @@ impl SetLines {
             let Some((number, members)) = parsed(line, nodes) else { continue };
             for name in [format!("SET{number}"), number.to_string()] {
                 // A set that is defined again in another subcase is another set: the last one is used.
-                sets.retain(|(own, _): &(String, Vec<i64>)| *own != name);
+                sets.retain(|(key, _): &(String, Vec<i64>)| *key != name);
                 sets.push((name, members.clone()));
             }
         }
@@ -45,7 +45,7 @@ impl SetLines {
 fn parsed<T>(line: &str, nodes: &BTreeMap<i64, T>) -> Option<(i64, Vec<i64>)> {
     let (head, members) = line.split_once('=')?;
     let number: i64 = head.split_whitespace().nth(1)?.parse().ok()?;
-    let mut own = BTreeSet::new();
+    let mut listed = BTreeSet::new();
     // Exceptions are taken out of the last range; numbers beyond it are members again.
     let (mut range, mut except) = (None, false);
     let mut words = members.split([',', ' ', '\t']).filter(|word| !word.is_empty()).peekable();
@@ -55,23 +55,23 @@ fn parsed<T>(line: &str, nodes: &BTreeMap<i64, T>) -> Option<(i64, Vec<i64>)> {
             continue;
         }
         if word.eq_ignore_ascii_case("ALL") {
-            own.extend(nodes.keys().copied());
+            listed.extend(nodes.keys().copied());
             continue;
         }
         let first: i64 = word.parse().ok()?;
         if words.next_if(|word| word.eq_ignore_ascii_case("THRU")).is_some() {
             let last: i64 = words.next()?.parse().ok()?;
-            let own_range = (first <= last).then_some(first..=last)?;
-            own.extend(nodes.range(own_range.clone()).map(|(id, _)| *id));
-            (range, except) = (Some(own_range), false);
+            let listed_range = (first <= last).then_some(first..=last)?;
+            listed.extend(nodes.range(listed_range.clone()).map(|(id, _)| *id));
+            (range, except) = (Some(listed_range), false);
         } else if except && range.as_ref().is_some_and(|range| range.contains(&first)) {
-            own.remove(&first);
+            listed.remove(&first);
         } else {
             except = false;
-            own.extend(nodes.contains_key(&first).then_some(first));
+            listed.extend(nodes.contains_key(&first).then_some(first));
         }
     }
-    Some((number, own.into_iter().collect()))
+    Some((number, listed.into_iter().collect()))
 }
 
 #[cfg(test)]
@@ -93,7 +93,7 @@ mod tests {
         }
         let nodes: BTreeMap<i64, ()> = [1, 2, 3, 4, 6, 9, 11].map(|id| (id, ())).into();
         let sets = lines.of(&nodes);
-        let of = |name: &str| sets.iter().find(|(own, _)| own == name).expect("a set").1.clone();
+        let of = |name: &str| sets.iter().find(|(key, _)| key == name).expect("a set").1.clone();
         // Numbers beyond the range are members again.
         assert_eq!(of("SET5"), [1, 3, 6, 9]);
         assert_eq!(of("7"), [1, 2, 3, 4, 6, 9, 11]);

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 /// Largest depth of systems that refer to one another.
-const DEEPEST: usize = 200;
+const MAX_REFERENCE_DEPTH: usize = 200;
 /// Sine of the angle between the points of a system below which they count as collinear.
 const ON_A_LINE: f64 = 1e-12;
 /// Distance from the axis, relative to that from the origin, below which a grid counts as on the axis.
@@ -60,7 +60,7 @@ pub(super) enum Definition {
 impl Grid {
     /// Returns true when both cards define the same grid.
     pub(super) fn is_the_same(&self, other: &Self) -> bool {
-        let said = |own: &Self| (own.system, own.x, own.axes, own.held.clone());
+        let said = |position: &Self| (position.system, position.x, position.axes, position.held.clone());
         said(self) == said(other)
     }
 }
@@ -134,10 +134,12 @@ impl<'b> Systems<'b> {
             return Err(refused(format!("coordinate system {id} is not in the deck")));
         };
         let at = |diagnostic: Diagnostic| diagnostic.in_file(&card.path).at_line(card.line);
-        if self.open.contains(&id) || self.open.len() >= DEEPEST {
+        if self.open.contains(&id) || self.open.len() >= MAX_REFERENCE_DEPTH {
             let through: Vec<String> = self.open.iter().take(8).map(i64::to_string).collect();
             let message = format!("coordinate system {id} refers to itself through {}", through.join(", "));
-            return Err(at(refused(message)).with_help("give a system of the circle in the basic one"));
+            return Err(
+                at(refused(message)).with_help("define one of the systems of the circle in the basic system")
+            );
         }
         self.open.push(id);
         let points = self.points(card).map_err(|diagnostic| match diagnostic.file() {
@@ -253,8 +255,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
-    let own = length(a);
-    (own > 0.0 && own.is_finite()).then(|| a.map(|x| x / own))
+    let length_of_a = length(a);
+    (length_of_a > 0.0 && length_of_a.is_finite()).then(|| a.map(|x| x / length_of_a))
 }
 
 #[cfg(test)]

@@ -87,9 +87,9 @@ pub(super) fn elements(text: &[&[u8]], head: usize, types: &Types, read: &mut El
     let mut at = (head + 2).min(end);
     while at < end {
         at = match element(&text[at..end], width) {
-            Some(own) => {
-                add(&own, types, read);
-                at + own.lines
+            Some(element) => {
+                add(&element, types, read);
+                at + element.lines
             }
             None => {
                 read.leave_out("EBLOCK with lines that cannot be read", 1);

@@ -148,7 +148,7 @@ impl<'m> NodalReference<'m> {
             100.0 * error
         );
         let help = "add --allow-long, so that the step may be halved again, or start loads from zero";
-        Some(Diagnostic::new(Code::ReferenceLacks, message).with_help(help))
+        Some(Diagnostic::new(Code::ReferenceIncomplete, message).with_help(help))
     }
 
     /// Returns the errors of the motion of `body`, evaluated at the instants of this motion; `None` if the body has
