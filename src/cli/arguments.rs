@@ -76,6 +76,12 @@ pub enum Command {
         after_help = "Examples:\n  flexbody trade rod.flex.h5 --scene tumble.toml --report trade.html\n  flexbody trade model.toml --modes 20 --scene tumble.toml --reference nodal --csv trade.csv"
     )]
     Trade(TradeArguments),
+    /// Tell which terms of the equations of motion a body needs for ranges of spin, deflection and attached mass,
+    /// without a scene, and the settings of other programs that keep them
+    #[command(
+        after_help = "Example:\n  flexbody advise rod.flex.h5 --spin 130 --deflection 0.5 --attached 0.4@big_end"
+    )]
+    Advise(AdviseArguments),
     /// Write a body with some of its modes and groups of terms, as a selection or a trade study recommends
     #[command(
         after_help = "Example:\n  flexbody reduce rod.flex.h5 --keep-modes 1,3,5-9 --terms W1 -o small.flex.h5"
@@ -113,6 +119,35 @@ pub enum Command {
     /// Print a page of the manual
     #[command(after_help = "Example:\n  flexbody man convert > flexbody-convert.1")]
     Man(ManArguments),
+}
+
+/// Arguments of `advise`.
+#[derive(Debug, Args)]
+pub struct AdviseArguments {
+    /// Flex-body file with all terms
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// Largest rotation rate of the body, in Hz
+    #[arg(long, value_name = "HZ", default_value_t = 0.0)]
+    pub spin: f64,
+    /// Largest deflection of a node, in the unit of length of the body [default: 1 % of its largest extent]
+    #[arg(long, value_name = "LENGTH", value_parser = positive)]
+    pub deflection: Option<f64>,
+    /// Mass attached to the body, in its unit of mass, at an interface or at the farthest node: MASS or MASS@INTERFACE
+    #[arg(long, value_name = "MASS[@INTERFACE]")]
+    pub attached: Option<String>,
+    /// The rotation is prescribed by joints, as that of a driven crank
+    #[arg(long)]
+    pub rotation_given: bool,
+    /// Largest size of a term that may be left out, relative to what it is compared with
+    #[arg(long, value_name = "REL", value_parser = positive, default_value_t = 0.05)]
+    pub limit: f64,
+    /// Report to write, format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
+    /// Options of printing.
+    #[command(flatten)]
+    pub printing: Printing,
 }
 
 /// Modes and terms that a command line states instead of a selection.

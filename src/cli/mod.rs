@@ -1,6 +1,7 @@
 //! Command line: arguments, one file per command, progress. Only this module prints or exits; it contains no
 //! arithmetic.
 
+mod advise;
 mod arguments;
 mod assemble;
 mod audit;

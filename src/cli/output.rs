@@ -5,8 +5,8 @@ use super::outcome::{Outcome, warnings};
 use super::resources::{memory_left, use_threads};
 use super::terminal::{colours_of_stderr, for_terminal};
 use super::{
-    assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, prepare, recipe,
-    reduce, response, select, simulate, trade, view,
+    advise, assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, prepare,
+    recipe, reduce, response, select, simulate, trade, view,
 };
 use clap::{CommandFactory, Parser};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
@@ -92,6 +92,7 @@ fn outcome_of(arguments: &Arguments) -> Result<Outcome> {
         Command::Trade(arguments) => trade::run(arguments),
         Command::Response(arguments) => response::run(arguments),
         Command::Reduce(arguments) => reduce::run(arguments),
+        Command::Advise(arguments) => advise::run(arguments),
         Command::View(arguments) => view::run(arguments),
         Command::Export(arguments) => export::run(arguments),
         Command::Audit(arguments) => audit::run(arguments),
@@ -116,6 +117,7 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
         Command::Trade(arguments) => ("trade", arguments.printing),
         Command::Response(arguments) => ("response", arguments.printing),
         Command::Reduce(arguments) => ("reduce", arguments.printing),
+        Command::Advise(arguments) => ("advise", arguments.printing),
         Command::View(arguments) => ("view", arguments.printing),
         Command::Export(arguments) => ("export", arguments.printing),
         Command::Audit(arguments) => ("audit", arguments.printing),

@@ -10,6 +10,7 @@
     clippy::unwrap_used
 )]
 
+mod advice;
 mod audit;
 mod batch;
 mod body_lumped;
@@ -62,6 +63,7 @@ mod variations;
 #[cfg(feature = "hdf5")]
 mod view;
 
+pub use advice::AdviceFacts;
 pub use audit::{audit_json, audit_text};
 pub use batch::{BatchFacts, BatchRow};
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};

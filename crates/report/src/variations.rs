@@ -2,9 +2,10 @@
 
 use super::numbers::{counted, significant};
 use flexbody_motion::scene::OutputErrors;
-use flexbody_study::reference::ReferenceError;
+use flexbody_study::reference::{MAX_REFERENCE_ERROR, ReferenceError};
 use flexbody_study::selection::VariedSelection;
-use flexbody_study::trade::Trade;
+#[cfg(feature = "hdf5")]
+use flexbody_study::trade::{InCase, Trade, TradeVariation};
 use serde::Serialize;
 
 /// Errors in a variation.
@@ -38,13 +39,13 @@ impl<'a> VariationFacts<'a> {
     }
 
     /// Returns the variations of a study with the errors of its recommended row; empty without such a row.
+    #[cfg(feature = "hdf5")]
     pub(super) fn of_trade(trade: &'a Trade) -> Vec<Self> {
         let recommended = trade.recommended.row().and_then(|row| trade.rows[row].outcome.as_ref().ok());
         let Some(varied) = recommended.and_then(|measured| measured.varied.as_ref()) else {
             return Vec::new();
         };
-        let facts = |(one, own): (&'a flexbody_study::trade::TradeVariation, _)| {
-            let own: &Option<flexbody_study::trade::InCase> = own;
+        let facts = |(one, own): (&'a TradeVariation, &Option<InCase>)| {
             let worst = own.map(|own| own.worst);
             let is_reference = one.reference.as_ref().is_none_or(ReferenceError::is_reference);
             Self {
@@ -61,7 +62,7 @@ impl<'a> VariationFacts<'a> {
     }
 
     fn is_judged(&self) -> bool {
-        self.holds || self.reference.is_none_or(|part| part <= flexbody_study::reference::MAX_REFERENCE_ERROR)
+        self.holds || self.reference.is_none_or(|part| part <= MAX_REFERENCE_ERROR)
     }
 }
 

@@ -8,6 +8,7 @@
     clippy::unwrap_used
 )]
 
+pub mod advice;
 pub mod recipe;
 pub mod reference;
 pub mod response;

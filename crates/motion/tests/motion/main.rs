@@ -20,4 +20,5 @@ mod partial_bodies;
 mod rotation;
 mod settled_rates;
 mod turning_nodes;
+mod variations;
 mod watched;

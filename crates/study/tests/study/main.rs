@@ -2,6 +2,7 @@
 
 #![allow(unreachable_pub)] // tests export nothing
 
+mod advice;
 mod continuous_motion;
 mod nodal_reference;
 mod random_verdicts;

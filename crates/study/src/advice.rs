@@ -1,0 +1,267 @@
+//! Advice on the terms of the equations of motion for ranges of spin, deflection and attached mass, without a scene: the
+//! guidelines of \[WP19\] section 8.
+
+use crate::selection::{Significance, Situation, significances};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
+use flexbody_motion::dynamics::Terms;
+use flexbody_motion::scene::{
+    Attachment, AttachmentKind, Initial, Limits, MotionRange, Range, Requirements, Run, Scene, Scheme,
+};
+use nalgebra::{Matrix3, Vector3};
+
+/// Largest deflection, relative to the extent of the body, that is assumed if none is stated. It is the value of the
+/// tables of \[WP19\].
+const ASSUMED_DEFLECTION: f64 = 0.01;
+
+/// Ranges of the motion of a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ranges {
+    /// Largest rotation rate. Unit: Hz.
+    pub spin_hz: f64,
+    /// Largest deflection of a node, in the unit of length of the body; `None` for 1 % of its extent.
+    pub deflection: Option<f64>,
+    /// Mass attached to the body at an interface.
+    pub attached: Option<AttachedMass>,
+    /// True if joints prescribe the rotation, as those of a driven crank do.
+    pub is_rotation_given: bool,
+    /// Largest size of a term, relative to the term that it is compared with, that may be left out.
+    pub limit: f64,
+}
+
+/// Point mass attached to a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AttachedMass {
+    /// Mass, in the unit of mass of the body.
+    pub mass: f64,
+    /// Name of the interface that carries it; `None` for the node farthest from the centre of mass.
+    pub interface: Option<String>,
+}
+
+/// Size of one term beside the term that it is compared with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdvisedTerm {
+    /// The term, and its bounds.
+    pub significance: Significance,
+    /// Size that decides: from the norms of the invariants where they bound the term, else from I0 and the frequencies.
+    pub size: f64,
+    /// True if the term acts in this motion: inertia of the rotation does not where the rotation is given.
+    pub counts: bool,
+}
+
+/// A guideline of \[WP19\] section 8.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GuidelineAdvice {
+    /// Name: `I`, `II`, `III`, `III, free` or `IV`.
+    pub name: &'static str,
+    /// Terms that the guideline keeps, in words.
+    pub keeps: &'static str,
+    /// Index of the largest term that the guideline leaves out, among those that count; `None` if it leaves out none.
+    pub largest_left_out: Option<usize>,
+    /// Ratio of this term to the limit; zero if the guideline leaves out none.
+    pub ratio: f64,
+}
+
+impl GuidelineAdvice {
+    /// Returns true if the guideline leaves out nothing above the limit.
+    pub fn qualifies(&self) -> bool {
+        self.ratio <= 1.0
+    }
+}
+
+/// Advice on the terms of a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Advice {
+    /// Ranges that were asked for.
+    pub ranges: Ranges,
+    /// Largest deflection, in the unit of length of the body.
+    pub deflection: f64,
+    /// Ratio of the rotation rate to the first frequency.
+    pub speed_ratio: f64,
+    /// All terms.
+    pub terms: Vec<AdvisedTerm>,
+    /// The guidelines, from the fewest terms to all.
+    pub guidelines: Vec<GuidelineAdvice>,
+    /// Groups of the kinetic energy with a term above the limit.
+    pub groups: TermGroups,
+}
+
+impl Advice {
+    /// Returns the first guideline that qualifies. The last one always does.
+    pub fn guideline(&self) -> &GuidelineAdvice {
+        let first = self.guidelines.iter().find(|one| one.qualifies());
+        first.unwrap_or(&self.guidelines[self.guidelines.len() - 1])
+    }
+}
+
+/// Guidelines with the labels of the terms that each keeps, and these terms in words.
+const GUIDELINES: [(&str, &[&str], &str); 5] = [
+    ("I", &[], "inertia of the undeformed body I0"),
+    ("II", &["II"], "I0 and the constant centrifugal load W1'w w / 2"),
+    ("III", &["II", "III"], "II, inertia W1 Q, centrifugal load W2 Q w w and Euler force W3"),
+    ("III, free", &["II", "III", FREE], "III, inertia Q'W2 Q and inertia coupling Q'W3"),
+    ("IV", &["II", "III", FREE, "IV"], "all terms, with Coriolis forces and torques"),
+];
+
+/// Label of the terms that slender free bodies need.
+const FREE: &str = "III, free slender bodies";
+
+/// Term of [`Significance`] that is a torque on the rotation, beside those that stand beside I0.
+const CORIOLIS_TORQUE: &str = "Coriolis torque";
+
+/// Returns the advice for a body in mean axes.
+///
+/// The sizes of the terms are those of [`significances`] at the largest spin w, the angular acceleration w^2, and modal
+/// amplitudes that move a node by the largest deflection. An attached mass m_a at the distance r adds the inertia
+/// mu (|r|^2 I - r r') with mu = m m_a / (m + m_a), that of both about their common centre of mass.
+///
+/// # Errors
+/// FB801 for ranges that are negative or not finite, and for an unknown interface; FB225 and others if the body has no
+/// mean axes.
+pub fn advise(body: &FlexBody, ranges: Ranges) -> Result<Advice> {
+    body.require_mean_axes("advise")?;
+    refuse_ranges(&ranges)?;
+    let deflection = ranges.deflection.unwrap_or(ASSUMED_DEFLECTION * body.extent());
+    let spin = body.units().eigenvalue_of(ranges.spin_hz).sqrt();
+    let scene = scene_of(spin, deflection, attached_inertia(body, ranges.attached.as_ref())?);
+    let situation = Situation::new(body, &scene, &[]);
+    // A term counts unless the rotation is given and the term is inertia of the rotation.
+    let advised = |significance: Significance| AdvisedTerm {
+        size: significance.of_body.unwrap_or(significance.bound),
+        counts: !(ranges.is_rotation_given && acts_on_rotation(&significance)),
+        significance,
+    };
+    let terms: Vec<AdvisedTerm> = significances(&situation, body).into_iter().map(advised).collect();
+    let guidelines =
+        GUIDELINES.map(|(name, labels, keeps)| guideline(name, labels, keeps, &terms, ranges.limit));
+    let is_needed = |group: &TermGroup| {
+        terms.iter().any(|term| term.counts && term.significance.group == *group && term.size > ranges.limit)
+    };
+    Ok(Advice {
+        deflection,
+        speed_ratio: spin / situation.first_rate.value,
+        groups: TermGroup::ALL
+            .iter()
+            .filter(|group| is_needed(group))
+            .fold(TermGroups::NONE, |all, one| all.with(*one)),
+        guidelines: guidelines.to_vec(),
+        terms,
+        ranges,
+    })
+}
+
+/// Returns true for the inertia of the rotation and the torques on it.
+fn acts_on_rotation(term: &Significance) -> bool {
+    term.beside.starts_with("I0") || term.term.starts_with(CORIOLIS_TORQUE)
+}
+
+fn guideline(
+    name: &'static str,
+    labels: &[&str],
+    keeps: &'static str,
+    terms: &[AdvisedTerm],
+    limit: f64,
+) -> GuidelineAdvice {
+    let left_out = |at: &usize| {
+        let term = &terms[*at];
+        term.counts && !labels.contains(&term.significance.guideline)
+    };
+    let largest = (0..terms.len()).filter(left_out).max_by(|a, b| terms[*a].size.total_cmp(&terms[*b].size));
+    GuidelineAdvice {
+        name,
+        keeps,
+        largest_left_out: largest,
+        ratio: largest.map_or(0.0, |at| terms[at].size / limit),
+    }
+}
+
+fn refuse_ranges(ranges: &Ranges) -> Result<()> {
+    let attached = ranges.attached.as_ref().map_or(0.0, |attached| attached.mass);
+    let values = [
+        ("rotation rate", ranges.spin_hz, 0.0),
+        ("deflection", ranges.deflection.unwrap_or(1.0), f64::MIN_POSITIVE),
+        ("attached mass", attached, 0.0),
+        ("limit", ranges.limit, f64::MIN_POSITIVE),
+    ];
+    match values.into_iter().find(|(_, value, least)| !value.is_finite() || value < least) {
+        Some((name, value, _)) => {
+            let message = format!("the {name} is {value}, expected a finite number that is not negative");
+            Err(Diagnostic::new(Code::Usage, message).into())
+        }
+        None => Ok(()),
+    }
+}
+
+/// Returns the inertia that an attached mass adds about the common centre of mass, body axes.
+fn attached_inertia(body: &FlexBody, attached: Option<&AttachedMass>) -> Result<Matrix3<f64>> {
+    let Some(AttachedMass { mass, interface }) = attached else { return Ok(Matrix3::zeros()) };
+    let centre = body.invariants().first_moment() / body.invariants().mass();
+    let place = match interface {
+        Some(name) => interface_place(body, name)?,
+        None => farthest_node(body, &centre),
+    };
+    let arm = place - centre;
+    let own = body.invariants().mass();
+    let reduced = own * mass / (own + mass);
+    Ok((Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * reduced)
+}
+
+fn interface_place(body: &FlexBody, name: &str) -> Result<Vector3<f64>> {
+    let Some(interface) = body.interfaces().iter().find(|one| one.name == name) else {
+        let names: Vec<&str> = body.interfaces().iter().map(|one| one.name.as_str()).collect();
+        let message = format!("the body has no interface `{name}`");
+        let help = match names.is_empty() {
+            true => {
+                "leave the interface out: the mass is then at the node farthest from the centre".to_owned()
+            }
+            false => format!("its interfaces are {}", names.join(", ")),
+        };
+        return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+    };
+    let centre = || {
+        let sum: Vector3<f64> = interface.nodes.iter().map(|&node| node_place(body, node)).sum();
+        sum / interface.nodes.len() as f64
+    };
+    Ok(interface.reference.map_or_else(centre, Vector3::from))
+}
+
+fn node_place(body: &FlexBody, node: usize) -> Vector3<f64> {
+    Vector3::from(body.nodes().positions[node])
+}
+
+fn farthest_node(body: &FlexBody, centre: &Vector3<f64>) -> Vector3<f64> {
+    let places = (0..body.n_nodes()).map(|node| node_place(body, node));
+    let distance = |place: &Vector3<f64>| (place - centre).norm_squared();
+    places.max_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(*centre)
+}
+
+/// Returns a scene of ranges alone.
+fn scene_of(spin: f64, deflection: f64, inertia: Matrix3<f64>) -> Scene {
+    Scene {
+        name: "ranges".to_owned(),
+        run: Run {
+            duration: None,
+            outputs: 1,
+            most_steps: Run::MOST_STEPS,
+            scheme: Scheme::Adaptive { tolerance: 1e-9 },
+            terms: Terms::ALL,
+        },
+        initial: Initial::default(),
+        gravity: None,
+        loads: Vec::new(),
+        spin: None,
+        carried: None,
+        watched: Vec::new(),
+        requirements: Requirements {
+            motion: MotionRange { angular_velocity: Some(Range::Any(spin)), ..MotionRange::default() },
+            attachment: Attachment { kind: AttachmentKind::Free, inertia, ..Attachment::default() },
+            limits: Limits { deflection: Some(deflection), ..Limits::default() },
+            ..Requirements::default()
+        },
+        source: None,
+        series: Vec::new(),
+        resolved: true,
+        case: None,
+    }
+}
