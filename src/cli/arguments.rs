@@ -151,7 +151,7 @@ pub struct AdviseArguments {
 }
 
 /// Modes and terms that a command line states instead of a selection.
-#[derive(Debug, Default, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct StatedArguments {
     /// Groups of terms of the body instead of a selection: W1, W2, W3 with commas, none, all, or the groups of a
     /// guideline of Witteveen and Pichler: I, II, III, IV
@@ -313,7 +313,7 @@ fn job_programs() -> clap::builder::PossibleValuesParser {
 }
 
 /// Properties of the job of an FE program that a manifest would state, for every command that takes a model.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct JobArguments {
     /// FE program that has written the job [default: detected from its files]
     #[arg(long, value_name = "PROGRAM", value_parser = job_programs())]
@@ -447,7 +447,7 @@ pub struct SimulateArguments {
 }
 
 /// Arguments of `convert`.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct ConvertArguments {
     /// Manifest of the model (see docs/input.md), or the job of an FE program (docs/fe_programs.md); with --from the
     /// body of another program
@@ -485,6 +485,9 @@ pub struct ConvertArguments {
     /// All flexible modes up to this frequency instead
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub max_frequency: Option<f64>,
+    /// Body whose settings are used: basis, modes, accuracy, residual vectors, frame, comparators and storage
+    #[arg(long, value_name = "BODY.flex.h5", conflicts_with_all = ["from", "modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "frame", "lumped", "storage", "scene"])]
+    pub like: Option<PathBuf>,
     /// Basis of the body
     #[arg(long, value_parser = names::basis(), default_value = BasisKind::default().name())]
     pub basis: BasisKind,

@@ -59,6 +59,7 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         scene: None,
         case: None,
         allow_unjudged: false,
+        like: None,
         stated: StatedArguments::default(),
         report: arguments.report.clone(),
         split: false,

@@ -2,6 +2,7 @@
 
 use super::arguments::{ConvertArguments, EngineName, EnrichmentName, StatedArguments};
 use super::import;
+use super::like::with_settings_of;
 use super::mode_source::ModeSource;
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
@@ -36,6 +37,8 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
         return import::run(arguments, from);
     }
+    let repeated = arguments.like.as_ref().map(|path| with_settings_of(arguments, path)).transpose()?;
+    let arguments = repeated.as_ref().unwrap_or(arguments);
     let mode_source = ModeSource::of(arguments);
     let outcome = run_with(arguments, &mode_source)?;
     mode_source.tidy();
@@ -503,7 +506,8 @@ fn refuse_overwriting(
     let shapes = arguments.shapes.as_ref().map(|path| MatrixLocation::parse(path).path);
     let loads = loads.iter().filter_map(LoadSource::file).map(|location| &location.path);
     let own = files.paths();
-    let inputs = own.iter().chain(masses).chain(&shapes).chain(loads).chain(&arguments.scene);
+    let inputs =
+        own.iter().chain(masses).chain(&shapes).chain(loads).chain(&arguments.scene).chain(&arguments.like);
     let series = cases
         .into_iter()
         .flat_map(|cases| cases.iter())

@@ -16,6 +16,7 @@ mod exit;
 mod export;
 mod import;
 mod inspect;
+mod like;
 mod mode_source;
 mod models;
 mod outcome;

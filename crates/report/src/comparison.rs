@@ -14,6 +14,7 @@ use flexbody_body::invariants::{CauchySchwarz, Invariants, compare_invariants};
 use flexbody_linalg::larger;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -95,10 +96,11 @@ pub struct BodyComparison {
 /// is such an import, the two body frames are assumed to coincide.
 ///
 /// # Errors
-/// [`BodyIncomparable`](Code::BodyIncomparable) when units, dimensions or numbers of modes differ;
-/// [`compare_common`] compares bodies with different numbers of modes.
+/// [`BodyIncomparable`](Code::BodyIncomparable) when dimensions or numbers of modes differ, or units of which only one
+/// body states its own; [`compare_common`] compares bodies with different numbers of modes.
 pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
     comparable(a, b)?;
+    let b = &*in_units_of(a, b)?;
     let placed = is_placed(a) && is_placed(b);
     let (in_own_a, in_own_b);
     // A body without a known place in the model is compared in its own frame.
@@ -165,6 +167,7 @@ pub fn compare_common(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Re
     if a.n_modes() == b.n_modes() {
         return compare(a, b, tolerances);
     }
+    let b = &*in_units_of(a, b)?;
     let common = CommonModes::of(a, b)?;
     let some = |body: &FlexBody, modes: &[usize]| body.reduced(modes, body.groups(), Vec::new());
     let mut comparison = compare(&some(a, &common.a)?, &some(b, &common.b)?, tolerances)?;
@@ -188,15 +191,19 @@ fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
     let mut problems = Vec::new();
     let incomparable = |message: String| Diagnostic::new(Code::BodyIncomparable, message);
     let (ua, ub) = (a.units(), b.units());
+    // Stated units can be converted; assumed ones may be wrong.
+    let are_stated = ua.stated && ub.stated;
     for (what, x, y) in
         [("length", &ua.length, &ub.length), ("mass", &ua.mass, &ub.mass), ("time", &ua.time, &ub.time)]
     {
-        if x.to_si() != y.to_si() {
-            problems.push(incomparable(format!(
-                "unit of {what} is `{}` in the first body and `{}` in the second",
+        if x.to_si() != y.to_si() && !are_stated {
+            let message = format!(
+                "unit of {what} is `{}` in the first body and `{}` in the second, and only one body states its units",
                 x.name(),
                 y.name()
-            )));
+            );
+            let help = "convert the model of the other body again, with its units stated";
+            problems.push(incomparable(message).with_help(help));
         }
     }
     if !have_the_same_modes(a.conditions(), b.conditions()) {
@@ -217,6 +224,17 @@ fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
         problems.push(incomparable(message).with_help(help));
     }
     if problems.is_empty() { Ok(()) } else { Err(Error::new(problems)) }
+}
+
+/// Returns `b` in the units of `a`, if both bodies state their units; else `b` as it is.
+fn in_units_of<'b>(a: &FlexBody, b: &'b FlexBody) -> Result<Cow<'b, FlexBody>> {
+    let (ua, ub) = (a.units(), b.units());
+    let pairs = [(&ua.length, &ub.length), (&ua.mass, &ub.mass), (&ua.time, &ub.time)];
+    let are_equal = pairs.iter().all(|(a, b)| a.to_si() == b.to_si());
+    if are_equal || !(ua.stated && ub.stated) {
+        return Ok(Cow::Borrowed(b));
+    }
+    b.in_units(ua).map(Cow::Owned)
 }
 
 /// Returns true if two reference conditions may be the same; a file of another program does not state its

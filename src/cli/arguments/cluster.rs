@@ -112,7 +112,7 @@ pub struct BatchArguments {
 }
 
 /// Solver for the modes.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct EngineArguments {
     /// Solver for the free modes: this program, or SLEPc over MPI (docs/cluster.md)
     #[arg(long, value_enum, default_value_t = EngineName::BuiltIn)]

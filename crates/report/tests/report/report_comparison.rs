@@ -229,10 +229,11 @@ fn bodies_with_different_numbers_of_modes_are_compared_in_what_they_have_in_comm
 }
 
 #[test]
-fn other_units_and_other_mode_counts_cannot_be_compared() {
+fn assumed_units_and_other_mode_counts_cannot_be_compared() {
     let body = engine_mount();
     let tonnes = changed(&body, |p| p.units = UnitSystem::parse("mm", "t", "s").unwrap());
-    let error = compare(&body, &tonnes, &Tolerances::default()).unwrap_err();
+    let assumed = changed(&body, |p| p.units.stated = false);
+    let error = compare(&assumed, &tonnes, &Tolerances::default()).unwrap_err();
     assert!(error.has(Code::BodyIncomparable) && error.diagnostics().len() == 2, "{error}");
     // Two names of one unit are equal.
     let tonne = changed(&body, |p| p.units = UnitSystem::parse("mm", "tonne", "s").unwrap());
@@ -321,4 +322,24 @@ fn reports_have_a_test_case_for_every_quantity_and_escape_names() {
     let json: serde_json::Value = serde_json::from_str(&written("r.json")).expect("JSON");
     assert_eq!(json, comparison.json());
     assert!(ComparisonFormat::from_path(Path::new("r.pdf")).is_none());
+}
+
+/// A body equals itself in other units, whichever of the two is the reference; assumed units are not converted.
+#[test]
+fn bodies_in_different_units_compare_by_their_meaning() {
+    let units = |length, mass, time| UnitSystem::parse(length, mass, time).expect("units");
+    let metres = oracle::flexible::soft_block(5).in_units(&units("m", "kg", "s")).expect("a body");
+    let other = metres.in_units(&units("mm", "t", "ms")).expect("a body");
+    for (a, b) in [(&metres, &other), (&other, &metres)] {
+        let comparison = compare(a, b, &Tolerances::default()).expect("a comparison");
+        assert!(comparison.passed(), "{}", comparison.text());
+    }
+    let fewer = other.reduced(&[0, 1, 2], other.groups(), Vec::new()).expect("a body");
+    let common = compare_common(&metres, &fewer, &Tolerances::default()).expect("a comparison");
+    assert!(common.passed(), "{}", common.text());
+    // One body states no units: its numbers may be in any.
+    let mut parts = other.into_parts();
+    parts.units.stated = false;
+    let assumed = FlexBody::new(parts).expect("a body");
+    assert!(compare(&metres, &assumed, &Tolerances::default()).is_err());
 }
