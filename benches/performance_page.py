@@ -1,4 +1,4 @@
-"""docs/performance.md from what benches/performance.py measured."""
+"""docs/validation/performance.md from what benches/performance.py measured."""
 
 import math
 from statistics import median

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes everything of the repository that programs write, by one command each:
 #
-#   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/codes.md, docs/format.md, schemas
+#   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/reference/codes.md, docs/reference/file_format.md, schemas
 #   ./scripts/make.sh pages [NAME]     pages with measurements: accuracy, cutoff, python, seeds, stability, trade, performance, verdicts
 #   ./scripts/make.sh fixtures NAME    fixtures: models, general, frames, broken, foreign, jobs, modes, open, ... (fixtures/make/make_NAME.py; its head says what it needs)
 #   ./scripts/make.sh site             the documentation as a site

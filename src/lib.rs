@@ -76,7 +76,7 @@
 //! `examples/joints/mod.rs` holds flexible bodies together in some two hundred lines, `examples/pendulum.rs`
 //! and `examples/slider_crank.rs` use it.
 //!
-//! **Hand the body to another program.** Errors carry codes (`docs/codes.md`), with what to do.
+//! **Hand the body to another program.** Errors carry codes (`docs/reference/codes.md`), with what to do.
 //!
 //! ```
 //! use flexbody::{ConvertOptions, Model};

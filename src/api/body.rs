@@ -57,7 +57,7 @@ impl FlexBody {
         flexbody_file::write(&self.0, path)
     }
 
-    /// Writes the body in a format of another program, given by its name on the command line (docs/export.md): the
+    /// Writes the body in a format of another program, given by its name on the command line (docs/reference/exports.md): the
     /// file, and further files beside it. Returns warnings about parts of the body that the format cannot hold.
     ///
     /// # Errors

@@ -144,7 +144,7 @@ impl Motion {
         &self.diagnostics
     }
 
-    /// Writes the motion to an HDF5 file in the format of `flexbody simulate -o` (docs/simulate.md). The file appears
+    /// Writes the motion to an HDF5 file in the format of `flexbody simulate -o` (docs/reference/simulate.md). The file appears
     /// whole or not at all.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ fn assert_generated(path: &str, generated: &str) {
 
 #[test]
 fn format_description() {
-    assert_generated("docs/format.md", &flexbody_file::format_markdown());
+    assert_generated("docs/reference/file_format.md", &flexbody_file::format_markdown());
 }
 
 #[test]
@@ -31,18 +31,18 @@ fn format_schema() {
 
 #[test]
 fn diagnostic_codes() {
-    assert_generated("docs/codes.md", &diagnostic::codes_markdown());
+    assert_generated("docs/reference/codes.md", &diagnostic::codes_markdown());
 }
 
 /// The output of `flexbody recipe` is in the page on FE programs, each piece in a block of its own.
 #[test]
 fn recipes_are_those_of_the_page() {
-    let page = oracle::root().join("docs/fe_programs.md");
+    let page = oracle::root().join("docs/how_to/from_fe_programs.md");
     let page = std::fs::read_to_string(page).expect("the page");
     for recipe in RECIPES {
         for step in recipe.steps {
             let block = format!("{}:\n\n```\n{}\n```\n", step.place, step.lines);
-            assert!(page.contains(&block), "{}: docs/fe_programs.md lacks\n{block}", recipe.program);
+            assert!(page.contains(&block), "{}: docs/how_to/from_fe_programs.md lacks\n{block}", recipe.program);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The digests of the content of a flex-body file, as `docs/format.md` describes them: a SHA-256 of every group and
+//! The digests of the content of a flex-body file, as `docs/reference/file_format.md` describes them: a SHA-256 of every group and
 //! dataset, listed by path, and a SHA-256 of this list.
 
 use super::schema::{LIST, WHOLE};

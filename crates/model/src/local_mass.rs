@@ -32,7 +32,7 @@ const MASSLESS: f64 = 0.01;
 
 /// Largest difference of the mass of a node from the mass expected from its stiffness, relative to the
 /// largest expected mass of its group, for a mass that fits. Nodes of equal elements stay within 0.12 on all
-/// models in docs/plausibility.md.
+/// models in docs/validation/plausibility.md.
 const FITS: f64 = 0.15;
 /// Smallest such difference that is reported.
 const MISFITS: f64 = 0.3;

@@ -151,8 +151,8 @@ def read_model(
     units: Sequence[object] | None = None,
     interfaces: Mapping[str, str | tuple[str, str]] | None = None,
 ) -> Model:
-    """Reads a model: a manifest (`model.toml`, docs/input.md), or what an FE program has written
-    (docs/fe_programs.md), of which `path` is the deck.
+    """Reads a model: a manifest (`model.toml`, docs/reference/input.md), or what an FE program has written
+    (docs/how_to/from_fe_programs.md), of which `path` is the deck.
 
     Parameters
     ----------

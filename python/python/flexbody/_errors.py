@@ -23,7 +23,7 @@ def _printable(text: str) -> str:
 
 
 class Diagnostic(NamedTuple):
-    """One finding: what, where, and what to do. docs/codes.md lists the codes."""
+    """One finding: what, where, and what to do. docs/reference/codes.md lists the codes."""
 
     code: str
     """Identity, as in "FB307"."""

@@ -110,7 +110,7 @@ impl ModeTable {
     pub(super) fn into_modes(mut self, file: &InputFile, source: SourceFile) -> Found<RawModes> {
         let n = self.labels.len();
         if n == 0 {
-            let help = "write the displacements of the modes: docs/fe_programs.md says how";
+            let help = "write the displacements of the modes: docs/how_to/import_modes.md says how";
             return Err(unreadable(file, "the file has no modes", help));
         }
         for (number, mode) in self.modes.iter_mut().enumerate() {
