@@ -166,7 +166,7 @@ PAGE = """\
 
 `benches/dynamics.py` wrote this page on {machine}; Python {python}, exudyn {exudyn}, numpy {numpy}. One thread each.
 
-## Beside Exudyn's `ObjectFFRFreducedOrder`
+## Compared with Exudyn's `ObjectFFRFreducedOrder`
 
 The same free body, tumbling and bent: the same modes and mass matrix (Exudyn forms its own invariants from them), start and step, the
 classical Runge-Kutta method in both programs (Exudyn: `RK44` with the rotation vector on its Lie group, as Euler parameters bring a constraint that

@@ -103,6 +103,11 @@
     clippy::unwrap_used
 )]
 
+/// The examples of the page on the library.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/reference/rust.md")]
+struct PageOnTheLibrary;
+
 mod api;
 #[cfg(feature = "cli")]
 #[allow(clippy::exit, clippy::print_stderr, clippy::print_stdout)] // the program

@@ -25,8 +25,9 @@ HEAD = """<!-- Written by scripts/pages/make_accuracy.py -->
 
 # Accuracy
 
-What `flexbody` {version} makes of the models in `fixtures/models`, against the reference numbers beside them (`expected.json`: scipy on the same
-matrices, mass properties as plain sums; frequencies printed by CalculiX). Written by `python3 scripts/pages/make_accuracy.py`.
+Results of `flexbody` {version} on the models in `fixtures/models`, compared with reference numbers (`expected.json`: scipy on the same
+matrices, mass properties as plain sums; frequencies printed by CalculiX).
+Written by `./scripts/make.sh pages accuracy`.
 """
 
 
@@ -169,7 +170,7 @@ def checks_of(found):
 def page(models, others, certificates, version):
     out = [HEAD.format(version=version), "## Modes", "",
            "Largest relative differences over all modes. CalculiX prints seven digits and splits the repeated frequencies of the cube in the last of them. The residual is |K psi - lambda M psi| / (|K psi| + |lambda M psi|), the noise "
-           "what the digits of K leave of rigid motion, relative to the first eigenvalue. The count of negative pivots must be six plus the number of modes.", ""]
+           "the stiffness of rigid motion that the digits of K leave, relative to the first eigenvalue. The count of negative pivots must be six plus the number of modes.", ""]
     out += table(["model", "element", "DOF", "modes", "eigenvalues, scipy", "frequencies, CalculiX", "worst residual", "scipy's residual", "noise", "negative pivots", "complete"],
                  [[m["name"], m["element"], f"{m['dofs']:,}", str(m["modes"]), digits(m["eigenvalue"]), digits(m["calculix"]), digits(m["residual"]),
                    digits(m["reference_residual"]), digits(m["noise"]), f"{m['pivots'][0]} of {m['pivots'][1]}", "proved" if m["proved"] else "not proved"] for m in models])
@@ -179,7 +180,7 @@ def page(models, others, certificates, version):
     out += table(["model", "mass", "centre of mass", "inertia", "I0", "W1", "W2", "W3", "row-sum W", "diagonal-scaling W"],
                  [[m["name"], *(digits(m[k]) for k in ("mass", "com", "inertia")), *(digits(m["invariants"][k]) for k in ("I0", "W1", "W2", "W3")),
                    *(digits(m["lumped"][s]) for s in SCHEMES)] for m in models])
-    out += ["## What lumped masses give", "", "Error norms of [theory](../theory.md) section 9 (`max`: largest entry, otherwise spectral norm), same modes. Rounding counts as 0.", ""]
+    out += ["## Errors of lumped masses", "", "Error norms of [theory](../theory.md) section 9 (`max`: largest entry, otherwise spectral norm), same modes. Rounding counts as 0.", ""]
     rows = []
     for m in models:
         for s in SCHEMES:
@@ -187,15 +188,15 @@ def page(models, others, certificates, version):
             rows.append([m["name"], s, "{0} (reference {1})".format(*m["negative"][s]), percent(e["com_shift"]), percent(e["I0_max"]),
                          *(percent(e[f"{k}_spectral"]) for k in ("I0", "W1", "W2", "W3", "modal_mass", "C2"))])
     out += table(["model", "scheme", "negative masses", "centre of mass", "I0 (max)", "I0", "W1", "W2", "W3", "modal mass", "C2"], rows)
-    out += ["## Identities", "", "`flexbody check --against model.toml`: how many hold, and the one that comes closest to its limit.", ""]
+    out += ["## Identities", "", "`flexbody check --against model.toml`: number of fulfilled identities, and the identity closest to its limit.", ""]
     rows = []
     for m in models:
         checks = checks_of(m["identities"])
         worst = max((c for c in checks if c["limit"] > 0), key=lambda c: c["value"] / c["limit"])
         rows.append([m["name"], f"{sum(c['passed'] for c in checks)} of {len(checks)}", f"`{worst['name']}`: {digits(worst['value'])} of {digits(worst['limit'])}"])
     out += table(["model", "hold", "closest"], rows)
-    out += ["## Nodal rotations, constraints, inner rows", "",
-            "Models of elements written for the purpose (`fixtures/make/make_general.py`), beside dense products of [theory](../theory.md) section 6 by numpy: beams and shells, a "
+    out += ["## Nodal rotations, constraints, internal rows", "",
+            "Models of elements written for the purpose (`fixtures/make/make_general.py`), compared with dense products of [theory](../theory.md) section 6 by numpy: beams and shells, a "
             "rigid connection eliminated in the matrices, bubbles and hierarchical functions without coordinates, massless rotations and spring ends. Frobenius norms about the centre of mass, "
             "relative to what the Cauchy-Schwarz inequality allows.", ""]
     out += table(["model", "element", "DOF", "mass structure", "eigenvalues, scipy", "mass", "I0", "W0", "W1", "W2", "W3", "complete", "identities hold"],
@@ -203,7 +204,7 @@ def page(models, others, certificates, version):
                    *(digits(m["norms"][k]) for k in ("I0", "W0", "W1", "W2", "W3")), "proved" if m["proved"] else "not proved", "{0} of {1}".format(*m["checks"])]
                   for m in others])
     out += ["## Accuracy `certified`", "",
-            "Guarantees of [theory](../theory.md) section 8 and what they cost: lower and upper bounds of every eigenvalue, of the error of every mode, of the rounding in every "
+            "Guarantees of [theory](../theory.md) section 8 and their cost: lower and upper bounds of every eigenvalue, of the error of every mode, of the rounding in every "
             "invariant; 20 modes. The blocks come from `benches/make_block.py`. CPU time of one thread, without reading and writing.", ""]
     out += table(["model", "DOF", "widest bounds", "digits of eigenvalues", "shape error", "digits of invariants", "counts below and above", "check", "factorisations",
                   "CPU s, `standard`", "CPU s, `certified`", "ratio"],

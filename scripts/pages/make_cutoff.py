@@ -30,18 +30,18 @@ HEAD = """<!-- Written by scripts/pages/make_cutoff.py -->
 
 A free steel plate of 1 x 0.75 x 0.01 m, bent to an arc of 0.8 rad along its long side: {cells} hexahedra with 20 nodes, {dofs:,} degrees of
 freedom, modes from {first:.0f} Hz. It spins about the axes of the model: x along the arc, y straight, z across the plate in its middle. The response is
-mostly bending, which the first modes have, and to about a tenth stretching of the plate in itself, which none of the first fifty modes has.
+mostly bending, which the first modes contain, and to about a tenth in-plane stretching, which none of the first fifty modes contains.
 
 Errors (8.13) of the static response to the centrifugal loads in the norm of K, of [theory](../theory.md#8-modes) section 8. `flexbody` {version}
-computes the modes; the exact response is a dense solve by scipy. Written by `python3 scripts/pages/make_cutoff.py`; `crates/body/tests/body/residual_vectors.rs` holds the figures.
+computes the modes; the exact response is a dense solve by scipy. Written by `./scripts/make.sh pages cutoff`; `crates/body/tests/body/residual_vectors.rs` tests the figures.
 
 """
 TAIL = """
 More modes do not help until the first one that stretches the plate; six residual vectors beside ten modes (`--modes 10 --residual-vectors
-centrifugal`) have everything, to what rounding of K leaves of a solution ({floor:.0e}). Errors in products of two spin rates (xy, yz, xz) are of
+centrifugal`) remove the whole error, down to the rounding of K in a solution ({floor:.0e}). Errors in products of two spin rates (xy, yz, xz) are of
 the same kind: {products}.
 
-`convert` reports the same errors by itself, before and after; they agree with those above to {agree:.0e}.
+`convert` reports the same errors, without and with residual vectors; they agree with those above to {agree:.0e}.
 """
 
 

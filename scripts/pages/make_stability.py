@@ -34,24 +34,24 @@ HEAD = """<!-- Written by scripts/pages/make_stability.py -->
 
 # Stability at the extremes
 
-What `flexbody` {version} keeps of extreme bodies, in decimal digits. Small models of bricks, tetrahedra and beams are made with 120 digits
+Decimal digits that `flexbody` {version} keeps of extreme bodies. Small models of bricks, tetrahedra and beams are made with 120 digits
 and written to files; the eigenproblem, the invariants and the frame of the files' numbers are then computed once more with 120 digits. Each pair of columns
-has two errors apart:
+separates two errors:
 
-* **in**: what the numbers in the files cost, exact results of the rounded matrices and coordinates against exact results of the body. These digits
-  no program has.
-* **out**: what `flexbody` loses on top, its results against exact results of the same files.
+* **in**: the error of the numbers in the files: exact results of the rounded matrices and coordinates, compared with exact results of the body. No program
+  can be more exact.
+* **out**: the additional error of `flexbody`: its results, compared with exact results of the same files.
 
 `f` are the frequencies, the worst of all modes. I0, W1, W2, W3 are compared entry by entry relative to their Cauchy-Schwarz bounds ([theory](../theory.md#9-lumped-comparators) section 9)
 in the frame of the file, the modes of eigenvalues within 10^-6 of each other turned into each other first; the worst entry counts. Modes whose eigenvalues
-differ by a part g are known to 10^-16 / g at best, which is what `out` shows of W1 to W3 beside better frequencies. `tumbling` is the state (attitude, rates, deformation)
+differ by a part g are known to 10^-16 / g at best, which explains `out` of W1 to W3 beside better frequencies. `tumbling` is the state (attitude, rates, deformation)
 after the body tumbled free for {turns} periods of its first mode at a twentieth of its frequency about an axis between the principal ones, with the modes up to ten times the first.
-16 stands for 16 or more. *told* are warnings and notes of the run; *refused* is an error with its exit code, and no file.
+16 stands for 16 or more. *told* lists warnings and notes of the run; *refused* is an error with its exit code, and no file.
 
 Every file was checked against its model (`flexbody check --against`): all passed. No case has an error above 10^-6 in frequencies, I0 or W1, or from its files in W2 and W3,
-without a warning that says so. Where rounding keeps the K-residuals above what `standard` promises, modes are projected in twice the precision ([theory](../theory.md#8-modes), after (8.4)): most frequencies then keep
-all digits of the files, and W2 and W3 what the distance of the modes leaves. Tumbling has no digits where the mass matrix of a bent needle is singular to double precision. Written by
-`python3 scripts/pages/make_stability.py`, which fails if this is not so; `crates/body/tests/body/extremes.rs` holds what is said here.
+without a warning that says so. Where rounding keeps the K-residuals above those that `standard` promises, modes are projected in twice the precision ([theory](../theory.md#8-modes), after (8.4)): most frequencies then keep
+all digits of the files, and W2 and W3 the digits that the distance of the modes permits. Tumbling has no digits where the mass matrix of a bent needle is singular to double precision. `./scripts/make.sh pages stability`
+writes this page, and fails if this is not so; `crates/body/tests/body/extremes.rs` tests these statements.
 
 ![digits kept against digits that the files hold](../images/stability.svg)
 """

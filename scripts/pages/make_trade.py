@@ -53,32 +53,32 @@ FEW = 6
 INSTANTS = 300
 HEAD = """<!-- Written by scripts/pages/make_trade.py -->
 
-# What accuracy costs
+# Cost of accuracy in each scene
 
-For each scene of `fixtures/scenes`: the body that it needs, its error against the finite element model, and the seconds that it takes in two programs that are
-not ours. `flexbody {version}`, Exudyn {exudyn}; {processor}. Written by `python3 scripts/pages/make_trade.py`.
+For each scene of `fixtures/scenes`: the body that it needs, its error against the finite element model, and the seconds that it takes in two other
+programs. `flexbody {version}`, Exudyn {exudyn}; {processor}. Written by `./scripts/make.sh pages trade`; how `trade` works: [reference](../reference/trade.md).
 
 * **Error**: `flexbody trade MODEL --modes N` simulates candidate bodies and measures each against a reference: 2N modes with residual vectors, enriched with the static
-  responses to the forces that the equations of all nodes leave unbalanced along the motion ([theory](../theory.md), (8.16)). What the reference itself lacks of the FE model is
-  estimated by the same forces and told beside. Where that is more than is allowed (**bold**), `trade` warns (FB548) and exits with 1: errors of such a scene are those against its
-  reference, and the FE model is known no better. The tumbling bracket is
-  thrown undeformed with its full spin, which is a shock: it rings at all its frequencies, and those of a body drift from those of the nodes. With `[initial] deformation = "static"`
-  it does not, and needs far fewer modes.
-* **Seconds**: of the processor, medians of {turns} runs in turns. *Exudyn*: generalised alpha with one step for all candidates of a scene, {per_period} steps per period of the highest
+  responses to the forces that the equations of all nodes leave unbalanced along the motion ([theory](../theory.md), (8.16)). The error of the reference
+  itself against the FE model is estimated by the same forces and listed. If it exceeds the tolerances (**bold**), `trade` warns (FB548) and exits with 1: errors of such a scene are
+  relative to its reference only. The tumbling bracket is
+  thrown undeformed with its full spin, which is a shock: it vibrates at all its frequencies, and those of a body differ from those of the nodes. With `[initial] deformation = "static"`
+  there is no shock, and far fewer modes are needed.
+* **Seconds** of the processor, medians of {turns} runs in turns. *Exudyn*: generalised alpha with one step for all candidates of a scene, {per_period} steps per period of the highest
   frequency that the scene asks about. *C*: the header of `export --to embedded` in a Runge-Kutta program of order 4, whose step is as long as that frequency and the highest mode of the
   body allow: a high mode that is not needed costs steps.
-* Timed are the candidates near the tolerances that no other is as cheap and as accurate as, the recommended one and the whole body, and once the reference. Lumped masses and other sets of terms take what the exact body with as many
-  modes takes.
-* **Figures**: the largest of the errors of attitude, deflection, stress and reaction, each over what the scene allows; the dashed line is 100 %.
-* **Whole body**: N free modes with residual vectors and all terms, what one would convert without knowing the scene. Where its error is beyond the tolerances (**bold**),
-  the body to take is better as well, and may cost more. Seconds in the table are those of the whole body and of the body to take.
+* **Timed candidates**: those near the tolerances that no other candidate beats in both cost and accuracy, the recommended one and the whole body, and once the reference. Lumped masses and other sets of terms take the time of the exact body with as many
+  modes.
+* **Figures**: the largest of the errors of attitude, deflection, stress and reaction, each over its tolerance; the dashed line is 100 %.
+* **Whole body**: N free modes with residual vectors and all terms, the body that one would convert without knowing the scene. If its error exceeds the tolerances (**bold**),
+  the recommended body is also more accurate, and may cost more. Seconds in the table are those of the whole body and of the recommended body.
 
 {table}
 
-Terms alone save nothing in Exudyn, whose object has no form without them (`export` writes zeros); there it is the modes that count. The C program leaves out what a body does not hold.
+Terms alone save nothing in Exudyn, whose object has no form without them (`export` writes zeros); only the number of modes counts there. The C program leaves out terms that a body does not hold.
 
-Modes that the tolerances of each scene take, by the way in which they are chosen, the lowest first where nothing else is said. Free modes and residual vectors are tried in the numbers 2N, N, N/2 and N/4 of free modes; shapes of the motion are
-those of `convert --scene --basis scene`, which know this motion only ([select](../reference/select.md#how-it-is-decided)):
+Number of modes that the tolerances of each scene need, by the way in which they are chosen; the lowest first unless stated otherwise. Free modes and residual vectors are tried in the numbers 2N, N, N/2 and N/4 of free modes; shapes of the motion are
+those of `convert --scene --basis scene`, which represent this motion only ([select](../reference/select.md#a-basis-for-one-scene)):
 
 {bases}
 
@@ -95,8 +95,8 @@ Guidelines of [WP19], section 8, taken literally as sets of terms ([theory](../t
 | III free | and Q'W2 Q in the inertia and the coupling Q'W3 |
 | IV | and Coriolis forces: everything |
 
-Each is integrated with the first {few} free modes, by a program of its own (numpy and scipy, `scripts/pages/trade_guidelines.py`, from the equations of theory section 3), against everything.
-Its whole motion agrees with `flexbody simulate` to {agree:.0e}. Numbers are attitude errors in radians / errors of the elastic energy's root; **bold** where one is beyond the tolerance of
+Each set is integrated with the first {few} free modes, by a separate program (numpy and scipy, `scripts/pages/trade_guidelines.py`, from the equations of theory section 3), and compared with all terms.
+Its whole motion agrees with `flexbody simulate` to {agree:.0e}. Numbers are attitude errors in radians / errors of the elastic energy's root; **bold** above the tolerance of
 the scene. Bodies with nodal rotations have other equations and are not in the table.
 
 """

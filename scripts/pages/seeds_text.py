@@ -6,17 +6,17 @@ import numpy as np
 
 PAGE = """<!-- Written by scripts/pages/make_seeds.py -->
 
-# How large the terms are
+# Sizes of the terms
 
 The tables of [WP19] (Witteveen and Pichler, On the relevance of inertia related terms in the equations of motion of a flexible body in the floating frame of reference formulation,
-Multibody System Dynamics 2019) on six bodies of this repository, of the kinds that the paper looks at. The bodies are others than those of the paper, so its numbers do not come out again; what every column is
-stands beside it with its formula. Misprints of the paper are corrected as in [theory, section 11](../theory.md#11-errors-in-the-literature).
+Multibody System Dynamics 2019) on six bodies of this repository, of the kinds that the paper studies. The bodies differ from those of the paper, and so do the numbers. Every column
+has its formula. Misprints of the paper are corrected as in [theory, section 11](../theory.md#11-errors-in-the-literature).
 
 | body | model | mass (kg) | largest extent (m) | modes | frequencies (Hz) |
 |---|---|---|---|---|---|
 @BODIES@
 
-Made by `python3 scripts/pages/make_seeds.py` with `flexbody` @VERSION@ and Exudyn @EXUDYN@. Free-surface modes, mass-normalised, about the centre of mass along principal axes; all numbers in kg, m, s. The car body has
+Made by `./scripts/make.sh pages seeds` with `flexbody` @VERSION@ and Exudyn @EXUDYN@. Free-surface modes, mass-normalised, about the centre of mass along principal axes; all numbers in kg, m, s. The car body has
 nodal rotations, so that its arrays are those of [theory, section 6](../theory.md#6-mass-matrices-that-do-not-commute-with-a-rotation).
 
 ## The invariants ([WP19] Tables 2 and 3)
@@ -25,19 +25,19 @@ I0 is 3 x 3 (kg m^2), W1 3 x 60 (kg^(1/2) m), W2 60 x 60 and W3 60 x 20 (numbers
 squares.
 
 @INVARIANTS@
-What one learns: no entry of W2 or W3 can exceed 1, whatever the body is, and the largest ones of W2 are between @W2LEAST@ and 1 here: the size of these arrays says little about their importance. W1 differs from body to body, but
-first of all by mass and size: no entry can exceed 2 sqrt(I0), and the largest is @W1LEAST@ to @W1MOST@ of that. What counts is what the arrays are multiplied with, which is the matter of the next tables. W3 is small for the plate, whose first modes
+Conclusion: no entry of W2 or W3 can exceed 1, whatever the body is, and the largest ones of W2 are between @W2LEAST@ and 1 here: the size of these arrays says little about their importance. W1 differs from body to body, mainly
+by mass and size: no entry can exceed 2 sqrt(I0), and the largest is @W1LEAST@ to @W1MOST@ of that. Their importance depends on the factors that they are multiplied with, which the next tables show. W3 is small for the plate, whose first modes
 move all nodes in one direction: such modes do not couple by rotation. The arrays are sparse where a body is symmetric or slender, and full for the car body.
 
 ## Ratios of terms ([WP19] Tables 4 and 5)
 
 Sizes of the terms as `flexbody select --json` states them under `significance` (`tier_1`, with the norms of the arrays): the formulas are those of [theory, section 7](../theory.md#7-sizes-of-the-terms). The body turns with a tenth of its first
-frequency, omega = @SPEED@ Omega_1, about the principal axis where the term is largest, alpha = omega^2, and the deflection is @DEFLECTION@ of the largest extent: |q| is what moves a node by that. The first three stand beside I0, the other four of them beside
+frequency, omega = @SPEED@ Omega_1, about the principal axis where the term is largest, alpha = omega^2, and the deflection is @DEFLECTION@ of the largest extent: |q| is the amplitude that moves a node by that. The first three stand beside I0, the other four of them beside
 the elastic or the inertia forces of the modes. The Coriolis torque (W1 Qd + Q'W2 Qd + Qd'W2 Q) omega, in its corrected form, stands beside I0 omega Omega_1 with the amplitudes of the [modes below](#significance-of-every-mode-wp19-27-28-36-to-40) at
 their own frequencies: about each axis the sum over the modes of the magnitudes, largest over the axes.
 
 @RATIOS@
-What one learns: at a deflection of @DEFLECTION@ the linear inertia is less than a tenth of I0, and the quadratic terms are smaller by another order. The slender beam is the exception that the paper is about: bending moves its mass away from an axis about which it has hardly
+Conclusion: at a deflection of @DEFLECTION@ the linear inertia is less than a tenth of I0, and the quadratic terms are smaller by another order. The slender beam is the exception that the paper studies: bending moves its mass away from an axis about which it has hardly
 any inertia, and @BEAM@ of the moment about that axis is quadratic. The Coriolis force of the modes is the largest force on them nearly everywhere, since it is of the first order in omega / Omega_1 and the centrifugal loads that grow with q are of the second; the plate
 hardly has one, its W3 being small. A ratio is no error: a term that is small beside another may be all that drives a slow motion ([trade.md](trade.md)).
 
@@ -52,7 +52,7 @@ How much of the body a mode moves: the root mean square of the displacement of m
 with the corrected third term of (19). For mass-normalised modes (19) is 1 / (sqrt(m) max |psi_i|), without any integral.
 
 @AVERAGED@
-What one learns: the largest displacement of a mode says little of what its inertia does. A mode of the rod, the beam or the plate moves the body by a third to a half of its largest displacement on average, one that lives in light booms by
+Conclusion: the largest displacement of a mode says little about the effect of its inertia. A mode of the rod, the beam or the plate moves the body by a third to a half of its largest displacement on average, one that lives in light booms by
 a few hundredths (@LOCAL@). A limit of the largest displacement therefore allows local modes
 much less kinetic energy than others.
 
@@ -74,21 +74,21 @@ I - W_3^T Q\\, I_0^{-1} Q^T W_3, \\qquad 1 - m^*_{pp} = \\sum_k \\frac{(Q^T W_3)
 with the signs of all other amplitudes such that it is largest. It is at most the sum of |q|^2 / I_k over the three axes, (40). Values below 1e-9 are shown as 0.
 
 @MODES@
-What one learns: with amplitudes that fall like 1 / lambda a few modes make all of the inertia terms; from the ninth on none is above @LATE@. Modes that bend a straight body have no linear term, since
+Conclusion: with amplitudes that fall like 1 / lambda a few modes make all of the inertia terms; from the ninth on none is above @LATE@. Modes that bend a straight body have no linear term, since
 they move mass across the distance from the axis, so that their first contribution is quadratic; what changes the inertia linearly are stretching modes and bending of bodies that are curved or have offsets. The coupling takes two modes that move the same
 mass in two directions: in the beam the first and the second, which bend it in its two planes, each through the amplitude of the other.
 
-## Who qualifies for guidelines I to IV ([WP19] section 8)
+## Bodies that qualify for guidelines I to IV ([WP19] section 8)
 
 Guidelines as sets of terms, with the labels of [trade.md](trade.md#guidelines-i-to-iv): I keeps I0 only, II also the constant centrifugal load W1'/2, III also W1 Q and W2 Q in the load (and the inertia coupling W3(alpha)'q), "III, free" also Q'W2 Q and
-Q'W3, IV everything: the Coriolis forces and torques of W2 and W3 too. A body qualifies for the first one that leaves out nothing above @NEGLIGIBLE@ of what stands beside it. Where joints give the rotation, as those of a driven crank do, the inertia of the rotation itself
+Q'W3, IV everything: the Coriolis forces and torques of W2 and W3 too. A body qualifies for the first one that leaves out nothing above @NEGLIGIBLE@ of the term beside it. Where joints give the rotation, as those of a driven crank do, the inertia of the rotation itself
 (W1 Q, Q'W2 Q, Q'W3 beside I0, and the Coriolis torque) does not enter the motion; of a free body it does. Beside each guideline stands the term that decides: the largest one that the guideline before it would leave out, or of I the largest that it leaves out. Deflections relative to the largest extent; the ratio of speed and frequency is omega / Omega_1 (inverted in the paper's text).
 
 @GUIDELINES@
-What one learns: a slow body is rigid where its rotation is given: at @SLOWEST@ of the first frequency @SLOW@ of 6 qualify for I with the small deflection. II, the constant centrifugal load, is what comes first with the speed when little else bends the body (@SECOND@ of 6 at @MIDDLE@ of the
-frequency): it grows with the square of the speed beside elastic forces that do not grow. At @FASTEST@ of the frequency the Coriolis force of the modes is larger, and @FAST@ of 6 need IV. A free body has to be looked at with its deflection: bent by @DEFLECTION@ @BENT@ of 6 do not qualify for I, however slow they are. The
-slender beam needs everything then, since its moment about its own axis is that of its bending. What asks for W1 Q mostly asks for the Coriolis torque of the same W1 too: what the inertia changes, the angular
-momentum has to give back, so that a group of the kinetic energy is rather needed or not as a whole. These are sizes, and cautious. What a term does to a given motion is measured by `select`: compare the [errors of the guidelines](trade.md#guidelines-i-to-iv) in scenes of these bodies.
+Conclusion: a slow body is rigid where its rotation is given: at @SLOWEST@ of the first frequency @SLOW@ of 6 qualify for I with the small deflection. II, the constant centrifugal load, is what comes first with the speed when little else bends the body (@SECOND@ of 6 at @MIDDLE@ of the
+frequency): it grows with the square of the speed beside elastic forces that do not grow. At @FASTEST@ of the frequency the Coriolis force of the modes is larger, and @FAST@ of 6 need IV. For a free body the deflection counts: bent by @DEFLECTION@ @BENT@ of 6 do not qualify for I, however slow they are. The
+slender beam needs everything then, since its moment about its own axis is that of its bending. A body that needs W1 Q mostly needs the Coriolis torque of the same W1 too, since the angular
+momentum balances the change of inertia: a group of the kinetic energy is needed or not needed as a whole. These are conservative sizes. `select` measures the effect of a term on a given motion: compare the [errors of the guidelines](trade.md#guidelines-i-to-iv) in scenes of these bodies.
 
 ## Ninety modes in a multibody run
 

@@ -349,8 +349,8 @@ pub struct SimulateArguments {
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
-    /// Manifest of the model (see docs/reference/input.md), or the job of an FE program (docs/how_to/from_fe_programs.md); with --from the
-    /// body of another program
+    /// Manifest of the model (see docs/reference/input.md), or the job of an FE program
+    /// (docs/how_to/from_fe_programs.md); with --from the body of another program
     #[arg(value_name = "MODEL.toml|JOB.inp", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs"])]
     pub model: Option<PathBuf>,
     /// Convert the body in a file of another program instead of making one from a model
@@ -431,8 +431,8 @@ pub struct ConvertArguments {
     /// Leave the surface out of the file
     #[arg(long, conflicts_with_all = ["from", "mesh_triangles"])]
     pub no_mesh: bool,
-    /// Write only the terms and modes that this scene needs (see docs/reference/select.md); its loads and band choose residual
-    /// vectors and modes unless these are stated
+    /// Write only the terms and modes that this scene needs (see docs/reference/select.md); its loads and band choose
+    /// residual vectors and modes unless these are stated
     #[arg(long, value_name = "SCENE.toml", conflicts_with = "split")]
     pub scene: Option<PathBuf>,
     /// Load case of the scene, by name [default: all, which one body must serve]

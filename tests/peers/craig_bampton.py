@@ -159,7 +159,7 @@ def compare(flexbody, name, coupling, scratch):
 PAGE = """\
 <!-- Written by tests/peers/craig_bampton.py -->
 
-# Craig-Bampton bases beside other programs
+# Craig-Bampton bases, compared with other programs
 
 `tests/peers/craig_bampton.py` converts two bodies of `fixtures/models` with `--basis craig-bampton --modes {modes}`, once with rigid and once with
 averaging interfaces, gives the same K, M and node sets to Exudyn, and the reduced matrices of the file (`/interface_coordinates`) to pyYeti.

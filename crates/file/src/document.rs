@@ -1,4 +1,5 @@
-//! The table as documentation: `docs/reference/file_format.md` and `schemas/flexbody-file.schema.json` are generated here.
+//! The table as documentation: `docs/reference/file_format.md` and `schemas/flexbody-file.schema.json` are generated
+//! here.
 
 use super::item::{DERIVED_TOLERANCE, Extent, Item, ItemKind, Origin, SchemaGroup};
 use super::schema::terms::KEPT;

@@ -11,7 +11,8 @@ use std::path::PathBuf;
 /// Arguments of `prepare`.
 #[derive(Debug, Args)]
 pub struct PrepareArguments {
-    /// Manifest of the model (see docs/reference/input.md), or the job of an FE program (docs/how_to/from_fe_programs.md)
+    /// Manifest of the model (see docs/reference/input.md), or the job of an FE program
+    /// (docs/how_to/from_fe_programs.md)
     #[arg(value_name = "MODEL.toml|JOB.inp")]
     pub model: PathBuf,
     /// Job of an FE program.

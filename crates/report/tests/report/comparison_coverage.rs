@@ -166,8 +166,8 @@ fn flatten(parts: &mut Parts) {
     general(parts).plane = true;
 }
 
-/// Returns the paths of the entries of `docs/reference/file_format.md` (attributes after `@`). The flag is true for entries
-/// marked "derived" or "always", which carry no information of their own.
+/// Returns the paths of the entries of `docs/reference/file_format.md` (attributes after `@`). The flag is true for
+/// entries marked "derived" or "always", which carry no information of their own.
 fn documented() -> Vec<(String, bool)> {
     let page = include_str!("../../../../docs/reference/file_format.md");
     let (mut group, mut separator, mut found) = ("", '/', Vec::new());
