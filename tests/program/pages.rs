@@ -2,7 +2,10 @@
 //!
 //! | block | what happens |
 //! |---|---|
-//! | `sh` | the commands run, one block after the other in one folder of the page, and succeed; with `exit=N` they end with that code, with `slow` only the slow tests run them, with `needs=A,B` only if these programs are found |
+//! | `sh` | the commands run, one block after the other in one folder of the page, and succeed |
+//! | `sh exit=N` | the last command ends with this code |
+//! | `sh slow` | the slow tests run the commands |
+//! | `sh needs=A,B` | the commands run if these programs are found |
 //! | `text` | its lines are in the output of the last `sh` block, in this order |
 //! | `toml` | is valid TOML; `toml manifest` and `toml scene` fit their schemas |
 //! | `json` | is valid JSON |
@@ -165,28 +168,37 @@ fn compile_c(block: &Block, folder: &Path) {
     assert!(done.status.success(), "{}\n{}", block.place(), String::from_utf8_lossy(&done.stderr));
 }
 
-/// Python program that runs its input if all of its modules are installed, and checks the syntax otherwise.
+/// Python program that runs its input if all of its modules are installed, and only checks the syntax otherwise.
 const PYTHON: &str = r#"
 import ast, importlib.util, sys
 text = sys.stdin.read()
-names = [name.name for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import) for name in node.names]
-names += [node.module for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
-if sys.argv[1:] != ["syntax"] and all(importlib.util.find_spec(name.split(".")[0]) for name in names):
+nodes = list(ast.walk(ast.parse(text)))
+names = [name.name for node in nodes if isinstance(node, ast.Import) for name in node.names]
+names += [node.module for node in nodes if isinstance(node, ast.ImportFrom)]
+if sys.argv[1] == "run" and all(importlib.util.find_spec(name.split(".")[0]) for name in names):
     exec(compile(text, "page", "exec"), {"__name__": "page"})
 "#;
 
-/// Runs the `python` blocks of a page as one program.
+/// Runs the `python` blocks of a page as one program. A block with `needs` is for a program that is not there: its
+/// syntax is checked.
 fn run_python(page: &str, blocks: &[&Block], folder: &Path) {
     if blocks.is_empty() || !is_installed("python3") {
         return;
     }
-    let only_syntax = blocks.iter().any(|block| block.value("needs").is_some());
-    let text: Vec<&str> = blocks.iter().map(|block| block.text.as_str()).collect();
-    fs::write(folder.join("page.py"), text.join("\n")).expect("written");
     fs::write(folder.join("runner"), PYTHON).expect("written");
-    let word = if only_syntax { "syntax" } else { "" };
-    let (code, output) = run(&format!("MPLBACKEND=Agg python3 runner {word} < page.py"), folder);
-    assert_eq!(code, Some(0), "{page}\n{output}");
+    let (other, own): (Vec<&Block>, Vec<&Block>) =
+        blocks.iter().partition(|block| block.value("needs").is_some());
+    for (word, blocks) in [("syntax", other), ("run", own)] {
+        let text: Vec<&str> = blocks.iter().map(|block| block.text.as_str()).collect();
+        let text = text.join("\n");
+        if text.contains("body.flex.h5") {
+            let command = "flexbody convert fixtures/models/cube_hex8/model.toml --modes 6 -o body.flex.h5";
+            assert_eq!(run(command, folder).0, Some(0));
+        }
+        fs::write(folder.join("page.py"), text).expect("written");
+        let (code, output) = run(&format!("MPLBACKEND=Agg python3 runner {word} < page.py"), folder);
+        assert_eq!(code, Some(0), "{page}\n{output}");
+    }
 }
 
 /// Returns the commands of `flexbody` in a block, with lines that are continued joined and placeholders left out.
