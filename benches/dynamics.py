@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Cost of the equations of motion beside Exudyn's ObjectFFRFreducedOrder and dense matrices; writes docs/dynamics.md.
+"""Cost of the equations of motion beside Exudyn's ObjectFFRFreducedOrder and dense matrices; writes docs/validation/dynamics.md.
 
     python3 -m venv target/peers && target/peers/bin/pip install exudyn==1.13.6 h5py numpy scipy
     cargo build --release --locked
@@ -166,7 +166,7 @@ PAGE = """\
 
 `benches/dynamics.py` wrote this page on {machine}; Python {python}, exudyn {exudyn}, numpy {numpy}. One thread each.
 
-## Beside Exudyn's `ObjectFFRFreducedOrder`
+## Compared with Exudyn's `ObjectFFRFreducedOrder`
 
 The same free body, tumbling and bent: the same modes and mass matrix (Exudyn forms its own invariants from them), start and step, the
 classical Runge-Kutta method in both programs (Exudyn: `RK44` with the rotation vector on its Lie group, as Euler parameters bring a constraint that
@@ -199,7 +199,7 @@ Jacobians by all coordinates and velocities and gravity, bracket_hex20:
 |---|---|---|
 {others}
 
-The unreduced equations of all nodes, state in, rates out ([theory (6.9)](theory.md#6-mass-matrices-that-do-not-commute-with-a-rotation)):
+The unreduced equations of all nodes, state in, rates out ([theory (6.9)](../theory.md#6-mass-matrices-that-do-not-commute-with-a-rotation)):
 
 | body | rows of K and M | all nodes (us) |
 |---|---|---|
@@ -245,7 +245,7 @@ def main():
     page = PAGE.format(machine=machine(), python=platform.python_version(), exudyn=version("exudyn"), numpy=version("numpy"), turns=TURNS,
                        peers=table(peers), trajectories=table(trajectories), evaluations=table(evaluations), others=table(others),
                        nodal=table(nodal))
-    (ROOT / "docs/dynamics.md").write_text(page)
+    (ROOT / "docs/validation/dynamics.md").write_text(page)
 
 
 if __name__ == "__main__":

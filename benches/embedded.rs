@@ -1,5 +1,5 @@
 //! Cost of the evaluation in C beside the library: `cargo bench --bench embedded`; with `-- --write` the
-//! table goes into docs/formats/embedded.md.
+//! table goes into docs/reference/formats/embedded.md.
 //!
 //! Accelerations of a free body from its state, each state another. Library and C programs take turns;
 //! seconds are of the processor, the ratio of every turn is formed by itself, and medians are told.
@@ -188,7 +188,7 @@ fn main() {
     );
     println!("{text}");
     if std::env::args().any(|argument| argument == "--write") {
-        let path = oracle::root().join("docs/formats/embedded.md");
+        let path = oracle::root().join("docs/reference/formats/embedded.md");
         let page = std::fs::read_to_string(&path).expect("the page");
         let (before, rest) = page.split_once("<!-- times -->\n").expect("a place for the table");
         let (_, after) = rest.split_once("<!-- end of times -->").expect("an end of the table");

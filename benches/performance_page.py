@@ -1,4 +1,4 @@
-"""docs/performance.md from what benches/performance.py measured."""
+"""docs/validation/performance.md from what benches/performance.py measured."""
 
 import math
 from statistics import median
@@ -12,16 +12,16 @@ HEAD = """<!-- Written by benches/performance.py; edit that -->
 
 # Performance
 
-`python3 benches/performance.py` makes the models and runs flexbody and its peers in turns. Every program computes {modes} flexible modes; the relative
+`./scripts/make.sh pages performance` makes the models and runs flexbody and its peers in turns. Every program computes {modes} flexible modes; the relative
 residual |K x - lambda M x| / |K x| of every mode is recomputed and must be below 1e-9 (1e-8 for a million degrees of freedom), frequencies must
-agree with flexbody's to 1e-8. Where rounding alone leaves more, eps | |K| |x| | / |K x|, that is the bound. Exudyn has no tolerance to set: its
+agree with flexbody's to 1e-8. If rounding alone exceeds this, eps | |K| |x| | / |K x| is the bound. Exudyn has no such tolerance: its
 residual and frequencies are shown, not judged.
 
-* flexbody is charged for its whole process: Matrix Market text in, checks, proof that no mode is missed, invariants, both lumped comparisons, flex-body file out.
-* Peers get the matrices as arrays for nothing. SLEPc and scipy are charged for factorisation and modes alone, with the loosest tolerance
-  tried that meets both; Exudyn for its whole conversion. Their imports are free. Memory is the peak of the process, models included.
+* flexbody is measured as a whole process: Matrix Market text in, checks, proof that no mode is missed, invariants, both lumped comparisons, flex-body file out.
+* Peers get the matrices as arrays; reading and imports are not counted. SLEPc and scipy are measured for factorisation and modes alone, with the loosest
+  tolerance that meets both conditions; Exudyn for its whole conversion. Memory is the peak of the process, models included.
 * CPU is user + system seconds of all threads. Figures are medians; +/- is half the range of the runs. Model files are in the page cache. Every run
-  follows one of the same program that is not measured: a virtual machine gets memory from its host page by page, at up to 2.5 ms per MB, whoever is first.
+  follows an unmeasured one of the same program: a virtual machine gets memory from its host page by page, at up to 2.5 ms per MB, in the first run.
 * Ratios are peer over flexbody on as many threads: above 1, flexbody needs less. `*`: measured on another occasion than flexbody's figures beside it.
 """
 
@@ -141,7 +141,7 @@ def target_lines(r):
         if found is not None:
             met = found >= bound if more else found <= bound
             rows.append((name, ("at least " if more else "at most ") + f"{bound:,g}", number(found), "yes" if met else "**no**"))
-    return rows and ["## Targets", "", *table(("", "wanted", "found", "met"), rows), ""]
+    return rows and ["## Targets", "", *table(("", "target", "measured", "met"), rows), ""]
 
 
 def spread(runs, what):
@@ -185,7 +185,7 @@ def phase_lines(r):
     rows = [[name, *[" / ".join(number(r.phase(case, f"flexbody-{t}", name, "wall_seconds")) for t in (1, 2)) for case in cases]] for name in names]
     counters = list(dict.fromkeys(key for case in cases for key in r.program(case, "flexbody-2")["detail"]["counters"]))
     work = [[name.replace("_", " "), *[f"{r.counter(case, name):,}" if r.counter(case, name) is not None else "" for case in cases]] for name in counters]
-    return ["## Where flexbody's time goes", "", "Wall seconds on 1 thread / on 2, last run.", "", *table(["phase", *cases], rows), "",
+    return ["## Time of each phase", "", "Wall seconds on 1 thread / on 2, last run.", "", *table(["phase", *cases], rows), "",
             "Work, the same at any thread count.", "", *table(["counter", *cases], work), ""]
 
 

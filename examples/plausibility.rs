@@ -1,7 +1,7 @@
-//! Writes docs/plausibility.md: what the checks of the mass against the stiffness find on every model at
-//! hand, in the right order and in wrong ones.
+//! Writes the table of docs/validation/plausibility.md: findings of the checks of the mass against the stiffness on
+//! every model at hand, in the right order and in wrong ones.
 //!
-//!     cargo run --release --example plausibility > docs/plausibility.md
+//!     cargo run --release --example plausibility
 //!
 //! With folders of models as arguments it prints their rows only.
 
@@ -39,43 +39,6 @@ const NAMES: [(&str, &str); 9] = [
     ("k_c3d8r_singularM", "bar, CalculiX C3D8R"),
 ];
 
-/// What stands before the table.
-const HEAD: &str = "\
-<!-- Written by cargo run --release --example plausibility -->
-
-# Does the mass belong to the stiffness, and are the units right?
-
-`flexbody` takes K, M and the nodes from three files, which may come from different runs. What each check looks at, its threshold, and what it cannot
-see stands here; the table below has its figures on every model of the fixtures and on models from other programs, in the right order and in wrong ones.
-
-| check | statistic | threshold | code |
-|---|---|---|---|
-| K against the nodes | force of rigid motion relative to the row sum of abs(K) | 10^-6, more for few digits | FB410, error |
-| K and M exchanged | displacement rows that a translation leaves free: more than half of M and less than a tenth of K | row sum below 10^-6 | FB438, error |
-| pattern of M against K | pairs of nodes with mass between them (above 10^-10 of the root of the diagonal entries) that K does not couple at all | none | FB433, error |
-| the same, when every node of a group has mass with every other | as of a point mass that was spread over nodes without stiffness (RBE3), or fluid around a body | none | FB434, warning |
-| exchanged masses | nodes that K couples with exactly the same others, thus of the same elements: mass against e = -1/2 sum r'K_ij r, relative to the largest of the group | off by 0.3, and less than 0.15 when two of them are exchanged | FB435, warning |
-| speed of sound | root of e/(d m), of the sums over the body and the median over the nodes; both must be out | 20 to 25,000 m/s; 1000 m/s where elements are heavier than 2500 kg/m^3 | FB436, warning |
-| density of solid elements | quartiles over up to 400 nodes of row-sum mass over the node's part of the elements around it | 10 to 25,000 kg/m^3: three quarters on one side | FB437, error |
-| density of everything else | mass over the box around the nodes | 0.1 to 30,000 kg/m^3 | FB413, warning |
-
-* e needs no element: with r the vectors to the other nodes, its sum over an isotropic solid is (6 lambda + 9 mu) V with Lame's constants, and E A L over a bar, without
-  bending, whatever the elements are. In a body of one material e/m is the same for all nodes, corners of quadratic elements with their negative
-  row sums included, up to the distortion of the elements. d is the number of directions.
-* Elements are found as the largest sets of nodes that K couples all with each other. Volumes and shares of mass are exact for affine elements with 4, 6, 8, 10 and
-  20 nodes, off by some percent for curved ones; nodes with anything else around them (rotations, bars, other sets) are not judged, nor are quadratic elements with a diagonal mass.
-* Numbers whose units nothing states are taken for m, kg, s; a speed that no matter has there is refused as well (FB437) where common units explain it. `allow_implausible = true` in `[model]`, or `--allow-implausible`, turns FB433 and FB437 into warnings.
-
-What stays invisible: the order of a **diagonal** M, which couples nothing (e/m from node to node is no help: slivers among linear tetrahedra spread it by
-factors of a thousand in the right order); M of a mesh with the same connections and other positions or densities; nodes of the same elements with like masses (the
-largest such change on each model is in the table); any order where K is full, as after static condensation; directions of a mass that is the same along x, y and z. A step of 386 between
-pounds and slinches shows in solids that are heavy enough, not in beams and shells.
-
-`M in random order`, `reversed` and the exchanges move whole nodes (with as many rows); the exchanges are up to sixty random pairs each (fewer in large models), those that do not change M left out. Changes are
-Frobenius norms relative to that of M. A code after a number says how many were told by it. Reversing a regular block leaves M as it was; models whose nodes have different numbers of rows are not reversed.
-
-";
-
 fn main() {
     let chosen: Vec<PathBuf> = std::env::args().skip(1).map(PathBuf::from).collect();
     if !chosen.is_empty() {
@@ -85,14 +48,16 @@ fn main() {
     let mut folders = subfolders(&root.join("fixtures/models"));
     folders.push(root.join("fixtures/small/tet4"));
     folders.extend(subfolders(&root.join("../shared/models")));
-    print!("{HEAD}");
-    println!(
-        "| model | pairs of M | not of K | speed, whole / median (m/s) | density, quartiles (kg/m^3) | told in the right order | M in random order | M reversed | two far nodes exchanged | two coupled nodes exchanged | largest change that passes | smallest that is told |"
+    let mut table = String::from(
+        "| model | pairs of M | not of K | speed, whole / median (m/s) | density, quartiles (kg/m^3) | found in the right order | M in random order | M reversed | two far nodes exchanged | two coupled nodes exchanged | largest undetected change | smallest detected change |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
-    for folder in folders {
-        println!("{}", row(&folder));
-    }
+    folders.iter().for_each(|folder| table.push_str(&format!("{}\n", row(folder))));
+    let path = root.join("docs/validation/plausibility.md");
+    let page = std::fs::read_to_string(&path).expect("the page");
+    let (before, rest) = page.split_once("<!-- models -->\n").expect("a place for the table");
+    let (_, after) = rest.split_once("<!-- end of models -->").expect("an end of the table");
+    let page = format!("{before}<!-- models -->\n{table}<!-- end of models -->{after}");
+    std::fs::write(&path, page).expect("written");
 }
 
 fn subfolders(folder: &Path) -> Vec<PathBuf> {

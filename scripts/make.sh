@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
 # Makes everything of the repository that programs write, by one command each:
 #
-#   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/codes.md, docs/format.md, schemas
-#   ./scripts/make.sh pages [NAME]     pages with measurements: accuracy, cutoff, python, seeds, stability, trade, performance, verdicts
+#   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/reference/codes.md, docs/reference/file_format.md, schemas
+#   ./scripts/make.sh pages [NAME]     pages of docs/validation, docs/reference/python.md and pictures; without NAME all of them (some hours). NAME:
+#                                      accuracy, craig_bampton, cutoff, dynamics, embedded, peers, performance, plausibility, python, seeds, stability,
+#                                      trade, verdicts [COUNT], image_response, image_simulation, image_terminal, image_tutorial, image_view, image_vtk
 #   ./scripts/make.sh fixtures NAME    fixtures: models, general, frames, broken, foreign, jobs, modes, open, ... (fixtures/make/make_NAME.py; its head says what it needs)
 #   ./scripts/make.sh site             the documentation as a site
 #   ./scripts/make.sh wheel            the Python package
@@ -35,18 +37,22 @@ bless)
     fi
     ;;
 pages)
+    # shellcheck source=scripts/cmake.sh
+    source scripts/cmake.sh
     case "$name" in
+    craig_bampton) "${PYTHON:-python3}" tests/peers/craig_bampton.py ;;
+    dynamics) "${PYTHON:-python3}" benches/dynamics.py ;;
+    embedded) cargo bench --locked --bench embedded -- --write ;;
+    peers) "${PYTHON:-python3}" tests/peers/suite.py --install --write ;;
     performance) ./benches/page.sh ;;
-    verdicts)
-        # shellcheck source=scripts/cmake.sh
-        source scripts/cmake.sh
-        FLEXBODY_BLESS=1 FLEXBODY_VERDICTS="${3:-600}" cargo test --release --locked --package flexbody-study random_verdicts -- --include-ignored
-        ;;
+    plausibility) cargo run --release --locked --example plausibility ;;
+    verdicts) FLEXBODY_BLESS=1 FLEXBODY_VERDICTS="${3:-600}" cargo test --release --locked --package flexbody-study random_verdicts -- --include-ignored ;;
     "")
-        for page in docs/make_*.py; do python3 "$page"; done
-        ./benches/page.sh
+        for script in scripts/pages/make_*.py scripts/pages/image_*.py; do "${PYTHON:-python3}" "$script"; done
+        for page in craig_bampton dynamics embedded peers performance plausibility verdicts; do ./scripts/make.sh pages "$page"; done
         ;;
-    *) python3 "docs/make_$name.py" ;;
+    image_*) "${PYTHON:-python3}" "scripts/pages/$name.py" "${@:3}" ;;
+    *) "${PYTHON:-python3}" "scripts/pages/make_$name.py" "${@:3}" ;;
     esac
     ;;
 fixtures)

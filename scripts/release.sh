@@ -10,7 +10,7 @@
 #
 # Needed: what the build needs (README.md), the Rust target x86_64-unknown-linux-musl (rustup adds it) and a C compiler for musl
 # (musl-tools of Debian and Ubuntu, musl-gcc of Fedora, or MUSL_CC=compiler). FLEXBODY=program is an ordinary build of the same
-# sources to compare with, which is then not built. docs/releases.md says what else belongs to a release: that ./.ci/run passes.
+# sources to compare with, which is then not built. docs/reference/versions.md says what else belongs to a release: that ./.ci/run passes.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/cmake.sh
@@ -93,7 +93,7 @@ for model in connecting_rod bracket_hex20 frame_beams; do
     if cmp --silent "$work/$model.ordinary.flex.h5" "$work/$model.static.flex.h5"; then
         echo "   $model: the same bytes"
     else
-        # METIS takes rand() of the C library, and principal axes its hypot(): docs/releases.md.
+        # METIS takes rand() of the C library, and principal axes its hypot(): docs/reference/versions.md.
         echo "   $model: the same body, not to the last bit"
     fi
 done

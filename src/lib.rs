@@ -77,7 +77,7 @@
 //! `examples/joints/mod.rs` holds flexible bodies together in some two hundred lines, `examples/pendulum.rs`
 //! and `examples/slider_crank.rs` use it.
 //!
-//! **Hand the body to another program.** Errors carry codes (`docs/codes.md`), with what to do.
+//! **Hand the body to another program.** Errors carry codes (`docs/reference/codes.md`), with what to do.
 //!
 //! ```
 //! use flexbody::{ConvertOptions, Model};
@@ -103,6 +103,11 @@
     clippy::too_many_lines,
     clippy::unwrap_used
 )]
+
+/// The examples of the page on the library.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/reference/rust.md")]
+struct PageOnTheLibrary;
 
 mod api;
 #[cfg(feature = "cli")]

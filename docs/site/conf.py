@@ -6,7 +6,7 @@ project = "flexbody"
 author = "the flexbody developers"
 extensions = ["myst_parser", "sphinx.ext.mathjax"]
 root_doc = "README"
-include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "fixtures/README.md", "fixtures/cases/README.md", "python/README.md", "docs/*.md", "docs/how_to/*.md", "docs/formats/*.md"]
+include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "fixtures/README.md", "fixtures/cases/README.md", "python/README.md", "docs/*.md", "docs/**/*.md"]
 # Headings are link targets and formulas stand between dollars, as where the sources are read.
 myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath"]
@@ -15,24 +15,25 @@ html_theme = "furo"
 html_title = "flexbody"
 html_copy_source = False
 
-# What the side bar has: its groups, and the pages of each in the order of reading.
+# Groups of the side bar, with the pages of each in the order of reading.
 CONTENTS = {
-    "Use": ["docs/tutorial", "docs/how_to/rotor", "docs/how_to/robot_link", "docs/how_to/vehicle_frame", "docs/how_to/satellite", "docs/fe_programs", "docs/recipes", "docs/python", "docs/input", "docs/simulate", "docs/select", "docs/response", "docs/export", "docs/audit", "docs/view", "docs/reference", "docs/codes"],
-    "Theory": ["docs/theory", "docs/plausibility", "docs/craig_bampton", "docs/cutoff"],
-    "Measured": ["docs/accuracy", "docs/trade", "docs/verdicts", "docs/seeds", "docs/stability", "docs/performance", "docs/dynamics"],
-    "Files": ["docs/format", "docs/formats/*"],
-    "Project": ["docs/releases", "python/README", "ARCHITECTURE", "fixtures/README", "fixtures/cases/README", "CONTRIBUTING", "CHANGELOG"],
+    "Start": ["docs/start/tour", "docs/start/tutorial", "docs/start/accuracy", "docs/start/basis"],
+    "Parts": ["docs/how_to/rotor", "docs/how_to/robot_link", "docs/how_to/frame", "docs/how_to/satellite"],
+    "From FE programs": ["docs/how_to/from_fe_programs", "docs/how_to/from_calculix", "docs/how_to/from_abaqus", "docs/how_to/from_ansys", "docs/how_to/from_nastran", "docs/how_to/from_open_codes", "docs/how_to/import_modes"],
+    "To other programs": ["docs/how_to/to_exudyn", "docs/how_to/to_mbdyn", "docs/how_to/to_simpack_modelica", "docs/how_to/to_mbsim", "docs/how_to/to_simscape", "docs/how_to/to_chrono", "docs/how_to/to_openradioss", "docs/how_to/to_real_time", "docs/how_to/to_viewers", "docs/how_to/read_the_file"],
+    "Many bodies": ["docs/how_to/batch", "docs/how_to/cluster", "docs/how_to/ci"],
+    "Reference": ["docs/reference/commands", "docs/reference/runs", "docs/reference/codes", "docs/reference/input", "docs/reference/scenes", "docs/reference/simulate", "docs/reference/select", "docs/reference/trade", "docs/reference/response", "docs/reference/report", "docs/reference/view", "docs/reference/audit", "docs/reference/exports", "docs/reference/python", "docs/reference/rust", "docs/reference/versions"],
+    "Files": ["docs/reference/file_format", "docs/reference/formats/*"],
+    "Theory": ["docs/theory"],
+    "Validation": ["docs/validation/index", "docs/validation/*"],
+    "Project": ["docs/decisions", "python/README", "ARCHITECTURE", "fixtures/README", "fixtures/cases/README", "CONTRIBUTING", "CHANGELOG"],
 }
 
 
 def contents():
-    """The side bar, as the directives that Sphinx makes it of. Pages that no group names come last."""
-    root = Path(__file__).resolve().parents[2]
-    named = {page for pages in CONTENTS.values() for page in pages}
-    rest = sorted(f"docs/{page.stem}" for page in root.glob("docs/*.md") if f"docs/{page.stem}" not in named)
-    groups = {**CONTENTS, "Further": rest} if rest else CONTENTS
+    """Returns the side bar as directives of Sphinx. A page that no group names is a warning, hence an error of scripts/site.sh."""
     options = ":hidden:\n:glob:\n"
-    return "".join(f"\n```{{toctree}}\n{options}:caption: {caption}\n\n" + "\n".join(pages) + "\n```\n" for caption, pages in groups.items())
+    return "".join(f"\n```{{toctree}}\n{options}:caption: {caption}\n\n" + "\n".join(pages) + "\n```\n" for caption, pages in CONTENTS.items())
 
 
 def with_contents(_app, name, source):

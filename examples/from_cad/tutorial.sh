@@ -1,5 +1,5 @@
 #!/bin/sh
-# docs/tutorial.md from its first command to its last: from a geometry to the vibration of the part in a multibody program.
+# docs/start/tutorial.md from its first command to its last: from a geometry to the vibration of the part in a multibody program.
 #
 #     examples/from_cad/tutorial.sh [FOLDER]
 #

@@ -318,15 +318,15 @@ impl Body {
         EquationsOfMotion::new(Arc::clone(&self.inner))
     }
 
-    /// Writes a flex-body file (HDF5, docs/format.md), which appears complete or not at all. The bytes are those of
-    /// `flexbody convert` for the same model and settings.
+    /// Writes a flex-body file (HDF5, docs/reference/file_format.md), which appears complete or not at all. The bytes
+    /// are those of `flexbody convert` for the same model and settings.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         brief(py, || self.inner.write(&path))
     }
 
-    /// Writes the body in a format of another program, by its name on the command line (docs/export.md): the file, and
-    /// further files beside it. Properties that the format cannot hold cause warnings. Returns these warnings and
-    /// notes.
+    /// Writes the body in a format of another program, by its name on the command line (docs/reference/exports.md):
+    /// the file, and further files beside it. Properties that the format cannot hold cause warnings. Returns these
+    /// warnings and notes.
     fn export<'py>(&self, py: Python<'py>, format: &str, path: PathBuf) -> PyResult<Bound<'py, PyTuple>> {
         let said = brief(py, || self.inner.export(format, &path))?;
         warn(py, &said)?;

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::path::PathBuf;
 
-/// A scene for a body: gravity, loads, prescribed motion, duration, tolerances (docs/simulate.md).
+/// A scene for a body: gravity, loads, prescribed motion, duration, tolerances (docs/reference/scenes.md).
 ///
 /// Scene(path, case=None) reads a scene file; `case` names the load case of a file that has several.
 #[pyclass(frozen, module = "flexbody")]

@@ -57,8 +57,9 @@ impl FlexBody {
         flexbody_file::write(&self.0, path)
     }
 
-    /// Writes the body in a format of another program, given by its name on the command line (docs/export.md): the
-    /// file, and further files beside it. Returns warnings about parts of the body that the format cannot hold.
+    /// Writes the body in a format of another program, given by its name on the command line
+    /// (docs/reference/exports.md): the file, and further files beside it. Returns warnings about parts of the body
+    /// that the format cannot hold.
     ///
     /// # Errors
     /// FB801 for an unknown format; FB720 if no file of this format can be made of the body; FB104 and FB602 if it

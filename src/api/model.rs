@@ -93,7 +93,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Reads the model of a manifest (`model.toml`, docs/input.md).
+    /// Reads the model of a manifest (`model.toml`, docs/reference/input.md).
     ///
     /// # Errors
     /// FB101 to FB209 for the files, FB301 to FB321 for matrices, FB401 to FB439 for the model: all errors of a stage
@@ -103,7 +103,7 @@ impl Model {
         Self::checked(read_model(&files)?, files.residual_vectors)
     }
 
-    /// Reads the output of an FE program (docs/fe_programs.md): the deck or another main file of a job.
+    /// Reads the output of an FE program (docs/how_to/from_fe_programs.md): the deck or another main file of a job.
     ///
     /// * `program`: name of the program as on the command line; `None` to detect it from the files.
     /// * `units`: units of length, mass and time, as in a manifest; `None` if not stated.

@@ -144,8 +144,8 @@ impl Motion {
         &self.diagnostics
     }
 
-    /// Writes the motion to an HDF5 file in the format of `flexbody simulate -o` (docs/simulate.md). The file appears
-    /// whole or not at all.
+    /// Writes the motion to an HDF5 file in the format of `flexbody simulate -o` (docs/reference/simulate.md). The
+    /// file appears whole or not at all.
     ///
     /// # Errors
     /// FB104, FB105, FB107 and FB602 if the file cannot be written.

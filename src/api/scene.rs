@@ -6,8 +6,8 @@ use flexbody_motion::scene::LoadCases;
 use flexbody_study::selection;
 use std::path::Path;
 
-/// Scene for a body (docs/simulate.md): one or more load cases, each with gravity, loads, prescribed motion, duration
-/// and tolerances.
+/// Scene for a body (docs/reference/scenes.md): one or more load cases, each with gravity, loads, prescribed motion,
+/// duration and tolerances.
 #[derive(Debug, Clone)]
 pub struct Scene(pub(super) LoadCases);
 

@@ -26,7 +26,7 @@ use std::path::PathBuf;
 #[command(
     after_help = "Exit codes: 0 done; 1 a check or tolerance failed; 2 bad input or usage; 3 no trustworthy \
     numerical result; 4 not enough memory or disk, or an output that may not be written; 70 internal error; 130 interrupted (SIGINT, SIGTERM, SIGHUP). Other signals: 128 + number. \
-    With 0 all output files are written; with 2 to 130 and after signals none is, and no unfinished file is left. Codes of all messages: docs/codes.md."
+    With 0 all output files are written; with 2 to 130 and after signals none is, and no unfinished file is left. Codes of all messages: docs/reference/codes.md."
 )]
 pub struct Arguments {
     /// Command to run.
@@ -345,7 +345,7 @@ pub struct TradeArguments {
     /// Job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
-    /// Scene with the motion and the tolerances (see docs/simulate.md)
+    /// Scene with the motion and the tolerances (see docs/reference/scenes.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
     /// Load case of the scene, by name [default: all; the worst case of a candidate counts]
@@ -392,7 +392,7 @@ pub struct SelectArguments {
     /// Job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
-    /// Scene with the motion and the tolerances (see docs/select.md)
+    /// Scene with the motion and the tolerances (see docs/reference/scenes.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
     /// Load case of the scene, by name [default: all, which one body must serve]
@@ -422,7 +422,7 @@ pub struct SimulateArguments {
     /// Flex-body file
     #[arg(value_name = "BODY.flex.h5")]
     pub body: PathBuf,
-    /// Scene with the motion (see docs/simulate.md)
+    /// Scene with the motion (see docs/reference/scenes.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
     /// Load case of the scene, by name [default: all, one after the other; file names contain the case names]
@@ -449,8 +449,8 @@ pub struct SimulateArguments {
 /// Arguments of `convert`.
 #[derive(Debug, Clone, Args)]
 pub struct ConvertArguments {
-    /// Manifest of the model (see docs/input.md), or the job of an FE program (docs/fe_programs.md); with --from the
-    /// body of another program
+    /// Manifest of the model (see docs/reference/input.md), or the job of an FE program
+    /// (docs/how_to/from_fe_programs.md); with --from the body of another program
     #[arg(value_name = "MODEL.toml|JOB.inp", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs"])]
     pub model: Option<PathBuf>,
     /// Convert the body in a file of another program instead of making one from a model
@@ -534,8 +534,8 @@ pub struct ConvertArguments {
     /// Leave the surface out of the file
     #[arg(long, conflicts_with_all = ["from", "mesh_triangles"])]
     pub no_mesh: bool,
-    /// Write only the terms and modes that this scene needs (see docs/select.md); its loads and band choose residual
-    /// vectors and modes unless these are stated
+    /// Write only the terms and modes that this scene needs (see docs/reference/select.md); its loads and band choose
+    /// residual vectors and modes unless these are stated
     #[arg(long, value_name = "SCENE.toml", conflicts_with = "split")]
     pub scene: Option<PathBuf>,
     /// Load case of the scene, by name [default: all, which one body must serve]

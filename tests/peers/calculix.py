@@ -152,7 +152,7 @@ def from_cad(flexbody, folder, version):
 
 
 def tutorial(place, version, environment):
-    """docs/tutorial.md to its end: the bracket on a shaker, in Exudyn."""
+    """docs/start/tutorial.md to its end: the bracket on a shaker, in Exudyn."""
     try:
         import exudyn
     except ImportError:
@@ -161,5 +161,5 @@ def tutorial(place, version, environment):
     done = subprocess.run([ROOT / "examples/from_cad/tutorial.sh", place], check=True, capture_output=True, text=True, env=dict(environment, PYTHON=sys.executable))
     found = re.search(r"([0-9.]+) Hz in Exudyn, ([0-9.]+) Hz", done.stdout)
     error = abs(float(found[1]) / float(found[2]) - 1)
-    what = "docs/tutorial.md: frequency of the bracket on its bolts with an instrument, beside that of K and M"
+    what = "docs/start/tutorial.md: frequency of the bracket on its bolts with an instrument, beside that of K and M"
     return [Row(f"Gmsh, CalculiX {version}, Exudyn {exudyn.__version__}", "C3D10", what, error, 2e-4)]

@@ -56,7 +56,7 @@ def rows(flexbody, folder):
 
 
 def arm(flexbody, folder):
-    """The table of docs/formats/embedded.md."""
+    """The table of docs/reference/formats/embedded.md."""
     compiler = common.program("arm-none-eabi-gcc", "ARM_GCC", "Debian: apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi")
     program = source(flexbody, folder, "float")
     version = common.run(compiler, "-dumpfullversion").strip()

@@ -1,5 +1,5 @@
 //! Table of diagnostics. Every message of the program has a code, a severity, an exit code, a title and a default help
-//! in this table. `docs/codes.md` is generated from the table; `fixtures/cases/` triggers each code.
+//! in this table. `docs/reference/codes.md` is generated from the table; `fixtures/cases/` triggers each code.
 
 use crate::exit_code::ExitCode;
 use std::borrow::Cow;
@@ -96,12 +96,12 @@ codes! {
     MeshPartial = "FB124", Note, Done, "surface for drawing the body is incomplete", "nothing to do for the results; connectors and springs are not drawn";
     MeshForeign = "FB125", Error, BadInput, "mesh does not match the nodes", "give the mesh that the matrices were computed on, in the same units, or leave `mesh` out";
     ModesDiffer = "FB127", Warning, Done, "modes in the file are not modes of K and M", "give modes of the same mesh, material and mass matrix, of the body without supports";
-    ModeFileSyntax = "FB128", Error, BadInput, "mode file cannot be read", "write the file as docs/fe_programs.md says, or give the shapes as an array";
+    ModeFileSyntax = "FB128", Error, BadInput, "mode file cannot be read", "write the file as docs/how_to/import_modes.md says, or give the shapes as an array";
     ModesCompleted = "FB129", Note, Done, "rows missing from the mode file were completed with K and M", "nothing to do: the completed modes satisfy the equations of motion in these rows too";
     DeckConstrained = "FB131", Note, Done, "rows constrained by the deck were eliminated", "nothing to do: matrices before the constraints (KGG, MGG) describe parts that are not joined";
     InputChanged = "FB132", Error, BadInput, "file changed while it was read", "run again after the program that writes the file has finished";
     // FB2xx: tables and manifest
-    ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/input.md for the keys";
+    ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/reference/input.md for the keys";
     ManifestUnit = "FB202", Error, BadInput, "unknown unit", "use one of length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";
     TableHeader = "FB203", Error, BadInput, "unexpected table header", "write the header of nodes: `node,x,y,z`; of dofs: `node,dir` or `row,node,dir`";
     TableRow = "FB204", Error, BadInput, "table row cannot be read", "give one row per line with the columns of the header";
@@ -111,7 +111,7 @@ codes! {
     DofRowOrder = "FB208", Error, BadInput, "row numbers of dofs.csv are not 0, 1, 2, ... without gaps", "number the rows from 0, or leave the column out";
     InterfaceNode = "FB209", Error, BadInput, "interface names a node that the model does not have", "correct the node list of the interface";
     InterfaceAcross = "FB210", Error, BadInput, "interface contains nodes of several bodies", "define one interface for each body";
-    SceneSyntax = "FB211", Error, BadInput, "scene is not valid TOML or has unknown, missing or mistyped keys", "see docs/simulate.md for the keys";
+    SceneSyntax = "FB211", Error, BadInput, "scene is not valid TOML or has unknown, missing or mistyped keys", "see docs/reference/scenes.md for the keys";
     SceneBody = "FB212", Error, BadInput, "scene does not fit the body", "run flexbody inspect, which shows the modes and interfaces of the body";
     SceneContradicts = "FB213", Error, BadInput, "scene contradicts itself", "remove one of the two entries";
     CarrierImpossible = "FB214", Error, BadInput, "body cannot be carried at this place", "carry an interface with a reference point whose nodes do not lie on one line, or a node with rotations, of a body with all terms";
@@ -207,7 +207,7 @@ codes! {
     SpinSoftens = "FB542", Warning, Done, "body without geometric stiffness is too soft at this spin", "convert the model with [[geometric_stiffness]] for spin";
     PhaseDrifts = "FB543", Warning, Done, "errors grow with time although amplitudes are bounded", "check a run of the longest duration that the model is meant for: phases drift apart with angular velocity times duration";
     ResonanceDropped = "FB544", Warning, Done, "dropped mode is near the frequency of a load", "keep the mode, or lengthen the run until the resonance would show";
-    LoadIdle = "FB545", Warning, Done, "load has no effect", "let an interface carry the body to see gravity and inertia bend it: [carried] in docs/simulate.md";
+    LoadIdle = "FB545", Warning, Done, "load has no effect", "let an interface carry the body to see gravity and inertia bend it: [carried] in docs/reference/scenes.md";
     CarrierUnresolved = "FB546", Warning, Done, "modes resolve the carried interface poorly", "convert with --basis craig-bampton, or with --residual-vectors interfaces, and with the interface in the manifest";
     CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness does not act while the body is carried", "trust spin rates far below the first frequency only: the geometric stiffness is that of the free body";
     ReferenceIncomplete = "FB548", Warning, Done, "reference body lacks a part of the model that matters here", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where the difference comes from";
@@ -232,7 +232,7 @@ codes! {
     BodyIdentity = "FB704", Error, CheckFailed, "identity violated", "convert the model again; if the error persists, report the file to the developers";
     BodySourceChanged = "FB706", Warning, Done, "input file differs from the one the body was made of", "convert the model again";
     BodyIncomparable = "FB707", Error, BadInput, "flexible bodies cannot be compared", "compare bodies of the same model, dimension and units";
-    BodyChanged = "FB712", Error, CheckFailed, "content of a flex-body file changed since it was written", "take the file as it was written, or convert the model again; docs/format.md says how a program that changes files states new digests";
+    BodyChanged = "FB712", Error, CheckFailed, "content of a flex-body file changed since it was written", "take the file as it was written, or convert the model again; docs/reference/file_format.md says how a program that changes files states new digests";
     BodyWithoutDigest = "FB713", Note, Done, "flex-body file has no digest, so changes since it was written cannot be detected", "convert the model again to get a digest";
     BodyUntrustworthy = "FB714", Error, Untrustworthy, "body violates conditions that hold for every body; nothing was written", "ask for fewer modes, and look for weakly joined parts and implausible masses; if the error persists, report the model to the developers";
     WarningsDenied = "FB715", Error, CheckFailed, "warnings are treated as errors", "resolve the warnings, or leave out --deny-warnings";
@@ -240,7 +240,7 @@ codes! {
     ExportLoses = "FB720", Error, BadInput, "format cannot hold the whole body", "use --allow-loss to write the file without it";
     ExportLost = "FB721", Warning, Done, "exported file lacks a part of the body", "nothing to do if the simulation does not need it";
     ExportNeeds = "FB722", Note, Done, "program uses a part of the file only with a setting", "make the setting named in the message in the input of the program";
-    ExportPicture = "FB723", Note, Done, "file is a picture of the body", "use another format for multibody programs: docs/export.md lists them";
+    ExportPicture = "FB723", Note, Done, "file is a picture of the body", "use another format for multibody programs: docs/reference/exports.md lists them";
     ForeignUnreadable = "FB730", Error, BadInput, "flexible-body file of another program cannot be read", "give a SID_FEM, MBDyn .fem, MBSim or Exudyn file as the program writes it";
     ForeignIncomplete = "FB731", Error, BadInput, "file lacks data that a body needs", "write the file again with the missing part";
     ForeignChanged = "FB732", Note, Done, "modes of the file are not normalised or contain rigid motions; combinations of them were used", "nothing to do: the motion of the nodes is unchanged, the modal coordinates differ";
@@ -263,9 +263,9 @@ codes! {
     ClusterUnfinished = "FB763", Error, BadInput, "cluster has no result yet", "run the driver; it continues from the saved modes";
     ClusterInaccurate = "FB764", Error, Untrustworthy, "modes from the cluster are not modes of the model", "run the driver again, with --solver mumps if another solver was used";
     CompletenessElsewhere = "FB765", Note, Done, "completeness relies on the count of another program", "use flexbody assemble --prove to count with flexbody";
-    EngineMissing = "FB766", Error, BadInput, "MPI, PETSc or SLEPc not found", "install them (docs/cluster.md), name them with --mpiexec and --python, or use --engine built-in";
+    EngineMissing = "FB766", Error, BadInput, "MPI, PETSc or SLEPc not found", "install them (docs/how_to/cluster.md), name them with --mpiexec and --python, or use --engine built-in";
     EngineFailed = "FB767", Error, Untrustworthy, "MPI solver ended without a result", "run the same command again: it continues from the saved modes";
-    BatchSyntax = "FB770", Error, BadInput, "list of bodies cannot be read", "see docs/cluster.md for the keys";
+    BatchSyntax = "FB770", Error, BadInput, "list of bodies cannot be read", "see docs/how_to/batch.md for the keys";
     BatchFailed = "FB771", Error, CheckFailed, "bodies of a batch failed", "see the message of each body; the other bodies were written, and a second run makes the missing ones only";
     // FB8xx: usage
     Usage = "FB801", Error, BadInput, "command line not understood", "see flexbody help";
@@ -274,7 +274,7 @@ codes! {
     Internal = "FB999", Error, Bug, "internal error", "report this bug of flexbody with the input";
 }
 
-/// Returns the content of `docs/codes.md`: the table of codes and the exit codes.
+/// Returns the content of `docs/reference/codes.md`: the table of codes and the exit codes.
 pub fn codes_markdown() -> String {
     let mut out = String::from(
         "<!-- Generated from the table in crates/base/src/diagnostic.rs: FLEXBODY_BLESS=1 cargo test --test program docs_generated -->\n\n\
@@ -289,7 +289,7 @@ pub fn codes_markdown() -> String {
          | 130 | interrupted (Ctrl-C), terminated (SIGTERM) or disconnected from its terminal (SIGHUP); no unfinished file is left |\n\n\
          Other signals that end a program end this one too, after its unfinished files: a shell reports 128 + the number\n\
          of the signal. With exit code 0 all outputs are in their places; with 2, 3, 4, 70, 130 and after a signal none\n\
-         is, and the files that they would have replaced are there ([reference](reference.md#output-files)).\n\n\
+         is, and the files that they would have replaced are there ([output files](runs.md#output-files)).\n\n\
          A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
          `--deny-warnings` treats a warning as a failed check (1): then nothing is written.\n\n\
          | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",

@@ -1,6 +1,6 @@
 //! Exit codes of the process.
 
-/// Process exit codes, the contract with scripts and CI pipelines (`docs/codes.md`).
+/// Process exit codes, the contract with scripts and CI pipelines (`docs/reference/codes.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum ExitCode {

@@ -41,8 +41,8 @@ pub struct NamedAttributes {
     pub values: Vec<(String, serde_json::Value)>,
 }
 
-/// Returns every array and every attribute of the flex-body file of `body` (`docs/format.md`), in the order of the
-/// file.
+/// Returns every array and every attribute of the flex-body file of `body` (`docs/reference/file_format.md`), in the
+/// order of the file.
 ///
 /// For a body with 32-bit floats the large arrays are rounded as in the file. Entries derived from them are not rounded
 /// again.

@@ -1,5 +1,5 @@
-//! The digests of the content of a flex-body file, as `docs/format.md` describes them: a SHA-256 of every group and
-//! dataset, listed by path, and a SHA-256 of this list.
+//! The digests of the content of a flex-body file, as `docs/reference/file_format.md` describes them: a SHA-256 of
+//! every group and dataset, listed by path, and a SHA-256 of this list.
 
 use super::schema::{LIST, WHOLE};
 use flexbody_base::hdf5_file::{Record, Stored, attribute_names, attribute_record, dataset_record};

@@ -1,4 +1,5 @@
-//! The table as documentation: `docs/format.md` and `schemas/flexbody-file.schema.json` are generated here.
+//! The table as documentation: `docs/reference/file_format.md` and `schemas/flexbody-file.schema.json` are generated
+//! here.
 
 use super::item::{DERIVED_TOLERANCE, Extent, Item, ItemKind, Origin, SchemaGroup};
 use super::schema::terms::KEPT;
@@ -97,10 +98,10 @@ with h5py.File(\"body.flex.h5\", \"r+\") as f:
         f.attrs[name] = value
 ```
 
-A digest tells damage and careless edits from what was written; it is no signature. What the laws of mechanics say of the numbers themselves is checked besides: section 10 of the [theory](theory.md).
+A digest tells damage and careless edits from what was written; it is no signature. What the laws of mechanics say of the numbers themselves is checked besides: section 10 of the [theory](../theory.md).
 ";
 
-/// Returns the text of `docs/format.md`.
+/// Returns the text of `docs/reference/file_format.md`.
 pub fn format_markdown() -> String {
     let mut out = INTRODUCTION.to_owned();
     let mut add =

@@ -1,4 +1,5 @@
-//! The table of the flex-body file, from which writer, reader, validator, `docs/format.md` and the JSON schema follow.
+//! The table of the flex-body file, from which writer, reader, validator, `docs/reference/file_format.md` and the JSON
+//! schema follow.
 
 use super::draft::node_indices;
 use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, Triangles};

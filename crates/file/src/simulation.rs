@@ -1,4 +1,4 @@
-//! The file of a simulation: a small HDF5 file with a separate format, described in `docs/simulate.md`.
+//! The file of a simulation: a small HDF5 file with a separate format, described in `docs/reference/simulate.md`.
 
 use super::names;
 use super::value::Units;

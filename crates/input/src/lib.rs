@@ -1,6 +1,6 @@
 //! Reads manifests, matrices, tables of nodes and degrees of freedom, and jobs of FE programs. Each matrix format has
 //! one file behind [`Reader`] and [`READERS`], each FE program one in `jobs`. The contracts with users are
-//! `docs/input.md` and `docs/fe_programs.md`.
+//! `docs/reference/input.md` and `docs/how_to/from_fe_programs.md`.
 
 #![deny(
     clippy::exit,

@@ -1,5 +1,5 @@
 //! The way FE programs write their matrices: the lines of the deck, the run, and the command that continues from there.
-//! `docs/fe_programs.md` shows these lines as well.
+//! `docs/how_to/from_fe_programs.md` shows these lines as well.
 
 /// Way from a deck of one FE program to a flexible body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

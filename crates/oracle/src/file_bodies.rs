@@ -360,7 +360,7 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     (bits, texts)
 }
 
-/// Recomputes the digests of a file, as `docs/format.md` describes them.
+/// Recomputes the digests of a file, as `docs/reference/file_format.md` describes them.
 pub fn seal(file: &hdf5::File) {
     let mut found = BTreeMap::new();
     digest_group(&file.as_group().unwrap(), "", &mut found);

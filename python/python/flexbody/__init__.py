@@ -151,8 +151,8 @@ def read_model(
     units: Sequence[object] | None = None,
     interfaces: Mapping[str, str | tuple[str, str]] | None = None,
 ) -> Model:
-    """Reads a model: a manifest (`model.toml`, docs/input.md), or the files of an FE program
-    (docs/fe_programs.md), whose deck is `path`.
+    """Reads a model: a manifest (`model.toml`, docs/reference/input.md), or the files of an FE program
+    (docs/how_to/import_modes.md), whose deck is `path`.
 
     Parameters
     ----------

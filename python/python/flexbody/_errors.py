@@ -23,7 +23,7 @@ def _printable(text: str) -> str:
 
 
 class Diagnostic(NamedTuple):
-    """One finding: message, place and help. docs/codes.md lists the codes."""
+    """One finding: message, place and help. docs/reference/codes.md lists the codes."""
 
     code: str
     """Identity, as in "FB307"."""

@@ -11,7 +11,8 @@ use std::path::PathBuf;
 /// Arguments of `prepare`.
 #[derive(Debug, Args)]
 pub struct PrepareArguments {
-    /// Manifest of the model (see docs/input.md), or the job of an FE program (docs/fe_programs.md)
+    /// Manifest of the model (see docs/reference/input.md), or the job of an FE program
+    /// (docs/how_to/from_fe_programs.md)
     #[arg(value_name = "MODEL.toml|JOB.inp")]
     pub model: PathBuf,
     /// Job of an FE program.
@@ -93,7 +94,7 @@ pub struct AssembleArguments {
 /// Arguments of `batch`.
 #[derive(Debug, Args)]
 pub struct BatchArguments {
-    /// List of bodies (see docs/cluster.md)
+    /// List of bodies (see docs/how_to/batch.md)
     #[arg(value_name = "LIST.toml")]
     pub list: PathBuf,
     /// Memory that all conversions together may use: a number with K, M, G or T [default: all that the machine and its
@@ -114,7 +115,7 @@ pub struct BatchArguments {
 /// Solver for the modes.
 #[derive(Debug, Clone, Args)]
 pub struct EngineArguments {
-    /// Solver for the free modes: this program, or SLEPc over MPI (docs/cluster.md)
+    /// Solver for the free modes: this program, or SLEPc over MPI (docs/how_to/cluster.md)
     #[arg(long, value_enum, default_value_t = EngineName::BuiltIn)]
     pub engine: EngineName,
     /// Number of MPI ranks of --engine slepc

@@ -1,4 +1,4 @@
-"""Embedded: this module compiles and calls the C99 header of the body, which evaluates the equations of docs/formats/embedded.md from the numbers beside it.
+"""Embedded: this module compiles and calls the C99 header of the body, which evaluates the equations of docs/reference/formats/embedded.md from the numbers beside it.
 
 The header takes velocities of the origin along body axes: it is called with a velocity of flight, of which the accelerations may not depend.
 """
@@ -62,7 +62,7 @@ class Embedded(Equations):
         self.places = self.frames(define("FRAMES"), data)
 
     def frames(self, count, data):
-        """Returns the places by the functions of the header, one mode at a time. Numbers come from the table of docs/formats/embedded.md."""
+        """Returns the places by the functions of the header, one mode at a time. Numbers come from the table of docs/reference/formats/embedded.md."""
         nf = self.modes
         start = lambda entry: int.from_bytes(bytes(data[entry : entry + 4]), "little")
         at = start(232)

@@ -13,7 +13,7 @@ import numpy as np
 from . import bodies, checks, matrices, table
 
 PART = 1e-3
-# Tables of the layout of `embedded` (docs/formats/embedded.md): entry, and the kind of their first numbers.
+# Tables of the layout of `embedded` (docs/reference/formats/embedded.md): entry, and the kind of their first numbers.
 TABLES = {"rigid": 72, "linear": 88, "w2": 104, "w3": 120, "stiffness": 200, "damping": 216, "frame_position": 264, "frame_translation": 280, "frame_rotation": 296}
 
 

@@ -3,7 +3,7 @@
 EMBSlib leaves out 2 w~ Ct' q' ("the derivation of the center of gravity is neglected"), which is zero for modes of the free body, and adds m w~ v although its acceleration is that of
 the frame in space. The equations here have the first term and not the second. mdCM, J and the coupling Cr are of first order in q, and with them the equations.
 
-The order of numbers in each dialect is that of docs/formats/sid.md; that of `embs` is what the reader in C (`matrix3Index` of ReadSID_C.h: modes, rows, columns) and the
+The order of numbers in each dialect is that of docs/reference/formats/sid.md; that of `embs` is what the reader in C (`matrix3Index` of ReadSID_C.h: modes, rows, columns) and the
 declaration `Real[nr, nq, nc]` of Modelica (by rows) make of m1(i, j, k).
 """
 

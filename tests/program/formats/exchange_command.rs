@@ -179,11 +179,11 @@ fn an_audit_says_what_is_wrong_and_exits_with_1() {
 
 #[test]
 fn every_format_has_its_page_and_its_line() {
-    let docs = oracle::root().join("docs");
-    let table = fs::read_to_string(docs.join("export.md")).expect("docs/export.md");
+    let docs = oracle::root().join("docs/reference");
+    let table = fs::read_to_string(docs.join("exports.md")).expect("docs/reference/exports.md");
     for format in flexbody_formats::FORMATS {
         let name = format.name();
-        assert!(table.contains(&format!("(formats/{name}.md)")), "docs/export.md: {name}");
+        assert!(table.contains(&format!("(formats/{name}.md)")), "docs/reference/exports.md: {name}");
         let page = fs::read_to_string(docs.join(format!("formats/{name}.md"))).expect("a page");
         for dialect in format.dialects() {
             assert!(

@@ -1,7 +1,7 @@
 /*
  * SUMMARY
  *
- * Written by flexbody beside the file of the numbers (layout version 1); docs/formats/embedded.md describes both. C99 and C++11, freestanding: no
+ * Written by flexbody beside the file of the numbers (layout version 1); docs/reference/formats/embedded.md describes both. C99 and C++11, freestanding: no
  * allocation, no library. A compiler may still call memcpy and memset, which every freestanding C has.
  *
  * The equations of motion of one flexible body (docs/theory.md section 6 and 7.4) with exactly the terms that the file holds:

@@ -1,4 +1,4 @@
-//! Layout of the file: tables that drive the writer, the C header and `docs/formats/embedded.md`.
+//! Layout of the file: tables that drive the writer, the C header and `docs/reference/formats/embedded.md`.
 
 use std::fmt::Write;
 

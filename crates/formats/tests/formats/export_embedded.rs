@@ -538,7 +538,7 @@ fn any_name_makes_a_header_that_compiles() {
 
 #[test]
 fn the_page_has_the_layout_that_is_written() {
-    let path = oracle::root().join("docs/formats/embedded.md");
+    let path = oracle::root().join("docs/reference/formats/embedded.md");
     let page = std::fs::read_to_string(&path).expect("the page");
     let (before, rest) = page.split_once("<!-- layout -->\n").expect("a place for the tables");
     let (own, after) = rest.split_once("<!-- end of layout -->").expect("their end");

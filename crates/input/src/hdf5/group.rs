@@ -1,5 +1,5 @@
 //! A sparse matrix in an HDF5 group: compressed columns or rows, or coordinates, in the conventions of scipy, anndata,
-//! MATLAB and PETSc (`docs/input.md`).
+//! MATLAB and PETSc (`docs/reference/input.md`).
 
 use super::super::assemble::{
     ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, assembled, check_size, push,

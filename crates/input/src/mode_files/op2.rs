@@ -36,7 +36,7 @@ const WORDS_PER_POINT: usize = 8;
 /// Type of a grid point, unlike scalar points and others.
 const GRID: i64 = 1;
 
-const HELP: &str = "write it with PARAM,POST,-1, or give the shapes as an array: docs/fe_programs.md has the lines for pyNastran";
+const HELP: &str = "write it with PARAM,POST,-1, or give the shapes as an array: docs/how_to/import_modes.md has the lines for pyNastran";
 
 /// Names of tables of eigenvectors along the axes of the grid points.
 const TABLES: &[&str] = &["OUGV1", "OUG1", "OUGV1PAT", "OPHIG"];

@@ -110,7 +110,7 @@ impl ModeTable {
     pub(super) fn into_modes(mut self, file: &InputFile, source: SourceFile) -> Found<RawModes> {
         let n = self.labels.len();
         if n == 0 {
-            let help = "write the displacements of the modes: see docs/fe_programs.md";
+            let help = "write the displacements of the modes: see docs/how_to/import_modes.md";
             return Err(unreadable(file, "the file has no modes", help));
         }
         for (number, mode) in self.modes.iter_mut().enumerate() {

@@ -137,17 +137,23 @@ nodes_file = "right.csv"
 
 #[test]
 fn the_manifest_of_the_documentation_is_in_order() {
-    let docs = include_str!("../../../../docs/input.md");
-    let example =
-        docs.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("an example");
+    let docs = include_str!("../../../../docs/reference/input.md");
+    let example = docs
+        .split("```toml manifest\n")
+        .nth(1)
+        .and_then(|rest| rest.split("```").next())
+        .expect("an example");
     let files = manifest(example).unwrap();
     assert_eq!(
         (files.name.as_str(), files.units.mass.to_si(), files.interfaces.len()),
         ("conrod", 1000.0, 2)
     );
-    let docs = include_str!("../../../../docs/fe_programs.md");
-    let example =
-        docs.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("an example");
+    let docs = include_str!("../../../../docs/how_to/from_fe_programs.md");
+    let example = docs
+        .split("```toml manifest\n")
+        .nth(1)
+        .and_then(|rest| rest.split("```").next())
+        .expect("an example");
     assert_eq!(manifest(example).unwrap().interfaces.len(), 5);
 }
 

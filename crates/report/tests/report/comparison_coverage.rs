@@ -1,5 +1,5 @@
 //! `compare` compares every entry of the flex-body file or lists it as not compared. The entries are those of
-//! `docs/format.md`.
+//! `docs/reference/file_format.md`.
 
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
@@ -166,10 +166,10 @@ fn flatten(parts: &mut Parts) {
     general(parts).plane = true;
 }
 
-/// Returns the paths of the entries of `docs/format.md` (attributes after `@`). The flag is true for entries
-/// marked "derived" or "always", which carry no information of their own.
+/// Returns the paths of the entries of `docs/reference/file_format.md` (attributes after `@`). The flag is true for
+/// entries marked "derived" or "always", which carry no information of their own.
 fn documented() -> Vec<(String, bool)> {
-    let page = include_str!("../../../../docs/format.md");
+    let page = include_str!("../../../../docs/reference/file_format.md");
     let (mut group, mut separator, mut found) = ("", '/', Vec::new());
     for line in page.lines() {
         if let Some(path) = line.strip_prefix("## `").and_then(|rest| rest.strip_suffix('`')) {

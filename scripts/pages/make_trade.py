@@ -1,0 +1,508 @@
+#!/usr/bin/env python3
+"""Writes docs/validation/trade.md and docs/images/trade_*.svg: what each scene of fixtures/scenes needs, and what accuracy costs there.
+
+    pip install numpy scipy h5py exudyn==1.13.6
+    cargo build --release --locked
+    python3 scripts/pages/make_trade.py
+
+Seconds are those of the processor in Exudyn and in a C program (scripts/pages/trade_seconds.py); it takes about an hour, since all of them are measured five
+times, one after the other. What it finds of a scene is kept in target/trade: `--only SCENE ...` measures some of them anew.
+"""
+
+import argparse
+import csv
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from importlib import metadata
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process per core instead
+import numpy as np  # noqa: E402
+
+from trade_figure import figure  # noqa: E402
+from trade_guidelines import GUIDELINES, Body, read_scene, study  # noqa: E402
+from trade_seconds import PER_PERIOD, TURNS, InC, InExudyn, Task  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# Scene, model, modes of a usual conversion: the reference has twice as many, residual vectors, and what the scene's motion lacks.
+SCENES = [
+    ("tumbling", "bracket_hex20", 12),
+    ("connecting_rod_8000rpm", "connecting_rod", 20),
+    ("car_frame_road", "car_frame", 30),
+    ("satellite_tumbling", "satellite", 20),
+    ("turbine_blade_runup", "turbine_blade", 15),
+    ("mems_gyroscope", "mems_gyroscope", 20),
+    ("robot_link", "robot_link", 10),
+    ("gear_disc", "gear_disc", 30),
+    ("conveyor_plate", "conveyor_plate", 20),
+]
+COUNTER = ("block_79_periods", "cube_hex8", 12)
+# Candidates of the front whose error is more than this many times what is allowed are not timed.
+HOPELESS = 10
+# What the reference may lack of the FE model, as `trade` names it.
+OUTPUTS = ("attitude", "deflection", "stress", "reaction")
+# Lowest modes that the guidelines are tried with.
+FEW = 6
+INSTANTS = 300
+HEAD = """<!-- Written by scripts/pages/make_trade.py -->
+
+# Cost of accuracy in each scene
+
+For each scene of `fixtures/scenes`: the body that it needs, its error against the finite element model, and the seconds that it takes in two other
+programs. `flexbody {version}`, Exudyn {exudyn}; {processor}. Written by `./scripts/make.sh pages trade`; how `trade` works: [reference](../reference/trade.md).
+
+* **Error**: `flexbody trade MODEL --modes N` simulates candidate bodies and measures each against a reference: 2N modes with residual vectors, enriched with the static
+  responses to the forces that the equations of all nodes leave unbalanced along the motion ([theory](../theory.md), (8.16)). The error of the reference
+  itself against the FE model is estimated by the same forces and listed. If it exceeds the tolerances (**bold**), `trade` warns (FB548) and exits with 1: errors of such a scene are
+  relative to its reference only. The tumbling bracket is
+  thrown undeformed with its full spin, which is a shock: it vibrates at all its frequencies, and those of a body differ from those of the nodes. With `[initial] deformation = "static"`
+  there is no shock, and far fewer modes are needed.
+* **Seconds** of the processor, medians of {turns} runs in turns. *Exudyn*: generalised alpha with one step for all candidates of a scene, {per_period} steps per period of the highest
+  frequency that the scene asks about. *C*: the header of `export --to embedded` in a Runge-Kutta program of order 4, whose step is as long as that frequency and the highest mode of the
+  body allow: a high mode that is not needed costs steps.
+* **Timed candidates**: those near the tolerances that no other candidate beats in both cost and accuracy, the recommended one and the whole body, and once the reference. Lumped masses and other sets of terms take the time of the exact body with as many
+  modes.
+* **Figures**: the largest of the errors of attitude, deflection, stress and reaction, each over its tolerance; the dashed line is 100 %.
+* **Whole body**: N free modes with residual vectors and all terms, the body that one would convert without knowing the scene. If its error exceeds the tolerances (**bold**),
+  the recommended body is also more accurate, and may cost more. Seconds in the table are those of the whole body and of the recommended body.
+
+{table}
+
+Terms alone save nothing in Exudyn, whose object has no form without them (`export` writes zeros); only the number of modes counts there. The C program leaves out terms that a body does not hold.
+
+Number of modes that the tolerances of each scene need, by the way in which they are chosen; the lowest first unless stated otherwise. Free modes and residual vectors are tried in the numbers 2N, N, N/2 and N/4 of free modes; shapes of the motion are
+those of `convert --scene --basis scene`, which represent this motion only ([select](../reference/select.md#a-basis-for-one-scene)):
+
+{bases}
+
+"""
+GUIDE = """## Guidelines I to IV
+
+Guidelines of [WP19], section 8, taken literally as sets of terms ([theory](../theory.md#7-sizes-of-the-terms), section 7), whether or not they cut across a group of the kinetic energy:
+
+| | terms |
+|---|---|
+| I | I0 only |
+| II | and the constant centrifugal load, W1'/2 |
+| III | and W1 Q in the inertia, W2 Q in the load |
+| III free | and Q'W2 Q in the inertia and the coupling Q'W3 |
+| IV | and Coriolis forces: everything |
+
+Each set is integrated with the first {few} free modes, by a separate program (numpy and scipy, `scripts/pages/trade_guidelines.py`, from the equations of theory section 3), and compared with all terms.
+Its whole motion agrees with `flexbody simulate` to {agree:.0e}. Numbers are attitude errors in radians / errors of the elastic energy's root; **bold** above the tolerance of
+the scene. Bodies with nodal rotations have other equations and are not in the table.
+
+"""
+
+
+def run(program, *arguments, folder, passes=(0,)):
+    done = subprocess.run([program, *map(str, arguments)], cwd=folder, capture_output=True, text=True)
+    if done.returncode not in passes:
+        sys.exit(f"{' '.join(map(str, arguments))} ended with {done.returncode}:\n{done.stderr}")
+    return done.stdout
+
+
+def number(value, digits=2):
+    if value is None:
+        return ""
+    if value == 0:
+        return "0"
+    if not 1e-3 <= abs(value) < 1e4:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{digits}g}" if abs(value) < 100 else f"{value:.0f}"
+
+
+def convert(program, folder, model, modes):
+    words = ["convert", ROOT / "fixtures/models" / model / "model.toml", "--modes", modes, "-o", "body.flex.h5", "--quiet"]
+    run(program, *words, folder=folder)
+
+
+def decided(program, folder, scene, *body):
+    """What `select` decides, in its five lines."""
+    told = json.loads(run(program, "select", *body, "--scene", scene, "--json", folder=folder, passes=(0, 1)))["results"]["verdict"]
+    lines = [f"* {label}: {told[key]}" for label, key in (("take", "take"), ("why", "why"), ("error", "error"), ("saves", "saves"))]
+    return "`select`:\n\n" + "\n".join(lines)
+
+
+def described(row):
+    words = f"{row['modes']} mode{'s' if row['modes'] > 1 else ''}, {' '.join(row['groups']) or 'no group'}"
+    if row["mode_numbers"][-1] != row["modes"]:
+        words += " (the liveliest)"
+    lumped = {"couplings": "lumped couplings", "whole": "lumped mass", None: None}[row["lumped_part"]]
+    return words + (f", {lumped} ({row['lumped']})" if lumped else "") + (", f32" if row["storage"] == "f32" else "")
+
+
+def worst_error(row, tolerance):
+    """The error that is largest beside its tolerance: its name, its size and the tolerance, of the attitude in radians, else relative."""
+    errors = {key: value for key, value in row["measured"]["errors"].items() if key in tolerance and value is not None}
+    name = max(errors, key=lambda key: errors[key] / tolerance[key])
+    return name, errors[name], tolerance[name]
+
+
+def in_words(name, value):
+    return f"{number(value)} rad" if name == "attitude" else f"{number(100 * value)} %"
+
+
+def own_error(name, error, allowed):
+    """An error beside what is allowed, in bold where it is more."""
+    return f"{in_bold(name, error, allowed)} (allowed {in_words(name, allowed)})"
+
+
+def in_bold(name, error, allowed):
+    """An error, in bold where it is more than is allowed."""
+    return f"{name} **{in_words(name, error)}**" if error > allowed else f"{name} {in_words(name, error)}"
+
+
+def shown(told):
+    """Numbers of the rows that the page shows: the front where it is near the tolerances, what is recommended, the usual body, lumped masses and two sets of groups."""
+    rows = told["rows"]
+    numbers = worth_timing(told) + [1]
+    whole = rows[0]["modes"]
+    for row in rows:
+        alone = row["lumped"] or row["modes"] == whole and row["kind"] == "groups" and len(row["groups"]) == 2
+        if alone and row["measured"]:
+            numbers.append(row["number"])
+    unique = sorted(set(numbers), key=lambda at: rows[at - 1]["measured"]["multiplications"])
+    return [rows[at - 1] for at in unique if rows[at - 1]["measured"]]
+
+
+def worth_timing(told):
+    """Numbers of the rows that are timed: the front near the tolerances, what is recommended, the usual body."""
+    rows = told["rows"]
+    near = [number for number in told["front"] if 0 < rows[number - 1]["measured"]["worst"] <= HOPELESS]
+    return near + ([told["recommended"]] if told["recommended"] else []) + [usual(told)]
+
+
+def usual(told):
+    """The row of N free modes with residual vectors and all terms: the first conversion after the reference that has both."""
+    usual = [row for row in told["rows"] if row["source"].endswith("free modes, residual vectors") and row["source"] != told["rows"][0]["source"] and len(row["groups"]) == 3]
+    return usual[0]["number"]
+
+
+class Timed:
+    """A candidate in both programs."""
+
+    def __init__(self, program, folder, row, scene, start):
+        own = folder / f"{row['number']:03}"
+        own.mkdir()
+        path = folder / f"candidate_{row['number']:03}.flex.h5"
+        kept = [mode - 1 for mode in row["mode_numbers"]]
+        task = Task(path, scene, None if start is None else tuple(part[kept] for part in start))
+        self.programs, self.seconds, self.steps, self.why = {}, {}, {}, {}
+        for name, kind in (("exudyn", InExudyn), ("c", InC)):
+            try:
+                self.programs[name] = kind(program, task, own)
+                self.seconds[name], self.steps[name] = [], (task if name == "exudyn" else self.programs[name]).steps
+            except (RuntimeError, ValueError) as error:
+                self.why[name] = str(error).splitlines()[0]
+
+    def run(self):
+        for name, program in list(self.programs.items()):
+            try:
+                seconds, path = program.run()
+                self.seconds[name].append(seconds)
+                self.path = path if name == "exudyn" else getattr(self, "path", None)
+            except (RuntimeError, ValueError) as error:
+                self.why[name] = str(error).splitlines()[0]
+                del self.programs[name]
+
+    def median(self, name):
+        return float(np.median(self.seconds[name])) if self.seconds.get(name) and name not in self.why else None
+
+
+def timed(program, folder, told, scene):
+    """Seconds of the rows that are shown, taken in turns."""
+    q, qd, _ = simulated_modes(program, folder, folder / "candidate_001.flex.h5", scene[0])
+    first = told["rows"][0]["source"]
+    found = {}
+    for number in sorted(set(worth_timing(told) + [1])):
+        row = told["rows"][number - 1]
+        start = (q[0], qd) if row["source"] == first else None
+        found[number] = Timed(program, folder, row, scene[1], start)
+    # The reference runs once, to see that the scene is the same there.
+    for turn in range(TURNS):
+        for number, one in found.items():
+            if turn == 0 or number > 1:
+                one.run()
+    return found
+
+
+def measured(told, times):
+    """What is shown, as a table."""
+    out = ["| candidate | error | of what is allowed | Exudyn (s) | C (ms) | steps in C | file (kB) |", "|---|---|---|---|---|---|---|"]
+    for row in shown(told):
+        own, one = row["measured"], times.get(row["number"])
+        name, error, _ = worst_error(row, told["tolerance"])
+        label = f"**{described(row)}**" if row["number"] == told["recommended"] else described(row)
+        label += " (whole body)" if row["number"] == usual(told) else ""
+        cells = [f"{name} {in_words(name, error)}", f"{number(100 * own['worst'])} %", *timings(one), number(own["file_bytes"] / 1e3, 3)]
+        out.append(f"| {label} | " + " | ".join(cells) + " |")
+    return "\n".join(out)
+
+
+def timings(one):
+    """Seconds in Exudyn, milliseconds and steps in C; nothing of candidates that were not timed."""
+    if one is None:
+        return ["", "", ""]
+    seconds, milliseconds = one.median("exudyn"), one.median("c")
+    return [
+        number(seconds) if seconds else one.why.get("exudyn", ""),
+        number(1e3 * milliseconds) if milliseconds else one.why.get("c", ""),
+        f"{one.steps['c']:,}" if "c" in one.steps else "",
+    ]
+
+
+def drawn(told, times, name):
+    """The figure: the largest error over what is allowed, against seconds in Exudyn."""
+    points = []
+    for row in shown(told):
+        # A lumped mass takes what the reference takes, whose modes it has.
+        timed_as = 1 if row["lumped"] else row["number"]
+        seconds, worst = times[timed_as].median("exudyn") if timed_as in times else None, row["measured"]["worst"]
+        if seconds and worst > 0:
+            points.append((seconds, 100 * worst, described(row), bool(row["lumped"]), row["number"] == told["recommended"]))
+    (ROOT / "docs/images" / f"trade_{name}.svg").write_text(figure(told["scene"], points))
+
+
+def summary(told, times):
+    """The row of the table on top."""
+    lacks = told["reference_lacks"]
+    reference = ", ".join(in_bold(key, lacks[-1][key], told["tolerance"][key]) for key in OUTPUTS if lacks and lacks[-1][key])
+    whole = times[usual(told)]
+    name, error, allowed = worst_error(told["rows"][usual(told) - 1], told["tolerance"])
+    beside = own_error(name, error, allowed)
+    if not told["recommended"]:
+        return f"| {told['scene']} | none within the tolerances | | {beside} | {reference} | | |"
+    row = told["rows"][told["recommended"] - 1]
+    own = times[told["recommended"]]
+    name, error, allowed = worst_error(row, told["tolerance"])
+
+    def saved(kind, unit):
+        before, after = whole.median(kind), own.median(kind)
+        if not before or not after:
+            return whole.why.get(kind) or own.why.get(kind) or ""
+        return f"{number(unit * before)} to {number(unit * after)}: **{number(before / after)} times**"
+
+    return f"| {told['scene']} | {described(row)} | {own_error(name, error, allowed)} | {beside} | {reference} | {saved('exudyn', 1)} | {saved('c', 1e3)} |"
+
+
+def scene_part(program, name, model, modes):
+    """The part of a scene, and its rows of the two tables on top."""
+    path = ROOT / "fixtures/scenes" / f"{name}.toml"
+    manifest = ROOT / "fixtures/models" / model / "model.toml"
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        words = ["trade", manifest, "--modes", modes, "--scene", path, "--repeat", 1, "--bodies", folder, "--report", "trade.json", "--quiet"]
+        begin = time.perf_counter()
+        run(program, *words, folder=folder, passes=(0, 1))
+        took = time.perf_counter() - begin
+        told = json.loads((folder / "trade.json").read_text())
+        times = timed(program, folder, told, (path, read_scene(path)))
+        agree = agreement(program, folder, path, times[told["rows"][0]["number"]])
+    drawn(told, times, name)
+    verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:])
+    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s. The modes of the reference move in Exudyn as in `simulate` to {number(100 * agree)} % of the root of the elastic energy."
+    parts = [f"## {told['scene']}", said, verdict, measured(told, times), f"![error over seconds](../images/trade_{name}.svg)"]
+    return "\n\n".join(parts) + "\n\n", summary(told, times), bases(told)
+
+
+def bases(told):
+    """The row of the table of bases: how many modes the tolerances take, by the way in which they are chosen."""
+    rows, first = told["rows"], told["rows"][0]
+
+    def fewest(fits):
+        found = [row["modes"] for row in rows if not row["lumped"] and row["measured"] and row["measured"]["worst"] <= 1 and fits(row)]
+        return str(min(found)) if found else f"more than {max((row['modes'] for row in rows if fits(row)), default=0)}"
+
+    def of_reference(row):
+        return row["source"] == first["source"]
+
+    def in_order(row):
+        return row["mode_numbers"][-1] == row["modes"]
+
+    cells = [
+        fewest(lambda row: row["source"].endswith("free modes") or row["source"].endswith("free mode")),
+        fewest(lambda row: row["source"].endswith("residual vectors") and in_order(row)),
+        fewest(of_reference),
+        fewest(lambda row: row["source"].endswith("of the motion")),
+    ]
+    return f"| {told['scene']} | " + " | ".join(cells) + " |"
+
+
+def agreement(program, folder, scene, one):
+    """Largest difference of the motion of the reference in Exudyn to `simulate`, in the root of the elastic energy."""
+    task = one.programs["exudyn"].task
+    q, _, instants = simulated_modes(program, folder, task.path, scene)
+    own = np.array([np.interp(instants, one.programs["exudyn"].instants, column) for column in one.path.T]).T
+    root = np.sqrt(task.eigenvalue)
+    return np.linalg.norm((own - q) * root, axis=1).max() / np.linalg.norm(q * root, axis=1).max()
+
+
+def simulated_modes(program, folder, body, scene):
+    """Modal coordinates of `flexbody simulate` (instants x modes), their first rates, and the instants."""
+    run(program, "simulate", body, "--scene", scene, "--csv", "modes.csv", "--quiet", folder=folder)
+    with open(folder / "modes.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    count = sum(key.startswith("q_") for key in rows[0])
+    q = np.array([[float(row[f"q_{j + 1}"]) for j in range(count)] for row in rows])
+    return q, np.array([float(rows[0][f"qd_{j + 1}"]) for j in range(count)]), np.array([float(row["time"]) for row in rows])
+
+
+def simulated(program, folder, scene, body):
+    """The motion by `flexbody simulate`: instants, and the states as the other program has them."""
+    run(program, "simulate", "body.flex.h5", "--scene", scene, "--csv", "motion.csv", "--quiet", folder=folder)
+    with open(folder / "motion.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    names = [f"attitude_{k}" for k in range(4)] + [f"angular_velocity_{k}" for k in "xyz"] + [f"q_{j + 1}" for j in range(body.nf)] + [f"qd_{j + 1}" for j in range(body.nf)]
+    return np.array([float(row["time"]) for row in rows]), np.array([[float(row[name]) for row in rows] for name in names])
+
+
+def guidelines(job):
+    """Errors of each guideline in a scene, the tolerances, and how well the two programs agree; `None` for bodies with other equations."""
+    program, name, model = job
+    path = ROOT / "fixtures/scenes" / f"{name}.toml"
+    scene = read_scene(path)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        convert(program, folder, model, FEW)
+        body = Body(folder / "body.flex.h5")
+        if not body.solid:
+            return name, None
+        instants, own = simulated(program, folder, path, body)
+    every = max(1, len(instants) // INSTANTS)
+    whole, errors = study(body, scene, instants[::every])
+    root = np.sqrt(body.eigenvalue)[:, None]
+    q, p = (root * of[7:7 + body.nf] for of in (own[:, ::every], whole))
+    # A body with geometric stiffness has it in `simulate`, and not here.
+    agree = None if body.prestressed else np.linalg.norm(q - p, axis=0).max() / np.linalg.norm(q, axis=0).max()
+    tolerance = {"attitude": 1e-3, "stress": 0.01, **scene.get("tolerance", {})}
+    return name, (scene["name"], errors, tolerance, agree)
+
+
+def guide_part(found):
+    rows = [one for _, one in found if one is not None]
+    names = [name for name in GUIDELINES if name != "IV"]
+    out = ["| scene | " + " | ".join(names) + " |", "|---|" + "---|" * len(names)]
+    for title, errors, tolerance, _ in rows:
+        cells = []
+        for name in names:
+            if errors[name] is None:
+                cells.append("**does not run**")
+                continue
+            pair = [f"**{number(errors[name][key])}**" if errors[name][key] > tolerance[key] else number(errors[name][key]) for key in ("attitude", "stress")]
+            cells.append(" / ".join(pair))
+        out.append(f"| {title} | " + " | ".join(cells) + " |")
+    agree = max(one[3] for one in rows if one[3] is not None)
+    holds = {name: [title for title, errors, tolerance, _ in rows if errors[name] and all(errors[name][key] <= tolerance[key] for key in ("attitude", "stress"))] for name in names}
+    lines = [f"* {name} holds in {len(held)} of {len(rows)} scenes" + (": " + ", ".join(held) if held else "") + "." for name, held in holds.items()]
+    return GUIDE.format(few=FEW, agree=agree) + "\n".join(out) + "\n\n" + "\n".join(lines) + "\n\n"
+
+
+def counter_part(program):
+    """A block whose deformation and spin are small, and guidelines that fail."""
+    name, model, modes = COUNTER
+    path = ROOT / "fixtures/scenes" / f"{name}.toml"
+    scene = read_scene(path)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        convert(program, folder, model, modes)
+        body = Body(folder / "body.flex.h5")
+        instants, own = simulated(program, folder, path, body)
+        decision = decided(program, folder, path, "body.flex.h5")
+    every = max(1, len(instants) // INSTANTS)
+    whole, errors = study(body, scene, instants[::every])
+    q = np.linalg.norm(own[7:7 + body.nf], axis=0).max()
+    omega = np.linalg.norm(own[4:7], axis=0).max()
+    first = np.sqrt(body.eigenvalue[0])
+    facts = f"eta = |q| / sqrt(I0) = {100 * q / np.sqrt(np.diag(body.I0).min()):.1f} %, omega / Omega1 = {omega / first:.3f}, {first * instants[-1] / (2 * np.pi):.0f} periods of the first mode"
+    lines = [f"| {key} | " + " | ".join(f"{100 * errors[key][what]:.2g} %" if errors[key] else "does not run" for what in ("omega", "modes")) + f" | {number(errors[key]['attitude'])} |" for key in errors if errors[key]]
+    table = "\n".join(["| guideline | angular velocity | modal coordinates | attitude (rad) |", "|---|---|---|---|", *lines])
+    said = "Small deformations and a slow spin, for which guidelines I and II are meant; over many periods they are not enough. What is enough:"
+    parts = ["## A block that tumbles while it vibrates", f"`fixtures/scenes/{name}.toml` with `{model}`: {facts}.", table, said, decision]
+    return "\n\n".join(parts) + "\n\n"
+
+
+def conversion_part(program):
+    """What the settings of a conversion cost and are worth, against the motion of all nodes."""
+    name, model, modes = COUNTER
+    words = ["trade", ROOT / "fixtures/models" / model / "model.toml", "--modes", modes, "--scene", ROOT / "fixtures/scenes" / f"{name}.toml"]
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        run(program, *words, "--reference", "nodal", "--repeat", 1, "--report", "trade.json", "--quiet", folder=folder, passes=(0, 1))
+        told = json.loads((folder / "trade.json").read_text())
+    lines = ["| conversion | modes | made in (s) | work | file (kB) | attitude (rad) | stress | error / tolerance |", "|---|---|---|---|---|---|---|---|"]
+    for row in told["rows"]:
+        own = row["measured"]
+        if own is None or len(row["groups"]) < 3 or row["kind"] != "modes" or row["source"] in [line.split(" | ")[0][2:] for line in lines]:
+            continue
+        cells = [row["source"], str(row["modes"]), number(own["seconds"]["preprocessing"]), f"{own['multiplications']:,}", number(own["file_bytes"] / 1e3, 3)]
+        cells += [number(own["errors"][key]) for key in ("attitude", "stress")] + [number(own["worst"], 3)]
+        lines.append("| " + " | ".join(cells) + " |")
+    said = f"The same scene with the manifest, `trade {model}/model.toml --modes {modes} --reference nodal`: conversions with all groups, against the unreduced equations of all nodes."
+    return "## Settings of the conversion\n\n" + said + "\n\n" + "\n".join(lines) + "\n\n"
+
+
+def processor():
+    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return f"{len(names)} cores, {names[0]}" if names else "processor not known"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
+    parser.add_argument("--output", type=Path, default=ROOT / "docs/validation/trade.md")
+    parser.add_argument("--only", nargs="*", help="measure these parts only, by the names of their scenes")
+    args = parser.parse_args()
+    program = str(Path(args.program).resolve())  # it runs in another folder
+    version = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
+    kept = ROOT / "target/trade"
+    kept.mkdir(parents=True, exist_ok=True)
+    for name, make in jobs(program).items():
+        # One after the other: the times are measured.
+        if not args.only or name in args.only:
+            (kept / f"{name}.json").write_text(json.dumps(make()))
+            print(name, flush=True)
+    found = {path.stem: json.loads(path.read_text()) for path in kept.glob("*.json")}
+    args.output.write_text(assembled(version, found), encoding="utf-8")
+    print(args.output)
+
+
+def jobs(program):
+    """What is measured, each part by its name."""
+    scenes = {one[0]: partial(scene_part, program, *one) for one in SCENES}
+    return {**scenes, "guidelines": partial(all_guidelines, program), "block": partial(counter_part, program), "conversions": partial(conversion_part, program)}
+
+
+def all_guidelines(program):
+    with ProcessPoolExecutor() as pool:
+        return list(pool.map(guidelines, [(program, name, model) for name, model, *_ in SCENES]))
+
+
+def assembled(version, found):
+    """The page, of the parts that are there."""
+    parts = [found[name] for name, *_ in SCENES if name in found]
+    head = ["| scene | body | its error | error of the whole body | the reference lacks (estimated) | seconds in Exudyn | milliseconds in C |", "|---|---|---|---|---|---|---|"]
+    top = "\n".join(head + [part[1] for part in parts])
+    head = ["| scene | free modes | and residual vectors | those of the reference that do most | shapes of the motion |", "|---|---|---|---|---|"]
+    ways = "\n".join(head + [part[2] for part in parts])
+    text = HEAD.format(version=version, exudyn=metadata.version("exudyn"), processor=processor(), turns=TURNS, per_period=PER_PERIOD, table=top, bases=ways)
+    missing = [name for name, *_ in SCENES if name not in found]
+    if missing:
+        text += f"Not measured yet in this form: {', '.join(missing)} (`python3 scripts/pages/make_trade.py --only ...`).\n\n"
+    text += "".join(part[0] for part in parts)
+    if "guidelines" in found:
+        text += guide_part(found["guidelines"])
+    return (text + found.get("block", "") + found.get("conversions", "")).rstrip() + "\n"
+
+
+if __name__ == "__main__":
+    main()
