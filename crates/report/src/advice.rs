@@ -180,11 +180,11 @@ impl<'a> AdviceFacts<'a> {
             _ => "free",
         };
         let mut terms = vec![
-            Term::new("Rotation rate", spin),
+            Term::new("Rotation rate", spin).short("Spin"),
             Term::new("Deflection", deflection),
             Term::new("Rotation", rotation),
         ];
-        terms.extend(self.attached_mass.map(|mass| Term::new("Attached mass", self.units.mass_of(mass, 4))));
+        terms.extend(self.attached_mass.map(|mass| Term::new("Attached mass", self.units.mass_of(mass, 4)).short("Attached")));
         terms
     }
 

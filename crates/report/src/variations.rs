@@ -92,6 +92,9 @@ pub(super) fn in_words(variations: &[VariationFacts<'_>]) -> Option<String> {
     if !failing.is_empty() {
         words.push_str(&format!(": does not hold (error over tolerance) in {}", list(&failing)));
     }
+    if !failing.is_empty() {
+        words.push_str("; no candidate holds there: make such a variation a [[case]] if it can occur");
+    }
     if !unjudged.is_empty() {
         let names: Vec<&str> = unjudged.iter().map(|one| one.name).collect();
         words.push_str(&format!(
