@@ -93,7 +93,7 @@ pub(super) fn in_words(variations: &[VariationFacts<'_>]) -> Option<String> {
         words.push_str(&format!(": does not hold (error over tolerance) in {}", list(&failing)));
     }
     if !failing.is_empty() {
-        words.push_str("; no candidate holds there: make such a variation a [[case]] if it can occur");
+        words.push_str("; make such a variation a [[case]] of the scene if it can occur");
     }
     if !unjudged.is_empty() {
         let names: Vec<&str> = unjudged.iter().map(|one| one.name).collect();
