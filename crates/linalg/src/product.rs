@@ -6,10 +6,10 @@
 
 use super::SymmetricMatrix;
 use super::contiguous::{contiguous, contiguous_mut};
+use super::parallel;
 use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 
 /// Number of rows per parallel task.
 const ROWS_PER_TASK: usize = 1024;
@@ -165,16 +165,16 @@ fn pass<const B: usize, const W: usize>(
     let arch = Arch::new();
     let columns: [&[f64]; W] = std::array::from_fn(|c| contiguous(x.col(c)));
     // Pack the columns row by row.
-    let rows = (0..a.n()).into_par_iter().with_min_len(ROWS_PER_TASK);
-    let packed: Vec<[[f64; W]; B]> =
-        rows.map(|i| std::array::from_fn(|b| columns.map(|column| column[i * B + b]))).collect();
+    let packed: Vec<[[f64; W]; B]> = parallel::values(a.n(), ROWS_PER_TASK, |i| {
+        std::array::from_fn(|b| columns.map(|column| column[i * B + b]))
+    });
     // Give each task its rows of all columns.
     let mut targets: Vec<_> =
         y.col_iter_mut().map(|column| contiguous_mut(column).chunks_mut(ROWS_PER_TASK * B)).collect();
     let shares: Vec<[&mut [f64]; W]> = (0..a.n().div_ceil(ROWS_PER_TASK))
         .map(|_| std::array::from_fn(|c| targets[c].next().expect("as many chunks as tasks")))
         .collect();
-    shares.into_par_iter().enumerate().for_each(|(chunk, share)| {
+    parallel::for_each(shares.into_iter().enumerate(), |(chunk, share)| {
         arch.dispatch(RowProducts { a, first: chunk * ROWS_PER_TASK, x: &packed, y: share, f });
     });
 }
