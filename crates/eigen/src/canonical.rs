@@ -3,8 +3,7 @@
 
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Mat, MatMut, MatRef};
-use flexbody_linalg::{combine, contiguous_mut};
-use rayon::prelude::*;
+use flexbody_linalg::{combine, contiguous_mut, parallel};
 use std::ops::Range;
 
 /// Relative gap between eigenvalues below which they belong to one cluster, which is completed and put into canonical
@@ -56,8 +55,7 @@ pub fn canonical_basis(mut shapes: MatMut<'_, f64>, clusters: &[Range<usize>]) {
             reflect_onto_first(rest.rb_mut(), row);
         }
     }
-    let columns: Vec<&mut [f64]> = shapes.col_iter_mut().map(contiguous_mut).collect();
-    columns.into_par_iter().for_each(|column| {
+    parallel::for_each(shapes.col_iter_mut().map(contiguous_mut), |column| {
         if canonical_sign(column.iter().copied()) < 0.0 {
             column.iter_mut().for_each(|x| *x = -*x);
         }

@@ -15,9 +15,8 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::multigrid::DeflationSpace;
 use flexbody_linalg::multigrid::{CorrectionTarget, Levels};
 use flexbody_linalg::{
-    Solve, Tall, combine, combine_in_place, combine_into, gram, largest, subtract_combination,
+    Solve, Tall, combine, combine_in_place, combine_into, gram, largest, parallel, subtract_combination,
 };
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Residual asked of the first mode beyond the wanted ones. The error of its eigenvalue, which bounds the gap of the
@@ -221,7 +220,7 @@ impl<'a> Correction<'a> {
         let columns: Vec<_> = poor.chain(after.as_ref().col_iter()).collect();
         // Columns are scaled to unit size: residuals near rounding would leave the range of single precision.
         let unit = |size: f64| if size > 0.0 { size.recip() } else { 0.0 };
-        let scales: Vec<f64> = columns.par_iter().map(|column| unit(column.norm_max())).collect();
+        let scales = parallel::map(&columns, |column| unit(column.norm_max()));
         let mut d = Tall::with_capacity(self.problem.pencil.n(), columns.len());
         columns.iter().zip(scales).for_each(|(column, scale)| d.push_multiple(scale, *column));
         // Solve the correction equations.

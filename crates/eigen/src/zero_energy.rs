@@ -39,7 +39,7 @@ pub(super) fn is_noisy(floors: &[f64], tolerance: f64) -> bool {
 /// Returns sum_j f(K_ij x_j) for each row i and each column x.
 fn row_sums(k: &SymmetricMatrix, x: MatRef<'_, f64>, f: impl Fn(f64) -> f64 + Copy + Sync) -> Tall {
     let mut sums = Tall::zeros(x.nrows(), x.ncols());
-    sum_terms(k, 1, x, sums.as_mut(), f);
+    sum_terms(k, x, sums.as_mut(), f);
     sums
 }
 

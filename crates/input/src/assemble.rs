@@ -4,9 +4,8 @@
 use super::digits::significant_digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::memory::{allow_failure, left, refuse_beyond};
-use flexbody_linalg::{ColumnBlock, CscMatrix, split_columns};
+use flexbody_linalg::{ColumnBlock, CscMatrix, parallel, split_columns};
 use flexbody_model::RawMatrix;
-use rayon::prelude::*;
 use std::ops::Range;
 use std::path::Path;
 
@@ -213,7 +212,7 @@ impl Counted {
         let mut col_ptr = vec![0usize; n + 1];
         let width = n.div_ceil(4 * rayon::current_num_threads()).max(1);
         // Each task counts the entries of its columns.
-        col_ptr[1..].par_chunks_mut(width).enumerate().for_each(|(task, counts)| {
+        parallel::for_each(col_ptr[1..].chunks_mut(width).enumerate(), |(task, counts)| {
             let first = task * width;
             list.visit(first..first + counts.len(), |_, col, _| counts[col - first] += 1);
         });
@@ -234,7 +233,7 @@ impl Counted {
             sort_columns(&col_ptr[first..=end], block.rows, block.values)
         };
         let blocks = split_columns(&col_ptr, &equal_shares(&col_ptr), &mut row_idx, &mut values);
-        let has_duplicates = blocks.into_par_iter().map(fill).reduce(|| false, |a, b| a | b);
+        let has_duplicates = parallel::map(blocks, fill).contains(&true);
         Self { col_ptr, row_idx, values, has_duplicates }
     }
 
@@ -336,7 +335,7 @@ impl ColumnEntries {
         let blocks = split_columns(&col_ptr, &cuts, &mut row_idx, &mut values);
         let sort =
             |b: ColumnBlock<'_>| sort_columns(&col_ptr[b.columns.start..=b.columns.end], b.rows, b.values);
-        if blocks.into_par_iter().map(sort).reduce(|| false, |a, b| a | b) {
+        if parallel::map(blocks, sort).contains(&true) {
             merge_duplicates(&mut col_ptr, &mut row_idx, &mut values)?;
         }
         Ok(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
@@ -374,7 +373,7 @@ impl List {
                 (low.min(e.col).min(other), high.max(e.col).max(other))
             })
         };
-        let extents = pieces.par_iter().map(extent).collect();
+        let extents = parallel::map(&pieces, extent);
         Self { pieces, extents, mirror }
     }
 

@@ -6,7 +6,7 @@ use super::assemble::{Entry, Sides, check_size, refuse_beyond_memory};
 use super::digits::{COUNTED, written_digits};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::text::compression::{Compression, broken};
-use rayon::prelude::*;
+use flexbody_linalg::parallel;
 use std::io::Read;
 use std::path::Path;
 
@@ -76,7 +76,7 @@ impl Coordinates {
         let (mut block, mut skip) = (first, skip);
         loop {
             // The next block is read and unpacked while this one is parsed.
-            let (following, ()) = rayon::join(|| blocks.next(), || self.parse(&block[skip..]));
+            let (following, ()) = parallel::join(|| blocks.next(), || self.parse(&block[skip..]));
             let following = following.map_err(|e| vec![broken(path, &e)]);
             if self.is_too_much()? && !matches!(following, Ok(None)) {
                 self.stopped = true;
@@ -105,9 +105,7 @@ impl Coordinates {
     }
 
     fn parse(&mut self, block: &[u8]) {
-        let pieces: Vec<&[u8]> = line_aligned(block).collect();
-        let parsed: Vec<line::EntryLines> =
-            pieces.into_par_iter().map(|piece| line::parse(piece, self.limits)).collect();
+        let parsed = parallel::map(line_aligned(block), |piece| line::parse(piece, self.limits));
         for piece in parsed {
             let before = self.lines;
             self.count += (piece.entries.len() + piece.bad_count) as u64;

@@ -13,8 +13,8 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result as Outcome};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::SeenFile;
+use flexbody_linalg::parallel;
 use flexbody_model::{DofLabel, RawMatrix};
-use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -117,16 +117,14 @@ impl Dmigs {
                 continue;
             }
             let heads = self.heads();
-            let read = parts.par_iter().map(|part| {
+            self.take(parallel::try_map(parts, |part| {
                 let mut columns = Columns::of(part.bytes.len());
                 read_cards(&bytes[part.bytes.clone()], path, part.above, &mut |card| {
                     columns.card(card, path, &heads);
                     Ok(())
                 })?;
                 Ok(columns)
-            });
-            let read: Vec<Result<Columns, Diagnostic>> = read.collect();
-            self.take(read.into_iter().collect::<Result<_, _>>()?);
+            })?);
         }
         Ok(())
     }
@@ -142,8 +140,8 @@ impl Dmigs {
             .iter()
             .map(|columns| columns.points.iter().map(|point| self.number(*point)).collect())
             .collect();
-        let numbered = all.into_par_iter().zip(places).map(|(columns, place)| columns.numbered(&place));
-        let numbered: Vec<Columns> = numbered.collect();
+        let numbered =
+            parallel::map(all.into_iter().zip(places), |(columns, place)| columns.numbered(&place));
         for columns in numbered {
             for (matrix, entries, written) in columns.runs {
                 let dmig = &mut self.matrices[matrix];
@@ -253,7 +251,9 @@ impl Dmigs {
     /// Returns the nonzero entries with rows and columns as indices in `points`, and their sides of the diagonal.
     fn in_rows(&self, mut pieces: Vec<Vec<Entry>>, points: &[Point]) -> (Vec<Vec<Entry>>, Sides) {
         let row_of = |point| points.binary_search(point).map_or(u32::MAX, |row| row as u32);
-        let row_of: Vec<u32> = self.points.par_iter().map(row_of).collect();
+        let row_of: Vec<u32> = parallel::concat(self.points.len(), 1024, |range| {
+            self.points[range].iter().map(row_of).collect()
+        });
         let place = |piece: &mut Vec<Entry>| {
             let mut sides = Sides::default();
             piece.retain_mut(|entry| {
@@ -266,7 +266,7 @@ impl Dmigs {
             sides
         };
         let either = |a: Sides, b: Sides| Sides { lower: a.lower | b.lower, upper: a.upper | b.upper };
-        let sides = pieces.par_iter_mut().map(place).reduce(Sides::default, either);
+        let sides = parallel::map(&mut pieces, place).into_iter().fold(Sides::default(), either);
         (pieces, sides)
     }
 

@@ -13,9 +13,9 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::Compression;
 use flexbody_base::text::InputFile;
+use flexbody_linalg::parallel;
 use flexbody_model::RawMatrix;
 use layout::{Columns, SINGLE_DIGITS, Stored, Stretch};
-use rayon::prelude::*;
 use text::Format;
 
 /// Number of digits with which OUTPUT4 writes single-precision numbers as text.
@@ -149,9 +149,8 @@ fn columns(file: &InputFile, stored: &Stored, encoding: Encoding) -> Found<Colum
                 Encoding::Binary(binary) => binary.columns(bytes, &stored.header),
             }
         };
-        let read: Vec<Found<Columns>> = stretches.par_iter().map(read).collect();
-        for columns in read {
-            all.append(&columns?);
+        for columns in parallel::try_map(stretches, read)? {
+            all.append(&columns);
         }
     }
     Ok(all)

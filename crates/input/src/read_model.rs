@@ -16,6 +16,7 @@ use flexbody_base::provenance::{SourceFile, Sources};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::quotes::without_foreign_quotes;
+use flexbody_linalg::parallel;
 use flexbody_model::{
     Damping, DofLabel, Elements, GeometricStiffness, GivenRows, LostRow, NodeAxes, NodeSet, Nodes, RawMatrix,
     RawModel, RowMap, filled_rows,
@@ -273,15 +274,15 @@ impl Parsed {
         let matrices = match &files.source {
             ModelSource::Job(job) => Matrices::Job(Box::new(read_job(job).map(ModelMatrices::from))),
             ModelSource::Tables(tables) => {
-                let ((stiffness, mass), (nodes, dofs)) = rayon::join(
+                let ((stiffness, mass), (nodes, dofs)) = parallel::join(
                     || {
-                        rayon::join(
+                        parallel::join(
                             || matrix(&tables.stiffness, MatrixRole::Stiffness),
                             || matrix(&tables.mass, MatrixRole::Mass),
                         )
                     },
                     || {
-                        rayon::join(
+                        parallel::join(
                             || read_node_file(opened.get(&tables.nodes)?, files.dimension),
                             || tables.dofs.as_ref().map(|path| Mapping::read(opened.get(path)?)),
                         )

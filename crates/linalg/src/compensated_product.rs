@@ -3,8 +3,8 @@
 use super::SymmetricMatrix;
 use super::compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
 use super::contiguous::contiguous;
+use super::parallel;
 use faer::MatRef;
-use rayon::prelude::*;
 
 /// Number of columns of a block.
 pub const LANES: usize = 8;
@@ -53,23 +53,22 @@ pub fn multiply_compensated(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64
         }
     }
     let (mut hi, mut lo) = (vec![[0.0; LANES]; n], vec![[0.0; LANES]; n]);
-    hi.par_chunks_mut(ROWS_PER_TASK).zip(lo.par_chunks_mut(ROWS_PER_TASK)).enumerate().for_each(
-        |(chunk, (hi, lo))| {
-            with_fma(
-                #[inline(always)]
-                || {
-                    for (r, (hi, lo)) in hi.iter_mut().zip(lo).enumerate() {
-                        let (node, component) =
-                            ((chunk * ROWS_PER_TASK + r) / block, (chunk * ROWS_PER_TASK + r) % block);
-                        let (columns, values) = a.row(node);
-                        for (&j, &value) in columns.iter().zip(values) {
-                            accumulate(hi, lo, value, &packed[j as usize * block + component]);
-                        }
+    let tasks = hi.chunks_mut(ROWS_PER_TASK).zip(lo.chunks_mut(ROWS_PER_TASK)).enumerate();
+    parallel::for_each(tasks, |(chunk, (hi, lo))| {
+        with_fma(
+            #[inline(always)]
+            || {
+                for (r, (hi, lo)) in hi.iter_mut().zip(lo).enumerate() {
+                    let row = chunk * ROWS_PER_TASK + r;
+                    let (node, component) = (row / block, row % block);
+                    let (columns, values) = a.row(node);
+                    for (&j, &value) in columns.iter().zip(values) {
+                        accumulate(hi, lo, value, &packed[j as usize * block + component]);
                     }
-                },
-            );
-        },
-    );
+                }
+            },
+        );
+    });
     CompensatedBlock { hi, lo }
 }
 
@@ -82,10 +81,8 @@ pub fn multiply_compensated(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64
 pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[DoubleDouble; LANES]> {
     let n = a.nrows();
     assert_eq!(n, y.hi.len(), "rows of a compensated Gram product");
-    let partial: Vec<Vec<[DoubleDouble; LANES]>> = (0..n.div_ceil(ROWS_PER_TASK))
-        .into_par_iter()
-        .map(|chunk| {
-            let rows = chunk * ROWS_PER_TASK..((chunk + 1) * ROWS_PER_TASK).min(n);
+    let partial: Vec<Vec<[DoubleDouble; LANES]>> =
+        parallel::map(parallel::ranges(n, ROWS_PER_TASK), |rows| {
             let column = |c: usize| {
                 let (mut hi, mut lo) = ([0.0; LANES], [0.0; LANES]);
                 let factors = contiguous(a.col(c));
@@ -100,8 +97,7 @@ pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[Double
                 std::array::from_fn(|w| DoubleDouble { hi: hi[w], lo: lo[w] })
             };
             (0..a.ncols()).map(column).collect()
-        })
-        .collect();
+        });
     // Add the partial sums in fixed order.
     let mut total = vec![[DoubleDouble::default(); LANES]; a.ncols()];
     for part in &partial {

@@ -1,8 +1,8 @@
 //! Elimination of dependent rows of a pencil: u = T y, K -> T' K T, M -> T' M T.
 
+use super::parallel;
 use super::{CscMatrix, Pencil, SymmetricMatrix, combine, gram};
 use faer::{Mat, MatRef};
-use rayon::prelude::*;
 
 /// Number of columns per parallel task.
 const COLUMNS_PER_TASK: usize = 2048;
@@ -190,7 +190,7 @@ impl Elimination {
             }
             (lengths, row_idx, values)
         };
-        let chunks: Vec<_> = (0..m).into_par_iter().step_by(COLUMNS_PER_TASK).map(chunk).collect();
+        let chunks = parallel::map((0..m).step_by(COLUMNS_PER_TASK), chunk);
         let (mut col_ptr, mut row_idx, mut values) = (vec![0usize], Vec::new(), Vec::new());
         for (lengths, rows, entries) in chunks {
             for length in lengths {

@@ -5,12 +5,12 @@ use super::assembly_tree::AssemblyTree;
 use super::front::{self, Real, Trapezoid, extend_add};
 use super::largest::largest;
 use super::ordering::{nested_dissection, smallest_graph, vertex_graph};
+use super::parallel;
 use super::substitution;
 use super::tree_walk::{Needs, TreeWalk};
 use super::{Pencil, SymmetricMatrix};
 use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
-use rayon::prelude::*;
 use std::convert::Infallible;
 use std::sync::{Arc, OnceLock};
 
@@ -377,8 +377,8 @@ pub(super) fn substitute<T: Real, const K: usize>(
     analysis.walk.down(tree, &mut slots, &down);
     // Back to the order and scale of the model.
     let columns_per_task = (MIN_ROWS_PER_TASK / x.nrows().max(1)).max(1);
-    let columns: Vec<_> = x.col_iter_mut().collect();
-    columns.into_par_iter().with_min_len(columns_per_task).enumerate().for_each(|(j, mut to)| {
+    let mut columns: Vec<_> = x.col_iter_mut().collect();
+    parallel::for_each_mut(&mut columns, columns_per_task, |j, to| {
         for (&vertex, from) in tree.order().iter().zip(values.chunks_exact(block)) {
             for (row, from) in (vertex as usize * block..).zip(from) {
                 to[row] = from[j].wide() * scale[row];
@@ -402,7 +402,7 @@ fn in_elimination_order<T: Real, const K: usize>(
         }
         values
     };
-    (0..x.nrows()).into_par_iter().with_min_len(MIN_ROWS_PER_TASK).map(scaled).collect()
+    parallel::values(x.nrows(), MIN_ROWS_PER_TASK, scaled)
 }
 
 /// Number of columns that are solved together: the factor is read from memory once for all of them.

@@ -1,12 +1,12 @@
 //! Dense fronts: trapezoids in panels of columns, each panel row-major, and the kernels that eliminate the leading
 //! columns of a front. Work is cut into fixed pieces of rows, so that the bits do not depend on the number of threads.
 
+use super::parallel;
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, MatMut, MatRef, Par, Spec};
-use rayon::prelude::*;
 use std::ops::{AddAssign, Mul, Neg};
 
 /// Number of columns of a panel: large enough for products at full speed, small enough for its triangles to cost
@@ -199,7 +199,7 @@ pub(super) fn by_rows<T: Real>(
     if cost < MIN_PARALLEL_MULTIPLICATIONS {
         block.chunks_mut(ROWS_PER_PIECE * width).enumerate().for_each(|(i, piece)| work(i, piece));
     } else {
-        block.par_chunks_mut(ROWS_PER_PIECE * width).enumerate().for_each(|(i, piece)| work(i, piece));
+        parallel::for_each(block.chunks_mut(ROWS_PER_PIECE * width).enumerate(), |(i, piece)| work(i, piece));
     }
 }
 
@@ -331,6 +331,6 @@ pub(super) fn subtract_from_rest<T: Real>(
     if total * total * w / 2 < MIN_PARALLEL_MULTIPLICATIONS {
         rest.panels.iter_mut().enumerate().for_each(|(p, panel)| work(p, panel));
     } else {
-        rest.panels.par_iter_mut().enumerate().for_each(|(p, panel)| work(p, panel));
+        parallel::for_each(rest.panels.iter_mut().enumerate(), |(p, panel)| work(p, panel));
     }
 }

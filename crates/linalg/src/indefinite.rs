@@ -6,6 +6,7 @@ use super::contiguous::contiguous_mut;
 use super::factor::{Analysis, COLUMNS_PER_SOLVE, Solve, substitute};
 use super::front::{PANEL_COLUMNS, ROWS_PER_PIECE, Real, Trapezoid};
 use super::inertia::{Blocks, Contribution, Inertia, eliminate_front};
+use super::parallel;
 use super::random::normal;
 use super::substitution::{
     MIN_PARALLEL_ENTRIES, solve_lower, solve_transposed, subtract_product, subtract_transposed,
@@ -13,7 +14,6 @@ use super::substitution::{
 use super::tall::{Tall, column_norms, subtract_columns};
 use faer::MatMut;
 use faer::prelude::ReborrowMut;
-use rayon::prelude::*;
 use std::convert::Infallible;
 
 /// Factor of the indefinite matrix K - sigma M with numbers of type `T`. Solutions are computed in double precision, so
@@ -117,8 +117,7 @@ impl Solve for Indefinite<'_> {
 
 /// Calls `change` with row, column and entry for all entries of a block, its columns in parallel.
 fn for_columns(block: &mut Tall, change: impl Fn(usize, usize, &mut f64) + Sync) {
-    let columns: Vec<_> = block.as_mut().col_iter_mut().map(contiguous_mut).collect();
-    columns.into_par_iter().enumerate().for_each(|(j, column)| {
+    parallel::for_each(block.as_mut().col_iter_mut().map(contiguous_mut).enumerate(), |(j, column)| {
         column.iter_mut().enumerate().for_each(|(i, entry)| change(i, j, entry));
     });
 }
@@ -169,8 +168,8 @@ fn forward<T: Real, const K: usize>(
         if l.len() < MIN_PARALLEL_ENTRIES {
             piece(l, below);
         } else {
-            let pieces = l.par_chunks(ROWS_PER_PIECE * width).zip(below.par_chunks_mut(ROWS_PER_PIECE));
-            pieces.for_each(|(l, below)| piece(l, below));
+            let pieces = l.chunks(ROWS_PER_PIECE * width).zip(below.chunks_mut(ROWS_PER_PIECE));
+            parallel::for_each(pieces, |(l, below)| piece(l, below));
         }
     }
 }
@@ -201,13 +200,13 @@ fn backward<T: Real, const K: usize>(
         if l.len() < MIN_PARALLEL_ENTRIES {
             piece(l, below, &mut y);
         } else {
-            let pieces = l.par_chunks(ROWS_PER_PIECE * width).zip(below.par_chunks(ROWS_PER_PIECE));
-            let parts = pieces.map(|(l, below)| {
+            let pieces = l.chunks(ROWS_PER_PIECE * width).zip(below.chunks(ROWS_PER_PIECE));
+            let parts = parallel::map(pieces, |(l, below)| {
                 let mut part = vec![[0.0; K]; width];
                 piece(l, below, &mut part);
                 part
             });
-            for part in parts.collect::<Vec<_>>() {
+            for part in parts {
                 for (y, part) in y.iter_mut().zip(&part) {
                     y.iter_mut().zip(part).for_each(|(y, part)| *y += part);
                 }

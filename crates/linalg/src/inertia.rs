@@ -8,10 +8,10 @@ use super::front::{
     drop_negligible, extend_add, subtract_eliminated, subtract_from_rest,
 };
 use super::largest::largest;
+use super::parallel;
 use dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor as lblt;
 use faer::{Mat, MatRef, Par, Spec};
-use rayon::prelude::*;
 use std::cmp::Ordering::{Equal, Greater, Less};
 use std::convert::Infallible;
 
@@ -232,16 +232,13 @@ impl<T: Real> Blocks<T> {
             drop_negligible(rows);
         };
         let length = ROWS_PER_PIECE * width;
-        if below.len() * width < MIN_PARALLEL_MULTIPLICATIONS {
-            let pieces = below.chunks_mut(length).zip(scaled.chunks_mut(length));
-            pieces
-                .zip(growth.chunks_mut(ROWS_PER_PIECE))
-                .for_each(|((rows, scaled), growth)| piece(rows, scaled, growth));
+        let cost = below.len() * width;
+        let pieces =
+            below.chunks_mut(length).zip(scaled.chunks_mut(length)).zip(growth.chunks_mut(ROWS_PER_PIECE));
+        if cost < MIN_PARALLEL_MULTIPLICATIONS {
+            pieces.for_each(|((rows, scaled), growth)| piece(rows, scaled, growth));
         } else {
-            let pieces = below.par_chunks_mut(length).zip(scaled.par_chunks_mut(length));
-            pieces
-                .zip(growth.par_chunks_mut(ROWS_PER_PIECE))
-                .for_each(|((rows, scaled), growth)| piece(rows, scaled, growth));
+            parallel::for_each(pieces, |((rows, scaled), growth)| piece(rows, scaled, growth));
         }
     }
 

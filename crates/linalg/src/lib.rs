@@ -27,6 +27,7 @@ mod matrix_sum;
 pub mod multigrid;
 mod one_sided_jacobi;
 mod ordering;
+pub mod parallel;
 mod pencil;
 mod product;
 mod random;

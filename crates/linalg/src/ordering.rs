@@ -4,8 +4,8 @@
 //! freedom in half the time, and a quarter of the factorisation work of minimum degree on compact solids.
 
 use super::assembly_tree::Graph;
+use super::parallel;
 use super::{Pencil, SymmetricMatrix};
-use rayon::prelude::*;
 use std::sync::Mutex;
 
 /// Lock for METIS, which has one random state per process: one call at a time keeps the ordering reproducible.
@@ -92,7 +92,7 @@ fn graph<const S: usize, const H: usize>(pencil: &Pencil<'_>) -> Option<Graph> {
     const VERTICES_PER_TASK: usize = 1024;
     let vertices = pencil.n() / S;
     let mut pointers = vec![0i32; vertices + 1];
-    pointers[1..].par_iter_mut().with_min_len(VERTICES_PER_TASK).enumerate().for_each(|(vertex, count)| {
+    parallel::for_each_mut(&mut pointers[1..], VERTICES_PER_TASK, |vertex, count| {
         neighbours::<S, H>(pencil, vertex as u32, |_| *count += 1);
     });
     for vertex in 0..vertices {
@@ -108,7 +108,7 @@ fn graph<const S: usize, const H: usize>(pencil: &Pencil<'_>) -> Option<Graph> {
         shares.push((first as u32..end as u32, share));
         rest = after;
     }
-    shares.into_par_iter().for_each(|(range, share)| {
+    parallel::for_each(shares, |(range, share)| {
         let mut places = share.iter_mut();
         for vertex in range {
             neighbours::<S, H>(pencil, vertex, |other| {

@@ -6,10 +6,10 @@
 
 use super::SymmetricMatrix;
 use super::contiguous::{contiguous, contiguous_mut};
+use super::parallel;
 use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 
 /// Number of rows per parallel task.
 const ROWS_PER_TASK: usize = 1024;
@@ -21,7 +21,12 @@ const ROWS_PER_TILE: usize = 32;
 /// # Panics
 /// If the shapes do not match, or the block is not 1, 2 or 3.
 pub fn multiply(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>, y: MatMut<'_, f64>) {
-    sum_terms(a, block, x, y, |term| term);
+    match block {
+        1 => passes::<1>(a, x, y, |term| term),
+        2 => passes::<2>(a, x, y, |term| term),
+        3 => passes::<3>(a, x, y, |term| term),
+        _ => panic!("blocks of 1, 2 or 3 components, not {block}"),
+    }
 }
 
 /// Computes y = (A kron I_block) x for one vector, on one thread and without allocation.
@@ -110,46 +115,42 @@ fn row_times<const B: usize>(columns: &[u32], values: &[f64], x: &[[f64; B]]) ->
     std::array::from_fn(|b| sums.iter().map(|sum| sum[b]).sum())
 }
 
-/// Computes y_i = sum_j f(a_ij x_j), component by component for A kron I_block: [`multiply`] with a function of each
-/// term.
+/// Computes y_i = sum_j f(a_ij x_j) for each column: [`multiply`] with a function of each term.
 ///
 /// # Panics
-/// If the shapes do not match, or the block is not 1, 2 or 3.
+/// If the shapes do not match.
 pub fn sum_terms(
     a: &SymmetricMatrix,
-    block: usize,
+    x: MatRef<'_, f64>,
+    y: MatMut<'_, f64>,
+    f: impl Fn(f64) -> f64 + Copy + Sync,
+) {
+    passes::<1>(a, x, y, f);
+}
+
+/// Sums the terms for A kron I_B, in passes over the matrix of up to eight columns.
+fn passes<const B: usize>(
+    a: &SymmetricMatrix,
     x: MatRef<'_, f64>,
     mut y: MatMut<'_, f64>,
     f: impl Fn(f64) -> f64 + Copy + Sync,
 ) {
-    let n = a.n() * block;
+    let n = a.n() * B;
     assert!(x.nrows() == n && y.nrows() == n && x.ncols() == y.ncols(), "shapes of a block product");
     let mut start = 0;
     while start < x.ncols() {
-        let rest = x.ncols() - start;
-        let width = if rest >= 8 {
-            8
-        } else if rest >= 4 {
-            4
-        } else {
-            rest.min(2)
+        let width = match x.ncols() - start {
+            8.. => 8,
+            4.. => 4,
+            rest => rest.min(2),
         };
         let xs = x.subcols(start, width);
         let ys = y.rb_mut().subcols_mut(start, width);
-        match (block, width) {
-            (3, 8) => pass::<3, 8>(a, xs, ys, f),
-            (3, 4) => pass::<3, 4>(a, xs, ys, f),
-            (3, 2) => pass::<3, 2>(a, xs, ys, f),
-            (3, _) => pass::<3, 1>(a, xs, ys, f),
-            (2, 8) => pass::<2, 8>(a, xs, ys, f),
-            (2, 4) => pass::<2, 4>(a, xs, ys, f),
-            (2, 2) => pass::<2, 2>(a, xs, ys, f),
-            (2, _) => pass::<2, 1>(a, xs, ys, f),
-            (1, 8) => pass::<1, 8>(a, xs, ys, f),
-            (1, 4) => pass::<1, 4>(a, xs, ys, f),
-            (1, 2) => pass::<1, 2>(a, xs, ys, f),
-            (1, _) => pass::<1, 1>(a, xs, ys, f),
-            _ => panic!("blocks of 1, 2 or 3 components, not {block}"),
+        match width {
+            8 => pass::<B, 8>(a, xs, ys, f),
+            4 => pass::<B, 4>(a, xs, ys, f),
+            2 => pass::<B, 2>(a, xs, ys, f),
+            _ => pass::<B, 1>(a, xs, ys, f),
         }
         start += width;
     }
@@ -163,20 +164,24 @@ fn pass<const B: usize, const W: usize>(
     f: impl Fn(f64) -> f64 + Copy + Sync,
 ) {
     let arch = Arch::new();
-    let columns: [&[f64]; W] = std::array::from_fn(|c| contiguous(x.col(c)));
-    // Pack the columns row by row.
-    let rows = (0..a.n()).into_par_iter().with_min_len(ROWS_PER_TASK);
-    let packed: Vec<[[f64; W]; B]> =
-        rows.map(|i| std::array::from_fn(|b| columns.map(|column| column[i * B + b]))).collect();
+    let packed = packed::<B, W>(x);
     // Give each task its rows of all columns.
     let mut targets: Vec<_> =
         y.col_iter_mut().map(|column| contiguous_mut(column).chunks_mut(ROWS_PER_TASK * B)).collect();
     let shares: Vec<[&mut [f64]; W]> = (0..a.n().div_ceil(ROWS_PER_TASK))
         .map(|_| std::array::from_fn(|c| targets[c].next().expect("as many chunks as tasks")))
         .collect();
-    shares.into_par_iter().enumerate().for_each(|(chunk, share)| {
+    parallel::for_each(shares.into_iter().enumerate(), |(chunk, share)| {
         arch.dispatch(RowProducts { a, first: chunk * ROWS_PER_TASK, x: &packed, y: share, f });
     });
+}
+
+/// Returns the columns row by row.
+fn packed<const B: usize, const W: usize>(x: MatRef<'_, f64>) -> Vec<[[f64; W]; B]> {
+    let columns: [&[f64]; W] = std::array::from_fn(|c| contiguous(x.col(c)));
+    parallel::values(x.nrows() / B, ROWS_PER_TASK, |i| {
+        std::array::from_fn(|b| columns.map(|column| column[i * B + b]))
+    })
 }
 
 /// Rows `first`, `first + 1`, ... of the product, as many as `y` holds.

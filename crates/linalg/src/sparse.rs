@@ -1,7 +1,7 @@
 //! Compressed sparse matrices: the general form that readers deliver, and the symmetric form of all computations.
 
+use super::parallel;
 use super::stored::Stored;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of columns per parallel task.
@@ -42,10 +42,12 @@ impl CscMatrix {
         assert_eq!(col_ptr[0], 0, "first column pointer");
         assert_eq!(*col_ptr.last().expect("n_cols + 1 >= 1"), row_idx.len(), "entries");
         assert_eq!(row_idx.len(), values.len(), "values");
-        (0..n_cols).into_par_iter().with_min_len(COLUMNS_PER_TASK).for_each(|j| {
-            let rows = &row_idx[col_ptr[j]..col_ptr[j + 1]];
-            assert!(rows.is_sorted_by(|a, b| a < b), "rows of column {j} not ascending");
-            assert!(rows.last().is_none_or(|&r| (r as usize) < n_rows), "row out of range");
+        parallel::for_each(parallel::ranges(n_cols, COLUMNS_PER_TASK), |columns| {
+            for j in columns {
+                let rows = &row_idx[col_ptr[j]..col_ptr[j + 1]];
+                assert!(rows.is_sorted_by(|a, b| a < b), "rows of column {j} not ascending");
+                assert!(rows.last().is_none_or(|&r| (r as usize) < n_rows), "row out of range");
+            }
         });
         Self { n_rows, n_cols, col_ptr, row_idx, values }
     }
@@ -174,7 +176,7 @@ impl CscMatrix {
         }
         let (mut row_idx, mut values) = (vec![0u32; self.nnz()], vec![0.0; self.nnz()]);
         let cuts: Vec<usize> = (0..n).step_by(COLUMNS_PER_TASK).chain([n]).collect();
-        split_columns(&col_ptr, &cuts, &mut row_idx, &mut values).into_par_iter().for_each(|block| {
+        parallel::for_each(split_columns(&col_ptr, &cuts, &mut row_idx, &mut values), |block| {
             let mut entries: Vec<(u32, f64)> = Vec::new();
             let mut at = 0;
             for &old in &from[block.columns] {
@@ -197,10 +199,10 @@ impl CscMatrix {
         let n = self.n_cols;
         // Each task has one cursor per column, so that few long ranges are best.
         let length = n.div_ceil(16).max(COLUMNS_PER_TASK);
-        let surplus = |first: usize| self.lower_surplus(first..(first + length).min(n));
+        let surplus = |columns| self.lower_surplus(columns).ok_or(());
         self.n_rows == n
-            && (0..n).into_par_iter().step_by(length).map(surplus).try_reduce(|| 0, |a, b| Some(a + b))
-                == Some(0)
+            && parallel::try_map(parallel::ranges(n, length), surplus)
+                .is_ok_and(|all| all.iter().sum::<i64>() == 0)
     }
 
     /// Returns the number of entries below the diagonal minus that above it, in some columns. Returns `None` if an
@@ -377,7 +379,7 @@ impl SymmetricMatrix {
 
     /// Returns the diagonal.
     pub fn diagonal(&self) -> Vec<f64> {
-        (0..self.n()).into_par_iter().with_min_len(COLUMNS_PER_TASK).map(|i| self.0.get(i, i)).collect()
+        parallel::values(self.n(), COLUMNS_PER_TASK, |i| self.0.get(i, i))
     }
 
     /// Returns the submatrix of some rows, ascending, and the corresponding columns.

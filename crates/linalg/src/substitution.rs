@@ -4,11 +4,11 @@
 
 use super::front::{PANEL_COLUMNS, Real, Trapezoid};
 use super::instructions::{instructions_for_rows, prefetch};
+use super::parallel;
 use faer::traits::ComplexField;
 use faer::traits::math_utils::recip;
 use pulp::bytemuck::{cast_slice, cast_slice_mut};
 use pulp::{Scalar, Simd, WithSimd};
-use rayon::prelude::*;
 
 /// Number of rows in a piece of parallel work.
 const ROWS_PER_TASK: usize = 512;
@@ -29,8 +29,8 @@ pub(super) fn forward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T
         if rest.len() < MIN_PARALLEL_ENTRIES {
             arch.dispatch(Step::SubtractProduct(rest, x, below));
         } else {
-            let pieces = rest.par_chunks(ROWS_PER_TASK * width).zip(below.par_chunks_mut(ROWS_PER_TASK));
-            pieces.for_each(|(l, y)| arch.dispatch(Step::SubtractProduct(l, x, y)));
+            let pieces = rest.chunks(ROWS_PER_TASK * width).zip(below.chunks_mut(ROWS_PER_TASK));
+            parallel::for_each(pieces, |(l, y)| arch.dispatch(Step::SubtractProduct(l, x, y)));
         }
     }
 }
@@ -45,14 +45,12 @@ pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[
         if rest.len() < MIN_PARALLEL_ENTRIES {
             arch.dispatch(Step::SubtractTransposed(rest, below, x));
         } else {
-            let pieces = rest.par_chunks(ROWS_PER_TASK * width).zip(below.par_chunks(ROWS_PER_TASK));
-            let sums: Vec<Vec<[T; K]>> = pieces
-                .map(|(l, y)| {
-                    let mut sum = vec![[T::default(); K]; width];
-                    arch.dispatch(Step::SubtractTransposed(l, y, &mut sum));
-                    sum
-                })
-                .collect();
+            let pieces = rest.chunks(ROWS_PER_TASK * width).zip(below.chunks(ROWS_PER_TASK));
+            let sums = parallel::map(pieces, |(l, y)| {
+                let mut sum = vec![[T::default(); K]; width];
+                arch.dispatch(Step::SubtractTransposed(l, y, &mut sum));
+                sum
+            });
             for sum in &sums {
                 for (x, part) in x.iter_mut().zip(sum) {
                     x.iter_mut().zip(part).for_each(|(x, part)| *x += *part);

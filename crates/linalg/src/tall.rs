@@ -3,6 +3,7 @@
 
 use super::contiguous::{contiguous, contiguous_mut};
 use super::few_columns::{MAX_FEW_COLUMNS, add_few_combinations, gram_of_few};
+use super::parallel;
 use faer::linalg::matmul::matmul;
 use faer::prelude::ReborrowMut;
 use faer::{Accum, ColMut, ColRef, Mat, MatMut, MatRef, Par};
@@ -13,8 +14,8 @@ use std::ops::Range;
 /// Number of rows per partial product.
 const ROWS_PER_PARTIAL_PRODUCT: usize = 4096;
 
-/// Smallest number of pieces of [`ROWS_PER_PARTIAL_PRODUCT`] numbers that one thread clears before the work is split.
-const MIN_PIECES_PER_TASK: usize = 16;
+/// Number of zeros that a parallel task writes.
+const ZEROS_PER_TASK: usize = 1 << 16;
 
 /// Tall block that grows by columns. All threads take part in the first write to new memory.
 #[derive(Debug, Clone, Default)]
@@ -126,10 +127,7 @@ pub fn zeros(rows: usize, columns: usize) -> Mat<f64> {
     let spare = unsafe {
         std::slice::from_raw_parts_mut(block.as_ptr_mut().cast::<MaybeUninit<f64>>(), stride * columns)
     };
-    spare
-        .par_chunks_mut(ROWS_PER_PARTIAL_PRODUCT)
-        .with_min_len(MIN_PIECES_PER_TASK)
-        .for_each(|part| part.fill(MaybeUninit::new(0.0)));
+    parallel::for_each(spare.chunks_mut(ZEROS_PER_TASK), |part| part.fill(MaybeUninit::new(0.0)));
     // SAFETY: all numbers have been written.
     unsafe { block.set_dims(rows, columns) };
     block
@@ -147,21 +145,17 @@ pub fn copied(x: MatRef<'_, f64>) -> Mat<f64> {
 pub fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     assert_eq!(a.nrows(), b.nrows(), "rows of a Gram product");
     let n = a.nrows();
-    let chunks = n.div_ceil(ROWS_PER_PARTIAL_PRODUCT).max(1);
-    let partial: Vec<Mat<f64>> = (0..chunks)
-        .into_par_iter()
-        .map(|chunk| {
-            let start = chunk * ROWS_PER_PARTIAL_PRODUCT;
-            let rows = ROWS_PER_PARTIAL_PRODUCT.min(n - start);
-            let (a, b) = (a.subrows(start, rows), b.subrows(start, rows));
-            if b.ncols() <= MAX_FEW_COLUMNS {
-                return gram_of_few(a, b);
-            }
-            let mut part = Mat::zeros(a.ncols(), b.ncols());
-            matmul(part.as_mut(), Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
-            part
-        })
-        .collect();
+    let partial = parallel::map(0..n.div_ceil(ROWS_PER_PARTIAL_PRODUCT).max(1), |chunk| {
+        let start = chunk * ROWS_PER_PARTIAL_PRODUCT;
+        let rows = ROWS_PER_PARTIAL_PRODUCT.min(n - start);
+        let (a, b) = (a.subrows(start, rows), b.subrows(start, rows));
+        if b.ncols() <= MAX_FEW_COLUMNS {
+            return gram_of_few(a, b);
+        }
+        let mut part = Mat::zeros(a.ncols(), b.ncols());
+        matmul(part.as_mut(), Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
+        part
+    });
     sum_pairwise(&partial)
 }
 
@@ -193,7 +187,7 @@ pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
         sums.iter().sum::<f64>() + rest.iter().map(|x| x * x).sum::<f64>()
     };
     // Sums of squares in fixed order; norms outside the safe range are computed with scaling.
-    let parts: Vec<f64> = (0..chunks * a.ncols()).into_par_iter().map(squares).collect();
+    let parts = parallel::values(chunks * a.ncols(), 1, squares);
     let norm = |j: usize| {
         let norm = parts[j * chunks..(j + 1) * chunks].iter().sum::<f64>().sqrt();
         if SAFE_NORMS.contains(&norm) { norm } else { a.col(j).norm_l2() }
@@ -208,19 +202,15 @@ pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
 pub fn weighted_square(x: ColRef<'_, f64>, weights: &[f64]) -> f64 {
     assert_eq!(x.nrows(), weights.len(), "one weight for each row");
     let part = |(x, w): (&[f64], &[f64])| x.iter().zip(w).map(|(x, w)| x * x * w).sum::<f64>();
-    let parts: Vec<f64> = contiguous(x)
-        .par_chunks(ROWS_PER_PARTIAL_PRODUCT)
-        .zip(weights.par_chunks(ROWS_PER_PARTIAL_PRODUCT))
-        .map(part)
-        .collect();
-    parts.iter().sum()
+    let tasks = contiguous(x).chunks(ROWS_PER_PARTIAL_PRODUCT).zip(weights.chunks(ROWS_PER_PARTIAL_PRODUCT));
+    parallel::map(tasks, part).iter().sum()
 }
 
 /// Divides x by `size`.
 pub fn divide(x: ColMut<'_, f64>, size: f64) {
-    contiguous_mut(x)
-        .par_chunks_mut(ROWS_PER_PARTIAL_PRODUCT)
-        .for_each(|x| x.iter_mut().for_each(|x| *x /= size));
+    parallel::for_each(contiguous_mut(x).chunks_mut(ROWS_PER_PARTIAL_PRODUCT), |x| {
+        x.iter_mut().for_each(|x| *x /= size)
+    });
 }
 
 /// Returns the pairwise sum of equal-shaped matrices: its error grows with the logarithm of their number.
@@ -276,7 +266,7 @@ pub fn combine_into(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>) 
 pub fn combine_in_place(v: MatMut<'_, f64>, h: MatRef<'_, f64>) {
     assert!(v.ncols() == h.nrows() && h.ncols() <= h.nrows(), "tall product in place");
     let chunks = v.nrows().div_ceil(ROWS_PER_PARTIAL_PRODUCT);
-    split_rows(v, chunks).into_par_iter().for_each(|mut part| {
+    parallel::for_each(split_rows(v, chunks), |mut part| {
         let mut combined = Mat::zeros(part.nrows(), h.ncols());
         add_product_of_rows(combined.as_mut(), Accum::Replace, part.as_ref(), h, 1.0);
         part.rb_mut().subcols_mut(0, h.ncols()).copy_from(combined);
@@ -292,8 +282,7 @@ pub fn subtract_columns(y: MatMut<'_, f64>, scales: &[f64], x: MatRef<'_, f64>) 
         y.nrows() == x.nrows() && y.ncols() == x.ncols() && x.ncols() == scales.len(),
         "columns to subtract"
     );
-    let columns: Vec<_> = y.col_iter_mut().zip(x.col_iter()).zip(scales).collect();
-    columns.into_par_iter().for_each(|((y, x), scale)| {
+    parallel::for_each(y.col_iter_mut().zip(x.col_iter()).zip(scales), |((y, x), scale)| {
         y.iter_mut().zip(x.iter()).for_each(|(y, x)| *y -= scale * x);
     });
 }
@@ -307,15 +296,14 @@ pub fn side_by_side(blocks: &[MatRef<'_, f64>]) -> Mat<f64> {
     assert!(blocks.iter().all(|block| block.nrows() == n), "rows of blocks side by side");
     let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
     let mut joined = zeros(n, columns.len());
-    let pairs: Vec<_> = joined.col_iter_mut().zip(columns).collect();
-    pairs.into_par_iter().for_each(|(mut to, from)| to.copy_from(from));
+    parallel::for_each(joined.col_iter_mut().zip(columns), |(mut to, from)| to.copy_from(from));
     joined
 }
 
 fn add_product(w: MatMut<'_, f64>, accum: Accum, v: MatRef<'_, f64>, h: MatRef<'_, f64>, alpha: f64) {
     assert!(w.nrows() == v.nrows() && v.ncols() == h.nrows() && w.ncols() == h.ncols(), "tall product");
     let chunks = w.nrows().div_ceil(ROWS_PER_PARTIAL_PRODUCT);
-    split_rows(w, chunks).into_par_iter().enumerate().for_each(|(chunk, part)| {
+    parallel::for_each(split_rows(w, chunks).into_iter().enumerate(), |(chunk, part)| {
         let v = v.subrows(chunk * ROWS_PER_PARTIAL_PRODUCT, part.nrows());
         add_product_of_rows(part, accum, v, h, alpha);
     });

@@ -3,7 +3,7 @@
 //! results of its children, do not depend on the number of threads.
 
 use super::assembly_tree::AssemblyTree;
-use rayon::prelude::*;
+use super::parallel;
 use std::ops::Range;
 
 /// Smallest part of all work in a heavy subtree: enough subtrees for eight threads.
@@ -162,7 +162,7 @@ fn up<S: Send, U: Send, E: Send>(
 ) -> Result<Open<U>, E> {
     let start = segment.supernodes.start;
     let results: Vec<Result<Open<U>, E>> =
-        split(segment, slots).into_par_iter().map(|(branch, slots)| up(tree, branch, slots, visit)).collect();
+        parallel::map(split(segment, slots), |(branch, slots)| up(tree, branch, slots, visit));
     // Branches in parallel, then the rest of the segment in elimination order.
     let mut pending: Vec<Option<U>> = segment.supernodes.clone().map(|_| None).collect();
     for result in results {
@@ -207,5 +207,5 @@ fn down<S: Send, D: Send>(
             branch.supernodes.clone().filter_map(|s| Some((s, pending[s - start].take()?))).collect();
         tasks.push((branch, slots, messages));
     }
-    tasks.into_par_iter().for_each(|(branch, slots, messages)| down(tree, branch, slots, messages, visit));
+    parallel::for_each(tasks, |(branch, slots, messages)| down(tree, branch, slots, messages, visit));
 }

@@ -12,8 +12,8 @@ use super::common_units::{fitting_units, state_units};
 use super::local_mass::LocalMass;
 use super::node_pairs::neighbours;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::parallel;
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 
 /// Range of densities of materials in kg/m^3, from light foams to osmium.
 const MATERIAL_DENSITIES: (f64, f64) = (10.0, 25_000.0);
@@ -78,10 +78,9 @@ impl Densities {
             return None;
         }
         let count = n.min(MAX_SAMPLED_NODES);
-        let sampled = (0..count).into_par_iter().map(|s| s * n / count);
         let density = |i: usize| Some(local.mass[i] / around(body, i, diagonal_mass)?);
-        let mut densities: Vec<f64> =
-            sampled.map(density).collect::<Vec<_>>().into_iter().flatten().collect();
+        let sampled = (0..count).map(|s| s * n / count);
+        let mut densities: Vec<f64> = parallel::map(sampled, density).into_iter().flatten().collect();
         let judged = densities.len();
         if judged < 4 || judged * 20 < count {
             return None;

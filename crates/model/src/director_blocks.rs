@@ -2,8 +2,7 @@
 
 use super::columns::Columns;
 use super::rows::Rows;
-use flexbody_linalg::SymmetricMatrix;
-use rayon::prelude::*;
+use flexbody_linalg::{SymmetricMatrix, parallel};
 use std::ops::Range;
 
 /// Part of sqrt(M_ii M_jj) below which an entry of the rest is the rounding of the values that it is a
@@ -81,8 +80,7 @@ impl<'a> Blocks<'a> {
     pub(crate) fn split(&self) -> (SymmetricMatrix, Option<SymmetricMatrix>) {
         let d = self.rows.dimension;
         let sizes = self.sizes();
-        let parts: Vec<Partial> =
-            self.chunks().into_par_iter().map(|vertices| self.part(vertices, &sizes)).collect();
+        let parts = parallel::map(self.chunks(), |vertices| self.part(vertices, &sizes));
         let (mut points, mut directors, mut share) = (Vec::new(), Vec::new(), 0.0f64);
         let (mut rest_of_points, mut rest_of_rotations) = (Vec::new(), Vec::new());
         for part in parts {
@@ -122,8 +120,7 @@ impl<'a> Blocks<'a> {
             blocks.iter().map(|(q, block)| self.rest_of(p, *q, block, &sizes).1).fold(0.0, f64::max)
         };
         let of_chunk = |vertices: Range<usize>| vertices.map(of_vertex).fold(0.0, f64::max);
-        let shares: Vec<f64> = self.chunks().into_par_iter().map(of_chunk).collect();
-        shares.into_iter().fold(0.0, f64::max)
+        parallel::map(self.chunks(), of_chunk).into_iter().fold(0.0, f64::max)
     }
 
     /// Returns the columns of these vertices.

@@ -19,9 +19,10 @@ use super::director_blocks::{Blocks, ROUNDING_ENTRY};
 use super::node_moments::NodeMoments;
 use super::rows::Rows;
 use faer::{Mat, MatMut, MatRef};
-use flexbody_linalg::{SymmetricMatrix, contiguous, contiguous_mut, multiply, multiply_vector, zeros};
+use flexbody_linalg::{
+    SymmetricMatrix, contiguous, contiguous_mut, multiply, multiply_vector, parallel, zeros,
+};
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 
 /// M as a mass of points and directors, and the rest of M.
 ///
@@ -314,6 +315,6 @@ impl DirectorMass {
 
 /// Computes every column of `to` from that of `from`, on all threads.
 fn each_column(from: MatRef<'_, f64>, to: &mut Mat<f64>, make: impl Fn(&[f64], &mut [f64]) + Sync) {
-    let columns: Vec<_> = from.col_iter().zip(to.col_iter_mut()).collect();
-    columns.into_par_iter().for_each(|(from, to)| make(contiguous(from), contiguous_mut(to)));
+    let columns = from.col_iter().zip(to.col_iter_mut());
+    parallel::for_each(columns, |(from, to)| make(contiguous(from), contiguous_mut(to)));
 }

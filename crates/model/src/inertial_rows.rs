@@ -4,9 +4,8 @@ use super::node_moments::{NodeMoments, RigidAcceleration};
 use super::rigid::centre_and_length;
 use super::{DirectorMass, FeModel};
 use faer::{Mat, MatRef};
-use flexbody_linalg::{contiguous_mut, gram};
+use flexbody_linalg::{contiguous_mut, gram, parallel};
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Rows that the inertia of a model acts on: those of the model or, if nodal rotations carry mass, points
@@ -112,8 +111,7 @@ impl<'m> InertialRows<'m> {
     /// Computes y += omega x x for every vector that turns with the body; column j with the j-th omega,
     /// axes of the model.
     pub fn add_turned(&self, omega: impl Fn(usize) -> Vector3<f64> + Sync, x: &Mat<f64>, y: &mut Mat<f64>) {
-        let columns: Vec<_> = y.col_iter_mut().enumerate().collect();
-        columns.into_par_iter().for_each(|(j, y)| {
+        parallel::for_each(y.col_iter_mut().enumerate(), |(j, y)| {
             self.add_turned_vector(&omega(j), x.col_as_slice(j), contiguous_mut(y));
         });
     }

@@ -5,7 +5,7 @@ use super::rows::{Recovered, Rows};
 use super::wording::name_some;
 use super::{Damping, DofLabel, Nodes, RawModel, filled_rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use rayon::prelude::*;
+use flexbody_linalg::parallel;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
@@ -138,8 +138,9 @@ impl RowsOfNodes {
         found: &mut Vec<Diagnostic>,
     ) -> Self {
         // Look up in parallel: there are several labels per node.
-        let places: Vec<Option<usize>> =
-            labels.par_iter().map(|label| index.get(&label.node).copied()).collect();
+        let places: Vec<Option<usize>> = parallel::concat(labels.len(), 1024, |rows| {
+            labels[rows].iter().map(|label| index.get(&label.node).copied()).collect()
+        });
         let mut all = Self { placed: vec![[MISSING_ROW; 6]; raw.nodes.len()], without_place: Vec::new() };
         let mut twice = Vec::new();
         let mut later = HashMap::new();

@@ -12,8 +12,7 @@ use super::common_units::{state_units, units_of_speed};
 use super::node_pairs::neighbours;
 use super::wording::name_some;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_linalg::SymmetricMatrix;
-use rayon::prelude::*;
+use flexbody_linalg::{SymmetricMatrix, parallel};
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -85,10 +84,11 @@ impl LocalMass {
                     diagonal = value;
                 }
             }
-            (dilation, (mass, diagonal))
+            [dilation, mass, diagonal]
         };
-        let (dilation, (mass, diagonal)) = (0..n).into_par_iter().with_min_len(1024).map(sums).unzip();
-        Self { dilation, mass, diagonal }
+        let sums: Vec<[f64; 3]> = parallel::concat(n, 1024, |nodes| nodes.map(sums).collect());
+        let all = |k: usize| sums.iter().map(|node| node[k]).collect();
+        Self { dilation: all(0), mass: all(1), diagonal: all(2) }
     }
 
     /// Returns the speeds of sound of a body of the given dimension; `None` if nothing is stretched.
@@ -148,7 +148,7 @@ impl LocalMass {
             around(i).hash(&mut hasher);
             hasher.finish()
         };
-        let keys: Vec<u64> = (0..nodes.len()).into_par_iter().with_min_len(1024).map(key).collect();
+        let keys: Vec<u64> = parallel::concat(nodes.len(), 1024, |nodes| nodes.map(key).collect());
         let mut groups: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
         keys.iter().enumerate().for_each(|(i, &key)| groups.entry(key).or_default().push(i));
         let same =

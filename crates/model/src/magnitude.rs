@@ -3,8 +3,7 @@
 use super::rigid::extents;
 use super::{Nodes, RawModel};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_linalg::SymmetricMatrix;
-use rayon::prelude::*;
+use flexbody_linalg::{SymmetricMatrix, parallel};
 
 /// Largest size, and reciprocal of the smallest, of a quantity: squares of all quantities then stay
 /// twenty-eight decades within the range of double precision, a margin for modes and rounding errors.
@@ -18,8 +17,10 @@ pub(super) fn check_magnitudes(
     nodes: &Nodes,
     raw: &RawModel,
 ) -> Option<Diagnostic> {
-    let largest =
-        |m: &SymmetricMatrix| m.as_csc().values().par_iter().map(|v| v.abs()).reduce(|| 0.0, f64::max);
+    let largest = |m: &SymmetricMatrix| {
+        let of_part = |part: &[f64]| part.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        parallel::map(m.as_csc().values().chunks(1 << 16), of_part).into_iter().fold(0.0, f64::max)
+    };
     let (k, m) = (largest(stiffness), largest(mass));
     let far = nodes.positions.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     let size = extents(&nodes.positions).into_iter().fold(0.0, f64::max);

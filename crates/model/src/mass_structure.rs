@@ -3,8 +3,7 @@
 use super::columns::Columns;
 use super::rows::Rows;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_linalg::SymmetricMatrix;
-use rayon::prelude::*;
+use flexbody_linalg::{SymmetricMatrix, parallel};
 use std::ops::Range;
 
 /// Number of nodes per parallel task: sums have fixed partitions.
@@ -35,13 +34,9 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
     let dimension = rows.dimension;
     let displacements = rows.displacements();
     let n = displacements / dimension;
-    let chunks = |n: usize| -> Vec<Range<usize>> {
-        (0..n).step_by(NODES_PER_TASK).map(|i| i..(i + NODES_PER_TASK).min(n)).collect()
-    };
-    let parts: Vec<([f64; 3], f64)> = chunks(rows.nodes)
-        .into_par_iter()
-        .map(|nodes| directional_mass(m, dimension, dimension * rows.nodes, nodes))
-        .collect();
+    let parts = parallel::map(parallel::ranges(rows.nodes, NODES_PER_TASK), |nodes| {
+        directional_mass(m, dimension, dimension * rows.nodes, nodes)
+    });
     let (mut totals, mut magnitude) = ([0.0f64; 3], 0.0f64);
     for (part, part_magnitude) in parts {
         for (total, part) in totals.iter_mut().zip(part) {
@@ -68,8 +63,9 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
     // Massless nodes have no scale of their own: compare with the mean nodal mass.
     let smallest = f64::EPSILON * mean / n as f64;
     let scale = |a: usize, b: usize| (sizes[a] * sizes[b]).max(smallest);
-    let parts: Vec<Partial> =
-        chunks(n).into_par_iter().map(|nodes| reduce(m, dimension, displacements, nodes, scale)).collect();
+    let parts = parallel::map(parallel::ranges(n, NODES_PER_TASK), |nodes| {
+        reduce(m, dimension, displacements, nodes, scale)
+    });
     let mut form = joined(n, parts);
     form.commutes = form.deviation <= tolerance && (displacements..m.n()).all(|row| m.row(row).0.is_empty());
     Ok(form)

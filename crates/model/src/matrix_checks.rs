@@ -5,8 +5,8 @@ use super::tolerance::rounding;
 use super::wording::name_some;
 use super::{DofLabel, RawMatrix, RawModel};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_linalg::{CscMatrix, SymmetricMatrix};
-use rayon::prelude::*;
+use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
+use std::ops::Range;
 use std::path::Path;
 
 /// Adds an error for a matrix that is not square, empty, or not finite.
@@ -19,8 +19,8 @@ pub(super) fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnost
         let message = format!("{name} matrix has no nonzero entries");
         found.push(Diagnostic::new(Code::MatrixEmpty, message).in_file(&raw.path));
     }
-    let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
-    if !matrix.values().par_chunks(1 << 16).all(finite) {
+    let not_finite = |values: &[f64]| values.iter().any(|v| !v.is_finite());
+    if parallel::any(matrix.values().chunks(1 << 16), not_finite) {
         let at = matrix.values().iter().position(|v| !v.is_finite()).expect("just found");
         let column = matrix.col_ptr().partition_point(|&p| p <= at);
         let message = format!(
@@ -102,8 +102,9 @@ impl Asymmetry {
             }
             task
         };
-        let columns = (0..n).into_par_iter().with_min_len(COLUMNS_PER_TASK);
-        columns.map(of_column).reduce(Self::default, Self::and)
+        let of_columns = |columns: Range<usize>| columns.map(of_column).fold(Self::default(), Self::and);
+        let parts = parallel::map(parallel::ranges(n, COLUMNS_PER_TASK), of_columns);
+        parts.into_iter().fold(Self::default(), Self::and)
     }
 
     /// Combines the results of some columns and of the columns after them.

@@ -5,9 +5,9 @@ use super::assembled::Assembled;
 use super::rows::Rows;
 use super::wording::name_some;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_linalg::SymmetricMatrix;
-use rayon::prelude::*;
+use flexbody_linalg::{SymmetricMatrix, parallel};
 use std::collections::HashMap;
+use std::ops::Range;
 
 /// Mass between two rows, relative to the root of their diagonal entries, below which it is the rounding of
 /// zero.
@@ -29,9 +29,9 @@ impl MassPairs {
     /// Finds all pairs in matrices in the internal order.
     pub(crate) fn new(stiffness: &SymmetricMatrix, mass: &SymmetricMatrix, rows: &Rows) -> Self {
         let diagonal = mass.diagonal();
-        let pairs_of_chunk = |first: usize| {
+        let pairs_of_chunk = |vertices: Range<usize>| {
             let mut part = Self::default();
-            for vertex in first..(first + VERTICES_PER_TASK).min(rows.vertices()) {
+            for vertex in vertices {
                 let mut coupled = by_mass(mass, &diagonal, rows, vertex);
                 coupled.retain(|&other| other as usize > vertex);
                 part.count += coupled.len();
@@ -44,9 +44,8 @@ impl MassPairs {
             }
             part
         };
-        let starts = (0..rows.vertices()).into_par_iter().step_by(VERTICES_PER_TASK);
         let mut all = Self::default();
-        for part in starts.map(pairs_of_chunk).collect::<Vec<_>>() {
+        for part in parallel::map(parallel::ranges(rows.vertices(), VERTICES_PER_TASK), pairs_of_chunk) {
             all.count += part.count;
             all.foreign.extend(part.foreign);
         }

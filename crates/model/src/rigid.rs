@@ -1,8 +1,7 @@
 //! Rigid displacement fields of the nodes, and the residual of K for them.
 
 use faer::Mat;
-use flexbody_linalg::{SymmetricMatrix, largest};
-use rayon::prelude::*;
+use flexbody_linalg::{SymmetricMatrix, largest, parallel};
 
 /// Returns the number of rigid motions of a body of the given dimension: six in space, three in the plane.
 pub fn rigid_count(dimension: usize) -> usize {
@@ -92,33 +91,25 @@ pub fn span(positions: &[[f64; 3]]) -> f64 {
 /// free body.
 pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>, sizes: &[f64]) -> Vec<f64> {
     // Store the fields row by row, so that the data for a matrix entry lie in one or two cache lines.
-    let rows: Vec<[f64; 7]> = (0..k.n())
-        .into_par_iter()
-        .with_min_len(1024)
-        .map(|i| {
-            std::array::from_fn(|c| match c {
-                6 => sizes[i],
-                _ if c < fields.ncols() => fields[(i, c)],
-                _ => 0.0,
-            })
+    let rows: Vec<[f64; 7]> = parallel::values(k.n(), 1024, |i| {
+        std::array::from_fn(|c| match c {
+            6 => sizes[i],
+            _ if c < fields.ncols() => fields[(i, c)],
+            _ => 0.0,
         })
-        .collect();
-    (0..k.n())
-        .into_par_iter()
-        .with_min_len(1024)
-        .map(|i| {
-            let (columns, values) = k.row(i);
-            let mut sums = [0.0; 6];
-            let mut scale = 0.0;
-            for (&j, &v) in columns.iter().zip(values) {
-                let row = &rows[j as usize];
-                scale += v.abs() * row[6];
-                for (sum, field) in sums.iter_mut().zip(row) {
-                    *sum += v * field;
-                }
+    });
+    parallel::values(k.n(), 1024, |i| {
+        let (columns, values) = k.row(i);
+        let mut sums = [0.0; 6];
+        let mut scale = 0.0;
+        for (&j, &v) in columns.iter().zip(values) {
+            let row = &rows[j as usize];
+            scale += v.abs() * row[6];
+            for (sum, field) in sums.iter_mut().zip(row) {
+                *sum += v * field;
             }
-            let worst = largest(sums.map(f64::abs));
-            if scale > 0.0 { worst / scale } else { 0.0 }
-        })
-        .collect()
+        }
+        let worst = largest(sums.map(f64::abs));
+        if scale > 0.0 { worst / scale } else { 0.0 }
+    })
 }

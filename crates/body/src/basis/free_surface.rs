@@ -12,9 +12,10 @@ use flexbody_eigen::{
     Accuracy, EigenProblem, EigenSolution, FactorChoice, Plan, Proof, Wanted, Way, energy_noise, plan, solve,
 };
 use flexbody_linalg::context::Context;
-use flexbody_linalg::{Pencil, Tall, combine, contiguous_mut, gram, subtract_combination, symmetric_eigen};
+use flexbody_linalg::{
+    Pencil, Tall, combine, contiguous_mut, gram, parallel, subtract_combination, symmetric_eigen,
+};
 use flexbody_model::{FeModel, centre_and_length};
-use rayon::prelude::*;
 
 /// Number of columns multiplied by K or M at a time if only products with other columns are needed; equals
 /// the width of one product.
@@ -240,8 +241,7 @@ fn polynomial_fields(model: &FeModel, n: usize, monomials: &[&[usize]]) -> Tall 
     let rows = model.rows();
     let rotations = rows.displacements()..;
     let mut fields = Tall::zeros(n, monomials.len() * d);
-    let columns: Vec<&mut [f64]> = fields.as_mut().col_iter_mut().map(contiguous_mut).collect();
-    columns.into_par_iter().enumerate().for_each(|(column, field)| {
+    parallel::for_each(fields.as_mut().col_iter_mut().map(contiguous_mut).enumerate(), |(column, field)| {
         let (monomial, component) = (monomials[column / d], column % d);
         for (r, at) in local.iter().zip((component..).step_by(d)) {
             field[at] = monomial.iter().map(|&k| r[k]).product();

@@ -8,11 +8,10 @@ use crate::invariants::{
 use faer::{Mat, MatRef};
 use flexbody_eigen::canonical_sign;
 use flexbody_linalg::{
-    SymmetricMatrix, contiguous_mut, copied, gram, multiply, projection_compensated, zeros,
+    SymmetricMatrix, contiguous_mut, copied, gram, multiply, parallel, projection_compensated, zeros,
 };
 use flexbody_model::{DirectorMass, FeModel, NodeMoments, rigid_count};
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 /// Body frame and the node positions in it.
 pub struct NodesInFrame {
@@ -98,14 +97,13 @@ impl BodyModes {
             let turned = rotations.iter().flat_map(|turned| turned.col_as_slice(j)).map(|angle| size * angle);
             canonical_sign(moved.chain(turned))
         };
-        let signs: Vec<f64> = (0..nf).into_par_iter().map(sign).collect();
+        let signs = parallel::map(0..nf, sign);
         // Turn the modes with a negative sign.
         for shapes in [&mut vectors, &mut displacements].into_iter().chain(&mut rotations) {
-            let columns: Vec<_> =
-                shapes.col_iter_mut().zip(&signs).filter(|(_, sign)| **sign < 0.0).collect();
-            columns
-                .into_par_iter()
-                .for_each(|(shape, _)| contiguous_mut(shape).iter_mut().for_each(|x| *x = -*x));
+            let reversed = shapes.col_iter_mut().zip(&signs).filter(|(_, sign)| **sign < 0.0);
+            parallel::for_each(reversed, |(shape, _)| {
+                contiguous_mut(shape).iter_mut().for_each(|x| *x = -*x)
+            });
         }
         let internal = internal(model, &vectors, &displacements);
         Self { vectors, displacements, rotations, internal, signs, nodes }

@@ -11,10 +11,9 @@ use super::{CauchySchwarz, Invariants};
 use faer::{Mat, MatMut, MatRef};
 use flexbody_linalg::{
     CompensatedBlock, DoubleDouble, LANES, SymmetricMatrix, accumulate, accumulate_pair, gram_compensated,
-    larger, multiply_compensated, sum_length, with_fma,
+    larger, multiply_compensated, parallel, sum_length, with_fma,
 };
 use nalgebra::Matrix3;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of columns per pass over the mass matrix: their sums fill half of the vector registers.
@@ -111,7 +110,7 @@ fn mass_gram(mass: &SymmetricMatrix, columns: SolidColumns<'_>) -> (Mat<f64>, Ma
 /// Returns a node-wise copy of a block of at most [`COLUMNS_PER_PASS`] columns, padded with zeros.
 fn by_node(columns: SolidColumns<'_>, block: Range<usize>) -> Vec<[f64; COLUMNS_PER_PASS]> {
     let mut rows = vec![[0.0; COLUMNS_PER_PASS]; columns.rows()];
-    rows.par_chunks_mut(ROWS_PER_PRODUCT).enumerate().for_each(|(chunk, rows)| {
+    parallel::for_each(rows.chunks_mut(ROWS_PER_PRODUCT).enumerate(), |(chunk, rows)| {
         columns.by_node(ROWS_PER_PRODUCT * chunk, block.clone(), COLUMNS_PER_PASS, rows.as_flattened_mut());
     });
     rows
@@ -134,45 +133,40 @@ fn gram_block(
 ) -> Vec<[DoubleDouble; COLUMNS_PER_PASS]> {
     let (n, n_left) = (mass.n(), block.end);
     let x = by_node(columns, block);
-    let group = group_length(n);
-    let partial: Vec<Vec<[[f64; COLUMNS_PER_PASS]; 2]>> = (0..n.div_ceil(group))
-        .into_par_iter()
-        .map(|g| {
-            let mut left = Mat::<f64>::zeros(ROWS_PER_PRODUCT, n_left);
-            let mut sums = vec![[[0.0; COLUMNS_PER_PASS]; 2]; n_left];
-            let mut product = vec![[[0.0; COLUMNS_PER_PASS]; 2]; ROWS_PER_PRODUCT];
-            let nodes = g * group..((g + 1) * group).min(n);
-            for first in nodes.clone().step_by(ROWS_PER_PRODUCT) {
-                let chunk = first..(first + ROWS_PER_PRODUCT).min(nodes.end);
-                let rows = chunk.len();
-                // Rows of the chunk of X, column-wise.
-                by_column(columns, chunk.clone(), left.subrows_mut(0, rows));
-                with_fma(
-                    #[inline(always)]
-                    || {
-                        // Ms X of the chunk in double-double arithmetic.
-                        for (target, i) in product.iter_mut().zip(chunk) {
-                            let (mut hi, mut lo) = ([0.0; COLUMNS_PER_PASS], [0.0; COLUMNS_PER_PASS]);
-                            let (neighbours, values) = mass.row(i);
-                            for (&j, &value) in neighbours.iter().zip(values) {
-                                accumulate(&mut hi, &mut lo, value, &x[j as usize]);
-                            }
-                            *target = [hi, lo];
+    let partial = parallel::map(parallel::ranges(n, group_length(n)), |nodes| {
+        let mut left = Mat::<f64>::zeros(ROWS_PER_PRODUCT, n_left);
+        let mut sums = vec![[[0.0; COLUMNS_PER_PASS]; 2]; n_left];
+        let mut product = vec![[[0.0; COLUMNS_PER_PASS]; 2]; ROWS_PER_PRODUCT];
+        for first in nodes.clone().step_by(ROWS_PER_PRODUCT) {
+            let chunk = first..(first + ROWS_PER_PRODUCT).min(nodes.end);
+            let rows = chunk.len();
+            // Rows of the chunk of X, column-wise.
+            by_column(columns, chunk.clone(), left.subrows_mut(0, rows));
+            with_fma(
+                #[inline(always)]
+                || {
+                    // Ms X of the chunk in double-double arithmetic.
+                    for (target, i) in product.iter_mut().zip(chunk) {
+                        let (mut hi, mut lo) = ([0.0; COLUMNS_PER_PASS], [0.0; COLUMNS_PER_PASS]);
+                        let (neighbours, values) = mass.row(i);
+                        for (&j, &value) in neighbours.iter().zip(values) {
+                            accumulate(&mut hi, &mut lo, value, &x[j as usize]);
                         }
-                        // Add the products X' (Ms X) of the chunk.
-                        for (c, sum) in sums.iter_mut().enumerate() {
-                            let [mut hi, mut lo] = *sum;
-                            for (&a, [y, z]) in left.col_as_slice(c)[..rows].iter().zip(&product) {
-                                accumulate_pair(&mut hi, &mut lo, a, (y, z));
-                            }
-                            *sum = [hi, lo];
+                        *target = [hi, lo];
+                    }
+                    // Add the products X' (Ms X) of the chunk.
+                    for (c, sum) in sums.iter_mut().enumerate() {
+                        let [mut hi, mut lo] = *sum;
+                        for (&a, [y, z]) in left.col_as_slice(c)[..rows].iter().zip(&product) {
+                            accumulate_pair(&mut hi, &mut lo, a, (y, z));
                         }
-                    },
-                );
-            }
-            sums
-        })
-        .collect();
+                        *sum = [hi, lo];
+                    }
+                },
+            );
+        }
+        sums
+    });
     // Add the groups in a fixed order: the result does not depend on the number of threads.
     let mut total = vec![[DoubleDouble::default(); COLUMNS_PER_PASS]; n_left];
     for part in &partial {

@@ -10,10 +10,9 @@
 use super::{Invariants, PrimaryData, TermGroups};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
-use flexbody_linalg::SymmetricMatrix;
+use flexbody_linalg::{SymmetricMatrix, parallel};
 use nalgebra::{Matrix3, Vector3};
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of rows per dense product, the longest plain sum. Shorter chunks cost time, longer chunks lose
@@ -276,11 +275,7 @@ pub(super) fn sum_of_groups(
     (rows, columns): (usize, usize),
     contribution: impl Fn(Range<usize>) -> Mat<f64> + Sync,
 ) -> Mat<f64> {
-    let group = group_length(n);
-    let partial: Vec<Mat<f64>> = (0..n.div_ceil(group))
-        .into_par_iter()
-        .map(|g| contribution(g * group..((g + 1) * group).min(n)))
-        .collect();
+    let partial = parallel::map(parallel::ranges(n, group_length(n)), contribution);
     let mut total = Mat::<f64>::zeros(rows, columns);
     for part in &partial {
         total += part;
@@ -295,7 +290,7 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel:
     let (before, width) = (panel.start, lanes * LANE_COLUMNS);
     // Columns of the panel, node by node.
     let mut x = Aligned::zeros(n * width);
-    x.get_mut().par_chunks_mut(ROWS_PER_PRODUCT * width).enumerate().for_each(|(chunk, rows)| {
+    parallel::for_each(x.get_mut().chunks_mut(ROWS_PER_PRODUCT * width).enumerate(), |(chunk, rows)| {
         columns.by_node(chunk * ROWS_PER_PRODUCT, panel.clone(), width, rows);
     });
     let x = x.get();

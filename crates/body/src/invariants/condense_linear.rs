@@ -8,9 +8,8 @@ use super::condense::{
 use super::{Invariants, LumpedMasses, PrimaryData, TermGroups, s_of_modal_mass};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
-use flexbody_linalg::{SymmetricMatrix, gram};
+use flexbody_linalg::{SymmetricMatrix, gram, parallel};
 use pulp::Arch;
-use rayon::prelude::*;
 
 /// Condenses mass-normalised modes without W2 and W3: multiplies four columns by Ms instead of 4 + 3 nf,
 /// and assumes m_ff = I. m, c, J, C1, C2 and W1 agree with [`condense`](super::condense()) to rounding.
@@ -78,7 +77,7 @@ fn of_rigid_products<M: NodalMass + ?Sized>(
 fn rigid_products<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) -> Mat<f64> {
     let (n, count) = (columns.rows(), columns.count());
     let mut x: Vec<Lane> = vec![[0.0; LANE_COLUMNS]; n];
-    x.par_chunks_mut(ROWS_PER_PRODUCT).enumerate().for_each(|(chunk, rows)| {
+    parallel::for_each(x.chunks_mut(ROWS_PER_PRODUCT).enumerate(), |(chunk, rows)| {
         columns.by_node(chunk * ROWS_PER_PRODUCT, 0..4, LANE_COLUMNS, rows.as_flattened_mut());
     });
     let arch = Arch::new();

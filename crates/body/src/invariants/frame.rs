@@ -8,9 +8,8 @@ use super::principal_axes::principal_axes;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_linalg::{SymmetricMatrix, contiguous_mut};
+use flexbody_linalg::{SymmetricMatrix, contiguous_mut, parallel};
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 
 /// The body frame in model coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,8 +44,7 @@ impl Frame {
     pub fn rotate_shapes(&self, shapes: &mut Mat<f64>) {
         assert_eq!(shapes.nrows() % 3, 0, "three rows per node");
         let to_body = self.axes.transpose();
-        let shapes: Vec<&mut [f64]> = shapes.col_iter_mut().map(contiguous_mut).collect();
-        shapes.into_par_iter().for_each(|shape| {
+        parallel::for_each(shapes.col_iter_mut().map(contiguous_mut), |shape| {
             for node in shape.as_chunks_mut::<3>().0 {
                 *node = (to_body * Vector3::from(*node)).into();
             }

@@ -7,10 +7,9 @@
 
 use super::{GeneralTerms, Invariants, PrimaryData, TermGroups};
 use faer::{ColMut, Mat, MatMut, MatRef};
-use flexbody_linalg::{SymmetricMatrix, Tall, gram, multiply};
+use flexbody_linalg::{SymmetricMatrix, Tall, gram, multiply, parallel};
 use flexbody_model::DirectorMass;
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of columns of X multiplied by M at a time. A larger block needs more memory.
@@ -142,8 +141,7 @@ impl<'a> GeneralColumns<'a> {
     /// Returns a range of columns of X, each filled by one thread.
     fn block(&self, columns: Range<usize>) -> Tall {
         let mut block = Tall::zeros(self.shapes.nrows(), columns.len());
-        let targets: Vec<_> = columns.zip(block.as_mut().col_iter_mut()).collect();
-        targets.into_par_iter().for_each(|(column, to)| self.fill(column, to));
+        parallel::for_each(columns.zip(block.as_mut().col_iter_mut()), |(column, to)| self.fill(column, to));
         block
     }
 

@@ -11,8 +11,8 @@ use crate::scanner::{Line, Lines};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;
 use flexbody_base::text::table::integer;
+use flexbody_linalg::parallel;
 use flexbody_model::{DofLabel, RawMatrix};
-use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 const HELP: &str = "write it with *SUBSTRUCTURE MATRIX OUTPUT, STIFFNESS=YES, MASS=YES, OUTPUT FILE=USER DEFINED, FILE NAME=part (without .mtx)";
@@ -181,16 +181,16 @@ impl SubstructureFile<'_> {
                 end - piece.values.len()
             })
             .collect();
-        let entries = pieces.into_par_iter().zip(starts);
-        let entries = entries.map(|(piece, start)| in_rows(&piece.values, start, n, stored)).collect();
+        let entries = parallel::map(pieces.into_iter().zip(starts), |(piece, start)| {
+            in_rows(&piece.values, start, n, stored)
+        });
         assemble(n, entries, stored, written, self.path).map_err(|diagnostic| vec![diagnostic])
     }
 
     /// Returns the numbers below a card.
     fn values(&self, card: &Card) -> Found<Vec<NumberLines>> {
         let (first, text) = self.deck.text(card);
-        let texts: Vec<&[u8]> = line_aligned(text).collect();
-        let pieces: Vec<NumberLines> = texts.into_par_iter().map(NumberLines::parse).collect();
+        let pieces = parallel::map(line_aligned(text), NumberLines::parse);
         let mut above = first;
         for piece in &pieces {
             if let Some((line, text)) = &piece.bad {

@@ -6,7 +6,7 @@ use crate::coordinates::{Blocks, Coordinates, Limits};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
-use rayon::prelude::*;
+use flexbody_linalg::parallel;
 use std::path::Path;
 
 /// Entries of a file, in its order.
@@ -58,7 +58,7 @@ impl CoordinateFile {
     /// Returns the number of rows that the indices require.
     pub(super) fn rows(&self) -> usize {
         let largest = |piece: &Vec<Entry>| piece.iter().map(|e| e.row.max(e.col) as usize + 1).max();
-        self.pieces.par_iter().filter_map(largest).max().unwrap_or(0)
+        parallel::map(&self.pieces, largest).into_iter().flatten().max().unwrap_or(0)
     }
 
     /// Returns the matrix of `n` rows. A single triangle represents both.

@@ -12,8 +12,8 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::table::integer;
+use flexbody_linalg::parallel;
 use flexbody_model::{DofLabel, RawMatrix};
-use rayon::prelude::*;
 use std::path::Path;
 
 /// Number of bad lines of a file that are reported one by one.
@@ -62,8 +62,7 @@ impl LabelledLines {
         let mut blocks = Blocks::of(&file, Compression::None);
         let mut pieces = Vec::new();
         while let Some(block) = blocks.next().map_err(|e| one(file.failed(&e)))? {
-            let texts: Vec<&[u8]> = line_aligned(&block).collect();
-            pieces.par_extend(texts.into_par_iter().map(LabelledEntries::parse));
+            pieces.extend(parallel::map(line_aligned(&block), LabelledEntries::parse));
             blocks.take_back(block);
         }
         // A change of the file during reading may be the cause of other problems, so it is reported first.
@@ -78,9 +77,8 @@ impl LabelledLines {
         let count = self.pieces.iter().map(|piece| piece.entries.len() as u64).sum();
         check_size(n, n, count).map_err(|diagnostic| vec![diagnostic.in_file(path)])?;
         let written = self.pieces.iter().map(|piece| piece.written).max().unwrap_or(0);
-        let numbered: Vec<Vec<Entry>> =
-            self.pieces.into_par_iter().map(|piece| piece.numbered(labels)).collect();
-        let some = |side: fn(&Entry) -> bool| numbered.par_iter().flatten_iter().any(side);
+        let numbered = parallel::map(self.pieces, |piece| piece.numbered(labels));
+        let some = |side: fn(&Entry) -> bool| parallel::any(&numbered, |piece| piece.iter().any(side));
         let sides = Sides {
             lower: some(|entry| entry.row > entry.col && entry.value != 0.0),
             upper: some(|entry| entry.row < entry.col && entry.value != 0.0),

@@ -1,9 +1,9 @@
 //! Sparse matrices of small dense blocks in single precision, multiplied by [`WIDTH`] columns at a time. Every row is
 //! one sum in storage order, so that the bits do not depend on the number of threads.
 
+use crate::parallel;
 use pulp::bytemuck::cast_slice;
 use pulp::{Arch, Scalar, Simd, WithSimd};
-use rayon::prelude::*;
 
 /// Number of columns that are processed together; the matrix is read once for all of them. With 8, each column takes a
 /// third longer; with 32, the loss by unused columns exceeds the gain.
@@ -33,7 +33,7 @@ pub(super) struct BlockMatrix<const R: usize, const C: usize> {
 
 impl<const R: usize, const C: usize> BlockMatrix<R, C> {
     /// Builds the matrix from its rows, copied by all threads.
-    pub(super) fn from_rows(rows: Vec<Entries<R, C>>) -> Self {
+    pub(super) fn from_rows(mut rows: Vec<Entries<R, C>>) -> Self {
         let mut pointers = vec![0];
         pointers.extend(rows.iter().scan(0, |end, row| {
             *end += row.len();
@@ -42,20 +42,20 @@ impl<const R: usize, const C: usize> BlockMatrix<R, C> {
         let entries = rows.iter().map(Vec::len).sum();
         let (mut columns, mut blocks) = (vec![0; entries], vec![[[0.0; C]; R]; entries]);
         let (mut free_columns, mut free_blocks) = (&mut columns[..], &mut blocks[..]);
-        let mut places = Vec::with_capacity(rows.len());
-        for row in &rows {
-            let (row_columns, row_blocks);
-            (row_columns, free_columns) = free_columns.split_at_mut(row.len());
-            (row_blocks, free_blocks) = free_blocks.split_at_mut(row.len());
-            places.push((row_columns, row_blocks));
+        let mut tasks = Vec::with_capacity(rows.len().div_ceil(BLOCK_ROWS_PER_TASK));
+        for rows in rows.chunks_mut(BLOCK_ROWS_PER_TASK) {
+            let length = rows.iter().map(Vec::len).sum();
+            let (part_columns, part_blocks);
+            (part_columns, free_columns) = free_columns.split_at_mut(length);
+            (part_blocks, free_blocks) = free_blocks.split_at_mut(length);
+            tasks.push((rows, part_columns, part_blocks));
         }
-        rows.into_par_iter().zip(places).with_min_len(BLOCK_ROWS_PER_TASK).for_each(
-            |(row, (columns, blocks))| {
-                for ((entry, column), block) in row.into_iter().zip(columns).zip(blocks) {
-                    (*column, *block) = entry;
-                }
-            },
-        );
+        parallel::for_each(tasks, |(rows, columns, blocks)| {
+            let entries = rows.iter_mut().flat_map(std::mem::take);
+            for ((entry, column), block) in entries.zip(columns).zip(blocks) {
+                (*column, *block) = entry;
+            }
+        });
         Self { pointers, columns, blocks }
     }
 
@@ -98,7 +98,7 @@ impl<const R: usize, const C: usize> BlockMatrix<R, C> {
     ) -> Vec<Rows<R>> {
         let arch = Arch::new();
         let made = |row: usize| arch.dispatch(Dispatched(RowProduct { matrix: self, row, x, make: &make }));
-        (0..self.n_rows()).into_par_iter().with_min_len(BLOCK_ROWS_PER_TASK).map(made).collect()
+        parallel::values(self.n_rows(), BLOCK_ROWS_PER_TASK, made)
     }
 }
 
@@ -107,7 +107,7 @@ impl<const B: usize> BlockMatrix<B, B> {
     pub(super) fn apply_pencil(&self, mass: &[f32], theta: &[f32; WIDTH], x: &[Rows<B>]) -> Vec<Rows<B>> {
         let arch = Arch::new();
         let made = |row: usize| arch.dispatch(Dispatched(PencilProduct { a: self, mass, theta, row, x }));
-        (0..self.n_rows()).into_par_iter().with_min_len(BLOCK_ROWS_PER_TASK).map(made).collect()
+        parallel::values(self.n_rows(), BLOCK_ROWS_PER_TASK, made)
     }
 }
 

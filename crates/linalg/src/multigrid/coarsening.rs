@@ -2,7 +2,7 @@
 
 use super::aggregates::{Strong, aggregates};
 use super::blocks::{BlockMatrix, Entries};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Number of nodes per parallel task.
 const NODES_PER_TASK: usize = 256;
@@ -55,7 +55,7 @@ pub(super) fn stored<const B: usize>(a: &impl SymmetricBlocks<B>) -> BlockMatrix
         a.visit(node, |column, block| row.push((column as u32, narrow(block))));
         row
     };
-    BlockMatrix::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK).map(row).collect())
+    BlockMatrix::from_rows(parallel::concat(a.nodes(), NODES_PER_TASK, |nodes| nodes.map(row).collect()))
 }
 
 /// Returns the diagonal block of each node.
@@ -69,7 +69,7 @@ pub(super) fn diagonal<const B: usize>(a: &impl SymmetricBlocks<B>) -> Vec<Block
         });
         found
     };
-    (0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK).map(block_of).collect()
+    parallel::values(a.nodes(), NODES_PER_TASK, block_of)
 }
 
 /// Returns the inverse of a symmetric positive definite matrix by its Cholesky factor; `None` for any other matrix.
@@ -118,7 +118,7 @@ pub(super) fn strong_couplings<const B: usize>(
         });
         row
     };
-    Strong::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK).map(row).collect())
+    Strong::from_rows(parallel::concat(a.nodes(), NODES_PER_TASK, |nodes| nodes.map(row).collect()))
 }
 
 /// Groups of a level, with an orthonormal basis of the motions of each.
@@ -139,11 +139,10 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
         let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
         of_node.iter().enumerate().for_each(|(node, &group)| members[group as usize].push(node as u32));
         // Orthonormalise the motions of each group.
-        let found: Vec<(Motions<B, C>, Block<C, C>)> = members
-            .par_iter()
-            .with_min_len(GROUPS_PER_TASK)
-            .map(|members| orthonormal(members.iter().map(|&node| motions[node as usize]).collect()))
-            .collect();
+        let of_group =
+            |group: usize| orthonormal(members[group].iter().map(|&node| motions[node as usize]).collect());
+        let found: Vec<(Motions<B, C>, Block<C, C>)> =
+            parallel::concat(count, GROUPS_PER_TASK, |groups| groups.map(of_group).collect());
         // Rows of each node in the basis of its group.
         let mut basis = vec![[[0.0; C]; B]; of_node.len()];
         for (members, (rows_of_group, _)) in members.iter().zip(&found) {
@@ -189,8 +188,12 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
                 std::array::from_fn(|b| std::array::from_fn(|c| entry(b, c)))
             })
         };
-        let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK);
-        BlockMatrix::from_rows(nodes.map_init(|| Sums::new(self.count), row).collect())
+        BlockMatrix::from_rows(parallel::values_with_memory(
+            a.nodes(),
+            NODES_PER_TASK,
+            || Sums::new(self.count),
+            row,
+        ))
     }
 }
 
@@ -236,8 +239,12 @@ pub(super) fn galerkin<const B: usize, const C: usize>(
         });
         sums.take(|_, sum| narrow(sum))
     };
-    let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES_PER_TASK);
-    let ap = BlockMatrix::from_rows(nodes.map_init(|| Sums::new(count), forces).collect());
+    let ap = BlockMatrix::from_rows(parallel::values_with_memory(
+        a.nodes(),
+        NODES_PER_TASK,
+        || Sums::new(count),
+        forces,
+    ));
     let row = |sums: &mut Sums<C, C>, group: usize| {
         for (node, motion) in r.row(group) {
             for (other, force) in ap.row(node) {
@@ -251,8 +258,7 @@ pub(super) fn galerkin<const B: usize, const C: usize>(
             block
         })
     };
-    let groups = (0..count).into_par_iter().with_min_len(GROUPS_PER_TASK);
-    BlockMatrix::from_rows(groups.map_init(|| Sums::new(count), row).collect())
+    BlockMatrix::from_rows(parallel::values_with_memory(count, GROUPS_PER_TASK, || Sums::new(count), row))
 }
 
 /// Adds a b to c.

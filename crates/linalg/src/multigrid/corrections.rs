@@ -7,8 +7,8 @@ use super::blocks::{BlockMatrix, Rows, WIDTH};
 use super::deflation::Deflation;
 use super::smoother::products;
 use crate::contiguous_mut;
+use crate::parallel;
 use faer::MatMut;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Number of nodes per parallel task.
@@ -156,12 +156,15 @@ impl<'a, const B: usize> Work<'a, B> {
             return;
         }
         // Start from t = 0: the residual is the force, in single precision.
-        let blocks = r.par_iter_mut().zip(t).zip(p).enumerate().with_min_len(NODES_PER_TASK);
-        blocks.for_each(|(node, ((r, t), p))| {
-            for &(w, force) in &fresh {
-                for b in 0..B {
-                    r[b][w] = force[node * B + b] as f32;
-                    (t[b][w], p[b][w]) = (0.0, 0.0);
+        let tasks =
+            r.chunks_mut(NODES_PER_TASK).zip(t.chunks_mut(NODES_PER_TASK)).zip(p.chunks_mut(NODES_PER_TASK));
+        parallel::for_each(tasks.enumerate(), |(task, ((r, t), p))| {
+            for (node, ((r, t), p)) in (task * NODES_PER_TASK..).zip(r.iter_mut().zip(t).zip(p)) {
+                for &(w, force) in &fresh {
+                    for b in 0..B {
+                        r[b][w] = force[node * B + b] as f32;
+                        (t[b][w], p[b][w]) = (0.0, 0.0);
+                    }
                 }
             }
         });
@@ -187,7 +190,8 @@ impl<'a, const B: usize> Work<'a, B> {
         }
         // A column with NaN gets a zero direction.
         let is_number = rz.map(f64::is_finite);
-        self.p.par_iter_mut().zip(z).with_min_len(NODES_PER_TASK).for_each(|(p, z)| {
+        parallel::for_each_mut(&mut self.p, NODES_PER_TASK, |node, p| {
+            let z = &z[node];
             for b in 0..B {
                 for w in 0..WIDTH {
                     p[b][w] = if is_number[w] { z[b][w] + beta[w] * p[b][w] } else { 0.0 };
@@ -209,13 +213,16 @@ impl<'a, const B: usize> Work<'a, B> {
             alpha[w] = f32::from(u8::from(slot.steps == 1));
             (slot.is_reached, slot.is_at_end) = (true, true);
         }
-        let blocks = self.t.par_iter_mut().zip(&mut self.r).zip(&self.p).zip(q).with_min_len(NODES_PER_TASK);
-        blocks.for_each(|(((t, r), p), q)| {
+        parallel::for_each_mut(&mut self.t, NODES_PER_TASK, |node, t| {
+            let p = &self.p[node];
             for b in 0..B {
-                for w in 0..WIDTH {
-                    t[b][w] += alpha[w] * p[b][w];
-                    r[b][w] -= alpha[w] * q[b][w];
-                }
+                (0..WIDTH).for_each(|w| t[b][w] += alpha[w] * p[b][w]);
+            }
+        });
+        parallel::for_each_mut(&mut self.r, NODES_PER_TASK, |node, r| {
+            let q = &q[node];
+            for b in 0..B {
+                (0..WIDTH).for_each(|w| r[b][w] -= alpha[w] * q[b][w]);
             }
         });
     }
@@ -230,18 +237,19 @@ impl<'a, const B: usize> Work<'a, B> {
         let mut ended = Vec::new();
         for (w, slot) in slots.iter_mut().enumerate() {
             let Some(Slot { column, .. }) = slot.take_if(|slot| ends(slot)) else { continue };
-            columns[column].par_chunks_mut(B).zip(&*t).with_min_len(NODES_PER_TASK).for_each(|(rows, t)| {
-                rows.iter_mut().zip(t).for_each(|(rows, t)| *rows = f64::from(t[w]));
+            let tasks = columns[column].chunks_mut(NODES_PER_TASK * B).zip(t.chunks(NODES_PER_TASK));
+            parallel::for_each(tasks, |(rows, t)| {
+                rows.iter_mut().zip(t.as_flattened()).for_each(|(row, t)| *row = f64::from(t[w]));
             });
             ended.push(w);
         }
         if ended.is_empty() || is_last {
             return;
         }
-        r.par_iter_mut().zip(p).with_min_len(NODES_PER_TASK).for_each(|(r, p)| {
-            for &w in &ended {
-                (0..B).for_each(|b| (r[b][w], p[b][w]) = (0.0, 0.0));
-            }
-        });
+        for x in [r, p] {
+            parallel::for_each_mut(x, NODES_PER_TASK, |_, x| {
+                ended.iter().for_each(|&w| x.iter_mut().for_each(|row| row[w] = 0.0));
+            });
+        }
     }
 }

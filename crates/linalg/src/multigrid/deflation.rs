@@ -1,9 +1,9 @@
 //! Deflation: projection off known modes, in single precision.
 
 use super::blocks::{Rows, WIDTH};
+use crate::parallel;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
-use rayon::prelude::*;
 
 /// Number of rows per partial product.
 const ROWS_PER_PARTIAL_PRODUCT: usize = 4096;
@@ -76,7 +76,7 @@ impl<'a> Deflation<'a> {
             })
         };
         // Products with M X and K X, summed in fixed order; then subtract X times the coefficients.
-        let parts: Vec<[Mat<f32>; 2]> = z.par_chunks(nodes).enumerate().map(products).collect();
+        let parts: Vec<[Mat<f32>; 2]> = parallel::map(z.chunks(nodes).enumerate(), products);
         let sum = |block: usize, i: usize, w: usize| -> f64 {
             parts.iter().map(|part| f64::from(part[block][(i, w)])).sum()
         };
@@ -92,7 +92,7 @@ impl<'a> Deflation<'a> {
             conjugate.unwrap_or(heavy) as f32
         });
         // z <- z - X times the coefficients.
-        z.par_chunks_mut(nodes).enumerate().for_each(|(chunk, z)| {
+        parallel::for_each(z.chunks_mut(nodes).enumerate(), |(chunk, z)| {
             let (start, rows) = (chunk * nodes * B, z.len() * B);
             let z = MatMut::from_row_major_slice_mut(z.as_flattened_mut().as_flattened_mut(), rows, WIDTH);
             matmul(z, Accum::Add, self.x.as_ref().subrows(start, rows), along.as_ref(), -1.0, Par::Seq);
@@ -104,8 +104,7 @@ impl<'a> Deflation<'a> {
 fn narrow(blocks: &[MatRef<'_, f64>], sizes: &[f64], scale: impl Fn(f64) -> f64 + Sync) -> Mat<f32> {
     let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
     let mut narrowed = Mat::zeros(blocks[0].nrows(), columns.len());
-    let pairs: Vec<_> = narrowed.col_iter_mut().zip(columns).zip(sizes).collect();
-    pairs.into_par_iter().for_each(|((to, from), &size)| {
+    parallel::for_each(narrowed.col_iter_mut().zip(columns).zip(sizes), |((to, from), &size)| {
         let scale = if size > 0.0 { scale(size) } else { 0.0 };
         to.iter_mut().zip(from.iter()).for_each(|(to, from)| *to = (scale * from) as f32);
     });

@@ -5,12 +5,12 @@ use super::coarsening::{Block, Motions, SymmetricBlocks};
 use super::corrections::{CorrectionTarget, Corrections, SmallPencil};
 use super::deflation::{Deflation, DeflationSpace};
 use super::level::{Coarse, Level};
+use crate::parallel;
 use crate::{
     Pencil, SymmetricMatrix, combine, contiguous_mut, dense_cholesky, dense_inverse, gram, largest,
     solve_lower,
 };
 use faer::{Mat, MatMut, MatRef};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Largest number of rows of a level that is solved with a dense matrix.
@@ -242,7 +242,7 @@ fn masses_beside<const B: usize>(a: &BlockMatrix<B, B>, mass: &SymmetricMatrix, 
             entry.map_or(0.0, |(_, value)| (scale * value) as f32)
         })
     };
-    (0..a.n_rows()).into_par_iter().with_min_len(NODES_PER_TASK).flat_map_iter(row).collect()
+    parallel::concat(a.n_rows(), NODES_PER_TASK, |nodes| nodes.flat_map(row).collect())
 }
 
 /// Scales columns to a largest entry of one, within the range of single precision. Zero columns stay zero.
@@ -309,12 +309,11 @@ fn packed<const B: usize>(x: MatRef<'_, f64>) -> Vec<Rows<B>> {
         }
         rows
     };
-    (0..x.nrows() / B).into_par_iter().with_min_len(NODES_PER_TASK).map(rows).collect()
+    parallel::values(x.nrows() / B, NODES_PER_TASK, rows)
 }
 
 fn unpack<const B: usize>(rows: &[Rows<B>], x: MatMut<'_, f64>, scale: f64) {
-    let mut columns: Vec<&mut [f64]> = x.col_iter_mut().map(contiguous_mut).collect();
-    columns.par_iter_mut().enumerate().for_each(|(w, column)| {
+    parallel::for_each(x.col_iter_mut().map(contiguous_mut).enumerate(), |(w, column)| {
         for (node_rows, rows) in column.chunks_exact_mut(B).zip(rows) {
             node_rows.iter_mut().zip(rows).for_each(|(x, row)| *x = scale * f64::from(row[w]));
         }

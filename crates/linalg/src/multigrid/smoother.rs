@@ -2,10 +2,10 @@
 //! Brezina, Hu and Tuminaro, J. Comput. Phys. 188 (2003) 593), preconditioned by the diagonal blocks of the nodes.
 
 use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
+use crate::parallel;
 use crate::symmetric_eigen;
 use faer::Mat;
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 
 /// Number of nodes per parallel task.
 const NODES_PER_TASK: usize = 1024;
@@ -69,12 +69,8 @@ impl<const B: usize> Smoother<B> {
         let mut u_before = vec![[[0.0; WIDTH]; B]; u.len()];
         let (mut diagonals, mut lengths) = (Vec::new(), Vec::new());
         for _ in 0..LANCZOS_STEPS {
-            let mut v: Vec<Rows<B>> = u
-                .par_iter()
-                .with_min_len(NODES_PER_TASK)
-                .enumerate()
-                .map(|(node, u)| self.divided(node, u))
-                .collect();
+            let mut v: Vec<Rows<B>> =
+                parallel::values(u.len(), NODES_PER_TASK, |node| self.divided(node, &u[node]));
             // Normalise in the inner product of D: v' D v = 1.
             let length = products(&v, &u).map(f64::sqrt);
             let scale = length.map(|length| if length > 0.0 { (1.0 / length) as f32 } else { 0.0 });
@@ -85,7 +81,7 @@ impl<const B: usize> Smoother<B> {
             let weights = along.map(|along| along as f32);
             // The first step has no predecessor.
             let before = length.map(|length| if diagonals.is_empty() { 0.0 } else { length as f32 });
-            next.par_iter_mut().with_min_len(NODES_PER_TASK).enumerate().for_each(|(node, next)| {
+            parallel::for_each_mut(&mut next, NODES_PER_TASK, |node, next| {
                 for b in 0..B {
                     for w in 0..WIDTH {
                         next[b][w] -= weights[w] * u[node][b][w] + before[w] * u_before[node][b][w];
@@ -114,8 +110,8 @@ impl<const B: usize> Smoother<B> {
     /// Makes two steps of the iteration for A x = b from x = 0.
     pub(super) fn smoothed_from_zero(&self, b: &[Rows<B>]) -> Vec<Rows<B>> {
         let (arch, scale) = (Arch::new(), self.steps().first);
-        let first = |(node, b)| arch.dispatch(FirstStep { smoother: self, scale, node, b });
-        let x: Vec<Rows<B>> = b.par_iter().with_min_len(NODES_PER_TASK).enumerate().map(first).collect();
+        let first = |node: usize| arch.dispatch(FirstStep { smoother: self, scale, node, b: &b[node] });
+        let x: Vec<Rows<B>> = parallel::values(b.len(), NODES_PER_TASK, first);
         self.second_step(b, &x, |node| x[node])
     }
 
@@ -205,12 +201,14 @@ pub(super) fn products<const B: usize>(x: &[Rows<B>], y: &[Rows<B>]) -> [f64; WI
         sums
     };
     let pieces: Vec<[f64; WIDTH]> =
-        x.par_chunks(NODES_PER_TASK).zip(y.par_chunks(NODES_PER_TASK)).map(piece).collect();
+        parallel::map(x.chunks(NODES_PER_TASK).zip(y.chunks(NODES_PER_TASK)), piece);
     pieces.iter().fold([0.0; WIDTH], |all, sums| std::array::from_fn(|w| all[w] + sums[w]))
 }
 
 fn scale_columns<const B: usize>(x: &mut [Rows<B>], scale: &[f32; WIDTH]) {
-    x.par_iter_mut().with_min_len(NODES_PER_TASK).flatten_iter().for_each(|row| {
-        row.iter_mut().zip(scale).for_each(|(x, scale)| *x *= scale);
+    parallel::for_each(x.chunks_mut(NODES_PER_TASK), |x| {
+        for row in x.as_flattened_mut() {
+            row.iter_mut().zip(scale).for_each(|(x, scale)| *x *= scale);
+        }
     });
 }

@@ -4,3 +4,4 @@
 
 mod arithmetic;
 mod factors;
+mod parallel;

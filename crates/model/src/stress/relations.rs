@@ -3,9 +3,11 @@
 use crate::FeModel;
 use crate::rigid::centre_and_length;
 use crate::tolerance::rounding;
-use flexbody_linalg::{SymmetricMatrix, larger};
+use flexbody_linalg::{SymmetricMatrix, larger, parallel};
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
+
+/// Number of nodes per parallel task.
+const NODES_PER_TASK: usize = 16;
 
 /// Smallest size of a row relative to the largest one: forces of smaller rows are compared with this size.
 const MIN_ROW_SIZE: f64 = 1e-3;
@@ -42,8 +44,9 @@ impl Relations {
     pub(super) fn new(model: &FeModel, matrix: &SymmetricMatrix, solid: bool, digits: u8) -> Self {
         let largest = matrix.as_csc().values().iter().fold(0.0f64, |most, value| most.max(value.abs()));
         let fields = RigidFields::new(model, if largest > 0.0 { largest.recip() } else { 1.0 });
-        let nodes: Vec<NodeMotion> =
-            (0..model.nodes().len()).into_par_iter().map(|i| fields.of_node(matrix, i)).collect();
+        let nodes: Vec<NodeMotion> = parallel::concat(model.nodes().len(), NODES_PER_TASK, |nodes| {
+            nodes.map(|i| fields.of_node(matrix, i)).collect()
+        });
         let turned: f64 = nodes.iter().map(|node| node.turned.norm()).sum();
         let entries: f64 = nodes.iter().map(|node| node.entries).sum();
         let size = larger(turned, MIN_FORCE_SIZE * entries);
@@ -165,12 +168,9 @@ fn directed_share(model: &FeModel, matrix: &SymmetricMatrix, solid: bool) -> f64
         }
         sums
     };
-    let [directed, all] = (0..model.nodes().len())
-        .into_par_iter()
-        .map(of_node)
-        .collect::<Vec<_>>()
-        .into_iter()
-        .fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    let shares: Vec<[f64; 2]> =
+        parallel::concat(model.nodes().len(), NODES_PER_TASK, |nodes| nodes.map(of_node).collect());
+    let [directed, all] = shares.into_iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
     if all > 0.0 { directed / all } else { 0.0 }
 }
 

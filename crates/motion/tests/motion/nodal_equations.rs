@@ -268,7 +268,7 @@ fn assert_projection(name: &str, raw: RawModel) {
         // Bound of the rounding of products with K: |Psi|'|K| |u|.
         let u = Mat::from_fn(lifted.u.len(), 1, |i, _| lifted.u[i]);
         let mut terms = Mat::zeros(u.nrows(), 1);
-        sum_terms(model.stiffness(), 1, u.as_ref(), terms.as_mut(), f64::abs);
+        sum_terms(model.stiffness(), u.as_ref(), terms.as_mut(), f64::abs);
         let shapes = lifting.vectors();
         let rounding = |i: usize| match i.checked_sub(r) {
             Some(j) => {

@@ -14,11 +14,10 @@ use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{CoupledModel, rigid_modes};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::{gram, largest, side_by_side};
+use flexbody_linalg::{gram, largest, parallel, side_by_side};
 use flexbody_model::{DampingRatios, FeModel};
 use flexbody_motion::scene::Requirements;
 use nalgebra::{DMatrix, Matrix6, Vector3};
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Largest deviation from one of the modal masses (and relative modal stiffnesses) of a body in its own model. It
@@ -356,7 +355,7 @@ impl Curves {
         units: &UnitSystem,
     ) -> Self {
         let omega = |f: &Frequency| units.eigenvalue_of(f.hertz).sqrt();
-        let responses = |sum: &ModalSum| frequencies.par_iter().map(|f| sum.at(omega(f))).collect::<Vec<_>>();
+        let responses = |sum: &ModalSum| parallel::map(&frequencies, |f| sum.at(omega(f)));
         let own = responses(reduced);
         let enriched = match known {
             Some(known) => known.enriched.as_ref().map_or_else(|| own.clone(), responses),

@@ -12,10 +12,10 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::{FlexBody, Storage, TermGroups};
 use flexbody_linalg::context::Context;
+use flexbody_linalg::parallel;
 use flexbody_model::FeModel;
 use flexbody_motion::integration::Work;
 use flexbody_motion::scene::{LoadCases, Measure, Scene, Tolerance, ends_a_run};
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Requested reference motion for the errors of a study.
@@ -329,12 +329,11 @@ impl Job<'_> {
         context: &Context<'_>,
     ) -> Result<Vec<TradeRow>> {
         let progress = Progress::new(context, phase, all.len());
-        let measured = |candidate| {
+        parallel::try_map(all, |candidate| {
             let row = self.measure(candidate);
             progress.step();
             row
-        };
-        all.into_par_iter().map(measured).collect()
+        })
     }
 
     /// Measures a candidate, without times. An error that ends its simulation becomes the outcome of the row.

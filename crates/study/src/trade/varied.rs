@@ -6,8 +6,8 @@ use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_linalg::context::Context;
+use flexbody_linalg::parallel;
 use flexbody_motion::scene::{LoadCases, Measure, SceneVariation, Tolerance, Variations, ends_a_run};
-use rayon::prelude::*;
 
 /// Largest number of candidates that are judged on variations. More cost time where no cheap candidate holds.
 const MOST_JUDGED: usize = 24;
@@ -154,7 +154,7 @@ impl<'j> Judge<'j> {
             Err(error) if error.diagnostics().iter().all(|one| ends_a_run(one.code())) => Ok(None),
             Err(error) => Err(error),
         };
-        let by_variation = self.cases.par_iter().map(measured).collect::<Result<Vec<_>>>()?;
+        let by_variation = parallel::try_map(&self.cases, measured)?;
         let worst = |at: usize| by_variation[at].map_or(f64::INFINITY, |own| own.worst);
         let count = by_variation.len();
         let largest = (0..count).rev().max_by(|a, b| worst(*a).total_cmp(&worst(*b))).unwrap_or(0);
