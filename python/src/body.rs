@@ -3,7 +3,7 @@
 use crate::arrays::{by_node, matrix, matrix3, triples, vector};
 use crate::body_class::Body;
 use crate::equations::EquationsOfMotion;
-use crate::errors::{diagnostics, warn};
+use crate::errors::{diagnostics, exception, warn};
 use crate::report::{loads, report};
 use crate::scene::{Motion, Scene, Selection};
 use crate::trade::{Trade, options as trade_options};
@@ -355,6 +355,14 @@ impl Body {
     fn select(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Selection> {
         let (scene, body) = (Scene::whole(py, scene)?, Arc::clone(&self.inner));
         Selection::with_warnings(py, run(py, move |listener| body.select_with_progress(&scene, listener))?)
+    }
+
+    /// Returns the body with some of its modes (numbers from 1, ascending; all by default) and groups of terms: "W1", "W2",
+    /// "W3" with commas, "none", "all", or those of a guideline: "I", "II", "III", "IV".
+    #[pyo3(signature = (modes=None, terms="all"))]
+    fn subset(&self, py: Python<'_>, modes: Option<Vec<usize>>, terms: &str) -> PyResult<Self> {
+        let body = self.inner.subset(modes.as_deref(), terms).map_err(|error| exception(py, &error))?;
+        Ok(Body::new(body, Vec::new()))
     }
 
     /// Simulates the body in a scene: a Scene, or the path of a scene file without load cases.

@@ -66,6 +66,12 @@ impl Trade {
         Ok(Body::new(body, Vec::new()))
     }
 
+    /// Returns the command that makes exactly the recommended candidate from the files of the study: the model or the
+    /// body, and the scene. None if no candidate is recommended.
+    fn command(&self, input: &str, scene: &str) -> Option<String> {
+        self.inner.command(input, scene)
+    }
+
     /// Returns the report of `flexbody trade`: a dict with all numbers, or "json", "text", "html" as a str.
     #[pyo3(signature = (form="dict"))]
     fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {

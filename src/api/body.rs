@@ -7,7 +7,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::convert::interface_compliance;
-use flexbody_body::flex_body;
+use flexbody_body::flex_body::{self, Subset};
 use flexbody_body::verification::body_identities;
 use flexbody_file::RecordedMotion;
 use flexbody_formats::export::ExportOptions;
@@ -237,6 +237,21 @@ impl FlexBody {
     /// The errors of [`FlexBody::select`]; FB605 if the listener stops it.
     pub fn select_with_progress(&self, scene: &Scene, listener: Listener<'_>) -> Result<Selection> {
         heard(listener, |context| select(&self.0, &[], &scene.0, context)).map(Selection)
+    }
+
+    /// Returns the body with some of its modes and groups of terms, like `flexbody reduce`.
+    ///
+    /// * `modes`: numbers of the modes to keep, from 1, ascending; `None` for all.
+    /// * `terms`: groups to keep: `W1`, `W2`, `W3` with commas, `none`, `all`, or those of a guideline of the literature:
+    ///   `I`, `II`, `III`, `IV`.
+    ///
+    /// # Errors
+    /// FB801 for unknown groups, and for modes that the body does not have.
+    pub fn subset(&self, modes: Option<&[usize]>, terms: &str) -> Result<FlexBody> {
+        let numbers = |modes: &[usize]| modes.iter().map(usize::to_string).collect::<Vec<_>>().join(",");
+        let modes = modes.map(|modes| Subset::parse_modes(&numbers(modes))).transpose()?;
+        let subset = Subset { modes, groups: Subset::parse_groups(terms)? };
+        self.0.clone().subset(&subset).map(FlexBody)
     }
 
     /// Returns the equations of motion of the body, with all terms that it holds.

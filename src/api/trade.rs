@@ -6,7 +6,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::ModeSettings;
 use flexbody_report::{TradeFacts, trade_csv};
-use flexbody_study::recipe::Recipe;
+use flexbody_study::recipe::{Origin, Recipe};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
     self, ReferenceChoice, ReferenceKind, Source, TradeSettings, Varied, WantedBodies, conversions,
@@ -131,6 +131,14 @@ impl Trade {
             return Err(Diagnostic::new(Code::Usage, message).into());
         };
         row.candidate.body(&self.sources[row.candidate.source]).map(FlexBody)
+    }
+
+    /// Returns the command that makes exactly the recommended candidate from the file `input`, the model or the flex-body
+    /// file of the study, and the scene file `scene`. Returns `None` if nothing is recommended.
+    pub fn command(&self, input: &str, scene: &str) -> Option<String> {
+        let candidate = &self.study.rows[self.recommended()?].candidate;
+        let origin = Origin { input: vec![input.to_owned()], scene: scene.to_owned(), case: None };
+        self.sources[candidate.source].command(candidate, &origin)
     }
 
     /// Returns true if there is a recommended candidate that holds in the stated variations, and the reference is

@@ -258,9 +258,9 @@ fn files_that_were_changed_are_refused() {
     let mut bytes = whole.clone();
     bytes[100] ^= 1;
     fs::write(job.path("modes.petsc"), &bytes).expect("written");
-    job.refused(&[], "FB761", 1, "the modes are not those");
+    job.refused(&[], "FB761", 1, "the modes changed since");
     fs::write(job.path("modes.petsc"), &whole[..whole.len() - 8]).expect("written");
-    job.refused(&[], "FB761", 1, "the modes are not those");
+    job.refused(&[], "FB761", 1, "the modes changed since");
     fs::remove_file(job.path("modes.petsc")).expect("removed");
     job.refused(&[], "FB760", 2, "cannot be read");
     fs::write(job.path("modes.petsc"), &whole).expect("written");
@@ -275,7 +275,7 @@ fn files_that_were_changed_are_refused() {
         fs::write(job.path(name), text.replace("\"version\":1", "\"version\":2")).expect("written");
         job.refused(&[], "FB760", 2, "version 2");
         fs::write(job.path(name), "no lines").expect("written");
-        job.refused(&[], "FB760", 2, "file is no `flexbody-");
+        job.refused(&[], "FB760", 2, "file is not a `flexbody-");
         fs::write(job.path(name), text).expect("written");
     }
     assert_eq!(job.assemble(&[]).0, 0, "the files as they were are taken");

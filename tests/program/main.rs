@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod bodies;
+mod ci_example;
 mod cluster;
 mod command_line;
 mod docs_generated;

@@ -184,7 +184,10 @@ impl<'a> AdviceFacts<'a> {
             Term::new("Deflection", deflection),
             Term::new("Rotation", rotation),
         ];
-        terms.extend(self.attached_mass.map(|mass| Term::new("Attached mass", self.units.mass_of(mass, 4)).short("Attached")));
+        terms.extend(
+            self.attached_mass
+                .map(|mass| Term::new("Attached mass", self.units.mass_of(mass, 4)).short("Attached")),
+        );
         terms
     }
 

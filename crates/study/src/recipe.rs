@@ -51,7 +51,7 @@ pub enum SceneBasis {
     Shapes {
         /// Number of shapes.
         count: usize,
-        /// As for the enriched body.
+        /// True if the truncation error of the enriched body is within a hundredth of the tolerances.
         is_fine: bool,
     },
 }

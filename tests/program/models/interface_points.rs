@@ -205,8 +205,8 @@ fn the_point_of_a_set_is_stated_and_told() {
         assert!(away(point, [0.25, 0.04, 0.03]) < 1e-15, "{json}");
     }
     for (interface, said) in [
-        ("end=RIGHT,averaging,1/2", "`1/2` is no point"),
-        ("end=RIGHT,averaging,1/2/z", "`1/2/z` is no point"),
+        ("end=RIGHT,averaging,1/2", "`1/2` is not a point"),
+        ("end=RIGHT,averaging,1/2/z", "`1/2/z` is not a point"),
         ("end=RIGHT,glued,1/2/3", "`glued` is not a coupling"),
         ("end=RIGHT,free,0.2/0/0", "is free, but has a reference point"),
         ("end=RIGHT,averaging,1/2/inf", "is not finite"),

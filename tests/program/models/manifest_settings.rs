@@ -109,7 +109,7 @@ fn residual_vectors_that_cannot_be_are_refused_wherever_they_are_asked_for() {
     for (options, said) in [
         ("--residual-vectors gravity", "`gravity` is not a set of loads for residual vectors"),
         ("--residual-vectors interfaces,interfaces", "loads are named twice"),
-        ("--residual-vectors loads=", "`loads=` is no set of loads"),
+        ("--residual-vectors loads=", "`loads=` is not a set of loads"),
         ("--basis imported --shapes F.mtx", "residual vectors need --basis free"),
         ("--accuracy certified", "residual vectors are not eigenvectors and cannot be certified"),
         ("--lumped-modes", "--lumped-modes compares free-surface modes, not residual vectors"),

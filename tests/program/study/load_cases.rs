@@ -119,7 +119,7 @@ fn one_body_serves_every_case_and_holds_what_any_of_them_needs() {
     let place = folder.path();
     written(place);
     let whole = body(place);
-    let cases = LoadCases::read(place.join("cases.toml"), None).expect("cases");
+    let cases = LoadCases::read(place.join("cases.toml"), None).expect("cases").without_variations();
     let both = select(&whole, &[], &cases, &Context::QUIET).expect("a selection");
     assert!(both.holds() && both.cases.len() == 2, "{both:#?}");
     let select_alone =

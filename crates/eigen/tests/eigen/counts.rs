@@ -40,7 +40,7 @@ fn exact_modes_of_a_span_are_proved_and_a_missing_one_is_seen() {
     assert_eq!(without.completeness.proof, Proof::NotProved);
     let remark = &without.completeness.remark;
     assert!(
-        remark.contains("the body has 9 flexible modes") && remark.contains("the given subspace 8"),
+        remark.contains("the body has 9 flexible modes") && remark.contains("the given subspace has 8"),
         "{remark}"
     );
 }

@@ -300,7 +300,7 @@ fn errors_name_the_line() {
     unreadable(
         &text.replacen("** RECORD GROUP 1,", "** RECORD GROUP 2,", 1),
         line_of("** RECORD GROUP 1,"),
-        "before record group 1",
+        "precedes record group 1",
     );
     let cut: String = text.lines().take(group_9 + 1).map(|line| format!("{line}\n")).collect();
     unreadable(&cut, group_9 + 1, "ends too early");
@@ -537,7 +537,7 @@ fn a_clamped_public_body_keeps_its_frame() {
     };
     let given = read(&shared);
     let notes = audit(&given, 1e-6).notes.join("\n");
-    assert!(notes.contains("the frame stands on 2 nodes that move in no mode, 1 to 21"), "{notes}");
+    assert!(notes.contains("the frame is fixed to 2 nodes that move in no mode, 1 to 21"), "{notes}");
     let source = SourceFile::new("body", &shared, "0".repeat(64));
     let taken = import_body(&given, source, UnitSystem::default(), None).expect("a body");
     // Surface lines are kept, stresses are reported as lost.

@@ -91,7 +91,7 @@ fn damaged_meshes_are_refused_where_they_are_damaged() {
         ("a.vtu", vtu.replace("format=\"ascii\"", "format=\"spoken\""), "format `spoken`"),
         ("a.vtu", vtu.replace("Float64", "Float80"), "type `Float80`"),
         ("a.vtu", vtu.replace("</Piece>", "</Piece><Piece NumberOfPoints=\"0\"/>"), "2 pieces"),
-        ("a.vtu", plain.replace("Float64", "Float32"), "24 numbers"),
+        ("a.vtu", plain.replace("Float64", "Float32"), "24 coordinates"),
         ("a.vtu", plain.replace("byte_order", "header_type=\"UInt16\" byte_order"), "UInt16"),
         ("a.vtk", vtk.replace("ASCII", "SPOKEN"), "ASCII or BINARY"),
         ("a.vtk", vtk.replace("UNSTRUCTURED_GRID", "STRUCTURED_POINTS"), "no list of points"),

@@ -73,13 +73,13 @@ fn damaged_node_files_are_refused_where_they_are_damaged() {
             Code::NodeFileSyntax,
             "a node and coordinates",
         ),
-        ("a.cdb", "/PREP7\nNBLOCK,6\n(something)\n".to_owned(), Code::NodeFileSyntax, "no format"),
+        ("a.cdb", "/PREP7\nNBLOCK,6\n(something)\n".to_owned(), Code::NodeFileSyntax, "not a format"),
         ("a.cdb", "/PREP7\nFINISH\n".to_owned(), Code::NodeFileSyntax, "no nodes"),
         (
             "a.cdb",
             "/PREP7\nNBLOCK,6\n(3i99999999999999999,6e21.13)\n".to_owned(),
             Code::NodeFileSyntax,
-            "no format",
+            "not a format",
         ),
         (
             "a.cdb",

@@ -26,7 +26,7 @@ pub enum Variations {
     Without,
     /// None: the standard variations are used.
     Standard,
-    /// Those of the file.
+    /// Variations of the file.
     Stated(Vec<SceneVariation>),
 }
 
@@ -100,8 +100,11 @@ impl Scene {
         let mut scene = self.clone();
         let wanted = |at: usize| load.is_none_or(|load| load == at);
         for (_, load) in scene.loads.iter_mut().enumerate().filter(|(at, _)| wanted(*at)) {
-            load.force = change(&load.force);
-            load.torque = change(&load.torque);
+            for history in [&mut load.force, &mut load.torque] {
+                if !history.is_nothing() {
+                    *history = change(history);
+                }
+            }
         }
         scene
     }

@@ -187,7 +187,7 @@ fn a_mode_that_is_missing_is_counted() {
     let [diagnostic] = found.diagnostics.as_slice() else { panic!("{:?}", found.diagnostics) };
     assert_eq!(diagnostic.code(), Code::CompletenessUnproved);
     let message = diagnostic.message();
-    assert!(message.contains("12 flexible modes") && message.ends_with("subspace 11"), "{message}");
+    assert!(message.contains("12 flexible modes") && message.ends_with("subspace has 11"), "{message}");
     assert!(modes_of(&model, shapes(), Accuracy::Certified).is_err(), "certified is a promise");
 }
 

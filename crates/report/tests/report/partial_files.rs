@@ -135,7 +135,7 @@ fn files_that_keep_what_is_not_there_or_drop_what_is_are_refused() {
     says(error.clone(), "/invariants/W1: expected a dataset of 64-bit floats, found nothing");
     says(error, "/lumped/row-sum/Ibar: expected a dataset of 64-bit floats, found nothing");
     let error = refused(&partial, |f| set_text(f, "W3", "dropped"));
-    says(error, "/invariants/W3: expected nothing, since /terms@W3 says `dropped`, found a dataset");
+    says(error, "/invariants/W3: expected nothing, since /terms@W3 is `dropped`, found a dataset");
     let error = refused(&partial, |f| f.unlink("invariants/W2").expect("unlinked"));
     says(error, "/invariants/W2: expected a dataset of 64-bit floats, found nothing");
     let error = refused(&partial, |f| f.unlink("invariants/C2").expect("unlinked"));
@@ -162,7 +162,7 @@ fn files_that_keep_what_is_not_there_or_drop_what_is_are_refused() {
         set_text(f, "W3", "dropped");
         f.unlink("invariants/W3").expect("unlinked");
     });
-    says(error, "/lumped/row-sum/W3: expected nothing, since /terms@W3 says `dropped`, found a dataset");
+    says(error, "/lumped/row-sum/W3: expected nothing, since /terms@W3 is `dropped`, found a dataset");
 }
 
 #[test]

@@ -84,7 +84,10 @@ fn guarantees_are_said_with_no_more_digits_than_they_have() {
     let half = 0.5 * body.frequencies_hz()[0];
     assert!(words.contains("guaranteed every eigenvalue to 8.6 digits or more (mode 4 worst)"), "{words}");
     assert!(words.contains("only 6 rigid modes below") && words.contains("(inertia count 6)"), "{words}");
-    assert!(words.contains("to 15.2 digits or more (W1 worst); modes within 8e-12 of exact ones"), "{words}");
+    assert!(
+        words.contains("to 15.2 digits or more (W1 worst); modes within 8e-12 of the exact modes"),
+        "{words}"
+    );
     let json = json(&body, &RunData::default());
     assert!(
         schema().is_valid(&json),

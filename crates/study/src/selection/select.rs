@@ -12,7 +12,7 @@ use super::varied::{VariedRuns, VariedSelection, framed_variations};
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroups};
+use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroup, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{LoadCases, PerQuantity};
 
@@ -163,12 +163,23 @@ pub fn select_judged(
         }
     };
     // State the reasons of the decision.
-    let SelectionState { choice, trials, diagnostics, short_of, chosen_by_case, varied, .. } =
-        selection_state;
+    let SelectionState {
+        choice,
+        trials,
+        diagnostics,
+        short_of,
+        chosen_by_case,
+        varied,
+        groups_of_variations,
+        ..
+    } = selection_state;
     for (demand, short_of) in demands.iter_mut().zip(short_of) {
         demand.short_of = short_of;
     }
-    let decided = DecisionInput { demands: &demands, choice: &choice, trials: &trials }.decisions();
+    let mut decided = DecisionInput { demands: &demands, choice: &choice, trials: &trials }.decisions();
+    for (term, error) in decided.iter_mut().filter(|(term, _)| groups_of_variations.has(term.group)) {
+        (*term, *error) = needed_by_variations(term.group, &varied, cases);
+    }
     let (terms, decisive_errors): (Vec<_>, Vec<_>) = decided.into_iter().unzip();
     let first = &demands[0];
     Ok(Selection {
@@ -214,6 +225,30 @@ fn demands<'d>(
 ) -> Result<Vec<Demand<'d>>> {
     let demand = |(at, framed)| Demand::new(framed, cases.case_name(at), context, tier_1);
     framed_cases.iter().enumerate().map(demand).collect()
+}
+
+/// Returns the decision about a group that the scene alone would drop, and the error that it then has in the worst
+/// variation.
+fn needed_by_variations(
+    group: TermGroup,
+    varied: &[VariedSelection],
+    cases: &LoadCases,
+) -> (TermDecision, Option<DecisiveError>) {
+    let without = |one: &VariedSelection| Some((one.name.clone(), one.case.clone(), one.of_scene.clone()?));
+    let worst = varied.iter().filter_map(without).max_by(|a, b| a.2.worst.total_cmp(&b.2.worst));
+    let error = worst.as_ref().and_then(|(_, case, trial)| {
+        let at = (0..cases.len()).find(|at| cases.case_name(*at) == case.as_deref());
+        let tolerance = &cases[at.unwrap_or(0)].requirements.tolerance;
+        let (output, error, tolerance) = trial.errors?.decisive(tolerance);
+        let case = at.filter(|_| case.is_some());
+        Some(DecisiveError { output, error, tolerance, budget: trial.budget, tier: 2, case })
+    });
+    let reason = match &worst {
+        Some((name, ..)) => format!("variation `{name}`: error of the model that the scene alone needs"),
+        None => "needed by a variation of the scene".to_owned(),
+    };
+    let (bound, limit) = error.map_or((0.0, 0.0), |one| (one.error, one.tolerance * one.budget));
+    (TermDecision { group, kept: true, tier: 2, bound, limit, reason }, error)
 }
 
 /// Returns the input numbers of the decision, marked with their load cases if there are several.

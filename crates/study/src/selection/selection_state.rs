@@ -26,6 +26,8 @@ pub(super) struct SelectionState<'s> {
     pub chosen_by_case: Vec<Trial>,
     /// Errors of the chosen model in variations of the scene.
     pub varied: Vec<VariedSelection>,
+    /// Groups that the scene alone would drop, and that variations need.
+    pub groups_of_variations: TermGroups,
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -51,7 +53,8 @@ impl<'s> SelectionState<'s> {
         };
         let short_of = vec![None; demands.len()];
         let (chosen_by_case, varied) = (Vec::new(), Vec::new());
-        Self { demands, choice, trials, short_of, chosen_by_case, varied, diagnostics }
+        let groups_of_variations = TermGroups::NONE;
+        Self { demands, choice, trials, short_of, chosen_by_case, varied, groups_of_variations, diagnostics }
     }
 
     /// Returns true if all load cases have a duration, so that motion can be measured.
@@ -185,7 +188,9 @@ impl<'s> SelectionState<'s> {
         let ranked = search.ranked(&mut self.choice);
         let modes = self.choice.modes.clone();
         self.choice.keep(modes.clone());
+        let groups = self.choice.groups;
         self.varied = varied.judge(&mut self.choice, &ranked, held, is_limited, cases)?;
+        self.groups_of_variations = self.choice.groups.and(groups.complement());
         self.diagnostics.extend(self.varied.iter().filter_map(VariedSelection::warning));
         if modes == self.choice.modes {
             return Ok(reason);

@@ -198,7 +198,7 @@ fn bodies_without_such_coordinates_are_refused_with_what_to_do() {
     for (body, said, helped) in [
         (&free_modes, "the body has free modes only", "--basis craig-bampton"),
         (&plane, "out of the plane", "in space"),
-        (&free_interface, "the interface `bus` is free", "couple the interface"),
+        (&free_interface, "interface `bus` is free", "couple the interface"),
         (&renamed, "do not match its interfaces", "--basis craig-bampton"),
     ] {
         for format in ["simscape", "chrono"] {

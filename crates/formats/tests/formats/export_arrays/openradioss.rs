@@ -384,6 +384,6 @@ fn node_numbers_that_eight_columns_cannot_hold_are_refused() {
         let error = export(&body, format, &ExportOptions::default(), true).expect_err("no place");
         let [diagnostic] = error.diagnostics() else { panic!("{error}") };
         assert_eq!(diagnostic.code(), Code::ExportLoses);
-        assert!(diagnostic.message().contains(&format!("the node number {id}")), "{}", diagnostic.message());
+        assert!(diagnostic.message().contains(&format!("node number {id}:")), "{}", diagnostic.message());
     }
 }
