@@ -79,7 +79,7 @@ fn usage_errors_end_with_2_say_what_is_wrong_and_write_nothing() {
         ("convert", "--output <BODY.flex.h5>"),
         ("convert model.toml", "--output <BODY.flex.h5>"),
         ("convert -o b.h5", "<MODEL.toml|JOB.inp>"),
-        ("convert model.toml -o b.h5 --interface a=B", "--interface applies to the jobs of FE programs"),
+        ("convert model.toml -o b.h5 --interface a=B", "--interface applies to jobs; add [[interface]]"),
         ("convert model.toml -o b.h5 --format calculix", "--format applies to jobs"),
         ("convert job.inp -o b.h5 --format patran", "[possible values: calculix, abaqus, nastran]"),
         ("convert job.inp -o b.h5 --interface a=B,glued", "`glued` is not a coupling"),

@@ -253,10 +253,8 @@ fn every_body_gets_files_of_its_own() {
     let line = format!("check pair-1.flex.h5 --against {}", elsewhere.display());
     let check = flexbody(folder.path(), &line);
     assert_eq!(check.status.code(), Some(2));
-    assert!(
-        String::from_utf8_lossy(&check.stderr)
-            .contains("states body 1 of 2, but the matrices of the model hold 1")
-    );
+    let said = String::from_utf8_lossy(&check.stderr).into_owned();
+    assert!(said.contains("the file states body 1 of 2, but the matrices of the model hold 1"), "{said}");
 }
 
 #[test]

@@ -518,7 +518,7 @@ fn the_program_writes_what_its_schema_says() {
     let rows = facts["rows"].as_array().expect("rows");
     let lines = facts["verdict"].as_array().expect("lines");
     let labels: Vec<&str> = lines.iter().map(|line| line["label"].as_str().expect("a label")).collect();
-    assert_eq!(labels, ["Asked", "Recommended", "Why", "Error", "Saves"]);
+    assert_eq!(labels, ["Asked", "Recommended", "Why", "Error", "Saves", "Variations", "Command"]);
     // Every measured candidate was written as a body.
     for (at, row) in rows.iter().enumerate() {
         let path = place.join(format!("candidate_{:03}.flex.h5", at + 1));

@@ -164,7 +164,7 @@ pub fn select_judged(
     };
     // State the reasons of the decision.
     let SelectionState {
-        choice,
+        mut choice,
         trials,
         diagnostics,
         short_of,
@@ -176,7 +176,11 @@ pub fn select_judged(
     for (demand, short_of) in demands.iter_mut().zip(short_of) {
         demand.short_of = short_of;
     }
+    // Decide for the model that the scene alone needs, then for what variations add to it.
+    let groups = choice.groups;
+    choice.groups = groups.and(groups_of_variations.complement());
     let mut decided = DecisionInput { demands: &demands, choice: &choice, trials: &trials }.decisions();
+    choice.groups = groups;
     for (term, error) in decided.iter_mut().filter(|(term, _)| groups_of_variations.has(term.group)) {
         (*term, *error) = needed_by_variations(term.group, &varied, cases);
     }
