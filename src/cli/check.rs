@@ -39,7 +39,7 @@ fn model_of(body: &FlexBody, raw: RawModel) -> Result<FeModel> {
     let count = bodies.len();
     let found = bodies.into_iter().map(|checked| checked.model).find(|model| model.number() == Some(number));
     found.ok_or_else(|| {
-        let message = format!("the file states body {number}, but the matrices of the model hold {count}");
+        let message = format!("the file states {number}, but the matrices of the model hold {count}");
         Diagnostic::new(Code::BodyIncomparable, message).into()
     })
 }

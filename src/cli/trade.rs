@@ -70,10 +70,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
     let facts = TradeFacts::new(&study, &reference_errors, &run);
-    let recommended = study.recommended.row().map(|row| &study.rows[row].candidate);
-    let origin = origin(&arguments.body, &arguments.job, &arguments.scene, &arguments.case);
-    let command = recommended.and_then(|taken| sources[taken.source].command(taken, &origin));
-    let facts = match command {
+    let facts = match command_of(arguments, &study, &sources) {
         Some(command) => facts.with_command(command),
         None => facts,
     };
@@ -98,6 +95,13 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let passed = study.recommended.row().is_some() && is_reference && study.holds_in_stated_variations();
     let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })
+}
+
+/// Returns the command that makes the recommended body; `None` if nothing is recommended.
+fn command_of(arguments: &TradeArguments, study: &Trade, sources: &[Source]) -> Option<String> {
+    let candidate = &study.rows[study.recommended.row()?].candidate;
+    let origin = origin(&arguments.body, &arguments.job, &arguments.scene, &arguments.case);
+    sources[candidate.source].command(candidate, &origin)
 }
 
 /// Writes the bodies of the measured candidates to files of `folder` that are named by their numbers. Refuses to

@@ -2,7 +2,9 @@
 
 use super::numbers::{counted, significant};
 use flexbody_motion::scene::OutputErrors;
-use flexbody_study::reference::{MAX_REFERENCE_ERROR, ReferenceError};
+use flexbody_study::reference::MAX_REFERENCE_ERROR;
+#[cfg(feature = "hdf5")]
+use flexbody_study::reference::ReferenceError;
 use flexbody_study::selection::VariedSelection;
 #[cfg(feature = "hdf5")]
 use flexbody_study::trade::{InCase, Trade, TradeVariation};

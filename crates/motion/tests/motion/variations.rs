@@ -35,10 +35,7 @@ fn scene(text: &str, like: &Scene) -> Scene {
 #[test]
 fn changes_equal_scenes_written_by_hand() {
     let by_hand = [
-        (
-            "scale = { factor = 2, load = 2 }",
-            SCENE.replace("rate = 10", "rate = 10").replace("[0, 0, 4]", "[0, 0, 4]\nhistory = 2"),
-        ),
+        ("scale = { factor = 2, load = 2 }", SCENE.replace("[0, 0, 4]", "[0, 0, 4]\nhistory = 2")),
         ("move = { load = 1, interface = \"tip\" }", SCENE.replace("node = 1", "interface = \"tip\"")),
         ("speed = 1.5", SCENE.replace("rate = 10", "rate = 15")),
         ("run.duration = 3", SCENE.replace("duration = 1\n", "duration = 3\n")),
