@@ -76,7 +76,7 @@ pub fn any<I: Send>(items: impl IntoIterator<Item = I>, test: impl Fn(I) -> bool
 /// Returns the values at the indices below `count`, written where they stay. A parallel task has at least `length` of
 /// them.
 ///
-/// This loop is compiled for each type of values. [`concat`] is smaller, but copies the values once more.
+/// This loop is compiled for each type of values. [`concat()`] is smaller, but copies the values once more.
 pub fn values<T: Send>(count: usize, length: usize, value: impl Fn(usize) -> T + Sync) -> Vec<T> {
     values_of(count, length, &value)
 }

@@ -46,7 +46,7 @@ impl Tailoring {
     /// small there.
     ///
     /// # Errors
-    /// The errors of [`convert`](flexbody_body::convert::convert) and [`enrich`].
+    /// The errors of [`convert`] and [`enrich`].
     pub fn convert(
         &self,
         model: &FeModel,
@@ -254,7 +254,7 @@ fn read_set(set: &LoadSource, model: &FeModel) -> Result<Loads> {
 /// are not computed; the rest is decided for the converted body. The scene files become sources of the body.
 ///
 /// # Errors
-/// The errors of [`convert`](flexbody_body::convert::convert), [`enrich`] and [`select`].
+/// The errors of [`convert`], [`enrich`] and [`select_judged`].
 pub fn convert_for(
     model: &FeModel,
     tailoring: &Tailoring,

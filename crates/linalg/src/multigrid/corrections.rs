@@ -26,7 +26,7 @@ const SINGLE_PRECISION_ERROR_FLOOR: f64 = 1e-4;
 /// Goal of a correction.
 #[derive(Debug, Clone, Copy)]
 pub struct CorrectionTarget {
-    /// Index of the corrected pair among the modes [near](super::Near) it.
+    /// Index of the corrected pair among the modes [near](super::DeflationSpace) it.
     pub pair: usize,
     /// Part of the error of the correction that may remain.
     pub left: f64,
