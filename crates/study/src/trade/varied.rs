@@ -10,7 +10,7 @@ use flexbody_linalg::parallel;
 use flexbody_motion::scene::{LoadCases, Measure, SceneVariation, Tolerance, Variations, ends_a_run};
 
 /// Largest number of candidates that are judged on variations. More cost time where no cheap candidate holds.
-const MOST_JUDGED: usize = 24;
+const MOST_JUDGED: usize = 8;
 
 /// Bodies and scenes of the variations of a study.
 #[derive(Debug, Clone, Default)]
