@@ -10,13 +10,13 @@ use std::process::Command;
 use tempfile::TempDir;
 
 /// A cube that turns and is shaken, so that few modes and some terms suffice.
-const SHAKEN: &str = "[run]\nduration = 2e-3\noutputs = 20\n\
+const SHAKEN: &str = "variation = []\n[run]\nduration = 2e-3\noutputs = 20\n\
     [initial]\nangular_velocity = [0, 0, 200]\n\
     [[load]]\nnode = 99\nforce = [300, 0, 0]\naxes = \"body\"\nhistory = { amplitude = 1, frequency = 1500 }\n\
     [tolerance]\ndeflection = 0.1\nstress = 0.1\nattitude = 0.01\n";
 
 /// A body whose interface carries it and is shaken.
-const CARRIED: &str = "[run]\nduration = 2e-3\noutputs = 20\n\
+const CARRIED: &str = "variation = []\n[run]\nduration = 2e-3\noutputs = 20\n\
     [carried]\ninterface = \"root\"\n\
     [carried.translation]\ndirection = [0, 1, 0]\nacceleration = { to = 1e6, duration = 1e-3 }\n\
     [tolerance]\ndeflection = 0.1\nstress = 0.1\nreaction = 0.1\n";
