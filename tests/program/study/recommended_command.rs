@@ -103,6 +103,7 @@ fn command_of_a_trade_of_a_carried_body_makes_the_recommended_candidate() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn command_of_a_selection_makes_the_selected_body() {
     let folder = folder(SHAKEN);
     let place = folder.path();
