@@ -248,8 +248,7 @@ impl FlexBody {
     /// # Errors
     /// FB801 for unknown groups, and for modes that the body does not have.
     pub fn subset(&self, modes: Option<&[usize]>, terms: &str) -> Result<FlexBody> {
-        let numbers = |modes: &[usize]| modes.iter().map(usize::to_string).collect::<Vec<_>>().join(",");
-        let modes = modes.map(|modes| Subset::parse_modes(&numbers(modes))).transpose()?;
+        let modes = modes.map(|modes| Subset::modes_of(modes.to_vec())).transpose()?;
         let subset = Subset { modes, groups: Subset::parse_groups(terms)? };
         self.0.clone().subset(&subset).map(FlexBody)
     }

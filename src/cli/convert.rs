@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
 /// Runs a conversion whose modes are found by this program or elsewhere.
 pub(super) fn run_with(arguments: &ConvertArguments, mode_source: &ModeSource) -> Result<Outcome> {
     refuse_without_modes(arguments)?;
-    stated_parts(&arguments.stated)?;
+    let stated = stated_parts(&arguments.stated)?;
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
     // The command line takes precedence over the manifest.
@@ -72,8 +72,16 @@ pub(super) fn run_with(arguments: &ConvertArguments, mode_source: &ModeSource) -
     // Check before the work: files that a deck includes or assigns are known now.
     refuse_replacing_read(places.all())?;
     watcher.hear(Event::Phase("checks"));
-    let job =
-        Job { arguments, lumped: &lumped, loads: &loads, formats: &formats, cases, mode_source, threads };
+    let job = Job {
+        arguments,
+        lumped: &lumped,
+        loads: &loads,
+        formats: &formats,
+        cases,
+        stated: stated.as_ref(),
+        mode_source,
+        threads,
+    };
     if !arguments.split {
         let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
         OutputSlot::commit_all(done.slots)?;
@@ -126,6 +134,8 @@ struct Job<'a> {
     formats: &'a [Format],
     /// Load cases of the scene; `None` without a scene.
     cases: Option<&'a LoadCases>,
+    /// Parts of the body that the command line states; `None` if a scene selects them.
+    stated: Option<&'a StatedParts>,
     mode_source: &'a ModeSource,
     threads: usize,
 }
@@ -226,16 +236,17 @@ impl Job<'_> {
         settings: ConvertSettings,
         context: &Context<'_>,
     ) -> Result<(Conversion, Option<Selection>)> {
-        let stated = stated_parts(&self.arguments.stated)?;
         let Some((path, cases)) = self.arguments.scene.as_ref().zip(self.cases) else {
             let mut conversion = convert(model, &settings, context)?;
-            conversion.body = conversion.body.subset(&stated.unwrap_or_default().subset)?;
+            if let Some(stated) = self.stated {
+                conversion.body = conversion.body.subset(&stated.subset)?;
+            }
             return Ok((conversion, None));
         };
         let tailoring = self.of_band(settings);
-        let made = match stated {
+        let made = match self.stated {
             Some(stated) => {
-                convert_stated(model, &tailoring, cases, &stated, context).map(|made| (made, None))
+                convert_stated(model, &tailoring, cases, stated, context).map(|made| (made, None))
             }
             None => convert_for(model, &tailoring, cases, context).map(|(made, chosen)| (made, Some(chosen))),
         };

@@ -8,7 +8,7 @@ use flexbody_eigen::Accuracy;
 use serde_json::Value;
 use std::path::Path;
 
-/// Returns the arguments with the basis, modes, accuracy, residual vectors, frame, comparators and terms of the body in
+/// Returns the arguments with the basis, modes, accuracy, residual vectors, frame, comparators and storage of the body in
 /// `path`, as its file records them.
 ///
 /// # Errors

@@ -13,7 +13,7 @@ use flexbody_report::{Facts, Format, RunData, render};
 
 pub(super) fn run(arguments: &ReduceArguments) -> Result<Outcome> {
     let subset = subset(arguments.terms.as_deref(), arguments.keep_modes.as_deref())?;
-    if subset.is_everything() && arguments.storage.is_none() {
+    if arguments.keep_modes.is_none() && arguments.terms.is_none() && arguments.storage.is_none() {
         let message = "nothing is left out: neither --keep-modes, --terms nor --storage is given";
         let help = "name the modes or terms to keep, as in --keep-modes 1,3,5-9 --terms W1";
         return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());

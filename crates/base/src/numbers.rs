@@ -17,6 +17,21 @@ pub fn significant(value: f64, digits: usize) -> String {
     if plain == "-0" { "0".to_owned() } else { plain }
 }
 
+/// Returns the first and last number of each run of consecutive numbers.
+pub fn runs(numbers: &[usize]) -> Vec<(usize, usize)> {
+    let runs = numbers.chunk_by(|a, b| a + 1 == *b);
+    runs.filter_map(|run| Some((*run.first()?, *run.last()?))).collect()
+}
+
+/// Returns ascending numbers as a list of runs with `separator` between them: `1-4,7,9-10`.
+pub fn joined_runs(numbers: &[usize], separator: &str) -> String {
+    let run = |(first, last): &(usize, usize)| match last - first {
+        0 => first.to_string(),
+        _ => format!("{first}-{last}"),
+    };
+    runs(numbers).iter().map(run).collect::<Vec<_>>().join(separator)
+}
+
 /// Removes the zeros at the end of a number with decimals.
 fn trimmed(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }

@@ -17,27 +17,14 @@ use std::sync::OnceLock;
 
 /// Returns the scene of a free body at rest, without loads or requirements, for this duration.
 pub fn nothing_happens(name: &str, duration: f64, tolerance: f64) -> Scene {
-    Scene {
-        name: name.to_owned(),
-        run: Run {
-            duration: Some(duration),
-            outputs: 60,
-            most_steps: Run::MOST_STEPS,
-            scheme: Scheme::Adaptive { tolerance },
-            terms: Terms::ALL,
-        },
-        initial: Initial::default(),
-        gravity: None,
-        loads: Vec::new(),
-        spin: None,
-        carried: None,
-        watched: Vec::new(),
-        requirements: Default::default(),
-        source: None,
-        series: Vec::new(),
-        resolved: false,
-        case: None,
-    }
+    let run = Run {
+        duration: Some(duration),
+        outputs: 60,
+        most_steps: Run::MOST_STEPS,
+        scheme: Scheme::Adaptive { tolerance },
+        terms: Terms::ALL,
+    };
+    Scene::new(name, run)
 }
 
 /// Returns solid bodies, soft and stiff, and a plane body.

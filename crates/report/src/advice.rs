@@ -7,8 +7,9 @@ use super::numbers::{frequency, percent, significant};
 use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
-use flexbody_body::flex_body::{FlexBody, Subset, TermGroup, TermGroups};
+use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
 use flexbody_study::advice::{Advice, AdvisedTerm, GuidelineAdvice};
+use flexbody_study::recipe::advised;
 use serde::Serialize;
 
 /// Facts of an advice.
@@ -112,10 +113,7 @@ impl<'a> AdviceFacts<'a> {
             limit: advice.ranges.limit,
             guideline: advice.guideline().name,
             groups: groups.map(TermGroup::name).collect(),
-            command: format!(
-                "flexbody reduce {path} --terms {} -o small.flex.h5",
-                Subset::groups_text(advice.groups)
-            ),
+            command: advised(path, advice.groups),
             guidelines: advice.guidelines.iter().map(guideline).collect(),
             terms: terms.iter().map(term).collect(),
             programs: programs(advice.groups),

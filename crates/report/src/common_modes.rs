@@ -1,10 +1,10 @@
 //! Modes that two bodies have in common if one has fewer modes than the other.
 
 use super::clusters::close;
-use super::errors_in_words::runs;
 use super::numbers::{counted, frequency, frequency_range};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::runs;
 use flexbody_body::flex_body::FlexBody;
 
 /// Paired modes of two bodies (indices from 0, ascending, the same number for both).

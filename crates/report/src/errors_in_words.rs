@@ -1,6 +1,7 @@
 //! Errors and numbers of modes in words.
 
 use super::numbers::significant;
+use flexbody_base::numbers::joined_runs;
 use flexbody_motion::scene::OutputErrors;
 
 /// Returns the error of a quantity in words: `0.001 rad` for the attitude, `1 %` for other quantities.
@@ -23,19 +24,9 @@ pub(super) fn errors_to_digits(errors: &OutputErrors, digits: usize) -> String {
     errors.named().into_iter().filter_map(part).collect::<Vec<_>>().join(", ")
 }
 
-/// Returns the first and last number of each run of consecutive numbers.
-pub(super) fn runs(numbers: &[usize]) -> Vec<(usize, usize)> {
-    let runs = numbers.chunk_by(|a, b| a + 1 == *b);
-    runs.filter_map(|run| Some((*run.first()?, *run.last()?))).collect()
-}
-
 /// Returns ascending numbers with runs joined: 1-4, 7, 9-10.
 pub(super) fn ranges(numbers: &[usize]) -> String {
-    let run = |(first, last): &(usize, usize)| match last - first {
-        0 => first.to_string(),
-        _ => format!("{first}-{last}"),
-    };
-    runs(numbers).iter().map(run).collect::<Vec<_>>().join(", ")
+    joined_runs(numbers, ", ")
 }
 
 /// Returns the inertia terms of a model: `W1, W2 and W3`.

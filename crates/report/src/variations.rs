@@ -3,8 +3,6 @@
 use super::numbers::{counted, significant};
 use flexbody_motion::scene::OutputErrors;
 use flexbody_study::reference::MAX_REFERENCE_ERROR;
-#[cfg(feature = "hdf5")]
-use flexbody_study::reference::ReferenceError;
 use flexbody_study::selection::VariedSelection;
 #[cfg(feature = "hdf5")]
 use flexbody_study::trade::{InCase, Trade, TradeVariation};
@@ -47,18 +45,14 @@ impl<'a> VariationFacts<'a> {
         let Some(varied) = recommended.and_then(|measured| measured.varied.as_ref()) else {
             return Vec::new();
         };
-        let facts = |(one, own): (&'a TradeVariation, &Option<InCase>)| {
-            let worst = own.map(|own| own.worst);
-            let is_reference = one.reference.as_ref().is_none_or(ReferenceError::is_reference);
-            Self {
-                name: &one.name,
-                case: one.case.as_deref(),
-                stated: one.is_stated,
-                holds: is_reference && worst.is_some_and(|worst| worst <= 1.0 - one.reserved),
-                errors: own.map(|own| own.errors),
-                worst,
-                reference: one.reference.as_ref().map(|own| own.worst),
-            }
+        let facts = |(one, own): (&'a TradeVariation, &Option<InCase>)| Self {
+            name: &one.name,
+            case: one.case.as_deref(),
+            stated: one.is_stated,
+            holds: one.accepts(own.as_ref()),
+            errors: own.map(|own| own.errors),
+            worst: own.map(|own| own.worst),
+            reference: one.reference.as_ref().map(|own| own.worst),
         };
         trade.variations.iter().zip(&varied.by_variation).map(facts).collect()
     }
@@ -92,10 +86,10 @@ pub(super) fn in_words(variations: &[VariationFacts<'_>]) -> Option<String> {
         words.push_str(&format!(": holds, {} % of what is allowed at most", significant(100.0 * worst, 2)));
     }
     if !failing.is_empty() {
-        words.push_str(&format!(": does not hold (error over tolerance) in {}", list(&failing)));
-    }
-    if !failing.is_empty() {
-        words.push_str("; make such a variation a [[case]] of the scene if it can occur");
+        words.push_str(&format!(
+            ": does not hold (error over tolerance) in {}; make such a variation a [[case]] of the scene if it can occur",
+            list(&failing)
+        ));
     }
     if !unjudged.is_empty() {
         let names: Vec<&str> = unjudged.iter().map(|one| one.name).collect();

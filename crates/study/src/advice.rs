@@ -7,7 +7,7 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
-    Attachment, AttachmentKind, Initial, Limits, MotionRange, Range, Requirements, Run, Scene, Scheme,
+    Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Run, Scene, Scheme,
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -238,30 +238,18 @@ fn farthest_node(body: &FlexBody, centre: &Vector3<f64>) -> Vector3<f64> {
 
 /// Returns a scene of ranges alone.
 fn scene_of(spin: f64, deflection: f64, inertia: Matrix3<f64>) -> Scene {
-    Scene {
-        name: "ranges".to_owned(),
-        run: Run {
-            duration: None,
-            outputs: 1,
-            most_steps: Run::MOST_STEPS,
-            scheme: Scheme::Adaptive { tolerance: 1e-9 },
-            terms: Terms::ALL,
-        },
-        initial: Initial::default(),
-        gravity: None,
-        loads: Vec::new(),
-        spin: None,
-        carried: None,
-        watched: Vec::new(),
-        requirements: Requirements {
-            motion: MotionRange { angular_velocity: Some(Range::Any(spin)), ..MotionRange::default() },
-            attachment: Attachment { kind: AttachmentKind::Free, inertia, ..Attachment::default() },
-            limits: Limits { deflection: Some(deflection), ..Limits::default() },
-            ..Requirements::default()
-        },
-        source: None,
-        series: Vec::new(),
-        resolved: true,
-        case: None,
-    }
+    let run = Run {
+        duration: None,
+        outputs: 1,
+        most_steps: Run::MOST_STEPS,
+        scheme: Scheme::Adaptive { tolerance: 1e-9 },
+        terms: Terms::ALL,
+    };
+    let requirements = Requirements {
+        motion: MotionRange { angular_velocity: Some(Range::Any(spin)), ..MotionRange::default() },
+        attachment: Attachment { kind: AttachmentKind::Free, inertia, ..Attachment::default() },
+        limits: Limits { deflection: Some(deflection), ..Limits::default() },
+        ..Requirements::default()
+    };
+    Scene { requirements, resolved: true, ..Scene::new("ranges", run) }
 }

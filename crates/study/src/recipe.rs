@@ -65,7 +65,7 @@ impl Recipe {
         };
         let mut words = own.words(origin);
         words.extend(subset_words(subset, n_modes, own.scene != SceneBasis::Without));
-        convert_command(origin, words, storage)
+        command("convert", &origin.input, words, storage)
     }
 }
 
@@ -85,7 +85,9 @@ impl ConversionRecipe {
             }
         };
         words.extend(scene_words(origin));
-        words.extend(is_fine.then(|| text(["--enrichment", "fine"])).into_iter().flatten());
+        if is_fine {
+            words.extend(text(["--enrichment", "fine"]));
+        }
         words
     }
 }
@@ -94,9 +96,11 @@ impl ConversionRecipe {
 /// user gave; `None` if the band of the scene decides.
 pub fn selected_from_model(selection: &Selection, origin: &Origin, modes: Option<usize>) -> String {
     let mut words = scene_words(origin);
-    words.extend(modes.map(|modes| text(["--modes", &modes.to_string()])).into_iter().flatten());
+    if let Some(modes) = modes {
+        words.extend(text(["--modes", &modes.to_string()]));
+    }
     words.extend(subset_words(&subset_of(selection), selection.n_modes, true));
-    convert_command(origin, words, Storage::F64)
+    command("convert", &origin.input, words, Storage::F64)
 }
 
 /// Returns the command that makes the body of a selection from the flex-body file that it was made for.
@@ -108,18 +112,19 @@ fn subset_of(selection: &Selection) -> Subset {
     Subset { modes: Some(selection.modes.clone()), groups: selection.groups }
 }
 
+/// Returns the command that makes the body of an advice from its flex-body file.
+pub fn advised(file: &str, groups: TermGroups) -> String {
+    let subset = Subset { modes: None, groups };
+    command("reduce", &[file.to_owned()], subset_words(&subset, 0, true), Storage::F64)
+}
+
 fn reduction(origin: &Origin, subset: &Subset, n_modes: usize, storage: Storage) -> String {
-    let options = subset_words(subset, n_modes, false);
-    command("reduce", origin, options.into_iter().chain(storage_words(storage)))
+    command("reduce", &origin.input, subset_words(subset, n_modes, true), storage)
 }
 
-fn convert_command(origin: &Origin, words: Vec<String>, storage: Storage) -> String {
-    command("convert", origin, words.into_iter().chain(storage_words(storage)))
-}
-
-fn command(name: &str, origin: &Origin, options: impl Iterator<Item = String>) -> String {
-    let start = text(["flexbody", name]).into_iter().chain(origin.input.iter().cloned());
-    let words = start.chain(options).chain(text(["-o", "body.flex.h5"]));
+fn command(name: &str, input: &[String], options: Vec<String>, storage: Storage) -> String {
+    let start = text(["flexbody", name]).into_iter().chain(input.iter().cloned());
+    let words = start.chain(options).chain(storage_words(storage)).chain(text(["-o", "body.flex.h5"]));
     words.map(|word| shell_word(&word)).collect::<Vec<_>>().join(" ")
 }
 
@@ -128,13 +133,13 @@ fn scene_words(origin: &Origin) -> Vec<String> {
     text(["--scene", &origin.scene]).into_iter().chain(case).collect()
 }
 
-/// Returns the options that state the subset. With a scene the terms are always stated, since `convert` would select
-/// them otherwise.
-fn subset_words(subset: &Subset, n_modes: usize, has_scene: bool) -> Vec<String> {
+/// Returns the options that state the subset of `n_modes` modes. The terms are stated even if the body has all of them
+/// if `states_terms`: `convert` with a scene would select them otherwise, and `reduce` needs something to do.
+fn subset_words(subset: &Subset, n_modes: usize, states_terms: bool) -> Vec<String> {
     let some = subset.modes.as_ref().filter(|modes| modes.len() < n_modes);
     let mut words: Vec<String> =
         some.iter().flat_map(|modes| text(["--keep-modes", &Subset::modes_text(modes)])).collect();
-    if has_scene || subset.groups != TermGroups::ALL {
+    if states_terms || subset.groups != TermGroups::ALL {
         words.extend(text(["--terms", &Subset::groups_text(subset.groups)]));
     }
     words
@@ -162,7 +167,17 @@ fn shell_word(word: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::shell_word;
+    use super::*;
+
+    /// A command that leaves nothing out still runs: `reduce` without an option is refused.
+    #[test]
+    fn the_whole_body_is_stated() {
+        let origin = Origin { input: vec!["a b.h5".to_owned()], scene: "s.toml".to_owned(), case: None };
+        let all = Subset { modes: Some(vec![0, 1]), groups: TermGroups::ALL };
+        let command = Recipe::File.command(&origin, &all, 2, Storage::F64);
+        assert_eq!(command, "flexbody reduce 'a b.h5' --terms all -o body.flex.h5");
+        assert_eq!(advised("a.h5", TermGroups::NONE), "flexbody reduce a.h5 --terms none -o body.flex.h5");
+    }
 
     #[test]
     fn words_are_quoted_for_the_shell() {

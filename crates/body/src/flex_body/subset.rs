@@ -3,6 +3,7 @@
 use super::{FlexBody, TermDecision, TermGroup, TermGroups};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::joined_runs;
 
 /// Reason of a group that a stated subset leaves out.
 const LEFT_OUT: &str = "left out on request; no scene has judged it";
@@ -26,33 +27,40 @@ pub struct Subset {
 }
 
 impl Subset {
-    /// Returns true if the subset is the whole body.
-    pub fn is_everything(&self) -> bool {
-        self.modes.is_none() && self.groups == TermGroups::ALL
-    }
-
     /// Parses numbers of modes from 1, with commas and ranges: `1,3,5-9`. Returns ascending indices from 0.
     ///
     /// # Errors
     /// [`Usage`](Code::Usage) for text that is no number, the number 0, descending ranges and repeated numbers.
     pub fn parse_modes(text: &str) -> Result<Vec<usize>> {
-        let mut modes = Vec::new();
+        let mut numbers = Vec::new();
         for piece in text.split(',').map(str::trim) {
             let (first, last) = piece.split_once('-').unwrap_or((piece, piece));
-            let number = |text: &str| text.trim().parse::<usize>().ok().filter(|&n| n > 0 && n <= MOST_MODES);
+            let number = |text: &str| {
+                text.trim().parse::<usize>().ok().filter(|number| (1..=MOST_MODES).contains(number))
+            };
             let (Some(first), Some(last)) = (number(first), number(last)) else {
                 return Err(refused(format!("`{piece}` is not a number of a mode or a range of numbers")));
             };
             if first > last {
                 return Err(refused(format!("the range `{piece}` descends")));
             }
-            modes.extend(first - 1..last);
+            numbers.extend(first..=last);
         }
-        modes.sort_unstable();
-        if let Some(pair) = modes.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(refused(format!("mode {} is named twice in `{text}`", pair[0] + 1)));
+        Self::modes_of(numbers)
+    }
+
+    /// Returns the ascending indices (from 0) of modes that are given by their numbers, from 1.
+    ///
+    /// # Errors
+    /// [`Usage`](Code::Usage) for the number 0 and for repeated numbers.
+    pub fn modes_of(mut numbers: Vec<usize>) -> Result<Vec<usize>> {
+        numbers.sort_unstable();
+        if let Some(pair) = numbers.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(refused(format!("mode {} is named twice", pair[0])));
         }
-        Ok(modes)
+        let index =
+            |number: usize| number.checked_sub(1).ok_or_else(|| refused("there is no mode 0".to_owned()));
+        numbers.into_iter().map(index).collect()
     }
 
     /// Parses groups of terms: names with commas (`W1,W3`), `none`, `all`, or a guideline of \[WP19\] section 8 (`I`,
@@ -82,17 +90,8 @@ impl Subset {
 
     /// Returns the modes in the form that [`Subset::parse_modes`] reads.
     pub fn modes_text(modes: &[usize]) -> String {
-        let mut pieces: Vec<String> = Vec::new();
-        let mut rest = modes;
-        while let Some(&first) = rest.first() {
-            let run = rest.iter().enumerate().take_while(|(i, mode)| **mode == first + i).count();
-            pieces.push(match run {
-                1 => (first + 1).to_string(),
-                _ => format!("{}-{}", first + 1, first + run),
-            });
-            rest = &rest[run..];
-        }
-        pieces.join(",")
+        let numbers: Vec<usize> = modes.iter().map(|mode| mode + 1).collect();
+        joined_runs(&numbers, ",")
     }
 
     /// Returns the groups in the form that [`Subset::parse_groups`] reads.

@@ -48,6 +48,25 @@ pub struct CaseName {
 }
 
 impl Scene {
+    /// Creates a scene in which nothing happens to the body: no loads, no prescribed motion, no requirements.
+    pub fn new(name: impl Into<String>, run: Run) -> Self {
+        Self {
+            name: name.into(),
+            run,
+            initial: Initial::default(),
+            gravity: None,
+            loads: Vec::new(),
+            spin: None,
+            carried: None,
+            watched: Vec::new(),
+            requirements: Requirements::default(),
+            source: None,
+            series: Vec::new(),
+            resolved: false,
+            case: None,
+        }
+    }
+
     /// Returns the name of the load case; `None` if the scene has no cases.
     pub fn case_name(&self) -> Option<&str> {
         Some(&self.case.as_ref()?.name)

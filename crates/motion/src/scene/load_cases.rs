@@ -122,6 +122,11 @@ impl LoadCases {
         &self.variations
     }
 
+    /// Returns true if the scene file states its variations, which a body then has to hold in.
+    pub fn states_variations(&self) -> bool {
+        matches!(self.variations, Variations::Stated(_))
+    }
+
     /// Returns the load cases without variations.
     pub fn without_variations(self) -> Self {
         Self { variations: Variations::Without, ..self }

@@ -97,6 +97,14 @@ pub enum Range {
 }
 
 impl Range {
+    /// Returns the range multiplied by a factor.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        match self {
+            Self::Any(length) => Self::Any(factor * length),
+            Self::Axes(components) => Self::Axes(factor * components),
+        }
+    }
+
     /// Returns the largest length of a vector within the range.
     pub fn length(&self) -> f64 {
         match self {

@@ -69,7 +69,8 @@ pub enum Change {
         /// New point of application.
         to: Point,
     },
-    /// All prescribed and initial angular velocities are multiplied by a factor.
+    /// All prescribed and initial angular velocities, and the limits of rotation that the scene states, are multiplied by
+    /// a factor.
     Speed(f64),
 }
 
@@ -90,6 +91,11 @@ impl Scene {
             Change::Speed(factor) => {
                 let mut scene = self.turning_faster(*factor);
                 scene.initial.angular_velocity *= *factor;
+                // A variation may leave the range that the scene states: it is a motion that nobody asked for.
+                let motion = &mut scene.requirements.motion;
+                for range in [&mut motion.angular_velocity, &mut motion.angular_acceleration] {
+                    *range = range.map(|range| range.scaled(factor.abs()));
+                }
                 scene
             }
         }
@@ -129,8 +135,9 @@ impl Scene {
                 self.turned_excitation(&rotation).map(|(what, scene)| (format!("{what} {name}"), scene)),
             );
         }
-        let faster = self.changed(&Change::Speed(STANDARD_SPEED));
-        if faster != *self {
+        let is_driven = self.rotation().is_some_and(|history| !history.is_nothing());
+        if is_driven || self.initial.angular_velocity != Vector3::zeros() {
+            let faster = self.changed(&Change::Speed(STANDARD_SPEED));
             all.push(("20 % faster".to_owned(), faster));
         }
         all

@@ -107,6 +107,13 @@ impl ReferenceError {
         self.worst <= MAX_REFERENCE_ERROR
     }
 
+    /// Returns the part of the tolerances that the last error of `rounds` leaves to others: all of it if no error is
+    /// known, or if the body is no reference.
+    pub(crate) fn left(rounds: &[Self]) -> f64 {
+        let error = rounds.last().filter(|own| own.is_reference());
+        (1.0 - error.map_or(0.0, |own| own.worst)).max(0.0)
+    }
+
     /// Returns the remark about rigid interfaces that the body and the compared model have in common.
     pub fn coupling_remark(&self) -> Option<Diagnostic> {
         self.coupling.as_ref().map(CouplingEffect::remark)

@@ -92,8 +92,7 @@ impl<'c> Demand<'c> {
 
     /// Returns the part of the tolerances left after the truncation error of the body and the bounds.
     pub(super) fn budget(&self) -> f64 {
-        let reference_error = self.reference_errors.last().filter(|own| own.is_reference());
-        let left = (1.0 - reference_error.map_or(0.0, |own| own.worst)).max(0.0);
+        let left = ReferenceError::left(self.reference_errors);
         if self.by_bounds.is_none() {
             return left;
         }

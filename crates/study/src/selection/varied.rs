@@ -9,7 +9,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
-use flexbody_motion::scene::{LoadCases, Measure, SceneVariation, Trace, Variations};
+use flexbody_motion::scene::{LoadCases, Measure, SceneVariation, Trace};
 
 /// Factor by which the number of modes grows from trial to trial. A smaller value finds fewer modes and takes more
 /// simulations.
@@ -98,21 +98,18 @@ impl<'v> VariedRuns<'v> {
         Ok(Self { variations, cases, references, reference_errors })
     }
 
-    /// Measures a model in every variation.
-    fn measured(&self, modes: &[usize], groups: TermGroups) -> Result<Vec<Trial>> {
-        let trial = |(at, (case, reference)): (usize, (&Case<'v>, &Trace))| {
-            let runs = case.runs();
-            let measure = Measure::new(runs.body, reference);
-            Ok(runs.measured(&measure, modes, groups, self.budget(at))?.0)
+    /// Measures a model in every variation; `measures` belong to the references.
+    fn measured(&self, measures: &[Measure<'_>], choice: &Choice) -> Result<Vec<Trial>> {
+        let trial = |(at, (case, measure)): (usize, (&Case<'v>, &Measure<'_>))| {
+            let budget = ReferenceError::left(self.errors_of(at));
+            Ok(case.runs().measured(measure, &choice.modes, choice.groups, budget)?.0)
         };
-        self.cases.iter().zip(&self.references).enumerate().map(trial).collect()
+        self.cases.iter().zip(measures).enumerate().map(trial).collect()
     }
 
-    /// Returns the part of the tolerances that the truncation error of the whole body leaves in a variation.
-    fn budget(&self, at: usize) -> f64 {
-        let own =
-            self.reference_errors.get(at).and_then(|rounds| rounds.last()).filter(|own| own.is_reference());
-        (1.0 - own.map_or(0.0, |own| own.worst)).max(0.0)
+    /// Returns the truncation errors of the whole body in a variation; empty if none are known.
+    fn errors_of(&self, at: usize) -> &'v [ReferenceError] {
+        self.reference_errors.get(at).map_or(&[], Vec::as_slice)
     }
 
     /// Judges `choice`. Unless the scene limits the cost, modes in the order `ranked` and groups of `held` are added
@@ -125,7 +122,11 @@ impl<'v> VariedRuns<'v> {
         is_limited: bool,
         cases: &LoadCases,
     ) -> Result<Vec<VariedSelection>> {
-        let of_scene = self.measured(&choice.modes, choice.groups)?;
+        // The measures look at all nodes and instants of the references: made once for all models.
+        let both = self.cases.iter().zip(&self.references);
+        let measures: Vec<Measure<'_>> =
+            both.map(|(case, reference)| Measure::new(case.runs().body, reference)).collect();
+        let of_scene = self.measured(&measures, choice)?;
         let mut chosen = of_scene.clone();
         let passed = |trials: &[Trial]| trials.iter().all(Trial::passed);
         let mut count = choice.modes.len();
@@ -140,16 +141,16 @@ impl<'v> VariedRuns<'v> {
             } else {
                 choice.groups = held;
             }
-            chosen = self.measured(&choice.modes, choice.groups)?;
+            chosen = self.measured(&measures, choice)?;
         }
         let is_changed = chosen != of_scene;
         let row = |(at, (chosen, before)): (usize, (Trial, Trial))| VariedSelection {
             name: self.variations[at].name.clone(),
             case: cases.case_name(self.variations[at].case).map(str::to_owned),
-            is_stated: matches!(cases.stated_variations(), Variations::Stated(_)),
+            is_stated: cases.states_variations(),
             chosen,
             of_scene: is_changed.then_some(before),
-            reference_errors: self.reference_errors.get(at).cloned().unwrap_or_default(),
+            reference_errors: self.errors_of(at).to_vec(),
         };
         Ok(chosen.into_iter().zip(of_scene).enumerate().map(row).collect())
     }

@@ -11,7 +11,7 @@ use flexbody_body::convert::{ConvertSettings, Lumping, convert};
 use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{LoadCases, Scene, SceneVariation, Variations};
+use flexbody_motion::scene::{LoadCases, Scene, SceneVariation};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::fmt::Write;
@@ -271,7 +271,7 @@ impl<'m> ConversionContext<'m> {
             let warning = rounds.last()?.warning(&one.scene, enrichment.enough())?;
             Some(warning.about(format!("variation `{}`", one.name)))
         };
-        let are_stated = matches!(cases.stated_variations(), Variations::Stated(_));
+        let are_stated = cases.states_variations();
         let diagnostics =
             variations.iter().zip(&reference_errors).filter_map(warning).filter(|_| are_stated).collect();
         let related = |source: &Source| source.clone().beside(made.body(), self.model).expect(OF_THE_MODEL);

@@ -5,7 +5,7 @@ use super::case::StudyCase;
 use super::varied::Judge;
 use super::{
     Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Source, Timed,
-    TradeRow, TradeSettings, TradeVariation, front, reserved,
+    TradeRow, TradeSettings, TradeVariation, front,
 };
 use crate::selection::most_excited_modes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -155,7 +155,7 @@ pub fn trade(
     let in_scene = Recommendation::new(&rows, allowed);
     let judge = settings.varied.filter(|varied| !varied.variations.is_empty()).map(|varied| {
         let names: Vec<Option<String>> = cases.iter().map(|case| case.name.clone()).collect();
-        Judge::new(varied, sources, &names, &reserved(&varied.reference_errors, false), context)
+        Judge::new(varied, sources, &names, context)
     });
     let judge = judge.transpose()?;
     let recommended = match &judge {

@@ -1,13 +1,13 @@
 //! Judgement of candidates on variations of the scene that their bodies were not made for.
 
 use super::case::StudyCase;
-use super::{Candidate, InCase, Measured, Recommendation, Source, TradeRow, front};
+use super::{Candidate, InCase, Measured, Recommendation, Source, TradeRow, front, reserved};
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::parallel;
-use flexbody_motion::scene::{LoadCases, Measure, SceneVariation, Tolerance, Variations, ends_a_run};
+use flexbody_motion::scene::{LoadCases, Measure, SceneVariation, Tolerance, ends_a_run};
 
 /// Largest number of candidates that are judged on variations. More cost time where no cheap candidate holds.
 const MOST_JUDGED: usize = 8;
@@ -33,7 +33,7 @@ impl Varied {
     pub fn of_body(cases: &LoadCases, dimension: usize) -> Self {
         Self {
             variations: cases.variations(dimension),
-            are_stated: matches!(cases.stated_variations(), Variations::Stated(_)),
+            are_stated: cases.states_variations(),
             ..Self::default()
         }
     }
@@ -54,6 +54,15 @@ pub struct TradeVariation {
     pub reserved: f64,
     /// Truncation error of the reference; `None` if unknown.
     pub reference: Option<ReferenceError>,
+}
+
+impl TradeVariation {
+    /// Returns true if these errors are within the tolerances that the reference leaves, and it is a reference. False if
+    /// the simulation stopped.
+    pub fn accepts(&self, errors: Option<&InCase>) -> bool {
+        let is_reference = self.reference.as_ref().is_none_or(ReferenceError::is_reference);
+        is_reference && errors.is_some_and(|own| own.worst <= 1.0 - self.reserved)
+    }
 }
 
 /// Errors of a candidate in the variations of a study.
@@ -86,13 +95,13 @@ impl<'j> Judge<'j> {
         varied: &Varied,
         sources: &[Source],
         names: &[Option<String>],
-        reserved: &[f64],
         context: &Context<'_>,
     ) -> Result<Self> {
         let (sources, before) = match varied.sources.is_empty() {
             true => (sources, 0),
             false => (&varied.sources[..], 1),
         };
+        let reserved = reserved(&varied.reference_errors, false);
         let (mut cases, mut variations) = (Vec::new(), Vec::new());
         for (at, one) in varied.variations.iter().enumerate() {
             let reserved = reserved.get(at).copied().unwrap_or(0.0);
@@ -131,9 +140,11 @@ impl<'j> Judge<'j> {
             Recommendation::MostAccurate(row) => (vec![row], true),
             Recommendation::Cheapest(_) => (front::holding(rows), false),
         };
+        // The measures look at all nodes and instants of the references: made once for all candidates.
+        let measures: Vec<Measure<'_>> = self.cases.iter().map(StudyCase::measure).collect();
         let most = wanted.len().min(MOST_JUDGED);
         for (done, &row) in wanted.iter().take(most).enumerate() {
-            let judged = self.judged(&rows[row].candidate)?;
+            let judged = self.judged(&measures, &rows[row].candidate)?;
             let holds = judged.beyond == 0;
             if let Ok(measured) = &mut rows[row].outcome {
                 measured.varied = Some(judged);
@@ -147,29 +158,26 @@ impl<'j> Judge<'j> {
     }
 
     /// Measures a candidate in every variation.
-    fn judged(&self, candidate: &Candidate) -> Result<InVariations> {
+    fn judged(&self, measures: &[Measure<'_>], candidate: &Candidate) -> Result<InVariations> {
         let own = Candidate { source: candidate.source + self.before, ..candidate.clone() };
-        let measured = |case: &StudyCase<'_>| match measured(case, &own) {
+        let measured = |(case, measure)| match measured(case, measure, &own) {
             Ok(found) => Ok(Some(found)),
             Err(error) if error.diagnostics().iter().all(|one| ends_a_run(one.code())) => Ok(None),
             Err(error) => Err(error),
         };
-        let by_variation = parallel::try_map(&self.cases, measured)?;
+        let by_variation = parallel::try_map(self.cases.iter().zip(measures), measured)?;
         let worst = |at: usize| by_variation[at].map_or(f64::INFINITY, |own| own.worst);
         let count = by_variation.len();
         let largest = (0..count).rev().max_by(|a, b| worst(*a).total_cmp(&worst(*b))).unwrap_or(0);
-        let is_reference =
-            |at: usize| self.variations[at].reference.as_ref().is_none_or(ReferenceError::is_reference);
-        let within = |at: &usize| is_reference(*at) && worst(*at) <= self.cases[*at].most();
-        let beyond = count - (0..count).filter(within).count();
+        let both = self.variations.iter().zip(&by_variation);
+        let beyond = both.filter(|(variation, errors)| !variation.accepts(errors.as_ref())).count();
         Ok(InVariations { worst: worst(largest), variation: largest, beyond, by_variation })
     }
 }
 
-fn measured(case: &StudyCase<'_>, candidate: &Candidate) -> Result<InCase> {
-    let measure: Measure<'_> = case.measure();
+fn measured(case: &StudyCase<'_>, measure: &Measure<'_>, candidate: &Candidate) -> Result<InCase> {
     let body = case.body(candidate)?;
-    Ok(case.measured(&measure, candidate, &body)?.0)
+    Ok(case.measured(measure, candidate, &body)?.0)
 }
 
 impl Measured {
