@@ -5,8 +5,8 @@
     cargo build --release --locked
     python3 scripts/pages/make_trade.py
 
-Seconds are those of the processor in Exudyn and in a C program (scripts/pages/trade_seconds.py); it takes about an hour, since all of them are measured five
-times, one after the other. What it finds of a scene is kept in target/trade: `--only SCENE ...` measures some of them anew.
+Runs in Exudyn and in a C program are those of scripts/pages/trade_seconds.py; all of it takes about an hour. What it finds of a scene is kept in
+target/trade: `--only SCENE ...` measures some of them again.
 """
 
 import argparse
@@ -27,7 +27,7 @@ import numpy as np  # noqa: E402
 
 from trade_figure import figure  # noqa: E402
 from trade_guidelines import GUIDELINES, Body, read_scene, study  # noqa: E402
-from trade_seconds import PER_PERIOD, TURNS, InC, InExudyn, Task  # noqa: E402
+from trade_seconds import TURNS, InC, InExudyn, Measure, Task, cheapest  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -64,12 +64,13 @@ programs. `flexbody {version}`, Exudyn {exudyn}; {processor}. Written by `./scri
   relative to its reference only. The tumbling bracket is
   thrown undeformed with its full spin, which is a shock: it vibrates at all its frequencies, and those of a body differ from those of the nodes. With `[initial] deformation = "static"`
   there is no shock, and far fewer modes are needed.
-* **Seconds** of the processor, medians of {turns} runs in turns. *Exudyn*: generalised alpha with one step for all candidates of a scene, {per_period} steps per period of the highest
-  frequency that the scene asks about. *C*: the header of `export --to embedded` in a Runge-Kutta program of order 4, whose step is as long as that frequency and the highest mode of the
-  body allow: a high mode that is not needed costs steps.
-* **Timed candidates**: those near the tolerances that no other candidate beats in both cost and accuracy, the recommended one and the whole body, and once the reference. Lumped masses and other sets of terms take the time of the exact body with as many
-  modes.
-* **Figures**: the largest of the errors of attitude, deflection, stress and reaction, each over its tolerance; the dashed line is 100 %.
+* **Runs**: time, error and number of steps are those of one run. The number of steps belongs to a candidate as its modes do: for each candidate and program it is the smallest found for which the error of the run
+  against the reference is within what the error of the reference leaves of the tolerances; a candidate beyond the tolerances may get a tenth worse. `flexbody measure` finds the error of a run from its modal coordinates and attitude.
+  Times are those of the processor, medians of {turns} runs in turns. *simulate*: explicit steps of order 8 with error control, or the method that the scene states. *Exudyn*: generalised alpha, implicit, order 2. *C*: the header of
+  `export --to embedded` in a Runge-Kutta program of order 4, explicit: its step is limited by the highest mode of the body, so that a high mode that is not needed costs steps.
+* **Candidates that are run**: those near the tolerances that no other candidate beats in both cost and accuracy, the recommended one and the whole body.
+* **Out of sample**: *variations* are motions that the body was not made for; a recommended body holds in them, or the verdict says where it does not.
+* **Percentages** are the largest of the errors of attitude, deflection, stress and reaction over its tolerance; the dashed line of the figures is 100 %.
 * **Whole body**: N free modes with residual vectors and all terms, the body that one would convert without knowing the scene. If its error exceeds the tolerances (**bold**),
   the recommended body is also more accurate, and may cost more. Seconds in the table are those of the whole body and of the recommended body.
 
@@ -187,87 +188,106 @@ def usual(told):
 
 
 class Timed:
-    """A candidate in both programs."""
+    """A candidate in both programs, each with the fewest steps that the tolerances allow."""
 
-    def __init__(self, program, folder, row, scene, start):
+    def __init__(self, program, folder, row, scene, start, measure, most):
         own = folder / f"{row['number']:03}"
         own.mkdir()
         path = folder / f"candidate_{row['number']:03}.flex.h5"
-        kept = [mode - 1 for mode in row["mode_numbers"]]
-        task = Task(path, scene, None if start is None else tuple(part[kept] for part in start))
-        self.programs, self.seconds, self.steps, self.why = {}, {}, {}, {}
+        task = Task(path, scene, start)
+        self.task, self.programs, self.runs, self.errors, self.seconds, self.why = task, {}, {}, {}, {}, {}
         for name, kind in (("exudyn", InExudyn), ("c", InC)):
             try:
-                self.programs[name] = kind(program, task, own)
-                self.seconds[name], self.steps[name] = [], (task if name == "exudyn" else self.programs[name]).steps
+                made = kind(program, task, own)
+                best = cheapest(made, measure, task, row["measured"]["worst"], most, own)
             except (RuntimeError, ValueError) as error:
                 self.why[name] = str(error).splitlines()[0]
+                continue
+            if best is None:
+                self.why[name] = f"no number of steps up to {made.most:,} is enough"
+                continue
+            self.programs[name], (self.runs[name], self.errors[name]) = made, best
+            self.seconds[name] = [self.runs[name].seconds]
 
     def run(self):
-        for name, program in list(self.programs.items()):
-            try:
-                seconds, path = program.run()
-                self.seconds[name].append(seconds)
-                self.path = path if name == "exudyn" else getattr(self, "path", None)
-            except (RuntimeError, ValueError) as error:
-                self.why[name] = str(error).splitlines()[0]
-                del self.programs[name]
+        for name, program in self.programs.items():
+            self.seconds[name].append(program.run(self.runs[name].steps).seconds)
 
     def median(self, name):
-        return float(np.median(self.seconds[name])) if self.seconds.get(name) and name not in self.why else None
+        return float(np.median(self.seconds[name])) if name in self.seconds else None
 
 
-def timed(program, folder, told, scene):
-    """Seconds of the rows that are shown, taken in turns."""
-    q, qd, _ = simulated_modes(program, folder, folder / "candidate_001.flex.h5", scene[0])
-    first = told["rows"][0]["source"]
+def timed(program, folder, told, scene, model):
+    """The rows that are shown in both programs; seconds are taken in turns."""
+    reference = folder / "candidate_001.flex.h5"
+    measure = Measure(program, scene[0], reference, model)
+    lacks = told["reference_lacks"]
+    # What the error of the reference leaves of the tolerances; all of them if it is no reference.
+    lost = max(lacks[-1][key] / told["tolerance"][key] for key in OUTPUTS if lacks[-1][key]) if lacks else 0.0
+    most = 1.0 - lost if lost < 1.0 else 1.0
     found = {}
-    for number in sorted(set(worth_timing(told) + [1])):
+    for number in worth_timing(told):
         row = told["rows"][number - 1]
-        start = (q[0], qd) if row["source"] == first else None
-        found[number] = Timed(program, folder, row, scene[1], start)
-    # The reference runs once, to see that the scene is the same there.
-    for turn in range(TURNS):
-        for number, one in found.items():
-            if turn == 0 or number > 1:
-                one.run()
+        # A body starts in its own equilibrium, as `simulate` has it.
+        q, qd, _ = simulated_modes(program, folder, folder / f"candidate_{number:03}.flex.h5", scene[0])
+        found[number] = Timed(program, folder, row, scene[1], (q[0], qd), measure, most)
+    for _ in range(TURNS - 1):
+        for one in found.values():
+            one.run()
     return found
 
 
 def measured(told, times):
     """What is shown, as a table."""
-    out = ["| candidate | error | of what is allowed | Exudyn (s) | C (ms) | steps in C | file (kB) |", "|---|---|---|---|---|---|---|"]
+    out = [
+        "| candidate | error of the body | in `simulate` | in Exudyn | in C | file (kB) |",
+        "|---|---|---|---|---|---|",
+    ]
     for row in shown(told):
         own, one = row["measured"], times.get(row["number"])
         name, error, _ = worst_error(row, told["tolerance"])
         label = f"**{described(row)}**" if row["number"] == told["recommended"] else described(row)
         label += " (whole body)" if row["number"] == usual(told) else ""
-        cells = [f"{name} {in_words(name, error)}", f"{number(100 * own['worst'])} %", *timings(one), number(own["file_bytes"] / 1e3, 3)]
+        cells = [f"{name} {in_words(name, error)}: {number(100 * own['worst'])} %", simulated_run(own), *other_runs(one), number(own["file_bytes"] / 1e3, 3)]
         out.append(f"| {label} | " + " | ".join(cells) + " |")
     return "\n".join(out)
 
 
-def timings(one):
-    """Seconds in Exudyn, milliseconds and steps in C; nothing of candidates that were not timed."""
+def simulated_run(measured):
+    """The run in `flexbody simulate`: seconds, error, accuracy of the step."""
+    if not measured["runs"]:
+        return ""
+    run = max(measured["runs"], key=lambda run: run["worst"])
+    step = f"tolerance {run['tolerance']:g}" if run["tolerance"] else f"step {run['step']:.3g}"
+    return f"{time_in_words(run['seconds'])}, {number(100 * run['worst'])} %, {step}"
+
+
+def other_runs(one):
+    """The runs in Exudyn and in C: seconds, error of the same run, number of steps; empty for candidates that were not run."""
     if one is None:
-        return ["", "", ""]
-    seconds, milliseconds = one.median("exudyn"), one.median("c")
+        return ["", ""]
     return [
-        number(seconds) if seconds else one.why.get("exudyn", ""),
-        number(1e3 * milliseconds) if milliseconds else one.why.get("c", ""),
-        f"{one.steps['c']:,}" if "c" in one.steps else "",
+        f"{time_in_words(one.median(name))}, {number(100 * one.errors[name])} %, {one.runs[name].steps:,} steps" if name in one.runs else one.why.get(name, "")
+        for name in ("exudyn", "c")
     ]
 
 
+def time_in_words(seconds):
+    """Seconds with a fitting prefix."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if seconds >= size:
+            return f"{number(seconds / size, 3)} {unit}"
+    return f"{number(seconds / 1e-6, 3)} us"
+
+
 def drawn(told, times, name):
-    """The figure: the largest error over what is allowed, against seconds in Exudyn."""
+    """The figure: error and seconds of the runs in Exudyn."""
     points = []
     for row in shown(told):
-        # A lumped mass takes what the reference takes, whose modes it has.
-        timed_as = 1 if row["lumped"] else row["number"]
-        seconds, worst = times[timed_as].median("exudyn") if timed_as in times else None, row["measured"]["worst"]
-        if seconds and worst > 0:
-            points.append((seconds, 100 * worst, described(row), bool(row["lumped"]), row["number"] == told["recommended"]))
+        one = times.get(row["number"])
+        seconds = one.median("exudyn") if one else None
+        if seconds:
+            points.append((seconds, 100 * one.errors["exudyn"], described(row), bool(row["lumped"]), row["number"] == told["recommended"]))
     (ROOT / "docs/images" / f"trade_{name}.svg").write_text(figure(told["scene"], points))
 
 
@@ -284,13 +304,14 @@ def summary(told, times):
     own = times[told["recommended"]]
     name, error, allowed = worst_error(row, told["tolerance"])
 
-    def saved(kind, unit):
+    def saved(kind):
         before, after = whole.median(kind), own.median(kind)
         if not before or not after:
             return whole.why.get(kind) or own.why.get(kind) or ""
-        return f"{number(unit * before)} to {number(unit * after)}: **{number(before / after)} times**"
+        errors = f"errors {number(100 * whole.errors[kind])} % and {number(100 * own.errors[kind])} % of the tolerance"
+        return f"{time_in_words(before)} to {time_in_words(after)}: **{number(before / after)} times** ({errors})"
 
-    return f"| {told['scene']} | {described(row)} | {own_error(name, error, allowed)} | {beside} | {reference} | {saved('exudyn', 1)} | {saved('c', 1e3)} |"
+    return f"| {told['scene']} | {described(row)} | {own_error(name, error, allowed)} | {beside} | {reference} | {saved('exudyn')} | {saved('c')} |"
 
 
 def scene_part(program, name, model, modes):
@@ -304,11 +325,10 @@ def scene_part(program, name, model, modes):
         run(program, *words, folder=folder, passes=(0, 1))
         took = time.perf_counter() - begin
         told = json.loads((folder / "trade.json").read_text())
-        times = timed(program, folder, told, (path, read_scene(path)))
-        agree = agreement(program, folder, path, times[told["rows"][0]["number"]])
+        times = timed(program, folder, told, (path, read_scene(path)), manifest)
     drawn(told, times, name)
     verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:])
-    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s. The modes of the reference move in Exudyn as in `simulate` to {number(100 * agree)} % of the root of the elastic energy."
+    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s."
     parts = [f"## {told['scene']}", said, verdict, measured(told, times), f"![error over seconds](../images/trade_{name}.svg)"]
     return "\n\n".join(parts) + "\n\n", summary(told, times), bases(told)
 
@@ -334,15 +354,6 @@ def bases(told):
         fewest(lambda row: row["source"].endswith("of the motion")),
     ]
     return f"| {told['scene']} | " + " | ".join(cells) + " |"
-
-
-def agreement(program, folder, scene, one):
-    """Largest difference of the motion of the reference in Exudyn to `simulate`, in the root of the elastic energy."""
-    task = one.programs["exudyn"].task
-    q, _, instants = simulated_modes(program, folder, task.path, scene)
-    own = np.array([np.interp(instants, one.programs["exudyn"].instants, column) for column in one.path.T]).T
-    root = np.sqrt(task.eigenvalue)
-    return np.linalg.norm((own - q) * root, axis=1).max() / np.linalg.norm(q * root, axis=1).max()
 
 
 def simulated_modes(program, folder, body, scene):
@@ -490,11 +501,11 @@ def all_guidelines(program):
 def assembled(version, found):
     """The page, of the parts that are there."""
     parts = [found[name] for name, *_ in SCENES if name in found]
-    head = ["| scene | body | its error | error of the whole body | the reference lacks (estimated) | seconds in Exudyn | milliseconds in C |", "|---|---|---|---|---|---|---|"]
+    head = ["| scene | body | its error | error of the whole body | the reference lacks (estimated) | Exudyn | C |", "|---|---|---|---|---|---|---|"]
     top = "\n".join(head + [part[1] for part in parts])
     head = ["| scene | free modes | and residual vectors | those of the reference that do most | shapes of the motion |", "|---|---|---|---|---|"]
     ways = "\n".join(head + [part[2] for part in parts])
-    text = HEAD.format(version=version, exudyn=metadata.version("exudyn"), processor=processor(), turns=TURNS, per_period=PER_PERIOD, table=top, bases=ways)
+    text = HEAD.format(version=version, exudyn=metadata.version("exudyn"), processor=processor(), turns=TURNS, table=top, bases=ways)
     missing = [name for name, *_ in SCENES if name not in found]
     if missing:
         text += f"Not measured yet in this form: {', '.join(missing)} (`python3 scripts/pages/make_trade.py --only ...`).\n\n"

@@ -1,11 +1,13 @@
-"""Seconds that a body of a trade study takes in two programs that are not ours: Exudyn, with the body as `export --to exudyn` writes it, and a
-program in C around the header of `export --to embedded`.
+"""Runs of a body of a trade study in two other programs: Exudyn, with the body as `export --to exudyn` writes it, and a program in C around the header
+of `export --to embedded`.
 
-Both simulate the scene with a step of their own choice, which is stated: Exudyn with generalised alpha, implicit, as long as the highest frequency that
-the scene asks about allows, the same for every body; the C program with the classical Runge-Kutta method, explicit, as long as that frequency and the
-highest mode of the body allow.
+Error and seconds are those of the same run. The number of steps is the smallest found for which the error of the run against the reference of the study
+(`flexbody measure`) is within what the tolerances leave. Exudyn integrates with generalised alpha, implicit, the C program with the classical Runge-Kutta
+method of order 4, explicit.
 """
 
+import csv
+import json
 import re
 import subprocess
 import time
@@ -15,13 +17,19 @@ import numpy as np
 
 from trade_guidelines import history, skew
 
-# Steps per period of the highest frequency that the scene asks about (`[band]`), and how many there are at the least and at the most.
-PER_PERIOD, FEWEST, MOST = 20, 500, 20000
+# Steps per period of the highest frequency that the scene asks about (`[band]`), with which the search for the number of steps begins.
+PER_PERIOD = 20
+# Smallest number of steps that is tried, and largest number of instants that are compared.
+FEWEST, INSTANTS = 40, 20_000
+# Runs of the search; its result has at most this many times the steps that would be enough.
+TRIALS, CLOSE = 7, 1.3
+# Ratio of error to tolerance that the integration may add where a body exceeds the tolerances anyway, relative to the error of the body.
+SHARE = 0.1
 # A scene that names no such frequency is followed up to this many times the first one of the body.
 WITHOUT_BAND = 5
 # The Runge-Kutta method of order 4 is stable up to 2.83 / omega.
 STABLE = 2.5
-TURNS = 5
+TURNS = 3
 
 
 def rotation(vector):
@@ -36,7 +44,7 @@ def rotation(vector):
 class Task:
     """A body in a scene, along the axes of the frame of its file."""
 
-    def __init__(self, path, scene, start=None):
+    def __init__(self, path, scene, start):
         with h5py.File(path) as file:
             self.axes = file["frame/axes"][()]
             self.eigenvalue = file["modes/eigenvalue"][()]
@@ -49,7 +57,7 @@ class Task:
         self.attitude = rotation(np.array(first.get("rotation", [0, 0, 0]), float)) @ self.axes
         self.velocity = np.array(first.get("velocity", [0, 0, 0]), float)
         self.omega = self.in_body(first.get("angular_velocity", [0, 0, 0]), first.get("axes", "model"))
-        self.q, self.qd = start if start is not None else (np.zeros(self.nf), np.zeros(self.nf))
+        self.q, self.qd = start
         spin = scene.get("spin")
         self.spin = None
         if spin is not None:
@@ -60,7 +68,7 @@ class Task:
         first = np.sqrt(self.eigenvalue.min()) / (2 * np.pi)
         frequency = scene.get("band", {}).get("frequency", WITHOUT_BAND * first)
         wanted = PER_PERIOD * frequency * self.duration
-        self.steps = int(np.clip(np.ceil(wanted), FEWEST, MOST))
+        self.first_steps = int(max(np.ceil(wanted), FEWEST))
 
     def in_body(self, vector, axes):
         """Components along the axes of the frame of a vector that turns with the body."""
@@ -107,7 +115,10 @@ def export(program, path, kind, target, *options):
 
 
 class InExudyn:
-    """The body in Exudyn, made anew for every run since a run changes it."""
+    """The body in Exudyn, made again for every run since a run changes it."""
+
+    order = 2
+    most = 100_000
 
     def __init__(self, program, task, folder):
         import exudyn
@@ -126,7 +137,7 @@ class InExudyn:
             for group in file.get("interfaces", {}).values():
                 name = group["name"][()]
                 self.places[name.decode()] = (group["meshNodeNumbers"][()].tolist(), group["weights"][()].tolist(), group["marker"][()] == b"rigid")
-        self.instants = np.linspace(0.0, task.duration, task.steps + 1)
+        self.fewest = FEWEST
 
     def marker(self, system, made, place):
         from exudyn import itemInterface as items
@@ -141,12 +152,13 @@ class InExudyn:
             return system.AddMarker(items.MarkerSuperElementPosition(**whole)), False
         return system.AddMarker(items.MarkerSuperElementRigid(**whole, useAlternativeApproach=True)), True
 
-    def system(self):
-        """The multibody system, the loads that change with time and the sensor of the modes."""
+    def system(self, steps):
+        """The multibody system, and the sensors of the modes and of the attitude."""
         import exudyn
         from exudyn import itemInterface as items
 
         task = self.task
+        self.steps, self.instants = steps, np.linspace(0.0, task.duration, steps + 1)
         container = exudyn.SystemContainer()
         system = container.AddSystem()
         self.body.rigidBodyNodeType = exudyn.NodeType.RotationEulerParameters
@@ -161,8 +173,9 @@ class InExudyn:
         changing = self.loads(system, made) + self.driven(system, made)
         system.SetPreStepUserFunction(self.before_step(changing))
         sensor = system.AddSensor(items.SensorNode(nodeNumber=made["nGenericODE2"], outputVariableType=exudyn.OutputVariableType.Coordinates, storeInternal=True))
+        turned = system.AddSensor(items.SensorNode(nodeNumber=made["nRigidBody"], outputVariableType=exudyn.OutputVariableType.RotationMatrix, storeInternal=True))
         system.Assemble()
-        return container, system, sensor
+        return container, system, sensor, turned
 
     def loads(self, system, made):
         """[(set a value of the system, values at the ends of the steps)]"""
@@ -202,7 +215,7 @@ class InExudyn:
 
     def before_step(self, changing):
         """What sets the values for the end of a step."""
-        width, last = self.task.duration / self.task.steps, self.task.steps
+        width, last = self.task.duration / self.steps, self.steps
 
         def set_values(system, t):
             at = min(int(t / width + 0.5), last)
@@ -212,23 +225,27 @@ class InExudyn:
 
         return set_values
 
-    def run(self):
-        """(seconds of the integration, modal coordinates at the ends of the steps)"""
+    def run(self, steps):
+        """A run with this number of steps."""
         import exudyn
 
-        container, system, sensor = self.system()
+        container, system, sensor, turned = self.system(steps)
         settings = exudyn.SimulationSettings()
         integration = settings.timeIntegration
-        integration.numberOfSteps, integration.endTime = self.task.steps, self.task.duration
+        integration.numberOfSteps, integration.endTime = steps, self.task.duration
         integration.verboseMode, integration.adaptiveStep = 0, False
         integration.generalizedAlpha.spectralRadius = 0.9
         integration.newton.useModifiedNewton = True
         settings.solutionSettings.writeSolutionToFile = False
-        settings.solutionSettings.sensorsWritePeriod = 0.5 * self.task.duration / self.task.steps
+        every = max(1, steps // INSTANTS)
+        settings.solutionSettings.sensorsWritePeriod = (every - 0.5) * self.task.duration / steps
         begin = time.process_time()
         system.SolveDynamic(settings)
         seconds = time.process_time() - begin
-        return seconds, system.GetSensorStoredData(sensor)[:, 1:]
+        modes, axes = system.GetSensorStoredData(sensor), system.GetSensorStoredData(turned)
+        if modes[-1, 0] < (1 - 1e-9) * self.task.duration:
+            raise RuntimeError("Exudyn stopped before the end")
+        return Run(steps, seconds, modes[:, 0], modes[:, 1:], axes[:, 1:].reshape(-1, 3, 3))
 
 
 # C
@@ -305,16 +322,26 @@ static int rates(double t, const double *y, double *d)
 @SOLVE@
 }
 
+static void sample(double *row, double t, const double *y)
+{
+    row[0] = t;
+    memcpy(row + 1, y, 4 * sizeof(double));
+    memcpy(row + 5, y + 4 + NV, NF * sizeof(double));
+}
+
+/* Arguments: the body, the number of steps, the number of steps between two samples, the file of the samples. */
 int main(int argc, char **argv)
 {
-    long steps = atol(argv[2]);
+    long steps = atol(argv[2]), every = atol(argv[3]), count = 0;
+    double *samples = malloc(sizeof(double) * (5 + NF) * (size_t)(steps / every + 2));
     double h = @DURATION@ / (double)steps, y[SIZE] = {@START@}, k[4][SIZE], s[SIZE];
     FILE *file = fopen(argv[1], "rb");
     static _Alignas(64) unsigned char data[FLEXBODY_BODY_BYTES];
-    if (argc < 3 || !file || fread(data, 1, sizeof data, file) != sizeof data || flexbody_body_open(&e, data, sizeof data)) return 2;
+    if (argc < 5 || !samples || !file || fread(data, 1, sizeof data, file) != sizeof data || flexbody_body_open(&e, data, sizeof data)) return 2;
     clock_t begin = clock();
     for (long i = 0; i < steps; i++) {
         double t = h * (double)i;
+        if (i % every == 0) sample(samples + (5 + NF) * count++, t, y);
         if (rates(t, y, k[0])) return 3;
         for (int j = 0; j < SIZE; j++) s[j] = y[j] + 0.5 * h * k[0][j];
         if (rates(t + 0.5 * h, s, k[1])) return 3;
@@ -324,10 +351,10 @@ int main(int argc, char **argv)
         if (rates(t + h, s, k[3])) return 3;
         for (int j = 0; j < SIZE; j++) y[j] += h / 6 * (k[0][j] + 2 * k[1][j] + 2 * k[2][j] + k[3][j]);
     }
-    printf("%.9g", (double)(clock() - begin) / CLOCKS_PER_SEC);
-    for (int j = 0; j < NF; j++) printf(" %.9g", y[4 + NV + j]);
-    printf("\\n");
-    return 0;
+    sample(samples + (5 + NF) * count++, h * (double)steps, y);
+    printf("%.9g\\n", (double)(clock() - begin) / CLOCKS_PER_SEC);
+    file = fopen(argv[4], "wb");
+    return !file || fwrite(samples, sizeof(double) * (5 + NF), (size_t)count, file) != (size_t)count || fclose(file) ? 4 : 0;
 }
 """
 
@@ -355,6 +382,9 @@ def in_c(value, rate=False):
 class InC:
     """The body in a C program that is compiled for it."""
 
+    order = 4
+    most = 2_000_000
+
     def __init__(self, program, task, folder):
         self.task, self.folder = task, folder
         points = [str(name) for (kind, name), *_ in task.loads if kind == "node"]
@@ -366,7 +396,7 @@ class InC:
         if done.returncode != 0:
             raise RuntimeError(done.stderr)
         highest = np.sqrt(task.eigenvalue.max())
-        self.steps = max(task.steps, int(np.ceil(task.duration * highest / STABLE)))
+        self.fewest = max(FEWEST, int(np.ceil(task.duration * highest / STABLE)))
 
     def source(self):
         header = (self.folder / "body.h").read_text()
@@ -426,13 +456,88 @@ class InC:
     for (int j = 0; j < NF; j++) d[4 + RIGID + j] = applied[RIGID + j] - force[RIGID + j];
     return 0;"""
 
-    def run(self):
-        """(seconds of the integration, modal coordinates at its end)"""
-        done = subprocess.run(["./driver", "body.bin", str(self.steps)], cwd=self.folder, capture_output=True, text=True)
+    def run(self, steps):
+        """A run with this number of steps."""
+        every = max(1, steps // INSTANTS)
+        done = subprocess.run(["./driver", "body.bin", str(steps), str(every), "samples.bin"], cwd=self.folder, capture_output=True, text=True)
         if done.returncode != 0:
             raise RuntimeError(f"the C program ended with {done.returncode}")
-        values = np.array([float(value) for value in done.stdout.split()])
-        return values[0], values[1:]
+        rows = np.fromfile(self.folder / "samples.bin").reshape(-1, 5 + self.task.nf)
+        axes = np.array([axes_of(row) for row in rows[:, 1:5]])
+        return Run(steps, float(done.stdout), rows[:, 0], rows[:, 5:], axes)
+
+
+class Run:
+    """A run of another program: its number of steps, its seconds, and its motion at its instants. `attitude` has the axes of the frame of the body in
+    the world."""
+
+    def __init__(self, steps, seconds, instants, q, attitude):
+        self.steps, self.seconds, self.instants, self.q, self.attitude = steps, seconds, instants, q, attitude
+
+    def error(self, measure, task, path):
+        """Ratio of error to tolerance against the reference of the study."""
+        if not np.isfinite(self.q).all() or not np.isfinite(self.attitude).all():
+            return np.inf
+        with open(path, "w", newline="") as file:
+            rows = csv.writer(file)
+            rows.writerow(["time", *(f"attitude_{k}" for k in range(4)), *(f"q_{j + 1}" for j in range(task.nf))])
+            for t, axes, q in zip(self.instants, self.attitude, self.q):
+                rows.writerow([repr(float(value)) for value in (t, *euler_parameters(axes @ task.axes.T), *q)])
+        return measure(task.path, path)
+
+
+class Measure:
+    """`flexbody measure` against the reference of a study."""
+
+    def __init__(self, program, scene, reference, model):
+        self.words, self.against = [program, "measure"], ["--scene", scene, "--reference", reference, "--model", model, "--json"]
+
+    def __call__(self, body, history):
+        words = [*self.words, body, *self.against, "--history", history]
+        done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
+        if done.returncode not in (0, 1):
+            raise RuntimeError(done.stderr)
+        return json.loads(done.stdout)["results"]["worst"]
+
+
+def cheapest(program, measure, task, worst, most, folder):
+    """The run with the fewest steps found whose error is within `most` times the tolerance, and that error, for a body with the error `worst`.
+
+    Steps are increased until the error of the integration, which is proportional to a power of the step, is small enough, and then reduced as long as it
+    leaves room.
+    """
+    allowed = most if worst <= most else (1 + SHARE) * worst
+    room = max(allowed - worst, SHARE * allowed)
+    steps, best, too_few = max(task.first_steps, program.fewest), None, program.fewest - 1
+    for _ in range(TRIALS):
+        try:
+            run = program.run(steps)
+            error = run.error(measure, task, folder / "run.csv")
+        except RuntimeError:
+            run, error = None, np.inf
+        if error <= allowed:
+            best = run, error
+        else:
+            too_few = max(too_few, steps)
+        added = abs(error - worst) if np.isfinite(error) else np.inf
+        factor = np.clip((added / room) ** (1 / program.order) * 1.1, 0.25, 4.0)
+        wanted = int(np.ceil(steps * factor))
+        most_steps = best[0].steps if best else program.most
+        wanted = int(np.clip(wanted, too_few + 1, most_steps))
+        if best and (wanted * CLOSE >= best[0].steps or best[0].steps <= program.fewest):
+            break
+        if steps == wanted:
+            break
+        steps = wanted
+    return best
+
+
+def axes_of(parameters):
+    """The rotation matrix of Euler parameters."""
+    a, x, y, z = parameters / np.linalg.norm(parameters)
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - a * z), 2 * (x * z + a * y)],
+                     [2 * (x * y + a * z), 1 - 2 * (x * x + z * z), 2 * (y * z - a * x)],
+                     [2 * (x * z - a * y), 2 * (y * z + a * x), 1 - 2 * (x * x + y * y)]])
 
 
 def euler_parameters(a):

@@ -2,6 +2,7 @@
 
 mod cluster;
 mod guidance;
+mod judgement;
 mod names;
 mod response;
 
@@ -17,6 +18,7 @@ use flexbody_formats::IMPORT_FORMATS;
 use flexbody_formats::export::ExportFormat;
 use flexbody_study::trade::ReferenceChoice;
 pub(super) use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
+pub(super) use judgement::{AdviseArguments, MeasureArguments};
 pub(super) use response::ResponseArguments;
 use std::path::PathBuf;
 
@@ -82,6 +84,11 @@ pub enum Command {
         after_help = "Example:\n  flexbody advise rod.flex.h5 --spin 130 --deflection 0.5 --attached 0.4@big_end"
     )]
     Advise(AdviseArguments),
+    /// Measure the error of a run of another program: compare its modal coordinates and attitude with an accurate motion
+    #[command(
+        after_help = "Examples:\n  flexbody measure small.flex.h5 --scene tumble.toml --history run.csv\n  flexbody measure small.flex.h5 --scene tumble.toml --history run.csv --reference full.flex.h5 --model model.toml"
+    )]
+    Measure(MeasureArguments),
     /// Write a body with some of its modes and groups of terms, as a selection or a trade study recommends
     #[command(
         after_help = "Example:\n  flexbody reduce rod.flex.h5 --keep-modes 1,3,5-9 --terms W1 -o small.flex.h5"
@@ -119,35 +126,6 @@ pub enum Command {
     /// Print a page of the manual
     #[command(after_help = "Example:\n  flexbody man convert > flexbody-convert.1")]
     Man(ManArguments),
-}
-
-/// Arguments of `advise`.
-#[derive(Debug, Args)]
-pub struct AdviseArguments {
-    /// Flex-body file with all terms
-    #[arg(value_name = "BODY.flex.h5")]
-    pub body: PathBuf,
-    /// Largest rotation rate of the body, in Hz
-    #[arg(long, value_name = "HZ", default_value_t = 0.0)]
-    pub spin: f64,
-    /// Largest deflection of a node, in the unit of length of the body [default: 1 % of its largest extent]
-    #[arg(long, value_name = "LENGTH", value_parser = positive)]
-    pub deflection: Option<f64>,
-    /// Mass attached to the body, in its unit of mass, at an interface or at the farthest node: MASS or MASS@INTERFACE
-    #[arg(long, value_name = "MASS[@INTERFACE]")]
-    pub attached: Option<String>,
-    /// The rotation is prescribed by joints, as that of a driven crank
-    #[arg(long)]
-    pub rotation_given: bool,
-    /// Largest size of a term that may be left out, relative to what it is compared with
-    #[arg(long, value_name = "REL", value_parser = positive, default_value_t = 0.05)]
-    pub limit: f64,
-    /// Report to write, format by extension: .html, .json or .txt (repeatable)
-    #[arg(long, value_name = "FILE")]
-    pub report: Vec<PathBuf>,
-    /// Options of printing.
-    #[command(flatten)]
-    pub printing: Printing,
 }
 
 /// Modes and terms that a command line states instead of a selection.
@@ -313,7 +291,7 @@ fn job_programs() -> clap::builder::PossibleValuesParser {
 }
 
 /// Properties of the job of an FE program that a manifest would state, for every command that takes a model.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct JobArguments {
     /// FE program that has written the job [default: detected from its files]
     #[arg(long, value_name = "PROGRAM", value_parser = job_programs())]

@@ -17,6 +17,7 @@ mod export;
 mod import;
 mod inspect;
 mod like;
+mod measure;
 mod mode_source;
 mod models;
 mod outcome;

@@ -5,8 +5,8 @@ use super::outcome::{Outcome, warnings};
 use super::resources::{memory_left, use_threads};
 use super::terminal::{colours_of_stderr, for_terminal};
 use super::{
-    advise, assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, prepare,
-    recipe, reduce, response, select, simulate, trade, view,
+    advise, assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, measure,
+    prepare, recipe, reduce, response, select, simulate, trade, view,
 };
 use clap::{CommandFactory, Parser};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
@@ -91,6 +91,7 @@ fn outcome_of(arguments: &Arguments) -> Result<Outcome> {
         Command::Simulate(arguments) => simulate::run(arguments),
         Command::Trade(arguments) => trade::run(arguments),
         Command::Response(arguments) => response::run(arguments),
+        Command::Measure(arguments) => measure::run(arguments),
         Command::Reduce(arguments) => reduce::run(arguments),
         Command::Advise(arguments) => advise::run(arguments),
         Command::View(arguments) => view::run(arguments),
@@ -116,6 +117,7 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
         Command::Simulate(arguments) => ("simulate", arguments.printing),
         Command::Trade(arguments) => ("trade", arguments.printing),
         Command::Response(arguments) => ("response", arguments.printing),
+        Command::Measure(arguments) => ("measure", arguments.printing),
         Command::Reduce(arguments) => ("reduce", arguments.printing),
         Command::Advise(arguments) => ("advise", arguments.printing),
         Command::View(arguments) => ("view", arguments.printing),

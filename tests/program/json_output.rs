@@ -89,6 +89,9 @@ fn every_command_prints_an_object_of_the_schema() {
         ("select b.h5 --scene scene.toml", 0),
         ("simulate b.h5 --scene scene.toml", 0),
         ("simulate b.h5 --scene model.toml", 2),
+        ("simulate b.h5 --scene scene.toml --csv run.csv", 0),
+        ("measure b.h5 --scene scene.toml --history run.csv", 0),
+        ("measure b.h5 --scene scene.toml --history scene.toml", 2),
         ("trade b.h5 --scene scene.toml --repeat 1", 0),
         ("response b.h5 --band 0..1000 --from 1 --to 2", 0),
         (

@@ -135,13 +135,10 @@ impl Writer<'_> {
 
     /// Writes the integration method and its settings.
     fn method(&self) -> hdf5::Result<()> {
+        put_text(&self.file, "method", self.recording.scheme.name())?;
         match self.recording.scheme {
-            Scheme::Adaptive { tolerance } => {
-                put_text(&self.file, "method", "adaptive")?;
-                self.number("tolerance", tolerance)
-            }
+            Scheme::Adaptive { tolerance } => self.number("tolerance", tolerance),
             Scheme::Conserving { order, step } => {
-                put_text(&self.file, "method", "conserving")?;
                 self.file.new_attr::<i64>().create("order")?.write_scalar(&(order as i64))?;
                 step.map_or(Ok(()), |step| self.number("step", step))
             }

@@ -36,6 +36,7 @@ mod identities;
 mod lumped;
 mod lumped_effect;
 mod mass_properties;
+mod measured_run;
 mod numbers;
 mod output;
 mod picture;
@@ -70,6 +71,7 @@ pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare
 pub use comparison_report::{ComparisonFormat, ComparisonReport};
 pub use facts::Facts;
 pub use identities::{diagnostics_json, identities_json, identities_text};
+pub use measured_run::MeasuredRunFacts;
 pub use output::output_json;
 pub use render::{Format, render};
 pub use response::{ResponseFacts, response_csv};

@@ -15,17 +15,30 @@ use super::variations::VariationFacts;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::Storage;
-use flexbody_motion::scene::{OutputErrors, Tolerance};
+use flexbody_motion::scene::{OutputErrors, Scheme, Tolerance};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
-    CandidateKind, InCase, LumpedMass, Measured, ReferenceKind, Trade, TradeCase, TradeRow,
+    CandidateKind, InCase, LumpedMass, Measured, ReferenceKind, Timed, TimedRun, Trade, TradeCase, TradeRow,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Columns of the Pareto front in a text.
-const IN_TEXT: [&str; 7] =
-    ["No.", "Candidate", "Multiplications", "Evaluation", "Simulation", "File", "Error / tolerance"];
+const IN_TEXT: [&str; 8] = [
+    "No.",
+    "Candidate",
+    "Multiplications",
+    "File",
+    "Error / tolerance",
+    "Step accuracy",
+    "Simulation",
+    "Error / tolerance of the run",
+];
+
+/// Meaning of the timed runs.
+const RUNS: &str = "errors are those of the body, with the steps of the reference; the candidates of the front are also run \
+                    with the cheapest accuracy of the time integration that meets what is left of the tolerances: step \
+                    accuracy, time and error are those of this run";
 
 /// Smallest error over tolerance on the plot; smaller errors are drawn at this value. A smaller value adds
 /// decades to the axis.
@@ -120,11 +133,63 @@ struct MeasuredFacts<'a> {
     by_variation: Vec<Option<f64>>,
     multiplications: usize,
     file_bytes: u64,
-    /// Number of integration steps; `None` for candidates that are not on the front.
+    /// Cheapest run within the tolerances in every load case; empty for candidates that are not on the front.
+    runs: Vec<TimedRunFacts<'a>>,
+    /// Number of integration steps of these runs; `None` for candidates that are not on the front.
     steps: Option<u64>,
+    /// Accuracy of the integration in words, of the run with the largest ratio of error to tolerance.
+    #[serde(skip)]
+    accuracy: Option<String>,
     rejected_steps: Option<u64>,
     evaluations: Option<u64>,
     seconds: Seconds,
+}
+
+/// Run of a candidate: its integration, and the errors and the time of the same run.
+#[derive(Debug, Clone, Serialize)]
+struct TimedRunFacts<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    case: Option<&'a str>,
+    method: &'static str,
+    /// Largest error of a step of the adaptive method, relative to the motion.
+    tolerance: Option<f64>,
+    /// Step of the conserving method.
+    step: Option<f64>,
+    errors: OutputErrors,
+    /// Largest ratio of error to tolerance.
+    worst: f64,
+    seconds: f64,
+    steps: u64,
+}
+
+impl<'a> TimedRunFacts<'a> {
+    fn new(run: &TimedRun, case: &'a TradeCase) -> Self {
+        let (tolerance, step) = match run.scheme {
+            Scheme::Adaptive { tolerance } => (Some(tolerance), None),
+            Scheme::Conserving { step, .. } => (None, step),
+        };
+        Self {
+            case: case.name.as_deref(),
+            method: run.scheme.name(),
+            tolerance,
+            step,
+            errors: run.errors.errors,
+            worst: run.errors.worst,
+            seconds: run.seconds,
+            steps: run.work.steps,
+        }
+    }
+}
+
+/// Returns the accuracy of a time integration as the key of a scene: `tolerance = 1e-4` or `step = 0.002`.
+pub(super) fn accuracy_key(scheme: Scheme) -> String {
+    // All digits, without an exponent where that is short.
+    let exact =
+        |value: f64| if (1e-3..1e6).contains(&value) { format!("{value}") } else { format!("{value:e}") };
+    match scheme {
+        Scheme::Adaptive { tolerance } => format!("tolerance = {}", exact(tolerance)),
+        Scheme::Conserving { step, .. } => format!("step = {}", exact(step.unwrap_or_default())),
+    }
 }
 
 /// Times of a candidate. Unit: s.
@@ -141,6 +206,8 @@ impl<'a> MeasuredFacts<'a> {
         let InCase { errors, worst, growth } = *measured.decisive_case();
         let case = cases[measured.case].name.as_deref();
         let ratios = measured.by_case.iter().map(|own| own.worst);
+        let work = timed.map(Timed::work);
+        let runs = timed.iter().flat_map(|timed| timed.runs.iter().zip(cases));
         Self {
             errors,
             worst,
@@ -155,13 +222,15 @@ impl<'a> MeasuredFacts<'a> {
                 .collect(),
             multiplications: measured.multiplications,
             file_bytes: measured.bytes,
-            steps: timed.map(|timed| timed.work.steps),
-            rejected_steps: timed.map(|timed| timed.work.rejected),
-            evaluations: timed.map(|timed| timed.work.rates),
+            runs: runs.map(|(run, case)| TimedRunFacts::new(run, case)).collect(),
+            accuracy: timed.map(|timed| accuracy_key(timed.decisive().scheme).replace(" = ", " ")),
+            steps: work.map(|work| work.steps),
+            rejected_steps: work.map(|work| work.rejected),
+            evaluations: work.map(|work| work.rates),
             seconds: Seconds {
                 preprocessing: measured.preprocessing,
                 evaluation: timed.map(|timed| timed.evaluation),
-                integration: timed.map(|timed| timed.integration),
+                integration: timed.map(Timed::seconds),
             },
         }
     }
@@ -173,16 +242,18 @@ impl MeasuredFacts<'_> {
     fn cells(&self, several: bool) -> Vec<Inline> {
         let none = || "\u{2013}".to_owned();
         let number = |value: Option<f64>| value.map_or_else(none, |value| significant(value, 3));
-        let mut row = cells([
-            self.multiplications.to_string(),
-            self.seconds.evaluation.map_or_else(none, short),
-            self.seconds.integration.map_or_else(none, duration),
-            self.steps.map_or_else(none, |steps| steps.to_string()),
-            bytes(self.file_bytes),
-        ]);
+        let mut row = cells([self.multiplications.to_string(), bytes(self.file_bytes)]);
         row.extend(several.then(|| self.seconds.preprocessing.map_or_else(none, duration).into()));
         row.extend(cells(self.errors.named().map(|(_, error)| number(error))));
-        row.push(significant(self.worst, 3).into());
+        let run_worst = self.runs.iter().map(|run| run.worst).max_by(f64::total_cmp);
+        row.extend(cells([
+            significant(self.worst, 3),
+            self.accuracy.clone().unwrap_or_else(none),
+            self.seconds.integration.map_or_else(none, duration),
+            number(run_worst),
+            self.steps.map_or_else(none, |steps| steps.to_string()),
+            self.seconds.evaluation.map_or_else(none, short),
+        ]));
         row.extend(self.case.map(Inline::from));
         row
     }
@@ -242,7 +313,7 @@ impl<'a> TradeFacts<'a> {
         let mut facts = Self {
             format: "flexbody-trade",
             format_major: 2,
-            format_minor: 0,
+            format_minor: 1,
             generator: generator(),
             scene: &trade.scene,
             body: &trade.body,
@@ -384,6 +455,7 @@ impl<'a> TradeFacts<'a> {
             Term::page("Tolerances", self.tolerances_in_words()),
             Term::page("Candidates", candidates),
             Term::page("Cost", "multiplications of one evaluation of the equations of motion"),
+            Term::page("Runs", RUNS),
             Term::page("Time", self.time_in_words()),
         ]
     }
@@ -440,9 +512,10 @@ impl<'a> TradeFacts<'a> {
         let several = self.rows.iter().any(|row| row.source != self.rows[0].source);
         let mut heads = vec!["No.", "Candidate"];
         heads.extend(several.then_some("Basis"));
-        heads.extend(["Up to (Hz)", "Multiplications", "Evaluation", "Simulation", "Steps", "File"]);
+        heads.extend(["Up to (Hz)", "Multiplications", "File"]);
         heads.extend(several.then_some("Preprocessing"));
         heads.extend(["Attitude (rad)", "Deflection", "Stress", "Reaction", "Error / tolerance"]);
+        heads.extend(["Step accuracy", "Simulation", "Error / tolerance of the run", "Steps", "Evaluation"]);
         heads.extend((!self.cases.is_empty()).then_some("Worst case"));
         let row = |row: &&RowFacts<'a>| {
             let taken = if self.recommended == Some(row.number) { ">\u{a0}" } else { "" };
@@ -478,10 +551,15 @@ fn short(seconds: f64) -> String {
     engineering(seconds, 3, TIME_UNITS)
 }
 
+/// Returns the smallest of a quantity of the runs of a candidate.
+fn finest(measured: Option<&MeasuredFacts<'_>>, of: fn(&TimedRunFacts<'_>) -> Option<f64>) -> Option<f64> {
+    measured?.runs.iter().filter_map(of).min_by(f64::total_cmp)
+}
+
 /// Returns the study as comma-separated values with one row per candidate; numbers round-trip.
 pub fn trade_csv(trade: &Trade) -> String {
     let mut table = "number,source,kind,modes,last_frequency_hz,groups,lumped,lumped_part,storage,multiplications,evaluation_seconds,\
-                   integration_seconds,preprocessing_seconds,steps,file_bytes,attitude,deflection,stress,reaction,worst,\
+                   integration_seconds,preprocessing_seconds,steps,run_tolerance,run_step,run_worst,file_bytes,attitude,deflection,stress,reaction,worst,\
                    case,on_front,recommended,failed\n"
         .to_owned();
     for (at, row) in trade.rows.iter().enumerate() {
@@ -506,6 +584,9 @@ pub fn trade_csv(trade: &Trade) -> String {
             csv::number(m.and_then(|m| m.seconds.integration)),
             csv::number(m.and_then(|m| m.seconds.preprocessing)),
             count(|m| m.steps),
+            csv::number(finest(m, |run| run.tolerance)),
+            csv::number(finest(m, |run| run.step)),
+            csv::number(m.and_then(|m| m.runs.iter().map(|run| run.worst).max_by(f64::total_cmp))),
             count(|m| Some(m.file_bytes)),
             csv::number(errors.attitude),
             csv::number(errors.deflection),

@@ -1,14 +1,15 @@
-//! Verdict of a trade study in five lines: request, recommendation, reason, error, savings.
+//! Verdict of a trade study in lines: request, recommendation, reason, error, savings, run.
 
 use super::errors_in_words::{errors_in_words, groups_in_words, ranges};
 use super::numbers::{counted, duration, frequency, significant};
 use super::reference_error::ReferenceErrorFacts;
+use super::trade::accuracy_key;
 use super::variations::{VariationFacts, in_words};
 use flexbody_body::flex_body::Storage;
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{InCase, Measured, Recommendation, Trade, TradeRow};
 
-/// Returns the five lines with their labels. `names` are the names of the rows, `tolerances` the tolerances
+/// Returns the lines with their labels. `names` are the names of the rows, `tolerances` the tolerances
 /// of the scene in words, `reference_error` the error of a reference that deviates too much from its model.
 pub(super) fn verdict_lines(
     trade: &Trade,
@@ -23,13 +24,15 @@ pub(super) fn verdict_lines(
     let row = &trade.rows[at];
     let Ok(measured) = &row.outcome else { return vec![("Asked", asked)] };
     let whole = trade.rows.first().and_then(|row| row.outcome.as_ref().ok());
-    vec![
+    let mut lines = vec![
         ("Asked", asked),
         ("Recommended", recommended(row, has_several_sources(trade))),
         ("Why", why(trade, names, measured)),
         ("Error", error(trade, measured, reference_error)),
         ("Saves", whole.map_or_else(String::new, |whole| saves(whole, measured))),
-    ]
+    ];
+    lines.extend(run(measured).map(|run| ("Run", run)));
+    lines
 }
 
 fn asked(trade: &Trade, tolerances: &str) -> String {
@@ -173,10 +176,23 @@ fn saves(whole: &Measured, own: &Measured) -> String {
     if whole.multiplications == own.multiplications {
         return "nothing: no cheaper candidate is within the tolerances".to_owned();
     }
-    let times = whole.timed.zip(own.timed).map(|(before, after)| (before.integration, after.integration));
+    let times =
+        whole.timed.as_ref().zip(own.timed.as_ref()).map(|(whole, own)| (whole.seconds(), own.seconds()));
     let seconds = times.map_or_else(String::new, |(before, after)| {
         let (own, all) = (duration(after), duration(before));
         format!("; {own} instead of {all} for {run} in flexbody, {} times faster", ratio(before, after))
     });
     format!("{work} times fewer multiplications per evaluation{seconds}")
+}
+
+/// Returns the cheapest run of the recommended row within the tolerances: the accuracy of its integration, its error and
+/// its time.
+fn run(measured: &Measured) -> Option<String> {
+    let timed = measured.timed.as_ref()?;
+    let key = accuracy_key(timed.decisive().scheme);
+    let (worst, seconds) = (significant(100.0 * timed.worst(), 2), duration(timed.seconds()));
+    let runs = if timed.runs.len() > 1 { "all load cases together" } else { "the run" };
+    Some(format!(
+        "with `{key}` in [run] of the scene {runs} takes {seconds}, and the error is {worst} % of the tolerance"
+    ))
 }

@@ -9,6 +9,7 @@
 )]
 
 pub mod advice;
+pub mod measured_run;
 pub mod recipe;
 pub mod reference;
 pub mod response;

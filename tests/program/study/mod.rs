@@ -1,6 +1,7 @@
 //! Selections, trade studies and responses by the program.
 
 mod load_cases;
+mod measured_run;
 mod recommended_command;
 mod response;
 mod scene_damping;

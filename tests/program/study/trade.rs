@@ -10,7 +10,10 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{Axes, Initial, LoadCases, ModeStart, PerQuantity, Scene, Scheme, simulate};
+use flexbody_motion::scene::{
+    Axes, Initial, LoadCases, Measure, ModeStart, OutputErrors, PerQuantity, Run, Scene, Scheme, simulate,
+    trace, trace_at,
+};
 use flexbody_study::recipe::Recipe;
 use flexbody_study::reference::PART_OF_FINE;
 use flexbody_study::selection::select;
@@ -172,8 +175,9 @@ fn errors_are_the_same_bits_at_one_and_two_threads() {
         for row in &mut found.rows {
             let measured = row.outcome.as_mut().expect("a motion");
             let Some(timed) = &mut measured.timed else { continue };
-            assert!(timed.evaluation > 0.0 && timed.integration > 0.0);
-            (timed.evaluation, timed.integration) = (0.0, 0.0);
+            assert!(timed.evaluation > 0.0 && timed.seconds() > 0.0);
+            timed.evaluation = 0.0;
+            timed.runs.iter_mut().for_each(|run| run.seconds = 0.0);
         }
         for row in found.front.iter().copied().chain(found.recommended.row()).chain([0]) {
             let measured = found.rows[row].outcome.as_ref().expect("a motion");
@@ -182,6 +186,55 @@ fn errors_are_the_same_bits_at_one_and_two_threads() {
         found
     };
     assert_eq!(on(1), on(2));
+}
+
+/// Returns the errors of a candidate of `body` in `scene`, with the steps of `scheme`, relative to the motion of `body`.
+fn errors_of_run(body: &FlexBody, scene: &Scene, row: &TradeRow, scheme: Scheme) -> OutputErrors {
+    let reference = trace(body, scene, &Context::QUIET).expect("a motion").0;
+    let source = Source::new("body", body.clone(), Recipe::File, None).expect("a body");
+    let candidate = row.candidate.body(&source).expect("a body");
+    let own = Scene { run: Run { scheme, ..scene.run.clone() }, ..scene.clone() };
+    let motion = trace_at(&candidate, &own, &reference.time, &Context::QUIET).expect("a motion");
+    Measure::new(body, &reference).of_subset(&motion, &row.candidate.modes).largest()
+}
+
+#[test]
+fn steps_are_the_longest_that_the_tolerances_allow() {
+    let body = soft_block(6);
+    let free = tumble(0.1 * first_rate(&body), 1.0);
+    let mut conserving = free.clone();
+    conserving.run.scheme = Scheme::Conserving { order: 4, step: None };
+    for scene in [free, conserving] {
+        let found = study(body.clone(), &scene);
+        let timed = found.rows.iter().filter_map(|row| Some((row, row.outcome.as_ref().ok()?)));
+        let timed: Vec<_> = timed.filter_map(|(row, own)| Some((row, own, own.timed.as_ref()?))).collect();
+        assert!(timed.len() > 5);
+        for (row, measured, timed) in timed {
+            let run = timed.runs[0];
+            // Error and time belong to one run.
+            let again = errors_of_run(&body, &scene, row, run.scheme);
+            for ((name, a), (_, b)) in again.named().into_iter().zip(run.errors.errors.named()) {
+                let (a, b) = (a.unwrap_or(0.0), b.unwrap_or(0.0));
+                assert!((a - b).abs() <= 1e-9 * b, "{name}: {a} {b}, {row:?}");
+            }
+            let most = if measured.holds() { 1.0 } else { 1.1 * measured.worst() };
+            assert!(run.errors.worst <= most, "{row:?}");
+            // Longer steps are not enough.
+            let longer = match run.scheme {
+                Scheme::Adaptive { tolerance } if tolerance < 1e-2 => {
+                    Scheme::Adaptive { tolerance: 3.34 * tolerance }
+                }
+                Scheme::Conserving { order, step: Some(step) }
+                    if 20.0 * step < scene.run.duration.unwrap_or(0.0) =>
+                {
+                    Scheme::Conserving { order, step: Some(2.0 * step) }
+                }
+                _ => continue,
+            };
+            let worst = errors_of_run(&body, &scene, row, longer).worst(&scene.requirements.tolerance);
+            assert!(worst > most, "{row:?}: {worst}");
+        }
+    }
 }
 
 #[test]
@@ -464,7 +517,7 @@ fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
     }
     assert!(both.cases.iter().all(|case| case.ruled_out_alone > 0), "{:?}", both.cases);
     // The cost of two cases is the sum of both runs.
-    let steps = |trade: &Trade| measured(&trade.rows[0]).timed.expect("the reference is timed").work.steps;
+    let steps = |trade: &Trade| measured(&trade.rows[0]).timed.expect("the reference is timed").work().steps;
     assert_eq!(steps(&both), alone.iter().map(steps).sum::<u64>());
 }
 
@@ -518,7 +571,7 @@ fn the_program_writes_what_its_schema_says() {
     let rows = facts["rows"].as_array().expect("rows");
     let lines = facts["verdict"].as_array().expect("lines");
     let labels: Vec<&str> = lines.iter().map(|line| line["label"].as_str().expect("a label")).collect();
-    assert_eq!(labels, ["Asked", "Recommended", "Why", "Error", "Saves", "Variations", "Command"]);
+    assert_eq!(labels, ["Asked", "Recommended", "Why", "Error", "Saves", "Run", "Variations", "Command"]);
     // Every measured candidate was written as a body.
     for (at, row) in rows.iter().enumerate() {
         let path = place.join(format!("candidate_{:03}.flex.h5", at + 1));

@@ -172,6 +172,16 @@ pub enum Scheme {
     },
 }
 
+impl Scheme {
+    /// Returns the name of the method in scene files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Adaptive { .. } => "adaptive",
+            Self::Conserving { .. } => "conserving",
+        }
+    }
+}
+
 /// State at time zero.
 ///
 /// A point with the coordinates x in the model is at `origin` + A x in the world, where A is the rotation

@@ -3,10 +3,10 @@
 use super::extremes::Survey;
 use super::prepared::{Finished, PARTS, Prepared, Reaction, Stop, damped};
 use super::simulate::remarks;
-use super::{Extremes, FramedScene, Resolution, Scene, Scheme};
-use crate::dynamics::{Configuration, EulerParameters, Motion};
+use super::{Extremes, FramedScene, MotionHistory, Resolution, Scene, Scheme};
+use crate::dynamics::{BodyPoint, Configuration, EulerParameters, Motion};
 use crate::integration::{Failure, ObserverEvent, Work};
-use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
 use flexbody_body::flex_body::FlexBody;
@@ -47,6 +47,33 @@ pub struct Trace {
 }
 
 impl Trace {
+    /// Returns the motion of `body` in `scene` that another program computed, for comparison with a reference. It has no
+    /// reactions and no extremes; without attitudes in the history those of `fallback`, sampled at the same times, stand
+    /// in.
+    ///
+    /// # Errors
+    /// The errors of [`FramedScene::new`]; FB707 for a body whose modal coordinates in the scene are not those of its
+    /// file.
+    pub fn of_history(
+        body: &FlexBody,
+        scene: &Scene,
+        history: &MotionHistory,
+        fallback: &Trace,
+    ) -> Result<Self> {
+        refuse_other_coordinates(body, scene)?;
+        let framed = FramedScene::new(body, scene)?;
+        let run = Prepared::new(&framed.body, &framed.scene)?;
+        let mut trace = Tracer::new(&run).trace;
+        trace.time.clone_from(&history.time);
+        trace.attitude.clone_from(history.attitude.as_ref().unwrap_or(&fallback.attitude));
+        trace.q.clone_from(&history.q);
+        trace.elastic = history.q.iter().map(|q| run.equations.elastic_energy(q)).collect();
+        let path = |point: &BodyPoint| history.q.iter().map(|q| point.deflection(q)).collect();
+        trace.deflections = run.watched.iter().map(path).collect();
+        trace.reactions = None;
+        Ok(trace)
+    }
+
     /// Returns the number of bytes of this motion for a body with `modes` modes.
     pub fn bytes(&self, modes: usize) -> f64 {
         self.time.len() as f64 * Self::bytes_of_instant(modes, self.deflections.len())
@@ -129,6 +156,17 @@ pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64], context: &Context
     };
     let finished = run.integrate(times, 1, look)?;
     Ok(tracer.finish(finished, Extremes::default()))
+}
+
+/// Refuses a body with other modal coordinates in the scene than in its file: one that is carried, or whose frame is not
+/// in mean axes.
+fn refuse_other_coordinates(body: &FlexBody, scene: &Scene) -> Result<()> {
+    if scene.carried.is_none() && body.conditions().is_mean() {
+        return Ok(());
+    }
+    let message = "in this scene the body has other modal coordinates than in its file, so that those of another program cannot be compared";
+    let help = "compare in a scene without [carried], with a body that was converted with --frame com";
+    Err(Diagnostic::new(Code::BodyIncomparable, message).with_help(help).into())
 }
 
 /// Observer that collects a [`Trace`].

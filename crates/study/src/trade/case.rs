@@ -1,6 +1,6 @@
 //! Reference motion of a load case, against which candidates are measured.
 
-use super::{Candidate, InCase, NodalReference, Source, timing};
+use super::{Candidate, InCase, NodalReference, Source, TimedRun, timing};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::memory::refuse_beyond;
@@ -8,7 +8,6 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
-use flexbody_motion::integration::Work;
 use flexbody_motion::scene::{FramedScene, Measure, Scene, Trace, trace, trace_at};
 
 /// Scene (a single one or a load case) with the motion of the reference in it.
@@ -90,18 +89,30 @@ impl<'m> StudyCase<'m> {
     }
 
     /// Returns the errors of `candidate`, whose body is `body`, and the multiplications of an evaluation of its
-    /// equations.
+    /// equations. It is integrated as the reference is.
     pub(super) fn measured(
         &self,
         measure: &Measure<'_>,
         candidate: &Candidate,
         body: &FlexBody,
     ) -> Result<(InCase, usize)> {
-        let source = &self.sources[candidate.source];
         let mut scene = self.own_scene(body, candidate);
         scene.run.scheme = self.motion.scheme;
+        let multiplications = EquationsOfMotion::new(body, scene.run.terms).multiplications();
+        Ok((self.errors(measure, candidate, body, &scene)?, multiplications))
+    }
+
+    /// Returns the errors of the run of `candidate`, whose body is `body`, in `scene`.
+    fn errors(
+        &self,
+        measure: &Measure<'_>,
+        candidate: &Candidate,
+        body: &FlexBody,
+        scene: &Scene,
+    ) -> Result<InCase> {
+        let source = &self.sources[candidate.source];
         let instants = self.nodal.as_ref().map_or(&self.motion.time[..], NodalReference::time);
-        let motion = trace_at(body, &scene, instants, &Context::QUIET)?;
+        let motion = trace_at(body, scene, instants, &Context::QUIET)?;
         let history = match &self.nodal {
             Some(nodal) => nodal.errors(body, &motion),
             None => source.errors(measure, body, &candidate.modes, &motion),
@@ -115,23 +126,44 @@ impl<'m> StudyCase<'m> {
         let errors = history.largest();
         let worst = errors.worst(tolerance);
         let growth = history.growth(&self.motion, tolerance);
-        let multiplications = EquationsOfMotion::new(body, scene.run.terms).multiplications();
-        Ok((InCase { errors, worst, growth }, multiplications))
+        Ok(InCase { errors, worst, growth })
     }
 
-    /// Returns the duration of the simulation of `candidate`, whose body is `body`, its work, and the duration of one
-    /// evaluation of its equations. Unit: s.
+    /// Returns the cheapest run of `candidate` that meets what is left of the tolerances, with its duration, and the
+    /// duration of one evaluation of its equations (unit: s). `body` is the body of the candidate, and `accurate` has
+    /// its errors with the steps of the reference.
     pub(super) fn time(
         &self,
+        measure: &Measure<'_>,
         candidate: &Candidate,
         body: &FlexBody,
+        accurate: &InCase,
         repeat: usize,
-    ) -> Result<(f64, Work, f64)> {
-        let scene = self.own_scene(body, candidate);
-        let (integration, work) = timing::integration(body, &scene, repeat)?;
+    ) -> Result<(TimedRun, f64)> {
+        let mut scene = self.own_scene(body, candidate);
+        let most = timing::allowed(accurate.worst, self.most());
+        let duration = scene.run.duration.unwrap_or(0.0);
+        // The loosest integration that is accurate enough. With the steps of the reference the errors are known.
+        let mut errors = *accurate;
+        for scheme in timing::schemes(self.motion.scheme, duration) {
+            scene.run.scheme = scheme;
+            if scheme == self.motion.scheme {
+                errors = *accurate;
+                break;
+            }
+            // A run that stops is too inaccurate.
+            match self.errors(measure, candidate, body, &scene) {
+                Ok(found) if found.worst <= most => {
+                    errors = found;
+                    break;
+                }
+                _ => {}
+            }
+        }
+        let (seconds, work) = timing::integration(body, &scene, repeat)?;
         let evaluation = timing::evaluation(body, scene.run.terms)
             .map_err(|reason| Error::from(Diagnostic::new(Code::SimulationStopped, reason.to_string())))?;
-        Ok((integration, work, evaluation))
+        Ok((TimedRun { scheme: scene.run.scheme, errors, seconds, work }, evaluation))
     }
 
     fn own_scene(&self, body: &FlexBody, candidate: &Candidate) -> Scene {

@@ -21,4 +21,5 @@ pub use row::{Failed, InCase, Measured, Timed, TradeRow};
 pub use settings::{TradeSettings, reserved};
 pub use source::Source;
 pub use study::{ReferenceChoice, ReferenceKind, Trade, TradeCase, trade};
+pub use timing::TimedRun;
 pub use varied::{InVariations, TradeVariation, Varied};

@@ -1,19 +1,44 @@
 //! Candidate with its errors, cost and times.
 
-use super::{Candidate, InVariations};
+use super::{Candidate, InVariations, TimedRun};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_motion::integration::Work;
 use flexbody_motion::scene::OutputErrors;
 
 /// Times of a candidate, measured one after the other on one thread.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Timed {
     /// Time of one evaluation of the equations, the longest of any load case. Unit: s.
     pub evaluation: f64,
-    /// Time of the simulations of all load cases. Unit: s.
-    pub integration: f64,
-    /// Work of these simulations, with the steps that a scene without a stated step takes for the candidate.
-    pub work: Work,
+    /// Cheapest run within the tolerances in every load case.
+    pub runs: Vec<TimedRun>,
+}
+
+impl Timed {
+    /// Returns the time of the runs of all load cases. Unit: s.
+    pub fn seconds(&self) -> f64 {
+        self.runs.iter().map(|run| run.seconds).sum()
+    }
+
+    /// Returns the work of the runs of all load cases.
+    pub fn work(&self) -> Work {
+        self.runs.iter().fold(Work::default(), |all, run| Work {
+            steps: all.steps + run.work.steps,
+            rejected: all.rejected + run.work.rejected,
+            rates: all.rates + run.work.rates,
+        })
+    }
+
+    /// Returns the largest ratio of error to tolerance of these runs.
+    pub fn worst(&self) -> f64 {
+        self.decisive().errors.worst
+    }
+
+    /// Returns the run with the largest ratio of error to tolerance, the first of equal ones.
+    pub fn decisive(&self) -> &TimedRun {
+        let all = self.runs.iter().rev();
+        all.max_by(|a, b| a.errors.worst.total_cmp(&b.errors.worst)).expect("a load case")
+    }
 }
 
 /// Errors of a candidate in a load case, or in a single scene.

@@ -14,7 +14,6 @@ use flexbody_body::flex_body::{FlexBody, Storage, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::parallel;
 use flexbody_model::FeModel;
-use flexbody_motion::integration::Work;
 use flexbody_motion::scene::{LoadCases, Measure, Scene, Tolerance, ends_a_run};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -388,18 +387,16 @@ impl Job<'_> {
         })
     }
 
+    /// Times the cheapest run of a row within the tolerances in every load case.
     fn time(&self, row: &mut TradeRow, repeat: usize) -> Result<()> {
         let Ok(measured) = &mut row.outcome else { return Ok(()) };
-        let mut all = Timed { evaluation: 0.0, integration: 0.0, work: Work::default() };
-        for case in self.cases {
+        let mut all = Timed { evaluation: 0.0, runs: Vec::new() };
+        for ((case, measure), accurate) in self.cases.iter().zip(&self.measures).zip(&measured.by_case) {
             let body = case.body(&row.candidate)?;
-            match case.time(&row.candidate, &body, repeat) {
-                Ok((integration, work, evaluation)) => {
-                    all.integration += integration;
+            match case.time(measure, &row.candidate, &body, accurate, repeat) {
+                Ok((run, evaluation)) => {
+                    all.runs.push(run);
                     all.evaluation = all.evaluation.max(evaluation);
-                    all.work.steps += work.steps;
-                    all.work.rejected += work.rejected;
-                    all.work.rates += work.rates;
                 }
                 Err(error) => {
                     row.outcome = Err(Failed(case.about(error.first_error().clone())));

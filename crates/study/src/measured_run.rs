@@ -1,0 +1,103 @@
+//! Error of a run of another program.
+
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::context::Context;
+use flexbody_model::FeModel;
+use flexbody_motion::scene::{
+    FramedScene, Measure, MotionHistory, OtherModes, OutputErrors, Scene, Tolerance, Trace, trace, trace_at,
+};
+
+/// Errors of a run of another program relative to a reference motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredRun {
+    /// Name of the scene.
+    pub scene: String,
+    /// Number of modes of the body that was run.
+    pub modes: usize,
+    /// Number of modes of the reference.
+    pub reference_modes: usize,
+    /// Number of instants that were compared.
+    pub instants: usize,
+    /// Largest errors; `None` for quantities that the run does not have.
+    pub errors: OutputErrors,
+    /// Tolerances of the scene.
+    pub tolerance: Tolerance,
+    /// Largest ratio of error to tolerance.
+    pub worst: f64,
+    /// Growth of the errors over the run, see [`ErrorHistory::growth`](flexbody_motion::scene::ErrorHistory::growth).
+    pub growth: Option<f64>,
+}
+
+impl MeasuredRun {
+    /// Returns true if every error is within its tolerance.
+    pub fn holds(&self) -> bool {
+        self.worst <= 1.0
+    }
+}
+
+/// Measures the errors of `history`, which another program computed with `body` in `scene`. The reference is the motion
+/// of `reference`, a body with more modes of the model, or of `body` itself, with the accuracy of the scene. Errors
+/// between the instants of the history are those of parabolas through them.
+///
+/// # Errors
+/// The errors of [`trace`] for the reference; those of [`MotionHistory::covering`] and [`Trace::of_history`] for the
+/// history; FB707 for bodies of different models.
+pub fn measured_run(
+    body: &FlexBody,
+    history: MotionHistory,
+    scene: &Scene,
+    reference: Option<(&FlexBody, &FeModel)>,
+    context: &Context<'_>,
+) -> Result<(MeasuredRun, Vec<Diagnostic>)> {
+    let duration = scene.run.duration.ok_or_else(|| {
+        Diagnostic::new(Code::SceneContradicts, "the scene has no `duration`: nothing is simulated")
+            .with_help("give `duration` in [run]")
+    })?;
+    let history = history.covering(duration)?;
+    let shared = reference.map(|(whole, model)| beside(body, whole, model)).transpose()?;
+    let whole = reference.map_or(body, |(whole, _)| whole);
+    // The extremes belong to the continuous motion, the comparison to the instants of the history.
+    let (continuous, diagnostics) = trace(whole, scene, context)?;
+    let sampled = trace_at(whole, scene, &history.time, context)?;
+    let motion = Trace { extremes: continuous.extremes, ..sampled };
+    let own = Trace::of_history(body, scene, &history, &motion)?;
+    let framed_whole = FramedScene::new(whole, scene)?.body;
+    let framed_body = FramedScene::new(body, scene)?.body;
+    let measure = Measure::new(&framed_whole, &motion);
+    let errors = match &shared {
+        Some(shared) => {
+            let modes =
+                OtherModes::new(&framed_body, &framed_whole, shared.as_ref()).ok_or_else(unrelated)?;
+            measure.of_other(&own, &modes)
+        }
+        None => measure.of_subset(&own, &(0..body.n_modes()).collect::<Vec<_>>()),
+    };
+    let tolerance = scene.requirements.tolerance;
+    let mut largest = errors.largest();
+    largest.attitude = largest.attitude.filter(|_| history.attitude.is_some());
+    let run = MeasuredRun {
+        scene: scene.name.clone(),
+        modes: body.n_modes(),
+        reference_modes: whole.n_modes(),
+        instants: history.time.len(),
+        errors: largest,
+        worst: largest.worst(&tolerance),
+        tolerance,
+        growth: errors.growth(&motion, &tolerance),
+    };
+    Ok((run, diagnostics))
+}
+
+/// Returns Psi'K Psi_r of the modes of `body` and of those of `whole`.
+fn beside(body: &FlexBody, whole: &FlexBody, model: &FeModel) -> Result<Mat<f64>> {
+    body.stiffness_beside(whole, model).ok_or_else(unrelated)
+}
+
+fn unrelated() -> Error {
+    let message = "the body, the reference and the model do not belong together";
+    let help = "give two bodies that were converted from this model, with the same frame";
+    Diagnostic::new(Code::BodyIncomparable, message).with_help(help).into()
+}

@@ -1,0 +1,63 @@
+//! Arguments of the commands that judge a body without a study: by ranges of motion, and by a run of another program.
+
+use super::{Printing, positive};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `advise`.
+#[derive(Debug, Args)]
+pub struct AdviseArguments {
+    /// Flex-body file with all terms
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// Largest rotation rate of the body, in Hz
+    #[arg(long, value_name = "HZ", default_value_t = 0.0)]
+    pub spin: f64,
+    /// Largest deflection of a node, in the unit of length of the body [default: 1 % of its largest extent]
+    #[arg(long, value_name = "LENGTH", value_parser = positive)]
+    pub deflection: Option<f64>,
+    /// Mass attached to the body, in its unit of mass, at an interface or at the farthest node: MASS or MASS@INTERFACE
+    #[arg(long, value_name = "MASS[@INTERFACE]")]
+    pub attached: Option<String>,
+    /// The rotation is prescribed by joints, as that of a driven crank
+    #[arg(long)]
+    pub rotation_given: bool,
+    /// Largest size of a term that may be left out, relative to what it is compared with
+    #[arg(long, value_name = "REL", value_parser = positive, default_value_t = 0.05)]
+    pub limit: f64,
+    /// Report to write, format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
+    /// Options of printing.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Arguments of `measure`.
+#[derive(Debug, Args)]
+pub struct MeasureArguments {
+    /// Flex-body file of the body that the other program simulated
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// Scene that the other program simulated
+    #[arg(long, value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// Load case of the scene, if it has several
+    #[arg(long, value_name = "NAME")]
+    pub case: Option<String>,
+    /// Run of the other program: a table with the columns time, q_1 to q_n and, if known, attitude_0 to attitude_3
+    #[arg(long, value_name = "RUN.csv")]
+    pub history: PathBuf,
+    /// Flex-body file with more modes of the same model, whose motion is the reference [default: the body itself]
+    #[arg(long, value_name = "BODY.flex.h5", requires = "model")]
+    pub reference: Option<PathBuf>,
+    /// Model of both bodies: its manifest, or a job of an FE program
+    #[arg(long, value_name = "MODEL", requires = "reference")]
+    pub model: Option<PathBuf>,
+    /// Report to write, format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
+    /// Options of printing.
+    #[command(flatten)]
+    pub printing: Printing,
+}
