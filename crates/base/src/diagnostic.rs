@@ -291,9 +291,9 @@ pub fn codes_markdown() -> String {
          | 70 | internal error: a bug of flexbody |\n\
          | 130 | interrupted (Ctrl-C), terminated (SIGTERM) or disconnected from its terminal (SIGHUP); no unfinished file is left |\n\n\
          Any other signal that ends programs also ends this one, after its unfinished files are removed: a shell reports\n\
-         128 + the number of the signal. With exit code 0 all outputs are in their places, with 1 too unless the message says that nothing\n\
-         is written. With 2, 3, 4, 70, 130 and after a signal none is, and the files that they would have replaced are\n\
-         there ([output files](runs.md#output-files)).\n\n\
+         128 + the number of the signal. With exit code 0 all outputs are in their places, with 1 too unless the message\n\
+         says that nothing is written. With 2, 3, 4, 70, 130 and after a signal no output is, and the files that they\n\
+         would have replaced are there ([output files](runs.md#output-files)).\n\n\
          A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
          `--deny-warnings` treats a warning as a failed check (1): then nothing is written.\n\n\
          ## Codes\n\n\
