@@ -25,7 +25,8 @@ struct Case {
 
 const PLAIN: Case = Case { spin: 0.05, deformation: 1e-3, periods: 20.0, nudge: 0.0 };
 
-/// What tells a motion that nobody can follow from one that was integrated badly.
+/// Relative change of the initial state of a second run. If its motion differs as much as the error of the
+/// integration, the motion is chaotic and not badly integrated.
 const NUDGE: f64 = 1e-9;
 
 /// Largest change of energy and angular momentum relative to what there was, largest |q| beside the size of

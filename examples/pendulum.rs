@@ -26,16 +26,15 @@ const ANGLE: f64 = 0.9;
 const STEP: f64 = 1.2e-3; // s, of the stiffness of steel; the frequencies grow with its root
 const MODES: usize = 2;
 
-/// What a swing showed.
+/// Results of a swing.
 pub struct Swing {
     /// Period of the flexible body.
     pub period: f64,
-    /// That of the rigid body in closed form.
+    /// Period of the rigid body in closed form.
     pub rigid_period: f64,
     /// Change of the energy, relative to what falls.
     pub energy: f64,
-    /// What is left of the change of momentum without the impulses of joint and weight, relative to that of
-    /// the weight.
+    /// Change of momentum minus the impulses of joint and weight, relative to the impulse of the weight.
     pub impulse: f64,
     /// Impulse of the joint from one passage through the vertical to the next, relative to that on the rigid
     /// body in closed form: along, and upwards.

@@ -21,9 +21,9 @@ const JUDGING: [Code; 6] = [
     Code::InertiaImplausible,
 ];
 
-/// How many exchanges of two nodes are tried for each model at the most, and with how many nodes to check in
-/// all.
+/// Largest number of exchanges of two nodes for each model.
 const EXCHANGES: usize = 60;
+/// Number of nodes to check over all exchanges of a model.
 const CHECKED: usize = 40_000;
 
 /// Names under which models without a manifest are shown.
@@ -161,7 +161,7 @@ impl Random {
     }
 }
 
-/// What is told of exchanges of two nodes, and the changes of M that are told and that are not.
+/// Messages about exchanges of two nodes, and the changes of M with and without a message.
 #[derive(Default)]
 struct Exchanges {
     tried: usize,

@@ -31,7 +31,7 @@ const MODES: usize = 4;
 const BAYS: [i32; 2] = [2, 6];
 const LENGTHS: [f64; 2] = [2.0 * truss::BAY, 6.0 * truss::BAY];
 
-/// What a run showed, as the largest of everything.
+/// Results of a run: the largest value of each quantity.
 pub struct Run {
     /// Difference of the slider's place from that of the rigid mechanism at the same angle of the crank,
     /// relative to the crank.
@@ -41,11 +41,11 @@ pub struct Run {
     pub speed: f64,
     /// Change of the energy, relative to the kinetic energy of the start.
     pub energy: f64,
-    /// What is left of the change of momentum without impulses, relative to the largest momentum.
+    /// Change of momentum minus the impulses, relative to the largest momentum.
     pub impulse: f64,
     /// The largest force of the guide.
     pub guide: f64,
-    /// That of the hinge.
+    /// The largest force of the hinge.
     pub hinge: f64,
     /// The largest gap of a joint, relative to the crank.
     pub gap: f64,

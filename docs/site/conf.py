@@ -4,7 +4,8 @@ from pathlib import Path
 
 project = "flexbody"
 author = "the flexbody developers"
-extensions = ["myst_parser", "sphinx.ext.mathjax"]
+# MathJax is part of the site, so that formulas appear without a network.
+extensions = ["myst_parser", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
 root_doc = "README"
 include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "fixtures/README.md", "fixtures/cases/README.md", "python/README.md", "docs/*.md", "docs/**/*.md"]
 # Headings are link targets and formulas stand between dollars, as where the sources are read.
@@ -14,6 +15,8 @@ myst_fence_as_directive = ["math"]
 html_theme = "furo"
 html_title = "flexbody"
 html_copy_source = False
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 
 # Groups of the side bar, with the pages of each in the order of reading.
 CONTENTS = {

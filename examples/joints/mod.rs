@@ -39,7 +39,7 @@ pub type Result<T> = std::result::Result<T, &'static str>;
 /// The mass matrix of a body that is deformed too far.
 const NO_MASS: &str = "the mass matrix of a body is not positive definite";
 
-/// What a joint holds on to.
+/// End of a joint.
 pub enum End {
     /// A place in the world.
     Ground(Vector3<f64>),
@@ -91,7 +91,7 @@ fn entries(equations: &EquationsOfMotion) -> usize {
 }
 
 impl<'a> Assembly<'a> {
-    /// Where the state of a body begins.
+    /// Returns the index of the first entry of a body in the state.
     pub fn first(&self, body: usize) -> usize {
         self.bodies[..body].iter().map(entries).sum()
     }

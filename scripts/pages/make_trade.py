@@ -135,7 +135,7 @@ def decided(program, folder, scene, *body):
 def described(row):
     words = f"{row['modes']} mode{'s' if row['modes'] > 1 else ''}, {' '.join(row['groups']) or 'no group'}"
     if row["mode_numbers"][-1] != row["modes"]:
-        words += " (the liveliest)"
+        words += " (by contribution)"
     lumped = {"couplings": "lumped couplings", "whole": "lumped mass", None: None}[row["lumped_part"]]
     return words + (f", {lumped} ({row['lumped']})" if lumped else "") + (", f32" if row["storage"] == "f32" else "")
 

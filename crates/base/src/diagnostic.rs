@@ -142,13 +142,13 @@ codes! {
     NodesMissing = "FB401", Error, BadInput, "degrees of freedom refer to nodes without coordinates", "add the nodes to the node table";
     DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "give one row of dofs.csv for each matrix row; without dofs.csv there are three rows for each node";
     DofDuplicate = "FB403", Error, BadInput, "direction of a node occurs twice", "label each matrix row with another pair (node, direction)";
-    DofIncomplete = "FB404", Error, BadInput, "nodes lack displacement directions, so that the body cannot move rigidly", "export the matrices without supports, symmetry planes or eliminated constraints";
+    DofIncomplete = "FB404", Error, BadInput, "displacement directions of nodes are missing, so the body cannot move rigidly", "export the matrices without supports, symmetry planes or eliminated constraints";
     NodesUnused = "FB406", Note, Done, "nodes without degrees of freedom were left out", "nothing to do if they are reference nodes or deleted nodes";
     MassNotPositive = "FB407", Error, Untrustworthy, "mass is not positive", "check densities and the matrix that was given as mass";
     MassDirectional = "FB408", Error, BadInput, "mass differs between directions, so it is not the mass of a free body", "export the mass matrix without supports and without eliminated constraints";
     MassBlockStructure = "FB409", Note, Done, "part of the mass matrix does not rotate with the nodes", "nothing to do for slender beams and thin shells, whose error falls with the square of the element size to that of the rotary inertia of their sections; for a condensed model (superelement) keep more nodes";
     RigidMotionStrained = "FB410", Error, BadInput, "rigid motion strains the body: K R is not zero", "remove supports from K, and check that rotations are labelled as rotations and that coordinates have the units and the order of the matrix";
-    PencilSingular = "FB411", Error, BadInput, "eigenproblem is singular: K and M leave rows free", "remove these degrees of freedom from the matrices, or hold them";
+    PencilSingular = "FB411", Error, BadInput, "eigenproblem is singular: rows have neither stiffness nor mass", "remove these degrees of freedom from the matrices, or hold them";
     MassDiagonal = "FB412", Warning, Done, "mass matrix is diagonal, so it is already lumped", "export the consistent mass matrix from the FE program; below, `exact` means exact for this lumped matrix";
     InertiaImplausible = "FB413", Warning, Done, "mass and size do not fit any material in the units of the model", "check the units in the manifest, or set them with --units";
     BodiesSeveral = "FB414", Error, Untrustworthy, "matrices contain several bodies", "convert each body separately with --split, or connect the bodies";
@@ -166,11 +166,11 @@ codes! {
     InterfaceCoupling = "FB430", Error, BadInput, "interface cannot be coupled to its reference point", "give the interface three nodes that do not lie on one line (two in the plane), or another coupling";
     InterfaceShared = "FB431", Error, BadInput, "interfaces share nodes", "assign each shared node to one interface";
     InterfaceFit = "FB432", Warning, Done, "interface declared rigid deforms in the modes", "use --basis craig-bampton, or declare the interface averaging";
-    MassOrder = "FB433", Error, BadInput, "mass matrix couples nodes that the stiffness matrix does not: its rows stand in another order, or it is another mesh's", "write K and M from the same analysis in the same order; --allow-implausible (or allow_implausible in [model]) if the model is meant so";
+    MassOrder = "FB433", Error, BadInput, "mass matrix couples nodes that the stiffness matrix does not: its rows are in another order, or it belongs to another mesh", "write K and M from the same analysis in the same order; --allow-implausible (or allow_implausible in [model]) if the model is meant so";
     MassPairs = "FB434", Warning, Done, "mass matrix couples nodes that the stiffness matrix does not", "nothing to do if the model is meant so; else write K and M in the same order";
     MassesExchanged = "FB435", Warning, Done, "masses of nodes seem to be exchanged", "write K and M in the same order of nodes";
-    SpeedImplausible = "FB436", Warning, Done, "speed of sound of no known matter: stiffness, mass and lengths do not fit the units of the model", "check that density, Young's modulus and coordinates are all in the units of the manifest, or state these with --units";
-    DensityImplausible = "FB437", Error, BadInput, "density or speed of sound of no known matter: the numbers do not fit the units of the model", "check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant";
+    SpeedImplausible = "FB436", Warning, Done, "speed of sound is outside the range of all known materials: stiffness, mass and lengths do not fit the units of the model", "check that density, Young's modulus and coordinates are all in the units of the manifest, or state these with --units";
+    DensityImplausible = "FB437", Error, BadInput, "density or speed of sound is outside the range of all known materials: the numbers do not fit the units of the model", "check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant";
     MatricesExchanged = "FB438", Error, BadInput, "stiffness and mass matrix are exchanged", "give the other file as stiffness, this one as mass";
     InterfaceFar = "FB439", Warning, Done, "reference point of an interface is far from its nodes", "reference points are in model axes and in the unit of length of the nodes";
     GeometricStiffnessMotion = "FB440", Error, BadInput, "geometric stiffness is not that of a stress: it breaks a relation with rigid motion", "give the stress stiffness alone: the difference of the stiffness matrices with and without prestress holds the stiffness of the initial displacements as well";
@@ -189,17 +189,17 @@ codes! {
     ModesClamped = "FB509", Note, Done, "fewer modes exist than requested", "nothing to do";
     NoiseFloor = "FB510", Warning, Done, "digits of the input limit the accuracy of the lowest modes", "write the matrices with 17 significant digits";
     MassMatrixSingular = "FB511", Note, Done, "mass matrix is singular: fewer finite modes than degrees of freedom", "nothing to do: common with reduced integration";
-    NoModes = "FB512", Error, BadInput, "no flexible mode in the range asked for", "raise --max-frequency";
-    FactorPrecision = "FB513", Note, Done, "choice of the precision of the factor", "nothing to do: --factor f64 or f32 sets it";
+    NoModes = "FB512", Error, BadInput, "no flexible mode below the requested frequency", "raise --max-frequency";
+    FactorPrecision = "FB513", Note, Done, "precision of the factorisation that was chosen automatically", "nothing to do: --factor f64 or f32 sets it";
     DampingIndefinite = "FB514", Error, Untrustworthy, "modal damping is not positive semidefinite or not finite", "check the signs and the units of the damping: damping must not add energy";
     ModesOverdamped = "FB515", Warning, Done, "modes are overdamped", "nothing to do if intended; otherwise check the units: a ratio of 2 % is 0.02, alpha is in 1/time, beta in time, D in mass/time";
     ShapesNone = "FB520", Error, BadInput, "no shape deforms the body", "give shapes that are not rigid motions";
-    ShapesDependent = "FB521", Warning, Done, "shapes that add nothing were left out", "nothing to do if expected";
+    ShapesDependent = "FB521", Warning, Done, "shapes that depend linearly on the others were left out", "nothing to do if expected";
     ShapesRigid = "FB522", Note, Done, "rigid-body motions were removed from the shapes; the body frame performs them", "nothing to do: no motion is lost";
     ShapesSpan = "FB523", Warning, Done, "modes of the given subspace are not eigenvectors", "nothing to do for static shapes; otherwise compute the modes more accurately, or write all their digits";
-    LoadsCovered = "FB524", Note, Done, "static responses that add nothing to the basis were left out", "nothing to do: other modes contain them";
-    FreeFrequencies = "FB525", Note, Done, "frequencies of the Craig-Bampton body compared with the free body", "use more fixed-interface modes (--modes, --max-frequency) if higher frequencies matter";
-    InterfaceCompliance = "FB526", Note, Done, "modes lack a part of the static compliance at the interfaces", "convert with --basis craig-bampton or --residual-vectors interfaces, which contain it";
+    LoadsCovered = "FB524", Note, Done, "static responses that the basis already contains were left out", "nothing to do: other modes contain them";
+    FreeFrequencies = "FB525", Note, Done, "frequencies of the Craig-Bampton body that differ from the free body by more than 1 %", "use more fixed-interface modes (--modes, --max-frequency) if higher frequencies matter";
+    InterfaceCompliance = "FB526", Note, Done, "modes do not contain the whole static compliance at the interfaces", "convert with --basis craig-bampton or --residual-vectors interfaces, which contain it";
     GeometricStiffnessNone = "FB530", Warning, Done, "no geometric stiffness: the body softens under spin where a real one stiffens", "give [[geometric_stiffness]] for spin, or keep to spin rates far below the value in the message";
     GeometricStiffnessPartial = "FB531", Note, Done, "geometric stiffness is given for some directions of a load only", "nothing to do if the load does not act in the other directions";
     SimulationStopped = "FB540", Error, Untrustworthy, "simulation stopped", "check spin, loads and dropped terms: the motion leaves the range of the model";
@@ -210,12 +210,12 @@ codes! {
     LoadIdle = "FB545", Warning, Done, "load has no effect", "let an interface carry the body to see gravity and inertia bend it: [carried] in docs/reference/scenes.md";
     CarrierUnresolved = "FB546", Warning, Done, "modes resolve the carried interface poorly", "convert with --basis craig-bampton, or with --residual-vectors interfaces, and with the interface in the manifest";
     CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness does not act while the body is carried", "trust spin rates far below the first frequency only: the geometric stiffness is that of the free body";
-    ReferenceIncomplete = "FB548", Warning, Done, "reference body lacks a part of the model that matters here", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where the difference comes from";
-    LumpedWithoutBody = "FB549", Note, Done, "lumped mass gives no body to compare with", "nothing to do: a program that lumps the mass in this way has no body either";
+    ReferenceIncomplete = "FB548", Warning, Done, "error of the reference body relative to the model uses more of the tolerances than intended", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where the difference comes from";
+    LumpedWithoutBody = "FB549", Note, Done, "no body can be computed with a lumped mass, so it is missing in the comparison", "nothing to do: a program that lumps the mass in this way cannot compute the body either";
     RunTooLong = "FB550", Error, BadInput, "run takes more steps than allowed", "simulate a shorter `duration`, leave out modes beyond the frequencies of the loads, or raise `most_steps` in [run]";
     StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";
     MotionWithoutBasis = "FB552", Note, Done, "no small number of shapes represents the motion", "nothing to do: the body has the modes of a conversion without --basis scene";
-    RateUnsettled = "FB554", Warning, Done, "rate still changes with the step size of the integration", "give a smaller `tolerance` (or a shorter `step`) in [run] until the rate no longer changes";
+    RateUnsettled = "FB554", Warning, Done, "angular velocity still changes with the step size of the integration", "give a smaller `tolerance` (or a shorter `step`) in [run] until the angular velocity no longer changes";
     SelectionUnjudged = "FB557", Error, CheckFailed, "body does not meet the tolerances of the scene, or this cannot be judged", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body nevertheless";
     VariationFails = "FB559", Warning, Done, "recommended body does not hold in a variation of the scene", "make the variation a [[case]] of the scene, so that the body is made for it as well; or leave out a [[variation]] that cannot occur";
     CouplingEffect = "FB558", Note, Done, "effect of rigid interfaces that the body and its reference model share", "nothing to do where a stiff part is mounted at the interface; otherwise set coupling = \"averaging\", which lets the interface deform";
@@ -238,13 +238,13 @@ codes! {
     WarningsDenied = "FB715", Error, CheckFailed, "warnings are treated as errors", "resolve the warnings, or leave out --deny-warnings";
     ForeignRounded = "FB716", Warning, Done, "inertia data in a file of another program have few digits", "write the file with 17 significant digits, and from one mass matrix; flexbody audit gives details";
     ExportLoses = "FB720", Error, BadInput, "format cannot hold the whole body", "use --allow-loss to write the file without it";
-    ExportLost = "FB721", Warning, Done, "exported file lacks a part of the body", "nothing to do if the simulation does not need it";
+    ExportLost = "FB721", Warning, Done, "exported file does not hold all data of the body", "nothing to do if the simulation does not need it";
     ExportNeeds = "FB722", Note, Done, "program uses a part of the file only with a setting", "make the setting named in the message in the input of the program";
     ExportPicture = "FB723", Note, Done, "file is a picture of the body", "use another format for multibody programs: docs/reference/exports.md lists them";
     ForeignUnreadable = "FB730", Error, BadInput, "flexible-body file of another program cannot be read", "give a SID_FEM, MBDyn .fem, MBSim or Exudyn file as the program writes it";
-    ForeignIncomplete = "FB731", Error, BadInput, "file lacks data that a body needs", "write the file again with the missing part";
+    ForeignIncomplete = "FB731", Error, BadInput, "data that a body needs are missing in the file", "write the file again with the missing data";
     ForeignChanged = "FB732", Note, Done, "modes of the file are not normalised or contain rigid motions; combinations of them were used", "nothing to do: the motion of the nodes is unchanged, the modal coordinates differ";
-    ForeignDropped = "FB733", Warning, Done, "file lacks terms of the kinetic energy, which the body does not have either", "use a format that holds them";
+    ForeignDropped = "FB733", Warning, Done, "terms of the kinetic energy are missing in the file, and therefore in the body", "use a format that holds them";
     MotionUnreadable = "FB734", Error, BadInput, "file is not a simulation result, or it is damaged", "give the file that flexbody simulate -o writes";
     MotionForeign = "FB735", Error, BadInput, "simulation result belongs to another body", "simulate this body, or give the body that was simulated";
     AuditIdentity = "FB740", Error, CheckFailed, "identity of inertia data violated", "write the file again with the program that made it, or with flexbody export";
@@ -279,6 +279,9 @@ pub fn codes_markdown() -> String {
     let mut out = String::from(
         "<!-- Generated from the table in crates/base/src/diagnostic.rs: FLEXBODY_BLESS=1 cargo test --test program docs_generated -->\n\n\
          # Diagnostics and exit codes\n\n\
+         A message begins with its severity and its code (`error[FB101]: ...`); its line `help:` says what to do next. The\n\
+         table of [codes](#codes) has the general help of each code; the message of a run may have a more precise one.\n\n\
+         ## Exit codes\n\n\
          | exit code | meaning |\n|---|---|\n\
          | 0 | the work was done |\n\
          | 1 | a check failed or a tolerance was exceeded; the inputs themselves were readable |\n\
@@ -287,11 +290,24 @@ pub fn codes_markdown() -> String {
          | 4 | not enough memory or disk, or an output that may not be written (no permission, a read-only file system: FB121) |\n\
          | 70 | internal error: a bug of flexbody |\n\
          | 130 | interrupted (Ctrl-C), terminated (SIGTERM) or disconnected from its terminal (SIGHUP); no unfinished file is left |\n\n\
-         Other signals that end a program end this one too, after its unfinished files: a shell reports 128 + the number\n\
-         of the signal. With exit code 0 all outputs are in their places; with 2, 3, 4, 70, 130 and after a signal none\n\
-         is, and the files that they would have replaced are there ([output files](runs.md#output-files)).\n\n\
+         Any other signal that ends programs also ends this one, after its unfinished files are removed: a shell reports\n\
+         128 + the number of the signal. With exit code 0 all outputs are in their places, with 1 too unless the message\n\
+         says that nothing is written. With 2, 3, 4, 70, 130 and after a signal no output is, and the files that they\n\
+         would have replaced are there ([output files](runs.md#output-files)).\n\n\
          A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
          `--deny-warnings` treats a warning as a failed check (1): then nothing is written.\n\n\
+         ## Codes\n\n\
+         A **warning** means that the result may be wrong or incomplete for your purpose. A **note** states a fact or a\n\
+         choice of the program; act on it only if its help says so.\n\n\
+         | codes | subject |\n|---|---|\n\
+         | FB1xx | files, and input decks of FE programs |\n\
+         | FB2xx | manifest, tables, scene file |\n\
+         | FB3xx | matrices and arrays |\n\
+         | FB4xx | checks of the model: mass, stiffness, rigid motion, units, interfaces |\n\
+         | FB5xx | modes, bases, simulation, selection |\n\
+         | FB6xx | memory, disk, time, processes |\n\
+         | FB7xx | flex-body files, files of other programs, cluster, batches |\n\
+         | FB8xx | command line |\n\n\
          | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",
     );
     for code in Code::ALL {

@@ -103,9 +103,9 @@ fn beside_the_mean(
     let extent = span(nodes);
     (away > MEAN_POINT_DISTANCE * extent && away > ROUNDING_LENGTH * size).then(|| {
         let [point, mean] = [centre.point, centre.mean].map(|x| in_words(x, size));
-        let away = significant(away, 4);
+        let (percent, away) = (significant(100.0 * away / extent, 2), significant(away, 4));
         let message = format!(
-            "interface `{name}`: the reference point is {}, at ({point}); the mean of its nodes, ({mean}), is {away} away from it, and the nodes extend over {}",
+            "interface `{name}`: the reference point is {}, at ({point}); the mean of its nodes, ({mean}), is {away} away from it, {percent} % of the extent of the nodes ({})",
             centre.origin,
             significant(extent, 4)
         );

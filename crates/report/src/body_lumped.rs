@@ -24,13 +24,14 @@ pub(super) fn lumped<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
         let title = Inline::from("Errors of ").then(word_as("lumped mass", "lumped masses"));
         blocks.push(Block::Heading(title));
         blocks.push(Block::Paragraph(
-            "Errors of the same modes with nodal masses instead of the mass matrix:".into(),
+            "For comparison only: errors that nodal masses instead of the mass matrix would cause in this body, with the same modes:"
+                .into(),
         ));
         blocks.push(Block::List(lumped.iter().map(in_words).collect()));
         blocks.extend(bars(lumped).map(Block::Bars));
         let norms = vec![Block::Table(schemes(lumped)), Block::Table(all_norms(lumped))];
         blocks.push(Block::Fold("All error norms", norms));
-        blocks.push(Block::Terms(listed("lumped", lumped, in_text)));
+        blocks.push(Block::Terms(listed("if lumped", lumped, in_text)));
     }
     if !own_modes.is_empty() {
         blocks.push(heading("Modes computed with lumped masses"));

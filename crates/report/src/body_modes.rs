@@ -164,9 +164,9 @@ fn truncation<'a>(loads: &[Truncation]) -> Vec<Block<'a>> {
     let listed = listed("static", loads, |t| {
         let with = format!(", {} with residual vectors", significant(t.after, 2));
         let with = if has_none(t) { "" } else { &with };
-        format!("{}: error {} with free modes alone{with}", t.load, significant(t.before, 2))
+        format!("{}: relative error {} with free modes alone{with}", t.load, significant(t.before, 2))
     });
-    let caption = "Static responses: error of the modes, in the norm of K";
+    let caption = "Static responses: relative error with the modes, in the norm of K; its square is the missing part of the compliance";
     vec![Block::Table(Table::new(caption, heads, &[0], rows)), Block::Terms(listed)]
 }
 
@@ -201,12 +201,10 @@ fn completeness(facts: &Facts<'_>) -> Vec<Term> {
         "rigid eigenvalues {} of the first flexible one; |K R| {} of |K| |R|",
         residual[0], residual[1]
     );
-    items.push(
-        Term::new("Noise of the input", noise_of_input).in_text(
-            "noise",
-            format!("rigid modes at {} of the first eigenvalue; K R {}", noise[0], noise[1]),
-        ),
-    );
+    items.push(Term::new("Noise of the input", noise_of_input).in_text(
+        "noise",
+        format!("rigid eigenvalues {} of the first flexible one; |K R| {} of |K| |R|", noise[0], noise[1]),
+    ));
     items
 }
 

@@ -151,8 +151,8 @@ impl InterfaceFacts {
         self.reference_model.map_or_else(String::new, place)
     }
 
-    /// Returns `80 nodes, rigid, at 0, 0, 12.5 mm` or `3 nodes, averaging, at 1, 0, 0 mm, deforms by up to 12
-    /// %`. Coordinates that are rounding relative to `size` are written as zero; `unit` is the unit of
+    /// Returns `80 nodes, rigid, at 0, 0, 12.5 mm` or `3 nodes, averaging, at 1, 0, 0 mm, up to 12 % of its
+    /// motion in a mode is deformation`. Coordinates that are rounding relative to `size` are written as zero; `unit` is the unit of
     /// length.
     pub(crate) fn in_words(&self, size: f64, unit: &str) -> String {
         let place = self.place_in_words(size, unit);
@@ -161,11 +161,11 @@ impl InterfaceFacts {
         format!("{}{coupling}{place}{motion}", counted(self.n_nodes, "node"))
     }
 
-    /// Returns the motion of the interface in the modes: `deforms by up to 12 % of its motion`, or `moves as a
-    /// rigid body`; `None` without a reference point.
+    /// Returns the motion of the interface in the modes: `up to 12 % of its motion in a mode is deformation`, or
+    /// `moves as a rigid body`; `None` without a reference point.
     pub(crate) fn motion_in_words(&self) -> Option<String> {
         Some(match self.deformation? {
-            part if part > RIGID => format!("deforms by up to {} of its motion", percent(part)),
+            part if part > RIGID => format!("up to {} of its motion in a mode is deformation", percent(part)),
             _ => "moves as a rigid body".to_owned(),
         })
     }

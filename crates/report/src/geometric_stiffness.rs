@@ -90,8 +90,8 @@ pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
     })
 }
 
-/// Returns the spins in words: `no geometric stiffness: 1 % softer at 12.5, 80.1, 79.9 Hz (x, y, z of the
-/// model)`.
+/// Returns the spins in words: `no geometric stiffness: 1 % softer at 12.5, 80.1, 79.9 Hz of rotation about x, y,
+/// z of the model`.
 pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
     let axes = ["x", "y", "z"].into_iter().zip(hertz);
     let known: Vec<(&str, f64)> = axes.filter_map(|(axis, hz)| Some((axis, (*hz)?))).collect();
@@ -101,7 +101,7 @@ pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
     let (rates, unit) = frequencies(&known.iter().map(|(_, hz)| *hz).collect::<Vec<f64>>(), 3);
     let axes: Vec<&str> = known.iter().map(|(axis, _)| *axis).collect();
     format!(
-        "no geometric stiffness: 1 % softer at {} {unit} ({} of the model)",
+        "no geometric stiffness: 1 % softer at {} {unit} of rotation about {} of the model",
         rates.join(", "),
         axes.join(", ")
     )

@@ -251,7 +251,7 @@ impl<'a> SelectionFacts<'a> {
         let verdict = if term.kept { "keep" } else { "drop" };
         if term.limit > 0.0 {
             let (bound, limit) = (significant(term.bound, 3), significant(term.limit, 3));
-            let reach = if term.kept { "error without it" } else { "error at most" };
+            let reach = if term.kept { "error without it" } else { "error without it at most" };
             let budget = match term.budget {
                 budget if budget < 1.0 => {
                     format!(
@@ -262,7 +262,7 @@ impl<'a> SelectionFacts<'a> {
                 _ => String::new(),
             };
             format!(
-                "{verdict} (tier {}): {}: {reach} {bound}, tolerance {limit}{budget}",
+                "{verdict} (tier {}): {}; {reach} {bound}, tolerance {limit}{budget}",
                 term.tier, term.reason
             )
         } else {
@@ -311,7 +311,9 @@ impl<'a> SelectionFacts<'a> {
             Term::new(input.name, format!("{}: {}", significant(input.value, 5), input.source))
                 .in_text("Inputs", format!("{} {value}: {}", input.name, input.source))
         };
-        let inputs = self.inputs.iter().map(input);
+        let units = "units of the body, angles in radians";
+        let units = Term::new("Units", units).in_text("Inputs", format!("in {units}"));
+        let inputs = std::iter::once(units).chain(self.inputs.iter().map(input));
         let inputs = inputs.chain([Term::new("Tolerances", tolerances).short("Tolerances")]).collect();
         blocks.extend([heading("Inputs"), Block::Terms(inputs)]);
         blocks.extend([heading("Sizes of the terms"), Block::Table(self.sizes())]);

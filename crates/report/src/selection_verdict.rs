@@ -161,13 +161,14 @@ fn reason(kept: bool, decisive_error: Option<DecisiveError>, groups: &[TermGroup
 }
 
 fn error(selection: &Selection) -> String {
-    let own = selection.reference_errors.last();
-    let reference_errors = match own {
-        Some(own) => {
-            let much = if ReferenceError::is_reference(own) { "" } else { ", too much for a reference" };
+    let last_error = selection.reference_errors.last();
+    let reference_errors = match last_error {
+        Some(last_error) => {
+            let much =
+                if ReferenceError::is_reference(last_error) { "" } else { ", too much for a reference" };
             format!(
                 "; the body with all its modes differs from the FE model by {} (estimated){much}",
-                ReferenceErrorFacts::new(own).parts()
+                ReferenceErrorFacts::new(last_error).parts()
             )
         }
         None => String::new(),

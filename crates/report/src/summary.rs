@@ -121,12 +121,13 @@ fn modes(facts: &Facts<'_>) -> Vec<Term> {
 }
 
 fn lumped(facts: &Facts<'_>) -> Vec<Term> {
-    let mut items = listed_to(MAX_LISTED, "lumped", &facts.lumped, |own: &LumpedFacts| {
-        let tone = if own.negative_masses > 0 { Tone::Warning } else { Tone::Plain };
-        entry(tone, "lumped", format!("{}: {}", scheme_in_words(&own.scheme), own.in_words(false)), 3)
+    let mut items = listed_to(MAX_LISTED, "if lumped", &facts.lumped, |lumped: &LumpedFacts| {
+        let tone = if lumped.negative_masses > 0 { Tone::Warning } else { Tone::Plain };
+        let words = format!("{}: {}", scheme_in_words(&lumped.scheme), lumped.in_words(false));
+        entry(tone, "if lumped", words, 3)
     });
-    items.extend(listed_to(MAX_LISTED, "own modes", &facts.lumped_modes, |own: &LumpedModesFacts| {
-        let words = format!("{}: {}", scheme_in_words(&own.scheme), own.in_words());
+    items.extend(listed_to(MAX_LISTED, "own modes", &facts.lumped_modes, |lumped: &LumpedModesFacts| {
+        let words = format!("{}: {}", scheme_in_words(&lumped.scheme), lumped.in_words());
         entry(Tone::Plain, "own modes", words, 3)
     }));
     items

@@ -169,18 +169,24 @@ fn error(trade: &Trade, measured: &Measured, reference_error: Option<&ReferenceE
     format!("{}: {worst} % of the tolerance{case}{growth}{reference_error}", errors_in_words(errors))
 }
 
-fn saves(whole: &Measured, own: &Measured) -> String {
-    let run = if own.by_case.len() > 1 { "the runs of all load cases" } else { "this run" };
-    let ratio = |whole: f64, own: f64| significant(whole / own, 2);
-    let work = ratio(whole.multiplications as f64, own.multiplications as f64);
-    if whole.multiplications == own.multiplications {
+fn saves(whole: &Measured, candidate: &Measured) -> String {
+    let run = if candidate.by_case.len() > 1 { "the runs of all load cases" } else { "this run" };
+    let ratio = |before: f64, after: f64| significant(before / after, 2);
+    let work = ratio(whole.multiplications as f64, candidate.multiplications as f64);
+    if whole.multiplications == candidate.multiplications {
         return "nothing: no cheaper candidate is within the tolerances".to_owned();
     }
-    let times =
-        whole.timed.as_ref().zip(own.timed.as_ref()).map(|(whole, own)| (whole.seconds(), own.seconds()));
+    let times = whole
+        .timed
+        .as_ref()
+        .zip(candidate.timed.as_ref())
+        .map(|(whole, own)| (whole.seconds(), own.seconds()));
     let seconds = times.map_or_else(String::new, |(before, after)| {
-        let (own, all) = (duration(after), duration(before));
-        format!("; {own} instead of {all} for {run} in flexbody, {} times faster", ratio(before, after))
+        let (shorter, longer) = (duration(after), duration(before));
+        format!(
+            "; {shorter} instead of {longer} for {run} in flexbody, {} times faster",
+            ratio(before, after)
+        )
     });
     format!("{work} times fewer multiplications per evaluation{seconds}")
 }

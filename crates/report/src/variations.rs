@@ -80,14 +80,15 @@ pub(super) fn in_words(variations: &[VariationFacts<'_>]) -> Option<String> {
         format!("{}: {part}", one.name)
     };
     let list = |some: &[&VariationFacts<'_>]| some.iter().map(|one| size(one)).collect::<Vec<_>>().join(", ");
-    let mut words = format!("{} ({kind}), which the body was not made for", counted(count, "variation"));
+    let mut words = format!("{} ({kind}) that did not choose the body", counted(count, "variation"));
     let worst = variations.iter().filter(|one| one.holds).filter_map(|one| one.worst).fold(0.0, f64::max);
     if failing.is_empty() && unjudged.is_empty() {
-        words.push_str(&format!(": holds, {} % of what is allowed at most", significant(100.0 * worst, 2)));
+        let worst = significant(100.0 * worst, 2);
+        words.push_str(&format!(": within the tolerances, largest error {worst} % of its tolerance"));
     }
     if !failing.is_empty() {
         words.push_str(&format!(
-            ": does not hold (error over tolerance) in {}; make such a variation a [[case]] of the scene if it can occur",
+            ": exceeds the tolerances (error in % of the tolerance) in {}; make such a variation a [[case]] of the scene if it can occur",
             list(&failing)
         ));
     }

@@ -67,9 +67,9 @@ impl Tailoring {
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
     ) -> Result<Enriched<Conversion>> {
         let make = |loads: &Mat<f64>| {
-            let own = self.with_motion(loads);
-            let band_settings = own.settings_of_band(cases);
-            let modal = own.find_modes(band_settings.as_ref(), model, context)?;
+            let with_loads = self.with_motion(loads);
+            let band_settings = with_loads.settings_of_band(cases);
+            let modal = with_loads.find_modes(band_settings.as_ref(), model, context)?;
             let condensed = condense(&modal)?;
             modal.finish(condensed, context)
         };
@@ -94,14 +94,15 @@ impl Tailoring {
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
     ) -> Result<Enriched<Conversion>> {
         let Enriched { made: mut reference, rounds } = whole;
-        let own = || rounds.iter().map(|rounds| rounds.last());
-        if own().flatten().any(|own| !own.is_reference()) {
-            let message = "the error of the body whose motion would give the shapes is itself more than half of the tolerances";
+        let last_errors = || rounds.iter().map(|rounds| rounds.last());
+        if last_errors().flatten().any(|error| !error.is_reference()) {
+            let message = "the error of the body from whose motion the shapes would be computed is itself more than half of the tolerances";
             reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
             return Ok(Enriched { made: reference, rounds });
         }
         // The shapes may take what the truncation error of the whole body leaves.
-        let reference_errors: Vec<f64> = own().map(|own| own.map_or(0.0, |own| own.worst)).collect();
+        let reference_errors: Vec<f64> =
+            last_errors().map(|error| error.map_or(0.0, |error| error.worst)).collect();
         let bodies = MotionBodies::new(model, &reference.body, cases, context)?;
         let make = |bodies: &MotionBodies<'_>, count: usize| -> Result<Conversion> {
             let settings = self.settings_of_shapes(bodies.basis(count));
@@ -115,7 +116,7 @@ impl Tailoring {
             .map(|bodies| bodies.fewest(&most, |count| make(bodies, count), |made| &made.body));
         if let Some(FewestShapes { made, errors, worst, .. }) = fewest.transpose()?.flatten() {
             let modes = made.body.n_modes();
-            let own = errors.into_iter().zip(worst).zip(reference_errors).map(
+            let rounds = errors.into_iter().zip(worst).zip(reference_errors).map(
                 |((errors, worst), reference_error)| {
                     vec![ReferenceError {
                         modes,
@@ -127,9 +128,9 @@ impl Tailoring {
                     }]
                 },
             );
-            return Ok(Enriched { rounds: own.collect(), made });
+            return Ok(Enriched { rounds: rounds.collect(), made });
         }
-        let message = "with any number of shapes the motion takes more than half of the tolerances, which are needed for dropped terms";
+        let message = "every number of shapes leaves an error of more than half of the tolerances; the other half is needed for dropped terms";
         reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
         Ok(Enriched { made: reference, rounds })
     }
@@ -146,8 +147,9 @@ impl Tailoring {
         let bodies = MotionBodies::new(model, reference, cases, context)?;
         let most = bodies.as_ref().map_or(0, MotionBodies::most);
         let Some(bodies) = bodies.filter(|_| (1..=most).contains(&count)) else {
-            let message = format!("{count} shapes of the motion are asked for, and the motion has {most}");
-            let help = "give a smaller number, or leave it out: the fewest that suffice are taken";
+            let message =
+                format!("{count} shapes of the motion are requested, but the motion has only {most}");
+            let help = "request a smaller number, or leave it out to get the smallest number that suffices";
             return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
         };
         convert(model, &self.settings_of_shapes(bodies.basis(count)), context)
@@ -162,9 +164,11 @@ impl Tailoring {
 
     /// Returns these settings with the static responses to `loads` in the basis.
     fn with_motion(&self, loads: &Mat<f64>) -> Self {
-        let mut own = self.clone();
-        own.settings.basis = self.settings.basis.with_motion(loads).unwrap_or(own.settings.basis);
-        own
+        let mut tailoring = self.clone();
+        if let Some(basis) = self.settings.basis.with_motion(loads) {
+            tailoring.settings.basis = basis;
+        }
+        tailoring
     }
 
     /// Returns settings with the modes up to the highest band of the load cases; `None` if no band decides.
@@ -319,35 +323,36 @@ fn with_sources(body: FlexBody, cases: &LoadCases) -> Result<FlexBody> {
     FlexBody::new(parts)
 }
 
-/// Refuses settings and scenes for which a conversion with selection, or a basis made of motion, is not possible.
+/// Returns an error if the settings or the scenes permit no conversion with selection, or no basis of a motion.
 fn refuse_unfit(tailoring: &Tailoring, cases: &LoadCases) -> Result<()> {
     refuse_frame(tailoring)?;
     if !tailoring.of_motion {
         return Ok(());
     }
     if cases.iter().any(|scene| !scene.initial.modes.is_empty()) {
-        let message = "--basis scene: the scene starts modes by their number, which a body made of its motion does not have";
-        return Err(Diagnostic::new(Code::Usage, message).into());
+        let message = "--basis scene: `initial.mode` of the scene names modes by number, but the modes of this basis result from the simulated motion";
+        let help = "remove `initial.mode` from the scene, or choose another --basis";
+        return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
     }
     refuse_without_run(cases)
 }
 
-/// Refuses a body frame that stands on an interface.
+/// Returns an error if the body frame is fixed to an interface.
 fn refuse_frame(tailoring: &Tailoring) -> Result<()> {
     if tailoring.settings.frame.interface().is_none() {
         return Ok(());
     }
-    let message = "a scene chooses terms and modes of bodies in mean axes, not of one whose frame stands on an interface";
-    let help = "leave --scene out, or use --frame com";
+    let message = "terms and modes can be chosen for a scene only if the body frame is at the centre of mass or that of the model, not fixed to an interface";
+    let help = "leave --scene out, or use --frame com, principal or model";
     Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
 }
 
-/// Refuses scenes without a motion to make shapes of.
+/// Returns an error if a scene has no simulated motion from which shapes could be computed.
 fn refuse_without_run(cases: &LoadCases) -> Result<()> {
     if cases.iter().all(|scene| scene.run.duration.is_some()) {
         return Ok(());
     }
-    let message = "--basis scene: shapes are made of a motion, and the scene has no [run] with a duration";
-    let help = "state `duration` under [run] of the scene";
+    let message = "--basis scene: the shapes are computed from a simulated motion, but the scene has no [run] with a duration";
+    let help = "add `duration` under [run] in the scene file";
     Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
 }

@@ -136,11 +136,11 @@ fn given_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Fra
         Err(Diagnostic::new(Code::Usage, message.to_owned()).with_help(help.to_owned()).into())
     };
     if settings.modes.accuracy == Accuracy::Certified {
-        let message = "accuracy certified bounds the modes of the free body, not those of a body whose frame stands on an interface";
+        let message = "accuracy certified bounds the modes of the free body; it has no bounds for modes relative to a frame that is fixed to an interface";
         return refuse(message, "use --accuracy standard, or a frame at the centre of mass");
     }
     if settings.lumped_modes {
-        let message = "--lumped-modes compares modes of the free body, not those of a body whose frame stands on an interface";
+        let message = "--lumped-modes compares modes of the free body; it cannot compare modes relative to a frame that is fixed to an interface";
         return refuse(message, "leave --lumped-modes out, or use a frame at the centre of mass");
     }
     interface_frame::frame_of_interface(model, name).map(Some)

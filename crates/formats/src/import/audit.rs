@@ -158,7 +158,7 @@ fn of_identity(check: IdentityCheck) -> AuditCheck {
         ),
         "s_transposed" | "w3_skew" => (
             Code::AuditLayout,
-            "products of modes lack their symmetry: rows and columns or blocks are mixed up",
+            "products of modes are not symmetric: rows and columns, or blocks, are mixed up",
         ),
         _ => (Code::AuditIdentity, "entries are larger than the mass of the body allows"),
     };

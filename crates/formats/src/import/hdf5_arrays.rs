@@ -59,7 +59,7 @@ impl Hdf5Arrays {
         if missing.is_empty() {
             return Ok(());
         }
-        let message = format!("the file lacks {}", missing.join(", "));
+        let message = format!("missing in the file: {}", missing.join(", "));
         Err(Diagnostic::new(Code::ForeignIncomplete, message).in_file(&self.path).into())
     }
 

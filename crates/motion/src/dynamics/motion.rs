@@ -80,14 +80,14 @@ impl Size {
         let (mass, c) = (equations.mass, equations.first_moment);
         let about_origin = 0.5 * equations.inertia.trace() / mass;
         let about_centre = about_origin - c.norm_squared() / (mass * mass);
-        let own: Vec<f64> = (0..equations.nf).map(|j| equations.stiffness.get(j, j)).collect();
+        let modal_stiffness: Vec<f64> = (0..equations.nf).map(|j| equations.stiffness.get(j, j)).collect();
         // Modes without stiffness get that of the softest mode with stiffness.
-        let softest = own.iter().copied().filter(|&k| k > 0.0).fold(f64::INFINITY, f64::min);
+        let softest = modal_stiffness.iter().copied().filter(|&k| k > 0.0).fold(f64::INFINITY, f64::min);
         let softest = if softest.is_finite() { softest } else { 1.0 };
         Self {
             mass,
             radius: if about_centre > 0.0 { about_centre } else { about_origin }.sqrt(),
-            stiffness: own.iter().map(|&k| k.max(softest)).collect(),
+            stiffness: modal_stiffness.iter().map(|&k| k.max(softest)).collect(),
             first_rate: softest.sqrt(),
         }
     }

@@ -17,19 +17,19 @@ pub struct Place {
 pub struct Configuration {
     /// Origin of the body frame, world axes.
     pub origin: Vector3<f64>,
-    /// Attitude of the frame, of unit length.
+    /// Attitude of the body frame: Euler parameters, of unit length, of the rotation from body axes to world axes.
     pub attitude: EulerParameters,
-    /// Velocity of the origin, world axes.
+    /// Velocity of the origin of the body frame, world axes.
     pub velocity: Vector3<f64>,
-    /// Angular velocity of the frame, body axes.
+    /// Angular velocity of the body frame in the world, body axes.
     pub omega: Vector3<f64>,
-    /// Modal coordinates (nf).
+    /// Modal coordinates (nf), of the modes in the body frame.
     pub q: Vec<f64>,
     /// Rates of the modal coordinates (nf).
     pub qd: Vec<f64>,
 }
 
-/// Energies, momenta, work and impulses of a motion at one time. Momenta are in world axes.
+/// Energies, momenta, work and impulses of a motion at one time. Vectors are along world axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Balance {
     /// Kinetic energy.
@@ -41,27 +41,35 @@ pub struct Balance {
     pub flight: f64,
     /// Work of forces, damping and prescribed motion since the start.
     pub work: f64,
-    /// Linear momentum.
+    /// Linear momentum, world axes.
     pub linear: Vector3<f64>,
-    /// Angular momentum about the position of the body origin at the start.
+    /// Angular momentum about the position of the body origin at the start, world axes.
     pub angular: Vector3<f64>,
-    /// Impulse of the forces since the start.
+    /// Impulse of the forces since the start, world axes.
     pub impulse: Vector3<f64>,
-    /// Angular impulse of the forces about this point.
+    /// Angular impulse of the forces since the start about the position of the body origin at the start, world axes.
     pub angular_impulse: Vector3<f64>,
 }
 
 /// Body at one state of its [`Motion`](super::Motion).
 #[derive(Debug)]
 pub struct Snapshot<'m> {
+    /// Position and orientation of the body frame in the world.
     pub(super) place: Place,
+    /// Euler parameters of the rotation from body axes to world axes.
     pub(super) attitude: EulerParameters,
+    /// Equations of motion at this state; their vectors are along body axes.
     pub(super) evaluation: &'m Evaluation<'m>,
+    /// Position of the body origin at the start, world axes: the point of the angular momentum.
     pub(super) reference: Vector3<f64>,
     pub(super) mass: f64,
+    /// Work of forces, damping and prescribed motion since the start.
     pub(super) work: f64,
+    /// Impulse of the forces since the start, world axes.
     pub(super) impulse: Vector3<f64>,
+    /// Angular impulse of the forces since the start about `reference`, world axes.
     pub(super) angular_impulse: Vector3<f64>,
+    /// Force and torque (about the body origin) of the prescribed motion, body axes.
     pub(super) reaction: (Vector3<f64>, Vector3<f64>),
 }
 
@@ -105,8 +113,8 @@ impl Snapshot<'_> {
         }
     }
 
-    /// Returns force and torque of the prescribed motion about the origin, body axes; zero without
-    /// prescribed motion.
+    /// Returns the force of the prescribed motion and its torque about the origin of the body frame, body axes; zero
+    /// without prescribed motion.
     pub fn reaction(&self) -> (Vector3<f64>, Vector3<f64>) {
         self.reaction
     }

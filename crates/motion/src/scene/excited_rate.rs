@@ -8,15 +8,16 @@ const MAX_INTERVAL_RATIO: f64 = 8.0;
 
 /// Returns the largest circular frequency of the modes that contribute to the motion: modes whose root of
 /// the elastic energy is at least this `part` of the tolerances. For a carried body the frequencies are not
-/// above those of the free body. A mode that follows slow forces has no motion of its own at any frequency;
-/// the criterion is therefore the amplitude q'' / omega^2 of its acceleration at its own frequency.
+/// above those of the free body. A mode that merely follows slow forces does not oscillate at its natural frequency
+/// omega; the criterion is therefore the amplitude q'' / omega^2 that its acceleration q'' would have there.
 pub fn highest_excited_rate(body: &FlexBody, scene: &Scene, motion: &Trace, part: f64) -> f64 {
     let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
     let roots = rates.iter().zip(&motion.extremes.amplitudes).map(|(rate, amplitude)| rate * amplitude.abs());
     let tolerance = &scene.requirements.tolerance.errors;
     let least = part * tolerance.stress.min(tolerance.deflection) * roots.fold(0.0, f64::max);
-    let own = accelerations(motion, rates.len());
-    let counts = |j: &usize| own[*j] > 0.0 && own[*j] / rates[*j] >= least;
+    let largest_accelerations = accelerations(motion, rates.len());
+    let counts =
+        |j: &usize| largest_accelerations[*j] > 0.0 && largest_accelerations[*j] / rates[*j] >= least;
     (0..rates.len()).rev().find(counts).map_or(0.0, |last| rates[last])
 }
 

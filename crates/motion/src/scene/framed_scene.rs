@@ -48,8 +48,8 @@ impl<'a> FramedScene<'a> {
         let (framed_body, mut found) = match &scene.carried {
             Some(carried) => {
                 let carrier = carrier(&carried.by);
-                let own = body.carried(&carrier)?;
-                let mut found = Vec::from_iter(own.unresolved(&carrier, body));
+                let carried_body = body.carried(&carrier)?;
+                let mut found = Vec::from_iter(carried_body.unresolved(&carrier, body));
                 found.extend(body.softened(&carrier));
                 if body.loses_geometric_stiffness() {
                     let message = format!(
@@ -57,7 +57,7 @@ impl<'a> FramedScene<'a> {
                     );
                     found.push(Diagnostic::new(Code::CarriedGeometricStiffness, message));
                 }
-                (Cow::Owned(own), found)
+                (Cow::Owned(carried_body), found)
             }
             None => {
                 refuse_numbered_modes(body, scene)?;

@@ -136,8 +136,8 @@ impl LoadCases {
     /// deflection of the first case.
     pub fn least_tolerance(&self) -> Tolerance {
         self[1..].iter().fold(self[0].requirements.tolerance, |least, scene| {
-            let own = scene.requirements.tolerance.errors;
-            Tolerance { errors: least.errors.zip(own).map(|(a, b)| a.min(b)), ..least }
+            let errors_of_case = scene.requirements.tolerance.errors;
+            Tolerance { errors: least.errors.zip(errors_of_case).map(|(a, b)| a.min(b)), ..least }
         })
     }
 }

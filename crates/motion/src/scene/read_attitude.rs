@@ -110,14 +110,14 @@ impl Attitudes {
     fn new(read: &FromFile) -> Result<Self> {
         let mut parameters: Vec<Vector4<f64>> = Vec::with_capacity(read.times.len());
         for (row, &line) in read.lines.iter().enumerate() {
-            let own = Vector4::from_fn(|k, _| read.columns[k][row]);
-            let length = own.norm();
+            let row_parameters = Vector4::from_fn(|k, _| read.columns[k][row]);
+            let length = row_parameters.norm();
             if (length - 1.0).abs() > LENGTH {
                 let message = format!("the Euler parameters have the norm {length:.4}, expected 1");
                 let help = "give as `columns` the cosine of half the angle, then the three components of the axis times the sine of half the angle";
                 return Err(wrong(read, line, message, help));
             }
-            let mut unit = own / length;
+            let mut unit = row_parameters / length;
             if let Some(before) = parameters.last() {
                 if before.dot(&unit) < 0.0 {
                     unit = -unit;
@@ -162,14 +162,14 @@ impl Attitudes {
     /// turning axes.
     fn refuse_loss(&self, read: &FromFile, velocity: &Samples<3>, end: f64) -> Result<()> {
         let axes = |row: usize| EulerParameters(self.parameters[row].into()).axes();
-        let mut own = axes(0);
+        let mut integrated_axes = axes(0);
         for (row, ends) in read.times.windows(2).enumerate().take_while(|(_, ends)| ends[0] < end) {
             let (middle, h) = (0.5 * (ends[0] + ends[1]), ends[1] - ends[0]);
             let aside = h / 12f64.sqrt();
             let [a, b] = [middle - aside, middle + aside].map(|time| velocity.at(time).value);
             let turn = (a + b) * (0.5 * h) + a.cross(&b) * (3f64.sqrt() * h * h / 12.0);
-            own *= RotationVector(turn).axes();
-            let apart = RotationVector::of_axes(&axes(row + 1).tr_mul(&own)).0.norm();
+            integrated_axes *= RotationVector(turn).axes();
+            let apart = RotationVector::of_axes(&axes(row + 1).tr_mul(&integrated_axes)).0.norm();
             if apart > LARGEST_LOSS {
                 let message = format!(
                     "the rows up to this line are too far apart: the interpolated angular velocity misses the attitude by {apart:.1e} radians"

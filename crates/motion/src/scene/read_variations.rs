@@ -101,21 +101,21 @@ fn varied(
     span: &Range<usize>,
     unchanged: &Scene,
 ) -> Option<Scene> {
-    let mut own = scene(walk, &merged(case, table), unchanged.name.clone())?;
-    own.name.clone_from(&unchanged.name);
-    own.case.clone_from(&unchanged.case);
-    for change in changes(walk, table, span, own.loads.len())? {
-        own = own.changed(&change);
+    let mut varied_scene = scene(walk, &merged(case, table), unchanged.name.clone())?;
+    varied_scene.name.clone_from(&unchanged.name);
+    varied_scene.case.clone_from(&unchanged.case);
+    for change in changes(walk, table, span, varied_scene.loads.len())? {
+        varied_scene = varied_scene.changed(&change);
     }
-    if own == *unchanged {
+    if varied_scene == *unchanged {
         walk.wrong(span.clone(), "the variation changes nothing of the scene".to_owned());
         return None;
     }
-    if own.run.duration.is_none() && unchanged.run.duration.is_some() {
+    if varied_scene.run.duration.is_none() && unchanged.run.duration.is_some() {
         walk.wrong(span.clone(), "the variation has no duration, and the scene has one".to_owned());
         return None;
     }
-    Some(own)
+    Some(varied_scene)
 }
 
 /// Reads `turn`, `scale`, `move` and `speed`.
@@ -126,23 +126,23 @@ fn changes(
     loads: usize,
 ) -> Option<Vec<Change>> {
     let mut all = Vec::new();
-    if let Some((own, span)) = walk.table(table, "turn") {
-        walk.known_keys(own, "`turn`", TURN);
-        if !own.contains_key("axis") {
+    if let Some((keys, span)) = walk.table(table, "turn") {
+        walk.known_keys(keys, "`turn`", TURN);
+        if !keys.contains_key("axis") {
             walk.wrong(span.clone(), "key `axis` is missing in `turn`".to_owned());
         }
-        let axis = direction(walk, own, "axis");
-        let degrees = finite(walk, own, "degrees", &span);
-        let load = load(walk, own, loads)?;
+        let axis = direction(walk, keys, "axis");
+        let degrees = finite(walk, keys, "degrees", &span);
+        let load = load(walk, keys, loads)?;
         all.push(Change::Turn { axis: Unit::new_normalize(axis?), angle: degrees?.to_radians(), load });
     }
     if let Some(value) = table.get("scale") {
         all.push(scale(walk, value, loads)?);
     }
-    if let Some((own, span)) = walk.table(table, "move") {
-        walk.known_keys(own, "`move`", MOVE);
-        let load = load(walk, own, loads)?;
-        let to = place(walk, own, span.clone())?;
+    if let Some((keys, span)) = walk.table(table, "move") {
+        walk.known_keys(keys, "`move`", MOVE);
+        let load = load(walk, keys, loads)?;
+        let to = place(walk, keys, span.clone())?;
         match (load, loads) {
             (Some(load), _) => all.push(Change::Move { load, to }),
             (None, 1) => all.push(Change::Move { load: 0, to }),

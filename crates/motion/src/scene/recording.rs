@@ -104,14 +104,14 @@ impl Resolution {
     }
 }
 
-/// Path of a point.
+/// Path of a point of the body. The axes of the model turn with the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     /// Name of the point in the scene.
     pub name: String,
     /// Position at every output time, world axes.
     pub place: Vec<Vector3<f64>>,
-    /// Deflection from the undeformed body, axes of the model.
+    /// Deflection from the undeformed body at every output time, axes of the model (turning with the body).
     pub deflection: Vec<Vector3<f64>>,
     /// Velocity of the position at every output time, world axes.
     pub velocity: Vec<Vector3<f64>>,

@@ -210,8 +210,8 @@ impl Driven {
         Some(Amplitude { energy: energy / root, coordinate, rate, acceleration, energy_rate })
     }
 
-    /// Returns the load on the error that the `dropped` groups cause, for motion within `own`.
-    pub fn residual(&self, dropped: TermGroups, norms: &Norms, own: &Amplitude) -> Vec<LoadSizes> {
+    /// Returns the load on the error that the `dropped` groups cause, for motion within `amplitude`.
+    pub fn residual(&self, dropped: TermGroups, norms: &Norms, amplitude: &Amplitude) -> Vec<LoadSizes> {
         let r = &self.rotation;
         let mut loads = Vec::new();
         if dropped.w1 {
@@ -229,18 +229,19 @@ impl Driven {
         if dropped.w2 {
             // Load of W2: E(w, w) q.
             let (w2, turned) = (r.largest.powi(2), 2.0 * r.largest * r.variation);
-            let moved = product(w2 * r.duration, own.energy_rate) + turned * own.energy;
-            let energy = norms.softening * w2 * own.energy;
-            push(norms.spin * w2 * own.coordinate, energy, norms.softening * moved);
+            let moved = product(w2 * r.duration, amplitude.energy_rate) + turned * amplitude.energy;
+            let energy = norms.softening * w2 * amplitude.energy;
+            push(norms.spin * w2 * amplitude.coordinate, energy, norms.softening * moved);
         }
         if dropped.w3 {
             // Loads of W3: 2 G(w) q', and G(w') q.
             let per_rate = norms.coupling / norms.first;
-            let moved = product(r.largest * r.duration, own.acceleration) + r.variation * own.rate;
-            let force = 2.0 * norms.coupling * r.largest * own.rate;
+            let moved =
+                product(r.largest * r.duration, amplitude.acceleration) + r.variation * amplitude.rate;
+            let force = 2.0 * norms.coupling * r.largest * amplitude.rate;
             push(force, force / norms.first, 2.0 * per_rate * moved);
-            let moved = product(r.jerk, own.coordinate) + r.variation * own.rate;
-            let force = norms.coupling * r.acceleration * own.coordinate;
+            let moved = product(r.jerk, amplitude.coordinate) + r.variation * amplitude.rate;
+            let force = norms.coupling * r.acceleration * amplitude.coordinate;
             push(force, force / norms.first, per_rate * moved);
         }
         loads
@@ -266,10 +267,10 @@ impl Driven {
         })
     }
 
-    /// Returns the missing torque without the `dropped` groups, for motion within `own`.
-    pub fn torque_defect(&self, dropped: TermGroups, norms: &Norms, own: &Amplitude) -> TorqueDefect {
+    /// Returns the missing torque without the `dropped` groups, for motion within `amplitude`.
+    pub fn torque_defect(&self, dropped: TermGroups, norms: &Norms, amplitude: &Amplitude) -> TorqueDefect {
         let (w, turn) = (self.rotation.largest, self.rotation.acceleration + self.rotation.largest.powi(2));
-        let (q, v, a) = (own.coordinate, own.rate, own.acceleration);
+        let (q, v, a) = (amplitude.coordinate, amplitude.rate, amplitude.acceleration);
         let there = |group: bool, torque: f64| if group { torque } else { 0.0 };
         let torque = there(dropped.w1, norms.inertia * (v * w + q * turn))
             + there(dropped.w2, 2.0 * q * v * w + q * q * turn)
@@ -278,25 +279,26 @@ impl Driven {
     }
 
     /// Returns the bound of the error of the driving torque, without the lever arms of loads: the missing torque, and
-    /// the torque of the whole body for the `error` of a motion within `own`.
+    /// the torque of the whole body for the `error` of a motion within `amplitude`.
     pub fn torque_error(
         &self,
         norms: &Norms,
-        own: &Amplitude,
+        amplitude: &Amplitude,
         error: &ErrorBound,
         defect: &TorqueDefect,
     ) -> f64 {
         let r = &self.rotation;
         let (w, turn) = (r.largest, r.acceleration + r.largest.powi(2));
         let (dq, dv) = (error.coordinate, error.rate);
-        let (q, v) = (own.coordinate + dq, own.rate + dv);
+        let (q, v) = (amplitude.coordinate + dq, amplitude.rate + dv);
         let linear = norms.inertia * (dv * w + dq * turn);
         let quadratic = 2.0 * (q * dv + v * dq) * w + 2.0 * q * dq * turn;
         // q'W3 e'' with e'' from the equations of motion; the part Lambda e multiplies W3'q in the norm of stiffness.
         let stiff = product(defect.stiff + product(norms.turning * norms.last, dq), error.energy);
         let rest = product(product(norms.turning, q), error.acceleration_without_stiffness);
-        let coupled =
-            stiff + rest + product(norms.turning, product(dq, own.acceleration) + w * (q * dv + dq * v));
+        let coupled = stiff
+            + rest
+            + product(norms.turning, product(dq, amplitude.acceleration) + w * (q * dv + dq * v));
         defect.torque + linear + quadratic + coupled
     }
 }

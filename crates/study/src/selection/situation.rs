@@ -176,9 +176,9 @@ fn turning_of_run(
             let (least, most) = (principal.min(), principal.max());
             let spin = (start.norm() + torque * duration) / least;
             let source = if scene.loads.is_empty() {
-                "[initial] angular_velocity, of a rigid body"
+                "[initial] angular_velocity (estimate for a rigid body)"
             } else {
-                "[initial] angular_velocity and [[load]], of a rigid body"
+                "[initial] angular_velocity and [[load]] (estimate for a rigid body)"
             };
             // |omega x I omega| is at most (I_max - I_min) |omega|^2.
             let acceleration = ((most - least) * spin * spin + torque) / least;

@@ -48,9 +48,9 @@ pub(crate) fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditC
     let compared = |&(mode, text): &(usize, &str)| {
         let (said, half, radians) = frequency_of(text)?;
         let lambda = (mode < nq).then(|| ke[(mode, mode)] / me[(mode, mode)])?;
-        let own = lambda.sqrt() / if radians { 1.0 } else { TAU };
-        let apart = ((said - own).abs() - half).max(0.0) / own;
-        Some((mode, said / own, if lambda > 0.0 { apart } else { f64::NAN }))
+        let computed = lambda.sqrt() / if radians { 1.0 } else { TAU };
+        let apart = ((said - computed).abs() - half).max(0.0) / computed;
+        Some((mode, said / computed, if lambda > 0.0 { apart } else { f64::NAN }))
     };
     let all: Vec<(usize, f64, f64)> = listed.mode_texts.iter().filter_map(compared).collect();
     let &(mode, ratio, value) = all.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;

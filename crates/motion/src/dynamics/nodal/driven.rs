@@ -60,8 +60,8 @@ impl NodalEvaluation<'_> {
         body.solve(&mut self.vbar, &mut self.first);
         // Right-hand side: missing momenta in the free components, given velocities in the others.
         let missing = momenta - body.onto_frame(&self.u, &self.w);
-        let own = body.given(velocities);
-        let frame = Vector6::from_fn(|k, _| if given[k] { own[k] } else { missing[k] });
+        let given_values = body.given(velocities);
+        let frame = Vector6::from_fn(|k, _| if given[k] { given_values[k] } else { missing[k] });
         let conditions = -sums(&body.conditions, &self.vbar);
         // Multipliers mu and frame motion nu; add C'mu to w and its response to vbar.
         let (mu, nu) = drive.solve(&conditions, &frame)?;
@@ -104,8 +104,8 @@ impl NodalEvaluation<'_> {
 
         // Multipliers and frame accelerations from the missing momentum rates and the given accelerations.
         let missing = wanted - body.onto_frame(&self.u, &self.w_rate);
-        let own = body.given(rates);
-        let frame = Vector6::from_fn(|k, _| if drive.given[k] { own[k] } else { missing[k] });
+        let given_values = body.given(rates);
+        let frame = Vector6::from_fn(|k, _| if drive.given[k] { given_values[k] } else { missing[k] });
         let conditions = -sums(&body.conditions, udd);
         let (lambda, nu) = drive.solve(&conditions, &frame)?;
         self.multipliers = lambda;

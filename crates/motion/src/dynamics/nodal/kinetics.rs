@@ -122,10 +122,10 @@ impl TurnedNodes<'_> {
         self.body.add_turned(1.0, omega, ud, of_points);
         for (place, node) in self.nodes.iter().enumerate() {
             let rate = self.directors.turn_of(place, ud);
-            let own = node.spin(&rate);
+            let spin = node.spin(&rate);
             let drift = node.spin_derivative(&rate) * rate;
             for (row, director) in self.directors_of(place) {
-                let value = drift.cross(&director) + (omega + own).cross(&own.cross(&director));
+                let value = drift.cross(&director) + (omega + spin).cross(&spin.cross(&director));
                 self.put(&mut flow.velocities, row, &value);
             }
         }
@@ -220,10 +220,10 @@ impl TurnedNodes<'_> {
         self.multiply(flow);
         // Add the rotation of the directors themselves.
         for (place, node) in self.nodes.iter().enumerate() {
-            let own = node.spin(&self.directors.turn_of(place, ud));
+            let spin = node.spin(&self.directors.turn_of(place, ud));
             let turned = self
                 .directors_of(place)
-                .map(|(row, d)| own.cross(&d).cross(&self.vector(&state.momenta, row)));
+                .map(|(row, d)| spin.cross(&d).cross(&self.vector(&state.momenta, row)));
             flow.moments[place] += turned.sum::<Vector3<f64>>();
         }
         let mut both = self.gather(flow, w);

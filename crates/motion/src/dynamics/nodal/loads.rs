@@ -13,7 +13,7 @@ impl NodalEvaluation<'_> {
     /// * `gravity`: g, world axes; for a plane body the component along z is ignored. Unit: length/time^2.
     pub fn add_gravity(&mut self, gravity: &Vector3<f64>) {
         let body = self.equations;
-        let own = self.in_body(gravity);
+        let gravity_model = self.in_body(gravity);
         let mass = &body.rigid_mass;
         // R'M R = [m I, -c~; c~, I0]; for a plane body only the last column of c~ exists.
         let mut moment = Vector3::new(mass[(1, 5)], -mass[(0, 5)], mass[(0, 4)]);
@@ -24,13 +24,13 @@ impl NodalEvaluation<'_> {
         if let Some(turned) = &self.turned {
             moment += turned.kinetics.first_moment_of_turns();
         }
-        self.force += own * mass[(0, 0)];
-        self.torque += moment.cross(&own);
+        self.force += gravity_model * mass[(0, 0)];
+        self.torque += moment.cross(&gravity_model);
         let mut translation = Vector6::zeros();
-        translation.fixed_rows_mut::<3>(0).copy_from(&own);
+        translation.fixed_rows_mut::<3>(0).copy_from(&gravity_model);
         add_motion(&body.mass_rigid, 1.0, &translation, &mut self.row_forces[..linear]);
         if let Some(turned) = &self.turned {
-            turned.kinetics.add_weight_of_turns(&own, &mut self.row_forces);
+            turned.kinetics.add_weight_of_turns(&gravity_model, &mut self.row_forces);
         }
     }
 
@@ -42,11 +42,14 @@ impl NodalEvaluation<'_> {
     /// When `i` is not below the number of nodes.
     pub fn add_force(&mut self, i: usize, force: &Vector3<f64>) {
         let d = self.equations.model.dimension();
-        let own = self.in_body(force);
+        let force_model = self.in_body(force);
         let place = self.equations.positions[i] + self.node_vector(&self.u, i);
-        self.force += own;
-        self.torque += place.cross(&own);
-        self.row_forces[d * i..d * (i + 1)].iter_mut().zip(&own).for_each(|(sum, value)| *sum += value);
+        self.force += force_model;
+        self.torque += place.cross(&force_model);
+        self.row_forces[d * i..d * (i + 1)]
+            .iter_mut()
+            .zip(&force_model)
+            .for_each(|(sum, value)| *sum += value);
     }
 
     /// Adds a torque at node `i`, along the axes turned by the rotation vector theta of the node: G(theta)
@@ -60,19 +63,19 @@ impl NodalEvaluation<'_> {
         let rows = self.equations.model.rows();
         let rotations = rows.rotations();
         let first = rotations.partition_point(|&(node, _)| (node as usize) < i);
-        let own = rotations[first..].iter().take_while(|&&(node, _)| node as usize == i);
-        let own: &[(u32, u8)] = &rotations[first..first + own.count()];
-        assert!(!own.is_empty(), "a node with rotations");
+        let of_node = rotations[first..].iter().take_while(|&&(node, _)| node as usize == i);
+        let of_node: &[(u32, u8)] = &rotations[first..first + of_node.count()];
+        assert!(!of_node.is_empty(), "a node with rotations");
         let at = rows.displacements() + first;
         let mut turn = Vector3::zeros();
-        own.iter().zip(&self.u[at..]).for_each(|(&(_, axis), u)| turn[usize::from(axis)] = *u);
+        of_node.iter().zip(&self.u[at..]).for_each(|(&(_, axis), u)| turn[usize::from(axis)] = *u);
         let mut torque = self.axes.tr_mul(torque);
         if self.equations.model.dimension() == 2 {
             (torque.x, torque.y) = (0.0, 0.0);
         }
         self.torque += torque;
         let moment = RotationVector(turn).map() * torque;
-        for (&(_, axis), sum) in own.iter().zip(&mut self.row_forces[at..]) {
+        for (&(_, axis), sum) in of_node.iter().zip(&mut self.row_forces[at..]) {
             *sum += moment[usize::from(axis)];
         }
     }
@@ -95,14 +98,14 @@ impl NodalEvaluation<'_> {
     /// * `force`: along `axes` of the world or of the frame; for a plane body the component along z is
     ///   ignored.
     pub fn add_force_at(&mut self, point: &NodalPoint, force: &Vector3<f64>, axes: LoadAxes) {
-        let mut own = self.along_model(force, axes);
+        let mut force_model = self.along_model(force, axes);
         if self.equations.model.dimension() == 2 {
-            own.z = 0.0;
+            force_model.z = 0.0;
         }
         let place = point.place() - self.equations.frame.origin + point.displacement(&self.u);
-        self.force += own;
-        self.torque += place.cross(&own);
-        self.add_weighted(&point.translation, &own);
+        self.force += force_model;
+        self.torque += place.cross(&force_model);
+        self.add_weighted(&point.translation, &force_model);
     }
 
     /// Adds a torque at a point, along the axes turned by the rotation vector theta of the point:
@@ -111,12 +114,12 @@ impl NodalEvaluation<'_> {
     /// * `torque`: along `axes` of the world or of the frame; for a plane body only the component along z
     ///   is used.
     pub fn add_torque_at(&mut self, point: &NodalPoint, torque: &Vector3<f64>, axes: LoadAxes) {
-        let mut own = self.along_model(torque, axes);
+        let mut torque_model = self.along_model(torque, axes);
         if self.equations.model.dimension() == 2 {
-            (own.x, own.y) = (0.0, 0.0);
+            (torque_model.x, torque_model.y) = (0.0, 0.0);
         }
-        self.torque += own;
-        let moment = RotationVector(point.rotation(&self.u)).map() * own;
+        self.torque += torque_model;
+        let moment = RotationVector(point.rotation(&self.u)).map() * torque_model;
         self.add_weighted(&point.rotation, &moment);
     }
 
@@ -135,8 +138,8 @@ impl NodalEvaluation<'_> {
 
     /// Returns a world vector in model axes, for a plane body in its plane.
     fn in_body(&self, world: &Vector3<f64>) -> Vector3<f64> {
-        let own = self.axes.tr_mul(world);
+        let vector_model = self.axes.tr_mul(world);
         let d = self.equations.model.dimension();
-        Vector3::from_fn(|k, _| if k < d { own[k] } else { 0.0 })
+        Vector3::from_fn(|k, _| if k < d { vector_model[k] } else { 0.0 })
     }
 }

@@ -32,11 +32,11 @@ impl NodalPoint {
         let d = model.dimension();
         let unit = |axis: usize| std::array::from_fn(|k| f64::from(k == axis));
         let rotations = (model.rows().displacements()..).zip(model.rows().rotations());
-        let own = rotations.filter(|(_, (of, _))| *of as usize == node);
+        let of_node = rotations.filter(|(_, (of, _))| *of as usize == node);
         Self {
             place: model.nodes().positions[node].into(),
             translation: (0..d).map(|k| (d * node + k, unit(k))).collect(),
-            rotation: own.map(|(row, &(_, axis))| (row, unit(axis.into()))).collect(),
+            rotation: of_node.map(|(row, &(_, axis))| (row, unit(axis.into()))).collect(),
         }
     }
 
@@ -87,8 +87,8 @@ impl NodalPoint {
         let axes: &[usize] = if d == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
         let mut loads = Mat::zeros(model.rows().len(), axes.len());
         for (column, &axis) in axes.iter().enumerate() {
-            let own = if axis < 3 { &self.translation } else { &self.rotation };
-            own.iter().for_each(|(row, weights)| loads[(*row, column)] = weights[axis % 3]);
+            let point_weights = if axis < 3 { &self.translation } else { &self.rotation };
+            point_weights.iter().for_each(|(row, weights)| loads[(*row, column)] = weights[axis % 3]);
         }
         loads
     }
@@ -97,11 +97,14 @@ impl NodalPoint {
 /// Returns the nonzero rows of `loads`, whose columns are the components from `first` on.
 fn weights(loads: MatRef<'_, f64>, first: usize) -> Weights {
     let row = |i: usize| {
-        let mut own = [0.0; 3];
-        (0..loads.ncols()).for_each(|k| own[first + k] = loads[(i, k)]);
-        (i, own)
+        let mut components = [0.0; 3];
+        (0..loads.ncols()).for_each(|k| components[first + k] = loads[(i, k)]);
+        (i, components)
     };
-    (0..loads.nrows()).map(row).filter(|(_, own)| own.iter().any(|weight| *weight != 0.0)).collect()
+    (0..loads.nrows())
+        .map(row)
+        .filter(|(_, components)| components.iter().any(|weight| *weight != 0.0))
+        .collect()
 }
 
 fn sum(weights: &Weights, u: &[f64]) -> Vector3<f64> {

@@ -15,8 +15,8 @@ impl NodalEvaluation<'_> {
         let Some(turned) = &mut self.turned else { return Ok(()) };
         turned.turn(&self.u, &self.conditions);
         self.vbar.copy_from_slice(&self.w);
-        let own = body.onto_frame(&self.u, &self.w);
-        let nu = given.solve(turned, momenta, &own, &mut self.vbar)?;
+        let resultant = body.onto_frame(&self.u, &self.w);
+        let nu = given.solve(turned, momenta, &resultant, &mut self.vbar)?;
         self.move_frame(&nu);
         if let Some(turned) = &mut self.turned {
             (self.p, self.h) = halves(&turned.kinetics.go(&nu, &self.ud, &mut self.w));
@@ -44,8 +44,8 @@ impl NodalEvaluation<'_> {
         for ((udd, force), drift) in udd.iter_mut().zip(&self.w_rate).zip(&self.first) {
             *udd = force - drift;
         }
-        let own = body.onto_frame(&self.u, udd);
-        let nu = given.solve(turned, &(wanted - drift), &own, udd)?;
+        let resultant = body.onto_frame(&self.u, udd);
+        let nu = given.solve(turned, &(wanted - drift), &resultant, udd)?;
         body.add_frame(-1.0, &nu, &self.u, udd);
         body.massless.project(body.stiffness(), udd, &mut self.workspace);
 
