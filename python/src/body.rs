@@ -1,15 +1,17 @@
 //! Methods of flexible bodies, and functions that read and list them.
 
-use crate::arrays::{by_node, matrix, matrix3, triples, vector};
+use crate::arrays::{Given, by_node, matrix, matrix3, triples, vector};
 use crate::body_class::Body;
 use crate::equations::EquationsOfMotion;
 use crate::errors::{diagnostics, exception, warn};
+use crate::model::Model;
 use crate::report::{loads, report};
 use crate::scene::{Motion, Scene, Selection};
 use crate::trade::{Trade, options as trade_options};
 use crate::work::{alone, brief, run};
-use flexbody::{FlexBody, Matrix};
-use numpy::PyArray1;
+use flexbody::{FlexBody, Matrix, MotionHistory};
+use numpy::{AllowTypeChange, PyArray1, PyArrayLike2};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::path::PathBuf;
@@ -371,6 +373,37 @@ impl Body {
         Motion::with_warnings(py, run(py, move |listener| body.simulate_with_progress(&scene, listener))?)
     }
 
+    /// Measures the errors of a run of this body in a scene by another program. `history` is the path of a table with the
+    /// columns time, q_1 to q_n and attitude_0 to attitude_3, or a tuple of time (nt), q (nt x nf) and attitude (nt x 4, or
+    /// None). The reference is the motion of `reference`, a body with more modes of `model`, or of this body itself.
+    ///
+    /// Returns the report of `flexbody measure` as a dict.
+    #[pyo3(signature = (scene, history, *, reference=None, model=None))]
+    fn measure<'py>(
+        &self,
+        py: Python<'py>,
+        scene: &Bound<'py, PyAny>,
+        history: &Bound<'py, PyAny>,
+        reference: Option<&Bound<'py, Self>>,
+        model: Option<&Bound<'py, Model>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (scene, body) = (Scene::one(py, scene)?, Arc::clone(&self.inner));
+        let history = motion_history(py, history, self.inner.n_modes())?;
+        let reference = match (reference, model) {
+            (Some(reference), Some(model)) => {
+                Some((Arc::clone(&reference.get().inner), model.get().shared()))
+            }
+            (None, None) => None,
+            _ => return Err(PyValueError::new_err("`reference` and `model` belong together")),
+        };
+        let run = run(py, move |listener| {
+            let reference = reference.as_ref().map(|(body, model)| (&**body, &**model));
+            body.measure(&scene, &history, reference, listener)
+        })?;
+        warn(py, run.diagnostics())?;
+        report(py, "dict", |format| run.report(format))
+    }
+
     /// Measures accuracy against cost in a scene for reduced versions of this body. `Model.trade` compares conversions.
     #[pyo3(signature = (scene, *, repeat=3))]
     fn trade(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, repeat: usize) -> PyResult<Trade> {
@@ -392,6 +425,26 @@ impl Body {
         let name = self.inner.name();
         format!("<flexbody.Body {name:?}: {nodes} nodes, {modes} modes, {first:.6} to {last:.6} Hz>")
     }
+}
+
+/// Returns the history that a caller gives: the path of a table, or a tuple of time, q and attitude or None.
+fn motion_history(py: Python<'_>, given: &Bound<'_, PyAny>, n_modes: usize) -> PyResult<MotionHistory> {
+    type Rows<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+    let history = match given.extract::<(Given<'_>, Rows<'_>, Option<Rows<'_>>)>() {
+        Ok((time, q, attitude)) => {
+            let rows = |rows: &Rows<'_>| -> Vec<Vec<f64>> {
+                rows.as_array().rows().into_iter().map(|row| row.to_vec()).collect()
+            };
+            let four = |row: Vec<f64>| {
+                <[f64; 4]>::try_from(row)
+                    .map_err(|_| PyValueError::new_err("`attitude` does not have four columns"))
+            };
+            let attitude = attitude.map(|all| rows(&all).into_iter().map(four).collect()).transpose()?;
+            MotionHistory::new(time.as_array().to_vec(), rows(&q), attitude)
+        }
+        Err(_) => MotionHistory::read(given.extract::<PathBuf>()?, n_modes),
+    };
+    history.map_err(|error| exception(py, &error))
 }
 
 /// Reads a flex-body file.

@@ -116,6 +116,11 @@ fn convert_options(
 }
 
 impl Model {
+    /// Returns the model for work on another thread.
+    pub fn shared(&self) -> Arc<flexbody::Model> {
+        Arc::clone(&self.inner)
+    }
+
     fn with_warnings(py: Python<'_>, inner: flexbody::Model) -> PyResult<Self> {
         warn(py, inner.diagnostics())?;
         Ok(Self { inner: Arc::new(inner) })

@@ -108,6 +108,12 @@ impl Selection {
         diagnostics(py, self.inner.diagnostics())
     }
 
+    /// Returns the command that makes exactly the selected body from the flex-body file that was judged. None if the body
+    /// was made with the selection.
+    fn command(&self, body: &str) -> Option<String> {
+        self.inner.command(body)
+    }
+
     /// Returns the report of `flexbody select`: a dict with all numbers, or "json", "text", "html" as a str.
     #[pyo3(signature = (form="dict"))]
     fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {

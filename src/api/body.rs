@@ -236,7 +236,8 @@ impl FlexBody {
     /// # Errors
     /// The errors of [`FlexBody::select`]; FB605 if the listener stops it.
     pub fn select_with_progress(&self, scene: &Scene, listener: Listener<'_>) -> Result<Selection> {
-        heard(listener, |context| select(&self.0, &[], &scene.0, context)).map(Selection)
+        heard(listener, |context| select(&self.0, &[], &scene.0, context))
+            .map(|inner| Selection { inner, is_of_body: true })
     }
 
     /// Returns the body with some of its modes and groups of terms, like `flexbody reduce`.

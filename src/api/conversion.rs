@@ -159,7 +159,7 @@ impl Model {
         let tailoring = Tailoring { settings, by_band, of_motion: options.basis == Basis::Scene };
         let (conversion, selection) =
             heard(listener, |context| convert_for(&self.checked, &tailoring, &scene.0, context))?;
-        Ok((accepted(conversion)?, Selection(selection)))
+        Ok((accepted(conversion)?, Selection { inner: selection, is_of_body: false }))
     }
 }
 

@@ -40,7 +40,7 @@ impl FlexBody {
 impl Selection {
     /// Returns the report of `flexbody select`.
     pub fn report(&self, format: ReportFormat) -> String {
-        SelectionFacts::new(&self.0, &run(self.diagnostics())).render(format.inner())
+        SelectionFacts::new(&self.inner, &run(self.diagnostics())).render(format.inner())
     }
 }
 

@@ -3,6 +3,7 @@
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_motion::scene::LoadCases;
+use flexbody_study::recipe::{Origin, selected_from_file};
 use flexbody_study::selection;
 use std::path::Path;
 
@@ -48,26 +49,37 @@ impl Scene {
 
 /// Terms and modes that a body needs in a scene.
 #[derive(Debug, Clone)]
-pub struct Selection(pub(super) selection::Selection);
+pub struct Selection {
+    pub(super) inner: selection::Selection,
+    /// True if it was made for a body; false if the body was made for it.
+    pub(super) is_of_body: bool,
+}
 
 impl Selection {
     /// Returns the indices of the kept modes (from 0).
     pub fn modes(&self) -> &[usize] {
-        &self.0.modes
+        &self.inner.modes
     }
 
     /// Returns the groups of the kinetic energy: name, whether it is kept, and the reason.
     pub fn groups(&self) -> Vec<(&'static str, bool, &str)> {
-        self.0.terms.iter().map(|term| (term.group.name(), term.kept, term.reason.as_str())).collect()
+        self.inner.terms.iter().map(|term| (term.group.name(), term.kept, term.reason.as_str())).collect()
     }
 
     /// Returns true if the tolerances of the scene hold, as far as they were measured.
     pub fn holds(&self) -> bool {
-        self.0.holds()
+        self.inner.holds()
+    }
+
+    /// Returns the command that makes exactly the selected body from the flex-body file `body` that was judged. Returns
+    /// `None` for a selection of [`Model::convert_for`](crate::Model::convert_for), which has made the body.
+    pub fn command(&self, body: &str) -> Option<String> {
+        let origin = Origin { input: vec![body.to_owned()], scene: String::new(), case: None };
+        self.is_of_body.then(|| selected_from_file(&self.inner, &origin))
     }
 
     /// Returns warnings and notes.
     pub fn diagnostics(&self) -> &[Diagnostic] {
-        &self.0.diagnostics
+        &self.inner.diagnostics
     }
 }

@@ -6,11 +6,10 @@ use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::context;
 use super::watcher::Watcher;
-use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_linalg::context::Event;
-use flexbody_motion::scene::{LoadCases, MotionHistory, Scene};
+use flexbody_motion::scene::{LoadCases, MotionHistory};
 use flexbody_report::{Format, MeasuredRunFacts, RunData};
 use flexbody_study::measured_run::measured_run;
 
@@ -21,7 +20,7 @@ pub(super) fn run(arguments: &MeasureArguments) -> Result<Outcome> {
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let cases = LoadCases::read(&arguments.scene, arguments.case.as_deref())?;
-    let scene = only_case(&cases)?;
+    let scene = cases.single()?;
     let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     let history = MotionHistory::read(&arguments.history, body.n_modes())?;
     let reference = match arguments.reference.as_ref().zip(arguments.model.as_ref()) {
@@ -49,16 +48,4 @@ pub(super) fn run(arguments: &MeasureArguments) -> Result<Outcome> {
     OutputSlot::commit_all(reports)?;
     let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: measured.holds() })
-}
-
-/// Returns the only load case of a scene.
-fn only_case(cases: &LoadCases) -> Result<&Scene> {
-    let mut all = cases.iter();
-    match (all.next(), all.next()) {
-        (Some(scene), None) => Ok(scene),
-        _ => {
-            let message = format!("the scene has {} load cases, and a run belongs to one", cases.len());
-            Err(Diagnostic::new(Code::Usage, message).with_help("name it with --case").into())
-        }
-    }
 }

@@ -57,6 +57,11 @@ pub fn measured_run(
             .with_help("give `duration` in [run]")
     })?;
     let history = history.covering(duration)?;
+    if history.q.iter().any(|q| q.len() != body.n_modes()) {
+        let message = format!("the history does not have {} modal coordinates at every time", body.n_modes());
+        let help = "give the history of a run with this body";
+        return Err(Diagnostic::new(Code::BodyIncomparable, message).with_help(help).into());
+    }
     let shared = reference.map(|(whole, model)| beside(body, whole, model)).transpose()?;
     let whole = reference.map_or(body, |(whole, _)| whole);
     // The extremes belong to the continuous motion, the comparison to the instants of the history.
