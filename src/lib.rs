@@ -116,8 +116,9 @@ mod cli;
 
 pub use api::{
     Accuracy, Basis, BodyFrame, Conversion, ConvertOptions, Coupling, FlexBody, FrameChoice,
-    GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, Matrix, MeasuredRun, Model, ModelBuilder,
-    Motion, MotionHistory, PointPath, Progress, ReportFormat, Scene, Selection, SourceFile, SparseMatrix,
+    GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, Matrix, MeasuredRun, Model,
+    ModelBuilder, Motion, MotionHistory, PointPath, Progress, ReportFormat, Scene, Selection, SourceFile,
+    SparseMatrix,
 };
 #[cfg(feature = "hdf5")]
 pub use api::{ReferenceChoice, Trade, TradeOptions};

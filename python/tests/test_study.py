@@ -61,15 +61,15 @@ def test_the_command_of_a_selection(bracket_body: flexbody.Body, scene: Path) ->
 
 def test_a_run_of_another_program(bracket_body: flexbody.Body, scene: Path, tmp_path: Path) -> None:
     motion = bracket_body.simulate(scene)
-    exact = bracket_body.measure(scene, (motion.time, motion.q, motion.attitude))
+    exact = bracket_body.measure(scene, (motion.time, motion.modal_coordinates, motion.attitude))
     assert exact["holds"] and exact["worst"] < 1e-6
-    wrong = bracket_body.measure(scene, (motion.time, 1.1 * motion.q, None))
+    wrong = bracket_body.measure(scene, (motion.time, 1.1 * motion.modal_coordinates, None))
     assert not wrong["holds"] and wrong["errors"]["attitude"] is None
     assert wrong["errors"]["stress"] == pytest.approx(0.1, rel=1e-6)
     table = tmp_path / "run.csv"
     table.write_text(motion.csv())
     assert bracket_body.measure(scene, table)["worst"] == pytest.approx(exact["worst"], abs=1e-9)
     with pytest.raises(flexbody.InputError, match="FB217"):
-        bracket_body.measure(scene, (2 * motion.time, motion.q, None))
+        bracket_body.measure(scene, (2 * motion.time, motion.modal_coordinates, None))
     with pytest.raises(ValueError, match="belong together"):
         bracket_body.measure(scene, table, reference=bracket_body)

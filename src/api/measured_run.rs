@@ -32,7 +32,9 @@ impl MotionHistory {
         let count = time.len();
         let refused = |message: &str| Err(Diagnostic::new(Code::Usage, message).into());
         if q.len() != count || attitude.as_ref().is_some_and(|rows| rows.len() != count) {
-            return refused("a history needs modal coordinates, and an attitude if one is given, for every time");
+            return refused(
+                "a history needs modal coordinates, and an attitude if one is given, for every time",
+            );
         }
         if count < 2 || !time.windows(2).all(|pair| pair[0] < pair[1]) {
             return refused("a history needs two or more ascending times");

@@ -480,7 +480,7 @@ mod tests {
     fn what_is_wrong_is_told_where_it_stands() {
         for (text, time, value, line, message) in [
             ("t,Fx\n0,1\n1,2\n", "t", "fy", 1, "there is no column `fy`"),
-            ("t,F,F\n0,1,2\n1,2,3\n", "t", "F", 1, "columns 2 and 3 are both `F`"),
+            ("t,F,F\n0,1,2\n1,2,3\n", "t", "F", 1, "columns 2 and 3 are both named `F`"),
             ("t,F\n0,1\n1,2\n", "t", "3", 1, "there is no column 3: the file has 2"),
             ("0,1\n1,2\n", "1", "F", 1, "there is no column `F`: the columns have no names"),
             ("t;F\n0;1,5\n1;2,5\n", "t", "F", 2, "`1,5` in column `F` has a decimal comma"),
