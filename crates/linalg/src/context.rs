@@ -55,7 +55,7 @@ impl WorkCounter {
 /// ```
 /// use flexbody_linalg::context::{Context, WorkCounter};
 /// let counter = WorkCounter::default();
-/// let context = Context { memory: Some(2_000_000_000), ..Context::QUIET }.counted_by(&counter);
+/// let context = Context { memory: Some(2_000_000_000), ..Context::QUIET }.with_counter(&counter);
 /// context.count(|work| work.solved_columns += 4);
 /// assert_eq!(counter.total().solved_columns, 4);
 /// ```
