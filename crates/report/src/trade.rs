@@ -23,17 +23,47 @@ use flexbody_study::trade::{
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Columns of the Pareto front in a text.
-const IN_TEXT: [&str; 8] = [
-    "No.",
-    "Candidate",
-    "Multiplications",
-    "File",
-    "Error / tolerance",
-    "Step accuracy",
-    "Simulation",
-    "Error / tolerance of the run",
+/// Heading of a column, and its cell for a measured candidate.
+type Column = (&'static str, fn(&MeasuredFacts<'_>) -> Inline);
+
+/// Error of a body, for the choice among candidates.
+const WORST: Column = ("Error / tolerance", |own| significant(own.worst, 3).into());
+/// Cost of a body.
+const COSTS: [Column; 2] = [
+    ("Multiplications", |own| own.multiplications.to_string().into()),
+    ("File", |own| bytes(own.file_bytes).into()),
 ];
+/// Errors of a body.
+const ERRORS: [Column; 4] = [
+    ("Attitude (rad)", |own| number(own.errors.attitude)),
+    ("Deflection", |own| number(own.errors.deflection)),
+    ("Stress", |own| number(own.errors.stress)),
+    ("Reaction", |own| number(own.errors.reaction)),
+];
+/// Cheapest run within the tolerances.
+const RUN: [Column; 5] = [
+    ("Step accuracy", |own| own.accuracy.clone().unwrap_or_else(none).into()),
+    ("Simulation", |own| own.seconds.integration.map_or_else(none, duration).into()),
+    (OF_THE_RUN, |own| number(own.runs.iter().map(|run| run.worst).max_by(f64::total_cmp))),
+    ("Steps", |own| own.steps.map_or_else(none, |steps| steps.to_string()).into()),
+    ("Evaluation", |own| own.seconds.evaluation.map_or_else(none, short).into()),
+];
+const OF_THE_RUN: &str = "Error / tolerance of the run";
+const PREPROCESSING: Column =
+    ("Preprocessing", |own| own.seconds.preprocessing.map_or_else(none, duration).into());
+const WORST_CASE: Column = ("Worst case", |own| own.case.unwrap_or_default().to_owned().into());
+
+/// Columns that a page shows and a text does not.
+const NOT_IN_TEXT: [&str; 4] = ["Basis", "Up to (Hz)", "Steps", "Evaluation"];
+
+/// Returns the sign for a quantity that is not known.
+fn none() -> String {
+    "\u{2013}".to_owned()
+}
+
+fn number(value: Option<f64>) -> Inline {
+    value.map_or_else(none, |value| significant(value, 3)).into()
+}
 
 /// Meaning of the timed runs.
 const RUNS: &str = "errors are those of the body, with the steps of the reference; the candidates of the front are also run \
@@ -236,29 +266,6 @@ impl<'a> MeasuredFacts<'a> {
     }
 }
 
-impl MeasuredFacts<'_> {
-    /// Returns the cells of the table of candidates; with `several` sources a cell with the preprocessing
-    /// time is added.
-    fn cells(&self, several: bool) -> Vec<Inline> {
-        let none = || "\u{2013}".to_owned();
-        let number = |value: Option<f64>| value.map_or_else(none, |value| significant(value, 3));
-        let mut row = cells([self.multiplications.to_string(), bytes(self.file_bytes)]);
-        row.extend(several.then(|| self.seconds.preprocessing.map_or_else(none, duration).into()));
-        row.extend(cells(self.errors.named().map(|(_, error)| number(error))));
-        let run_worst = self.runs.iter().map(|run| run.worst).max_by(f64::total_cmp);
-        row.extend(cells([
-            significant(self.worst, 3),
-            self.accuracy.clone().unwrap_or_else(none),
-            self.seconds.integration.map_or_else(none, duration),
-            number(run_worst),
-            self.steps.map_or_else(none, |steps| steps.to_string()),
-            self.seconds.evaluation.map_or_else(none, short),
-        ]));
-        row.extend(self.case.map(Inline::from));
-        row
-    }
-}
-
 impl<'a> RowFacts<'a> {
     fn new(number: usize, row: &'a TradeRow, cases: &'a [TradeCase]) -> Self {
         let candidate = &row.candidate;
@@ -412,12 +419,18 @@ impl<'a> TradeFacts<'a> {
         }
         blocks.push(heading("Error against cost"));
         blocks.extend(self.chart().map(Block::Chart));
-        let front =
-            self.table("Candidates for which no other is both cheaper and more accurate", &self.shown());
-        let front = Block::Table(front.in_text(|head| IN_TEXT.contains(&head)));
+        let case = (!self.cases.is_empty()).then_some(WORST_CASE);
+        let of_runs: Vec<Column> = COSTS.into_iter().chain([WORST]).chain(RUN).chain(case).collect();
+        let caption = "Candidates for which no other is both cheaper and more accurate";
+        let front = self.table(caption, &self.shown(), &of_runs);
+        let front = Block::Table(front.in_text(|head| !NOT_IN_TEXT.contains(&head)));
         blocks.extend([Block::Gap, heading("Pareto front"), front, Block::Gap]);
-        let all = self
-            .table("All candidates in the order of their simulation", &self.rows.iter().collect::<Vec<_>>());
+        // A body read from a file is the only source, and the time of its preprocessing is unknown.
+        let preprocessing = self.has_several_sources().then_some(PREPROCESSING);
+        let of_bodies = COSTS.into_iter().chain(preprocessing).chain(ERRORS).chain([WORST]).chain(case);
+        let every_row: Vec<_> = self.rows.iter().collect();
+        let caption = "All candidates in the order of their simulation";
+        let all = self.table(caption, &every_row, &of_bodies.collect::<Vec<_>>());
         blocks.extend([heading("All candidates"), Block::Table(all), Block::Terms(self.work())]);
         blocks.push(Block::Diagnostics(self.diagnostics));
         Document { name: self.scene, kind: "Trade study", generator: &self.generator, blocks }
@@ -507,24 +520,23 @@ impl<'a> TradeFacts<'a> {
         Some(Chart { title, x, panels: vec![Panel { caption: String::new(), y, height: 330.0, series }] })
     }
 
-    fn table(&self, caption: &str, rows: &[&RowFacts<'a>]) -> Table {
-        // A body read from a file is the only source, and the time of its preprocessing is unknown.
-        let several = self.rows.iter().any(|row| row.source != self.rows[0].source);
+    fn has_several_sources(&self) -> bool {
+        self.rows.iter().any(|row| row.source != self.rows[0].source)
+    }
+
+    fn table(&self, caption: &str, rows: &[&RowFacts<'a>], columns: &[Column]) -> Table {
+        let several = self.has_several_sources();
         let mut heads = vec!["No.", "Candidate"];
         heads.extend(several.then_some("Basis"));
-        heads.extend(["Up to (Hz)", "Multiplications", "File"]);
-        heads.extend(several.then_some("Preprocessing"));
-        heads.extend(["Attitude (rad)", "Deflection", "Stress", "Reaction", "Error / tolerance"]);
-        heads.extend(["Step accuracy", "Simulation", "Error / tolerance of the run", "Steps", "Evaluation"]);
-        heads.extend((!self.cases.is_empty()).then_some("Worst case"));
+        heads.push("Up to (Hz)");
+        heads.extend(columns.iter().map(|column| column.0));
         let row = |row: &&RowFacts<'a>| {
             let taken = if self.recommended == Some(row.number) { ">\u{a0}" } else { "" };
-            let mut row_cells =
-                cells([format!("{taken}{}", row.number), row.in_words().replace(' ', "\u{a0}")]);
+            let mut row_cells = cells([format!("{taken}{}", row.number), row.in_words()]);
             row_cells.extend(several.then(|| row.source.into()));
             row_cells.push(significant(row.last_frequency_hz, 5).into());
             match (&row.measured, row.failed) {
-                (Some(measured), _) => row_cells.extend(measured.cells(several)),
+                (Some(measured), _) => row_cells.extend(columns.iter().map(|column| (column.1)(measured))),
                 (None, failed) => {
                     let message = failed.map_or("", |diagnostic| diagnostic.message());
                     row_cells.push(Span::Error(message.to_owned()).into());
