@@ -52,13 +52,13 @@ TORQUE = "Coriolis torque"
 OF_ROTATION = ("W1 Q", "Q'W2 Q", "Q'W3", TORQUE)
 
 
-def write_beam(folder):
-    """The slender beam as a model with both ends as interfaces; its manifest."""
-    x, k, m = hexahedra(BEAM_CELLS, lambda lattice: lattice / np.array(BEAM_CELLS) * np.array(BEAM_SIZE))
+def write_beam(folder, size=BEAM_SIZE, cells=BEAM_CELLS):
+    """Writes a beam along x as a model with both ends as interfaces; returns its manifest."""
+    x, k, m = hexahedra(cells, lambda lattice: lattice / np.array(cells) * np.array(size))
     save(folder / "K.mtx", k)
     save(folder / "M.mtx", np.kron(m, np.eye(3)))
     (folder / "nodes.csv").write_text("node,x,y,z\n" + "".join(f"{i + 1},{a!r},{b!r},{c!r}\n" for i, (a, b, c) in enumerate(x.tolist())))
-    ends = {"left": x[:, 0] < 1e-9, "right": x[:, 0] > BEAM_SIZE[0] - 1e-9}
+    ends = {"left": x[:, 0] < 1e-9, "right": x[:, 0] > size[0] - 1e-9}
     lines = ['[model]\nname = "slender_beam"\n[model.units]\nlength = "m"\nmass = "kg"\ntime = "s"', '[files]\nstiffness = "K.mtx"\nmass = "M.mtx"\nnodes = "nodes.csv"']
     lines += [f'[[interface]]\nname = "{name}"\nnodes = {(np.flatnonzero(among) + 1).tolist()}' for name, among in ends.items()]
     (folder / "model.toml").write_text("\n".join(lines) + "\n")
