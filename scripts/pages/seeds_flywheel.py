@@ -95,8 +95,10 @@ class Case:
     def simulate(self, program, folder):
         """Errors of the guidelines in a tumble with the first mode bent, and the distance of all terms from `flexbody simulate`."""
         body = self.body
+        self.frequency = float(np.sqrt(body.eigenvalue[0]) / (2 * np.pi))
         rate = float(np.sqrt(body.eigenvalue[0]))
         largest = float(np.linalg.norm(body.shape[0], axis=1).max())
+        self.products = products(body, DEFLECTION * LENGTH / largest)
         spin = SPEED * rate * np.array(AXIS) / np.linalg.norm(AXIS)
         path = folder / "scene.toml"
         path.write_text(
@@ -109,6 +111,13 @@ class Case:
         own *= np.sign((own * whole[:4]).sum(axis=0))
         q = np.array([rows[f"q_{j + 1}"] for j in range(body.nf)])
         self.agree = max(np.abs(own - whole[:4]).max(), np.abs(q - whole[7:7 + body.nf]).max() / np.abs(q).max())
+
+
+def products(body, amplitude):
+    """The largest product of inertia of W1 Q over the smaller of the two moments, with the first mode bent."""
+    changed = np.abs(body.W1.reshape(3, 3, body.nf)[:, :, 0]) * amplitude
+    moments = np.diag(body.I0)
+    return max(float(changed[k, l] / min(moments[k], moments[l])) for k, l in ((0, 1), (1, 2), (0, 2)))
 
 
 class Study:

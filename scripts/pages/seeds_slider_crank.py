@@ -4,6 +4,7 @@ Both flexible bodies are reduced to the same groups by `flexbody reduce --terms`
 same groups, driven by the attitude and the joint forces of this run, has to find the same deflections.
 """
 
+import itertools
 import resource
 import time
 import warnings
@@ -11,7 +12,7 @@ import warnings
 import h5py
 import numpy as np
 
-from seeds_mechanism import CRANK, DAMPING, ROD, SPEED, WHEEL, apart, settled
+from seeds_mechanism import CRANK, DAMPING, ROD, WHEEL, apart, settled
 
 warnings.filterwarnings("ignore", category=DeprecationWarning)  # settings of Exudyn under their older names
 
@@ -19,6 +20,7 @@ CRANK_SIZE, CRANK_CELLS = (CRANK, 0.02, 0.02), (6, 1, 1)
 MODES = {"crank": 8, "rod": 16}
 BLOCK = 1.0  # kg
 SETS = ("none", "W1", "W2", "W3", "W1,W2", "W1,W3", "W2,W3", "all")
+SPEEDS = (60.0, 120.0)  # rad/s
 TURNS, STEPS, RUNS = 1.0, 1000, 3
 
 
@@ -53,8 +55,8 @@ def added(system, part, **start):
     return made
 
 
-def in_exudyn(crank, rod, steps):
-    """Returns the seconds of the processor, and the recorded values at the ends of the steps by their names."""
+def in_exudyn(crank, rod, speed, steps):
+    """Returns the seconds of the processor, and the recorded values at the ends of the steps by their names; raises an error where Exudyn stops."""
     import exudyn as exu
     import exudyn.itemInterface as item
 
@@ -69,9 +71,9 @@ def in_exudyn(crank, rod, steps):
         return system.AddMarker(item.MarkerBodyRigid(bodyNumber=body))
 
     # At the start all parts lie along x and are undeformed: the pin rises, the block is at rest.
-    wheel, block = rigid_body(1.0, WHEEL, [0, 0, 0], SPEED), rigid_body(BLOCK, 1.0, [CRANK + ROD, 0, 0], 0.0)
-    made_crank = added(system, crank, positionRef=[CRANK / 2, 0, 0], initialVelocity=[0, CRANK / 2 * SPEED, 0], initialAngularVelocity=[0, 0, SPEED])
-    made_rod = added(system, rod, positionRef=[CRANK + ROD / 2, 0, 0], initialVelocity=[0, CRANK / 2 * SPEED, 0], initialAngularVelocity=[0, 0, -CRANK / ROD * SPEED])
+    wheel, block = rigid_body(1.0, WHEEL, [0, 0, 0], speed), rigid_body(BLOCK, 1.0, [CRANK + ROD, 0, 0], 0.0)
+    made_crank = added(system, crank, positionRef=[CRANK / 2, 0, 0], initialVelocity=[0, CRANK / 2 * speed, 0], initialAngularVelocity=[0, 0, speed])
+    made_rod = added(system, rod, positionRef=[CRANK + ROD / 2, 0, 0], initialVelocity=[0, CRANK / 2 * speed, 0], initialAngularVelocity=[0, 0, -CRANK / ROD * speed])
 
     def end(kind, made, part, name, **more):
         nodes, weights = part.ends[name]
@@ -96,7 +98,7 @@ def in_exudyn(crank, rod, steps):
     system.Assemble()
     settings = exu.SimulationSettings()
     integration = settings.timeIntegration
-    integration.numberOfSteps, integration.endTime = steps, TURNS * 2 * np.pi / SPEED
+    integration.numberOfSteps, integration.endTime = steps, TURNS * 2 * np.pi / speed
     integration.verboseMode, integration.adaptiveStep = 0, False
     integration.generalizedAlpha.spectralRadius = 0.9
     integration.newton.useModifiedNewton = True
@@ -109,15 +111,21 @@ def in_exudyn(crank, rod, steps):
 
 
 class Run:
-    """The mechanism with one set of groups."""
+    """The mechanism with one set of groups at one speed."""
 
-    def __init__(self, program, whole, terms, folder):
-        self.terms, self.seconds = terms, []
-        self.parts = {name: Part(program, path, name, terms, folder) for name, path in whole.items()}
+    def __init__(self, parts, terms, speed):
+        self.parts, self.terms, self.speed, self.seconds = parts, terms, speed, []
 
     def once(self, steps=STEPS):
-        """Runs once more, and keeps the seconds if the number of steps is that of the study."""
-        seconds, recorded = in_exudyn(self.parts["crank"], self.parts["rod"], steps)
+        """Runs once more; keeps the results if the number of steps is that of the study. `stops` is true if Exudyn finds no solution."""
+        import exudyn as exu
+
+        try:
+            seconds, recorded = in_exudyn(self.parts["crank"], self.parts["rod"], self.speed, steps)
+        except exu.SolverError:
+            self.stops = True
+            return None
+        self.stops = False
         if steps == STEPS:
             self.seconds.append(seconds)
             self.recorded = recorded
@@ -150,19 +158,31 @@ class Run:
 
 
 class Study:
-    """All sets of groups; the last one has all terms, and is what the others are compared with."""
+    """All sets of groups at all speeds; the last set has all terms, and is what the others are compared with."""
 
     def __init__(self, program, manifests, folder):
         whole = {name: folder / f"{name}.flex.h5" for name in MODES}
         for name, path in whole.items():
             program.convert(manifests[name], path, MODES[name], "--frame", "com")
-        self.runs = [Run(program, whole, terms, folder) for terms in SETS]
+        parts = {terms: {name: Part(program, path, name, terms, folder) for name, path in whole.items()} for terms in SETS}
+        self.runs = {speed: [Run(parts[terms], terms, speed) for terms in SETS] for speed in SPEEDS}
         for _ in range(RUNS):
-            for run in self.runs:
+            for run in itertools.chain(*self.runs.values()):
                 run.once()
-        self.reference = self.runs[-1]
-        for run in self.runs:
+        for run in self.runs[SPEEDS[0]]:
             run.simulate(program, folder)
-        halved = self.reference.once(2 * STEPS)
-        at = np.searchsorted(halved["rod"][:, 0], self.reference.recorded["rod"][:, 0] - 1e-12).clip(max=len(halved["rod"]) - 1)
-        self.halved = apart((halved["rod"][:, 1:] @ self.reference.parts["rod"].shape)[at], self.reference.deflections["rod"])
+        slow = self.runs[SPEEDS[0]][-1]
+        halved = slow.once(2 * STEPS)
+        at = np.searchsorted(halved["rod"][:, 0], slow.recorded["rod"][:, 0] - 1e-12).clip(max=len(halved["rod"]) - 1)
+        self.in_mbdyn = None
+        self.halved = apart((halved["rod"][:, 1:] @ slow.parts["rod"].shape)[at], slow.deflections["rod"])
+        self.coupled = {speed: coupled_moment(whole["rod"], runs[-1].recorded["rod"][:, 1:]) for speed, runs in self.runs.items()}
+        self.first = {name: float(np.sqrt(part.eigenvalue[0]) / (2 * np.pi)) for name, part in parts["all"].items()}
+
+
+def coupled_moment(path, q):
+    """The largest moment about x that the inertia coupling Q'W3 takes from the rotation, (Q'W3 W3'Q)_xx, over (I0)_xx: above 1 the mass matrix without Q'W2 Q is not positive definite."""
+    with h5py.File(path) as file:
+        inertia, w3 = file["invariants/I0"][()], file["invariants/W3"][()]
+    rows = q @ w3[: q.shape[1]]
+    return float((rows**2).sum(axis=1).max() / inertia[0, 0])
