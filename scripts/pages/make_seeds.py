@@ -34,8 +34,10 @@ DEFLECTION = 0.01
 DEFLECTIONS = (0.001, DEFLECTION)
 SPEEDS = (0.002, 0.02, 0.1)
 NEGLIGIBLE = 0.05
-# Entries smaller than this beside the largest of their array are zeros that rounding has changed.
-ROUNDING = 1e-9
+# Entries smaller than this beside the largest of their array are zeros that the precision of the modes has changed.
+ROUNDING = 1e-6
+# Modes of Table 4, each of which moves a node by DEFLECTION.
+EQUAL_MODES = 10
 BODIES = [
     ("rod", "connecting_rod", "connecting rod, quadratic tetrahedra"),
     ("car body", "car_frame", "space frame of a car body, beams"),
@@ -116,10 +118,18 @@ class Body:
         return np.einsum("kij,i->kj", np.abs(self.W3.reshape(3, self.nf, self.nf)), self.amplitude)
 
     def deformed_inertia(self):
-        """The largest entries, and the means of the entries that are not zero, of W1 Q and Q'W2 Q (3 x 3), with the amplitudes of all modes and the signs of their shapes."""
-        linear = np.abs(np.einsum("abj,j->ab", self.W1.reshape(3, 3, self.nf), self.amplitude))
-        quadratic = np.abs(np.einsum("i,aibj,j->ab", self.amplitude, self.W2.reshape(3, self.nf, 3, self.nf), self.amplitude))
-        return [(a.max(), nonzero(a).mean()) for a in (linear, quadratic)]
+        """The largest entries of W1 Q and Q'W2 Q (3 x 3) with the amplitudes of all modes, and the signs of their shapes."""
+        linear = np.einsum("abj,j->ab", self.W1.reshape(3, 3, self.nf), self.amplitude)
+        quadratic = np.einsum("i,aibj,j->ab", self.amplitude, self.W2.reshape(3, self.nf, 3, self.nf), self.amplitude)
+        return np.abs(linear).max(), np.abs(quadratic).max()
+
+    def table_4(self):
+        """Means of the terms of an entry of W1 Q and of Q'W2 Q that are not zero, times their numbers n and n^2, with n modes that each move a node by DEFLECTION."""
+        n = EQUAL_MODES
+        amplitude = DEFLECTION * self.extent / self.largest[:n]
+        linear = self.W1.reshape(3, 3, self.nf)[:, :, :n] * amplitude
+        quadratic = np.einsum("i,aibj,j->aibj", amplitude, self.W2.reshape(3, self.nf, 3, self.nf)[:, :n, :, :n], amplitude)
+        return n * nonzero(linear).mean(), n**2 * nonzero(quadratic).mean()
 
     def coupled(self):
         """(37) to (39): what the modal mass 1 of every mode loses by the Schur complement, all modes being bent with one sign each that is worst."""
@@ -218,9 +228,9 @@ def linear_and_quadratic(bodies):
     """Table 4: the quadratic inertia beside the linear one."""
     rows = []
     for body in bodies:
-        (linear, linear_mean), (quadratic, quadratic_mean) = body.deformed_inertia()
-        rows.append([body.name, *map(number, (linear, quadratic, quadratic / linear, linear_mean, quadratic_mean, quadratic_mean / linear_mean))])
-    return table(["body", "largest of W1 Q", "of Q'W2 Q", "ratio", "mean of W1 Q", "of Q'W2 Q", "ratio"], rows)
+        equal, falling = body.table_4(), body.deformed_inertia()
+        rows.append([body.name, *map(number, (*equal, equal[1] / equal[0], *falling, falling[1] / falling[0]))])
+    return table(["body", "Table 4: W1 Q", "Q'W2 Q", "ratio", "falling amplitudes: W1 Q", "Q'W2 Q", "ratio"], rows)
 
 
 def averaged(bodies):
@@ -297,7 +307,7 @@ def main():
         wheels = seeds_flywheel.Study(program, folder)
     version = program.run("--version").split()[-1]
     chosen, count = guidelines(bodies, sizes)
-    settings = {"DEFLECTION": f"{100 * DEFLECTION:g} %", "NEGLIGIBLE": f"{100 * NEGLIGIBLE:g} %", "SPEED": SPEEDS[-1], "ROUNDING": f"{ROUNDING:g}"}
+    settings = {"DEFLECTION": f"{100 * DEFLECTION:g} %", "NEGLIGIBLE": f"{100 * NEGLIGIBLE:g} %", "SPEED": SPEEDS[-1], "ROUNDING": f"{ROUNDING:g}", "EQUAL": EQUAL_MODES}
     tables = {"INVARIANTS": invariants(bodies), "RATIOS": ratios(bodies, sizes), "AVERAGED": averaged(bodies), "MODES": per_mode(bodies), "GUIDELINES": chosen, "QUADRATIC": linear_and_quadratic(bodies)}
     motions = seeds_claims.words(bodies, sizes, wheels, terms)
     args.output.write_text(seeds_text.page(bodies, sizes, {**tables, **motions}, count, mechanism, seeds_mechanism, settings, version), encoding="utf-8")

@@ -114,7 +114,7 @@ class Run:
     """The mechanism with one set of groups at one speed."""
 
     def __init__(self, parts, terms, speed):
-        self.parts, self.terms, self.speed, self.seconds = parts, terms, speed, []
+        self.parts, self.terms, self.speed, self.seconds, self.simulating = parts, terms, speed, [], []
 
     def once(self, steps=STEPS):
         """Runs once more; keeps the results if the number of steps is that of the study. `stops` is true if Exudyn finds no solution."""
@@ -137,8 +137,11 @@ class Run:
         deflections = [apart(self.deflections[name], reference.deflections[name]) for name in ("rod", "crank")]
         return [*deflections, settled(self.recorded["pin force"][:, 1:], reference.recorded["pin force"][:, 1:])]
 
+    def simulated_seconds(self):
+        return float(np.median(self.simulating))
+
     def simulate(self, program, folder):
-        """Drives the rod by the attitude and the joint forces of this run in `flexbody simulate`: sets the distance of the deflections and the seconds of the processor."""
+        """Drives the rod by the attitude and the joint forces of this run in `flexbody simulate`: sets the distance of the deflections and notes the seconds of the processor."""
         recorded, rod = self.recorded, self.parts["rod"]
         rows = np.column_stack([recorded["attitude"][:, 0], recorded["attitude"][:, 4:8] + [1, 0, 0, 0], -recorded["pin force"][:, 1:], -recorded["block force"][:, 1:]])
         rows[:, 1:5] /= np.linalg.norm(rows[:, 1:5], axis=1)[:, None]
@@ -152,7 +155,7 @@ class Run:
         begin = resource.getrusage(resource.RUSAGE_CHILDREN)
         program.run("simulate", rod.path, "--scene", folder / "run.toml", "-o", folder / "run.h5", "--quiet")
         end = resource.getrusage(resource.RUSAGE_CHILDREN)
-        self.simulated_seconds = end.ru_utime + end.ru_stime - begin.ru_utime - begin.ru_stime
+        self.simulating.append(end.ru_utime + end.ru_stime - begin.ru_utime - begin.ru_stime)
         with h5py.File(folder / "run.h5") as file:
             self.simulated = apart(file[f"points/node {rod.middle}/deflection"][()], self.deflections["rod"])
 
@@ -169,8 +172,9 @@ class Study:
         for _ in range(RUNS):
             for run in itertools.chain(*self.runs.values()):
                 run.once()
-        for run in self.runs[SPEEDS[0]]:
-            run.simulate(program, folder)
+        for _ in range(RUNS):
+            for run in self.runs[SPEEDS[0]]:
+                run.simulate(program, folder)
         slow = self.runs[SPEEDS[0]][-1]
         halved = slow.once(2 * STEPS)
         at = np.searchsorted(halved["rod"][:, 0], slow.recorded["rod"][:, 0] - 1e-12).clip(max=len(halved["rod"]) - 1)
