@@ -21,6 +21,7 @@ import numpy as np
 
 import seeds_claims
 import seeds_flywheel
+import seeds_mbdyn
 import seeds_mechanism
 import seeds_slider_crank
 import seeds_text
@@ -287,6 +288,7 @@ def main():
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
     parser.add_argument("--output", type=Path, default=ROOT / "docs/validation/seeds.md")
+    parser.add_argument("--mbdyn", help="MBDyn of 2024 or later: the slider-crank is run in it too")
     args = parser.parse_args()
     program = Program(args.program)
     with tempfile.TemporaryDirectory() as scratch:
@@ -304,12 +306,13 @@ def main():
         (folder / "crank").mkdir()
         crank = write_beam(folder / "crank", seeds_slider_crank.CRANK_SIZE, seeds_slider_crank.CRANK_CELLS)
         terms = seeds_slider_crank.Study(program, {"rod": beam, "crank": crank}, folder)
+        in_mbdyn = seeds_mbdyn.Study(args.mbdyn, program, terms.parts, folder) if args.mbdyn else None
         wheels = seeds_flywheel.Study(program, folder)
     version = program.run("--version").split()[-1]
     chosen, count = guidelines(bodies, sizes)
     settings = {"DEFLECTION": f"{100 * DEFLECTION:g} %", "NEGLIGIBLE": f"{100 * NEGLIGIBLE:g} %", "SPEED": SPEEDS[-1], "ROUNDING": f"{ROUNDING:g}", "EQUAL": EQUAL_MODES}
     tables = {"INVARIANTS": invariants(bodies), "RATIOS": ratios(bodies, sizes), "AVERAGED": averaged(bodies), "MODES": per_mode(bodies), "GUIDELINES": chosen, "QUADRATIC": linear_and_quadratic(bodies)}
-    motions = seeds_claims.words(bodies, sizes, wheels, terms)
+    motions = seeds_claims.words(bodies, sizes, wheels, terms, in_mbdyn)
     args.output.write_text(seeds_text.page(bodies, sizes, {**tables, **motions}, count, mechanism, seeds_mechanism, settings, version), encoding="utf-8")
     print(args.output)
 

@@ -178,7 +178,7 @@ class Study:
         slow = self.runs[SPEEDS[0]][-1]
         halved = slow.once(2 * STEPS)
         at = np.searchsorted(halved["rod"][:, 0], slow.recorded["rod"][:, 0] - 1e-12).clip(max=len(halved["rod"]) - 1)
-        self.in_mbdyn = None
+        self.parts = parts
         self.halved = apart((halved["rod"][:, 1:] @ slow.parts["rod"].shape)[at], slow.deflections["rod"])
         self.coupled = {speed: coupled_moment(whole["rod"], runs[-1].recorded["rod"][:, 1:]) for speed, runs in self.runs.items()}
         self.first = {name: float(np.sqrt(part.eigenvalue[0]) / (2 * np.pi)) for name, part in parts["all"].items()}
