@@ -60,9 +60,10 @@ def shapes(xi):
     return np.array(values), np.array(gradients)
 
 
-def hexahedra(cells, place, young=210e9, poisson=0.3, density=7850.0):
-    """Positions, K (dense) and scalar mass of a body of steel; `place` takes points of the lattice (n x 3, in elements) to where they are."""
-    elements = [[tuple(2 * c + 1 + s for c, s in zip(cell, node)) for node in NODES] for cell in itertools.product(*map(range, cells))]
+def hexahedra(cells, place, young=210e9, poisson=0.3, density=7850.0, is_filled=lambda cell: True):
+    """Positions, K (dense) and scalar mass of a body of steel; `place` takes points of the lattice (n x 3, in elements) to where they are, `is_filled` is true for the cells of the body."""
+    filled = filter(is_filled, itertools.product(*map(range, cells)))
+    elements = [[tuple(2 * c + 1 + s for c, s in zip(cell, node)) for node in NODES] for cell in filled]
     number = {place: i for i, place in enumerate(sorted({place for element in elements for place in element}))}
     lattice = np.array(sorted(number)) / 2
     x = place(lattice)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes docs/validation/seeds.md: how large the invariants and the terms of the equations of motion are on six bodies, and a body with 90 modes in a multibody run.
+"""Writes docs/validation/seeds.md: how large the invariants and the terms of the equations of motion are on six bodies, and motions with and without terms.
 
     python3 -m venv target/peers && target/peers/bin/pip install exudyn==1.13.6 h5py numpy scipy
     cargo build --release --locked
@@ -19,7 +19,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+import seeds_claims
+import seeds_flywheel
+import seeds_mbdyn
 import seeds_mechanism
+import seeds_slider_crank
 import seeds_text
 from make_cutoff import hexahedra, save
 
@@ -31,6 +35,10 @@ DEFLECTION = 0.01
 DEFLECTIONS = (0.001, DEFLECTION)
 SPEEDS = (0.002, 0.02, 0.1)
 NEGLIGIBLE = 0.05
+# Entries smaller than this beside the largest of their array are zeros that the precision of the modes has changed.
+ROUNDING = 1e-6
+# Modes of Table 4, each of which moves a node by DEFLECTION.
+EQUAL_MODES = 10
 BODIES = [
     ("rod", "connecting_rod", "connecting rod, quadratic tetrahedra"),
     ("car body", "car_frame", "space frame of a car body, beams"),
@@ -52,13 +60,13 @@ TORQUE = "Coriolis torque"
 OF_ROTATION = ("W1 Q", "Q'W2 Q", "Q'W3", TORQUE)
 
 
-def write_beam(folder):
-    """The slender beam as a model with both ends as interfaces; its manifest."""
-    x, k, m = hexahedra(BEAM_CELLS, lambda lattice: lattice / np.array(BEAM_CELLS) * np.array(BEAM_SIZE))
+def write_beam(folder, size=BEAM_SIZE, cells=BEAM_CELLS):
+    """Writes a beam along x as a model with both ends as interfaces; returns its manifest."""
+    x, k, m = hexahedra(cells, lambda lattice: lattice / np.array(cells) * np.array(size))
     save(folder / "K.mtx", k)
     save(folder / "M.mtx", np.kron(m, np.eye(3)))
     (folder / "nodes.csv").write_text("node,x,y,z\n" + "".join(f"{i + 1},{a!r},{b!r},{c!r}\n" for i, (a, b, c) in enumerate(x.tolist())))
-    ends = {"left": x[:, 0] < 1e-9, "right": x[:, 0] > BEAM_SIZE[0] - 1e-9}
+    ends = {"left": x[:, 0] < 1e-9, "right": x[:, 0] > size[0] - 1e-9}
     lines = ['[model]\nname = "slender_beam"\n[model.units]\nlength = "m"\nmass = "kg"\ntime = "s"', '[files]\nstiffness = "K.mtx"\nmass = "M.mtx"\nnodes = "nodes.csv"']
     lines += [f'[[interface]]\nname = "{name}"\nnodes = {(np.flatnonzero(among) + 1).tolist()}' for name, among in ends.items()]
     (folder / "model.toml").write_text("\n".join(lines) + "\n")
@@ -102,11 +110,31 @@ class Body:
         """(28): integral of ufl^2 + ufm^2 over that of u0l^2 + u0m^2."""
         return max_over_axes(lambda k: np.diag(self.diagonal(self.W2, k)) * self.amplitude**2 / self.I0[k, k])
 
+    def coupling(self):
+        """(36): the block Q'W3 beside the diagonal blocks I0 and I of the mass matrix, all modes being bent with the signs that are worst."""
+        return max_over_axes(lambda k: self.coupling_rows()[k] / np.sqrt(self.I0[k, k]))
+
+    def coupling_rows(self):
+        """|Q|'|W3| (3 x nf)."""
+        return np.einsum("kij,i->kj", np.abs(self.W3.reshape(3, self.nf, self.nf)), self.amplitude)
+
+    def deformed_inertia(self):
+        """The largest entries of W1 Q and Q'W2 Q (3 x 3) with the amplitudes of all modes, and the signs of their shapes."""
+        linear = np.einsum("abj,j->ab", self.W1.reshape(3, 3, self.nf), self.amplitude)
+        quadratic = np.einsum("i,aibj,j->ab", self.amplitude, self.W2.reshape(3, self.nf, 3, self.nf), self.amplitude)
+        return np.abs(linear).max(), np.abs(quadratic).max()
+
+    def table_4(self):
+        """Means of the terms of an entry of W1 Q and of Q'W2 Q that are not zero, times their numbers n and n^2, with n modes that each move a node by DEFLECTION."""
+        n = EQUAL_MODES
+        amplitude = DEFLECTION * self.extent / self.largest[:n]
+        linear = self.W1.reshape(3, 3, self.nf)[:, :, :n] * amplitude
+        quadratic = np.einsum("i,aibj,j->aibj", amplitude, self.W2.reshape(3, self.nf, 3, self.nf)[:, :n, :, :n], amplitude)
+        return n * nonzero(linear).mean(), n**2 * nonzero(quadratic).mean()
+
     def coupled(self):
         """(37) to (39): what the modal mass 1 of every mode loses by the Schur complement, all modes being bent with one sign each that is worst."""
-        blocks = self.W3.reshape(3, self.nf, self.nf)
-        rows = np.einsum("kij,i->kj", np.abs(blocks), self.amplitude)
-        return (rows**2 / np.diag(self.I0)[:, None]).sum(axis=0)
+        return (self.coupling_rows()**2 / np.diag(self.I0)[:, None]).sum(axis=0)
 
     def coriolis_torque(self, scale):
         """(W1 Qd + Q'W2 Qd + Qd'W2 Q) w beside I0 w Omega_1, whatever the signs: the rate at which the inertia changes, largest over the axes; with `scale` times the amplitudes."""
@@ -130,6 +158,12 @@ class Body:
 
 
 SI = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "kg": 1.0, "g": 1e-3, "t": 1e3, "tonne": 1e3, "s": 1.0, "ms": 1e-3, "us": 1e-6}
+
+
+def nonzero(array):
+    """The magnitudes above the rounding of the largest."""
+    magnitudes = np.abs(array).ravel()
+    return magnitudes[magnitudes > ROUNDING * magnitudes.max()]
 
 
 def max_over_axes(of_axis):
@@ -178,8 +212,8 @@ def invariants(bodies):
     for body in bodies:
         for name in ("I0", "W1", "W2", "W3"):
             a = getattr(body, name)
-            rows.append([body.name if name == "I0" else "", name, number(np.abs(a).max()), number(np.abs(a).mean()), number(np.linalg.norm(a)), number(np.mean(np.abs(a) > 0.01 * np.abs(a).max()))])
-    return table(["body", "array", "largest entry", "mean of the magnitudes", "Frobenius norm", "part of the entries above 1 % of the largest"], rows)
+            rows.append([body.name if name == "I0" else "", name, number(np.abs(a).max()), number(nonzero(a).mean()), number(np.linalg.norm(a)), number(nonzero(a).size / a.size), number(np.mean(np.abs(a) > 0.01 * np.abs(a).max()))])
+    return table(["body", "array", "largest entry", "mean of the nonzero entries", "Frobenius norm", "part that is not zero", "part of the entries above 1 % of the largest"], rows)
 
 
 def ratios(bodies, sizes):
@@ -189,6 +223,15 @@ def ratios(bodies, sizes):
     for term, (_, guideline) in sizes[bodies[0].name].items():
         rows.append([term, guideline] + [number(sizes[body.name][term][0]) for body in bodies])
     return table(head, rows)
+
+
+def linear_and_quadratic(bodies):
+    """Table 4: the quadratic inertia beside the linear one."""
+    rows = []
+    for body in bodies:
+        equal, falling = body.table_4(), body.deformed_inertia()
+        rows.append([body.name, *map(number, (*equal, equal[1] / equal[0], *falling, falling[1] / falling[0]))])
+    return table(["body", "Table 4: W1 Q", "Q'W2 Q", "ratio", "falling amplitudes: W1 Q", "Q'W2 Q", "ratio"], rows)
 
 
 def averaged(bodies):
@@ -204,8 +247,9 @@ def per_mode(bodies):
     head = ["body", "measure"] + [f"{j}" for j in range(1, 9)] + ["largest of 9 to 20", "bound (40)"]
     rows = []
     for body in bodies:
-        for name, values in (("(27), linear", body.linear()), ("(28), quadratic", body.quadratic()), ("(37) to (39), coupling", body.coupled())):
-            coupling = name.endswith("coupling")
+        measures = (("(27), linear", body.linear()), ("(28), quadratic", body.quadratic()), ("(36), coupling", body.coupling()), ("(38), (39), loss of modal mass", body.coupled()))
+        for name, values in measures:
+            coupling = name.startswith("(38)")
             assert not coupling or values.max() <= body.coupling_bound(), body.name
             rows.append([body.name if name.startswith("(27)") else "", name] + [number(v) if v > 1e-9 else "0" for v in values[:8]] + [number(values[8:].max()), number(body.coupling_bound()) if coupling else ""])
     return table(head, rows)
@@ -244,6 +288,7 @@ def main():
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
     parser.add_argument("--output", type=Path, default=ROOT / "docs/validation/seeds.md")
+    parser.add_argument("--mbdyn", help="MBDyn of 2024 or later: the slider-crank is run in it too")
     args = parser.parse_args()
     program = Program(args.program)
     with tempfile.TemporaryDirectory() as scratch:
@@ -258,11 +303,17 @@ def main():
                 sizes[name, deflection, speed] = program.significance(bodies[-1], deflection, speed, folder)
             sizes[name] = sizes[name, DEFLECTION, SPEEDS[-1]]
         mechanism = seeds_mechanism.Study(program, beam, folder)
+        (folder / "crank").mkdir()
+        crank = write_beam(folder / "crank", seeds_slider_crank.CRANK_SIZE, seeds_slider_crank.CRANK_CELLS)
+        terms = seeds_slider_crank.Study(program, {"rod": beam, "crank": crank}, folder)
+        in_mbdyn = seeds_mbdyn.Study(args.mbdyn, program, terms.parts, folder) if args.mbdyn else None
+        wheels = seeds_flywheel.Study(program, folder)
     version = program.run("--version").split()[-1]
     chosen, count = guidelines(bodies, sizes)
-    settings = {"DEFLECTION": f"{100 * DEFLECTION:g} %", "NEGLIGIBLE": f"{100 * NEGLIGIBLE:g} %", "SPEED": SPEEDS[-1]}
-    tables = {"INVARIANTS": invariants(bodies), "RATIOS": ratios(bodies, sizes), "AVERAGED": averaged(bodies), "MODES": per_mode(bodies), "GUIDELINES": chosen}
-    args.output.write_text(seeds_text.page(bodies, sizes, tables, count, mechanism, seeds_mechanism, settings, version), encoding="utf-8")
+    settings = {"DEFLECTION": f"{100 * DEFLECTION:g} %", "NEGLIGIBLE": f"{100 * NEGLIGIBLE:g} %", "SPEED": SPEEDS[-1], "ROUNDING": f"{ROUNDING:g}", "EQUAL": EQUAL_MODES}
+    tables = {"INVARIANTS": invariants(bodies), "RATIOS": ratios(bodies, sizes), "AVERAGED": averaged(bodies), "MODES": per_mode(bodies), "GUIDELINES": chosen, "QUADRATIC": linear_and_quadratic(bodies)}
+    motions = seeds_claims.words(bodies, sizes, wheels, terms, in_mbdyn)
+    args.output.write_text(seeds_text.page(bodies, sizes, {**tables, **motions}, count, mechanism, seeds_mechanism, settings, version), encoding="utf-8")
     print(args.output)
 
 

@@ -21,8 +21,8 @@ nodal rotations, so that its arrays are those of [theory, section 6](../theory.m
 
 ## The invariants ([WP19] Tables 2 and 3)
 
-I0 is 3 x 3 (kg m^2), W1 3 x 60 (kg^(1/2) m), W2 60 x 60 and W3 60 x 20 (numbers without units). Largest and mean are of the magnitudes of the entries, zeros included; the norm is the root of the sum of their
-squares.
+I0 is 3 x 3 (kg m^2), W1 3 x 60 (kg^(1/2) m), W2 60 x 60 and W3 60 x 20 (numbers without units). Largest and mean are of the magnitudes of the entries; entries below @ROUNDING@ of the largest are zeros, and not in the mean. The norm is
+the root of the sum of the squares.
 
 @INVARIANTS@
 Conclusion: no entry of W2 or W3 can exceed 1, whatever the body is, and the largest ones of W2 are between @W2LEAST@ and 1 here: the size of these arrays says little about their importance. W1 differs from body to body, mainly
@@ -40,6 +40,13 @@ their own frequencies: about each axis the sum over the modes of the magnitudes,
 Conclusion: at a deflection of @DEFLECTION@ the linear inertia is less than a tenth of I0, and the quadratic terms are smaller by another order. The slender beam is the exception that the paper studies: bending moves its mass away from an axis about which it has hardly
 any inertia, and @BEAM@ of the moment about that axis is quadratic. The Coriolis force of the modes is the largest force on them nearly everywhere, since it is of the first order in omega / Omega_1 and the centrifugal loads that grow with q are of the second; the plate
 hardly has one, its W3 being small. A ratio is no error: a term that is small beside another may be all that drives a slow motion ([trade.md](trade.md)).
+
+The quadratic inertia beside the linear one, in kg m^2. Table 4: means of the terms of an entry that are not zero, times the number of terms, with @EQUAL@ modes that each move a node by @DEFLECTION@ of the extent; beside it the largest entries with
+the amplitudes of all modes that the [modes below](#significance-of-every-mode-wp19-27-28-36-to-40) have, which fall like 1 / lambda:
+
+@QUADRATIC@
+Conclusion: the paper finds the quadratic inertia two to three orders of magnitude below the linear one. Here it is @TABLE_LEAST@ to @TABLE_MOST@ of it, and @TABLE_BEAM@ times as large for the slender beam; with falling amplitudes @FALLING_LEAST@ to @FALLING_MOST@, and @FALLING_BEAM@ times.
+The ratio is in proportion to the deflection.
 
 ## Averaged deflections ([WP19] (19) to (22))
 
@@ -65,13 +72,13 @@ The first mode moves a node by @DEFLECTION@ of the largest extent, mode p has la
 \\frac{\\int u_{fl}^2 + u_{fm}^2 \\, dm}{\\int u_{0l}^2 + u_{0m}^2 \\, dm} = \\frac{(W_2)_{kk,pp}\\, q_p^2}{(I_0)_{kk}} \\quad (28)
 ```
 
-and of the inertia coupling (36), by which rotation takes modal mass away (the Schur complement (37) as corrected), the loss of the diagonal entry p,
+The inertia coupling (36) is the block Q'W3 of the mass matrix beside its diagonal blocks I0 and I. By it rotation takes modal mass away (the Schur complement (37) as corrected); (38) and (39) are the loss of the diagonal entry p:
 
 ```math
-I - W_3^T Q\\, I_0^{-1} Q^T W_3, \\qquad 1 - m^*_{pp} = \\sum_k \\frac{(Q^T W_3)_{kp}^2}{(I_0)_{kk}} = \\sum_k \\frac{1}{(I_0)_{kk}} \\Big( \\int \\psi_{m,p}\\, u_{fl} - \\psi_{l,p}\\, u_{fm} \\, dm \\Big)^2 \\quad (37) - (39)
+\\frac{\\lvert (Q^T W_3)_{kp} \\rvert}{\\sqrt{(I_0)_{kk}}} \\quad (36), \\qquad I - W_3^T Q\\, I_0^{-1} Q^T W_3, \\qquad 1 - m^*_{pp} = \\sum_k \\frac{(Q^T W_3)_{kp}^2}{(I_0)_{kk}} = \\sum_k \\frac{1}{(I_0)_{kk}} \\Big( \\int \\psi_{m,p}\\, u_{fl} - \\psi_{l,p}\\, u_{fm} \\, dm \\Big)^2 \\quad (37) - (39)
 ```
 
-with the signs of all other amplitudes such that it is largest. It is at most the sum of |q|^2 / I_k over the three axes, (40). Values below 1e-9 are shown as 0.
+with the signs of all other amplitudes such that both are largest, and (36) about the axis where it is. The loss is at most the sum of |q|^2 / I_k over the three axes, (40). Values below 1e-9 are shown as 0.
 
 @MODES@
 Conclusion: with amplitudes that fall like 1 / lambda a few modes make all of the inertia terms; from the ninth on none is above @LATE@. Modes that bend a straight body have no linear term, since
@@ -90,6 +97,15 @@ frequency): it grows with the square of the speed beside elastic forces that do 
 slender beam needs everything then, since its moment about its own axis is that of its bending. A body that needs W1 Q mostly needs the Coriolis torque of the same W1 too, since the angular
 momentum balances the change of inertia: a group of the kinetic energy is needed or not needed as a whole. These are conservative sizes. `select` measures the effect of a term on a given motion: compare the [errors of the guidelines](trade.md#guidelines-i-to-iv) in scenes of these bodies.
 
+## A beam with a flywheel
+
+@FLYWHEEL@
+## A slider-crank with and without terms ([WP19] section 9)
+
+@SLIDER_CRANK@
+## Claims of the paper
+
+@CLAIMS@
 ## Ninety modes in a multibody run
 
 The slender beam with up to 90 free modes as the connecting rod of a slider-crank in Exudyn: the crank (@CRANK@ m) is a heavy wheel that turns with @OMEGA@ rad/s, a ball joint holds one end of the rod on its pin, the other end slides along a
@@ -117,7 +133,13 @@ def sentences(bodies, sizes, count):
     mean = local.averaged()[0]
     small, large = sorted({key[1] for key in count})
     slow, middle, fast = sorted({key[2] for key in count})
+    ratios = {}
+    for name, of in (("TABLE", type(bodies[0]).table_4), ("FALLING", type(bodies[0]).deformed_inertia)):
+        own = {body.name: of(body)[1] / of(body)[0] for body in bodies}
+        beam = own.pop("slender beam")
+        ratios |= {f"{name}_LEAST": f"{min(own.values()):.2g}", f"{name}_MOST": f"{max(own.values()):.2g}", f"{name}_BEAM": f"{beam:.3g}"}
     return {
+        **ratios,
         "W2LEAST": f"{min(w2):.2g}", "W1LEAST": f"{min(w1):.2g}", "W1MOST": f"{max(w1):.2g}", "LATE": percent(late),
         "LOCAL": f"mode {mean.argmin() + 1} of the {local.name}: {percent(mean.min())}",
         "SLOW": count[True, small, slow].count("I"), "SECOND": count[True, small, middle].count("II"), "FAST": count[True, large, fast].count("IV"),

@@ -9,13 +9,18 @@ import h5py
 import numpy as np
 from scipy.integrate import solve_ivp
 
-# What a guideline keeps: of the inertia matrix, the coupling of rotation and modes, the load on the modes, Coriolis.
+# Terms that each guideline keeps. Loads and forces are in the rows of the modes, torques in the rows of the rotation.
+# In the normal case of IV, W1 Qd omega is the only Coriolis term in the rows of the rotation: "IV normal" keeps the Coriolis
+# force on the modes beside it, "IV rotation" does not. "IV" keeps all terms, as slender free bodies need.
+SOFT = {"load", "W1Q", "load W2Q"}
 GUIDELINES = {
     "I": set(),
     "II": {"load"},
-    "III": {"load", "W1Q", "load W2Q"},
-    "III free": {"load", "W1Q", "load W2Q", "QW2Q", "QW3"},
-    "IV": {"load", "W1Q", "load W2Q", "QW2Q", "QW3", "coriolis"},
+    "III": SOFT,
+    "III free": SOFT | {"QW2Q", "QW3"},
+    "IV rotation": SOFT | {"torque W1Qd"},
+    "IV normal": SOFT | {"torque W1Qd", "force W3Qd"},
+    "IV": SOFT | {"QW2Q", "QW3", "torque W1Qd", "torque W2Qd", "force W3Qd"},
 }
 
 
@@ -166,8 +171,10 @@ class Motion:
             inertia += (self.w1 @ q).reshape(3, 3)
         if "QW2Q" in kept:
             inertia += (w2q @ q).reshape(3, 3)
-        if "coriolis" in kept:
-            inertia_rate = (self.w1 @ qd + w2q @ qd + (self.w2 @ qd).reshape(9, nf) @ q).reshape(3, 3)
+        if "torque W1Qd" in kept:
+            inertia_rate += (self.w1 @ qd).reshape(3, 3)
+        if "torque W2Qd" in kept:
+            inertia_rate += (w2q @ qd + (self.w2 @ qd).reshape(9, nf) @ q).reshape(3, 3)
         coupling = (self.w3_transposed @ q).reshape(3, nf) if "QW3" in kept else np.zeros((3, nf))  # Q'W3
         load = np.zeros(nf)
         if "load" in kept:
@@ -175,7 +182,7 @@ class Motion:
         if "load W2Q" in kept:
             load += squares @ w2q
         force = load - body.eigenvalue * q - self.damping * qd
-        if "coriolis" in kept:
+        if "force W3Qd" in kept:
             force += 2 * w @ (self.w3 @ qd).reshape(3, nf)
         torque = np.zeros(3)
         axes = rotation_matrix(e)
