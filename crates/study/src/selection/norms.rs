@@ -108,6 +108,17 @@ impl Norms {
     }
 }
 
+/// Returns |e'W1 Q f| over |q|, by which modes change the moment of inertia about e (e = f) or a product of inertia;
+/// `None` if W1 is not held.
+///
+/// The load l(w) = W1'w w / 2 is a quadratic form in w, so that e'W1 Q f = (l(e + f) - l(e) - l(f))'q.
+pub(super) fn change_of_inertia(invariants: &Invariants, e: &Vector3<f64>, f: &Vector3<f64>) -> Option<f64> {
+    let load = CentrifugalLoad::new(invariants)?;
+    let (both, first, second) = (load.at(&(e + f)), load.at(e), load.at(f));
+    let squares = both.iter().zip(first.iter().zip(&second)).map(|(b, (e, f))| (b - e - f).powi(2));
+    Some(squares.sum::<f64>().sqrt())
+}
+
 /// Returns the smallest and the largest circular frequency.
 fn ends(eigenvalues: &[f64]) -> (f64, f64) {
     let root = |value: f64| value.max(0.0).sqrt();

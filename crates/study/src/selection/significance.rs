@@ -1,10 +1,10 @@
 //! Significance of every term of the equations of motion for a body and a scene: dimensionless (\[WP19\] eq. 28 and 36
 //! to 40, as corrected in the theory, section 11), and with the invariants of the body.
 
-use super::norms::Norms;
+use super::norms::{Norms, change_of_inertia};
 use super::situation::Situation;
 use flexbody_body::flex_body::{FlexBody, TermGroup};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Size of a term relative to the term that it is compared with.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,7 +122,8 @@ pub(super) fn largest_significances(cases: impl Iterator<Item = Vec<Significance
 }
 
 /// Returns the significance of all terms at the largest amplitudes and rates of a situation, for rotation about its
-/// axis or, if it has none, about the principal axis of inertia with the largest value.
+/// axis or, if it has none, about the principal axis of inertia with the largest value. The change W1 Q of the inertia of
+/// a body without such an axis includes the products of inertia, relative to the geometric mean of both moments.
 ///
 /// Symbols: eta = |q| / sqrt(e'I0 e); Omega_1 is the first circular frequency of the body (of the assembly for Coriolis
 /// forces); w and alpha are the largest angular velocity and acceleration.
@@ -146,8 +147,21 @@ pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance
     };
     // Largest value over the axes, at tier 0 and tier 1.
     let bound = largest(&|axis| Some(Norms::of_rigid(&invariants.inertia(), eigenvalues, Some(axis))));
-    let bound = bound.unwrap_or([f64::INFINITY; 8]);
-    let own = largest(&|axis| Norms::of_invariants(invariants, eigenvalues, Some(axis)));
+    let mut bound = bound.unwrap_or([f64::INFINITY; 8]);
+    let mut of_body = largest(&|axis| Norms::of_invariants(invariants, eigenvalues, Some(axis)));
+    // Modes may change products of inertia and no moment of inertia.
+    let rigid = invariants.inertia();
+    let about = |inertia: &Matrix3<f64>, axis: &Vector3<f64>| axis.dot(&(inertia * axis));
+    for (at, e) in axes.iter().enumerate() {
+        for f in &axes[at + 1..] {
+            let relative = situation.amplitude.value
+                / (about(&situation.inertia, e) * about(&situation.inertia, f)).sqrt();
+            bound[0] = bound[0].max((about(&rigid, e).sqrt() + about(&rigid, f).sqrt()) * relative);
+            if let Some((own, change)) = of_body.as_mut().zip(change_of_inertia(invariants, e, f)) {
+                own[0] = own[0].max(change * relative);
+            }
+        }
+    }
     let significance = |(i, term): (usize, Term)| Significance {
         term: term.name,
         beside: term.beside,
@@ -155,7 +169,7 @@ pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance
         group: term.group,
         guideline: term.guideline,
         bound: bound[i],
-        of_body: own.filter(|_| i < WITHOUT_NORM).map(|own| own[i]),
+        of_body: of_body.filter(|_| i < WITHOUT_NORM).map(|own| own[i]),
     };
     TERMS.into_iter().enumerate().map(significance).collect()
 }

@@ -1,8 +1,11 @@
 //! Advice for ranges of motion: limits of small and large motion, the formula of an attached mass, and covariance.
 
 use flexbody_body::flex_body::TermGroups;
+use flexbody_body::invariants::BodyFrame;
 use flexbody_study::advice::{Advice, AttachedMass, Ranges, advise};
-use oracle::flexible::soft_block;
+use oracle::elements::{ElementKind, MassRule, Material};
+use oracle::flexible::{body_of, soft_block};
+use oracle::mesh::Mesh;
 
 fn ranges(spin_hz: f64) -> Ranges {
     Ranges { spin_hz, deflection: None, attached: None, is_rotation_given: true, limit: 0.05 }
@@ -62,4 +65,30 @@ fn an_attached_mass_reduces_the_terms_beside_the_inertia() {
         assert!(advise(&body, ranges(wrong)).is_err());
         assert!(advise(&body, Ranges { limit: wrong, ..ranges(1.0) }).is_err());
     }
+}
+
+/// A bent beam with a wheel at its end changes a product of inertia and no moment of inertia.
+#[test]
+fn changes_of_products_of_inertia_count() {
+    let shaft = (0..8).map(|x| [x, 0, 0]);
+    let wheel = (-3..4).flat_map(|y| (-3..4).map(move |z| [8, y, z]));
+    let cells: Vec<[i32; 3]> = shaft.chain(wheel).collect();
+    let steel = Material { youngs: 2.1e11, poisson: 0.3, density: 7850.0 };
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &cells, |[x, y, z]| [0.1 * x, 0.02 * y, 0.021 * z]);
+    let body = body_of(mesh.assemble(&steel, MassRule::Consistent).raw_model(), 1, BodyFrame::Principal);
+    let deflection = 0.01 * body.extent();
+    let ranges = Ranges { deflection: Some(deflection), is_rotation_given: false, ..ranges(1.0) };
+    let size = advise(&body, ranges).expect("advice").terms[0].size;
+    // The change of every entry of the inertia, with one mode.
+    let (w1, inertia, shape) =
+        (body.invariants().w1().expect("W1"), body.invariants().inertia(), &body.modes().shape);
+    let length = |node: usize| (0..3).map(|k| shape[(3 * node + k, 0)].powi(2)).sum::<f64>().sqrt();
+    let q = deflection / (0..body.n_nodes()).map(length).fold(0.0, f64::max);
+    let change = |a: usize, b: usize| {
+        0.5 * (w1[(a, b)] + w1[(b, a)]).abs() * q / (inertia[(a, a)] * inertia[(b, b)]).sqrt()
+    };
+    let moments = (0..3).map(|a| change(a, a)).fold(0.0, f64::max);
+    let products = [(0, 1), (1, 2), (0, 2)].map(|(a, b)| change(a, b)).into_iter().fold(0.0, f64::max);
+    assert!(moments < 1e-6 * products, "{moments} {products}");
+    assert!((size - products).abs() < 1e-9 * products, "{size} {products}");
 }
