@@ -5,14 +5,14 @@ mod apart;
 mod matrix_lines;
 mod replication;
 
-use super::coordinates::{excerpt, real};
-use super::scanner::{self, Lines};
 use apart::Apart;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
+use flexbody_base::text::scanner::{self, Lines, excerpt, field, line_number, real, whole};
 pub(super) use matrix_lines::MatrixLines;
 use replication::{Replication, ReplicationRequest};
 use std::borrow::Cow;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Depth of included files above which a file is taken to include itself.
@@ -99,34 +99,17 @@ impl Card {
         self.continuation.clear();
     }
 
-    /// Sets the name of the continuation to that in `field`.
+    /// Sets the name of the continuation to that in the trimmed `field`.
     fn continue_as(&mut self, field: &[u8]) {
         self.continuation.clear();
-        self.continuation.extend(bare(field.trim_ascii()).iter().map(u8::to_ascii_uppercase));
+        self.continuation.extend(bare(field).iter().map(u8::to_ascii_uppercase));
     }
 
+    /// Adds a trimmed field.
     fn push(&mut self, field: &[u8]) {
-        self.text.extend_from_slice(field.trim_ascii());
+        self.text.extend_from_slice(field);
         self.ends.push(self.text.len());
     }
-}
-
-/// Returns the whole number in a field of a card; `None` if it is none.
-pub(super) fn whole(field: &[u8]) -> Option<i64> {
-    /// Number of digits that fit into an i64, whichever digits they are.
-    const MAX_DIGITS: usize = 18;
-    let digits = match field {
-        [b'+' | b'-', digits @ ..] => digits,
-        digits => digits,
-    };
-    if digits.is_empty() || digits.len() > MAX_DIGITS {
-        return std::str::from_utf8(field).ok()?.parse().ok();
-    }
-    let mut number = 0;
-    for digit in digits {
-        number = 10 * number + i64::from(digit.is_ascii_digit().then(|| digit - b'0')?);
-    }
-    Some(if field[0] == b'-' { -number } else { number })
 }
 
 /// Returns the components of a grid: digits from 0 to 6. Scalar points have 0 or none.
@@ -407,7 +390,7 @@ impl<'t> BulkReader<'t> {
     fn refuse_cut_off(&mut self, path: &Path, bytes: &[u8]) -> Taken {
         let is_matrix = self.is_open && self.card.name == "DMIG" && self.card_path == path;
         if is_matrix && !bytes.ends_with(b"\n") {
-            return Err(cut_off(path, bytes.iter().filter(|&&b| b == b'\n').count() + 1));
+            return Err(cut_off(path, line_number(bytes, bytes.len())));
         }
         Ok(())
     }
@@ -440,12 +423,16 @@ impl<'a> Line<'a> {
 
     /// Returns the text before the fields: the name of the card, or a continuation.
     fn head(&self) -> &[u8] {
-        let head = if self.is_free {
-            self.text.split(|&b| b == b',').next().unwrap_or_default()
+        self.part(0, 0..8)
+    }
+
+    /// Returns the k-th part between commas, or the part in fixed columns, trimmed; empty if the line is shorter.
+    fn part(&self, k: usize, columns: Range<usize>) -> &[u8] {
+        if self.is_free {
+            self.text.split(|&b| b == b',').nth(k).unwrap_or_default().trim_ascii()
         } else {
-            &self.text[..self.text.len().min(8)]
-        };
-        head.trim_ascii()
+            field(&self.text, columns)
+        }
     }
 }
 
@@ -496,20 +483,19 @@ fn card_fields(card: &mut Card, line: &Line<'_>, number: usize) -> Taken {
 
 fn fixed_fields(card: &mut Card, line: &[u8], fields: usize) {
     let width = 64 / fields;
-    let part = |from: usize, to: usize| line.get(from..line.len().min(to)).unwrap_or_default();
     for k in 0..fields {
-        card.push(part(8 + k * width, 8 + (k + 1) * width));
+        card.push(field(line, 8 + k * width..8 + (k + 1) * width));
     }
-    card.continue_as(part(72, 80));
+    card.continue_as(field(line, 72..80));
 }
 
 fn free_fields(card: &mut Card, line: &[u8], fields: usize) -> Result<(), Diagnostic> {
-    let mut given = line.split(|&b| b == b',').skip(1);
+    let mut given = line.split(|&b| b == b',').map(<[u8]>::trim_ascii).skip(1);
     for _ in 0..fields {
         card.push(given.next().unwrap_or_default());
     }
     card.continue_as(given.next().unwrap_or_default());
-    if given.any(|field| !field.trim_ascii().is_empty()) {
+    if given.any(|field| !field.is_empty()) {
         let message = format!("the line has more than {fields} fields");
         return Err(Diagnostic::new(Code::DeckSyntax, message).with_help("begin a continuation line"));
     }

@@ -4,8 +4,9 @@
 
 use super::assemble::{Entry, Sides, check_size, refuse_beyond_memory};
 use super::digits::{COUNTED, written_digits};
-use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::compression::{Compression, broken};
+use flexbody_base::text::scanner::BadLines;
 use flexbody_linalg::parallel;
 use std::io::Read;
 use std::path::Path;
@@ -13,11 +14,8 @@ use std::path::Path;
 mod line;
 mod text;
 
-pub(crate) use line::{Limits, real};
+pub(crate) use line::Limits;
 pub(crate) use text::{Blocks, line_aligned, most_entries};
-
-/// Number of bad lines that are reported one by one.
-const MAX_SHOWN_LINES: usize = 5;
 
 /// Entries of a file, and the problems of its lines.
 pub(super) struct Coordinates {
@@ -32,9 +30,7 @@ pub(super) struct Coordinates {
     pub stopped: bool,
     /// Number of lines of the file so far.
     lines: usize,
-    /// First bad lines with their numbers, from 1.
-    bad: Vec<(usize, Diagnostic)>,
-    bad_count: usize,
+    bad: BadLines,
     /// First line with an entry below the diagonal.
     pub lower: Option<usize>,
     /// First line with an entry above the diagonal.
@@ -53,8 +49,7 @@ impl Coordinates {
             count: 0,
             stopped: false,
             lines,
-            bad: Vec::new(),
-            bad_count: 0,
+            bad: BadLines::default(),
             lower: None,
             upper: None,
             written: 0,
@@ -99,7 +94,7 @@ impl Coordinates {
         if let Some(announced) = self.announced {
             return Ok(self.count > announced);
         }
-        let (n, entries) = (u64::from(self.limits.n), self.count - self.bad_count as u64);
+        let (n, entries) = (u64::from(self.limits.n), self.count - self.bad.count() as u64);
         let fits = check_size(n, n, entries.max(n)).and_then(|_| refuse_beyond_memory(entries));
         fits.map(|()| false).map_err(|diagnostic| vec![diagnostic])
     }
@@ -108,10 +103,8 @@ impl Coordinates {
         let parsed = parallel::map(line_aligned(block), |piece| line::parse(piece, self.limits));
         for piece in parsed {
             let before = self.lines;
-            self.count += (piece.entries.len() + piece.bad_count) as u64;
-            self.bad_count += piece.bad_count;
-            let remaining = MAX_SHOWN_LINES.saturating_sub(self.bad.len());
-            self.bad.extend(piece.bad.into_iter().take(remaining).map(|(line, bad)| (line + before, bad)));
+            self.count += (piece.entries.len() + piece.bad.count()) as u64;
+            self.bad.append(piece.bad, before);
             self.lower = self.lower.or(piece.lower.map(|line| line + before));
             self.upper = self.upper.or(piece.upper.map(|line| line + before));
             self.written = self.written.max(piece.written);
@@ -139,29 +132,17 @@ impl Coordinates {
 
     /// Returns diagnostics of the bad lines, the first few one by one.
     pub(super) fn bad_lines(&self, ends_with_newline: bool) -> Vec<Diagnostic> {
-        let more = self.bad_count - self.bad.len();
-        let located = |(k, (line, bad)): (usize, &(usize, Diagnostic))| {
-            let mut message = bad.message().to_owned();
-            if *line == self.lines && !ends_with_newline {
-                message += "; it is the last line and has no line end: the file may be cut off";
+        let located = |bad: Diagnostic| {
+            if ends_with_newline || bad.line() != Some(self.lines) {
+                return bad;
             }
-            if k + 1 == MAX_SHOWN_LINES && more > 0 {
-                message += &format!(" ({more} more lines have errors)");
-            }
-            Diagnostic::new(bad.code(), message).at_line(*line).with_help(bad.help())
+            let message = format!(
+                "{}; it is the last line and has no line end: the file may be cut off",
+                bad.message()
+            );
+            Diagnostic::new(bad.code(), message).at_line(self.lines).with_help(bad.help())
         };
-        self.bad.iter().enumerate().map(located).collect()
-    }
-}
-
-/// Returns the line, or its beginning, in printable form.
-pub(crate) fn excerpt(line: &[u8]) -> String {
-    const MAX_CHARACTERS: usize = 60;
-    match std::str::from_utf8(line) {
-        Ok(text) if text.len() <= MAX_CHARACTERS && !text.contains(|c: char| c.is_control() && c != '\t') => {
-            text.to_owned()
-        }
-        _ if line.len() <= MAX_CHARACTERS => line.escape_ascii().to_string(),
-        _ => format!("{}...", line[..MAX_CHARACTERS].escape_ascii()),
+        let bad = self.bad.clone().into_diagnostics(Code::MatrixSyntax, "line");
+        bad.into_iter().map(located).collect()
     }
 }

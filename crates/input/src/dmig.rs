@@ -13,15 +13,13 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result as Outcome};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::SeenFile;
+use flexbody_base::text::scanner::BadLines;
 use flexbody_linalg::parallel;
 use flexbody_model::{DofLabel, RawMatrix};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 pub(super) use columns::Point;
-
-/// Number of bad cards that are reported one by one.
-const MAX_SHOWN_CARDS: usize = 5;
 
 /// Form of rectangular matrices, such as loads.
 const RECTANGULAR: i64 = 9;
@@ -32,7 +30,7 @@ pub(super) struct Dmigs {
     matrices: Vec<Dmig>,
     points: Vec<Point>,
     numbers: HashMap<Point, u32>,
-    bad: Vec<Diagnostic>,
+    bad: BadLines,
     /// Files that were read only for these matrices, without the files that they include.
     pub files: Vec<SeenFile>,
 }
@@ -86,8 +84,9 @@ impl Dmigs {
     pub(super) fn card(&mut self, card: &Card, path: &Path) {
         match card.field(1) {
             b"0" => {
-                let bad = self.header(card, path).err();
-                self.complain(bad);
+                if let Err(bad) = self.header(card, path) {
+                    self.bad.add(bad);
+                }
             }
             _ => {
                 let heads = self.heads();
@@ -152,12 +151,8 @@ impl Dmigs {
                     _ => dmig.pieces.push(entries),
                 }
             }
-            columns.bad.into_iter().for_each(|bad| self.complain(Some(bad)));
+            self.bad.append(columns.bad, 0);
         }
-    }
-
-    fn complain(&mut self, bad: Option<Diagnostic>) {
-        self.bad.extend(bad.filter(|_| self.bad.len() < MAX_SHOWN_CARDS));
     }
 
     /// Returns the index of a point, which is created if necessary.
@@ -171,7 +166,7 @@ impl Dmigs {
 
     /// Returns the diagnostics of the cards, and removes them.
     pub(super) fn take_bad(&mut self) -> Vec<Diagnostic> {
-        std::mem::take(&mut self.bad)
+        std::mem::take(&mut self.bad).into_diagnostics(Code::MatrixSyntax, "card")
     }
 
     /// Returns the names of the matrices, in the order of the deck.
@@ -414,8 +409,8 @@ mod tests {
         for threads in [1, 3] {
             let found = read(&(lines.join("\n") + "\n"), threads).expect_err("refused");
             let at: Vec<_> = found.iter().map(Diagnostic::line).collect();
-            // Only the first five are reported.
-            assert_eq!(at, [0, 1, 2, 3, 4].map(|k| Some(bad[k] + 1)), "{found:?}");
+            assert_eq!(at, bad.map(|line| Some(line + 1)), "{found:?}");
+            assert_eq!(found[5].message(), "1 more card has errors: this line");
         }
         let cut_off = read(text.trim_end(), 2).expect_err("refused");
         assert_eq!((cut_off.len(), cut_off[0].line()), (1, Some(text.lines().count())), "{cut_off:?}");

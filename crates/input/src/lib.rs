@@ -46,7 +46,6 @@ mod recent;
 mod recipes;
 mod region;
 mod row_axes;
-mod scanner;
 mod scipy_npz;
 mod shapes;
 mod tables;

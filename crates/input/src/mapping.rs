@@ -1,12 +1,11 @@
 //! The degree of freedom of each matrix row: the table of this program, or files that Ansys writes with its matrices.
 
 use super::matrix_market::read_array;
-use super::scanner::{Lines, words};
 use super::tables::read_dofs;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::Compression;
 use flexbody_base::text::InputFile;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{Lines, integer, words};
 use flexbody_model::DofLabel;
 use std::path::Path;
 

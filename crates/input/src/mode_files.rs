@@ -7,10 +7,10 @@ mod op2;
 mod punch;
 mod table;
 
-use super::scanner::expected;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::InputFile;
+use flexbody_base::text::scanner::expected;
 use flexbody_model::RawModes;
 use table::ModeTable;
 

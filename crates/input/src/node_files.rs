@@ -14,11 +14,11 @@ mod xml_elements;
 use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};
 pub(super) use super::node_file::NodeFile;
-use super::scanner::expected;
 use super::tables::read_nodes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::refuse_packed;
+use flexbody_base::text::scanner::expected;
 use std::collections::HashSet;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;

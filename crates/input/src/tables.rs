@@ -2,7 +2,8 @@
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
-use flexbody_base::text::table::{BadRows, Column, Table, integer, printable};
+use flexbody_base::text::scanner::{BadLines, excerpt, integer, number};
+use flexbody_base::text::table::{Column, Table};
 use flexbody_model::{DofLabel, Nodes};
 use std::collections::HashMap;
 
@@ -53,7 +54,7 @@ pub(super) fn read_dofs(file: &InputFile) -> Found<Vec<DofLabel>> {
             Some(direction @ 1..=6) => direction as u8,
             _ => {
                 let message =
-                    format!("direction of node {node} is `{}`, expected 1 to 6", printable(fields[1]));
+                    format!("direction of node {node} is `{}`, expected 1 to 6", excerpt(fields[1]));
                 return Err(Diagnostic::new(Code::DofDirection, message));
             }
         };
@@ -61,7 +62,7 @@ pub(super) fn read_dofs(file: &InputFile) -> Found<Vec<DofLabel>> {
             (false, _) => 0,
             (true, Some(row)) => row,
             (true, None) => {
-                let message = format!("row number is `{}`", printable(fields[2]));
+                let message = format!("row number is `{}`", excerpt(fields[2]));
                 return Err(
                     Diagnostic::new(Code::TableRow, message).with_help("number the rows 0, 1, 2, ...")
                 );
@@ -76,7 +77,7 @@ pub(super) fn read_dofs(file: &InputFile) -> Found<Vec<DofLabel>> {
 fn by_row(file: &InputFile, rows: &[(i64, usize, DofLabel)]) -> Found<Vec<DofLabel>> {
     let n = rows.len();
     let mut at: Vec<Option<usize>> = vec![None; n];
-    let mut bad = BadRows::new(file.path());
+    let mut bad = BadLines::default();
     // Rows that are numbered from 1 get a specific help.
     let from_one = rows.iter().all(|r| r.0 >= 1) && rows.iter().any(|r| r.0 == n as i64);
     for (k, &(row, line, _)) in rows.iter().enumerate() {
@@ -89,14 +90,14 @@ fn by_row(file: &InputFile, rows: &[(i64, usize, DofLabel)]) -> Found<Vec<DofLab
             Some(Some(first)) => format!("row {row} is given twice, first on line {}", rows[*first].1),
             None => format!("row {row} is out of range, {n} rows are numbered 0 to {}", n - 1),
         };
-        let diagnostic = Diagnostic::new(Code::DofRowOrder, message).at_line(line);
+        let diagnostic = Diagnostic::new(Code::DofRowOrder, message).in_file(file.path()).at_line(line);
         bad.add(if from_one {
             diagnostic.with_help("number the rows from 0: they are numbered from 1")
         } else {
             diagnostic
         });
     }
-    bad.finish()?;
+    bad.finish(Code::TableRow, "row")?;
     Ok(at.into_iter().flatten().map(|k| rows[k].2).collect())
 }
 
@@ -115,11 +116,11 @@ pub(super) fn read_masses(file: &InputFile) -> Found<Vec<(i64, f64)>> {
         .map_err(|d| vec![d.with_help("name the columns in the first line: `node,mass`")])?;
     let rows = table.rows(|line, fields| {
         let node = node_number(fields[0])?;
-        match fast_float2::parse::<f64, _>(fields[1]) {
-            Ok(mass) if mass.is_finite() => Ok((node, line, mass)),
+        match number(fields[1]) {
+            Some(mass) if mass.is_finite() => Ok((node, line, mass)),
             _ => {
                 let message =
-                    format!("mass of node {node} is `{}`, expected a finite number", printable(fields[1]));
+                    format!("mass of node {node} is `{}`, expected a finite number", excerpt(fields[1]));
                 Err(Diagnostic::new(Code::LumpedMassTable, message))
             }
         }
@@ -132,17 +133,17 @@ fn node_number(field: &[u8]) -> Result<i64, Diagnostic> {
     integer(field).ok_or_else(|| {
         Diagnostic::new(
             Code::TableRow,
-            format!("node number is `{}`, expected a whole number", printable(field)),
+            format!("node number is `{}`, expected a whole number", excerpt(field)),
         )
     })
 }
 
 fn coordinate(node: i64, axis: &str, field: &[u8]) -> Result<f64, Diagnostic> {
-    let message = || format!("{axis} of node {node} is `{}`", printable(field));
-    match fast_float2::parse::<f64, _>(field) {
-        Ok(value) if value.is_finite() => Ok(value),
-        Ok(_) => Err(Diagnostic::new(Code::CoordinateNotFinite, message())),
-        Err(_) => {
+    let message = || format!("{axis} of node {node} is `{}`", excerpt(field));
+    match number(field) {
+        Some(value) if value.is_finite() => Ok(value),
+        Some(_) => Err(Diagnostic::new(Code::CoordinateNotFinite, message())),
+        None => {
             let diagnostic = Diagnostic::new(Code::TableRow, format!("{}, expected a number", message()));
             Err(if field.contains(&b',') {
                 diagnostic.with_help("write numbers with a decimal point")
@@ -154,13 +155,13 @@ fn coordinate(node: i64, axis: &str, field: &[u8]) -> Result<f64, Diagnostic> {
 }
 
 fn no_duplicates(file: &InputFile, nodes: impl Iterator<Item = (i64, usize)>) -> Found<()> {
-    let mut bad = BadRows::new(file.path());
+    let mut bad = BadLines::default();
     let mut first: HashMap<i64, usize> = HashMap::with_capacity(nodes.size_hint().0);
     for (node, line) in nodes {
         if let Some(before) = first.insert(node, line) {
             let message = format!("node {node} is given twice, first on line {before}");
-            bad.add(Diagnostic::new(Code::NodeDuplicate, message).at_line(line));
+            bad.add(Diagnostic::new(Code::NodeDuplicate, message).in_file(file.path()).at_line(line));
         }
     }
-    bad.finish()
+    bad.finish(Code::TableRow, "row")
 }

@@ -4,6 +4,7 @@
 pub mod compression;
 pub mod input_file;
 pub mod quotes;
+pub mod scanner;
 pub mod series;
 pub mod table;
 pub mod walk;

@@ -5,12 +5,8 @@
 //! first row, if it has as many fields. A line below the names without any number holds units, which are not read.
 
 use super::input_file::InputFile;
-use super::table::printable;
+use super::scanner::{BadLines, Line, Lines, Separator, excerpt, number, without_mark};
 use crate::diagnostic::{Code, Diagnostic};
-use std::borrow::Cow;
-
-/// Number of bad rows that are reported one by one.
-const MAX_SHOWN_ROWS: usize = 5;
 
 /// Smallest number of rows.
 const MIN_ROWS: usize = 2;
@@ -73,20 +69,21 @@ pub fn read_series(
     time: &ColumnKey,
     wanted: &[ColumnKey],
 ) -> Result<Series, Vec<Diagnostic>> {
-    let bytes = file.bytes();
-    let bad = |line: usize, message: String| vec![row_error(file, line, message)];
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err(vec![
-            row_error(file, 1, "file is UTF-16".to_owned()).with_help("save it as UTF-8 or ASCII text"),
-        ]);
-    }
-    let Some(layout) = Layout::of(bytes) else {
-        return Err(bad(1, "file has no rows".to_owned()));
+    let Some(text) = without_mark(file.bytes()) else {
+        let error = row_error(file, 1, "file is UTF-16".to_owned());
+        return Err(vec![error.with_help("save it as UTF-8 or ASCII text")]);
+    };
+    let Some(layout) = Layout::of(text) else {
+        return Err(vec![row_error(file, 1, "file has no rows".to_owned())]);
     };
     let places = layout.places(file, std::iter::once(time).chain(wanted))?;
     let mut reading = SeriesReader::new(file, &layout, places);
-    for (number, line) in layout.rows(bytes) {
-        reading.take(number, line);
+    let mut fields = Vec::new();
+    for row in layout.rows(text) {
+        split_into(layout.separator, row.text, &mut fields);
+        if let Err(diagnostic) = reading.row(row.number, &fields) {
+            reading.bad.add(diagnostic);
+        }
     }
     reading.finish()
 }
@@ -95,60 +92,29 @@ fn row_error(file: &InputFile, line: usize, message: String) -> Diagnostic {
     Diagnostic::new(Code::SeriesRow, message).in_file(file.path()).at_line(line)
 }
 
-/// Separator of the fields of a line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Separator {
-    Byte(u8),
-    Blanks,
-}
-
-impl Separator {
-    /// Returns the separator of a line.
-    fn of(line: &[u8]) -> Self {
-        let has = |byte: &u8| line.contains(byte);
-        match [b';', b'\t', b','].into_iter().find(has) {
-            // Commas between digits, in numbers separated by blanks, are decimal commas.
-            Some(b',')
-                if Self::Blanks.split(line).iter().all(|field| is_plain_or_with_decimal_comma(field)) =>
-            {
-                Self::Blanks
-            }
-            Some(byte) => Self::Byte(byte),
-            None => Self::Blanks,
+/// Returns the separator of a line.
+fn separator_of(line: &[u8]) -> Separator {
+    match Separator::of(line) {
+        // Commas between digits, in numbers separated by blanks, are decimal commas.
+        Separator::Byte(b',')
+            if Separator::Blanks.split(line).iter().all(|field| is_plain_or_with_decimal_comma(field)) =>
+        {
+            Separator::Blanks
         }
-    }
-
-    /// Returns the fields without surrounding blanks and quotes. Separators inside quotes do not count.
-    fn split(self, line: &[u8]) -> Vec<&[u8]> {
-        let (mut fields, mut from, mut quoted) = (Vec::new(), 0, false);
-        let separates = |byte: u8| match self {
-            Self::Byte(separator) => byte == separator,
-            Self::Blanks => byte == b' ' || byte == b'\t',
-        };
-        for (at, &byte) in line.iter().enumerate() {
-            quoted ^= byte == b'"';
-            if separates(byte) && !quoted {
-                fields.push(&line[from..at]);
-                from = at + 1;
-            }
-        }
-        fields.push(&line[from..]);
-        fields.iter_mut().for_each(|field| *field = unquoted(field));
-        match self {
-            Self::Blanks => fields.retain(|field| !field.is_empty()),
-            // A separator at the end of a line ends its last field.
-            Self::Byte(_) if fields.last().is_some_and(|field| field.is_empty()) => {
-                fields.pop();
-            }
-            Self::Byte(_) => (),
-        }
-        fields
+        separator => separator,
     }
 }
 
-fn unquoted(field: &[u8]) -> &[u8] {
-    let field = field.trim_ascii();
-    field.strip_prefix(b"\"").and_then(|f| f.strip_suffix(b"\"")).map_or(field, <[u8]>::trim_ascii)
+/// Replaces `fields` by the fields of a line. A separator at the end of a line ends its last field.
+fn split_into<'a>(separator: Separator, line: &'a [u8], fields: &mut Vec<&'a [u8]>) {
+    separator.split_into(line, fields);
+    fields.pop_if(|field| field.is_empty());
+}
+
+fn split(separator: Separator, line: &[u8]) -> Vec<&[u8]> {
+    let mut fields = Vec::new();
+    split_into(separator, line, &mut fields);
+    fields
 }
 
 /// Returns true for a whole number, or a number with digits on both sides of its only comma.
@@ -164,21 +130,6 @@ fn has_decimal_comma(field: &[u8]) -> bool {
     whole.last().is_some_and(u8::is_ascii_digit)
         && fraction.first().is_some_and(u8::is_ascii_digit)
         && number(&[whole, b".", fraction].concat()).is_some()
-}
-
-/// Parses a number. The exponent may have the letter D, as Fortran writes it.
-fn number(field: &[u8]) -> Option<f64> {
-    let text: Cow<'_, [u8]> = if field.iter().any(|byte| matches!(byte, b'D' | b'd')) {
-        field.iter().map(|&byte| if matches!(byte, b'D' | b'd') { b'e' } else { byte }).collect()
-    } else {
-        field.into()
-    };
-    fast_float2::parse(text.as_ref()).ok()
-}
-
-/// Returns the lines with their numbers, trimmed.
-fn numbered(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
-    bytes.split(|&byte| byte == b'\n').enumerate().map(|(at, line)| (at + 1, line.trim_ascii()))
 }
 
 fn is_comment(line: &[u8]) -> bool {
@@ -198,18 +149,17 @@ struct Layout<'f> {
 
 impl<'f> Layout<'f> {
     /// Detects the layout; `None` if all lines are comments.
-    fn of(bytes: &'f [u8]) -> Option<Self> {
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    fn of(text: &'f [u8]) -> Option<Self> {
         let mut comment = None;
         // First line that is not a comment, and the last comment before it.
-        let mut lines = numbered(bytes).filter(|(_, line)| !line.is_empty());
-        let (line, first) = lines.by_ref().find(|&(_, line)| {
-            let found = is_comment(line);
-            comment = if found { Some(line) } else { comment };
+        let mut lines = Lines::of(text).filter_map(Line::content);
+        let Line { number: line, text: first } = lines.by_ref().find(|line| {
+            let found = is_comment(line.text);
+            comment = if found { Some(line.text) } else { comment };
             !found
         })?;
-        let separator = Separator::of(first);
-        let head = separator.split(first);
+        let separator = separator_of(first);
+        let head = split(separator, first);
         let has_numbers =
             |fields: &[&[u8]]| fields.iter().any(|f| number(f).is_some() || has_decimal_comma(f));
         if has_numbers(&head) {
@@ -218,22 +168,22 @@ impl<'f> Layout<'f> {
             return Some(Self { separator, fields: head.len(), names, line, first_row: line });
         }
         // Rows show the separator more reliably than names, which may contain blanks.
-        let below = lines.find(|(_, line)| !is_comment(line));
-        let separator = below.map_or(separator, |(_, below)| match Separator::of(below) {
+        let below = lines.find(|line| !is_comment(line.text));
+        let separator = below.map_or(separator, |below| match separator_of(below.text) {
             Separator::Byte(byte) if first.contains(&byte) => Separator::Byte(byte),
             _ => separator,
         });
-        let head = separator.split(first);
-        let has_units = below.is_some_and(|(_, below)| !has_numbers(&separator.split(below)));
-        let first_row = if has_units { below.map_or(line, |(line, _)| line) + 1 } else { line + 1 };
+        let head = split(separator, first);
+        let units = below.filter(|below| !has_numbers(&split(separator, below.text)));
+        let first_row = units.map_or(line, |units| units.number) + 1;
         Some(Self { separator, fields: head.len(), names: head, line, first_row })
     }
 
     /// Returns the lines of the rows.
-    fn rows(&self, bytes: &'f [u8]) -> impl Iterator<Item = (usize, &'f [u8])> + use<'f> {
+    fn rows(&self, text: &'f [u8]) -> impl Iterator<Item = Line<'f>> + use<'f> {
         let first = self.first_row;
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        numbered(bytes).filter(move |(at, line)| *at >= first && !line.is_empty() && !is_comment(line))
+        let is_row = move |line: &Line<'_>| line.number >= first && !is_comment(line.text);
+        Lines::of(text).filter_map(Line::content).filter(is_row)
     }
 
     /// Returns the indices of the columns `keys`.
@@ -267,7 +217,7 @@ impl<'f> Layout<'f> {
             ColumnKey::Name(name) => name.as_bytes(),
         };
         if self.names.is_empty() {
-            let message = format!("there is no column `{}`: the columns have no names", printable(name));
+            let message = format!("there is no column `{}`: the columns have no names", excerpt(name));
             return Err((message, format!("give its number, 1 to {}", self.fields)));
         }
         // The whole name first, then the name without its unit: "Fx [N]" is found by "Fx".
@@ -279,13 +229,13 @@ impl<'f> Layout<'f> {
                 [place] => return Ok(place),
                 [] => (),
                 [first, second, ..] => {
-                    let name = printable(name);
+                    let name = excerpt(name);
                     let message = format!("columns {} and {} are both named `{name}`", first + 1, second + 1);
                     return Err((message, "give the number of the column".to_owned()));
                 }
             }
         }
-        Err((format!("there is no column `{}`", printable(name)), self.nearest(name)))
+        Err((format!("there is no column `{}`", excerpt(name)), self.nearest(name)))
     }
 
     /// Returns a help with the most similar name, and all names.
@@ -294,14 +244,14 @@ impl<'f> Layout<'f> {
         let distance = |column: &&&[u8]| strsim::damerau_levenshtein(&text(name), &text(before_unit(column)));
         let near = |column: &&&[u8]| distance(column) <= 2 && distance(column) < before_unit(column).len();
         match self.names.iter().filter(near).min_by_key(distance) {
-            Some(column) => format!("did you mean `{}`? {}", printable(column), self.all()),
+            Some(column) => format!("did you mean `{}`? {}", excerpt(column), self.all()),
             None => self.all(),
         }
     }
 
     /// Returns a help with all columns.
     fn all(&self) -> String {
-        let names: Vec<String> = self.names.iter().map(|name| printable(name)).collect();
+        let names: Vec<String> = self.names.iter().map(|name| excerpt(name)).collect();
         if names.is_empty() {
             format!("use a number from 1 to {}", self.fields)
         } else {
@@ -315,8 +265,8 @@ fn names_in(comment: &[u8], of_rows: Separator, fields: usize) -> Option<Vec<&[u
     let text = comment.trim_ascii_start();
     let begin = text.iter().position(|byte| !matches!(byte, b'#' | b'%' | b'!' | b' ' | b'\t'))?;
     let text = &text[begin..];
-    let separators = [of_rows, Separator::of(text), Separator::Blanks];
-    separators.into_iter().map(|separator| separator.split(text)).find(|names| names.len() == fields)
+    let separators = [of_rows, separator_of(text), Separator::Blanks];
+    separators.into_iter().map(|separator| split(separator, text)).find(|names| names.len() == fields)
 }
 
 /// Returns a name without the unit in brackets after it.
@@ -336,31 +286,17 @@ struct SeriesReader<'r> {
     /// Index of the time column, then of the other columns.
     places: Vec<usize>,
     series: Series,
-    shown: Vec<Diagnostic>,
-    bad: usize,
-    /// Line of the first bad row that is only counted.
-    first_not_shown: Option<usize>,
+    bad: BadLines,
 }
 
 impl<'r> SeriesReader<'r> {
     fn new(file: &'r InputFile, layout: &'r Layout<'r>, places: Vec<usize>) -> Self {
         let columns = vec![Vec::new(); places.len() - 1];
         let series = Series { times: Vec::new(), columns, lines: Vec::new() };
-        Self { file, layout, places, series, shown: Vec::new(), bad: 0, first_not_shown: None }
+        Self { file, layout, places, series, bad: BadLines::default() }
     }
 
-    fn take(&mut self, line: usize, text: &[u8]) {
-        if let Err(diagnostic) = self.row(line, text) {
-            self.bad += 1;
-            match self.bad {
-                bad if bad <= MAX_SHOWN_ROWS => self.shown.push(diagnostic),
-                _ => self.first_not_shown = self.first_not_shown.or(Some(line)),
-            }
-        }
-    }
-
-    fn row(&mut self, line: usize, text: &[u8]) -> Result<(), Diagnostic> {
-        let fields = self.layout.separator.split(text);
+    fn row(&mut self, line: usize, fields: &[&[u8]]) -> Result<(), Diagnostic> {
         if fields.len() != self.layout.fields {
             let count = match fields.len() {
                 1 => "1 field".to_owned(),
@@ -392,10 +328,10 @@ impl<'r> SeriesReader<'r> {
     fn cell(&self, line: usize, place: usize, field: &[u8]) -> Result<f64, Diagnostic> {
         let cell_error = |what: &str| {
             let column = match self.layout.names.get(place) {
-                Some(name) => format!("`{}`", printable(name)),
+                Some(name) => format!("`{}`", excerpt(name)),
                 None => format!("{}", place + 1),
             };
-            row_error(self.file, line, format!("`{}` in column {column} {what}", printable(field)))
+            row_error(self.file, line, format!("`{}` in column {column} {what}", excerpt(field)))
         };
         match number(field) {
             Some(value) if value.is_finite() => Ok(value),
@@ -419,22 +355,20 @@ impl<'r> SeriesReader<'r> {
         row_error(self.file, lines[row], message).with_help(help)
     }
 
-    fn finish(mut self) -> Result<Series, Vec<Diagnostic>> {
-        let more = self.bad - self.shown.len();
-        if let Some(line) = self.first_not_shown {
-            let message = format!("{more} more rows have errors, the first of them in this line");
-            self.shown.push(row_error(self.file, line, message));
+    fn finish(self) -> Result<Series, Vec<Diagnostic>> {
+        if !self.bad.is_empty() {
+            return Err(self.bad.into_diagnostics(Code::SeriesRow, "row"));
         }
         let rows = self.series.times.len();
-        if self.bad == 0 && rows < MIN_ROWS {
+        if rows < MIN_ROWS {
             let count = if rows == 0 { "no rows" } else { "only one row" };
             let message = format!("file has {count}, a history needs at least two");
-            self.shown.push(Diagnostic::new(Code::SeriesRow, message).in_file(self.file.path()));
+            return Err(vec![Diagnostic::new(Code::SeriesRow, message).in_file(self.file.path())]);
         }
-        if let (0, Some(row)) = (self.bad, closer_than_rounding(&self.series.times)) {
-            self.shown.push(self.too_close(row));
+        match closer_than_rounding(&self.series.times) {
+            Some(row) => Err(vec![self.too_close(row)]),
+            None => Ok(self.series),
         }
-        if self.shown.is_empty() { Ok(self.series) } else { Err(self.shown) }
     }
 }
 

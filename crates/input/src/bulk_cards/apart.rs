@@ -1,10 +1,9 @@
 //! Continuations that do not follow their card. Their names identify the card that they continue.
 
 use super::{Card, Line, bare, card_fields, without_comment};
-use crate::coordinates::excerpt;
-use crate::scanner::Lines;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
+use flexbody_base::text::scanner::{Lines, excerpt};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -124,12 +123,7 @@ fn is_named(line: &[u8]) -> bool {
 /// Returns the name that the continuation of a line must have, in upper case; empty if the line gives none.
 fn end_of(line: &[u8]) -> Vec<u8> {
     let line = Line::of(line);
-    let end = if line.is_free {
-        let is_large = line.head().ends_with(b"*") || line.head().starts_with(b"*");
-        let fields = if is_large { 4 } else { 8 };
-        line.text.split(|&b| b == b',').nth(fields + 1).unwrap_or_default()
-    } else {
-        line.text.get(72..line.text.len().min(80)).unwrap_or_default()
-    };
-    bare(end.trim_ascii()).to_ascii_uppercase()
+    let is_large = line.head().ends_with(b"*") || line.head().starts_with(b"*");
+    let fields = if is_large { 4 } else { 8 };
+    bare(line.part(fields + 1, 72..80)).to_ascii_uppercase()
 }

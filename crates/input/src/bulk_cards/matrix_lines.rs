@@ -2,6 +2,7 @@
 
 use super::{Line, is_begin, is_include, without_comment};
 use flexbody_base::text::InputFile;
+use flexbody_base::text::scanner::{self, Lines};
 use std::ops::Range;
 
 /// Bytes of cards that one thread reads at a time.
@@ -30,10 +31,11 @@ impl<'a> MatrixLines<'a> {
     pub(super) fn at(file: &'a InputFile, start: usize, above: usize) -> Option<Self> {
         let bytes = file.bytes();
         let (mut parts, mut last_line): (Vec<LineRange>, usize) = (Vec::new(), above);
-        let mut at = start;
-        while at < bytes.len() {
-            let end = memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |length| at + length + 1);
-            let line = &bytes[at..end];
+        let mut lines = Lines::starting_at(bytes, start, above);
+        loop {
+            let at = lines.at;
+            let Some(scanner::Line { number, text: line }) = lines.next() else { break };
+            let end = lines.at;
             if begins_matrix(line) {
                 let is_header = is_header(line);
                 match parts.last_mut() {
@@ -48,8 +50,7 @@ impl<'a> MatrixLines<'a> {
                     _ => break,
                 }
             }
-            at = end;
-            last_line += 1;
+            last_line = number;
         }
         (!parts.is_empty()).then_some(Self { file, parts, last_line })
     }
@@ -75,13 +76,8 @@ fn begins_matrix(line: &[u8]) -> bool {
 /// Returns true when a card of a matrix is its header: the second field is 0.
 fn is_header(line: &[u8]) -> bool {
     let line = Line::of(without_comment(line));
-    let field = if line.is_free {
-        line.text.split(|&b| b == b',').nth(2)
-    } else {
-        let columns = if line.head().ends_with(b"*") { 24..40 } else { 16..24 };
-        line.text.get(columns.start..line.text.len().min(columns.end))
-    };
-    field.is_some_and(|field| field.trim_ascii() == b"0")
+    let columns = if line.head().ends_with(b"*") { 24..40 } else { 16..24 };
+    line.part(2, columns) == b"0"
 }
 
 /// Returns true when a line continues a card, is empty or is a comment.

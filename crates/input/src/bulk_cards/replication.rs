@@ -1,9 +1,9 @@
 //! Replication: `=` copies the field of the card above, `*(x)` adds x to that field, `==` copies all fields from there
 //! on, and `=(n)` repeats the line above it n times.
 
-use super::{Card, Line, fixed_fields, free_fields, whole};
-use crate::coordinates::real;
+use super::{Card, Line, fixed_fields, free_fields};
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::scanner::{real, whole};
 
 /// Largest number of cards that one line may represent.
 const MAX_REPEATED_CARDS: i64 = 1_000_000;

@@ -1,9 +1,10 @@
 //! Data lines: a fast path for the form of nearly all files, and a slow path that reads every dialect and describes
-//! errors.
+//! errors. The fast path goes from byte to byte, without finding the line and its fields first; the slow path has them
+//! from the text scanner.
 
-use super::{COUNTED, Entry, excerpt, most_entries, written_digits};
-use crate::scanner::{expected, words};
+use super::{COUNTED, Entry, most_entries, written_digits};
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::scanner::{BadLines, excerpt, expected, line_end, real, words};
 
 /// Limits from the header that apply to every line.
 #[derive(Debug, Clone, Copy)]
@@ -17,9 +18,8 @@ pub(crate) struct Limits {
 pub(super) struct EntryLines {
     pub entries: Vec<Entry>,
     pub lines: usize,
-    /// First bad lines, each with its number from 1; `bad_count` counts all of them.
-    pub bad: Vec<(usize, Diagnostic)>,
-    pub bad_count: usize,
+    /// Bad lines, numbered from 1 within the piece.
+    pub bad: BadLines,
     /// First lines (from 1) with a nonzero entry below and above the diagonal.
     pub lower: Option<usize>,
     pub upper: Option<usize>,
@@ -39,20 +39,15 @@ pub(super) fn parse(text: &[u8], limits: Limits) -> EntryLines {
             at = next;
             continue;
         }
-        let end = text[at..].iter().position(|&b| b == b'\n').map_or(text.len(), |length| at + length);
+        let end = line_end(text, at);
         let line = text[at..end].trim_ascii();
         if !line.is_empty() && line[0] != b'%' {
             match slow(line, limits) {
                 Ok((entry, number)) => piece.push(entry, number),
-                Err(bad) => {
-                    piece.bad_count += 1;
-                    if piece.bad.len() < super::MAX_SHOWN_LINES {
-                        piece.bad.push((piece.lines, bad));
-                    }
-                }
+                Err(bad) => piece.bad.add(bad.at_line(piece.lines)),
             }
         }
-        at = end + 1;
+        at = end;
     }
     piece
 }
@@ -147,62 +142,11 @@ fn index(field: &[u8], which: &str, n: u32) -> Result<u32, Diagnostic> {
     }
 }
 
-/// Parses a number, including the dialects of Fortran: `1.0D+05`, `1.0Q5`, and `1.0-105` of three-digit exponents.
-pub(crate) fn real(field: &[u8]) -> Option<f64> {
-    // Only the digits of the exponent follow its letter.
-    let letter = field.iter().rposition(|b| !matches!(b, b'0'..=b'9' | b'+' | b'-'));
-    let letter = letter.filter(|&at| matches!(field[at], b'd' | b'D' | b'q' | b'Q'));
-    if letter.is_none()
-        && let Ok(value) = fast_float2::parse(field)
-    {
-        return Some(value);
-    }
-    let (mut short, mut long) = ([0; 64], Vec::new());
-    let text = match short.get_mut(..=field.len()) {
-        Some(text) => text,
-        None => {
-            long.resize(field.len() + 1, 0);
-            &mut long[..]
-        }
-    };
-    text[..field.len()].copy_from_slice(field);
-    if let Some(letter) = letter {
-        text[letter] = b'e';
-        return fast_float2::parse(&text[..field.len()]).ok();
-    }
-    let sign = (1..field.len()).find(|&k| matches!(field[k], b'+' | b'-'))?;
-    if !matches!(field[sign - 1], b'0'..=b'9' | b'.') {
-        return None;
-    }
-    text.copy_within(sign..field.len(), sign + 1);
-    text[sign] = b'e';
-    fast_float2::parse(&text[..]).ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const LIMITS: Limits = Limits { n: 9, integer: false };
-
-    #[test]
-    fn numbers_in_every_dialect() {
-        for (text, value) in [
-            ("1.0D+05", 1e5),
-            ("1.0d5", 1e5),
-            ("-1.5Q-3", -1.5e-3),
-            ("+2.5e+1", 25.0),
-            ("1.25-105", 1.25e-105),
-            ("-.5+003", -500.0),
-            (".5", 0.5),
-            ("5.", 5.0),
-        ] {
-            assert_eq!(real(text.as_bytes()), Some(value), "{text}");
-        }
-        for text in ["", "D", "1.0D", "1,5", "--1", "1e5e5", "0x10", "1_000", "+", "1-", "e5", "1.5-2-3"] {
-            assert_eq!(real(text.as_bytes()), None, "{text}");
-        }
-    }
 
     #[test]
     fn the_fast_and_the_slow_path_agree() {
@@ -227,9 +171,10 @@ mod tests {
         let piece =
             parse(b"% c\n1 1 1\n\n1 2\nx 1 1\n2 2 nan\n1 0 1 % c\n3 3 1 %c\n1 1 1 1\n4 4 z\n", LIMITS);
         assert_eq!(piece.entries.len(), 2);
-        assert_eq!((piece.lines, piece.bad_count, piece.bad.len()), (10, 6, 5));
-        assert_eq!(piece.bad.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [4, 5, 6, 7, 9]);
-        assert_eq!(piece.bad[2].1.code(), Code::MatrixNotFinite);
-        assert_eq!(piece.bad[3].1.code(), Code::MatrixIndex);
+        assert_eq!((piece.lines, piece.bad.count()), (10, 6));
+        let bad = piece.bad.into_diagnostics(Code::MatrixSyntax, "line");
+        assert_eq!(bad.iter().filter_map(Diagnostic::line).collect::<Vec<_>>(), [4, 5, 6, 7, 9, 10]);
+        assert_eq!(bad[2].code(), Code::MatrixNotFinite);
+        assert_eq!(bad[3].code(), Code::MatrixIndex);
     }
 }

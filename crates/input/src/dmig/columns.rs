@@ -2,10 +2,10 @@
 
 use crate::assemble::Entry;
 use crate::bulk_cards::Card;
-use crate::coordinates::excerpt;
 use crate::digits::written_digits;
 use crate::recent::Recent;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::scanner::{BadLines, excerpt};
 use std::path::Path;
 
 /// Grid or scalar point with its component: 1 to 6, and 0 for a scalar point.
@@ -21,7 +21,7 @@ pub(super) struct Columns {
     pub points: Vec<Point>,
     /// Index of the matrix, entries, and their largest number of written digits.
     pub runs: Vec<(usize, Vec<Entry>, u8)>,
-    pub bad: Vec<Diagnostic>,
+    pub bad: BadLines,
     recent: Recent<Point>,
     /// Capacity in entries of the next run.
     capacity: usize,
@@ -32,16 +32,14 @@ impl Columns {
     pub(super) fn of(bytes: usize) -> Self {
         /// Bytes of an entry in large fields.
         const ENTRY: usize = 56;
-        let (points, runs, bad) = (Vec::new(), Vec::new(), Vec::new());
+        let (points, runs, bad) = (Vec::new(), Vec::new(), BadLines::default());
         Self { points, runs, bad, recent: Recent::new(), capacity: bytes / ENTRY }
     }
 
     /// Adds the entries of a card; for a bad card those before the error.
     pub(super) fn card(&mut self, card: &Card, path: &Path, heads: &Heads) {
-        if let Err(bad) = self.column(card, path, heads)
-            && self.bad.len() < super::MAX_SHOWN_CARDS
-        {
-            self.bad.push(bad);
+        if let Err(bad) = self.column(card, path, heads) {
+            self.bad.add(bad);
         }
     }
 

@@ -12,7 +12,7 @@ use super::{Found, FromFile, JobFile, JobModel, JobReader, both, condensed, is_d
 use crate::reader::MatrixRole;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::integer;
 use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -5,12 +5,11 @@
 use super::deck::{Card, Deck, fields};
 use super::{Found, both, missing};
 use crate::assemble::{Entry, StoredEntries, assemble, check_size};
-use crate::coordinates::{excerpt, line_aligned, real};
+use crate::coordinates::line_aligned;
 use crate::digits::{COUNTED, written_digits};
-use crate::scanner::{Line, Lines};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{Line, Lines, excerpt, integer, real};
 use flexbody_linalg::parallel;
 use flexbody_model::{DofLabel, RawMatrix};
 use std::path::{Path, PathBuf};

@@ -8,10 +8,9 @@ use super::distributing_couplings::{placed_note, reference_places};
 use super::expanded::{Once, label_once};
 use super::rotation_nodes::rotation_nodes;
 use super::{Found, JobFile, JobModel, JobReader, both, is_deck, missing};
-use crate::scanner::{Line, Lines, expected};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{Line, Lines, expected, integer};
 use flexbody_model::{DofLabel, GivenRows, Nodes};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -90,11 +89,7 @@ impl JobReader for Calculix {
 fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
     let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
     let mut labels = Vec::with_capacity(file.bytes().len() / 6);
-    for Line { number, text } in Lines::of(file.bytes()) {
-        let line = text.trim_ascii_start();
-        if line.is_empty() {
-            continue;
-        }
+    for Line { number, text: line } in Lines::of(file.bytes()).filter_map(Line::content) {
         let label = line.iter().position(|&b| b == b'.').and_then(|dot| {
             let (node, direction) = (integer(&line[..dot])?, integer(&line[dot + 1..])?);
             (1..=3).contains(&direction).then_some(DofLabel { node, direction: direction as u8 })

@@ -1,10 +1,9 @@
 //! Keyword decks (`.inp`) of Abaqus and CalculiX: cards `*KEYWORD, PARAMETER=VALUE`, each with lines of data.
 
 use super::Found;
-use crate::coordinates::excerpt;
-use crate::scanner::Lines;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
+use flexbody_base::text::scanner::{Line, Lines, excerpt, line_end};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -67,11 +66,6 @@ impl Deck {
         &self.cards
     }
 
-    /// Returns the path of the main file.
-    pub(super) fn path(&self) -> Option<&Path> {
-        self.files.first().map(InputFile::path)
-    }
-
     /// Returns the files of the deck, the main one first.
     ///
     /// # Errors
@@ -90,9 +84,8 @@ impl Deck {
     pub(super) fn data<'d>(&'d self, card: &Card) -> impl Iterator<Item = (usize, &'d [u8])> + use<'d> {
         let (first, bytes) = self.text(card);
         let lines = Lines::below(bytes, first.saturating_sub(1));
-        lines
-            .map(|line| (line.number, line.text.trim_ascii_start()))
-            .filter(|(_, line)| !line.is_empty() && !line.starts_with(b"**"))
+        let is_data = |line: &Line<'_>| !line.text.starts_with(b"**");
+        lines.filter_map(Line::content).filter(is_data).map(|line| (line.number, line.text))
     }
 
     /// Returns a diagnostic about a line of the file with the card.
@@ -245,11 +238,6 @@ pub(crate) fn comparable(name: &str) -> String {
 fn is_keyword(line: &[u8]) -> bool {
     let start = line.iter().position(|b| !matches!(b, b' ' | b'\t')).unwrap_or(line.len());
     line.get(start) == Some(&b'*') && line.get(start + 1) != Some(&b'*')
-}
-
-/// Returns the start of the next line.
-fn line_end(bytes: &[u8], at: usize) -> usize {
-    memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |length| at + length + 1)
 }
 
 /// Returns keyword and parameters of a keyword line.

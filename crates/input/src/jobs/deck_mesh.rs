@@ -4,14 +4,10 @@ use super::deck::{Card, Deck, comparable, fields};
 use super::deck_sets::{Elements, Found as Resolved, Instances, Member, Scope};
 use super::element_kinds::{Drawing, drawing};
 use super::{Found, NodeSets, Unresolved};
-use crate::coordinates::excerpt;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{self, BadLines, excerpt, integer};
 use nalgebra::{Rotation3, Unit, Vector3};
 use std::collections::{BTreeMap, HashMap};
-
-/// Number of bad lines of a deck that are reported one by one.
-const MAX_SHOWN_LINES: usize = 5;
 
 /// Largest number of members of a line of a generated set.
 const MAX_GENERATED: i64 = 100_000_000;
@@ -41,13 +37,13 @@ impl DeckMesh {
     /// # Errors
     /// FB110 for lines that cannot be read, FB111 for cards that define nodes in a way that is not supported.
     pub(super) fn of(deck: &Deck) -> Found<Self> {
-        let mut reading = DeckMeshReader { deck, bad: Vec::new(), bad_count: 0 };
+        let mut reading = DeckMeshReader { deck, bad: BadLines::default() };
         let mut scopes = Scopes::default();
         for card in deck.cards() {
             reading.card(card, &mut scopes);
         }
-        let found = reading.finish();
-        if found.is_empty() { scopes.assembled() } else { Err(found) }
+        reading.bad.finish(Code::DeckSyntax, "line")?;
+        scopes.assembled()
     }
 
     /// Returns the elements for drawing.
@@ -203,8 +199,7 @@ fn power_of_ten_above(number: i64) -> i64 {
 /// State of reading a deck.
 struct DeckMeshReader<'d> {
     deck: &'d Deck,
-    bad: Vec<Diagnostic>,
-    bad_count: usize,
+    bad: BadLines,
 }
 
 impl DeckMeshReader<'_> {
@@ -228,32 +223,15 @@ impl DeckMeshReader<'_> {
             "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SYSTEM" => {
                 let message = format!("*{} is not read", card.title);
                 let help = "write the nodes and elements one by one, as preprocessors do";
-                self.complain(self.deck.about(card, Code::DeckUnsupported, message).with_help(help));
+                self.bad.add(self.deck.about(card, Code::DeckUnsupported, message).with_help(help));
             }
             _ => {}
         }
     }
 
-    fn complain(&mut self, diagnostic: Diagnostic) {
-        self.bad_count += 1;
-        if self.bad.len() < MAX_SHOWN_LINES {
-            self.bad.push(diagnostic);
-        }
-    }
-
-    fn finish(mut self) -> Vec<Diagnostic> {
-        if self.bad_count > self.bad.len() {
-            let message = format!("{} more lines have errors", self.bad_count - self.bad.len());
-            self.bad.extend(
-                self.deck.path().map(|path| Diagnostic::new(Code::DeckSyntax, message).in_file(path)),
-            );
-        }
-        self.bad
-    }
-
     fn syntax(&mut self, card: &Card, line: usize, expected: &str, text: &[u8]) {
         let message = format!("*{}: expected {expected}, found `{}`", card.title, excerpt(text));
-        self.complain(self.deck.at(card, line, Code::DeckSyntax, message).with_help("correct the line"));
+        self.bad.add(self.deck.at(card, line, Code::DeckSyntax, message).with_help("correct the line"));
     }
 
     fn numbers(&mut self, card: &Card, most: usize) -> Option<Vec<Vec<f64>>> {
@@ -284,7 +262,7 @@ impl DeckMeshReader<'_> {
             placement.turn = turn.filter(|[a, b, c, d, e, f, _]| [a, b, c] != [d, e, f]);
             if placement.turn.is_none() {
                 let message = "*INSTANCE: expected two points of an axis and an angle";
-                self.complain(self.deck.about(card, Code::DeckSyntax, message).with_help("correct the line"));
+                self.bad.add(self.deck.about(card, Code::DeckSyntax, message).with_help("correct the line"));
             }
         }
         placement
@@ -321,7 +299,7 @@ impl DeckMeshReader<'_> {
     fn elements(&mut self, card: &Card, scope: &mut Scope) {
         let Some(kind) = card.name("TYPE") else {
             let diagnostic = self.deck.about(card, Code::DeckSyntax, "*ELEMENT has no TYPE");
-            return self.complain(diagnostic.with_help("write *ELEMENT, TYPE=C3D20, for example"));
+            return self.bad.add(diagnostic.with_help("write *ELEMENT, TYPE=C3D20, for example"));
         };
         let mut members: Vec<(i64, Vec<i64>)> = Vec::new();
         let mut continues = false;
@@ -394,7 +372,7 @@ impl DeckMeshReader<'_> {
     fn set(&mut self, card: &Card, scopes: &mut Scopes) {
         let Some(name) = card.parameter("NSET").map(str::to_owned) else {
             let diagnostic = self.deck.about(card, Code::DeckSyntax, "*NSET has no name");
-            return self.complain(diagnostic.with_help("write *NSET, NSET=NAME"));
+            return self.bad.add(diagnostic.with_help("write *NSET, NSET=NAME"));
         };
         let members = match card.parameter("ELSET").filter(|elements| !elements.is_empty()) {
             Some(elements) => self.nodes_of_elements(card, elements, scopes),
@@ -465,7 +443,7 @@ fn range(bounds: &[i64]) -> Option<(i64, i64, i64)> {
 
 /// Returns a number; an empty field is zero.
 fn real(field: &[u8]) -> Option<f64> {
-    if field.is_empty() { Some(0.0) } else { crate::coordinates::real(field) }
+    if field.is_empty() { Some(0.0) } else { scanner::real(field) }
 }
 
 /// Returns Cartesian coordinates of a node in cylindrical (`C`: radius, degrees, z) or spherical coordinates (`S`:

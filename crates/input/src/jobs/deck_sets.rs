@@ -4,7 +4,7 @@
 use super::deck::comparable;
 use super::{NodeSets, Unresolved};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::integer;
 use std::collections::{BTreeMap, HashMap};
 
 /// Number of instances that a message names.

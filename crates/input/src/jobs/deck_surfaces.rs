@@ -2,7 +2,7 @@
 
 use super::deck::{Card, Deck, comparable, fields};
 use super::deck_mesh::DeckMesh;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::integer;
 use std::collections::{BTreeSet, HashMap};
 
 /// Nodes of the faces S1 to S6 of a hexahedron, numbered from 1 in the order of C3D20; C3D8 has the first 8 nodes.

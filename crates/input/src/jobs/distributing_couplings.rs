@@ -9,7 +9,7 @@ use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::numbers::significant;
-use flexbody_base::text::table::{integer, printable};
+use flexbody_base::text::scanner::{excerpt, integer, real};
 use flexbody_model::DofLabel;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -30,7 +30,7 @@ pub(super) fn reference_places(deck: &Deck, mesh: &DeckMesh) -> Found<BTreeMap<i
         // Data that continue in another file have a separate card.
         for (line, text) in deck.data(card) {
             let (places, weight) = weighted(text, mesh).ok_or_else(|| {
-                let text = printable(text);
+                let text = excerpt(text);
                 let message =
                     format!("*DISTRIBUTING COUPLING: `{text}` is not a node or node set and its weight");
                 vec![deck.at(card, line, Code::DeckUnsupported, message).with_help(HELP)]
@@ -106,7 +106,7 @@ fn reference_node(card: &Card, mesh: &DeckMesh) -> Result<i64, String> {
 fn weighted(line: &[u8], mesh: &DeckMesh) -> Option<(Vec<[f64; 3]>, f64)> {
     let mut given = fields(line);
     let (name, weight) = (given.next()?, given.next()?);
-    let weight = fast_float2::parse(weight).ok().filter(|weight: &f64| weight.is_finite())?;
+    let weight = real(weight).filter(|weight| weight.is_finite())?;
     let nodes: BTreeSet<i64> = match integer(name) {
         Some(node) => BTreeSet::from([node]),
         None => mesh.set(&String::from_utf8_lossy(name))?.iter().copied().collect(),

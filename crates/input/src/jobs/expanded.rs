@@ -12,6 +12,7 @@ use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::scanner::real;
 use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix};
 use flexbody_model::{DofLabel, RawMatrix};
 use std::collections::{BTreeMap, HashMap};
@@ -109,7 +110,7 @@ fn offsets(
         let offset = match offset.as_str() {
             "SPOS" => Some(0.5),
             "SNEG" => Some(-0.5),
-            number => crate::coordinates::real(number.as_bytes()).filter(|value| value.is_finite()),
+            number => real(number.as_bytes()).filter(|value| value.is_finite()),
         };
         let members = card.name("ELSET").and_then(|set| mesh.element_sets.get(&set));
         let (Some(offset), Some(members)) = (offset, members) else {

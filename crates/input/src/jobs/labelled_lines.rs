@@ -4,20 +4,16 @@
 use super::deck::fields;
 use super::{Found, FromFile, both};
 use crate::assemble::{Entry, Sides, StoredEntries, assemble, check_size};
-use crate::coordinates::{Blocks, line_aligned, most_entries, real};
+use crate::coordinates::{Blocks, line_aligned, most_entries};
 use crate::digits::{COUNTED, written_digits};
 use crate::recent::Recent;
-use crate::scanner::{Line, Lines, expected};
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::Code;
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{BadLines, Line, Lines, expected, integer, real};
 use flexbody_linalg::parallel;
 use flexbody_model::{DofLabel, RawMatrix};
 use std::path::Path;
-
-/// Number of bad lines of a file that are reported one by one.
-const MAX_SHOWN_LINES: usize = 5;
 
 /// Reads two matrices and the labels of their rows.
 ///
@@ -39,7 +35,7 @@ pub(super) fn has_labels(path: &Path) -> Found<bool> {
     let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
     let mut blocks = Blocks::of(&file, Compression::None);
     while let Some(block) = blocks.next().map_err(|e| vec![file.failed(&e)])? {
-        if let Some(line) = Lines::of(&block).find(|line| is_data(line.text.trim_ascii_start())) {
+        if let Some(line) = Lines::of(&block).filter_map(Line::content).find(|line| is_data(line.text)) {
             return Ok(line.text.contains(&b','));
         }
     }
@@ -67,8 +63,10 @@ impl LabelledLines {
         }
         // A change of the file during reading may be the cause of other problems, so it is reported first.
         file.refuse_changed().map_err(one)?;
-        let bad = bad_lines(&pieces, path);
-        if bad.is_empty() { Ok((Self { pieces }, file.seen().map_err(one)?)) } else { Err(bad) }
+        bad_lines(&mut pieces)
+            .finish(Code::MatrixSyntax, "line")
+            .map_err(|bad| bad.into_iter().map(|diagnostic| diagnostic.in_file(path)).collect::<Vec<_>>())?;
+        Ok((Self { pieces }, file.seen().map_err(one)?))
     }
 
     /// Returns the matrix with rows in the order of the ascending `labels`.
@@ -88,15 +86,14 @@ impl LabelledLines {
     }
 }
 
-fn bad_lines(pieces: &[LabelledEntries], path: &Path) -> Vec<Diagnostic> {
-    let mut before = 0;
-    let mut shown = Vec::new();
+/// Returns the bad lines of all pieces, numbered through the file.
+fn bad_lines(pieces: &mut [LabelledEntries]) -> BadLines {
+    let (mut bad, mut above) = (BadLines::default(), 0);
     for piece in pieces {
-        shown.extend(piece.bad.iter().map(|(line, bad)| bad.clone().in_file(path).at_line(before + line)));
-        before += piece.lines;
+        bad.append(std::mem::take(&mut piece.bad), above);
+        above += piece.lines;
     }
-    shown.truncate(MAX_SHOWN_LINES);
-    shown
+    bad
 }
 
 /// Entries of some lines. Rows and columns are indices in `labels`, where a label may occur more than once.
@@ -106,8 +103,8 @@ struct LabelledEntries {
     labels: Vec<DofLabel>,
     written: u8,
     lines: usize,
-    /// First bad lines: number within the piece, from 1, and problem.
-    bad: Vec<(usize, Diagnostic)>,
+    /// Bad lines, numbered from 1 within the piece.
+    bad: BadLines,
 }
 
 impl LabelledEntries {
@@ -131,11 +128,10 @@ impl LabelledEntries {
                     let (row, col) = (place(row), place(col));
                     piece.entries.push(Entry { row, col, value });
                 }
-                None if piece.bad.len() < MAX_SHOWN_LINES => {
+                None => {
                     const LINE: &str = "node, direction, node, direction, value";
-                    piece.bad.push((number, expected(Code::MatrixSyntax, LINE, line)));
+                    piece.bad.add(expected(Code::MatrixSyntax, LINE, line).at_line(number));
                 }
-                None => {}
             }
         }
         piece
@@ -222,6 +218,6 @@ mod tests {
         std::fs::write(&path, text).expect("written");
         let found = LabelledLines::read(&path).err().expect("refused");
         let at: Vec<_> = found.iter().map(|d| d.line()).collect();
-        assert_eq!(at, [1, 2, 3, 4, 6].map(|k| Some(lines + k)));
+        assert_eq!(at, [1, 2, 3, 4, 6, 7].map(|k| Some(lines + k)));
     }
 }

@@ -19,6 +19,7 @@ use bulk::Bulk;
 use elimination::GridPlaces;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
+use flexbody_base::text::scanner::BadLines;
 use flexbody_model::{Elements, NodeAxes as Axes, Nodes};
 use matrices::Matrices;
 use std::collections::HashMap;
@@ -93,7 +94,6 @@ impl JobReader for Nastran {
 /// Returns the positions of the grids in the basic system, and the row axes of grids with other axes than the basic
 /// ones.
 fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
-    const MAX_SHOWN: usize = 5;
     let mut systems = Systems::new(&bulk.systems, &bulk.grids);
     let (mut nodes, mut axes, mut bad) = (Nodes::default(), HashMap::new(), Vec::new());
     for (&id, grid) in &bulk.grids {
@@ -106,7 +106,7 @@ fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
                     axes.insert(id, axes_of_grid);
                 }
             }
-            Err(diagnostic) if bad.len() < MAX_SHOWN => bad.push(match diagnostic.file() {
+            Err(diagnostic) if bad.len() < BadLines::MAX_SHOWN => bad.push(match diagnostic.file() {
                 None => diagnostic
                     .about(format!("grid {id}"))
                     .in_file(&bulk.card_files[grid.file])

@@ -10,7 +10,7 @@ use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::deck_surfaces::nodes_of_surface;
 use flexbody_base::diagnostic::Code;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::integer;
 use flexbody_model::DofLabel;
 use std::collections::{BTreeSet, HashMap};
 

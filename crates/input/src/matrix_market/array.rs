@@ -2,13 +2,13 @@
 
 use super::header::{has_banner, size};
 use crate::array::Array;
-use crate::coordinates::{Blocks, excerpt, real};
+use crate::coordinates::Blocks;
 use crate::digits::written_digits;
-use crate::scanner::words;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::{Compression, broken};
+use flexbody_base::text::scanner::{Line, Lines, excerpt, real, words};
 
 /// Number of values whose written digits are counted.
 const MAX_COUNTED_VALUES: usize = 4096;
@@ -23,17 +23,15 @@ pub(crate) fn read_array(file: &InputFile, compression: Compression) -> Found<Ar
     let mut blocks = Blocks::of(file, compression);
     let mut reading = ArrayReader::default();
     while let Some(block) = blocks.next().map_err(damaged)? {
-        for line in block.split(|&b| b == b'\n') {
-            reading.line += 1;
-            let line = line.trim_ascii();
+        for Line { number, text } in Lines::below(&block, reading.line) {
+            reading.line = number;
+            let line = text.trim_ascii_start();
             if reading.line == 1 {
                 banner(line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line))?;
             } else if !line.is_empty() && !line.starts_with(b"%") {
                 reading.content(line).map_err(|diagnostic| vec![diagnostic.at_line(reading.line)])?;
             }
         }
-        // The text after the last line end of a block is no separate line.
-        reading.line -= usize::from(block.ends_with(b"\n"));
     }
     reading.finish().map_err(|diagnostic| vec![diagnostic])
 }

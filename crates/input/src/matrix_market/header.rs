@@ -1,8 +1,7 @@
 //! Banner, comments and size line.
 
-use crate::coordinates::excerpt;
-use crate::scanner::words;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::scanner::{Line, Lines, excerpt, words};
 
 /// Entries of the matrix that are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,26 +35,23 @@ fn without_bom(text: &[u8]) -> &[u8] {
 
 /// Returns the header, and its numbers of bytes and lines.
 pub(super) fn parse(text: &[u8]) -> Result<(Header, usize, usize), Vec<Diagnostic>> {
-    let mut lines = text.split_inclusive(|&b| b == b'\n');
-    let first = lines.next().unwrap_or(b"");
+    let mut lines = Lines::of(text);
+    let first = lines.next().map_or(&b""[..], |line| line.text);
     let (integer, symmetry) = banner(without_bom(first))?;
-    let (mut length, mut count) = (first.len(), 1);
-    for line in lines {
-        length += line.len();
-        count += 1;
-        let line = line.trim_ascii();
+    while let Some(Line { number, text: line }) = lines.next() {
+        let line = line.trim_ascii_start();
         if line.is_empty() || line.starts_with(b"%") {
             continue;
         }
         let numbers: Vec<Option<u64>> = words(line).map(size).collect();
         let &[Some(rows), Some(cols), Some(entries)] = numbers.as_slice() else {
             let message = format!("size line is `{}`, expected rows, columns and entries", excerpt(line));
-            return Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(count)]);
+            return Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(number)]);
         };
-        return Ok((Header { integer, symmetry, rows, cols, entries }, length, count));
+        return Ok((Header { integer, symmetry, rows, cols, entries }, lines.at, number));
     }
     let message = "file ends before the line with rows, columns and entries";
-    Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(count)])
+    Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(lines.number)])
 }
 
 /// Parses a whole number.

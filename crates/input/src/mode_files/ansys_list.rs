@@ -2,11 +2,9 @@
 
 use super::table::ModeTable;
 use super::{Found, syntax, unexpected, unreadable};
-use crate::coordinates::{excerpt, real};
 use crate::digits::written_digits;
-use crate::scanner::{Line, Lines, words};
 use flexbody_base::text::InputFile;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{Line, Lines, excerpt, integer, real, words};
 use flexbody_model::DofLabel;
 use std::f64::consts::TAU;
 

@@ -3,10 +3,8 @@
 
 use super::table::ModeTable;
 use super::{Found, syntax, unexpected, unreadable};
-use crate::coordinates::real;
-use crate::scanner::{Line, Lines, field, words};
 use flexbody_base::text::InputFile;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{Line, Lines, field, integer, real, words};
 use flexbody_model::DofLabel;
 use std::f64::consts::TAU;
 

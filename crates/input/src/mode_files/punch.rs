@@ -3,10 +3,8 @@
 
 use super::table::ModeTable;
 use super::{Found, syntax, unexpected, unreadable};
-use crate::coordinates::real;
-use crate::scanner::{Line, Lines, words};
 use flexbody_base::text::InputFile;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{Line, Lines, integer, real, words};
 use flexbody_model::DofLabel;
 
 /// Returns true when a file begins like a punch file with results.

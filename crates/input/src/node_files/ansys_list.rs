@@ -3,10 +3,8 @@
 
 use super::ansys_axes::axes;
 use super::{Found, NodeFile, unexpected};
-use crate::coordinates::real;
-use crate::scanner::{Line, Lines, words};
 use flexbody_base::text::InputFile;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{Line, Lines, integer, real, words};
 
 /// Returns true when the text begins with a header with tabs and a column X, or with the listing of NLIST.
 pub(super) fn recognises(head: &str) -> bool {

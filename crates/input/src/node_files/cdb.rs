@@ -5,10 +5,8 @@ mod eblock;
 
 use super::ansys_axes::axes;
 use super::{Found, NodeFile, syntax};
-use crate::coordinates::{excerpt, real};
-use crate::scanner::{Lines, field};
 use flexbody_base::text::InputFile;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{Lines, excerpt, field, integer, real};
 
 /// Returns true when the text is an archive.
 pub(super) fn recognises(head: &str) -> bool {

@@ -1,10 +1,9 @@
 //! Meshes of Gmsh (.msh, versions 2.2 and 4.1, text): nodes, the nodes of physical groups as sets, and elements.
 
 use super::{Found, NodeFile, syntax};
-use crate::scanner::Words;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::{Words, integer, number};
 use flexbody_model::{ElementShape, Elements};
 use std::collections::{BTreeSet, HashMap};
 
@@ -263,7 +262,7 @@ impl MeshWords<'_> {
 
     fn real(&mut self, expected: &str) -> Found<f64> {
         let word = self.text.next();
-        match word.and_then(|word| fast_float2::parse(word).ok()) {
+        match word.and_then(number) {
             Some(number) => Ok(number),
             None => self.wrong(expected, word),
         }

@@ -3,8 +3,8 @@
 
 use super::vtk_numbers::NumberType;
 use super::{Found, NodeFile, syntax};
-use crate::scanner::Words;
 use flexbody_base::text::InputFile;
+use flexbody_base::text::scanner::{Words, number};
 
 const BANNER: &str = "# vtk DataFile Version";
 
@@ -115,8 +115,8 @@ impl Cursor<'_> {
             let Some(word) = self.text.next() else {
                 return Err(format!("file ends after {} of {count} numbers", numbers.len()));
             };
-            let number = fast_float2::parse(word);
-            numbers.push(number.map_err(|_| format!("expected a number, found `{}`", word.escape_ascii()))?);
+            let value = number(word);
+            numbers.push(value.ok_or_else(|| format!("expected a number, found `{}`", word.escape_ascii()))?);
         }
         Ok(numbers)
     }

@@ -6,8 +6,8 @@ use super::vtk_cells::elements_of;
 use super::vtk_numbers::{Base64, NumberType, Packing, Unpacked};
 use super::xml_elements::{Element, elements};
 use super::{Found, NodeFile, refused};
-use crate::scanner::words;
 use flexbody_base::text::InputFile;
+use flexbody_base::text::scanner::{number, words};
 use flexbody_model::{Elements, Nodes};
 
 const HELP: &str = "write one mesh of points and cells (.vtu) in double precision, as it is or compressed by zlib, or give a table of nodes";
@@ -199,8 +199,6 @@ fn extent(piece: &Element<'_>) -> Option<u64> {
 
 fn ascii(text: &[u8]) -> Unpacked<Vec<f64>> {
     words(text)
-        .map(|word| {
-            fast_float2::parse(word).map_err(|_| format!("has `{}` for a number", word.escape_ascii()))
-        })
+        .map(|word| number(word).ok_or_else(|| format!("has `{}` for a number", word.escape_ascii())))
         .collect()
 }

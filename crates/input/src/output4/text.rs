@@ -2,12 +2,10 @@
 //! without blanks.
 
 use super::layout::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off, unpadded};
-use crate::bulk_cards::whole;
-use crate::coordinates::real;
 use crate::digits::written_digits;
-use crate::scanner::{Lines, expected};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
+use flexbody_base::text::scanner::{Lines, expected, real, whole};
 
 /// Returns true when a file begins with the header of a matrix.
 pub(super) fn begins(head: &[u8]) -> bool {

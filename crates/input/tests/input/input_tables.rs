@@ -74,6 +74,12 @@ fn dof_rows_are_put_into_the_order_of_their_numbers() {
 }
 
 #[test]
+fn numbers_may_have_exponents_of_fortran_and_fields_may_have_quotes() {
+    let model = read("\"node\" \"x\" y z\n1 1.5D+01 \" 2d0\" -3E0\n", None, 3).unwrap();
+    assert_eq!(model.nodes.positions, [[15.0, 2.0, -3.0]]);
+}
+
+#[test]
 fn bad_rows_are_shown_five_times_and_counted() {
     let mut text = "node,x,y,z\n".to_owned();
     for i in 0..100 {
@@ -81,7 +87,7 @@ fn bad_rows_are_shown_five_times_and_counted() {
     }
     let error = read(text, None, 3).unwrap_err();
     let lines: Vec<_> = error.diagnostics().iter().map(|d| d.line()).collect();
-    assert_eq!(lines, [Some(3), Some(5), Some(7), Some(9), Some(11), None]);
+    assert_eq!(lines, [Some(3), Some(5), Some(7), Some(9), Some(11), Some(13)]);
     assert!(error.to_string().contains("45 more rows"), "{error}");
 }
 

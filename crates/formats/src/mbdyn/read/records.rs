@@ -5,6 +5,7 @@ use super::words::{GROUP, Surplus, Words};
 use crate::import::digits::Digits;
 use flexbody_base::error::Result;
 use flexbody_base::text::InputFile;
+use flexbody_base::text::scanner::line_number;
 use std::collections::BTreeMap;
 
 /// Beginning of the last line.
@@ -41,7 +42,7 @@ pub(crate) struct Records {
 impl Records {
     pub(crate) fn read(file: &InputFile) -> Result<Self> {
         let text = std::str::from_utf8(file.bytes()).map_err(|e| {
-            let line = 1 + file.bytes()[..e.valid_up_to()].iter().filter(|byte| **byte == b'\n').count();
+            let line = line_number(file.bytes(), e.valid_up_to());
             Words::new(file.path(), "").refuse_at(line, "the file is not UTF-8 text")
         })?;
         let mut words = Words::new(file.path(), text);

@@ -1,8 +1,10 @@
-//! Lines and blank-separated words of a file with their positions.
+//! Words and lines of a file by the text scanner, with the rules of MBDyn: fields that touch, comments, and words that
+//! are skipped. Numbers are those of C++, which has no exponent with the letter D.
 
 use crate::import::digits::Digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::text::scanner;
 use std::path::Path;
 
 /// First words of a record group.
@@ -11,25 +13,20 @@ pub(crate) const GROUP: &str = "** RECORD GROUP ";
 /// Reading position in the text.
 pub(crate) struct Words<'t> {
     path: &'t Path,
-    lines: Vec<&'t str>,
-    /// Index of the current line.
-    line: usize,
-    /// Rest of the current line.
-    rest: &'t str,
+    text: &'t str,
+    words: scanner::Words<'t>,
     /// Number format of the record groups that no program writes with few digits on purpose.
     pub(crate) digits: Digits,
 }
 
 impl<'t> Words<'t> {
     pub(crate) fn new(path: &'t Path, text: &'t str) -> Self {
-        let lines: Vec<&str> = text.lines().collect();
-        let rest = lines.first().copied().unwrap_or("");
-        Self { path, lines, line: 0, rest, digits: Digits::default() }
+        Self { path, text, words: scanner::Words::of(text.as_bytes()), digits: Digits::default() }
     }
 
     /// Returns the number of the current line, from 1.
     pub(crate) fn at(&self) -> usize {
-        self.line + 1
+        self.words.line_number()
     }
 
     pub(crate) fn refuse(&self, what: impl Into<String>) -> Error {
@@ -46,27 +43,20 @@ impl<'t> Words<'t> {
 
     /// Returns the rest of the line and advances to the next line.
     pub(crate) fn take_line(&mut self) -> Option<&'t str> {
-        if self.line >= self.lines.len() {
-            return None;
-        }
-        let rest = self.rest;
-        self.line += 1;
-        self.rest = self.lines.get(self.line).copied().unwrap_or("");
-        Some(rest)
+        let rest = self.rest_of_line();
+        let length = self.words.line().len();
+        (length > 0).then_some(rest)
+    }
+
+    fn rest_of_line(&self) -> &'t str {
+        let line = self.words.clone().line();
+        self.text[self.words.at..self.words.at + line.len()].trim_end_matches(['\r', '\n'])
     }
 
     /// Returns the next word, on this line or a later one.
     pub(crate) fn word(&mut self) -> Option<&'t str> {
-        loop {
-            let rest = self.rest.trim_start();
-            if rest.is_empty() {
-                self.take_line()?;
-                continue;
-            }
-            let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
-            self.rest = &rest[end..];
-            return Some(&rest[..end]);
-        }
+        let length = self.words.next()?.len();
+        Some(&self.text[self.words.at - length..self.words.at])
     }
 
     /// Returns the next word of an incomplete record; an error at the end of the record group.
@@ -77,7 +67,7 @@ impl<'t> Words<'t> {
             }
             Some(word) => Ok(word),
             None => {
-                let last = self.lines.len();
+                let last = scanner::Lines::of(self.text.as_bytes()).count();
                 Err(self.refuse_at(last, format!("{what}: the file ends too early")))
             }
         }
@@ -95,9 +85,7 @@ impl<'t> Words<'t> {
             )));
         }
         if !touching.is_empty() {
-            // The rest of the line begins after the number.
-            let line = self.lines[self.line];
-            self.rest = &line[line.len() - self.rest.len() - touching.len()..];
+            self.words.at -= touching.len();
         }
         match word.parse::<f64>() {
             Ok(value) if value.is_finite() => {
@@ -128,9 +116,10 @@ impl<'t> Words<'t> {
     /// record group.
     pub(crate) fn surplus(&mut self) -> Surplus {
         let mut found = Surplus::of(self.at(), "");
-        while self.line < self.lines.len() && !self.rest.trim_start().starts_with("**") {
-            found.see(self.line + 1, self.rest);
-            self.take_line();
+        while !self.rest_of_line().trim_start().starts_with("**") {
+            let line = self.at();
+            let Some(text) = self.take_line() else { break };
+            found.see(line, text);
         }
         found
     }
@@ -145,14 +134,13 @@ impl<'t> Words<'t> {
     /// where the title should be.
     pub(crate) fn take_title(&mut self) -> std::result::Result<(), usize> {
         let first = self.at();
-        while self.rest.trim().is_empty() && self.line < self.lines.len() {
-            self.take_line();
-        }
-        if self.rest.starts_with("**") && !self.rest.starts_with(GROUP) {
+        while self.rest_of_line().trim().is_empty() && self.take_line().is_some() {}
+        let title = self.rest_of_line();
+        if title.starts_with("**") && !title.starts_with(GROUP) {
             self.take_line();
             return Ok(());
         }
-        if self.at() > first && !self.rest.starts_with("**") { Ok(()) } else { Err(first) }
+        if self.at() > first && !title.starts_with("**") { Ok(()) } else { Err(first) }
     }
 }
 

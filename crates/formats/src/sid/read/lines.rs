@@ -1,6 +1,7 @@
 //! Lines of a file: keywords and assignments.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::scanner;
 use std::path::Path;
 
 /// A line that is not blank.
@@ -18,14 +19,15 @@ pub(crate) struct Line<'t> {
 /// Iterator over the lines of a file.
 pub(crate) struct Lines<'t> {
     path: &'t Path,
-    lines: std::iter::Enumerate<std::str::Lines<'t>>,
+    text: &'t str,
+    lines: scanner::Lines<'t>,
     /// Number of the last line returned.
     last: usize,
 }
 
 impl<'t> Lines<'t> {
     pub(crate) fn new(path: &'t Path, text: &'t str) -> Self {
-        Self { path, lines: text.lines().enumerate(), last: 0 }
+        Self { path, text, lines: scanner::Lines::of(text.as_bytes()), last: 0 }
     }
 
     /// Returns the diagnostic FB730 at a line.
@@ -35,18 +37,21 @@ impl<'t> Lines<'t> {
 
     /// Returns the next line; an error if the file ends within `inside`.
     pub(crate) fn next(&mut self, inside: &str) -> Result<Line<'t>, Diagnostic> {
-        for (at, text) in self.lines.by_ref() {
-            if text.trim().is_empty() {
+        loop {
+            let start = self.lines.at;
+            let Some(line) = self.lines.next() else { break };
+            let text = self.text[start..start + line.text.len()].trim();
+            if text.is_empty() {
                 continue;
             }
-            self.last = at + 1;
+            self.last = line.number;
             let (key, value) = match text.split_once('=') {
                 Some((key, value)) => (key, Some(value.trim())),
                 None => (text, None),
             };
             let words: Vec<&str> = key.split_whitespace().collect();
             let key = words.join(" ").to_lowercase();
-            return Ok(Line { number: at + 1, text: text.trim(), key, value });
+            return Ok(Line { number: line.number, text, key, value });
         }
         Err(self.unreadable(self.last.max(1), format!("the file ends inside of `{inside}`")))
     }
@@ -70,14 +75,12 @@ impl<'t> Lines<'t> {
     /// Returns the value of a line as a finite number, with exponent letter E or D, and its text.
     pub(crate) fn number(&self, line: &Line<'t>) -> Result<(f64, &'t str), Diagnostic> {
         let value = line.value.unwrap_or("");
-        let wrong = || {
-            let message = format!("`{}` is `{value}`, expected a finite number", line.key);
-            self.unreadable(line.number, message)
-        };
-        if !value.bytes().all(|b| b.is_ascii_digit() || b"+-.eEdD".contains(&b)) {
-            return Err(wrong());
+        match scanner::number(value.as_bytes()) {
+            Some(number) if number.is_finite() => Ok((number, value)),
+            _ => {
+                let message = format!("`{}` is `{value}`, expected a finite number", line.key);
+                Err(self.unreadable(line.number, message))
+            }
         }
-        let number: f64 = value.replace(['D', 'd'], "e").parse().map_err(|_| wrong())?;
-        if number.is_finite() { Ok((number, value)) } else { Err(wrong()) }
     }
 }

@@ -5,18 +5,16 @@ use super::constraints::Constraints;
 use super::elements;
 use super::sets::SetLines;
 use super::systems::{Definition, Grid, SystemCard, SystemKind};
-use crate::bulk_cards::{Card, Item, components, read_deck, whole};
-use crate::coordinates::excerpt;
+use crate::bulk_cards::{Card, Item, components, read_deck};
 use crate::dmig::Dmigs;
 use crate::jobs::Found;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;
+use flexbody_base::text::scanner::{BadLines, excerpt, whole};
 use flexbody_model::Elements;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-/// Number of bad cards that are reported one by one.
-const MAX_SHOWN_CARDS: usize = 5;
 /// Largest number of scalar points in a range; `MAX_SCALARS` is the largest number in a deck.
 const MAX_RANGE: i64 = 1_000_000;
 const MAX_SCALARS: usize = 10_000_000;
@@ -64,8 +62,7 @@ pub(super) struct Bulk {
     defaults: [i64; 2],
     default_support: Vec<u8>,
     began: usize,
-    bad: Vec<Diagnostic>,
-    bad_count: usize,
+    bad: BadLines,
 }
 
 impl Bulk {
@@ -88,7 +85,7 @@ impl Bulk {
                     let message = "the deck has several sections of bulk data (BEGIN SUPER)";
                     let diagnostic = Diagnostic::new(Code::DeckUnsupported, message);
                     let help = "give the deck of one superelement";
-                    bulk.complain(diagnostic.in_file(place.path).at_line(place.line).with_help(help));
+                    bulk.bad.add(diagnostic.in_file(place.path).at_line(place.line).with_help(help));
                 }
                 bulk.began += 1;
                 Ok(())
@@ -103,11 +100,7 @@ impl Bulk {
             Item::Matrices(lines) => bulk.dmigs.cards(lines),
         })
         .map_err(|diagnostic| vec![diagnostic])?;
-        let mut bad = std::mem::take(&mut bulk.bad);
-        if bulk.bad_count > bad.len() {
-            let message = format!("{} more cards have errors", bulk.bad_count - bad.len());
-            bad.push(Diagnostic::new(Code::DeckSyntax, message).in_file(path));
-        }
+        let mut bad = std::mem::take(&mut bulk.bad).into_diagnostics(Code::DeckSyntax, "card");
         bad.extend(bulk.dmigs.take_bad());
         bulk.apply_defaults();
         bulk.files = files;
@@ -139,13 +132,6 @@ impl Bulk {
             points.extend(self.scalars.range(first..=last).map(|&id| (id, 0)));
         }
         points
-    }
-
-    fn complain(&mut self, diagnostic: Diagnostic) {
-        self.bad_count += 1;
-        if self.bad.len() < MAX_SHOWN_CARDS {
-            self.bad.push(diagnostic);
-        }
     }
 
     fn card(&mut self, card: &Card, path: &Path, file: usize) {
@@ -195,7 +181,7 @@ impl Bulk {
         if read.is_none() {
             let fields: Vec<String> = (0..card.len().min(8)).map(|k| excerpt(card.field(k))).collect();
             let message = format!("{} cannot be read: `{}`", card.name, fields.join("`, `"));
-            self.complain(Diagnostic::new(Code::DeckSyntax, message).in_file(path).at_line(card.line()));
+            self.bad.add(Diagnostic::new(Code::DeckSyntax, message).in_file(path).at_line(card.line()));
         }
     }
 
@@ -223,7 +209,7 @@ impl Bulk {
         // A card may occur in several included files.
         if self.grids.insert(id, grid).is_some_and(|other| !other.is_the_same(&same)) {
             let message = format!("grid {id} is given twice");
-            self.complain(Diagnostic::new(Code::NodeDuplicate, message).in_file(path).at_line(card.line()));
+            self.bad.add(Diagnostic::new(Code::NodeDuplicate, message).in_file(path).at_line(card.line()));
         }
         Some(())
     }
@@ -296,7 +282,7 @@ impl Bulk {
         let same = system.clone();
         if self.systems.insert(id, system).is_some_and(|other| !other.is_the_same(&same)) {
             let message = format!("coordinate system {id} is given twice");
-            self.complain(Diagnostic::new(Code::DeckSyntax, message).in_file(path).at_line(card.line()));
+            self.bad.add(Diagnostic::new(Code::DeckSyntax, message).in_file(path).at_line(card.line()));
         }
         Some(())
     }

@@ -1,10 +1,10 @@
 //! Rigid elements and multipoint constraints of a deck: the components of grids that follow others. KGG and MGG do not
 //! contain them: rows that follow others are eliminated.
 
-use crate::bulk_cards::{Card, components, whole};
-use crate::coordinates::real;
+use crate::bulk_cards::{Card, components};
 use crate::dmig::{Point, label};
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::scanner::{real, whole};
 use flexbody_model::DofLabel;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

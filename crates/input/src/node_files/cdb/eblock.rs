@@ -1,7 +1,7 @@
 //! Elements of an archive of Ansys, for drawing the part. Unreadable elements are left out and reported.
 
 use super::{nth_field, widths};
-use flexbody_base::text::table::integer;
+use flexbody_base::text::scanner::integer;
 use flexbody_model::{ElementShape, Elements};
 use std::collections::HashMap;
 

@@ -1,21 +1,28 @@
-//! The text scanner behind the line readers: lines with their numbers, words across lines, fields of fixed columns, and
-//! the message about unexpected text.
+//! Lines with their numbers, and words across lines.
 
-use crate::coordinates::excerpt;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use std::cell::Cell;
 
 /// Line of a text.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Line<'a> {
+pub struct Line<'a> {
     /// Number of the line, from 1.
     pub number: usize,
     /// Text of the line without its end and trailing blanks.
     pub text: &'a [u8],
 }
 
+impl Line<'_> {
+    /// Returns the line without blanks around its text; `None` for a blank line.
+    #[inline]
+    pub fn content(self) -> Option<Self> {
+        let text = self.text.trim_ascii_start();
+        (!text.is_empty()).then_some(Self { text, ..self })
+    }
+}
+
 /// Iterator over the lines of a text. Bytes after the last line end count as a line.
 #[derive(Debug, Clone)]
-pub(crate) struct Lines<'a> {
+pub struct Lines<'a> {
     text: &'a [u8],
     /// Start of the next line.
     pub at: usize,
@@ -24,78 +31,102 @@ pub(crate) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    pub(crate) fn of(text: &'a [u8]) -> Self {
+    /// Returns the lines of a whole file.
+    pub fn of(text: &'a [u8]) -> Self {
         Self::below(text, 0)
     }
 
     /// Returns true when there are no more lines.
-    pub(crate) fn is_at_end(&self) -> bool {
+    pub fn is_at_end(&self) -> bool {
         self.at >= self.text.len()
     }
 
+    /// Returns the text below the last line.
+    pub fn rest(&self) -> &'a [u8] {
+        &self.text[self.at..]
+    }
+
     /// Returns the lines of a part of a file with `above` lines above it.
-    pub(crate) fn below(text: &'a [u8], above: usize) -> Self {
-        Self { text, at: 0, number: above }
+    pub fn below(text: &'a [u8], above: usize) -> Self {
+        Self::starting_at(text, 0, above)
+    }
+
+    /// Returns the lines from the byte `at` on, where a line begins with `above` lines above it.
+    pub fn starting_at(text: &'a [u8], at: usize, above: usize) -> Self {
+        Self { text, at, number: above }
     }
 }
 
 impl<'a> Iterator for Lines<'a> {
     type Item = Line<'a>;
 
+    #[inline]
     fn next(&mut self) -> Option<Line<'a>> {
-        let rest = self.text.get(self.at..).filter(|rest| !rest.is_empty())?;
-        let length = memchr::memchr(b'\n', rest).unwrap_or(rest.len());
-        self.at = (self.at + length + 1).min(self.text.len());
+        if self.is_at_end() {
+            return None;
+        }
+        let end = line_end(self.text, self.at);
+        let text = self.text[self.at..end].trim_ascii_end();
+        self.at = end;
         self.number += 1;
-        Some(Line { number: self.number, text: rest[..length].trim_ascii_end() })
+        Some(Line { number: self.number, text })
     }
 }
 
-/// Returns the words of a text, separated by blanks.
-pub(crate) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
-    text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+/// Returns the start of the line below the one at `at`.
+#[inline]
+pub fn line_end(text: &[u8], at: usize) -> usize {
+    memchr::memchr(b'\n', &text[at..]).map_or(text.len(), |length| at + length + 1)
 }
 
-/// Returns the field of a line in these columns, trimmed; empty if the line is shorter.
-pub(crate) fn field(line: &[u8], columns: std::ops::Range<usize>) -> &[u8] {
-    line.get(columns.start..columns.end.min(line.len())).unwrap_or_default().trim_ascii()
+/// Returns the number of the line, from 1, with the byte `at`.
+pub fn line_number(text: &[u8], at: usize) -> usize {
+    1 + memchr::memchr_iter(b'\n', &text[..at]).count()
 }
 
 /// Iterator over the words of a text on all its lines.
 #[derive(Debug, Clone)]
-pub(crate) struct Words<'a> {
+pub struct Words<'a> {
     text: &'a [u8],
     /// Start of the text that has not been read.
     pub at: usize,
+    /// Last place whose line was asked for, and the number of the line: line ends are counted once.
+    counted: Cell<(usize, usize)>,
 }
 
 impl<'a> Words<'a> {
-    pub(crate) fn of(text: &'a [u8]) -> Self {
-        Self { text, at: 0 }
+    /// Returns the words of a whole file.
+    pub fn of(text: &'a [u8]) -> Self {
+        Self { text, at: 0, counted: Cell::new((0, 1)) }
     }
 
     /// Returns the text that has not been read.
-    pub(crate) fn rest(&self) -> &'a [u8] {
+    pub fn rest(&self) -> &'a [u8] {
         &self.text[self.at..]
     }
 
     /// Returns the rest of the line, with its end, and moves behind it.
-    pub(crate) fn line(&mut self) -> &'a [u8] {
-        let rest = self.rest();
-        let end = memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
-        self.at += end;
-        &rest[..end]
+    #[inline]
+    pub fn line(&mut self) -> &'a [u8] {
+        let start = self.at;
+        self.at = line_end(self.text, start);
+        &self.text[start..self.at]
     }
 
     /// Returns the number of the line, from 1, at which the unread text begins.
-    pub(crate) fn line_number(&self) -> usize {
-        1 + memchr::memchr_iter(b'\n', &self.text[..self.at]).count()
+    pub fn line_number(&self) -> usize {
+        let (from, number) = self.counted.get();
+        let (from, number) = if from <= self.at { (from, number) } else { (0, 1) };
+        let number = number - 1 + line_number(&self.text[from..], self.at - from);
+        self.counted.set((self.at, number));
+        number
     }
 }
 
 impl<'a> Iterator for Words<'a> {
     type Item = &'a [u8];
 
+    #[inline]
     fn next(&mut self) -> Option<&'a [u8]> {
         let rest = self.rest();
         let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
@@ -105,14 +136,9 @@ impl<'a> Iterator for Words<'a> {
     }
 }
 
-/// Returns the diagnostic about unexpected text.
-pub(crate) fn expected(code: Code, what: &str, found: &[u8]) -> Diagnostic {
-    Diagnostic::new(code, format!("expected {what}, found `{}`", excerpt(found)))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Lines, Words, field};
+    use super::*;
 
     #[test]
     fn lines_have_numbers_and_no_ends() {
@@ -132,11 +158,5 @@ mod tests {
         assert_eq!(found, [(&b"a"[..], 1), (b"b", 1), (b"c", 3)]);
         assert_eq!((words.line(), words.line_number()), (&b" rest of\n"[..], 4));
         assert_eq!((words.next(), words.next(), words.rest()), (Some(&b"d"[..]), None, &b""[..]));
-    }
-
-    #[test]
-    fn fields_end_with_their_line() {
-        let line = b"  12  ab";
-        assert_eq!([field(line, 0..4), field(line, 4..12), field(line, 8..12)], [&b"12"[..], b"ab", b""]);
     }
 }
