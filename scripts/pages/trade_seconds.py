@@ -22,7 +22,7 @@ PER_PERIOD = 20
 # Smallest number of steps that is tried, and largest number of instants that are compared.
 FEWEST, INSTANTS = 40, 20_000
 # Runs of the search; its result has at most this many times the steps that would be enough.
-TRIALS, CLOSE = 7, 1.3
+TRIALS, CLOSE = 5, 1.3
 # Ratio of error to tolerance that the integration may add where a body exceeds the tolerances anyway, relative to the error of the body.
 SHARE = 0.1
 # A scene that names no such frequency is followed up to this many times the first one of the body.
@@ -118,7 +118,7 @@ class InExudyn:
     """The body in Exudyn, made again for every run since a run changes it."""
 
     order = 2
-    most = 100_000
+    most = 20_000
 
     def __init__(self, program, task, folder):
         import exudyn
@@ -383,7 +383,7 @@ class InC:
     """The body in a C program that is compiled for it."""
 
     order = 4
-    most = 2_000_000
+    most = 500_000
 
     def __init__(self, program, task, folder):
         self.task, self.folder = task, folder
