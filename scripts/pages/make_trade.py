@@ -231,7 +231,7 @@ def timed(program, folder, told, scene, model):
     lost = max(lacks[-1][key] / told["tolerance"][key] for key in OUTPUTS if lacks[-1][key]) if lacks else 0.0
     most = 1.0 - lost if lost < 1.0 else 1.0
     found = {}
-    for number in worth_timing(told):
+    for number in sorted(set(worth_timing(told))):
         row = told["rows"][number - 1]
         # A body starts in its own equilibrium, as `simulate` has it.
         q, qd, _ = simulated_modes(program, folder, folder / f"candidate_{number:03}.flex.h5", scene[0])
@@ -332,7 +332,7 @@ def scene_part(program, name, model, modes):
         told = json.loads((folder / "trade.json").read_text())
         times = timed(program, folder, told, (path, read_scene(path)), manifest)
     drawn(told, times, name)
-    verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:])
+    verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:]).replace(f"{ROOT}/", "")
     said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s."
     parts = [f"## {told['scene']}", said, verdict, measured(told, times), f"![error over seconds](../images/trade_{name}.svg)"]
     return "\n\n".join(parts) + "\n\n", summary(told, times), bases(told)
