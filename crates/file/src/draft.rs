@@ -326,6 +326,7 @@ fn empty_body(units: UnitSystem, storage: Storage, invariants: Invariants) -> Pa
         },
         interfaces: Vec::new(),
         coordinates: None,
+        recoveries: Vec::new(),
         terms: Vec::new(),
         storage,
     }

@@ -128,6 +128,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         interfaces,
         damping,
         geometric_stiffness,
+        recoveries: Vec::new(),
         allow_implausible: files.allow_implausible,
         sources: Sources::default(),
         diagnostics,

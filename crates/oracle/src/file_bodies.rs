@@ -279,6 +279,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             })
             .collect(),
         coordinates: (n * nf % 2 == 1).then(|| coordinates(&mut r, 1 + interfaces, nf)),
+        recoveries: Vec::new(),
         terms: Vec::new(),
         mesh: r.mesh(n),
         storage: Storage::F64,
