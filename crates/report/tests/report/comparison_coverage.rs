@@ -5,8 +5,8 @@ use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     FixedInterface, FlexBody, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
-    LoadKind, LumpedBody, MassStructure, Parts, ReferenceConditions, Storage, SurfaceMesh, TermDecision,
-    TermGroup, UnitLoad,
+    LoadColumns, LoadKind, LumpedBody, MassStructure, Parts, Quantity, Recovery, RecoveryRow,
+    ReferenceConditions, Storage, SurfaceMesh, TermDecision, TermGroup, UnitLoad,
 };
 use flexbody_body::invariants::{BodyFrame, DIGITS, Frame, GeneralTerms, InertiaStiffness};
 use flexbody_file::contents;
@@ -96,6 +96,21 @@ fn complete() -> FlexBody {
         tier: 1,
         bound: 0.1,
         limit: 0.2,
+    }];
+    parts.recoveries = vec![Recovery {
+        name: "gauge".to_owned(),
+        rows: vec![RecoveryRow {
+            name: "g1".to_owned(),
+            quantity: Quantity::Strain,
+            component: "xx".to_owned(),
+            unit: String::new(),
+            node: None,
+            element: Some(1),
+        }],
+        offset: vec![0.5],
+        modes: Mat::from_fn(1, nf, number),
+        spin: Mat::from_fn(1, 6, number),
+        loads: vec![LoadColumns { interface: "left".to_owned(), columns: Mat::from_fn(1, 6, number) }],
     }];
     parts.conditions = ReferenceConditions::Interface("right".to_owned());
     parts.mesh = Some(SurfaceMesh::new(vec![[0, 1, 4]], vec![[0, 1]], n).expect("a triangle"));
