@@ -16,6 +16,8 @@ use interfaces::{COORDINATES, INTERFACES};
 use invariants::{COMPARISON, DAMPING, INVARIANTS, LUMPED};
 use nalgebra::{Matrix3, Vector3};
 use recovery::RECOVERY;
+#[cfg(feature = "hdf5")]
+pub(super) use recovery::labels_json;
 use terms::TERMS;
 
 mod certificate;

@@ -273,6 +273,10 @@ fn differing(change: impl FnOnce(&mut Parts)) -> (Vec<&'static str>, String) {
     let body = complete();
     let mut parts = body.clone().into_parts();
     change(&mut parts);
+    // Recoveries have loads at interfaces that are there.
+    let held: Vec<&Interface> = parts.interfaces.iter().filter(|one| one.reference.is_some()).collect();
+    let recoveries = parts.recoveries.iter_mut();
+    recoveries.for_each(|one| one.loads.retain(|load| held.iter().any(|own| own.name == load.interface)));
     let other = FlexBody::new(parts).unwrap_or_else(|e| panic!("{e}"));
     let found = compare(&body, &other, &Tolerances::default()).expect("comparable");
     (found.rows().iter().filter(|row| !row.passed).map(|row| row.quantity).collect(), found.text())
@@ -327,6 +331,7 @@ fn what_a_file_of_another_program_has_none_of_is_listed() {
     parts.source.n_dofs = 0;
     parts.frame = Frame::model();
     parts.interfaces.clear();
+    parts.recoveries.clear();
     parts.conditions = ReferenceConditions::Unstated;
     parts.geometric_stiffness.clear();
     parts.inertia_stiffness = None;
