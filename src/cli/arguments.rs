@@ -18,7 +18,7 @@ use flexbody_formats::IMPORT_FORMATS;
 use flexbody_formats::export::ExportFormat;
 use flexbody_study::trade::ReferenceChoice;
 pub(super) use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
-pub(super) use judgement::{AdviseArguments, MeasureArguments};
+pub(super) use judgement::{AdviseArguments, MeasureArguments, RecoverArguments};
 pub(super) use response::ResponseArguments;
 use std::path::PathBuf;
 
@@ -89,6 +89,10 @@ pub enum Command {
         after_help = "Examples:\n  flexbody measure small.flex.h5 --scene tumble.toml --history run.csv\n  flexbody measure small.flex.h5 --scene tumble.toml --history run.csv --reference full.flex.h5 --model model.toml"
     )]
     Measure(MeasureArguments),
+    /// Compute the recoveries of a body (stresses, strains, section forces) over a run of any program, from its modal
+    /// coordinates, angular velocity and loads
+    #[command(after_help = "Example:\n  flexbody recover rod.flex.h5 --history run.csv -o stress.h5")]
+    Recover(RecoverArguments),
     /// Write a body with some of its modes and groups of terms, as a selection or a trade study recommends
     #[command(
         after_help = "Example:\n  flexbody reduce rod.flex.h5 --keep-modes 1,3,5-9 --terms W1 -o small.flex.h5"

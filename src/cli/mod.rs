@@ -25,6 +25,7 @@ mod output;
 mod places;
 mod prepare;
 mod recipe;
+mod recover;
 mod reduce;
 mod resources;
 mod response;

@@ -47,6 +47,7 @@ struct Run {
 /// Returns the option for the result of a command and the name of its file; an audit prints its result.
 fn result_option(command: &str) -> Option<(&'static str, &'static str)> {
     match command {
+        "recover" => Some(("--output", "rows.csv")),
         "convert" | "assemble" | "simulate" | "view" | "export" => Some(("--output", "body.flex.h5")),
         "select" | "response" | "trade" | "batch" => Some(("--report", "report.json")),
         "audit" | "check" | "compare" => None,

@@ -18,6 +18,8 @@ const SCENE: &str = "[run]\nduration = 0.001\noutputs = 20\n[initial]\nangular_v
 const LIST: &str =
     "[[body]]\nmodel = \"model.toml\"\noutput = \"listed.h5\"\noptions = [\"--modes\", \"4\"]\n";
 
+const CUT: &str = "\n[[recovery]]\nname = \"root\"\nbox = { min = [-1, -1, -1], max = [0.2, 1, 1] }\n";
+
 /// Retriever of schemas in the folder of the referring schema.
 struct Folder;
 
@@ -42,6 +44,8 @@ fn folder() -> TempDir {
     let raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).with_lumped_mass().raw_model();
     write_model(folder.path(), &raw, Triangle::Lower);
     fs::write(folder.path().join("scene.toml"), SCENE).expect("written");
+    let manifest = fs::read_to_string(folder.path().join("model.toml")).expect("a manifest");
+    fs::write(folder.path().join("cut.toml"), manifest + CUT).expect("written");
     fs::write(folder.path().join("list.toml"), LIST).expect("written");
     let words = ["convert", "model.toml", "--modes", "4", "--quiet", "-o", "b.h5"];
     assert!(flexbody(folder.path(), &words).status.success());
@@ -92,6 +96,9 @@ fn every_command_prints_an_object_of_the_schema() {
         ("simulate b.h5 --scene scene.toml --csv run.csv", 0),
         ("measure b.h5 --scene scene.toml --history run.csv", 0),
         ("measure b.h5 --scene scene.toml --history scene.toml", 2),
+        ("convert cut.toml --modes 4 -o cut.h5", 0),
+        ("recover cut.h5 --history run.csv -o rows.csv", 0),
+        ("recover b.h5 --history run.csv -o rows.csv", 2),
         ("trade b.h5 --scene scene.toml --repeat 1", 0),
         ("response b.h5 --band 0..1000 --from 1 --to 2", 0),
         (

@@ -121,6 +121,7 @@ codes! {
     PlaceUnknown = "FB218", Error, BadInput, "place or direction does not exist in the body", "run flexbody inspect, which lists the interfaces; give nodes by number";
     SceneCase = "FB219", Error, BadInput, "load case not found, or not named although the scene has several", "name a case of the scene with --case NAME";
     NodeSetUnknown = "FB220", Error, BadInput, "node set or region contains no node of the model", "name a node set of the deck, or correct the region";
+    RecoveryUnknown = "FB221", Error, BadInput, "body has no recovery of this name", "run flexbody inspect, which lists the recoveries; give [[recovery]] in the manifest to convert with one";
     SceneDamping = "FB225", Error, BadInput, "scene and body both define damping", "remove [damping] from the scene (--damping from the command), or write `replace = true` in it to ignore the damping of the body";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
@@ -138,6 +139,9 @@ codes! {
     MatrixTooLarge = "FB313", Error, BadInput, "matrix has more than 4294967295 rows", "split the model";
     ShapesSize = "FB320", Error, BadInput, "array of shapes or loads does not fit the matrices", "give one row (or one column) for each matrix row, in the order of the matrices";
     ShapesZero = "FB321", Error, BadInput, "shape or load is zero everywhere", "remove the column";
+    RecoverySize = "FB322", Error, BadInput, "operator of a recovery does not fit the matrices", "give one column for each matrix row, in the order of the matrices, and one value of the offset for each row";
+    RecoveryRows = "FB323", Error, BadInput, "table of rows does not describe the operator of its recovery", "write the header `row,name,quantity,component,unit` and one line for each row of the operator; docs/reference/recovery.md has the words";
+    RecoveryCut = "FB324", Error, BadInput, "cut of a recovery does not divide the body", "give the nodes of one side, with all nodes of a rigid interface or none";
     // FB4xx: model
     NodesMissing = "FB401", Error, BadInput, "degrees of freedom refer to nodes without coordinates", "add the nodes to the node table";
     DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "give one row of dofs.csv for each matrix row; without dofs.csv there are three rows for each node";
@@ -176,6 +180,7 @@ codes! {
     GeometricStiffnessMotion = "FB440", Error, BadInput, "geometric stiffness is not that of a stress: it breaks a relation with rigid motion", "give the stress stiffness alone: the difference of the stiffness matrices with and without prestress holds the stiffness of the initial displacements as well";
     GeometricStiffnessLoad = "FB441", Error, BadInput, "geometric stiffness is not that of the load that it is given for", "check load, axis, sign and units, and divide the matrix by the size of the load (of spin about the centre of mass or the origin of the model: by the square of the rate in radians per unit of time)";
     GeometricStiffnessRough = "FB442", Warning, Done, "geometric stiffness fulfils its relations with rigid motion roughly", "nothing to do where elements of reduced integration explain it; else check that the matrix holds the stress stiffness alone";
+    RecoveryStrained = "FB443", Error, BadInput, "rigid motion of the body strains a recovery: its columns do not belong to the rows of the matrices", "write the operator by the rows of K and M; a row that a rigid motion may change is a `displacement` or `other`";
     InterfaceCentre = "FB450", Warning, Done, "reference point of an interface is not the mean of its nodes", "nothing to do if the joint belongs there; else state the point: --interface NAME=SET,COUPLING,X/Y/Z, or `reference` in [[interface]]";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";

@@ -177,6 +177,8 @@ fn symbol(extent: Extent) -> String {
         Extent::Coordinates => "nc".to_owned(),
         Extent::Triangles => "nt".to_owned(),
         Extent::Edges => "ne".to_owned(),
+        Extent::RecoveryRows => "r".to_owned(),
+        Extent::LoadedInterfaces => "ni".to_owned(),
     }
 }
 

@@ -8,8 +8,8 @@ use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     Certificate, FixedInterface, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
-    InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, ReferenceConditions, Source, Storage,
-    SurfaceMesh, TermDecision, TermGroup, TermGroups, UnitLoad,
+    InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, Parts, Recovery,
+    ReferenceConditions, Source, Storage, SurfaceMesh, TermDecision, TermGroup, TermGroups, UnitLoad,
 };
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass,
@@ -77,6 +77,14 @@ impl Draft {
                 let (nodes, coupling, reference) = (Vec::new(), None, None);
                 self.body.interfaces.push(Interface { name: name.to_owned(), nodes, coupling, reference });
             }
+            Per::Recovery => self.body.recoveries.push(Recovery {
+                name: name.to_owned(),
+                rows: Vec::new(),
+                offset: Vec::new(),
+                modes: Mat::new(),
+                spin: Mat::new(),
+                loads: Vec::new(),
+            }),
             Per::UnitLoad => self.body.geometric_stiffness.push(load()),
             Per::InertiaLoad => self.inertia().stiffness.push(load()),
         }
@@ -150,6 +158,31 @@ impl Draft {
     /// Returns the interface of the current instance.
     pub(super) fn interface(&mut self) -> &mut Interface {
         &mut self.body.interfaces[self.at]
+    }
+
+    /// Returns the recovery of the current instance.
+    pub(super) fn recovery(&mut self) -> &mut Recovery {
+        &mut self.body.recoveries[self.at]
+    }
+
+    /// Sets the interfaces of the loads of the current recovery.
+    pub(super) fn recovery_interfaces(&mut self, names: Vec<String>) -> Result<(), String> {
+        let load = |interface| LoadColumns { interface, columns: Mat::new() };
+        self.recovery().loads = names.into_iter().map(load).collect();
+        Ok(())
+    }
+
+    /// Sets the columns of the loads of the current recovery, one matrix for each of its interfaces.
+    ///
+    /// # Errors
+    /// The expected number of matrices, if it differs.
+    pub(super) fn recovery_columns(&mut self, columns: Vec<Mat<f64>>) -> Result<(), String> {
+        let loads = &mut self.recovery().loads;
+        if loads.len() != columns.len() {
+            return Err(format!("expected {} interfaces, found {}", loads.len(), columns.len()));
+        }
+        loads.iter_mut().zip(columns).for_each(|(load, columns)| load.columns = columns);
+        Ok(())
     }
 
     /// Returns the lumped body of the current instance.
@@ -326,6 +359,7 @@ fn empty_body(units: UnitSystem, storage: Storage, invariants: Invariants) -> Pa
         },
         interfaces: Vec::new(),
         coordinates: None,
+        recoveries: Vec::new(),
         terms: Vec::new(),
         storage,
     }

@@ -14,6 +14,8 @@ pub(super) struct Sizes {
     coordinates: Option<usize>,
     triangles: Option<usize>,
     edges: Option<usize>,
+    pub recovery_rows: Option<usize>,
+    pub loaded_interfaces: Option<usize>,
 }
 
 /// Reads a dataset of the stated shape, with its extents. Returns `None` if there is no such dataset.
@@ -53,6 +55,8 @@ impl Sizes {
             Extent::Coordinates => size == *self.coordinates.get_or_insert(size),
             Extent::Triangles => size == *self.triangles.get_or_insert(size),
             Extent::Edges => size == *self.edges.get_or_insert(size),
+            Extent::RecoveryRows => size == *self.recovery_rows.get_or_insert(size),
+            Extent::LoadedInterfaces => size == *self.loaded_interfaces.get_or_insert(size),
         }
     }
 
@@ -68,6 +72,8 @@ impl Sizes {
             Extent::Coordinates => self.coordinates,
             Extent::Triangles => self.triangles,
             Extent::Edges => self.edges,
+            Extent::RecoveryRows => self.recovery_rows,
+            Extent::LoadedInterfaces => self.loaded_interfaces,
         };
         known.unwrap_or(0)
     }
@@ -87,6 +93,8 @@ impl Sizes {
             Extent::Coordinates => known("nc", self.coordinates),
             Extent::Triangles => known("nt", self.triangles),
             Extent::Edges => known("ne", self.edges),
+            Extent::RecoveryRows => known("r", self.recovery_rows),
+            Extent::LoadedInterfaces => known("ni", self.loaded_interfaces),
         }
     }
 }

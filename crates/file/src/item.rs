@@ -4,7 +4,7 @@ use super::draft::Draft;
 use super::value::{ReadValue, Units, Value, View, text};
 #[cfg(feature = "hdf5")]
 use flexbody_body::flex_body::Storage;
-use flexbody_body::flex_body::{Interface, LumpedBody, Parts, TermGroup};
+use flexbody_body::flex_body::{Interface, LumpedBody, Parts, Recovery, TermGroup};
 
 /// One extent of a dataset's shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,8 +26,15 @@ pub(super) enum Extent {
     Triangles,
     /// Number ne of edges of the surface.
     Edges,
+    /// Number r of rows of the group's recovery.
+    RecoveryRows,
+    /// Number ni of interfaces with loads in the group's recovery.
+    LoadedInterfaces,
 }
-use Extent::{Coordinates, Edges, Fixed, InterfaceNodes, InternalRows, Modes, Nodes, ThreeModes, Triangles};
+use Extent::{
+    Coordinates, Edges, Fixed, InterfaceNodes, InternalRows, LoadedInterfaces, Modes, Nodes, RecoveryRows,
+    ThreeModes, Triangles,
+};
 
 /// Storage of an entry in the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -156,6 +163,7 @@ pub(super) enum Per {
     Interface,
     UnitLoad,
     InertiaLoad,
+    Recovery,
 }
 
 /// A row of the table: a dataset or attribute.
@@ -276,6 +284,8 @@ impl Item {
             Coordinates => view.body.coordinates.as_ref().map_or(0, |c| c.names.len()),
             Triangles => view.body.mesh.as_ref().map_or(0, |mesh| mesh.triangles().len()),
             Edges => view.body.mesh.as_ref().map_or(0, |mesh| mesh.edges().len()),
+            RecoveryRows => view.recovery.map_or(0, |one| one.rows.len()),
+            LoadedInterfaces => view.recovery.map_or(0, |one| one.loads.len()),
             InternalRows => view.body.modes.internal.as_ref().map_or(0, |internal| internal.dofs.len()),
         };
         self.shape().unwrap_or(&[]).iter().map(size).collect()
@@ -300,7 +310,7 @@ impl SchemaGroup {
 
     /// Returns the instances of this group in a body, with their names if these are data.
     pub(crate) fn instances<'a>(&self, body: &'a Parts) -> Vec<(Option<String>, View<'a>)> {
-        let view = View { body, lumped: None, interface: None, geometric_stiffness: None };
+        let view = View { body, lumped: None, interface: None, geometric_stiffness: None, recovery: None };
         match self.per {
             Per::Body => vec![(None, view)],
             Per::LumpingScheme => {
@@ -314,6 +324,10 @@ impl SchemaGroup {
             Per::UnitLoad => {
                 let view = |g| View { geometric_stiffness: Some(g), ..view };
                 body.geometric_stiffness.iter().map(|g| (Some(g.load.label()), view(g))).collect()
+            }
+            Per::Recovery => {
+                let one = |r: &'a Recovery| (Some(r.name.clone()), View { recovery: Some(r), ..view });
+                body.recoveries.iter().map(one).collect()
             }
             Per::InertiaLoad => {
                 let view = |g| View { geometric_stiffness: Some(g), ..view };

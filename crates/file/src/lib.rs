@@ -25,6 +25,8 @@ mod names;
 mod read;
 mod recorded_motion;
 #[cfg(feature = "hdf5")]
+mod recovered;
+#[cfg(feature = "hdf5")]
 mod scan;
 mod schema;
 #[cfg(feature = "hdf5")]
@@ -43,6 +45,8 @@ pub use flexbody_base::output::OutputSlot;
 #[cfg(feature = "hdf5")]
 pub use read::{read, read_with_notes, validate};
 pub use recorded_motion::RecordedMotion;
+#[cfg(feature = "hdf5")]
+pub use recovered::fill_recovered;
 #[cfg(feature = "hdf5")]
 pub use simulation::fill_simulation;
 #[cfg(feature = "hdf5")]

@@ -73,7 +73,7 @@ impl Scan {
         for group in TABLE {
             match group.per {
                 Per::Body => scan.group(file, group, None),
-                Per::LumpingScheme | Per::Interface | Per::UnitLoad | Per::InertiaLoad => {
+                _ => {
                     scan.list(file, group);
                     for (_, link) in scan.instances(group.parent()) {
                         // Links take almost no space: a file may hold millions of them.
@@ -147,7 +147,7 @@ impl Scan {
             Err(found) => return self.add(format!("{path}: expected a group, found {found}")),
         };
         let mut sizes = self.sizes;
-        sizes.interface_nodes = None;
+        (sizes.interface_nodes, sizes.recovery_rows, sizes.loaded_interfaces) = (None, None, None);
         for item in group.entries() {
             let name = key(&path, item);
             self.texts(&opened, &name, item);

@@ -15,12 +15,16 @@ use geometric_stiffness::{GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS};
 use interfaces::{COORDINATES, INTERFACES};
 use invariants::{COMPARISON, DAMPING, INVARIANTS, LUMPED};
 use nalgebra::{Matrix3, Vector3};
+use recovery::RECOVERY;
+#[cfg(feature = "hdf5")]
+pub(super) use recovery::labels_json;
 use terms::TERMS;
 
 mod certificate;
 mod geometric_stiffness;
 mod interfaces;
 mod invariants;
+mod recovery;
 pub(super) mod terms;
 
 /// Name of the root attribute with the list of digests: a line `SHA-256  path` for each group and dataset, by path.
@@ -31,7 +35,9 @@ pub(super) const WHOLE: &str = "sha256";
 /// Major version of the format. Readers refuse a newer major version; a newer minor version only adds entries.
 pub(super) const MAJOR: i64 = 1;
 /// Minor version with all entries, see [`MAJOR`]. A file states the lowest version that has all entries which it holds.
-pub(super) const MINOR: i64 = 7;
+pub(super) const MINOR: i64 = 8;
+/// Minor version of files of bodies without recoveries.
+const WITHOUT_RECOVERIES: i64 = 7;
 /// Minor version of files of bodies in mean axes.
 const MEAN_AXES_ONLY: i64 = 6;
 /// Minor version of files of bodies in mean axes without stiffness of inertia.
@@ -118,9 +124,10 @@ const ROOT: &[Item] = &[
         ONE,
         "additions within the major version; a reader ignores what it does not know",
         written(|v| {
-            let Parts { conditions, inertia_stiffness, mesh, .. } = v.body;
+            let Parts { conditions, inertia_stiffness, mesh, recoveries, .. } = v.body;
             Some(Value::Int(match (conditions.is_mean(), inertia_stiffness, mesh) {
-                (false, _, _) => MINOR,
+                _ if !recoveries.is_empty() => MINOR,
+                (false, _, _) => WITHOUT_RECOVERIES,
                 (true, Some(_), _) => MEAN_AXES_ONLY,
                 (true, None, Some(_)) => WITHOUT_INERTIA_STIFFNESS,
                 (true, None, None) => WITHOUT_MESH,
@@ -636,6 +643,12 @@ pub(super) const TABLE: &[SchemaGroup] = &[
         per: Per::InertiaLoad,
         description: "Stiffness that the inertia of turning nodes adds: terms of the kinetic energy of second order in the rotations of nodes that carry rotational inertia or an eccentric mass. Signs and loads are those of `/geometric_stiffness`, to which a solver adds it: `acceleration_x` to `_z`, `angular_acceleration_x` to `_z`, `spin_xx` to `_xz`, all of them; in the plane `acceleration_x`, `_y`, `angular_acceleration_z`, `spin_zz`. Absent: zero; in files before 1.6 of mass structure `general`: not known. Since 1.6; a file without it is one of 1.5.",
         items: &[INERTIA_STIFFNESS],
+    },
+    SchemaGroup {
+        path: "/recovery/<name>",
+        per: Per::Recovery,
+        description: "Rows that read stresses, strains, forces or displacements off the deformed body: y = offset + modes q + loads f + spin (w w), with the modal coordinates q, the loads f at the interfaces and the angular velocity w (theory section 12). Accelerations and gravity have no columns. The rows are along the axes of the operator that they were made of. Absent: none. Since 1.8; a file without it is one of 1.7.",
+        items: &[RECOVERY],
     },
     SchemaGroup {
         path: "/interface_coordinates",

@@ -4,7 +4,7 @@ use faer::{Mat, MatRef};
 use flexbody_base::units::{Unit, UnitSystem};
 use flexbody_body::flex_body::{
     FixedInterface, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InterfaceRows,
-    InternalRows, LumpedBody, Parts,
+    InternalRows, LumpedBody, Parts, Recovery,
 };
 use flexbody_body::invariants::Invariants;
 use flexbody_model::BodyNumber;
@@ -31,6 +31,7 @@ pub(super) struct View<'a> {
     pub interface: Option<&'a Interface>,
     /// Geometric stiffness or stiffness of inertia of a unit load.
     pub geometric_stiffness: Option<&'a GeometricStiffness<Mat<f64>>>,
+    pub recovery: Option<&'a Recovery>,
 }
 
 impl<'a> View<'a> {
@@ -76,6 +77,10 @@ impl<'a> View<'a> {
 
     pub(crate) fn load(&self) -> Option<&'a GeometricStiffness<Mat<f64>>> {
         self.geometric_stiffness
+    }
+
+    pub(crate) fn recovery(&self) -> Option<&'a Recovery> {
+        self.recovery
     }
 
     /// Returns the node indices of the group's interface; none for other groups.

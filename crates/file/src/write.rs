@@ -70,10 +70,12 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
     let file = create(path)?;
     let mut numbers = Numbers::default();
     for group in TABLE {
-        if group.per != Per::Body {
+        let instances = group.instances(body.parts());
+        // Groups since 1.8 are there only if they have members, so that other files keep their bytes.
+        if group.per != Per::Body && !(group.per == Per::Recovery && instances.is_empty()) {
             make(&file, group.parent())?;
         }
-        for (name, view) in group.instances(body.parts()) {
+        for (name, view) in instances {
             if group.per == Per::Body
                 && group.since() > 0
                 && group.entries().all(|item| item.value(&view).is_none())

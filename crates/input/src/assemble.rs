@@ -95,6 +95,14 @@ pub fn check_size(rows: u64, cols: u64, entries: u64) -> Result<usize, Diagnosti
     Ok(rows as usize)
 }
 
+/// Checks the declared size of a matrix that need not be square, as [`check_size`] does for square ones.
+pub(super) fn check_extents(rows: u64, cols: u64, entries: u64) -> Result<[usize; 2], Diagnostic> {
+    check_size(rows, rows, entries)?;
+    check_size(cols, cols, entries.min(most_entries_of(cols)))?;
+    refuse_beyond_memory(entries)?;
+    Ok([rows as usize, cols as usize])
+}
+
 /// Returns FB307 if only one triangle is stored and the file does not declare it; `help` receives the name of the
 /// triangle.
 pub(super) fn undeclared_triangle(sides: Sides, help: impl FnOnce(&str) -> String) -> Option<Diagnostic> {

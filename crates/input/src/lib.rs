@@ -44,6 +44,7 @@ mod reader;
 mod readers;
 mod recent;
 mod recipes;
+mod recovery_files;
 mod region;
 mod row_axes;
 mod scipy_npz;
@@ -55,8 +56,8 @@ pub use assemble::check_size;
 pub use jobs::{JobFile, is_job, job_programs};
 pub use manifest::read_manifest;
 pub use model_files::{
-    InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, TableFiles,
-    parse_units,
+    InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource,
+    RecoverySource, TableFiles, parse_units,
 };
 pub use read_model::{read_matrix, read_model, read_nodal_masses};
 pub use reader::{HEAD, MatrixRole, MatrixSource, Reader};

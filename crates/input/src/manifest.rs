@@ -15,9 +15,10 @@ mod basis;
 mod damping;
 mod geometric_stiffness;
 mod interface;
+mod recovery;
 mod region;
 
-const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "basis"];
+const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "recovery", "basis"];
 const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible"];
 const UNITS: &[&str] = &["length", "mass", "time"];
 const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program", "matrices", "mesh"];
@@ -67,6 +68,7 @@ impl ManifestWalk<'_, '_> {
         let interfaces = self.interfaces(top, usize::from(dimension));
         let damping = self.damping(top);
         let geometric_stiffness = self.geometric_stiffness(top);
+        let recoveries = self.recoveries(top, usize::from(dimension));
         let residual_vectors = self.residual_vectors(top);
         let Some((files, span)) = self.table(top, "files") else {
             if !top.contains_key("files") {
@@ -89,6 +91,7 @@ impl ManifestWalk<'_, '_> {
             interfaces: interfaces?,
             damping,
             geometric_stiffness,
+            recoveries,
             residual_vectors,
             manifest: Some(self.path.to_path_buf()),
             manifest_sha256: Some(self.fingerprint()),
@@ -215,6 +218,7 @@ mod tests {
     use super::damping::{DAMPING, RAYLEIGH};
     use super::geometric_stiffness::GEOMETRIC_STIFFNESS;
     use super::interface::INTERFACE;
+    use super::recovery::RECOVERY;
     use super::region::{BOX, CYLINDER, NEAREST, PLANE};
     use super::*;
     use flexbody_model::DAMPING_BAND_KEYS;
@@ -242,6 +246,7 @@ mod tests {
             ("/properties/damping/properties/bands/items/properties", DAMPING_BAND_KEYS),
             ("/properties/damping/properties/rayleigh/properties", RAYLEIGH),
             ("/properties/geometric_stiffness/items/properties", GEOMETRIC_STIFFNESS),
+            ("/properties/recovery/items/properties", RECOVERY),
             ("/properties/basis/properties", BASIS),
         ] {
             let mut known: Vec<&str> = known.to_vec();

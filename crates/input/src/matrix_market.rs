@@ -1,10 +1,14 @@
 //! Matrix Market coordinate files, plain or compressed: <https://math.nist.gov/MatrixMarket/formats.html>.
 
-use super::assemble::{StoredEntries, assemble, check_size, refuse_beyond_memory, undeclared_triangle};
+use super::assemble::{
+    Entry, StoredEntries, assemble, check_extents, check_size, refuse_beyond_memory, undeclared_triangle,
+};
 use super::coordinates::{Blocks, Coordinates, Limits};
 use super::reader::{MatrixSource, Reader};
+use super::recovery_files::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::{Compression, broken};
 use flexbody_model::RawMatrix;
 
@@ -69,6 +73,54 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnos
         Symmetry::General => StoredEntries::Full,
     };
     assemble(header.rows as usize, body.pieces, stored, body.written, path).map_err(|d| vec![d])
+}
+
+/// Returns true if the (unpacked) file that begins with `head` lists entries, not a dense array.
+pub(super) fn is_coordinate(head: &[u8]) -> bool {
+    let first = head.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    header::has_banner(head) && !String::from_utf8_lossy(first).to_lowercase().contains(" array ")
+}
+
+/// Reads a matrix that need not be square, with all entries stored: its numbers of rows and columns, and its entries
+/// from 0.
+///
+/// # Errors
+/// FB301 to FB306 for a file that is not valid, all that are found.
+pub(super) fn read_rectangular(
+    file: &InputFile,
+    compression: Compression,
+) -> std::result::Result<Rectangular, Vec<Diagnostic>> {
+    let path = file.path();
+    let mut blocks = Blocks::of(file, compression);
+    let Some(first) = blocks.next().map_err(|e| vec![broken(path, &e)])? else {
+        return Err(vec![Diagnostic::new(Code::FileEmpty, "compressed file holds no bytes")]);
+    };
+    let (header, length, lines) = header::parse(&first)?;
+    if header.symmetry == Symmetry::Symmetric && header.rows != header.cols {
+        let message =
+            format!("matrix of {} rows and {} columns is declared symmetric", header.rows, header.cols);
+        return Err(vec![Diagnostic::new(Code::MatrixKind, message).with_help("declare it general")]);
+    }
+    let [rows, columns] =
+        check_extents(header.rows, header.cols, header.entries).map_err(|d| vec![d.at_line(lines)])?;
+    let limits = Limits { n: rows.max(columns) as u32, integer: header.integer };
+    let mut body = Coordinates::new(limits, Some(header.entries), lines);
+    let newline = body.read(path, blocks, first, length)?;
+    let mut found = body.bad_lines(newline);
+    found.extend(wrong_count(&header, &body));
+    if !found.is_empty() {
+        return Err(found);
+    }
+    let mut entries: Vec<Entry> = body.pieces.into_iter().flatten().collect();
+    if header.symmetry == Symmetry::Symmetric {
+        let mirrored: Vec<Entry> = entries
+            .iter()
+            .filter(|entry| entry.row != entry.col)
+            .map(|entry| Entry { row: entry.col, col: entry.row, value: entry.value })
+            .collect();
+        entries.extend(mirrored);
+    }
+    Rectangular { rows, columns, entries }.checked().map_err(|diagnostic| vec![diagnostic])
 }
 
 /// Returns the largest number of entries that the file can hold, whatever it announces.

@@ -31,6 +31,8 @@ pub struct ModelFiles {
     pub damping: Option<Damping<MatrixLocation>>,
     /// Geometric stiffness of unit loads.
     pub geometric_stiffness: Vec<GeometricStiffness<MatrixLocation>>,
+    /// Rows to read off the body.
+    pub recoveries: Vec<RecoverySource>,
     /// Loads whose static responses join the modes.
     pub residual_vectors: Vec<LoadSource>,
     /// Path of the manifest, if there is one.
@@ -90,6 +92,36 @@ pub enum InterfaceNodes {
     Region(Region),
 }
 
+/// Rows to read off the body, and the files of their operator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecoverySource {
+    /// Name, unique within the model.
+    pub name: String,
+    /// Source of the operator.
+    pub operator: OperatorSource,
+}
+
+/// Source of the operator of a recovery.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OperatorSource {
+    /// Matrix R, one row per row of the recovery and one column per matrix row of the model.
+    Rows {
+        /// File of R.
+        operator: MatrixLocation,
+        /// Table of the labels of the rows.
+        rows: PathBuf,
+        /// File of the values of the undeformed body.
+        offset: Option<MatrixLocation>,
+    },
+    /// Section forces of the nodes on one side of a cut.
+    Cut {
+        /// Nodes on this side.
+        nodes: InterfaceNodes,
+        /// Point that the moments are about.
+        about: [f64; 3],
+    },
+}
+
 /// Loads of residual vectors and their source.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LoadSource {
@@ -106,6 +138,20 @@ pub enum LoadSource {
         /// Frequency in hertz, positive.
         hertz: f64,
     },
+}
+
+impl RecoverySource {
+    /// Returns the files of the recovery.
+    pub fn files(&self) -> Vec<&Path> {
+        match &self.operator {
+            OperatorSource::Rows { operator, rows, offset } => {
+                let offset = offset.as_ref().map(|offset| offset.path.as_path());
+                [operator.path.as_path(), rows.as_path()].into_iter().chain(offset).collect()
+            }
+            OperatorSource::Cut { nodes: InterfaceNodes::File(path), .. } => vec![path],
+            OperatorSource::Cut { .. } => Vec::new(),
+        }
+    }
 }
 
 impl LoadSource {
@@ -211,6 +257,7 @@ impl ModelFiles {
             .chain(damping)
             .chain(geometric)
             .chain(interfaces)
+            .chain(self.recoveries.iter().flat_map(RecoverySource::files).map(Path::to_path_buf))
             .collect()
     }
 
@@ -242,6 +289,7 @@ impl ModelFiles {
             interfaces: Vec::new(),
             damping: None,
             geometric_stiffness: Vec::new(),
+            recoveries: Vec::new(),
             residual_vectors: Vec::new(),
             manifest: None,
             manifest_sha256: None,

@@ -3,13 +3,16 @@
 use super::jobs::{JobModel, comparable, read_job};
 use super::mapping::Mapping;
 use super::mesh::MeshReading;
-use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource};
+use super::model_files::{
+    InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource, RecoverySource,
+};
 use super::node_file::{NodeFile, NodeSets, Unresolved};
 use super::node_files::read_node_file;
 use super::reader::{MatrixRole, MatrixSource};
 use super::readers::reader_for;
+use super::recovery_files::{read_offset, read_operator};
 use super::row_axes::Turn;
-use super::tables::{read_masses, read_node_list};
+use super::tables::{read_masses, read_node_list, read_recovery_rows};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::{SourceFile, Sources};
@@ -18,8 +21,8 @@ use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::quotes::without_foreign_quotes;
 use flexbody_linalg::parallel;
 use flexbody_model::{
-    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, LostRow, NodeAxes, NodeSet, Nodes, RawMatrix,
-    RawModel, RowMap, filled_rows,
+    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, LostRow, ModelRecovery, NodeAxes, NodeSet,
+    Nodes, RawMatrix, RawModel, RecoveryOperator, Reference, RowMap, filled_rows,
 };
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -97,6 +100,11 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         .iter()
         .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, opened, files)))
         .collect();
+    let recoveries: Vec<ModelRecovery> = files
+        .recoveries
+        .iter()
+        .filter_map(|one| take(&mut diagnostics, places.recovery(one, opened, files)))
+        .collect();
     let mesh_file = parsed.mesh.and_then(|mesh| take(&mut diagnostics, mesh));
     let mesh = matrices.as_ref().map(|matrices| {
         let from = mesh_file.as_ref().zip(files.mesh.as_deref());
@@ -128,6 +136,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         interfaces,
         damping,
         geometric_stiffness,
+        recoveries,
         allow_implausible: files.allow_implausible,
         sources: Sources::default(),
         diagnostics,
@@ -342,6 +351,39 @@ impl<'m> NodeLookup<'m> {
         };
         let (name, coupling, reference) = (interface.name.clone(), interface.coupling, interface.reference);
         Ok(NodeSet { name, nodes, coupling, reference, outline })
+    }
+
+    /// Returns a recovery with an operator by the rows of the files, or with the nodes of its cut.
+    fn recovery(
+        &self,
+        source: &RecoverySource,
+        opened: &OpenFiles,
+        files: &ModelFiles,
+    ) -> Found<ModelRecovery> {
+        let name = source.name.clone();
+        match &source.operator {
+            OperatorSource::Rows { operator, rows, offset } => {
+                let transposed = read_operator(opened.get(&operator.path)?, operator.group.as_deref())?;
+                let labels = read_recovery_rows(opened.get(rows)?)?;
+                let offset = offset.as_ref();
+                let offset =
+                    offset.map(|place| read_offset(opened.get(&place.path)?, place.group.as_deref()));
+                let operator_path = operator.path.clone();
+                let operator = RecoveryOperator::Rows { transposed, labels, offset: offset.transpose()? };
+                Ok(ModelRecovery { name, operator, path: operator_path })
+            }
+            OperatorSource::Cut { nodes, about } => {
+                let (coupling, reference) = (None, Reference::Centre);
+                let as_set =
+                    InterfaceSource { name: name.clone(), nodes: nodes.clone(), coupling, reference };
+                let nodes = self.node_set(&as_set, opened, files)?.nodes;
+                let path = match &as_set.nodes {
+                    InterfaceNodes::File(path) => path.clone(),
+                    _ => files.manifest.clone().unwrap_or_default(),
+                };
+                Ok(ModelRecovery { name, operator: RecoveryOperator::Cut { nodes, about: *about }, path })
+            }
+        }
     }
 
     fn moves(&self, node: i64) -> bool {
@@ -578,6 +620,7 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
         InterfaceNodes::File(path) => Some(("interface", path.as_path())),
         _ => None,
     }));
+    roles.extend(files.recoveries.iter().flat_map(RecoverySource::files).map(|path| ("recovery", path)));
     roles
 }
 

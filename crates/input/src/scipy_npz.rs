@@ -1,10 +1,14 @@
 //! Sparse matrices of SciPy (`scipy.sparse.save_npz`): an archive of the arrays of a matrix in CSC, CSR, COO
 //! or BSR form, <https://docs.scipy.org/doc/scipy/reference/generated/scipy.sparse.save_npz.html>.
 
-use super::assemble::{StoredEntries, assemble, check_size, push, refuse_beyond_memory, undeclared_triangle};
+use super::assemble::{
+    Entry, StoredEntries, assemble, check_extents, check_size, push, refuse_beyond_memory,
+    undeclared_triangle,
+};
 use super::compressed::{Compressed, EntryCheck};
 use super::npy;
 use super::reader::{MatrixSource, Reader};
+use super::recovery_files::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::memory::{left, refuse_beyond};
@@ -44,6 +48,67 @@ impl Reader for ScipyNpz {
         let read = source.has_one_matrix("an archive of SciPy").and_then(|()| read(source));
         read.map_err(|diagnostic| Error::from(diagnostic.in_file(source.file.path())))
     }
+}
+
+/// Reads a matrix in CSC, CSR or COO form that need not be square.
+///
+/// # Errors
+/// FB103, FB301 to FB306 for an archive that is not valid.
+pub(super) fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
+    let mut archive = Archive::open(bytes)?;
+    let form = archive.member("format").ok().and_then(|bytes| npy::read_word(&bytes)).unwrap_or_default();
+    let shape = npy::read_integers(&archive.member("shape")?)?;
+    let &[rows, columns] = shape.as_slice() else {
+        return Err(Diagnostic::new(Code::MatrixKind, "`shape` is not two whole numbers").with_help(HELP));
+    };
+    let entries = archive.count("data")?;
+    let [rows, columns] = check_extents(rows.max(0) as u64, columns.max(0) as u64, entries)?;
+    let mut member = |name: &str| -> std::result::Result<Vec<i64>, Diagnostic> {
+        let count = archive.count(name)?;
+        if name != "indptr" {
+            same_count(entries, count, name)?;
+        }
+        npy::read_integers(&archive.member(name)?)
+    };
+    let places: Vec<[i64; 2]> = match form.as_str() {
+        "coo" => member("row")?.into_iter().zip(member("col")?).map(|(row, column)| [row, column]).collect(),
+        "csc" | "csr" => {
+            let by_rows = form == "csr";
+            let (indices, pointers) = (member("indices")?, member("indptr")?);
+            let majors = if by_rows { rows } else { columns };
+            let is_valid = pointers.len() == majors + 1
+                && pointers.is_sorted()
+                && pointers[0] == 0
+                && pointers[majors] as u64 == entries;
+            if !is_valid {
+                let message = format!("`indptr` does not rise from 0 to {entries} in {} steps", majors);
+                return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP));
+            }
+            let mut places = Vec::with_capacity(indices.len());
+            for (major, pair) in pointers.windows(2).enumerate() {
+                let of_major = &indices[pair[0] as usize..pair[1] as usize];
+                places.extend(of_major.iter().map(|&minor| match by_rows {
+                    true => [major as i64, minor],
+                    false => [minor, major as i64],
+                }));
+            }
+            places
+        }
+        other => {
+            let message = format!("matrix is stored in the form `{}`", other.escape_default());
+            return Err(Diagnostic::new(Code::MatrixKind, message).with_help(HELP));
+        }
+    };
+    let data = npy::read(&archive.member("data")?)?;
+    if data.values.len() != places.len() {
+        let message = format!("{} values have {} places", data.values.len(), places.len());
+        return Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP));
+    }
+    let index = |index: i64| u32::try_from(index).unwrap_or(u32::MAX);
+    let entry =
+        |([row, col], value): ([i64; 2], &f64)| Entry { row: index(row), col: index(col), value: *value };
+    let entries = places.into_iter().zip(&data.values).map(entry).collect();
+    Rectangular { rows, columns, entries }.checked()
 }
 
 fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic> {

@@ -55,7 +55,8 @@ pub fn read_shapes(location: &MatrixLocation, counts: &[usize], role: &str) -> R
     Ok(RawShapes { matrix, digits, path: path.to_path_buf(), source })
 }
 
-fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, Vec<Diagnostic>> {
+/// Reads a dense array in any of the formats.
+pub(super) fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, Vec<Diagnostic>> {
     let compression = Compression::of(file.bytes());
     let head = compression.head(file, HEAD);
     let packed = compression != Compression::None;

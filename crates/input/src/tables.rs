@@ -4,7 +4,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{BadLines, excerpt, integer, number};
 use flexbody_base::text::table::{Column, Table};
-use flexbody_model::{DofLabel, Nodes};
+use flexbody_model::{DofLabel, Nodes, Quantity, RecoveryRow};
 use std::collections::HashMap;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
@@ -107,6 +107,64 @@ pub(super) fn read_node_list(file: &InputFile) -> Found<Vec<i64>> {
     let rows = table.rows(|line, fields| Ok((node_number(fields[0])?, line)))?;
     no_duplicates(file, rows.iter().copied())?;
     Ok(rows.into_iter().map(|r| r.0).collect())
+}
+
+/// Reads `row,name,quantity,component,unit` with optional `node` and `element`. Returns the labels in the order of the
+/// rows of the operator.
+///
+/// # Errors
+/// FB203, FB204 for a table that cannot be read, FB323 for unknown quantities and row numbers that are not 0, 1, 2, ...
+pub(super) fn read_recovery_rows(file: &InputFile) -> Found<Vec<RecoveryRow>> {
+    let columns = [
+        column("row", true),
+        column("name", true),
+        column("quantity", true),
+        column("component", true),
+        column("unit", true),
+        column("node", false),
+        column("element", false),
+    ];
+    let table = Table::open(file, &columns).map_err(|d| {
+        vec![d.with_help("name the columns in the first line: `row,name,quantity,component,unit`")]
+    })?;
+    let has = [table.has(5), table.has(6)];
+    let text = |field: &[u8]| String::from_utf8_lossy(field).trim().to_owned();
+    let mut rows = table.rows(|line, fields| {
+        let wrong = |message: String| Diagnostic::new(Code::RecoveryRows, message).at_line(line);
+        let Some(row) = integer(fields[0]) else {
+            return Err(wrong(format!("row number is `{}`", excerpt(fields[0]))));
+        };
+        let quantity = text(fields[2]);
+        let known = Quantity::from_name(&quantity).ok_or_else(|| {
+            let all = Quantity::ALL.map(Quantity::name).join(", ");
+            wrong(format!("quantity of row {row} is `{}`, expected one of {all}", excerpt(fields[2])))
+        })?;
+        let number = |at: usize, what: &str| match (has[at], fields[5 + at]) {
+            (false, _) | (true, b"") => Ok(None),
+            (true, field) => integer(field)
+                .map(Some)
+                .ok_or_else(|| wrong(format!("{what} number of row {row} is `{}`", excerpt(field)))),
+        };
+        let label = RecoveryRow {
+            name: text(fields[1]),
+            quantity: known,
+            component: text(fields[3]),
+            unit: text(fields[4]),
+            node: number(0, "node")?,
+            element: number(1, "element")?,
+        };
+        Ok((row, line, label))
+    })?;
+    rows.sort_by_key(|(row, ..)| *row);
+    for (expected, (row, line, _)) in (0..).zip(&rows) {
+        if *row != expected {
+            let message =
+                format!("row number is {row} where {expected} is expected: rows count from 0, each once");
+            let wrong = Diagnostic::new(Code::RecoveryRows, message).in_file(file.path()).at_line(*line);
+            return Err(vec![wrong]);
+        }
+    }
+    Ok(rows.into_iter().map(|(.., label)| label).collect())
 }
 
 /// Reads `node,mass`.

@@ -7,6 +7,7 @@ use super::layout::{Layout, layout};
 use super::load_checks::check_loads;
 use super::magnitude::check_magnitudes;
 use super::matrix_checks::{check_diagonal, check_diagonals, check_matrix, symmetric};
+use super::recovery_checks::{RowsOfFiles, checked_recoveries};
 use super::references::resolve_references;
 use super::rigid::rigid_count;
 use super::wording::name_some;
@@ -37,6 +38,10 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     let mass = order.symmetric(&mut raw.mass, "mass");
     let damping = raw.damping.take().and_then(|damping| order.damping(damping));
     let geometric_stiffness = order.geometric_stiffness(&mut raw.geometric_stiffness);
+    let matrix_rows = layout.row_to_internal.len();
+    let of_files = RowsOfFiles { given: &raw.given_rows, matrix_rows, to: &layout.row_to_internal };
+    let asked = std::mem::take(&mut raw.recoveries);
+    let recoveries = checked_recoveries(asked, &of_files, &nodes, &mut found);
     stop_on_error(&mut found)?;
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
         unreachable!("an asymmetric matrix is an error")
@@ -49,8 +54,18 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     let rows = layout.rows;
     let Following { stiffness, mass, note } = with_following_rotations(&raw, &rows, &nodes, stiffness, mass);
     found.extend(note);
-    let body =
-        Assembled { raw, nodes, mesh, rows, stiffness, mass, row_to_internal, damping, geometric_stiffness };
+    let body = Assembled {
+        raw,
+        nodes,
+        mesh,
+        rows,
+        stiffness,
+        mass,
+        row_to_internal,
+        damping,
+        geometric_stiffness,
+        recoveries,
+    };
     Ok((body, found))
 }
 

@@ -1,6 +1,6 @@
 //! A model between the checks of its matrices by themselves and those of the body.
 
-use super::{Damping, GeometricStiffness, Nodes, RawModel, Rows, SurfaceMesh};
+use super::{Damping, GeometricStiffness, ModelRecovery, Nodes, RawModel, Rows, SurfaceMesh};
 use flexbody_linalg::SymmetricMatrix;
 
 /// Model in the internal order whose matrices are valid by themselves.
@@ -24,4 +24,6 @@ pub(super) struct Assembled {
     pub damping: Option<Damping<SymmetricMatrix>>,
     /// Geometric stiffness, in the internal order.
     pub geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
+    /// Rows to read off the body, in the internal order.
+    pub recoveries: Vec<ModelRecovery>,
 }

@@ -9,6 +9,7 @@ use super::load_checks::missing_components;
 use super::local_mass::{LocalMass, SoundSpeed, check_exchanged, check_speed};
 use super::mass_structure::{MassForm, mass_form};
 use super::node_pairs::check_mass_pairs;
+use super::recovery_checks::check_rigid_responses;
 use super::rigid::{centre_and_length, extents, rigid_residuals};
 use super::rigid_motion::{check_inertia, check_rigid_motion};
 use super::stress::check_stress;
@@ -138,6 +139,7 @@ fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Res
     let limit = rounding(written, 3).max(1e-6);
     let rigid_residual = check_rigid_motion(body, rounded, limit, found);
     check_rigid_damping(body, found);
+    found.extend(check_rigid_responses(&body.recoveries, &body.rows, &body.nodes));
     found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
     Ok(rigid_residual)
 }

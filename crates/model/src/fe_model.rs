@@ -4,8 +4,8 @@
 use super::assembled::Assembled;
 use super::mass_structure::MassForm;
 use super::{
-    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, NodeSet, Nodes, Rows,
-    SurfaceMesh,
+    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, ModelRecovery, NodeSet,
+    Nodes, Rows, SurfaceMesh,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
@@ -34,6 +34,7 @@ pub struct FeModel {
     exact_scalar_mass: bool,
     damping: Option<Damping<SymmetricMatrix>>,
     geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
+    recoveries: Vec<ModelRecovery>,
     interfaces: Vec<NodeSet>,
     sources: Sources,
     digits: u8,
@@ -60,7 +61,18 @@ impl FeModel {
         diagonal_mass: bool,
         number: Option<BodyNumber>,
     ) -> Self {
-        let Assembled { raw, nodes, mesh, rows, stiffness, mass, damping, geometric_stiffness, .. } = body;
+        let Assembled {
+            raw,
+            nodes,
+            mesh,
+            rows,
+            stiffness,
+            mass,
+            damping,
+            geometric_stiffness,
+            recoveries,
+            ..
+        } = body;
         let scalar = form.commutes && rows.len() == rows.displacements();
         Self {
             digits: raw.stiffness.digits,
@@ -76,6 +88,7 @@ impl FeModel {
             exact_scalar_mass: form.commutes && form.exact,
             damping,
             geometric_stiffness,
+            recoveries,
             interfaces: raw.interfaces,
             sources: raw.sources,
             rigid_residual,
@@ -194,6 +207,11 @@ impl FeModel {
     /// of K.
     pub fn geometric_stiffness(&self) -> &[GeometricStiffness<SymmetricMatrix>] {
         &self.geometric_stiffness
+    }
+
+    /// Returns the rows to read off the body; operators have the internal rows.
+    pub fn recoveries(&self) -> &[ModelRecovery] {
+        &self.recoveries
     }
 
     /// Returns the elimination order shared by all factors of [`pencil`](Self::pencil).

@@ -166,6 +166,37 @@ impl GivenRows {
         if lost > MAX_FOREIGN_ENTRY * columns.norm_max() { Err(LostRow) } else { Ok(forces) }
     }
 
+    /// Maps forces f to T' f as [`GivenRows::forces`] does, for sparse columns.
+    ///
+    /// # Errors
+    /// [`LostRow`] if forces act on rows that the model does not have.
+    pub fn sparse_forces(&self, columns: CscMatrix) -> Result<CscMatrix, LostRow> {
+        let Some(map) = self.map(columns.n_rows()) else { return Ok(columns) };
+        let largest = columns.values().iter().fold(0.0f64, |most, value| most.max(value.abs()));
+        let mut entries = Vec::with_capacity(columns.nnz());
+        for j in 0..columns.n_cols() {
+            let (rows, values) = columns.column(j);
+            for (&row, &value) in rows.iter().zip(values) {
+                for (followed, weight) in map.followed(row as usize) {
+                    entries.push((followed, j as u32, weight * value));
+                }
+            }
+        }
+        let all = CscMatrix::from_triplets(map.follows.n_rows(), columns.n_cols(), &entries);
+        entries.clear();
+        for j in 0..all.n_cols() {
+            let (rows, values) = all.column(j);
+            for (&row, &value) in rows.iter().zip(values) {
+                match map.place(row) {
+                    Some(place) => entries.push((place, j as u32, value)),
+                    None if value.abs() > MAX_FOREIGN_ENTRY * largest => return Err(LostRow),
+                    None => {}
+                }
+            }
+        }
+        Ok(CscMatrix::from_triplets(map.kept.len(), all.n_cols(), &entries))
+    }
+
     /// Turns displacements given along the axes of the nodes to the axes of the model: rows by `labels`,
     /// one column each.
     ///

@@ -5,6 +5,7 @@ use super::assemble::assemble;
 use super::assembled::Assembled;
 use super::checks::{CheckedModel, check_body};
 use super::connections::groups;
+use super::recovery_checks::{recoveries_of_body, refuse_several_bodies};
 use super::wording::{in_words, name_some};
 use super::{BodyNumber, Damping, FeModel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
@@ -69,6 +70,9 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
     let interfaces = distribute(&whole.raw.interfaces, &component, &whole.nodes, &mut found);
     check_couplings(&whole, &component, &mut found);
     check_loads_of_others(&whole, &component, &interfaces, &mut found);
+    let body: HashMap<i64, usize> = whole.nodes.ids.iter().copied().zip(component.iter().copied()).collect();
+    let of_row = |row: usize| component[whole.rows.vertex(row)];
+    refuse_several_bodies(&whole.recoveries, of_row, |id| body.get(&id).copied(), &mut found);
     if found.iter().any(|d| d.severity() == Severity::Error) {
         return Err(found);
     }
@@ -167,7 +171,9 @@ fn body_model(
         .filter(|one| one.matrix.as_csc().nnz() > 0)
         .collect();
     let name = format!("{}-{number}", whole.raw.name);
+    let recoveries = recoveries_of_body(&whole.recoveries, kept, &nodes);
     Assembled {
+        recoveries,
         raw: RawModel { name, interfaces, given_rows: whole.raw.given_rows.of_body(), ..whole.raw.clone() },
         mesh: whole.mesh.as_ref().and_then(|mesh| mesh.among(&whole.nodes.ids, &nodes.ids)),
         nodes,

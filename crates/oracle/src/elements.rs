@@ -201,6 +201,27 @@ impl ElementKind {
     }
 }
 
+impl ElementKind {
+    /// Returns the stresses xx, yy, zz, xy, yz, xz at every quadrature point of the stiffness (6 per point) for unit
+    /// displacements of the nodes (3m columns): sigma = lambda tr(eps) I + 2 mu eps.
+    pub fn stresses(self, nodes: &[[f64; 3]], material: &Material) -> Vec<Vec<f64>> {
+        let (lambda, mu) = material.lame();
+        let mut rows = Vec::new();
+        for (xi, _) in self.stiffness_rule() {
+            let (gradient, _) = physical_gradients(nodes, &self.shape(xi).1);
+            for (i, j) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)] {
+                let entry = |(g, k): (&[f64; 3], usize)| {
+                    let volume = if i == j { lambda * g[k] } else { 0.0 };
+                    let along = |a: usize, b: usize| if k == a { g[b] } else { 0.0 };
+                    volume + mu * (along(i, j) + along(j, i))
+                };
+                rows.push(gradient.iter().flat_map(|g| [0, 1, 2].map(|k| entry((g, k)))).collect());
+            }
+        }
+        rows
+    }
+}
+
 /// Copies the upper triangle to the lower one.
 fn mirror(matrix: &mut [f64], n: usize) {
     for i in 0..n {

@@ -6,8 +6,8 @@ use flexbody_base::provenance::{SourceFile, sha256_hex};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
-    InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts,
-    ReferenceConditions, Source, Storage, SurfaceMesh, Truncation, UnitLoad,
+    InterfaceCoordinates, InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, Parts,
+    Quantity, Recovery, RecoveryRow, ReferenceConditions, Source, Storage, SurfaceMesh, Truncation, UnitLoad,
 };
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, TermGroups,
@@ -126,6 +126,30 @@ fn guarantee(r: &mut Random, eigenvalue: &[f64]) -> Guarantee {
         eigenvalue_upper: eigenvalue.to_vec(),
         shape_error: eigenvalue.iter().map(|_| r.positive().min(1.0)).collect(),
         digits: DIGITS.map(|_| r.positive().min(16.0)),
+    }
+}
+
+/// Returns a recovery of a few rows with loads at the `loaded` interfaces.
+fn recovery(r: &mut Random, number: usize, nf: usize, loaded: &[String]) -> Recovery {
+    let rows = 1 + r.below(3);
+    let row = |(i, r): (usize, &mut Random)| RecoveryRow {
+        name: format!("{}-{i}", r.name()),
+        quantity: Quantity::ALL[r.below(Quantity::ALL.len())],
+        component: "xx".to_owned(),
+        unit: r.name(),
+        node: (r.below(2) == 1).then_some(-7),
+        element: (r.below(2) == 1).then_some(i as i64),
+    };
+    Recovery {
+        name: format!("{}-{number}", r.name()),
+        rows: (0..rows).map(|i| row((i, r))).collect(),
+        offset: (0..rows).map(|_| r.value()).collect(),
+        modes: r.matrix(rows, nf),
+        spin: r.matrix(rows, 6),
+        loads: loaded
+            .iter()
+            .map(|interface| LoadColumns { interface: interface.clone(), columns: r.matrix(rows, 6) })
+            .collect(),
     }
 }
 
@@ -279,6 +303,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             })
             .collect(),
         coordinates: (n * nf % 2 == 1).then(|| coordinates(&mut r, 1 + interfaces, nf)),
+        recoveries: Vec::new(),
         terms: Vec::new(),
         mesh: r.mesh(n),
         storage: Storage::F64,
@@ -286,6 +311,11 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
     // Products of wild numbers would overflow.
     if let Some(rotation) = parts.modes.rotation.as_ref().filter(|_| !wild && r.below(2) == 1) {
         parts.inertia_stiffness = Some(InertiaStiffness::new(moments(&mut r, n), rotation.as_ref(), 3));
+    }
+    if n * nf % 2 == 1 {
+        let loaded = parts.interfaces.iter().filter(|interface| interface.reference.is_some());
+        let loaded: Vec<String> = loaded.map(|interface| interface.name.clone()).collect();
+        parts.recoveries = (0..2).map(|i| recovery(&mut r, i, nf, &loaded)).collect();
     }
     parts
 }
@@ -345,9 +375,22 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     if let Some(c) = &p.coordinates {
         [&c.stiffness, &c.mass, &c.of_modes].into_iter().for_each(|m| matrix(&mut bits, m));
     }
+    for one in &p.recoveries {
+        bits.extend(one.offset.iter().map(|v| v.to_bits()));
+        let columns = one.loads.iter().map(|load| &load.columns);
+        [&one.modes, &one.spin].into_iter().chain(columns).for_each(|m| matrix(&mut bits, m));
+    }
     bits.extend(p.lumped.iter().flat_map(|l| &l.comparison).map(|(_, v)| v.to_bits()));
     let texts = format!(
-        "{:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+        "{:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+        p.recoveries
+            .iter()
+            .map(|one| (
+                &one.name,
+                &one.rows,
+                one.loads.iter().map(|load| &load.interface).collect::<Vec<_>>()
+            ))
+            .collect::<Vec<_>>(),
         p.source,
         p.units,
         p.nodes.ids,

@@ -146,6 +146,7 @@ pub fn made_of(
         },
         interfaces: Vec::new(),
         coordinates: None,
+        recoveries: Vec::new(),
         terms: Vec::new(),
         mesh: None,
         storage: Storage::F64,

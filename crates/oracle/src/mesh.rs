@@ -5,9 +5,10 @@
 
 use super::elements::{ElementKind, MassRule, Material, TET_EDGES};
 use flexbody_linalg::CscMatrix;
-use flexbody_model::{Nodes, RawModel};
+use flexbody_model::{ModelRecovery, Nodes, Quantity, RawModel, RecoveryOperator, RecoveryRow};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// Nodes and elements.
 #[derive(Debug, Clone)]
@@ -182,6 +183,39 @@ impl Mesh {
             }
         }
         CscMatrix::from_triplets(3 * self.nodes.len(), 3 * self.nodes.len(), &all)
+    }
+}
+
+impl Mesh {
+    /// Returns the transpose of the operator of the stresses at all quadrature points (3n x 6 per point), with the
+    /// labels of its rows.
+    pub fn stress_operator(&self, material: &Material) -> (CscMatrix, Vec<RecoveryRow>) {
+        let (mut all, mut labels) = (Vec::new(), Vec::new());
+        for (e, (kind, nodes)) in self.elements.iter().enumerate() {
+            let positions: Vec<_> = nodes.iter().map(|&i| self.nodes[i]).collect();
+            for (r, row) in kind.stresses(&positions, material).into_iter().enumerate() {
+                let component = ["xx", "yy", "zz", "xy", "yz", "xz"][r % 6];
+                let column = labels.len() as u32;
+                let at = |(c, value): (usize, f64)| ((3 * nodes[c / 3] + c % 3) as u32, column, value);
+                all.extend(row.into_iter().enumerate().map(at));
+                labels.push(RecoveryRow {
+                    name: format!("{} {} {component}", e + 1, r / 6 + 1),
+                    quantity: Quantity::Stress,
+                    component: component.to_owned(),
+                    unit: "Pa".to_owned(),
+                    node: None,
+                    element: Some(e as i64 + 1),
+                });
+            }
+        }
+        (CscMatrix::from_triplets(3 * self.nodes.len(), labels.len(), &all), labels)
+    }
+
+    /// Returns the recovery of these stresses.
+    pub fn stresses(&self, material: &Material) -> ModelRecovery {
+        let (transposed, labels) = self.stress_operator(material);
+        let operator = RecoveryOperator::Rows { transposed, labels, offset: None };
+        ModelRecovery { name: "stress".to_owned(), operator, path: PathBuf::new() }
     }
 }
 

@@ -13,13 +13,13 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::{self, SourceFile};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
-    Coupling, FlexBody, Interface, MassStructure, Storage, Truncation, is_static,
+    Coupling, FlexBody, Interface, MassStructure, Quantity, Recovery, Storage, Truncation, is_static,
 };
 use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major version breaks readers, a newer minor version only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 7;
+const MINOR: u32 = 8;
 
 /// All facts of a report. The JSON form follows the schema `schemas/report.schema.json`.
 ///
@@ -65,6 +65,8 @@ pub(super) struct ModelFacts {
     pub units: UnitFacts,
     pub files: Vec<SourceFile>,
     pub interfaces: Vec<InterfaceFacts>,
+    /// Rows to read off the deformed body.
+    pub recoveries: Vec<RecoveryFacts>,
     /// Size of the surface; `None` if no surface is known.
     pub mesh: Option<MeshFacts>,
     pub settings: serde_json::Value,
@@ -168,6 +170,47 @@ impl InterfaceFacts {
             part if part > RIGID => format!("up to {} of its motion in a mode is deformation", percent(part)),
             _ => "moves as a rigid body".to_owned(),
         })
+    }
+}
+
+/// Rows to read off the deformed body.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct RecoveryFacts {
+    pub name: String,
+    pub rows: usize,
+    /// Quantities of the rows.
+    pub quantities: Vec<QuantityFacts>,
+    /// Interfaces whose loads the rows follow.
+    pub loads: Vec<String>,
+}
+
+/// Number of rows of a quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct QuantityFacts {
+    pub quantity: &'static str,
+    pub rows: usize,
+}
+
+impl RecoveryFacts {
+    fn of(recovery: &Recovery) -> Self {
+        let of = |quantity: Quantity| QuantityFacts {
+            quantity: quantity.name(),
+            rows: recovery.rows.iter().filter(|row| row.quantity == quantity).count(),
+        };
+        let quantities = Quantity::ALL.into_iter().map(of);
+        Self {
+            name: recovery.name.clone(),
+            rows: recovery.rows.len(),
+            quantities: quantities.filter(|one| one.rows > 0).collect(),
+            loads: recovery.loads.iter().map(|load| load.interface.clone()).collect(),
+        }
+    }
+
+    /// Returns `gauges: 12 x stress, 3 x force`.
+    pub(crate) fn in_words(&self) -> String {
+        let quantities: Vec<String> =
+            self.quantities.iter().map(|one| format!("{} x {}", one.rows, one.quantity)).collect();
+        format!("{}: {}", self.name, quantities.join(", "))
     }
 }
 
@@ -342,6 +385,7 @@ impl ModelFacts {
                 .iter()
                 .map(|interface| InterfaceFacts::of(interface, body))
                 .collect(),
+            recoveries: body.recoveries().iter().map(RecoveryFacts::of).collect(),
             mesh: MeshFacts::of(body),
             settings: source.settings.clone(),
         }

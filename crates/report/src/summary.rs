@@ -5,7 +5,7 @@ use super::Facts;
 use super::body_modes::first_and_last;
 use super::craig_bampton::CraigBamptonFacts;
 use super::document::{Block, Term, Tone, listed_to};
-use super::facts::{InterfaceFacts, RunFacts};
+use super::facts::{InterfaceFacts, RecoveryFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::lumped_effect::scheme_in_words;
@@ -53,6 +53,10 @@ fn body(facts: &Facts<'_>) -> Vec<Term> {
         let all: Vec<String> = model.interfaces.iter().map(|one| interface(one, size, &unit)).collect();
         let bends = model.interfaces.iter().any(InterfaceFacts::deforms_although_rigid);
         items.push(entry(warned_if(bends), "interfaces", all.join("; "), if bends { 6 } else { 4 }));
+    }
+    if !model.recoveries.is_empty() {
+        let all: Vec<String> = model.recoveries.iter().map(RecoveryFacts::in_words).collect();
+        items.push(entry(Tone::Plain, "recovery", all.join("; "), 4));
     }
     items
 }

@@ -1,4 +1,5 @@
-//! Arguments of the commands that judge a body without a study: by ranges of motion, and by a run of another program.
+//! Arguments of the commands that judge a body without a study, by ranges of motion and by a run of another program, and
+//! of the command that recovers stresses over such a run.
 
 use super::{Printing, positive};
 use clap::Args;
@@ -54,6 +55,30 @@ pub struct MeasureArguments {
     /// Model of both bodies: its manifest, or a job of an FE program
     #[arg(long, value_name = "MODEL", requires = "reference")]
     pub model: Option<PathBuf>,
+    /// Report to write, format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
+    /// Options of printing.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Arguments of `recover`.
+#[derive(Debug, Args)]
+pub struct RecoverArguments {
+    /// Flex-body file of a body with recoveries, whose motion the run is
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// Run of any program: a table with the columns time, q_1 to q_n, angular_velocity_x to _z and, for every loaded
+    /// interface, NAME force_x to _z and NAME torque_x to _z, along the axes of the model, which turn with the body
+    #[arg(long, value_name = "RUN.csv")]
+    pub history: PathBuf,
+    /// Rows over time, format by extension: .csv or .h5
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Recovery to compute (repeatable) [default: all]
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,

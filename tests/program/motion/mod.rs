@@ -3,4 +3,5 @@
 mod carried;
 mod joined;
 mod mechanisms;
+mod recovery;
 mod simulate;

@@ -88,6 +88,12 @@ pub fn read_series(
     reading.finish()
 }
 
+/// Returns true if the file has a column of this name, with or without a unit in brackets after it, or several.
+pub fn has_column(file: &InputFile, name: &str) -> bool {
+    let is_named = |column: &&[u8]| *column == name.as_bytes() || before_unit(column) == name.as_bytes();
+    Layout::of(file.bytes()).is_some_and(|layout| layout.names.iter().any(is_named))
+}
+
 fn row_error(file: &InputFile, line: usize, message: String) -> Diagnostic {
     Diagnostic::new(Code::SeriesRow, message).in_file(file.path()).at_line(line)
 }

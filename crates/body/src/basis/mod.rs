@@ -40,5 +40,6 @@ pub use oscillating::oscillating_responses;
 pub use residual_vectors::{
     Loads, UserLoads, free_static_responses, free_static_responses_twice, interface_loads,
 };
+pub(crate) use residual_vectors::{accurate_static_responses, centrifugal_loads};
 pub use rigid_modes::rigid_modes;
 pub use solved::{CountElsewhere, SolvedModes};

@@ -66,6 +66,29 @@ pub fn free_static_responses_twice(
     Ok(both.map(|x| model.expand(&x).into_owned()))
 }
 
+/// Returns the static responses G F to all columns of `loads` (N x m), made self-equilibrated by inertia relief, to the
+/// rounding of double precision. Interfaces that the couplings of `model` keep rigid move as rigid bodies.
+///
+/// * `first`: about the first flexible eigenvalue.
+///
+/// # Errors
+/// Failures of the factorisation, and responses that are not accurate: exit code 3.
+pub(crate) fn accurate_static_responses(
+    model: &CoupledModel<'_>,
+    loads: Mat<f64>,
+    first: f64,
+    context: &Context<'_>,
+) -> Result<Mat<f64>> {
+    let rigid = model.rigid_modes()?;
+    let problem = model.problem(rigid.as_ref());
+    let loads = model.restrict(loads);
+    let nothing = Mat::zeros(loads.nrows(), 0);
+    let (precision, accuracy) = (Precision::Double, ResponseAccuracy::FULL);
+    let found = static_responses(&problem, nothing.as_ref(), loads, first, precision, accuracy, context);
+    let responses = found.map_err(|failure| explain(model.model(), failure))?;
+    Ok(model.expand(&responses).into_owned())
+}
+
 /// Returns the nodal forces (N x 6, of a plane model N x 3) of unit forces and unit torques along the model
 /// axes at the reference point of the interface `name`. The transpose of the matrix maps displacements to
 /// the motion of that point. Returns `None` if the model has no such interface, or the interface has no
@@ -179,6 +202,12 @@ impl Loads {
 fn numbered(what: &str, loads: &Mat<f64>) -> Vec<(String, Mat<f64>)> {
     let one = |j: usize| (format!("{what} {}", j + 1), loads.as_ref().subcols(j, 1).to_owned());
     (0..loads.ncols()).map(one).collect()
+}
+
+/// Returns the six centrifugal loads of [`Loads::Centrifugal`], in the plane one, as nodal forces (N x 1 each), in the
+/// order of [`LoadKind::SPIN`](flexbody_model::LoadKind::SPIN).
+pub(crate) fn centrifugal_loads(model: &FeModel) -> Vec<Mat<f64>> {
+    centrifugal(model).into_iter().map(|(_, load)| load).collect()
 }
 
 fn centrifugal(model: &FeModel) -> Vec<(String, Mat<f64>)> {

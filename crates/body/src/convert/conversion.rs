@@ -4,8 +4,8 @@ use super::geometric_stiffness::softening_warning;
 use super::remarks::{free_frequencies, interface_compliance, poor_fits};
 use super::{Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping};
 use crate::flex_body::{
-    FlexBody, InterfaceCoordinates, LumpedBody, MassStructure, Modes, Parts, ReferenceConditions, Source,
-    Storage,
+    FlexBody, InterfaceCoordinates, LumpedBody, MassStructure, Modes, Parts, Recovery, ReferenceConditions,
+    Source, Storage,
 };
 use crate::invariants::{FrameChoice, Invariants, MassProperties};
 use flexbody_base::diagnostic::Diagnostic;
@@ -45,19 +45,19 @@ pub fn convert(model: &FeModel, settings: &ConvertSettings, context: &Context<'_
 }
 
 impl ModalModel<'_> {
-    /// Returns the body with the groups condensed so far, without comparators. A selection for a scene
+    /// Returns the body with the groups condensed so far, without comparators and recoveries. A selection for a scene
     /// works on this body.
     ///
     /// # Errors
     /// An error for damping that adds energy to the modes.
     pub fn body(&self, condensed: &Condensation) -> Result<FlexBody> {
-        FlexBody::new(self.parts(condensed, Vec::new())?.0)
+        FlexBody::new(self.parts(condensed, Vec::new(), Vec::new())?.0)
     }
 
     /// Finishes the conversion with the condensed data.
     ///
     /// # Errors
-    /// Errors for damping that adds energy to the modes, and for a comparator that fails.
+    /// Errors for damping that adds energy to the modes, for a comparator and for a recovery that fail.
     pub fn finish(self, condensed: Condensation, context: &Context<'_>) -> Result<Conversion> {
         let exact = &condensed.invariants;
         context.phase("lumped comparison");
@@ -68,7 +68,8 @@ impl ModalModel<'_> {
             .iter()
             .map(|masses| lumped::pipeline(&self, masses, exact, &without_counter))
             .collect::<Result<_>>()?;
-        let (parts, overdamped) = self.parts(&condensed, lumped)?;
+        let recoveries = self.recoveries(condensed.invariants.groups().w1, &without_counter)?;
+        let (parts, overdamped) = self.parts(&condensed, lumped, recoveries)?;
         let body = FlexBody::new(parts)?;
         let diagnostics = self.remarks(overdamped, &body);
         let solution = self.found.solution;
@@ -88,6 +89,7 @@ impl ModalModel<'_> {
         &self,
         condensed: &Condensation,
         lumped: Vec<LumpedBody>,
+        recoveries: Vec<Recovery>,
     ) -> Result<(Parts, Option<Diagnostic>)> {
         let (modes, overdamped) = self.damped_modes(&condensed.invariants)?;
         let parts = Parts {
@@ -109,6 +111,7 @@ impl ModalModel<'_> {
             inertia_stiffness: self.inertia_stiffness.clone(),
             lumped,
             certificate: self.certificate(condensed.guarantee.clone()),
+            recoveries,
             terms: condensed.terms.clone(),
             storage: Storage::default(),
         };

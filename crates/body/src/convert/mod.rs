@@ -16,6 +16,7 @@ mod geometric_stiffness;
 mod interface_frame;
 mod lumped;
 mod modal_model;
+mod recovery;
 mod remarks;
 mod settings;
 

@@ -2,8 +2,8 @@
 
 use super::validate::problems;
 use super::{
-    Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, ReferenceConditions, Source,
-    Storage, TermDecision, TermGroups,
+    Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, Recovery, ReferenceConditions,
+    Source, Storage, TermDecision, TermGroups,
 };
 use crate::basis::BasisKind;
 use crate::invariants::{
@@ -68,7 +68,8 @@ impl FlexBody {
     /// unique; the body number lies between 1 and the number of bodies; names of lumping schemes and of
     /// interfaces are unique and not empty; loads of geometric stiffness are those of the dimension, each
     /// once; surface and interfaces name existing nodes, interfaces declared free have no reference point; matrices in
-    /// interface coordinates are symmetric; a group of the kinetic energy is dropped by a decision of
+    /// interface coordinates are symmetric; names of recoveries are unique and not empty, and their loads act at
+    /// interfaces with a reference point; a group of the kinetic energy is dropped by a decision of
     /// [`Parts::terms`] or held, here and by the lumped comparators; no text contains a NUL character (no
     /// file could hold it).
     ///
@@ -134,6 +135,11 @@ impl FlexBody {
     /// Returns node numbers and positions in the body frame.
     pub fn nodes(&self) -> &Nodes {
         &self.parts.nodes
+    }
+
+    /// Returns the rows to read off the deformed body: stresses, strains, forces, displacements.
+    pub fn recoveries(&self) -> &[Recovery] {
+        &self.parts.recoveries
     }
 
     /// Returns the surface to draw the body by, if it is known.

@@ -1,7 +1,9 @@
 //! Change of the reference conditions of a body: to mean axes, or to a frame on an interface.
 
 use super::modal_change::{ModalChange, diagonal_eigenvalues, reduced_residuals};
-use super::{Carrier, Certificate, FlexBody, LoadKind, LumpedBody, Modes, Parts, ReferenceConditions};
+use super::{
+    Carrier, Certificate, FlexBody, LoadKind, LumpedBody, Modes, Parts, Recovery, ReferenceConditions,
+};
 use crate::invariants::{BodyFrame, FrameChoice, Invariants, TermGroups, error_norms, principal_axes};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -125,6 +127,10 @@ impl FlexBody {
         parts.geometric_stiffness = parts.geometric_stiffness.iter().map(stiffness).collect();
         parts.lumped =
             parts.lumped.iter().map(|lumped| changed_lumped(lumped, change, &invariants)).collect();
+        // Rows that rigid motion changes are known only relative to the former frame.
+        parts.recoveries.retain(Recovery::ignores_rigid_motion);
+        parts.recoveries =
+            parts.recoveries.iter().map(|one| one.with_modes(change.combined(&one.modes))).collect();
         parts.certificate = unproved(&parts);
         (parts.invariants, parts.conditions, parts.coordinates) = (invariants, conditions, None);
         Self::new(parts)

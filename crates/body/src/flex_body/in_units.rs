@@ -1,8 +1,8 @@
 //! Conversion of a body to other units.
 
 use super::{
-    Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LumpedBody, Modes,
-    Parts,
+    Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LoadColumns,
+    LumpedBody, Modes, Parts, Recovery,
 };
 use crate::invariants::{InertiaStiffness, Invariants, UnitFactors};
 use faer::Mat;
@@ -114,6 +114,24 @@ fn times(a: &Mat<f64>, factor: f64) -> Mat<f64> {
 }
 
 impl Change {
+    /// Returns a recovery for modal coordinates, angular velocities and loads in the new units. Its values keep the
+    /// units of their rows.
+    fn recovery(self, given: &Recovery) -> Recovery {
+        let (force, torque) = (self.of(2, 1, -2), self.of(2, 2, -2));
+        let loads = |one: &LoadColumns| LoadColumns {
+            columns: Mat::from_fn(one.columns.nrows(), one.columns.ncols(), |i, a| {
+                one.columns[(i, a)] / if a < 3 { force } else { torque }
+            }),
+            ..one.clone()
+        };
+        Recovery {
+            modes: times(&given.modes, 1.0 / self.modal()),
+            spin: times(&given.spin, 1.0 / self.of(0, 0, -2)),
+            loads: given.loads.iter().map(loads).collect(),
+            ..given.clone()
+        }
+    }
+
     /// Returns the factor of a coordinate by its name: a modal amplitude, the rotation `... rx`, or a
     /// displacement.
     fn coordinate(self, name: &str) -> f64 {
@@ -177,6 +195,7 @@ impl FlexBody {
         for interface in &mut parts.interfaces {
             interface.reference = interface.reference.as_ref().map(point);
         }
+        parts.recoveries = parts.recoveries.iter().map(|one| change.recovery(one)).collect();
         parts.coordinates = parts.coordinates.as_ref().map(|coordinates| change.coordinates(coordinates));
         Self::new(parts)
     }

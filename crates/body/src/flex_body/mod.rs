@@ -11,6 +11,7 @@ mod modal_change;
 mod model_axes;
 mod model_rows;
 mod parts;
+mod recovery;
 mod reduced;
 mod reference_conditions;
 mod rigid_motion;
@@ -25,13 +26,16 @@ pub use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
 pub use crate::invariants::{Frame, TermGroup, TermGroups};
 pub use body::FlexBody;
 pub use carried::Carrier;
-pub use flexbody_model::{Coupling, GeometricStiffness, LoadKind, SurfaceMesh, UnitLoad};
+pub use flexbody_model::{
+    Coupling, GeometricStiffness, LoadKind, Quantity, RecoveryRow, SurfaceMesh, UnitLoad,
+};
 pub use interface::{Interface, InterfaceRows};
 pub use modal_change::{ModalChange, RigidMotions, diagonal_eigenvalues, reduced_residuals, rigid_motions};
 pub use model_axes::stiffness_about;
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, is_static,
 };
+pub use recovery::{LOAD_COMPONENTS, LoadColumns, Recovery, RecoveryState};
 pub use reference_conditions::ReferenceConditions;
 pub use softening::{SOFTENING, axis_in_words};
 pub use storage::Storage;

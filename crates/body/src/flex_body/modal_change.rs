@@ -169,6 +169,11 @@ impl ModalChange {
         symmetric_part(&(self.modes.transpose() * a * &self.modes))
     }
 
+    /// Returns rows of the old modes (rows x nf) that rigid motion does not change, in the new modes: A X.
+    pub(crate) fn combined(&self, rows: &Mat<f64>) -> Mat<f64> {
+        rows * &self.modes
+    }
+
     /// Returns the displacements of nodes (3n x nf) at `positions` in the new modes.
     pub fn shapes(&self, shape: &Mat<f64>, positions: &[[f64; 3]]) -> Mat<f64> {
         match &self.taken {

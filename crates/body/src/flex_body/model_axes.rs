@@ -62,6 +62,7 @@ impl FlexBody {
             .collect();
         parts.geometric_stiffness = self.geometric_stiffness_in(&origin, &to_body);
         parts.inertia_stiffness = self.inertia_stiffness_in(&origin, &to_body);
+        parts.recoveries = parts.recoveries.iter().map(|one| one.in_axes(&to_body)).collect();
         parts.coordinates = None;
         Self::new(parts)
     }

@@ -69,6 +69,7 @@ impl FlexBody {
             certificate: parts.certificate.of_some(modes, &parts.modes),
             interfaces: parts.interfaces.clone(),
             coordinates: parts.coordinates.clone().filter(|_| all),
+            recoveries: self.reduced_recoveries(modes, invariants.groups()),
             terms: before.cloned().chain(terms.iter().cloned()).collect(),
             invariants,
             storage: parts.storage,

@@ -1,6 +1,8 @@
 //! Conditions on the parts of a flexible body, checked once; all violations are collected.
 
-use super::{MassStructure, Parts, ReferenceConditions, SurfaceMesh, TermGroup};
+use super::{
+    LOAD_COMPONENTS, LoadColumns, LoadKind, MassStructure, Parts, ReferenceConditions, SurfaceMesh, TermGroup,
+};
 use crate::invariants::{DIGITS, InertiaStiffness};
 use crate::problems::{MAX_NUMBER, Problems};
 use flexbody_base::diagnostic::Diagnostic;
@@ -47,6 +49,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.interfaces(parts, n);
     check.reference_conditions(parts);
     check.coordinates(parts, nf);
+    check.recoveries(parts, nf);
     check.text("source.name", &parts.source.name);
     if let Some(number) = parts.source.number.filter(|n| n.number == 0 || n.number > n.of) {
         check.add(format!("`source.number` is {number}"));
@@ -380,6 +383,35 @@ impl Problems {
             self.matrix(name, matrix, size, size);
             if (matrix.nrows(), matrix.ncols()) == (size, size) && *matrix != matrix.transpose() {
                 self.add(format!("`{name}` is not symmetric"));
+            }
+        }
+    }
+
+    fn recoveries(&mut self, parts: &Parts, nf: usize) {
+        self.names("a recovery", parts.recoveries.iter().map(|one| &one.name));
+        for one in &parts.recoveries {
+            let (name, rows) = (format!("recovery `{}`", one.name), one.rows.len());
+            if rows == 0 {
+                self.add(format!("{name} has no rows"));
+            }
+            for row in &one.rows {
+                [&row.name, &row.component, &row.unit].into_iter().for_each(|text| self.text(&name, text));
+            }
+            self.names(&format!("a row of {name}"), one.rows.iter().map(|row| &row.name));
+            self.length(&format!("{name} offset"), one.offset.len(), rows, "row");
+            self.finite(&format!("{name} offset"), one.offset.iter().copied());
+            self.matrix(&format!("{name} modes"), &one.modes, rows, nf);
+            self.matrix(&format!("{name} spin"), &one.spin, rows, LoadKind::SPIN.len());
+            self.names(&format!("an interface of {name}"), one.loads.iter().map(|load| &load.interface));
+            for LoadColumns { interface, columns } in &one.loads {
+                self.matrix(&format!("{name} loads at `{interface}`"), columns, rows, LOAD_COMPONENTS);
+                let known =
+                    parts.interfaces.iter().any(|own| own.name == *interface && own.reference.is_some());
+                if !known {
+                    self.add(format!(
+                        "{name} has loads at `{interface}`, which is no interface with a reference point"
+                    ));
+                }
             }
         }
     }

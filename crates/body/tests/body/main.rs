@@ -25,6 +25,7 @@ mod partial_conversion;
 mod plans;
 mod precision;
 mod real_models;
+mod recovery;
 mod residual_vectors;
 mod second_shift;
 mod single_precision;

@@ -152,7 +152,7 @@ fn a_newer_minor_with_unknown_entries_is_read() {
     let case = valid();
     let before = flexbody_file::read(&case.path).unwrap();
     let file = hdf5::File::open_rw(&case.path).unwrap();
-    set_int(&file, "/", "format_minor", 8);
+    set_int(&file, "/", "format_minor", 9);
     file.create_group("stress").unwrap();
     file.new_dataset::<f64>().shape([2]).create("modes/stress_norm").unwrap().write_raw(&[1.0, 2.0]).unwrap();
     set_text(&file.group("source").unwrap(), "comment", "checked by hand");

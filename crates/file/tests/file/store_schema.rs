@@ -38,10 +38,10 @@ fn every_required_entry_is_missed_when_it_is_not_there() {
         let (parent, key) = pointer.rsplit_once('/').unwrap();
         let key = key.replace("~1", "/").replace("~0", "~");
         broken.pointer_mut(parent).unwrap().as_object_mut().unwrap().remove(&key);
-        let optional = ["comparison", "lumped", "interfaces", "geometric_stiffness", "inertia_stiffness"]
+        let optional = ["comparison", "lumped", "interfaces", "geometric_stiffness", "inertia_stiffness", "recovery"]
             .iter()
             .any(|g| parent == format!("/groups/{g}/groups"))
-            || ["geometric_stiffness", "inertia_stiffness", "interface"].contains(&key.as_str())
+            || ["geometric_stiffness", "inertia_stiffness", "interface", "recovery"].contains(&key.as_str())
             || key.starts_with("rotational_")
             || (parent.starts_with("/groups/comparison/groups/") && parent.ends_with("/attributes"))
             || ["proved_modes", "negative_pivots", "shift_below", "negative_pivots_below"]
@@ -59,6 +59,7 @@ fn every_required_entry_is_missed_when_it_is_not_there() {
             || ["datasets", "attributes"]
                 .iter()
                 .any(|s| parent == format!("/groups/interface_coordinates/{s}"))
+            || ["loaded_interfaces", "loads"].contains(&key.as_str())
             || key.starts_with("digits_")
             || ["mesh", "triangles", "edges"].contains(&key.as_str())
             // All attributes of the frame are optional, but the section of a group with attributes is always

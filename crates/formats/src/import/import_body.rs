@@ -213,6 +213,7 @@ fn parts(
         certificate: certificate(file, invariants),
         interfaces: interfaces(given),
         coordinates: None,
+        recoveries: Vec::new(),
         terms: invariants.groups().dropped().map(|group| not_in_file(group, file.format)).collect(),
         storage: Storage::F64,
         modes: modes(

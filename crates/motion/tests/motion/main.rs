@@ -17,6 +17,7 @@ mod nodal_motion;
 mod nodal_turning;
 mod output_errors;
 mod partial_bodies;
+mod recovery;
 mod rotation;
 mod settled_rates;
 mod turning_nodes;

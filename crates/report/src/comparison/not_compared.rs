@@ -42,6 +42,7 @@ const NEVER_COMPARED: &[Entries] = &[
         has: |body| !body.lumped().is_empty(),
     },
     Entries { name: "surface", paths: "/mesh", has: |body| body.mesh().is_some() },
+    Entries { name: "recoveries", paths: "/recovery", has: |body| !body.recoveries().is_empty() },
     Entries {
         name: "matrices in interface coordinates, which `flexbody check` holds to the modes",
         paths: "/interface_coordinates",

@@ -5,8 +5,8 @@ use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     FixedInterface, FlexBody, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
-    LoadKind, LumpedBody, MassStructure, Parts, ReferenceConditions, Storage, SurfaceMesh, TermDecision,
-    TermGroup, UnitLoad,
+    LoadColumns, LoadKind, LumpedBody, MassStructure, Parts, Quantity, Recovery, RecoveryRow,
+    ReferenceConditions, Storage, SurfaceMesh, TermDecision, TermGroup, UnitLoad,
 };
 use flexbody_body::invariants::{BodyFrame, DIGITS, Frame, GeneralTerms, InertiaStiffness};
 use flexbody_file::contents;
@@ -96,6 +96,21 @@ fn complete() -> FlexBody {
         tier: 1,
         bound: 0.1,
         limit: 0.2,
+    }];
+    parts.recoveries = vec![Recovery {
+        name: "gauge".to_owned(),
+        rows: vec![RecoveryRow {
+            name: "g1".to_owned(),
+            quantity: Quantity::Strain,
+            component: "xx".to_owned(),
+            unit: String::new(),
+            node: None,
+            element: Some(1),
+        }],
+        offset: vec![0.5],
+        modes: Mat::from_fn(1, nf, number),
+        spin: Mat::from_fn(1, 6, number),
+        loads: vec![LoadColumns { interface: "left".to_owned(), columns: Mat::from_fn(1, 6, number) }],
     }];
     parts.conditions = ReferenceConditions::Interface("right".to_owned());
     parts.mesh = Some(SurfaceMesh::new(vec![[0, 1, 4]], vec![[0, 1]], n).expect("a triangle"));
@@ -258,6 +273,10 @@ fn differing(change: impl FnOnce(&mut Parts)) -> (Vec<&'static str>, String) {
     let body = complete();
     let mut parts = body.clone().into_parts();
     change(&mut parts);
+    // Recoveries have loads at interfaces that are there.
+    let held: Vec<&Interface> = parts.interfaces.iter().filter(|one| one.reference.is_some()).collect();
+    let recoveries = parts.recoveries.iter_mut();
+    recoveries.for_each(|one| one.loads.retain(|load| held.iter().any(|own| own.name == load.interface)));
     let other = FlexBody::new(parts).unwrap_or_else(|e| panic!("{e}"));
     let found = compare(&body, &other, &Tolerances::default()).expect("comparable");
     (found.rows().iter().filter(|row| !row.passed).map(|row| row.quantity).collect(), found.text())
@@ -312,6 +331,7 @@ fn what_a_file_of_another_program_has_none_of_is_listed() {
     parts.source.n_dofs = 0;
     parts.frame = Frame::model();
     parts.interfaces.clear();
+    parts.recoveries.clear();
     parts.conditions = ReferenceConditions::Unstated;
     parts.geometric_stiffness.clear();
     parts.inertia_stiffness = None;

@@ -1,0 +1,294 @@
+//! Recoveries of a body: the rows of its model in the modes, and their static columns outside the modes (theory
+//! section 12).
+
+use super::ModalModel;
+use crate::basis::{
+    CoupledModel, accurate_static_responses, centrifugal_loads, interface_loads, rigid_modes,
+};
+use crate::flex_body::{LOAD_COMPONENTS, LoadColumns, LoadKind, Recovery};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_linalg::context::Context;
+use flexbody_linalg::{
+    CscMatrix, combine, dense_cholesky, gram, side_by_side, solve_lower, solve_upper, subtract_combination,
+};
+use flexbody_model::{Coupling, FeModel, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
+use std::collections::HashSet;
+
+/// Names of the components of force and torque.
+const COMPONENTS: [&str; LOAD_COMPONENTS] = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
+
+impl ModalModel<'_> {
+    /// Returns the recoveries that the model asks for. Their static columns need one factor of K + tau M; cuts need
+    /// none.
+    ///
+    /// * `responds_to_spin`: true if the body holds the group W1, by which the modes respond to spin.
+    ///
+    /// # Errors
+    /// [`RecoveryCut`](Code::RecoveryCut) for a cut through a rigid interface; failures of the factor, and responses
+    /// that are not accurate.
+    pub(super) fn recoveries(&self, responds_to_spin: bool, context: &Context<'_>) -> Result<Vec<Recovery>> {
+        let asked = self.model.recoveries();
+        if asked.is_empty() {
+            return Ok(Vec::new());
+        }
+        context.phase("recovery");
+        let basis = FreeBasis::new(self)?;
+        let loads = StaticLoads::new(self.model)?;
+        let is_operator = |one: &ModelRecovery| matches!(one.operator, RecoveryOperator::Rows { .. });
+        let responses = match asked.iter().any(is_operator) {
+            true => self.responses(&basis, &loads, responds_to_spin, context)?,
+            false => Mat::new(),
+        };
+        let one = |one: &ModelRecovery| match &one.operator {
+            RecoveryOperator::Rows { transposed, labels, offset } => {
+                let modes = product(transposed, &self.modes.vectors);
+                let columns = product(transposed, &responses);
+                let offset = offset.clone().unwrap_or_else(|| vec![0.0; labels.len()]);
+                Ok(loads.recovery(&one.name, labels.clone(), offset, modes, &columns))
+            }
+            RecoveryOperator::Cut { nodes, about } => {
+                self.refuse_divided_interface(one, nodes, &basis.coupled)?;
+                let side = one_side(self.model, nodes, *about);
+                let (modes, columns) = basis.section_forces(self.model, &side, &loads, responds_to_spin);
+                let labels = section_labels(self.model);
+                let offset = vec![0.0; labels.len()];
+                Ok(loads.recovery(&one.name, labels, offset, modes, &columns))
+            }
+        };
+        let along_model = asked.iter().map(one).collect::<Result<Vec<Recovery>>>()?;
+        Ok(along_model.iter().map(|one| one.in_axes(&self.place.frame.axes)).collect())
+    }
+
+    /// Returns the static responses G_r F to all loads (N x m), relative to the frame of the body.
+    fn responses(
+        &self,
+        basis: &FreeBasis<'_>,
+        loads: &StaticLoads,
+        responds_to_spin: bool,
+        context: &Context<'_>,
+    ) -> Result<Mat<f64>> {
+        let first = self.found.solution.eigenvalues[0];
+        let mut responses = accurate_static_responses(&basis.coupled, loads.forces.clone(), first, context)?;
+        // Less the part that the modes contain.
+        let amplitudes = basis.static_amplitudes(loads, responds_to_spin);
+        subtract_combination(responses.as_mut(), basis.modes.as_ref(), amplitudes.as_ref());
+        // A frame on an interface follows its motion.
+        if let Some(name) = self.settings.frame.interface()
+            && let Some(measure) = interface_loads(self.model, name)?
+        {
+            let motion = gram(measure.as_ref(), responses.as_ref());
+            let rigid = self.model.rigid_fields(self.place.frame.origin.into(), 1.0);
+            subtract_combination(responses.as_mut(), rigid.as_ref(), motion.as_ref());
+        }
+        Ok(responses)
+    }
+
+    /// Returns an error if a cut divides an interface that all modes leave rigid: its inner forces are unknown.
+    fn refuse_divided_interface(
+        &self,
+        cut: &ModelRecovery,
+        side: &[i64],
+        coupled: &CoupledModel<'_>,
+    ) -> Result<()> {
+        let side: HashSet<i64> = side.iter().copied().collect();
+        for name in coupled.rigid_interfaces() {
+            let set = self.model.interfaces().iter().find(|set| set.name == name);
+            let nodes = set.map_or(&[][..], |set| set.nodes.as_slice());
+            let inside = nodes.iter().filter(|id| side.contains(id)).count();
+            if inside > 0 && inside < nodes.len() {
+                let message = format!(
+                    "recovery `{}`: its cut divides the rigid interface `{name}`, {inside} of {} nodes are on this side",
+                    cut.name,
+                    nodes.len()
+                );
+                return Err(Diagnostic::new(Code::RecoveryCut, message).in_file(&cut.path).into());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Modes without rigid motion, and the model with the couplings that they preserve.
+struct FreeBasis<'m> {
+    coupled: CoupledModel<'m>,
+    /// Rigid motions (N x 6), M-orthonormal.
+    rigid: Mat<f64>,
+    /// Psi_m = Psi - R R'M Psi (N x nf).
+    modes: Mat<f64>,
+    /// K_ff.
+    stiffness: Mat<f64>,
+}
+
+impl<'m> FreeBasis<'m> {
+    fn new(found: &ModalModel<'m>) -> Result<Self> {
+        let (model, vectors) = (found.model, &found.modes.vectors);
+        let pencil = model.pencil();
+        let rigid = rigid_modes(model, &pencil)?;
+        let mut modes = vectors.clone();
+        let along = gram(rigid.as_ref(), pencil.apply_mass(modes.as_ref()).as_ref());
+        subtract_combination(modes.as_mut(), rigid.as_ref(), along.as_ref());
+        let coupled = CoupledModel::of_modes(model, model.interfaces(), vectors.as_ref());
+        Ok(Self { coupled, rigid, modes, stiffness: found.modal_stiffness.clone() })
+    }
+
+    /// Returns the amplitudes K_ff^-1 Psi_m'F of the modes under constant loads. Without response to spin they are
+    /// zero for the centrifugal loads.
+    fn static_amplitudes(&self, loads: &StaticLoads, responds_to_spin: bool) -> Mat<f64> {
+        let solved = solve(&self.stiffness, &loads.modal(&self.modes, responds_to_spin));
+        solved.expect("the stiffness of modes with positive eigenvalues is positive definite")
+    }
+
+    /// Returns the section forces of one side with the motions T_S (N x 6): in the modes, T_S'M Psi_m m^-1 K_ff, and
+    /// under the loads, T_S'(F - M R R'F - M Psi_m m^-1 Psi_m'F) with m = Psi_m'M Psi_m. They are the loads less the
+    /// inertia of this side, so that no static solution and no strain enters.
+    fn section_forces(
+        &self,
+        model: &FeModel,
+        side: &Mat<f64>,
+        loads: &StaticLoads,
+        responds_to_spin: bool,
+    ) -> (Mat<f64>, Mat<f64>) {
+        let pencil = model.pencil();
+        let moved = pencil.apply_mass(side.as_ref());
+        let of_inertia = gram(moved.as_ref(), self.modes.as_ref());
+        let mass = gram(self.modes.as_ref(), pencil.apply_mass(self.modes.as_ref()).as_ref());
+        let accelerations = |modal: &Mat<f64>| {
+            solve(&mass, modal).expect("the mass of independent modes is positive definite")
+        };
+        let mut forces = loads.forces.clone();
+        let resultants = gram(self.rigid.as_ref(), forces.as_ref());
+        let of_rigid = combine(pencil.apply_mass(self.rigid.as_ref()).as_ref(), resultants.as_ref());
+        forces -= of_rigid;
+        let modal = accelerations(&loads.modal(&self.modes, responds_to_spin));
+        let columns = gram(side.as_ref(), forces.as_ref()) - combine(of_inertia.as_ref(), modal.as_ref());
+        (combine(of_inertia.as_ref(), accelerations(&self.stiffness).as_ref()), columns)
+    }
+}
+
+/// Returns A^-1 B for a symmetric positive definite A; `None` for another.
+fn solve(a: &Mat<f64>, b: &Mat<f64>) -> Option<Mat<f64>> {
+    let lower = dense_cholesky(a.clone())?;
+    Some(solve_upper(&lower, &solve_lower(&lower, b)))
+}
+
+/// Loads of the columns, along the axes of the model: six (in the plane one) centrifugal loads, then six (in the plane
+/// three) for each interface with a reference point.
+struct StaticLoads {
+    /// Nodal forces (N x m).
+    forces: Mat<f64>,
+    /// Components of [`LoadKind::SPIN`] of the centrifugal loads.
+    spins: &'static [usize],
+    interfaces: Vec<String>,
+    /// Components of force and torque of the loads at an interface.
+    components: &'static [usize],
+}
+
+impl StaticLoads {
+    fn new(model: &FeModel) -> Result<Self> {
+        let mut parts = centrifugal_loads(model);
+        let mut interfaces = Vec::new();
+        for set in model.interfaces().iter().filter(|set| set.coupling() != Coupling::Free) {
+            if let Some(loads) = interface_loads(model, &set.name)? {
+                interfaces.push(set.name.clone());
+                parts.push(loads);
+            }
+        }
+        let parts: Vec<_> = parts.iter().map(Mat::as_ref).collect();
+        let plane = model.dimension() == 2;
+        Ok(Self {
+            forces: side_by_side(&parts),
+            spins: LoadKind::Spin.of_dimension(model.dimension()),
+            interfaces,
+            components: if plane { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] },
+        })
+    }
+
+    /// Returns the modal loads Psi_m'F (nf x m); those of spin are zero if the modes do not respond to it.
+    fn modal(&self, modes: &Mat<f64>, responds_to_spin: bool) -> Mat<f64> {
+        let mut modal = gram(modes.as_ref(), self.forces.as_ref());
+        if !responds_to_spin {
+            modal.as_mut().subcols_mut(0, self.spins.len()).fill(0.0);
+        }
+        modal
+    }
+
+    /// Returns the recovery with the rows in the modes and under all loads (rows x m), along the axes of the model.
+    fn recovery(
+        &self,
+        name: &str,
+        rows: Vec<RecoveryRow>,
+        offset: Vec<f64>,
+        modes: Mat<f64>,
+        columns: &Mat<f64>,
+    ) -> Recovery {
+        let count = rows.len();
+        let mut spin = Mat::zeros(count, LoadKind::SPIN.len());
+        for (from, &to) in self.spins.iter().enumerate() {
+            (0..count).for_each(|i| spin[(i, to)] = columns[(i, from)]);
+        }
+        let at = |(a, interface): (usize, &String)| {
+            let mut own = Mat::zeros(count, LOAD_COMPONENTS);
+            for (from, &to) in self.components.iter().enumerate() {
+                let from = self.spins.len() + a * self.components.len() + from;
+                (0..count).for_each(|i| own[(i, to)] = columns[(i, from)]);
+            }
+            LoadColumns { interface: interface.clone(), columns: own }
+        };
+        let loads = self.interfaces.iter().enumerate().map(at).collect();
+        Recovery { name: name.to_owned(), rows, offset, modes, spin, loads }
+    }
+}
+
+/// Returns R X for R given by its transpose (N x rows).
+fn product(transposed: &CscMatrix, x: &Mat<f64>) -> Mat<f64> {
+    let entry = |i: usize, j: usize| -> f64 {
+        let (rows, values) = transposed.column(i);
+        rows.iter().zip(values).map(|(&row, value)| value * x[(row as usize, j)]).sum()
+    };
+    Mat::from_fn(transposed.n_cols(), x.ncols(), entry)
+}
+
+/// Returns T_S (N x 6, in the plane N x 3): rigid motions about a point, of the rows of some nodes alone.
+fn one_side(model: &FeModel, side: &[i64], about: [f64; 3]) -> Mat<f64> {
+    let members: HashSet<i64> = side.iter().copied().collect();
+    let is_member: Vec<bool> = model.nodes().ids.iter().map(|id| members.contains(id)).collect();
+    let fields = model.rigid_fields(about, 1.0);
+    let (d, rows) = (model.dimension(), model.rows());
+    let node_of = |row: usize| match row.checked_sub(rows.displacements()) {
+        None => Some(row / d).filter(|node| *node < is_member.len()),
+        Some(after) => rows.rotations().get(after).map(|(node, _)| *node as usize),
+    };
+    let inside: Vec<bool> =
+        (0..fields.nrows()).map(|row| node_of(row).is_some_and(|node| is_member[node])).collect();
+    Mat::from_fn(fields.nrows(), fields.ncols(), |row, c| if inside[row] { fields[(row, c)] } else { 0.0 })
+}
+
+/// Returns the labels of section forces: forces, then moments, along the axes of the model.
+fn section_labels(model: &FeModel) -> Vec<RecoveryRow> {
+    let units = model.units();
+    let named = |name: &str, si: &str| match name.parse::<f64>() {
+        Ok(_) => format!("({name} {si})"),
+        Err(_) => name.to_owned(),
+    };
+    let [mass, length, time] = [(&units.mass, "kg"), (&units.length, "m"), (&units.time, "s")]
+        .map(|(unit, si)| named(unit.name(), si));
+    let row = |&component: &usize| {
+        let is_force = component < 3;
+        RecoveryRow {
+            name: COMPONENTS[component].to_owned(),
+            quantity: if is_force { Quantity::Force } else { Quantity::Moment },
+            component: (component + 1).to_string(),
+            unit: if is_force {
+                format!("{mass} {length}/{time}^2")
+            } else {
+                format!("{mass} {length}^2/{time}^2")
+            },
+            node: None,
+            element: None,
+        }
+    };
+    let components: &[usize] = if model.dimension() == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
+    components.iter().map(row).collect()
+}

@@ -1,0 +1,242 @@
+//! Recovery of stresses, strains, forces and displacements: rows
+//!
+//! ```text
+//! y = y0 + (R Psi) q + sum_a (R G_r b_a) f_a - sum_{k <= l} (R G_r M c_kl) w_k w_l
+//! ```
+//!
+//! of the deformed body (theory section 12), with the modal coordinates q, the loads f_a on the body and the angular
+//! velocity w. G_r is the static flexibility of the free body outside the modes. Accelerations and gravity have no
+//! terms: G M (rigid motion) = 0.
+
+use super::{FlexBody, LoadKind, TermGroups, UnitLoad};
+use crate::invariants::Invariants;
+use faer::Mat;
+use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper};
+use flexbody_model::RecoveryRow;
+use nalgebra::{Matrix3, Vector3};
+
+/// Number of columns of a load at an interface: force and torque along three axes.
+pub const LOAD_COMPONENTS: usize = 6;
+
+/// Rows that are read off the body. The rows have the axes and units of the operator that they were made of; only the
+/// loads and the angular velocity are along the axes of the body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recovery {
+    /// Name.
+    pub name: String,
+    /// Label of every row.
+    pub rows: Vec<RecoveryRow>,
+    /// Values y0 of the undeformed body (rows).
+    pub offset: Vec<f64>,
+    /// R Psi (rows x nf).
+    pub modes: Mat<f64>,
+    /// -R G_r M c_kl (rows x 6) for the products w_k w_l in the order of [`LoadKind::SPIN`], along body axes. A body
+    /// without the group W1 has no response of its modes to spin; the columns then hold -R G M c_kl.
+    pub spin: Mat<f64>,
+    /// Columns of the loads at each interface with a reference point.
+    pub loads: Vec<LoadColumns>,
+}
+
+/// Columns of the loads at one interface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadColumns {
+    /// Name of the interface.
+    pub interface: String,
+    /// R G_r b_a (rows x 6) of unit forces and unit torques at the reference point, along body axes.
+    pub columns: Mat<f64>,
+}
+
+/// State of the body that the rows follow from.
+#[derive(Debug, Clone, Copy)]
+pub struct RecoveryState<'a> {
+    /// Modal coordinates (nf).
+    pub q: &'a [f64],
+    /// Angular velocity of the frame, body axes. Unit: 1/time.
+    pub angular_velocity: Vector3<f64>,
+    /// Force and torque at the reference point of each interface, body axes, in the order of [`Recovery::loads`].
+    pub loads: &'a [[f64; LOAD_COMPONENTS]],
+}
+
+impl Recovery {
+    /// Returns the values of all rows.
+    ///
+    /// # Panics
+    /// When the numbers of modes or of loads differ.
+    pub fn values(&self, state: &RecoveryState<'_>) -> Vec<f64> {
+        assert_eq!(state.q.len(), self.modes.ncols(), "modal coordinates");
+        assert_eq!(state.loads.len(), self.loads.len(), "loads");
+        let w = state.angular_velocity;
+        let products = LoadKind::SPIN.map(|(k, l)| w[k] * w[l]);
+        let of_loads = |i: usize| -> f64 {
+            let one = |(of_interface, load): (&LoadColumns, &[f64; LOAD_COMPONENTS])| -> f64 {
+                load.iter().enumerate().map(|(a, f)| of_interface.columns[(i, a)] * f).sum()
+            };
+            self.loads.iter().zip(state.loads).map(one).sum()
+        };
+        let value = |i: usize| {
+            let of_modes: f64 = state.q.iter().enumerate().map(|(j, q)| self.modes[(i, j)] * q).sum();
+            let of_spin: f64 = products.iter().enumerate().map(|(c, w)| self.spin[(i, c)] * w).sum();
+            self.offset[i] + of_modes + of_loads(i) + of_spin
+        };
+        (0..self.rows.len()).map(value).collect()
+    }
+
+    /// Returns true if no row changes with a rigid motion of the body, by the quantities of the rows.
+    pub fn ignores_rigid_motion(&self) -> bool {
+        self.rows.iter().all(|row| row.quantity.ignores_rigid_motion())
+    }
+
+    /// Returns the recovery for loads and angular velocities along the columns of `axes` (given in the present axes).
+    pub(crate) fn in_axes(&self, axes: &Matrix3<f64>) -> Self {
+        let spin = |i: usize, to: usize| -> f64 {
+            let coefficient = |component: usize| UnitLoad { kind: LoadKind::Spin, component }.along(axes)[to];
+            (0..LoadKind::SPIN.len()).map(|from| self.spin[(i, from)] * coefficient(from)).sum()
+        };
+        let turned = |columns: &Mat<f64>| {
+            Mat::from_fn(columns.nrows(), LOAD_COMPONENTS, |i, a| {
+                let first = a / 3 * 3;
+                (0..3).map(|k| columns[(i, first + k)] * axes[(k, a % 3)]).sum()
+            })
+        };
+        let load = |one: &LoadColumns| LoadColumns { columns: turned(&one.columns), ..one.clone() };
+        Self {
+            spin: Mat::from_fn(self.rows.len(), LoadKind::SPIN.len(), spin),
+            loads: self.loads.iter().map(load).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// Returns the recovery with other modal coordinates, for which R Psi is `modes`.
+    pub(super) fn with_modes(&self, modes: Mat<f64>) -> Self {
+        Self { modes, ..self.clone() }
+    }
+}
+
+/// Modal loads of the columns of recoveries: Psi_m' b, with the modes Psi_m in mean axes.
+struct ModalLoads {
+    /// Of the six centrifugal loads (nf x 6); `None` if the body does not hold W1.
+    spin: Option<Mat<f64>>,
+    /// Of unit forces and torques at an interface (nf x 6), by its name.
+    at_interfaces: Vec<(String, Mat<f64>)>,
+}
+
+impl FlexBody {
+    /// Returns the recoveries of this body after a reduction to the modes `kept` (indices, ascending) and the `groups`:
+    /// static columns take over what the dropped modes contributed to the static response, so that rows under constant
+    /// loads and constant spin do not change. A body that loses W1 has no modal response to spin.
+    pub(super) fn reduced_recoveries(&self, kept: &[usize], groups: TermGroups) -> Vec<Recovery> {
+        let recoveries = &self.parts().recoveries;
+        if recoveries.is_empty() {
+            return Vec::new();
+        }
+        let nf = self.n_modes();
+        let dropped: Vec<usize> = (0..nf).filter(|j| kept.binary_search(j).is_err()).collect();
+        let all: Vec<usize> = (0..nf).collect();
+        let loses_w1 = self.groups().w1 && !groups.w1;
+        if dropped.is_empty() && !loses_w1 {
+            return recoveries.clone();
+        }
+        let loads = self.modal_loads();
+        let take_over = |one: &Recovery, columns: &mut Mat<f64>, load: &Mat<f64>, from: &[usize]| {
+            let response = self.static_response(load, from);
+            for i in 0..columns.nrows() {
+                for c in 0..columns.ncols() {
+                    columns[(i, c)] += from
+                        .iter()
+                        .enumerate()
+                        .map(|(p, &j)| one.modes[(i, j)] * response[(p, c)])
+                        .sum::<f64>();
+                }
+            }
+        };
+        let reduced = |one: &Recovery| {
+            let mut new = one.clone();
+            new.modes = Mat::from_fn(one.rows.len(), kept.len(), |i, j| one.modes[(i, kept[j])]);
+            if let Some(spin) = &loads.spin {
+                take_over(one, &mut new.spin, spin, if loses_w1 { &all } else { &dropped });
+            }
+            for at in &mut new.loads {
+                if let Some((_, load)) = loads.at_interfaces.iter().find(|(name, _)| *name == at.interface) {
+                    take_over(one, &mut at.columns, load, &dropped);
+                }
+            }
+            new
+        };
+        recoveries.iter().map(reduced).collect()
+    }
+
+    /// Returns the static response of the modes `of` to modal loads (nf x c), K_ff restricted to these modes. The
+    /// stiffness of modes is diagonal, so that the other modes do not take part.
+    fn static_response(&self, loads: &Mat<f64>, of: &[usize]) -> Mat<f64> {
+        let stiffness = self.invariants().modal_stiffness();
+        Mat::from_fn(of.len(), loads.ncols(), |p, c| loads[(of[p], c)] / stiffness[(of[p], of[p])])
+    }
+
+    fn modal_loads(&self) -> ModalLoads {
+        let (modes, invariants) = (self.modes(), self.invariants());
+        // Rigid motion A (6 x nf) in the modes, about the origin of the frame.
+        let taken = rigid_part(invariants, self.dimension());
+        let rotation = modes.rotation.as_ref().map(Mat::as_ref);
+        let at_interface = |interface: &super::Interface| {
+            let rows = interface.rows(self.nodes(), modes.shape.as_ref(), rotation, self.dimension())?;
+            let reference = Vector3::from(interface.reference?);
+            let turning = rows.rotation.unwrap_or_else(|| Mat::zeros(3, self.n_modes()));
+            let motion = super::rigid_motion::stacked(&rows.translation, &turning);
+            let loads = Mat::from_fn(self.n_modes(), LOAD_COMPONENTS, |j, a| {
+                let resultant = resultant_of(a, &reference);
+                motion[(a, j)] - (0..6).map(|k| taken[(k, j)] * resultant[k]).sum::<f64>()
+            });
+            Some((interface.name.clone(), loads))
+        };
+        ModalLoads {
+            spin: centrifugal_loads(invariants, &taken),
+            at_interfaces: self.interfaces().iter().filter_map(at_interface).collect(),
+        }
+    }
+}
+
+/// Returns force and moment about the origin of unit load `a` at the point `x`.
+fn resultant_of(a: usize, x: &Vector3<f64>) -> [f64; 6] {
+    let unit = Vector3::ith(a % 3, 1.0);
+    let (force, moment) = if a < 3 { (unit, x.cross(&unit)) } else { (Vector3::zeros(), unit) };
+    [force.x, force.y, force.z, moment.x, moment.y, moment.z]
+}
+
+/// Returns A (6 x nf): the rigid motion nearest to each mode in the M-norm, zero in mean axes.
+fn rigid_part(invariants: &Invariants, dimension: usize) -> Mat<f64> {
+    let nf = invariants.n_modes();
+    let axes: &[usize] = if dimension == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
+    let mass = invariants.mass_matrix();
+    let rigid = Mat::from_fn(axes.len(), axes.len(), |i, j| mass[(axes[i], axes[j])]);
+    let coupling = Mat::from_fn(axes.len(), nf, |i, j| mass[(axes[i], 6 + j)]);
+    let mut taken = Mat::zeros(6, nf);
+    if let Some(lower) = dense_cholesky(rigid) {
+        let part = solve_upper(&lower, &solve_lower(&lower, &coupling));
+        for (i, &axis) in axes.iter().enumerate() {
+            (0..nf).for_each(|j| taken[(axis, j)] = part[(i, j)]);
+        }
+    }
+    taken
+}
+
+/// Returns -Psi_m' M c_kl (nf x 6) in the order of [`LoadKind::SPIN`], from W1 and the moments of the mass:
+/// -Psi' M c_kk is half the diagonal block of W1, -Psi' M c_kl its block (k, l).
+fn centrifugal_loads(invariants: &Invariants, taken: &Mat<f64>) -> Option<Mat<f64>> {
+    let (w1, nf) = (invariants.w1()?, invariants.n_modes());
+    let (first, second) = (invariants.first_moment(), invariants.second_moment());
+    Some(Mat::from_fn(nf, LoadKind::SPIN.len(), |j, c| {
+        let (k, l) = LoadKind::SPIN[c];
+        let of_mode = if k == l { 0.5 * w1[(k, k * nf + j)] } else { w1[(k, l * nf + j)] };
+        // Resultants of M c_kl about the origin: c_kl = E x.
+        let unit = |a: usize, b: usize| Matrix3::from_fn(|i, m| f64::from(u8::from(i == a && m == b)));
+        let e = if k == l { unit(k, k) - Matrix3::identity() } else { unit(k, l) + unit(l, k) };
+        let force = e * first;
+        let moments = e * second;
+        let moment = |i: usize| {
+            let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+            moments[(b, a)] - moments[(a, b)]
+        };
+        let rigid: f64 = (0..3).map(|i| taken[(i, j)] * force[i] + taken[(3 + i, j)] * moment(i)).sum();
+        of_mode + rigid
+    }))
+}

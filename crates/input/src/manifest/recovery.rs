@@ -1,0 +1,94 @@
+//! The tables `[[recovery]]`.
+
+use super::{ManifestWalk, MatrixLocation, TomlTable};
+use crate::model_files::{InterfaceNodes, OperatorSource, RecoverySource};
+use flexbody_base::diagnostic::Code;
+use std::collections::HashSet;
+use std::ops::Range;
+use std::path::Path;
+use toml::de::DeValue;
+
+pub(super) const RECOVERY: &[&str] =
+    &["name", "operator", "rows", "offset", "cut", "set", "box", "cylinder", "plane", "about"];
+
+/// Keys of [`RECOVERY`] that define the rows.
+const SOURCES: &[&str] = &["operator", "cut", "set", "box", "cylinder", "plane"];
+
+impl ManifestWalk<'_, '_> {
+    /// Reads the rows to read off the body. Entries with errors are left out; the errors are in `found`.
+    pub(super) fn recoveries(&mut self, top: &TomlTable, dimension: usize) -> Vec<RecoverySource> {
+        const EXPECTED: &str = "a list of tables: write [[recovery]]";
+        let Some(value) = top.get("recovery") else { return Vec::new() };
+        let DeValue::Array(list) = value.get_ref() else {
+            self.mistyped("recovery", value, EXPECTED);
+            return Vec::new();
+        };
+        let (mut names, mut given) = (HashSet::new(), Vec::new());
+        for item in list.iter() {
+            let DeValue::Table(table) = item.get_ref() else {
+                self.mistyped("recovery", item, EXPECTED);
+                continue;
+            };
+            if let Some(one) = self.recovery(table, item.span(), dimension) {
+                if !names.insert(one.name.clone()) {
+                    let message = format!("recovery `{}` is given twice", one.name);
+                    self.complain(Code::ManifestSyntax, item.span(), message);
+                }
+                given.push(one);
+            }
+        }
+        given
+    }
+
+    fn recovery(
+        &mut self,
+        table: &TomlTable,
+        span: Range<usize>,
+        dimension: usize,
+    ) -> Option<RecoverySource> {
+        self.known_keys(table, "[[recovery]]", RECOVERY);
+        if !table.contains_key("name") {
+            self.complain(Code::ManifestSyntax, span.clone(), "recovery has no name".into());
+        }
+        let name = self.string(table, "name")?;
+        let given: Vec<&str> = SOURCES.iter().copied().filter(|key| table.contains_key(*key)).collect();
+        let &[key] = given.as_slice() else {
+            let found = if given.is_empty() { "no source".to_owned() } else { given.join(", ") };
+            let message = format!("recovery `{name}` has {found}, expected one of {}", SOURCES.join(", "));
+            self.complain(Code::ManifestSyntax, span, message);
+            return None;
+        };
+        let foreign: &[&str] = if key == "operator" { &["about"] } else { &["rows", "offset"] };
+        if let Some(other) = foreign.iter().find(|other| table.contains_key(**other)) {
+            let message = format!("recovery `{name}` has `{other}`, which does not belong to `{key}`");
+            self.complain(Code::ManifestSyntax, span, message);
+            return None;
+        }
+        let folder = self.path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let operator = if key == "operator" {
+            if !table.contains_key("rows") {
+                let message = format!("key `rows` is missing in recovery `{name}`");
+                self.complain(Code::ManifestSyntax, span, message);
+            }
+            let operator = MatrixLocation::parse(self.string(table, "operator")?).relative_to(&folder);
+            let rows = folder.join(self.string(table, "rows")?);
+            let offset = match table.contains_key("offset") {
+                true => Some(MatrixLocation::parse(self.string(table, "offset")?).relative_to(&folder)),
+                false => None,
+            };
+            OperatorSource::Rows { operator, rows, offset }
+        } else {
+            let nodes = match key {
+                "cut" => InterfaceNodes::File(folder.join(self.string(table, key)?)),
+                "set" => InterfaceNodes::Set(self.string(table, key)?),
+                _ => InterfaceNodes::Region(self.region(key, table.get(key)?, dimension)?),
+            };
+            let about = match table.get("about") {
+                Some(value) => self.point("about", value, dimension)?,
+                None => [0.0; 3],
+            };
+            OperatorSource::Cut { nodes, about }
+        };
+        Some(RecoverySource { name, operator })
+    }
+}

@@ -1,0 +1,237 @@
+//! Files of recoveries: operators, which have one row for each value and one column for each matrix row of the model,
+//! and values of the undeformed body.
+
+use super::array::Array;
+use super::assemble::Entry;
+use super::matrix_market;
+use super::reader::{HEAD, Reader};
+use super::scipy_npz::{self, ScipyNpz};
+use super::shapes;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::{Compression, InputFile};
+use flexbody_linalg::CscMatrix;
+
+type Found<T> = Result<T, Vec<Diagnostic>>;
+
+/// Matrix that need not be square, with entries from 0.
+pub(super) struct Rectangular {
+    pub rows: usize,
+    pub columns: usize,
+    pub entries: Vec<Entry>,
+}
+
+impl Rectangular {
+    /// Returns the matrix if all entries lie within it and are finite.
+    ///
+    /// # Errors
+    /// FB303 and FB306.
+    pub(super) fn checked(self) -> Result<Self, Diagnostic> {
+        let Self { rows, columns, entries } = &self;
+        let outside = |entry: &&Entry| entry.row as usize >= *rows || entry.col as usize >= *columns;
+        if let Some(entry) = entries.iter().find(outside) {
+            let message = format!(
+                "an entry is at ({}, {}), counted from 0, in a matrix of {rows} x {columns}",
+                entry.row, entry.col
+            );
+            return Err(Diagnostic::new(Code::MatrixIndex, message));
+        }
+        match entries.iter().find(|entry| !entry.value.is_finite()) {
+            Some(Entry { row, col, value }) => {
+                let message = format!("entry ({row}, {col}), counted from 0, is {value}");
+                Err(Diagnostic::new(Code::MatrixNotFinite, message))
+            }
+            None => Ok(self),
+        }
+    }
+
+    /// Returns the transposed matrix.
+    fn transposed(&self) -> CscMatrix {
+        let entries: Vec<(u32, u32, f64)> = self.entries.iter().map(|e| (e.col, e.row, e.value)).collect();
+        CscMatrix::from_triplets(self.columns, self.rows, &entries)
+    }
+}
+
+/// Reads an operator R (rows x matrix rows of the model) and returns R': sparse in a Matrix Market file or an archive of
+/// SciPy, dense in a NumPy, HDF5 or Matrix Market array.
+///
+/// # Errors
+/// FB102 for other formats; FB103, FB301 to FB313 for files that cannot be read.
+pub(super) fn read_operator(file: &InputFile, dataset: Option<&str>) -> Found<CscMatrix> {
+    let about = |found: Vec<Diagnostic>| -> Vec<Diagnostic> {
+        found.into_iter().map(|diagnostic| diagnostic.in_file(file.path())).collect()
+    };
+    let compression = Compression::of(file.bytes());
+    let head = compression.head(file, HEAD);
+    if ScipyNpz.recognises(&head) && compression == Compression::None && dataset.is_none() {
+        let read = scipy_npz::read_rectangular(file.bytes()).map_err(|diagnostic| about(vec![diagnostic]));
+        return Ok(read?.transposed());
+    }
+    if matrix_market::is_coordinate(&head) && dataset.is_none() {
+        return Ok(matrix_market::read_rectangular(file, compression).map_err(about)?.transposed());
+    }
+    let array = shapes::read(file, dataset).map_err(|found| about(with_formats(found)))?;
+    transposed_array(&array).map_err(|diagnostic| about(vec![diagnostic]))
+}
+
+/// Reads one value per row.
+///
+/// # Errors
+/// The errors of dense arrays; FB322 for an array with several columns and several rows.
+pub(super) fn read_offset(file: &InputFile, dataset: Option<&str>) -> Found<Vec<f64>> {
+    let about = |found: Vec<Diagnostic>| -> Vec<Diagnostic> {
+        found.into_iter().map(|diagnostic| diagnostic.in_file(file.path())).collect()
+    };
+    let Array { rows, cols, values, .. } = shapes::read(file, dataset).map_err(about)?;
+    if rows != 1 && cols != 1 {
+        let message = format!("array of the offset is {rows} x {cols}, expected one value for each row");
+        return Err(about(vec![Diagnostic::new(Code::RecoverySize, message)]));
+    }
+    Ok(values)
+}
+
+/// Names the formats of operators in the help about a file of unknown format.
+fn with_formats(found: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let help = "give the operator as Matrix Market file (.mtx), archive of scipy.sparse.save_npz (.npz), NumPy array (.npy) or HDF5 dataset (FILE.h5:/dataset)";
+    let named = |diagnostic: Diagnostic| match diagnostic.code() {
+        Code::FileFormatUnknown => diagnostic.with_help(help),
+        _ => diagnostic,
+    };
+    found.into_iter().map(named).collect()
+}
+
+/// Returns the transpose of a dense array without its zeros.
+fn transposed_array(array: &Array) -> Result<CscMatrix, Diagnostic> {
+    let Array { rows, cols, row_major, values, .. } = array;
+    let at = |i: usize, j: usize| if *row_major { values[i * cols + j] } else { values[j * rows + i] };
+    let mut entries = Vec::new();
+    for i in 0..*rows {
+        for j in 0..*cols {
+            let value = at(i, j);
+            if value != 0.0 {
+                entries.push(Entry { row: i as u32, col: j as u32, value });
+            }
+        }
+    }
+    Ok(Rectangular { rows: *rows, columns: *cols, entries }.checked()?.transposed())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+    use zip::ZipWriter;
+    use zip::write::SimpleFileOptions;
+
+    /// Returns an array of NumPy with one extent.
+    fn npy(kind: &str, count: usize, bytes: &[u8]) -> Vec<u8> {
+        let shape = if kind.starts_with('<') { format!("({count},)") } else { "()".to_owned() };
+        let mut head = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+        while (head.len() + 11) % 64 != 0 {
+            head.push(' ');
+        }
+        head.push('\n');
+        let length = u16::try_from(head.len()).expect("a short head").to_le_bytes();
+        [b"\x93NUMPY\x01\x00", &length[..], head.as_bytes(), bytes].concat()
+    }
+
+    fn integers(values: &[i64]) -> Vec<u8> {
+        npy("<i8", values.len(), &values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>())
+    }
+
+    /// Returns an archive of a matrix with two rows and three columns, [[0, 2, 3], [4, 0, 0]].
+    fn archive(form: &str, data: &[f64], lists: &[(&str, &[i64])]) -> Vec<u8> {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let mut zip = ZipWriter::new(&mut bytes);
+        let mut put = |name: &str, content: &[u8]| {
+            zip.start_file(format!("{name}.npy"), SimpleFileOptions::default()).expect("memory");
+            zip.write_all(content).expect("memory");
+        };
+        for (name, values) in lists {
+            put(name, &integers(values));
+        }
+        put("format", &npy("|S3", 1, form.as_bytes()));
+        put("shape", &integers(&[2, 3]));
+        put("data", &npy("<f8", data.len(), &data.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>()));
+        zip.finish().expect("memory");
+        bytes.into_inner()
+    }
+
+    fn read(name: &str, bytes: &[u8]) -> Found<CscMatrix> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("written");
+        read_operator(&InputFile::open(&path).expect("a file"), None)
+    }
+
+    #[test]
+    fn operators_that_are_not_square_are_read_in_every_format() {
+        let expected = CscMatrix::from_triplets(3, 2, &[(1, 0, 2.0), (2, 0, 3.0), (0, 1, 4.0)]);
+        let dense: Vec<u8> =
+            [0.0, 2.0, 3.0, 4.0, 0.0, 0.0].iter().flat_map(|v: &f64| v.to_le_bytes()).collect();
+        let mut array = npy("<f8", 6, &dense);
+        let at = array.windows(4).position(|w| w == b"(6,)").expect("a shape");
+        array.splice(at..at + 4, *b"(2,3)");
+        let blank = array.iter().position(|&b| b == b'}').expect("an end") + 1;
+        array.remove(blank);
+        let files: [(&str, Vec<u8>); 6] = [
+            ("csr.npz", archive("csr", &[2.0, 3.0, 4.0], &[("indices", &[1, 2, 0]), ("indptr", &[0, 2, 3])])),
+            (
+                "csc.npz",
+                archive("csc", &[4.0, 2.0, 3.0], &[("indices", &[1, 0, 0]), ("indptr", &[0, 1, 2, 3])]),
+            ),
+            ("coo.npz", archive("coo", &[3.0, 4.0, 2.0], &[("row", &[0, 1, 0]), ("col", &[2, 0, 1])])),
+            (
+                "R.mtx",
+                b"%%MatrixMarket matrix coordinate real general\n2 3 3\n1 2 2\n1 3 3\n2 1 4\n".to_vec(),
+            ),
+            ("dense.mtx", b"%%MatrixMarket matrix array real general\n2 3\n0\n4\n2\n0\n3\n0\n".to_vec()),
+            ("R.npy", array),
+        ];
+        for (name, bytes) in files {
+            assert_eq!(read(name, &bytes), Ok(expected.clone()), "{name}");
+        }
+    }
+
+    #[test]
+    fn damaged_operators_are_refused() {
+        let good = archive("csr", &[2.0, 3.0, 4.0], &[("indices", &[1, 2, 0]), ("indptr", &[0, 2, 3])]);
+        for (name, bytes, code) in [
+            ("short.npz", good[..good.len() / 2].to_vec(), Code::FileCompressionBroken),
+            (
+                "pointers.npz",
+                archive("csr", &[2.0, 3.0, 4.0], &[("indices", &[1, 2, 0]), ("indptr", &[0, 4, 3])]),
+                Code::MatrixSyntax,
+            ),
+            (
+                "index.npz",
+                archive("csr", &[2.0, 3.0, 4.0], &[("indices", &[1, 3, 0]), ("indptr", &[0, 2, 3])]),
+                Code::MatrixIndex,
+            ),
+            (
+                "negative.npz",
+                archive("coo", &[3.0, 4.0, 2.0], &[("row", &[0, -1, 0]), ("col", &[2, 0, 1])]),
+                Code::MatrixIndex,
+            ),
+            (
+                "nan.npz",
+                archive("coo", &[f64::NAN, 4.0, 2.0], &[("row", &[0, 1, 0]), ("col", &[2, 0, 1])]),
+                Code::MatrixNotFinite,
+            ),
+            ("form.npz", archive("dia", &[1.0], &[("offsets", &[0])]), Code::MatrixKind),
+            (
+                "row.mtx",
+                b"%%MatrixMarket matrix coordinate real general\n2 3 1\n3 1 2\n".to_vec(),
+                Code::MatrixIndex,
+            ),
+            (
+                "count.mtx",
+                b"%%MatrixMarket matrix coordinate real general\n2 3 2\n1 1 2\n".to_vec(),
+                Code::MatrixCount,
+            ),
+            ("text.csv", b"1,2,3\n".to_vec(), Code::FileFormatUnknown),
+        ] {
+            let found = read(name, &bytes).expect_err(name);
+            assert_eq!(found[0].code(), code, "{name}: {}", found[0].message());
+        }
+    }
+}

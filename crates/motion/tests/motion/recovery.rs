@@ -1,0 +1,88 @@
+//! Stresses of a tumbling body: a few modes with static columns, against all modes.
+
+use flexbody_body::flex_body::{FlexBody, RecoveryState};
+use flexbody_body::invariants::BodyFrame;
+use flexbody_motion::dynamics::{
+    Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Motion, Terms,
+};
+use flexbody_motion::integration::{Explicit, Failure, Method, integrate};
+use nalgebra::Vector3;
+use oracle::elements::{ElementKind, MassRule, Material};
+use oracle::flexible::body_of;
+use oracle::mesh::{Mesh, grid};
+
+/// Returns a rubber-like arm without symmetry, with its stresses.
+fn arm(modes: usize) -> FlexBody {
+    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([6, 2, 1]), |[x, y, z]| {
+        [0.3 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.25 * z * (1.0 + 0.1 * y)]
+    });
+    let mut raw = mesh.assemble(&rubber, MassRule::Consistent).raw_model();
+    raw.recoveries = vec![mesh.stresses(&rubber)];
+    body_of(raw, modes, BodyFrame::Com)
+}
+
+/// Returns the spinning body at rest in its frame: with the modes at their static response to the spin.
+fn at_equilibrium(body: &FlexBody, omega: Vector3<f64>) -> Configuration {
+    let (nf, w1) = (body.n_modes(), body.invariants().w1().expect("all groups"));
+    let load = |j: usize| -> f64 {
+        let pairs = (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
+        pairs.map(|(k, l)| 0.5 * omega[k] * omega[l] * w1[(l, k * nf + j)]).sum()
+    };
+    Configuration {
+        origin: Vector3::zeros(),
+        attitude: EulerParameters([1.0, 0.0, 0.0, 0.0]),
+        velocity: Vector3::zeros(),
+        omega,
+        q: (0..nf).map(|j| load(j) / body.modes().eigenvalue[j]).collect(),
+        qd: vec![0.0; nf],
+    }
+}
+
+/// Returns the stresses at each time, with and without the static columns.
+fn stresses(body: &FlexBody, omega: Vector3<f64>, instants: &[f64]) -> [Vec<Vec<f64>>; 2] {
+    let equations = EquationsOfMotion::new(body, Terms::ALL);
+    let start = at_equilibrium(body, omega);
+    let (mut motion, mut state) = Motion::new(&equations, &EmptySpace, &start);
+    let (mut other, _) = Motion::new(&equations, &EmptySpace, &start);
+    let mut method = Method::Explicit(Explicit::new(state.len(), 1e-10, f64::INFINITY));
+    let (mut with, mut alone) = (Vec::new(), Vec::new());
+    let recovery = &body.recoveries()[0];
+    integrate(&mut method, &mut motion, &mut state, instants, &[], |time, state| {
+        let now = other.evaluate(time, state)?;
+        let q = now.evaluation().modal_coordinates();
+        let omega = now.evaluation().rigid_velocity().1;
+        let at = |angular_velocity| recovery.values(&RecoveryState { q, angular_velocity, loads: &[] });
+        with.push(at(omega));
+        alone.push(at(Vector3::zeros()));
+        Ok::<(), Failure>(())
+    })
+    .expect("integrates");
+    [with, alone]
+}
+
+#[test]
+fn stresses_of_a_tumbling_body_are_those_of_all_modes() {
+    let (whole, few) = (arm(10_000), arm(6));
+    let rate = 0.1 * whole.modes().eigenvalue[0].sqrt();
+    let omega = Vector3::new(0.3, 1.0, 0.2).normalize() * rate;
+    let instants: Vec<f64> = (0..=40).map(|i| f64::from(i) * 0.05 * std::f64::consts::TAU / rate).collect();
+    let [exact, of_modes] = stresses(&whole, omega, &instants);
+    let [with, alone] = stresses(&few, omega, &instants);
+    let all = |a: &[Vec<f64>]| a.iter().flatten().copied().collect::<Vec<f64>>();
+    let size = all(&exact).iter().fold(0.0f64, |most, v| most.max(v.abs()));
+    let distance = |a: &[Vec<f64>]| {
+        all(a).iter().zip(all(&exact)).fold(0.0f64, |most, (a, b)| most.max((a - b).abs())) / size
+    };
+    println!(
+        "with {:.1e}, modes alone {:.1e}, all modes {:.1e}",
+        distance(&with),
+        distance(&alone),
+        distance(&of_modes)
+    );
+    // All modes leave nothing for the columns.
+    assert!(distance(&of_modes) < 1e-9, "{:e}", distance(&of_modes));
+    // The rest is of the order of (0.1 f1 / f7)^2.
+    assert!(distance(&with) < 5e-3, "{:e}", distance(&with));
+    assert!(distance(&alone) > 20.0 * distance(&with), "{:e}", distance(&alone));
+}

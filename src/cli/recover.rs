@@ -1,0 +1,62 @@
+//! Command `flexbody recover`.
+
+use super::arguments::RecoverArguments;
+use super::outcome::{Outcome, refuse_warnings};
+use super::places::{format_of, refuse_replacing};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_motion::scene::LoadedHistory;
+use flexbody_report::{Format, RecoveredFacts, RunData, recovered_csv};
+use std::path::Path;
+
+/// Kind of an output file.
+#[derive(Clone, Copy)]
+enum Kind {
+    Csv,
+    Hdf5,
+}
+
+impl Kind {
+    /// Returns the kind of a file by its extension.
+    ///
+    /// # Errors
+    /// [`Usage`](Code::Usage) for other extensions.
+    fn of(path: &Path) -> Result<Self> {
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("csv") => Ok(Self::Csv),
+            Some("h5" | "hdf5") => Ok(Self::Hdf5),
+            _ => {
+                let message = format!("output {} has no known extension", path.display());
+                let help = "give it the extension .csv or .h5";
+                Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
+            }
+        }
+    }
+}
+
+pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
+    let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
+    let kind = Kind::of(&arguments.output)?;
+    let outputs = || std::iter::once(&arguments.output).chain(&arguments.report);
+    refuse_replacing([&arguments.body, &arguments.history].into_iter(), outputs())?;
+    let slot = OutputSlot::prepare(&arguments.output)?;
+    let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let (body, diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
+    let history = LoadedHistory::read(&arguments.history, &body)?;
+    let recovered = history.recover(&body, &arguments.only)?;
+    let run = RunData { diagnostics, ..RunData::default() };
+    refuse_warnings(arguments.printing, &run.diagnostics)?;
+    match kind {
+        Kind::Csv => slot.fill(recovered_csv(&history, &recovered).as_bytes())?,
+        Kind::Hdf5 => flexbody_file::fill_recovered(&body, &history, &recovered, &slot)?,
+    }
+    let facts = RecoveredFacts::new(&body, &history, &recovered, &run);
+    for (slot, format) in reports.iter().zip(formats) {
+        slot.fill(facts.render(format).as_bytes())?;
+    }
+    OutputSlot::commit_all(std::iter::once(slot).chain(reports))?;
+    let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
+    Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
+}

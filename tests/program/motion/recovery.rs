@@ -1,0 +1,218 @@
+//! Recoveries from the manifest to the rows over a run, through the command line.
+
+use crate::program::flexbody;
+use flexbody_body::flex_body::{FlexBody, RecoveryState};
+use flexbody_model::{RawModel, RecoveryOperator};
+use nalgebra::Vector3;
+use oracle::elements::{ElementKind, MassRule, Material};
+use oracle::files::{Triangle, write_model};
+use oracle::mesh::{Mesh, entries};
+use serde_json::Value;
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+fn mesh() -> Mesh {
+    Mesh::from_cells(ElementKind::Hex8, &oracle::mesh::grid([4, 1, 1]), |[x, y, z]| {
+        [0.1 * x + 0.01 * y, 0.05 * y, 0.04 * z]
+    })
+}
+
+/// Writes a block with its stresses as operator, a cut, and two interfaces; the operator is a Matrix Market file.
+fn folder() -> (TempDir, RawModel) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mesh = mesh();
+    let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+    raw.recoveries = vec![mesh.stresses(&Material::STEEL)];
+    write_model(folder.path(), &raw, Triangle::Lower);
+    let RecoveryOperator::Rows { transposed, labels, .. } = &raw.recoveries[0].operator else {
+        panic!("rows")
+    };
+    let mut operator = format!(
+        "%%MatrixMarket matrix coordinate real general\n{} {} {}\n",
+        transposed.n_cols(),
+        transposed.n_rows(),
+        transposed.nnz()
+    );
+    for (row, column, value) in entries(transposed) {
+        writeln!(operator, "{} {} {value:.17e}", column + 1, row + 1).expect("memory");
+    }
+    let mut rows = "row,name,quantity,component,unit,element\n".to_owned();
+    for (i, label) in labels.iter().enumerate() {
+        let element = label.element.expect("an element");
+        writeln!(rows, "{i},{},stress,{},Pa,{element}", label.name, label.component).expect("memory");
+    }
+    let ends = |x: f64| {
+        let at_end = (1..).zip(&mesh.nodes).filter(|(_, p)| (p[0] - 0.01 * p[1] / 0.05 - x).abs() < 1e-9);
+        at_end.map(|(id, _): (i64, _)| id.to_string()).collect::<Vec<_>>().join(", ")
+    };
+    let side = |p: &[f64; 3]| p[0] < 0.25;
+    let mut cut = "node\n".to_owned();
+    for (id, _) in (1..).zip(&mesh.nodes).filter(|(_, p)| side(p)) {
+        writeln!(cut, "{id}").expect("memory");
+    }
+    let manifest = fs::read_to_string(folder.path().join("model.toml")).expect("a manifest");
+    let manifest = format!(
+        "{manifest}\n[[interface]]\nname = \"left\"\nnodes = [{}]\n[[interface]]\nname = \"right\"\nnodes = [{}]\n\
+         [[recovery]]\nname = \"stress\"\noperator = \"R.mtx\"\nrows = \"rows.csv\"\n\
+         [[recovery]]\nname = \"root\"\ncut = \"side.csv\"\nabout = [0.2, 0, 0]\n",
+        ends(0.0),
+        ends(0.4)
+    );
+    for (name, text) in
+        [("R.mtx", &operator), ("rows.csv", &rows), ("side.csv", &cut), ("model.toml", &manifest)]
+    {
+        fs::write(folder.path().join(name), text).expect("written");
+    }
+    (folder, raw)
+}
+
+fn runs(place: &Path, line: &str) -> String {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let run = flexbody(place, &words);
+    assert!(run.status.success(), "{line}: {}", String::from_utf8_lossy(&run.stderr));
+    String::from_utf8(run.stdout).expect("UTF-8")
+}
+
+fn refused(place: &Path, line: &str, code: &str) {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let run = flexbody(place, &words);
+    let said = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(!run.status.success() && said.contains(code), "{line}: {said}");
+}
+
+/// Writes a run with loads at one interface and returns its modal coordinates, angular velocities and loads.
+fn write_run(place: &Path, body: &FlexBody, spin: bool) -> Vec<(Vec<f64>, Vector3<f64>, [f64; 6])> {
+    let nf = body.n_modes();
+    let mut head = "time".to_owned();
+    (1..=nf).for_each(|j| write!(head, ",q_{j}").expect("memory"));
+    if spin {
+        head.push_str(",angular_velocity_x,angular_velocity_y,angular_velocity_z");
+    }
+    for what in ["force", "torque"] {
+        ["x", "y", "z"].iter().for_each(|k| write!(head, ",right {what}_{k}").expect("memory"));
+    }
+    let mut table = head + "\n";
+    let mut states = Vec::new();
+    for i in 0..4 {
+        let number = |k: usize| f64::from(i + 1) * ((k + 1) as f64 * 1.3).sin();
+        let q: Vec<f64> = (0..nf).map(|j| 1e-4 * number(j)).collect();
+        let omega = Vector3::from_fn(|k, _| if spin { 100.0 * number(7 + k) } else { 0.0 });
+        let load: [f64; 6] = std::array::from_fn(|a| 1e3 * number(20 + a));
+        let numbers = std::iter::once(0.1 * f64::from(i)).chain(q.iter().copied());
+        let numbers = numbers.chain(omega.iter().copied().filter(|_| spin)).chain(load);
+        let cells: Vec<String> = numbers.map(|v| format!("{v:e}")).collect();
+        table += &(cells.join(",") + "\n");
+        states.push((q, omega, load));
+    }
+    fs::write(place.join("run.csv"), table).expect("written");
+    states
+}
+
+#[test]
+fn rows_of_a_run_are_those_of_the_body() {
+    let (folder, _) = folder();
+    let place = folder.path();
+    runs(place, "convert model.toml --modes 6 --frame principal -o body.h5 --quiet");
+    let text = runs(place, "inspect body.h5");
+    assert!(text.contains("stress: 192 x stress") && text.contains("root: 3 x force, 3 x moment"), "{text}");
+    let body = flexbody_file::read(place.join("body.h5")).expect("a body");
+    let states = write_run(place, &body, true);
+    let text = runs(place, "recover body.h5 --history run.csv -o out.csv");
+    assert!(text.contains("No columns of loads at") && text.contains("left"), "{text}");
+    let table = fs::read_to_string(place.join("out.csv")).expect("a table");
+    let mut lines = table.lines();
+    let head = lines.next().expect("a head");
+    assert!(head.starts_with("time,stress 1 1 xx,") && head.ends_with("root Mz"), "{head}");
+    let axes = body.frame().axes.transpose();
+    for ((q, omega, load), line) in states.iter().zip(lines) {
+        let along = |first: usize| axes * Vector3::new(load[first], load[first + 1], load[first + 2]);
+        let (force, torque) = (along(0), along(3));
+        let right = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
+        let found: Vec<f64> = line.split(',').skip(1).map(|cell| cell.parse().expect("a number")).collect();
+        let state = RecoveryState { q, angular_velocity: axes * omega, loads: &[[0.0; 6], right] };
+        let mut expected = body.recoveries()[0].values(&state);
+        let von_mises = |s: &[f64]| {
+            let stress = nalgebra::Matrix3::new(s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2]);
+            let deviator = stress - nalgebra::Matrix3::identity() * (stress.trace() / 3.0);
+            (1.5 * deviator.norm_squared()).sqrt()
+        };
+        let points: Vec<f64> = expected.chunks_exact(6).map(von_mises).collect();
+        expected.extend(points);
+        expected.extend(body.recoveries()[1].values(&state));
+        let size = expected.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        assert_eq!(found.len(), expected.len());
+        assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() <= 1e-13 * size));
+    }
+    // The same numbers in HDF5, of one recovery.
+    runs(place, "recover body.h5 --history run.csv --only root -o rows.h5");
+    let file = hdf5_metno::File::open(place.join("rows.h5")).expect("a file");
+    let values: Vec<f64> = file.dataset("recovery/root/values").expect("values").read_raw().expect("numbers");
+    let of_table = table.lines().skip(1).flat_map(|line| line.split(',').skip(1 + 192 + 32));
+    let of_table: Vec<f64> = of_table.map(|cell| cell.parse().expect("a number")).collect();
+    assert_eq!(values, of_table);
+    assert!(file.group("recovery/stress").is_err());
+    let told: Value =
+        serde_json::from_str(&runs(place, "recover body.h5 --history run.csv -o out.csv --json"))
+            .expect("JSON");
+    assert_eq!(told["results"]["unloaded"], serde_json::json!(["left"]));
+}
+
+#[test]
+fn runs_and_names_that_do_not_fit_are_refused() {
+    let (folder, _) = folder();
+    let place = folder.path();
+    runs(place, "convert model.toml --modes 6 -o body.h5 --quiet");
+    let body = flexbody_file::read(place.join("body.h5")).expect("a body");
+    // The angular velocity is missing, a modal coordinate is missing, a vector has two components.
+    write_run(place, &body, false);
+    refused(place, "recover body.h5 --history run.csv -o out.csv", "FB215");
+    write_run(place, &body, true);
+    let run = fs::read_to_string(place.join("run.csv")).expect("a table");
+    fs::write(place.join("other.csv"), run.replace("q_6", "p_6")).expect("written");
+    refused(place, "recover body.h5 --history other.csv -o out.csv", "FB215");
+    fs::write(place.join("other.csv"), run.replace("right force_z", "force_z")).expect("written");
+    refused(place, "recover body.h5 --history other.csv -o out.csv", "FB215");
+    // A number that is none does not count as a load of zero.
+    let last = run.trim_end().rfind(',').expect("a column") + 1;
+    fs::write(place.join("other.csv"), format!("{}x\n", &run[..last])).expect("written");
+    refused(place, "recover body.h5 --history other.csv -o out.csv", "FB216");
+    refused(place, "recover body.h5 --history run.csv --only nothing -o out.csv", "FB221");
+    refused(place, "recover body.h5 --history run.csv -o out.txt", "out.txt");
+    assert!(!place.join("out.csv").exists());
+    // A body without recoveries.
+    let plain = fs::read_to_string(place.join("model.toml")).expect("a manifest");
+    let plain = &plain[..plain.find("[[recovery]]").expect("a recovery")];
+    fs::write(place.join("plain.toml"), plain).expect("written");
+    runs(place, "convert plain.toml --modes 6 -o plain.h5 --quiet");
+    refused(place, "recover plain.h5 --history run.csv -o out.csv", "FB221");
+}
+
+/// The formats of the operator give the same body: Matrix Market, dense NumPy array.
+#[test]
+fn every_format_of_the_operator_gives_the_same_rows() {
+    let (folder, raw) = folder();
+    let place = folder.path();
+    let RecoveryOperator::Rows { transposed, .. } = &raw.recoveries[0].operator else { panic!("rows") };
+    let (rows, columns) = (transposed.n_cols(), transposed.n_rows());
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    let mut head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
+    while (head.len() + 11) % 64 != 0 {
+        head.push(' ');
+    }
+    head.push('\n');
+    bytes.extend((head.len() as u16).to_le_bytes());
+    bytes.extend(head.as_bytes());
+    for i in 0..rows {
+        bytes.extend((0..columns).flat_map(|j| transposed.get(j, i).to_le_bytes()));
+    }
+    fs::write(place.join("R.npy"), bytes).expect("written");
+    let manifest = fs::read_to_string(place.join("model.toml")).expect("a manifest");
+    fs::write(place.join("dense.toml"), manifest.replace("R.mtx", "R.npy")).expect("written");
+    runs(place, "convert model.toml --modes 4 -o sparse.h5 --quiet");
+    runs(place, "convert dense.toml --modes 4 -o dense.h5 --quiet");
+    let read = |name: &str| flexbody_file::read(place.join(name)).expect("a body");
+    let (sparse, dense) = (read("sparse.h5"), read("dense.h5"));
+    assert_eq!(sparse.recoveries(), dense.recoveries());
+}
