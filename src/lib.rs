@@ -64,10 +64,10 @@
 //! ```
 //! use flexbody::{ConvertOptions, Model, Scene};
 //! # fn main() -> flexbody::Result<()> {
-//! let body =
-//! Model::read("fixtures/models/bracket_hex20/model.toml")?.convert(&ConvertOptions::default().modes(6))?.body;
-//! let motion = body.simulate(&Scene::read("fixtures/scenes/tumbling.toml")?)?; println!("a node is deflected
-//! by {} at most", motion.largest_deflection());
+//! let model = Model::read("fixtures/models/bracket_hex20/model.toml")?;
+//! let body = model.convert(&ConvertOptions::default().modes(6))?.body;
+//! let motion = body.simulate(&Scene::read("fixtures/scenes/tumbling.toml")?)?;
+//! println!("a node is deflected by {} at most", motion.largest_deflection());
 //! # assert!(motion.largest_deflection() > 0.0);
 //! # Ok(())
 //! # }

@@ -267,14 +267,19 @@ impl FlexBody {
     /// use flexbody::dynamics::Evaluation;
     /// use flexbody::{ConvertOptions, Model};
     /// # fn main() -> flexbody::Result<()> {
-    /// let body =
-    /// Model::read("fixtures/models/cube_hex8/model.toml")?.convert(&ConvertOptions::default().modes(6))?.body; let
-    /// node = body.node_point(body.node_ids()[0])?; let equations = body.equations_of_motion(); let mut evaluation =
-    /// Evaluation::new(&equations); evaluation.set(&[1e-4; 6], &[0.1; 12]); // A force does the power F v on the
-    /// velocities nu, whatever the deformation. let force = nalgebra::Vector3::new(1.0, 2.0, 3.0); let mut generalised
-    /// = vec![0.0; 12]; node.add_force(&evaluation, &force, &mut generalised); let power: f64 =
-    /// generalised.iter().map(|part| part * 0.1).sum(); assert!((power - force.dot(&node.velocity(&evaluation))).abs()
-    /// < 1e-12); assert!(body.node_point(-1).is_err());
+    /// let model = Model::read("fixtures/models/cube_hex8/model.toml")?;
+    /// let body = model.convert(&ConvertOptions::default().modes(6))?.body;
+    /// let node = body.node_point(body.node_ids()[0])?;
+    /// let equations = body.equations_of_motion();
+    /// let mut evaluation = Evaluation::new(&equations);
+    /// evaluation.set(&[1e-4; 6], &[0.1; 12]);
+    /// // A force does the power F v on the velocities nu, whatever the deformation.
+    /// let force = nalgebra::Vector3::new(1.0, 2.0, 3.0);
+    /// let mut generalised = vec![0.0; 12];
+    /// node.add_force(&evaluation, &force, &mut generalised);
+    /// let power: f64 = generalised.iter().map(|part| part * 0.1).sum();
+    /// assert!((power - force.dot(&node.velocity(&evaluation))).abs() < 1e-12);
+    /// assert!(body.node_point(-1).is_err());
     /// # Ok(())
     /// # }
     /// ```

@@ -79,7 +79,10 @@ proptest! {
         seed in any::<u64>(), n in 1usize..6, modes in 1usize..8, bits in 0usize..8,
     ) {
         let groups = combinations().nth(bits).expect("one of eight");
-        let body = with_groups(&wild_body(seed, n, modes.min(3 * n), 0, 1), groups);
+        // The columns of recoveries take over what a dropped group leaves out: such sums of wild numbers overflow.
+        let mut parts = wild_body(seed, n, modes.min(3 * n), 0, 1).into_parts();
+        parts.recoveries.clear();
+        let body = with_groups(&FlexBody::new(parts).expect("a body"), groups);
         let (_folder, path) = written(&body);
         let read = flexbody_file::read(&path).unwrap_or_else(|e| panic!("{e}"));
         prop_assert_eq!(fingerprint(&read), fingerprint(&body));
