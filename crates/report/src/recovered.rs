@@ -123,9 +123,13 @@ impl<'a> RecoveredFacts<'a> {
             terms.push(Term::new("Loads at", names(&self.loaded)));
         }
         if !self.unloaded.is_empty() {
-            terms.push(Term::new("No columns of loads at", names(&self.unloaded)));
+            let words = format!("{}: the table has no columns of their loads", names(&self.unloaded));
+            terms.push(Term::new("Unloaded", words));
         }
-        terms.extend(self.recoveries.iter().map(|one| Term::new(one.name, self.largest_in_words(one))));
+        let recovery = |one: &RecoveryFacts<'_>| {
+            Term::new("Recovery", format!("{}: {}", one.name, self.largest_in_words(one)))
+        };
+        terms.extend(self.recoveries.iter().map(recovery));
         let blocks = vec![Block::Terms(terms), Block::Diagnostics(self.diagnostics)];
         Document { name: self.body, kind: "Recovery", generator: &self.generator, blocks }
     }

@@ -120,7 +120,7 @@ fn rows_of_a_run_are_those_of_the_body() {
     let body = flexbody_file::read(place.join("body.h5")).expect("a body");
     let states = write_run(place, &body, true);
     let text = runs(place, "recover body.h5 --history run.csv -o out.csv");
-    assert!(text.contains("No columns of loads at") && text.contains("left"), "{text}");
+    assert!(text.contains("Unloaded    left: the table has no columns of their loads"), "{text}");
     let table = fs::read_to_string(place.join("out.csv")).expect("a table");
     let mut lines = table.lines();
     let head = lines.next().expect("a head");
