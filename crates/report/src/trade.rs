@@ -5,7 +5,7 @@ use super::chart::{Axis, Chart, Mark, Panel, Series};
 use super::csv;
 use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
 use super::errors_in_words::{errors_in_words, ranges};
-use super::numbers::{TIME_UNITS, bytes, counted, duration, engineering, significant, times};
+use super::numbers::{bytes, counted, duration, significant, times};
 use super::reference_error::{ReferenceErrorFacts, reference_in_words};
 use super::run_data::RunData;
 use super::trade_cases::{TradeCaseFacts, case_facts, cases_table};
@@ -41,12 +41,11 @@ const ERRORS: [Column; 4] = [
     ("Reaction", |own| number(own.errors.reaction)),
 ];
 /// Cheapest run within the tolerances.
-const RUN: [Column; 5] = [
+const RUN: [Column; 4] = [
     ("Step accuracy", |own| own.accuracy.clone().unwrap_or_else(none).into()),
     ("Simulation", |own| own.seconds.integration.map_or_else(none, duration).into()),
     (OF_THE_RUN, |own| number(own.runs.iter().map(|run| run.worst).max_by(f64::total_cmp))),
     ("Steps", |own| own.steps.map_or_else(none, |steps| steps.to_string()).into()),
-    ("Evaluation", |own| own.seconds.evaluation.map_or_else(none, short).into()),
 ];
 const OF_THE_RUN: &str = "Error / tolerance of the run";
 const PREPROCESSING: Column =
@@ -54,7 +53,7 @@ const PREPROCESSING: Column =
 const WORST_CASE: Column = ("Worst case", |own| own.case.unwrap_or_default().to_owned().into());
 
 /// Columns that a page shows and a text does not.
-const NOT_IN_TEXT: [&str; 4] = ["Basis", "Up to (Hz)", "Steps", "Evaluation"];
+const NOT_IN_TEXT: [&str; 3] = ["Basis", "Up to (Hz)", "Steps"];
 
 /// Returns the sign for a quantity that is not known.
 fn none() -> String {
@@ -556,11 +555,6 @@ fn worst_reference_errors(reference_errors: &[Vec<ReferenceError>]) -> &[Referen
     // `max_by` returns the last of equal elements, so that the reversed order selects the first.
     let worst = reference_errors.iter().rev().max_by(|a, b| last(a).total_cmp(&last(b)));
     worst.map_or(&[], Vec::as_slice)
-}
-
-/// Returns the time of an evaluation with a fitting prefix.
-fn short(seconds: f64) -> String {
-    engineering(seconds, 3, TIME_UNITS)
 }
 
 /// Returns the smallest of a quantity of the runs of a candidate.
