@@ -4,7 +4,7 @@ use crate::dynamics::EulerParameters;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::InputFile;
-use flexbody_base::text::series::{ColumnKey, Series, read_series};
+use flexbody_base::text::series::{ColumnKey, Series, has_column, read_series};
 use std::path::{Path, PathBuf};
 
 /// Time by which a history may begin after 0 or end beside the scene, relative to the duration: times are often written
@@ -38,14 +38,12 @@ impl MotionHistory {
         let named = |prefix: &str, first: usize, count: usize| -> Vec<ColumnKey> {
             (first..first + count).map(|k| ColumnKey::Name(format!("{prefix}{k}"))).collect()
         };
-        let series = |keys: &[ColumnKey]| {
-            read_series(&file, &ColumnKey::Name("time".to_owned()), keys).map_err(Error::new)
-        };
-        let attitude_keys = named("attitude_", 0, 4);
-        let has_attitude = series(&attitude_keys[..1]).is_ok();
-        let modes = named("q_", 1, n_modes);
-        let keys = if has_attitude { [modes, attitude_keys].concat() } else { modes };
-        let all = series(&keys)?;
+        // The attitude is in the file if any of its columns is; then all must be.
+        let has_attitude = (0..4).any(|k| has_column(&file, &format!("attitude_{k}")));
+        let mut keys = named("q_", 1, n_modes);
+        keys.extend(has_attitude.then(|| named("attitude_", 0, 4)).into_iter().flatten());
+        let time = ColumnKey::Name("time".to_owned());
+        let all = read_series(&file, &time, &keys).map_err(Error::new)?;
         let row = |i: usize, columns: &[Vec<f64>]| columns.iter().map(|column| column[i]).collect::<Vec<_>>();
         let (modal, attitude) = all.columns.split_at(n_modes);
         let rows = 0..all.times.len();
