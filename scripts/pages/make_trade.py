@@ -234,8 +234,8 @@ def timed(program, folder, told, scene, model):
     for number in sorted(set(worth_timing(told))):
         row = told["rows"][number - 1]
         # A body starts in its own equilibrium, as `simulate` has it.
-        q, qd, _ = simulated_modes(program, folder, folder / f"candidate_{number:03}.flex.h5", scene[0])
-        found[number] = Timed(program, folder, row, scene[1], (q[0], qd), measure, most)
+        start = modes_at_the_start(program, folder, folder / f"candidate_{number:03}.flex.h5", scene[0])
+        found[number] = Timed(program, folder, row, scene[1], start, measure, most)
     for _ in range(TURNS - 1):
         for one in found.values():
             one.run()
@@ -361,14 +361,13 @@ def bases(told):
     return f"| {told['scene']} | " + " | ".join(cells) + " |"
 
 
-def simulated_modes(program, folder, body, scene):
-    """Modal coordinates of `flexbody simulate` (instants x modes), their first rates, and the instants."""
+def modes_at_the_start(program, folder, body, scene):
+    """Modal coordinates of `flexbody simulate` at the start of a scene, and their rates."""
     run(program, "simulate", body, "--scene", scene, "--csv", "modes.csv", "--quiet", folder=folder)
     with open(folder / "modes.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
-    count = sum(key.startswith("q_") for key in rows[0])
-    q = np.array([[float(row[f"q_{j + 1}"]) for j in range(count)] for row in rows])
-    return q, np.array([float(rows[0][f"qd_{j + 1}"]) for j in range(count)]), np.array([float(row["time"]) for row in rows])
+        first = next(csv.DictReader(file))
+    count = sum(key.startswith("q_") for key in first)
+    return tuple(np.array([float(first[f"{name}_{j + 1}"]) for j in range(count)]) for name in ("q", "qd"))
 
 
 def simulated(program, folder, scene, body):

@@ -23,6 +23,24 @@ DAMPING = 0.02
 RUNS = 3
 
 
+def integrated(system, steps, end_time):
+    """Integrates a mechanism with sensors and returns the seconds of the processor."""
+    import exudyn as exu
+
+    settings = exu.SimulationSettings()
+    integration = settings.timeIntegration
+    integration.numberOfSteps, integration.endTime = steps, end_time
+    integration.verboseMode, integration.adaptiveStep = 0, False
+    integration.generalizedAlpha.spectralRadius = 0.9
+    integration.newton.useModifiedNewton = True
+    settings.linearSolverType = exu.LinearSolverType.EXUdense
+    settings.solutionSettings.writeSolutionToFile = False
+    settings.solutionSettings.sensorsWritePeriod = 0.5 * integration.endTime / steps
+    begin = time.process_time()
+    system.SolveDynamic(settings)
+    return time.process_time() - begin
+
+
 def in_exudyn(path, eigenvalue, steps=STEPS, shown=()):
     """(seconds of the processor, {name: values at the ends of the steps})"""
     import exudyn as exu
@@ -68,18 +86,7 @@ def in_exudyn(path, eigenvalue, steps=STEPS, shown=()):
     }
     sensors = {name: system.AddSensor(sensor) for name, sensor in sensors.items()}
     system.Assemble()
-    settings = exu.SimulationSettings()
-    integration = settings.timeIntegration
-    integration.numberOfSteps, integration.endTime = steps, TURNS * 2 * np.pi / SPEED
-    integration.verboseMode, integration.adaptiveStep = 0, False
-    integration.generalizedAlpha.spectralRadius = 0.9
-    integration.newton.useModifiedNewton = True
-    settings.linearSolverType = exu.LinearSolverType.EXUdense
-    settings.solutionSettings.writeSolutionToFile = False
-    settings.solutionSettings.sensorsWritePeriod = 0.5 * integration.endTime / steps
-    begin = time.process_time()
-    system.SolveDynamic(settings)
-    seconds = time.process_time() - begin
+    seconds = integrated(system, steps, TURNS * 2 * np.pi / SPEED)
     return seconds, {name: system.GetSensorStoredData(sensor) for name, sensor in sensors.items()}
 
 

@@ -6,13 +6,12 @@ same groups, driven by the attitude and the joint forces of this run, has to fin
 
 import itertools
 import resource
-import time
 import warnings
 
 import h5py
 import numpy as np
 
-from seeds_mechanism import CRANK, DAMPING, ROD, WHEEL, apart, settled
+from seeds_mechanism import CRANK, DAMPING, ROD, WHEEL, apart, integrated, settled
 
 warnings.filterwarnings("ignore", category=DeprecationWarning)  # settings of Exudyn under their older names
 
@@ -96,18 +95,8 @@ def in_exudyn(crank, rod, speed, steps):
     sensors |= {name: item.SensorNode(nodeNumber=node, outputVariableType=kinds.Coordinates, storeInternal=True) for name, node in coordinates.items()}
     sensors = {name: system.AddSensor(sensor) for name, sensor in sensors.items()}
     system.Assemble()
-    settings = exu.SimulationSettings()
-    integration = settings.timeIntegration
-    integration.numberOfSteps, integration.endTime = steps, TURNS * 2 * np.pi / speed
-    integration.verboseMode, integration.adaptiveStep = 0, False
-    integration.generalizedAlpha.spectralRadius = 0.9
-    integration.newton.useModifiedNewton = True
-    settings.linearSolverType = exu.LinearSolverType.EXUdense
-    settings.solutionSettings.writeSolutionToFile = False
-    settings.solutionSettings.sensorsWritePeriod = 0.5 * integration.endTime / steps
-    begin = time.process_time()
-    system.SolveDynamic(settings)
-    return time.process_time() - begin, {name: system.GetSensorStoredData(sensor) for name, sensor in sensors.items()}
+    seconds = integrated(system, steps, TURNS * 2 * np.pi / speed)
+    return seconds, {name: system.GetSensorStoredData(sensor) for name, sensor in sensors.items()}
 
 
 class Run:

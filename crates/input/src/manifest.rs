@@ -50,6 +50,29 @@ impl DerefMut for ManifestWalk<'_, '_> {
 }
 
 impl ManifestWalk<'_, '_> {
+    /// Returns the tables `[[key]]`; `None` if the value is not a list. Entries that are no tables are left out; the
+    /// errors are in `found`.
+    fn tables<'t>(
+        &mut self,
+        top: &'t TomlTable<'_>,
+        key: &str,
+    ) -> Option<Vec<(&'t TomlTable<'t>, Range<usize>)>> {
+        let expected = format!("a list of tables: write [[{key}]]");
+        let Some(value) = top.get(key) else { return Some(Vec::new()) };
+        let DeValue::Array(list) = value.get_ref() else {
+            self.mistyped(key, value, &expected);
+            return None;
+        };
+        let mut tables = Vec::new();
+        for item in list.iter() {
+            match item.get_ref() {
+                DeValue::Table(table) => tables.push((table, item.span())),
+                _ => self.mistyped(key, item, &expected),
+            }
+        }
+        Some(tables)
+    }
+
     /// Reads the manifest. `None` means that `found` has errors.
     fn model(&mut self, top: &TomlTable) -> Option<ModelFiles> {
         self.known_keys(top, "the manifest", TOP);

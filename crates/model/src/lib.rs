@@ -71,7 +71,7 @@ pub use node_moments::{NodeMoments, RigidAcceleration};
 pub use nodes::{DofLabel, Nodes};
 pub use raw::{RawMatrix, RawModel, RawModes, RawShapes};
 pub use recovery::{ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
-pub use rigid::{centre_and_length, extents, rigid_count, rigid_fields, span};
+pub use rigid::{centre_and_length, extents, rigid_axes, rigid_count, rigid_fields, span};
 pub use rows::Rows;
 pub use separate_bodies::check_bodies;
 pub use surface::{Skin, SurfaceMesh, skin};

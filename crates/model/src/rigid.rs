@@ -5,7 +5,13 @@ use flexbody_linalg::{SymmetricMatrix, largest, parallel};
 
 /// Returns the number of rigid motions of a body of the given dimension: six in space, three in the plane.
 pub fn rigid_count(dimension: usize) -> usize {
-    if dimension == 2 { 3 } else { 6 }
+    rigid_axes(dimension).len()
+}
+
+/// Returns the indices of the rigid motions of a body of the given dimension, among three translations and three
+/// rotations; those of forces and torques are the same.
+pub fn rigid_axes(dimension: usize) -> &'static [usize] {
+    if dimension == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] }
 }
 
 /// Returns the rigid fields (3n x 6) about `centre`: three unit translations, three rotations e_k x (x -

@@ -136,28 +136,18 @@ impl<'a> RecoveredFacts<'a> {
 
     /// Returns the largest value in words: `90 rows, largest: 12.3 MPa, row s7 (stress xx), at 0.2 s`.
     fn largest_in_words(&self, one: &RecoveryFacts<'_>) -> String {
-        let unit = if one.unit.is_empty() { String::new() } else { format!(" {}", one.unit) };
-        let von_mises = one.von_mises.as_ref().map_or(String::new(), |own| {
-            format!(
-                "; von Mises of {}, largest: {} {}, {}, at {} {}",
-                counted(own.points, "point"),
-                significant(own.value, 5),
-                own.unit,
-                own.point,
-                significant(own.time, 6),
-                self.time_unit
-            )
+        let largest = |value: f64, unit: &str, place: &str, time: f64| {
+            let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+            let (value, time) = (significant(value, 5), significant(time, 6));
+            format!("largest: {value}{unit}, {place}, at {time} {}", self.time_unit)
+        };
+        let row = format!("row {} ({} {})", one.row, one.quantity, one.component);
+        let rows = format!("{}, {}", counted(one.rows, "row"), largest(one.value, one.unit, &row, one.time));
+        let von_mises = one.von_mises.as_ref().map_or_else(String::new, |own| {
+            let words = largest(own.value, own.unit, own.point, own.time);
+            format!("; von Mises of {}, {words}", counted(own.points, "point"))
         });
-        format!(
-            "{}, largest: {}{unit}, row {} ({} {}), at {} {}{von_mises}",
-            counted(one.rows, "row"),
-            significant(one.value, 5),
-            one.row,
-            one.quantity,
-            one.component,
-            significant(one.time, 6),
-            self.time_unit
-        )
+        rows + &von_mises
     }
 }
 

@@ -22,7 +22,7 @@ use flexbody_eigen::{Completeness, Proof, relative_residual};
 use flexbody_linalg::{
     combine, dense_cholesky, left_singular_vectors, solve_lower, solve_upper, subtract_combination,
 };
-use flexbody_model::{Coupling, FeModel, Nodes};
+use flexbody_model::{Coupling, FeModel, Nodes, rigid_axes};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 
@@ -132,10 +132,8 @@ fn motion_of_interface(
             "the nodes of interface `{name}` lie on one line: its orientation is not known, no frame can stand on it"
         )));
     };
-    Ok(match model.dimension() {
-        2 => Mat::from_fn(3, motion.ncols(), |i, j| motion[([0, 1, 5][i], j)]),
-        _ => motion,
-    })
+    let axes = rigid_axes(model.dimension());
+    Ok(Mat::from_fn(axes.len(), motion.ncols(), |i, j| motion[(axes[i], j)]))
 }
 
 /// Returns the completeness of the constrained modes, for which nothing is proved; the proof about the free

@@ -13,7 +13,7 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     CscMatrix, combine, dense_cholesky, gram, side_by_side, solve_lower, solve_upper, subtract_combination,
 };
-use flexbody_model::{Coupling, FeModel, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
+use flexbody_model::{Coupling, FeModel, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow, rigid_axes};
 use std::collections::HashSet;
 
 /// Names of the components of force and torque.
@@ -196,12 +196,11 @@ impl StaticLoads {
             }
         }
         let parts: Vec<_> = parts.iter().map(Mat::as_ref).collect();
-        let plane = model.dimension() == 2;
         Ok(Self {
             forces: side_by_side(&parts),
             spins: LoadKind::Spin.of_dimension(model.dimension()),
             interfaces,
-            components: if plane { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] },
+            components: rigid_axes(model.dimension()),
         })
     }
 
@@ -289,6 +288,5 @@ fn section_labels(model: &FeModel) -> Vec<RecoveryRow> {
             element: None,
         }
     };
-    let components: &[usize] = if model.dimension() == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
-    components.iter().map(row).collect()
+    rigid_axes(model.dimension()).iter().map(row).collect()
 }

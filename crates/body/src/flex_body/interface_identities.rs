@@ -4,7 +4,7 @@ use super::{InterfaceCoordinates, Parts, ReferenceConditions};
 use crate::invariants::IdentityCheck;
 use faer::Mat;
 use flexbody_linalg::{combine, gram, largest};
-use flexbody_model::{rigid_count, rigid_fields, span};
+use flexbody_model::{rigid_axes, rigid_count, rigid_fields, span};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
 
@@ -141,7 +141,7 @@ impl Parts {
         let lever: Matrix3<f64> = Vector3::cross_matrix(&c);
         // Existing translations and rotations: in the plane two translations and the rotation about the
         // third axis.
-        let axes: Vec<usize> = if self.dimension == 2 { vec![0, 1, 5] } else { (0..6).collect() };
+        let axes = rigid_axes(self.dimension);
         Mat::from_fn(axes.len(), axes.len(), |i, j| match (axes[i], axes[j]) {
             (i, j) if i < 3 && j < 3 => m * f64::from(i == j),
             (i, j) if i < 3 => -lever[(i, j - 3)],

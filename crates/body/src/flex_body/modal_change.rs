@@ -5,6 +5,7 @@ use super::rigid_motion::{rotations_without, shapes_without};
 use crate::invariants::{GeneralTerms, Invariants, symmetric_part};
 use faer::Mat;
 use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
+use flexbody_model::rigid_axes;
 
 /// Part of the squared M-norm left after removal of rigid motion, below which a combination of modes is a
 /// rigid motion.
@@ -54,9 +55,33 @@ impl RigidMotions {
     }
 }
 
-/// Returns the indices of the rigid motions of a dimension, among three translations and three rotations.
-fn rigid_axes(dimension: usize) -> &'static [usize] {
-    if dimension == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] }
+/// Coupling of the modes with rigid motion by the mass.
+pub(super) struct RigidCoupling {
+    axes: &'static [usize],
+    /// Lower Cholesky factor L of the mass of rigid motion.
+    lower: Mat<f64>,
+    /// L^-1 C with the coupling C of rigid motions and modes.
+    whitened: Mat<f64>,
+}
+
+impl RigidCoupling {
+    /// Returns the coupling; `None` if the mass of rigid motion is not positive definite. `mass` is that of rigid motion
+    /// and modes together.
+    pub(super) fn new(mass: &Mat<f64>, dimension: usize) -> Option<Self> {
+        let axes = rigid_axes(dimension);
+        let rigid = Mat::from_fn(axes.len(), axes.len(), |i, j| mass[(axes[i], axes[j])]);
+        let coupling = Mat::from_fn(axes.len(), mass.ncols() - 6, |i, j| mass[(axes[i], 6 + j)]);
+        let lower = dense_cholesky(rigid)?;
+        let whitened = solve_lower(&lower, &coupling);
+        Some(Self { axes, lower, whitened })
+    }
+
+    /// Returns A (6 x nf): the rigid motion nearest to each mode in the M-norm.
+    pub(super) fn nearest(&self) -> Mat<f64> {
+        let nearest = solve_upper(&self.lower, &self.whitened);
+        let row = |k: usize| self.axes.iter().position(|axis| *axis == k);
+        Mat::from_fn(6, nearest.ncols(), |k, j| row(k).map_or(0.0, |row| nearest[(row, j)]))
+    }
 }
 
 /// Modes split into a rigid part and deformation.
@@ -75,18 +100,13 @@ impl Split {
     fn new(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
         let nf = invariants.n_modes();
         let mass = invariants.mass_matrix();
-        let axes = rigid_axes(dimension);
-        let (rigid, coupling) = (
-            Mat::from_fn(axes.len(), axes.len(), |i, j| mass[(axes[i], axes[j])]),
-            Mat::from_fn(axes.len(), nf, |i, j| mass[(axes[i], 6 + j)]),
-        );
-        let Some(lower) = dense_cholesky(rigid) else {
+        let Some(coupling) = RigidCoupling::new(&mass, dimension) else {
             return Err("the mass matrix of rigid motion is not positive definite".to_owned());
         };
-        let whitened = solve_lower(&lower, &coupling);
+        let whitened = &coupling.whitened;
         let modal = Mat::from_fn(nf, nf, |i, j| mass[(6 + i, 6 + j)]);
         let beside = |i: usize, j: usize| {
-            modal[(i, j)] - (0..axes.len()).map(|k| whitened[(k, i)] * whitened[(k, j)]).sum::<f64>()
+            modal[(i, j)] - (0..whitened.nrows()).map(|k| whitened[(k, i)] * whitened[(k, j)]).sum::<f64>()
         };
         let remainder = |j: usize| beside(j, j) / modal[(j, j)];
         if let Some(j) = (0..nf).find(|&j| remainder(j) < -RIGID_REMAINDER) {
@@ -110,10 +130,8 @@ impl Split {
             return Err("all modes are rigid motions: nothing deforms the body".to_owned());
         }
         let vectors = eigen.vectors.as_ref().subcols(count, nf - count).to_owned();
-        let nearest = solve_upper(&lower, &whitened);
-        let row = |k: usize| axes.iter().position(|axis| *axis == k);
         Ok(Self {
-            rigid: Mat::from_fn(6, nf, |k, j| row(k).map_or(0.0, |row| nearest[(row, j)])),
+            rigid: coupling.nearest(),
             deforming: solve_upper(&modal_lower, &vectors),
             left: eigen.values[count..].to_vec(),
             rigid_motions: RigidMotions {

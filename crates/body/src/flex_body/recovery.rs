@@ -8,10 +8,10 @@
 //! velocity w. G_r is the static flexibility of the free body outside the modes. Accelerations and gravity have no
 //! terms: G M (rigid motion) = 0.
 
+use super::modal_change::RigidCoupling;
 use super::{FlexBody, LoadKind, TermGroups, UnitLoad};
 use crate::invariants::Invariants;
 use faer::Mat;
-use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper};
 use flexbody_model::RecoveryRow;
 use nalgebra::{Matrix3, Vector3};
 
@@ -174,8 +174,9 @@ impl FlexBody {
 
     fn modal_loads(&self) -> ModalLoads {
         let (modes, invariants) = (self.modes(), self.invariants());
-        // Rigid motion A (6 x nf) in the modes, about the origin of the frame.
-        let taken = rigid_part(invariants, self.dimension());
+        // Rigid motion A (6 x nf) in the modes, about the origin of the frame; zero in mean axes.
+        let coupling = RigidCoupling::new(&invariants.mass_matrix(), self.dimension());
+        let taken = coupling.map_or_else(|| Mat::zeros(6, self.n_modes()), |coupling| coupling.nearest());
         let rotation = modes.rotation.as_ref().map(Mat::as_ref);
         let at_interface = |interface: &super::Interface| {
             let rows = interface.rows(self.nodes(), modes.shape.as_ref(), rotation, self.dimension())?;
@@ -200,23 +201,6 @@ fn resultant_of(a: usize, x: &Vector3<f64>) -> [f64; 6] {
     let unit = Vector3::ith(a % 3, 1.0);
     let (force, moment) = if a < 3 { (unit, x.cross(&unit)) } else { (Vector3::zeros(), unit) };
     [force.x, force.y, force.z, moment.x, moment.y, moment.z]
-}
-
-/// Returns A (6 x nf): the rigid motion nearest to each mode in the M-norm, zero in mean axes.
-fn rigid_part(invariants: &Invariants, dimension: usize) -> Mat<f64> {
-    let nf = invariants.n_modes();
-    let axes: &[usize] = if dimension == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
-    let mass = invariants.mass_matrix();
-    let rigid = Mat::from_fn(axes.len(), axes.len(), |i, j| mass[(axes[i], axes[j])]);
-    let coupling = Mat::from_fn(axes.len(), nf, |i, j| mass[(axes[i], 6 + j)]);
-    let mut taken = Mat::zeros(6, nf);
-    if let Some(lower) = dense_cholesky(rigid) {
-        let part = solve_upper(&lower, &solve_lower(&lower, &coupling));
-        for (i, &axis) in axes.iter().enumerate() {
-            (0..nf).for_each(|j| taken[(axis, j)] = part[(i, j)]);
-        }
-    }
-    taken
 }
 
 /// Returns -Psi_m' M c_kl (nf x 6) in the order of [`LoadKind::SPIN`], from W1 and the moments of the mass:

@@ -5,7 +5,6 @@ use flexbody_base::diagnostic::Code;
 use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
 use std::ops::Range;
 use std::path::Path;
-use toml::de::DeValue;
 
 /// Keys `file`, `interface`, and the kinds of loads.
 pub(super) const GEOMETRIC_STIFFNESS: &[&str] = &[
@@ -22,20 +21,8 @@ pub(super) const GEOMETRIC_STIFFNESS: &[&str] = &[
 impl ManifestWalk<'_, '_> {
     /// Reads the geometric stiffness of unit loads. Entries with errors are left out; the errors are in `found`.
     pub(super) fn geometric_stiffness(&mut self, top: &TomlTable) -> Vec<GeometricStiffness<MatrixLocation>> {
-        const EXPECTED: &str = "a list of tables: write [[geometric_stiffness]]";
-        let Some(value) = top.get("geometric_stiffness") else { return Vec::new() };
-        let DeValue::Array(list) = value.get_ref() else {
-            self.mistyped("geometric_stiffness", value, EXPECTED);
-            return Vec::new();
-        };
-        let mut given = Vec::new();
-        for item in list.iter() {
-            match item.get_ref() {
-                DeValue::Table(table) => given.extend(self.one_geometric_stiffness(table, item.span())),
-                _ => self.mistyped("geometric_stiffness", item, EXPECTED),
-            }
-        }
-        given
+        let tables = self.tables(top, "geometric_stiffness").unwrap_or_default();
+        tables.into_iter().filter_map(|(table, span)| self.one_geometric_stiffness(table, span)).collect()
     }
 
     fn one_geometric_stiffness(

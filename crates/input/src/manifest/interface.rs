@@ -32,14 +32,10 @@ const NODES: &[&str] = &["nodes", "nodes_file", "set", "box", "cylinder", "plane
 impl ManifestWalk<'_, '_> {
     /// Reads the interfaces. `None` means that the list has errors.
     pub(super) fn interfaces(&mut self, top: &TomlTable, dimension: usize) -> Option<Vec<InterfaceSource>> {
-        let Some(value) = top.get("interface") else {
-            return Some(Vec::new());
-        };
-        let DeValue::Array(list) = value.get_ref() else {
-            self.mistyped("interface", value, "a list of tables: write [[interface]]");
-            return None;
-        };
-        if list.len() > MAX_INTERFACES {
+        if let Some(value) = top.get("interface")
+            && let DeValue::Array(list) = value.get_ref()
+            && list.len() > MAX_INTERFACES
+        {
             let message =
                 format!("the manifest has {} interfaces, a body has at most {MAX_INTERFACES}", list.len());
             self.complain(Code::ManifestSyntax, value.span(), message);
@@ -47,15 +43,11 @@ impl ManifestWalk<'_, '_> {
         }
         let mut names = HashSet::new();
         let mut interfaces = Vec::new();
-        for item in list.iter() {
-            let DeValue::Table(table) = item.get_ref() else {
-                self.mistyped("interface", item, "a list of tables: write [[interface]]");
-                continue;
-            };
-            if let Some(interface) = self.interface(table, item.span(), dimension) {
+        for (table, span) in self.tables(top, "interface")? {
+            if let Some(interface) = self.interface(table, span.clone(), dimension) {
                 if !names.insert(interface.name.clone()) {
                     let message = format!("interface `{}` is given twice", interface.name);
-                    self.complain(Code::ManifestSyntax, item.span(), message);
+                    self.complain(Code::ManifestSyntax, span, message);
                 }
                 interfaces.push(interface);
             }

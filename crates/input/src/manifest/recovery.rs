@@ -6,7 +6,6 @@ use flexbody_base::diagnostic::Code;
 use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
-use toml::de::DeValue;
 
 pub(super) const RECOVERY: &[&str] =
     &["name", "operator", "rows", "offset", "cut", "set", "box", "cylinder", "plane", "about"];
@@ -17,22 +16,12 @@ const SOURCES: &[&str] = &["operator", "cut", "set", "box", "cylinder", "plane"]
 impl ManifestWalk<'_, '_> {
     /// Reads the rows to read off the body. Entries with errors are left out; the errors are in `found`.
     pub(super) fn recoveries(&mut self, top: &TomlTable, dimension: usize) -> Vec<RecoverySource> {
-        const EXPECTED: &str = "a list of tables: write [[recovery]]";
-        let Some(value) = top.get("recovery") else { return Vec::new() };
-        let DeValue::Array(list) = value.get_ref() else {
-            self.mistyped("recovery", value, EXPECTED);
-            return Vec::new();
-        };
         let (mut names, mut given) = (HashSet::new(), Vec::new());
-        for item in list.iter() {
-            let DeValue::Table(table) = item.get_ref() else {
-                self.mistyped("recovery", item, EXPECTED);
-                continue;
-            };
-            if let Some(one) = self.recovery(table, item.span(), dimension) {
+        for (table, span) in self.tables(top, "recovery").unwrap_or_default() {
+            if let Some(one) = self.recovery(table, span.clone(), dimension) {
                 if !names.insert(one.name.clone()) {
                     let message = format!("recovery `{}` is given twice", one.name);
-                    self.complain(Code::ManifestSyntax, item.span(), message);
+                    self.complain(Code::ManifestSyntax, span, message);
                 }
                 given.push(one);
             }

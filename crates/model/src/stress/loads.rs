@@ -1,7 +1,7 @@
 //! Loads of geometric stiffness as forces at nodes, and the difference of other forces from them.
 
 use super::fit::{Relief, force, least_lengths, solve};
-use crate::rigid::centre_and_length;
+use crate::rigid::{centre_and_length, rigid_axes};
 use crate::{Coupling, FeModel, InertialRows, LoadKind, NodeSet, UnitLoad};
 use faer::Mat;
 use flexbody_linalg::{gram, larger};
@@ -52,7 +52,7 @@ impl<'m> UnitLoads<'m> {
         let rigid = rows.rigid();
         let momenta = rows.weigh(rigid.as_ref());
         let at_nodes = rows.restrict(momenta.clone());
-        let (d, to) = (model.dimension(), motions(model.dimension()));
+        let (d, to) = (model.dimension(), rigid_axes(model.dimension()));
         let relief = (0..model.nodes().len()).map(|i| {
             let mut forces: Relief = [Vector3::zeros(); 6];
             for (column, &motion) in to.iter().enumerate() {
@@ -292,11 +292,6 @@ impl<'m> UnitLoads<'m> {
         let at = |i: usize| Vector3::from_fn(|k, _| if k < d { load[(d * i + k, 0)] } else { 0.0 });
         (0..self.model.nodes().len()).map(at).collect()
     }
-}
-
-/// Returns the rigid motions of a body of the given dimension, as indices among the six.
-fn motions(dimension: usize) -> &'static [usize] {
-    if dimension == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] }
 }
 
 /// Returns the rigid motion of a translation.

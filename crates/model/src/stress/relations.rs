@@ -1,7 +1,7 @@
 //! Relations between a geometric stiffness and rigid motion of the body.
 
 use crate::FeModel;
-use crate::rigid::centre_and_length;
+use crate::rigid::{centre_and_length, rigid_axes};
 use crate::tolerance::rounding;
 use flexbody_linalg::{SymmetricMatrix, larger, parallel};
 use nalgebra::{Matrix3, Vector3};
@@ -100,7 +100,7 @@ impl<'m> RigidFields<'m> {
     fn new(model: &'m FeModel, scale: f64) -> Self {
         let (centre, _) = centre_and_length(&model.nodes().positions);
         let fields = model.rigid_fields(centre, 1.0);
-        let columns: &[usize] = if model.dimension() == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
+        let columns = rigid_axes(model.dimension());
         let row = |i: usize| {
             let mut row = [0.0; 6];
             columns.iter().enumerate().for_each(|(from, &to)| row[to] = fields[(i, from)]);

@@ -8,7 +8,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
-use flexbody_motion::scene::{FramedScene, Measure, Scene, Trace, trace, trace_at};
+use flexbody_motion::scene::{FramedScene, Measure, Scene, Scheme, Trace, trace, trace_at};
 
 /// Scene (a single one or a load case) with the motion of the reference in it.
 pub(super) struct StudyCase<'m> {
@@ -143,27 +143,23 @@ impl<'m> StudyCase<'m> {
         let mut scene = self.own_scene(body, candidate);
         let most = timing::allowed(accurate.worst, self.most());
         let duration = scene.run.duration.unwrap_or(0.0);
-        // The loosest integration that is accurate enough. With the steps of the reference the errors are known.
-        let mut errors = *accurate;
-        for scheme in timing::schemes(self.motion.scheme, duration) {
+        let finest = self.motion.scheme;
+        // The loosest integration that is accurate enough. A run that stops is not; that of the finest is known.
+        let is_enough = |scheme: Scheme| {
+            if scheme == finest {
+                return Some((scheme, *accurate));
+            }
             scene.run.scheme = scheme;
-            if scheme == self.motion.scheme {
-                errors = *accurate;
-                break;
-            }
-            // A run that stops is too inaccurate.
-            match self.errors(measure, candidate, body, &scene) {
-                Ok(found) if found.worst <= most => {
-                    errors = found;
-                    break;
-                }
-                _ => {}
-            }
-        }
+            let errors = self.errors(measure, candidate, body, &scene).ok()?;
+            (errors.worst <= most).then_some((scheme, errors))
+        };
+        let loosest = timing::schemes(finest, duration).into_iter().find_map(is_enough);
+        let (scheme, errors) = loosest.unwrap_or((finest, *accurate));
+        scene.run.scheme = scheme;
         let (seconds, work) = timing::integration(body, &scene, repeat)?;
         let evaluation = timing::evaluation(body, scene.run.terms)
             .map_err(|reason| Error::from(Diagnostic::new(Code::SimulationStopped, reason.to_string())))?;
-        Ok((TimedRun { scheme: scene.run.scheme, errors, seconds, work }, evaluation))
+        Ok((TimedRun { scheme, errors, seconds, work }, evaluation))
     }
 
     fn own_scene(&self, body: &FlexBody, candidate: &Candidate) -> Scene {
