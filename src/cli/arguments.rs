@@ -416,6 +416,9 @@ pub struct SimulateArguments {
     /// Table to write the motion to
     #[arg(long, value_name = "MOTION.csv")]
     pub csv: Option<PathBuf>,
+    /// File to write the rows of all recoveries of the body to, .csv or .h5
+    #[arg(long, value_name = "ROWS.csv|ROWS.h5")]
+    pub rows: Option<PathBuf>,
     /// Report to write, with plots as .html; format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,

@@ -6,13 +6,14 @@ use super::places::{format_of, refuse_replacing};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_motion::scene::LoadedHistory;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_motion::scene::{LoadedHistory, RecoveredMotion};
 use flexbody_report::{Format, RecoveredFacts, RunData, recovered_csv};
 use std::path::Path;
 
-/// Kind of an output file.
-#[derive(Clone, Copy)]
-enum Kind {
+/// Kind of a file of recoveries over time.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Kind {
     Csv,
     Hdf5,
 }
@@ -22,7 +23,7 @@ impl Kind {
     ///
     /// # Errors
     /// [`Usage`](Code::Usage) for other extensions.
-    fn of(path: &Path) -> Result<Self> {
+    pub(super) fn of(path: &Path) -> Result<Self> {
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             Some("csv") => Ok(Self::Csv),
@@ -32,6 +33,24 @@ impl Kind {
                 let help = "give it the extension .csv or .h5";
                 Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
             }
+        }
+    }
+}
+
+impl Kind {
+    /// Writes recoveries of `body` over a motion to the temporary file of `slot`.
+    ///
+    /// * `origin`: name and value of the attribute that says where the motion is from.
+    pub(super) fn fill(
+        self,
+        body: &FlexBody,
+        motion: &RecoveredMotion,
+        origin: (&str, &str),
+        slot: &OutputSlot,
+    ) -> Result<()> {
+        match self {
+            Self::Csv => slot.fill(recovered_csv(motion).as_bytes()),
+            Self::Hdf5 => flexbody_file::fill_recovered(body, motion, origin, slot),
         }
     }
 }
@@ -48,10 +67,7 @@ pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
     let recovered = history.recover(&body, &arguments.only)?;
     let run = RunData { diagnostics, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
-    match kind {
-        Kind::Csv => slot.fill(recovered_csv(&history, &recovered).as_bytes())?,
-        Kind::Hdf5 => flexbody_file::fill_recovered(&body, &history, &recovered, &slot)?,
-    }
+    kind.fill(&body, &recovered, ("history", &history.path.display().to_string()), &slot)?;
     let facts = RecoveredFacts::new(&body, &history, &recovered, &run);
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(facts.render(format).as_bytes())?;

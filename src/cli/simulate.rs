@@ -3,9 +3,10 @@
 use super::arguments::{Printing, SimulateArguments};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, marked, refuse_replacing, refuse_replacing_read};
+use super::recover::Kind;
 use super::resources::{context, use_threads};
 use super::watcher::Watcher;
-use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
+    let rows = arguments.rows.as_deref().map(Kind::of).transpose()?;
     let places = SimulationOutputs::of(arguments, None);
     refuse_replacing([&arguments.body, &arguments.scene].into_iter(), places.all())?;
     // Outputs are checked before reading, although the load cases are known only afterwards.
@@ -36,8 +38,12 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
         all => all.iter().map(SimulationOutputs::reserve).collect::<Result<Vec<_>>>()?,
     };
     let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
-    let job =
-        Job { path: &arguments.scene, printing: arguments.printing, body: &body, formats: &formats, threads };
+    if rows.is_some() && body.recoveries().is_empty() {
+        let message = "the body has no recovery, so there are no rows to write";
+        return Err(Diagnostic::new(Code::RecoveryUnknown, message).in_file(&arguments.body).into());
+    }
+    let printing = arguments.printing;
+    let job = Job { path: &arguments.scene, printing, body: &body, formats: &formats, rows, threads };
     let several = cases.len() > 1;
     let done =
         cases.iter().zip(&slots).map(|(scene, slots)| job.simulate(scene, several, &notes, slots, &watcher));
@@ -70,6 +76,7 @@ struct Job<'a> {
     printing: Printing,
     body: &'a FlexBody,
     formats: &'a [Format],
+    rows: Option<Kind>,
     threads: usize,
 }
 
@@ -115,6 +122,9 @@ impl Job<'_> {
         if let Some(slot) = &slots.table {
             slot.fill(simulation_csv(&recording).as_bytes())?;
         }
+        if let (Some(slot), Some(kind), Some(recovered)) = (&slots.rows, self.rows, &recording.recovered) {
+            kind.fill(self.body, recovered, ("scene", &recording.scene), slot)?;
+        }
         for (slot, format) in slots.reports.iter().zip(self.formats) {
             slot.fill(facts.render(*format).as_bytes())?;
         }
@@ -127,6 +137,7 @@ impl Job<'_> {
 struct SimulationOutputs {
     motion: Option<PathBuf>,
     table: Option<PathBuf>,
+    rows: Option<PathBuf>,
     reports: Vec<PathBuf>,
 }
 
@@ -134,6 +145,7 @@ struct SimulationOutputs {
 struct Slots {
     motion: Option<OutputSlot>,
     table: Option<OutputSlot>,
+    rows: Option<OutputSlot>,
     reports: Vec<OutputSlot>,
 }
 
@@ -145,18 +157,20 @@ impl SimulationOutputs {
         Self {
             motion: arguments.output.as_ref().map(place),
             table: arguments.csv.as_ref().map(place),
+            rows: arguments.rows.as_ref().map(place),
             reports: arguments.report.iter().map(place).collect(),
         }
     }
 
     fn all(&self) -> impl Iterator<Item = &PathBuf> {
-        self.motion.iter().chain(&self.table).chain(&self.reports)
+        self.motion.iter().chain(&self.table).chain(&self.rows).chain(&self.reports)
     }
 
     fn reserve(&self) -> Result<Slots> {
         Ok(Slots {
             motion: self.motion.as_ref().map(flexbody_file::prepare_output).transpose()?,
             table: self.table.as_ref().map(OutputSlot::prepare).transpose()?,
+            rows: self.rows.as_ref().map(OutputSlot::prepare).transpose()?,
             reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
         })
     }
@@ -164,6 +178,6 @@ impl SimulationOutputs {
 
 impl Slots {
     fn into_all(self) -> impl Iterator<Item = OutputSlot> {
-        self.motion.into_iter().chain(self.table).chain(self.reports)
+        self.motion.into_iter().chain(self.table).chain(self.rows).chain(self.reports)
     }
 }

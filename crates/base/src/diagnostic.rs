@@ -220,7 +220,9 @@ codes! {
     RunTooLong = "FB550", Error, BadInput, "run takes more steps than allowed", "simulate a shorter `duration`, leave out modes beyond the frequencies of the loads, or raise `most_steps` in [run]";
     StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";
     MotionWithoutBasis = "FB552", Note, Done, "no small number of shapes represents the motion", "nothing to do: the body has the modes of a conversion without --basis scene";
+    RecoveryLoadUnseen = "FB553", Warning, Done, "recoveries have no columns for a load", "define an interface with a reference point where the load acts (any coupling but `free`), convert again, and let the load act there";
     RateUnsettled = "FB554", Warning, Done, "angular velocity still changes with the step size of the integration", "give a smaller `tolerance` (or a shorter `step`) in [run] until the angular velocity no longer changes";
+    VariationStops = "FB555", Note, Done, "standard variation cannot be simulated and judges nothing", "state what may vary in [[variation]]; nothing to do if the load cannot turn so far";
     SelectionUnjudged = "FB557", Error, CheckFailed, "body does not meet the tolerances of the scene, or this cannot be judged", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body nevertheless";
     VariationFails = "FB559", Warning, Done, "recommended body does not hold in a variation of the scene", "make the variation a [[case]] of the scene, so that the body is made for it as well; or leave out a [[variation]] that cannot occur";
     CouplingEffect = "FB558", Note, Done, "effect of rigid interfaces that the body and its reference model share", "nothing to do where a stiff part is mounted at the interface; otherwise set coupling = \"averaging\", which lets the interface deform";

@@ -9,7 +9,7 @@ use flexbody_base::hdf5_file::{create, make, put_text};
 use flexbody_base::output::OutputSlot;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_motion::scene::{LoadedHistory, RecoveredRows};
+use flexbody_motion::scene::{RecoveredMotion, RowMap, StressPoint};
 use hdf5_metno as hdf5;
 use std::path::Path;
 
@@ -18,58 +18,69 @@ const FORMAT: &str = "flexbody-recovered";
 /// Version of the format.
 const VERSION: i64 = 1;
 
-/// Writes recoveries of `body` over time to the temporary file of `slot`, which appears under its name when the slot is
-/// committed.
+/// Writes recoveries of `body` over a motion to the temporary file of `slot`, which appears under its name when the slot
+/// is committed.
+///
+/// * `origin`: name and value of the root attribute that says where the motion is from.
 ///
 /// # Errors
 /// FB104 if the file cannot be written, FB602 if the disk is full.
 pub fn fill_recovered(
     body: &FlexBody,
-    history: &LoadedHistory,
-    recovered: &[RecoveredRows<'_>],
+    motion: &RecoveredMotion,
+    origin: (&str, &str),
     slot: &OutputSlot,
 ) -> Result<()> {
-    fill(body, history, recovered, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))
+    fill(body, motion, origin, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))
 }
 
-fn fill(
-    body: &FlexBody,
-    history: &LoadedHistory,
-    recovered: &[RecoveredRows<'_>],
-    path: &Path,
-) -> hdf5::Result<()> {
+fn fill(body: &FlexBody, motion: &RecoveredMotion, origin: (&str, &str), path: &Path) -> hdf5::Result<()> {
     let file = create(path)?;
     put_text(&file, "format", FORMAT)?;
     file.new_attr::<i64>().create("format_version")?.write_scalar(&VERSION)?;
     put_text(&file, "generator", &generator())?;
     put_text(&file, "body", &body.source().name)?;
-    put_text(&file, "history", &history.path.display().to_string())?;
-    let time = put(&file.as_group()?, "time", &[history.time.len()], &history.time)?;
+    put_text(&file, origin.0, origin.1)?;
+    let times = &motion.states.times;
+    let time = put(&file.as_group()?, "time", &[times.len()], times)?;
     put_text(&time, "units", body.units().time.name())?;
     make(&file, "/recovery")?;
-    for one in recovered {
-        let group = make(&file, &format!("/recovery/{}", names::encode(&one.recovery.name)))?;
-        put_text(&group, "rows", &labels_json(&one.recovery.rows))?;
-        let values: Vec<f64> = one.values.iter().flatten().copied().collect();
-        let shape = [one.values.len(), one.recovery.rows.len()];
-        let values = put(&group, "values", &shape, &values)?;
-        put_text(
-            &values,
-            "description",
-            "one row per instant, one column per row of the recovery, in its unit",
-        )?;
-        if !one.points.is_empty() {
-            let names: Vec<&str> = one.points.iter().map(|point| point.name.as_str()).collect();
-            put_text(&group, "points", &serde_json::to_string(&names).expect("strings are valid JSON"))?;
-            let equivalent: Vec<f64> = (0..history.time.len()).flat_map(|at| one.von_mises(at)).collect();
-            let shape = [history.time.len(), one.points.len()];
-            let equivalent = put(&group, "von_mises", &shape, &equivalent)?;
-            let about = "equivalent stress of von Mises, one row per instant, one column per point";
-            put_text(&equivalent, "description", about)?;
-        }
+    for one in &motion.recoveries {
+        let group = make(&file, &format!("/recovery/{}", names::encode(&one.name)))?;
+        fill_rows(&group, one, motion)?;
     }
     file.flush()?;
     file.close()
+}
+
+/// Writes the rows of one recovery, and the stress measures of its points.
+fn fill_rows(group: &hdf5::Group, map: &RowMap, motion: &RecoveredMotion) -> hdf5::Result<()> {
+    let instants = motion.states.times.len();
+    let rows: Vec<Vec<f64>> = motion.states.iter().map(|z| map.values(z)).collect();
+    put_text(group, "rows", &labels_json(&map.rows))?;
+    let about = |dataset: hdf5::Dataset, text: &str| put_text(&dataset, "description", text);
+    let values = put(group, "values", &[instants, map.rows.len()], &rows.concat())?;
+    about(values, "one row per instant, one column per row of the recovery, in its unit")?;
+    if map.points.is_empty() {
+        return Ok(());
+    }
+    let names: Vec<&str> = map.points.iter().map(|point| point.name.as_str()).collect();
+    put_text(group, "points", &serde_json::to_string(&names).expect("strings are valid JSON"))?;
+    let shape = [instants, map.points.len()];
+    let of_points = |measure: &dyn Fn(&StressPoint, &[f64]) -> f64| -> Vec<f64> {
+        rows.iter().flat_map(|rows| map.points.iter().map(|point| measure(point, rows))).collect()
+    };
+    let von_mises = put(group, "von_mises", &shape, &of_points(&StressPoint::von_mises))?;
+    about(von_mises, "equivalent stress of von Mises, one row per instant, one column per point")?;
+    let signed = put(group, "signed_von_mises", &shape, &of_points(&StressPoint::signed_von_mises))?;
+    about(
+        signed,
+        "equivalent stress of von Mises with the sign of the principal stress of the largest magnitude",
+    )?;
+    let principal: Vec<f64> =
+        rows.iter().flat_map(|rows| map.points.iter().flat_map(|point| point.principal(rows))).collect();
+    let principal = put(group, "principal", &[instants, map.points.len(), 3], &principal)?;
+    about(principal, "principal stresses, the largest first; instants x points x 3")
 }
 
 fn put(place: &hdf5::Group, name: &str, shape: &[usize], values: &[f64]) -> hdf5::Result<hdf5::Dataset> {

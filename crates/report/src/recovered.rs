@@ -8,7 +8,7 @@ use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_motion::scene::{LoadedHistory, RecoveredRows};
+use flexbody_motion::scene::{LoadedHistory, RecoveredMotion, RowExtreme, RowExtremes, RowMap, StressPoint};
 use serde::Serialize;
 
 /// Facts of recoveries over time.
@@ -32,9 +32,9 @@ pub struct RecoveredFacts<'a> {
     diagnostics: &'a [Diagnostic],
 }
 
-/// Largest value of a recovery.
+/// Largest values of a recovery.
 #[derive(Debug, Clone, Serialize)]
-struct RecoveryFacts<'a> {
+pub(super) struct RecoveryFacts<'a> {
     name: &'a str,
     rows: usize,
     /// Row of the largest magnitude.
@@ -48,12 +48,16 @@ struct RecoveryFacts<'a> {
     /// Instant of the largest magnitude.
     time: f64,
     /// Largest equivalent stress; `None` without points that have all six stresses.
-    von_mises: Option<VonMisesFacts<'a>>,
+    von_mises: Option<PointFacts<'a>>,
+    /// Largest principal stress; `None` if none is positive.
+    tension: Option<PointFacts<'a>>,
+    /// Smallest principal stress; `None` if none is negative.
+    compression: Option<PointFacts<'a>>,
 }
 
-/// Largest equivalent stress of von Mises of a recovery.
+/// Largest stress measure of a recovery.
 #[derive(Debug, Clone, Serialize)]
-struct VonMisesFacts<'a> {
+struct PointFacts<'a> {
     points: usize,
     /// Point of the largest value.
     point: &'a str,
@@ -62,42 +66,79 @@ struct VonMisesFacts<'a> {
     time: f64,
 }
 
+impl<'a> RecoveryFacts<'a> {
+    /// Collects the facts of the recoveries of a motion.
+    pub(super) fn of_motion(motion: &'a RecoveredMotion) -> Vec<Self> {
+        let pairs = motion.recoveries.iter().zip(&motion.extremes);
+        pairs.filter_map(|(map, extremes)| Self::new(map, extremes)).collect()
+    }
+
+    fn new(map: &'a RowMap, extremes: &RowExtremes) -> Option<Self> {
+        let RowExtreme { place, time, value } = extremes.row?;
+        let label = &map.rows[place];
+        let at_point = |extreme: RowExtreme| PointFacts {
+            points: map.points.len(),
+            point: &map.points[extreme.place].name,
+            value: extreme.value,
+            unit: &map.points[extreme.place].unit,
+            time: extreme.time,
+        };
+        Some(Self {
+            name: &map.name,
+            rows: map.rows.len(),
+            row: &label.name,
+            quantity: label.quantity.name(),
+            component: &label.component,
+            node: label.node,
+            element: label.element,
+            value,
+            unit: &label.unit,
+            time,
+            von_mises: extremes.von_mises.map(at_point),
+            tension: extremes.tension.map(at_point),
+            compression: extremes.compression.map(at_point),
+        })
+    }
+
+    /// Returns the lines of this recovery in a report: rows, then stress measures of points.
+    pub(super) fn terms(&self, time_unit: &str) -> Vec<Term> {
+        let largest = |value: f64, unit: &str, place: &str, time: f64| {
+            let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+            let (value, time) = (significant(value, 5), significant(time, 6));
+            format!("{value}{unit}, {place}, at {time} {time_unit}")
+        };
+        let row = format!("row {} ({} {})", self.row, self.quantity, self.component);
+        let of_rows = largest(self.value, self.unit, &row, self.time);
+        let words = format!("{}: {}, largest {of_rows}", self.name, counted(self.rows, "row"));
+        let mut terms = vec![Term::new("Recovery", words)];
+        let measures = [
+            ("von Mises largest", &self.von_mises),
+            ("principal stress largest", &self.tension),
+            ("principal stress smallest", &self.compression),
+        ];
+        for (measure, found) in measures {
+            if let Some(own) = found {
+                let words = largest(own.value, own.unit, own.point, own.time);
+                let of = counted(own.points, "point");
+                terms.push(Term::new("Recovery", format!("{}: {measure} of {of}: {words}", self.name)));
+            }
+        }
+        terms
+    }
+}
+
 impl<'a> RecoveredFacts<'a> {
     /// Collects the facts of `recovered` rows of `body` for `history`.
     pub fn new(
         body: &'a FlexBody,
         history: &'a LoadedHistory,
-        recovered: &'a [RecoveredRows<'a>],
+        recovered: &'a RecoveredMotion,
         run: &'a RunData,
     ) -> Self {
-        let facts = |one: &'a RecoveredRows<'a>| {
-            let (row, at, value) = one.largest()?;
-            let label = &one.recovery.rows[row];
-            let von_mises = one.largest_von_mises().map(|(point, at, value)| VonMisesFacts {
-                points: one.points.len(),
-                point: &one.points[point].name,
-                value,
-                unit: &one.points[point].unit,
-                time: history.time[at],
-            });
-            Some(RecoveryFacts {
-                name: &one.recovery.name,
-                rows: one.recovery.rows.len(),
-                row: &label.name,
-                quantity: label.quantity.name(),
-                component: &label.component,
-                node: label.node,
-                element: label.element,
-                value,
-                unit: &label.unit,
-                time: history.time[at],
-                von_mises,
-            })
-        };
         Self {
             format: "flexbody-recovered",
             format_major: 1,
-            format_minor: 0,
+            format_minor: 1,
             generator: generator(),
             body: &body.source().name,
             history: history.path.display().to_string(),
@@ -105,7 +146,7 @@ impl<'a> RecoveredFacts<'a> {
             time_unit: body.units().time.name().to_owned(),
             loaded: history.loads.iter().map(|load| load.interface.as_str()).collect(),
             unloaded: history.unloaded(body),
-            recoveries: recovered.iter().filter_map(facts).collect(),
+            recoveries: RecoveryFacts::of_motion(recovered),
             diagnostics: &run.diagnostics,
         }
     }
@@ -126,43 +167,40 @@ impl<'a> RecoveredFacts<'a> {
             let words = format!("{}: the table has no columns of their loads", names(&self.unloaded));
             terms.push(Term::new("Unloaded", words));
         }
-        let recovery = |one: &RecoveryFacts<'_>| {
-            Term::new("Recovery", format!("{}: {}", one.name, self.largest_in_words(one)))
-        };
-        terms.extend(self.recoveries.iter().map(recovery));
+        terms.extend(self.recoveries.iter().flat_map(|one| one.terms(&self.time_unit)));
         let blocks = vec![Block::Terms(terms), Block::Diagnostics(self.diagnostics)];
         Document { name: self.body, kind: "Recovery", generator: &self.generator, blocks }
-    }
-
-    /// Returns the largest value in words: `90 rows, largest: 12.3 MPa, row s7 (stress xx), at 0.2 s`.
-    fn largest_in_words(&self, one: &RecoveryFacts<'_>) -> String {
-        let largest = |value: f64, unit: &str, place: &str, time: f64| {
-            let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-            let (value, time) = (significant(value, 5), significant(time, 6));
-            format!("largest: {value}{unit}, {place}, at {time} {}", self.time_unit)
-        };
-        let row = format!("row {} ({} {})", one.row, one.quantity, one.component);
-        let rows = format!("{}, {}", counted(one.rows, "row"), largest(one.value, one.unit, &row, one.time));
-        let von_mises = one.von_mises.as_ref().map_or_else(String::new, |own| {
-            let words = largest(own.value, own.unit, own.point, own.time);
-            format!("; von Mises of {}, {words}", counted(own.points, "point"))
-        });
-        rows + &von_mises
     }
 }
 
 /// Returns recoveries over time as comma-separated values: the time, then for every recovery a column `RECOVERY ROW` for
-/// every row and a column `RECOVERY POINT von Mises` for every point with all six stresses; numbers round-trip.
-pub fn recovered_csv(history: &LoadedHistory, recovered: &[RecoveredRows<'_>]) -> String {
-    let name = |one: &RecoveredRows<'_>| -> Vec<String> {
-        let rows = one.recovery.rows.iter().map(|row| row.name.clone());
-        let points = one.points.iter().map(|point| format!("{} von Mises", point.name));
-        rows.chain(points).map(|own| csv::text(&format!("{} {own}", one.recovery.name))).collect()
+/// every row and, for every point with all six stresses, `RECOVERY POINT von Mises`, `RECOVERY POINT signed von Mises` and
+/// `RECOVERY POINT principal 1` to `3`; numbers round-trip.
+pub fn recovered_csv(motion: &RecoveredMotion) -> String {
+    const MEASURES: [&str; 5] =
+        ["von Mises", "signed von Mises", "principal 1", "principal 2", "principal 3"];
+    let name = |one: &RowMap| -> Vec<String> {
+        let rows = one.rows.iter().map(|row| row.name.clone());
+        let measures = |point: &StressPoint| MEASURES.map(|measure| format!("{} {measure}", point.name));
+        let points = one.points.iter().flat_map(measures);
+        rows.chain(points).map(|own| csv::text(&format!("{} {own}", one.name))).collect()
     };
     let mut table = String::new();
-    csv::push_row(&mut table, std::iter::once("time".to_owned()).chain(recovered.iter().flat_map(name)));
-    for (i, time) in history.time.iter().enumerate() {
-        let values = recovered.iter().flat_map(|one| one.values[i].iter().copied().chain(one.von_mises(i)));
+    csv::push_row(
+        &mut table,
+        std::iter::once("time".to_owned()).chain(motion.recoveries.iter().flat_map(name)),
+    );
+    for (time, z) in motion.states.times.iter().zip(motion.states.iter()) {
+        let values = |one: &RowMap| {
+            let rows = one.values(z);
+            let measures = |point: &StressPoint| {
+                let [a, b, c] = point.principal(&rows);
+                [point.von_mises(&rows), point.signed_von_mises(&rows), a, b, c]
+            };
+            let measures: Vec<f64> = one.points.iter().flat_map(measures).collect();
+            rows.into_iter().chain(measures)
+        };
+        let values = motion.recoveries.iter().flat_map(values);
         csv::push_row(&mut table, std::iter::once(*time).chain(values).map(csv::number));
     }
     table

@@ -6,6 +6,7 @@ use super::csv;
 use super::document::{Block, Document, State, Term, heading, quantity};
 use super::facts::UnitFacts;
 use super::numbers::{counted, frequencies, significant, times};
+use super::recovered::RecoveryFacts;
 use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
@@ -53,6 +54,9 @@ pub struct SimulationFacts<'a> {
     /// mean-axis frame.
     largest_conditions_torque: Option<f64>,
     points: Vec<PointFacts<'a>>,
+    /// Largest values of the recoveries over the continuous motion; absent for a body without.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    recoveries: Vec<RecoveryFacts<'a>>,
     diagnostics: &'a [Diagnostic],
     wall_seconds: f64,
     cpu_seconds: f64,
@@ -175,6 +179,7 @@ impl<'a> SimulationFacts<'a> {
             reaction,
             largest_conditions_torque: recording.conditions.as_deref().map(longest),
             points: points.map(|(path, peak)| PointFacts::new(path, peak.value)).collect(),
+            recoveries: recording.recovered.as_ref().map_or_else(Vec::new, RecoveryFacts::of_motion),
             diagnostics: &run.diagnostics,
             wall_seconds: run.wall_seconds(),
             cpu_seconds: run.cpu_seconds(),
@@ -316,6 +321,8 @@ impl<'a> SimulationFacts<'a> {
             let words = format!("last position {x}, {y}, {z} {length}; largest deflection {deflection}");
             Term::new("Point", format!("{name}: {words}"))
         }));
+        let time = self.units.time();
+        terms.extend(self.recoveries.iter().flat_map(|one| one.terms(&time)));
         terms
     }
 
@@ -400,7 +407,8 @@ fn line_chart(title: &str, time: &[f64], time_unit: &str, lines: Vec<Line>, unit
 
 /// Returns a recording as comma-separated values with one row per output time; numbers round-trip.
 pub fn simulation_csv(recording: &Recording) -> String {
-    let Recording { time, states, balances, paths, reactions, conditions, .. } = recording;
+    let Recording { time, states, balances, paths, reactions, conditions, recovered, .. } = recording;
+    let loads = recovered.as_ref().map(|recovered| &recovered.states);
     let nf = states.first().map_or(0, |state| state.q.len());
     let mut head = vec!["time".to_owned()];
     let xyz = |name: &str| ["x", "y", "z"].map(|k| format!("{name}_{k}"));
@@ -422,6 +430,10 @@ pub fn simulation_csv(recording: &Recording) -> String {
         for what in ["place", "deflection", "velocity", "acceleration"] {
             head.extend(xyz(&format!("{} {what}", path.name)));
         }
+    }
+    // Loads that recoveries depend on, as `recover` reads them.
+    for interface in loads.iter().flat_map(|states| states.layout.interfaces()) {
+        head.extend(["force", "torque"].iter().flat_map(|part| xyz(&format!("{interface} {part}"))));
     }
     let mut table = String::new();
     csv::push_row(&mut table, head.iter().map(|cell| csv::text(cell)));
@@ -447,6 +459,10 @@ pub fn simulation_csv(recording: &Recording) -> String {
             for vectors in [&path.place, &path.deflection, &path.velocity, &path.acceleration] {
                 row.extend(&vectors[i]);
             }
+        }
+        if let Some(states) = loads {
+            let of = |interface: usize| states.layout.load_of(states.state(i), interface);
+            row.extend((0..states.layout.interfaces().len()).flat_map(of));
         }
         csv::push_row(&mut table, row.into_iter().map(csv::number));
     }

@@ -133,12 +133,16 @@ fn rows_of_a_run_are_those_of_the_body() {
         let found: Vec<f64> = line.split(',').skip(1).map(|cell| cell.parse().expect("a number")).collect();
         let state = RecoveryState { q, angular_velocity: axes * omega, loads: &[[0.0; 6], right] };
         let mut expected = body.recoveries()[0].values(&state);
-        let von_mises = |s: &[f64]| {
+        let measures = |s: &[f64]| {
             let stress = nalgebra::Matrix3::new(s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2]);
             let deviator = stress - nalgebra::Matrix3::identity() * (stress.trace() / 3.0);
-            (1.5 * deviator.norm_squared()).sqrt()
+            let von_mises = (1.5 * deviator.norm_squared()).sqrt();
+            let mut principal: Vec<f64> = stress.symmetric_eigenvalues().iter().copied().collect();
+            principal.sort_by(|a, b| b.total_cmp(a));
+            let sign = if principal[0] >= -principal[2] { 1.0 } else { -1.0 };
+            [von_mises, sign * von_mises, principal[0], principal[1], principal[2]]
         };
-        let points: Vec<f64> = expected.chunks_exact(6).map(von_mises).collect();
+        let points: Vec<f64> = expected.chunks_exact(6).flat_map(measures).collect();
         expected.extend(points);
         expected.extend(body.recoveries()[1].values(&state));
         let size = expected.iter().fold(0.0f64, |most, v| most.max(v.abs()));
@@ -149,7 +153,7 @@ fn rows_of_a_run_are_those_of_the_body() {
     runs(place, "recover body.h5 --history run.csv --only root -o rows.h5");
     let file = hdf5_metno::File::open(place.join("rows.h5")).expect("a file");
     let values: Vec<f64> = file.dataset("recovery/root/values").expect("values").read_raw().expect("numbers");
-    let of_table = table.lines().skip(1).flat_map(|line| line.split(',').skip(1 + 192 + 32));
+    let of_table = table.lines().skip(1).flat_map(|line| line.split(',').skip(1 + 192 + 5 * 32));
     let of_table: Vec<f64> = of_table.map(|cell| cell.parse().expect("a number")).collect();
     assert_eq!(values, of_table);
     assert!(file.group("recovery/stress").is_err());
@@ -215,4 +219,81 @@ fn every_format_of_the_operator_gives_the_same_rows() {
     let read = |name: &str| flexbody_file::read(place.join(name)).expect("a body");
     let (sparse, dense) = (read("sparse.h5"), read("dense.h5"));
     assert_eq!(sparse.recoveries(), dense.recoveries());
+}
+
+/// Returns the columns of a table with their names.
+fn columns(path: &Path) -> Vec<(String, Vec<f64>)> {
+    let text = fs::read_to_string(path).expect("a table");
+    let mut lines = text.lines();
+    let head = lines.next().expect("a head").split(',').map(str::to_owned);
+    let rows: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect()).collect();
+    head.enumerate().map(|(c, name)| (name, rows.iter().map(|row| row[c]).collect())).collect()
+}
+
+/// The rows of `simulate` are those that `recover` computes from its table of the motion, for a free body and for one that
+/// an interface carries, and its extremes are not below any instant.
+#[test]
+fn rows_of_a_simulation_are_those_of_its_table() {
+    let (folder, _) = folder();
+    let place = folder.path();
+    runs(
+        place,
+        "convert model.toml --modes 6 --residual-vectors interfaces --frame principal -o body.h5 --quiet",
+    );
+    let load = "[[load]]\ninterface = \"right\"\nforce = [300, -200, 1000]\ntorque = [5, 4, 3]\naxes = \"world\"\n\
+                history = { amplitude = 1, frequency = 700 }\n";
+    let free = "[run]\nduration = 2e-3\noutputs = 400\n[initial]\nangular_velocity = [100, 50, 300]\n";
+    let carried = "gravity = [0, 0, -9.81]\n[run]\nduration = 2e-3\noutputs = 400\n[carried]\ninterface = \"left\"\n\
+                   [carried.spin]\naxis = [0, 0, 1]\nrate = 200\n";
+    for (name, scene) in [("free", free), ("carried", carried)] {
+        fs::write(place.join("scene.toml"), format!("{scene}{load}")).expect("written");
+        let told = runs(place, "simulate body.h5 --scene scene.toml --csv run.csv --rows rows.csv --json");
+        runs(place, "simulate body.h5 --scene scene.toml --rows rows.h5 --quiet");
+        runs(place, "recover body.h5 --history run.csv -o again.csv --quiet");
+        let (own, again) = (columns(&place.join("rows.csv")), columns(&place.join("again.csv")));
+        assert_eq!(own.len(), again.len());
+        let size = |prefix: &str| {
+            let all = own.iter().filter(|(name, _)| name.starts_with(prefix)).flat_map(|(_, values)| values);
+            all.fold(0.0f64, |most, value| most.max(value.abs()))
+        };
+        for ((own_name, own), (again_name, again)) in own.iter().zip(&again) {
+            assert_eq!(own_name, again_name);
+            let allowed = 1e-9 * size(own_name.split(' ').next().expect("a word"));
+            let largest = own.iter().zip(again).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+            assert!(
+                largest <= allowed,
+                "{name}: {own_name} differs by {largest:e} of {size:e}",
+                size = size("stress")
+            );
+        }
+        // The binary file has the same numbers.
+        let file = hdf5_metno::File::open(place.join("rows.h5")).expect("a file");
+        let values: Vec<f64> =
+            file.dataset("recovery/root/values").expect("values").read_raw().expect("numbers");
+        let of_table =
+            |i: usize| own.iter().filter(|(name, _)| name.starts_with("root")).map(move |(_, v)| v[i]);
+        assert_eq!(values, (0..401).flat_map(of_table).collect::<Vec<f64>>());
+        let told: Value = serde_json::from_str(&told).expect("JSON");
+        let stress = &told["results"]["recoveries"][0];
+        for (measure, end, sign) in [
+            ("von_mises", " von Mises", 1.0),
+            ("tension", "principal 1", 1.0),
+            ("compression", "principal 3", -1.0),
+        ] {
+            let of_points = own.iter().filter(|(name, _)| name.ends_with(end) && !name.contains("signed"));
+            let at_instants =
+                of_points.flat_map(|(_, v)| v).fold(0.0f64, |most, value| most.max(sign * value));
+            let said = sign * stress[measure]["value"].as_f64().expect("a number");
+            assert!(
+                at_instants <= said && said < 1.1 * at_instants,
+                "{name} {measure}: {said} {at_instants}"
+            );
+        }
+    }
+    refused(place, "simulate body.h5 --scene scene.toml --rows rows.txt", "rows.txt");
+    // A load at a node has no columns.
+    let at_node = load.replace("interface = \"right\"", "node = 1").replace("torque = [5, 4, 3]\n", "");
+    fs::write(place.join("scene.toml"), format!("{free}{at_node}")).expect("written");
+    refused(place, "simulate body.h5 --scene scene.toml --deny-warnings", "FB553");
 }

@@ -334,3 +334,42 @@ fn keys_of_a_case_take_the_place_of_those_of_the_scene() {
     assert_eq!((other.loads.len(), other.watched.len()), (2, 2));
     assert_eq!(other.loads[0], first.loads[0]);
 }
+
+/// A standard variation whose simulation stops judges nothing, and the rest decides; a stated one is an error.
+#[test]
+fn a_standard_variation_that_stops_is_left_out() {
+    let folder = folder();
+    let place = folder.path();
+    // A pull along the rod bends nothing; turned, it takes more steps than are allowed.
+    let scene = |more: &str, variation: &str| {
+        format!("{}{variation}[[load]]\n{PULL}", COMMON.replace("[run]\n", &format!("[run]\n{more}")))
+    };
+    let told = |words: &[&str]| {
+        let run = flexbody(place, words);
+        let json: Value = serde_json::from_slice(&run.stdout).unwrap_or(Value::Null);
+        (json, String::from_utf8_lossy(&run.stderr).into_owned())
+    };
+    let steps = |scene: &str| {
+        fs::write(place.join("scene.toml"), scene).expect("written");
+        let (json, said) = told(&["simulate", "rod.flex.h5", "--scene", "scene.toml", "--json"]);
+        json["results"]["steps"].as_u64().unwrap_or_else(|| panic!("{said}"))
+    };
+    let turned = PULL.replace("[2000, 0, 0]", "[0, 0, 2000]");
+    let (along, across) = (steps(&scene("", "")), steps(&scene("", "").replace(PULL, &turned)));
+    assert!(across > along + 10, "{along} and {across} steps");
+    let few = format!("most_steps = {}\n", (along + across) / 2);
+    fs::write(place.join("scene.toml"), scene(&few, "")).expect("written");
+    let words = ["select", "rod.flex.h5", "--scene", "scene.toml", "--json"];
+    let (json, said) = told(&words);
+    let notes = json["diagnostics"].as_array().unwrap_or_else(|| panic!("{said}"));
+    assert!(notes.iter().any(|note| note["code"] == "FB555"), "{notes:?}");
+    // The trade leaves the same variation out.
+    let (json, said) = told(&["trade", "rod.flex.h5", "--scene", "scene.toml", "--json"]);
+    let notes = json["diagnostics"].as_array().unwrap_or_else(|| panic!("{said}"));
+    assert!(notes.iter().any(|note| note["code"] == "FB555"), "{notes:?}");
+    // Stated, it is an error that names it.
+    let stated = "[[variation]]\nname = \"across\"\nturn = { axis = [0, 1, 0], degrees = 90 }\n";
+    fs::write(place.join("scene.toml"), scene(&few, stated)).expect("written");
+    let (_, said) = told(&words);
+    assert!(said.contains("FB550") && said.contains("across"), "{said}");
+}

@@ -1,6 +1,6 @@
 //! Results of a simulation.
 
-use super::{Drift, Extremes, Scene, Scheme};
+use super::{Drift, Extremes, RecoveredMotion, Scene, Scheme};
 use crate::dynamics::{Balance, Configuration, Orientation, RotationVector};
 use crate::integration::Work;
 use flexbody_body::flex_body::FlexBody;
@@ -35,6 +35,8 @@ pub struct Recording {
     pub work: Work,
     /// Extremes of the motion, including times between the output times.
     pub extremes: Extremes,
+    /// Recoveries of the body; `None` for a body without.
+    pub recovered: Option<RecoveredMotion>,
 }
 
 /// Frame of a recording, and the conditions that the body is exposed to.

@@ -1,11 +1,11 @@
 //! Recoveries over time, from a motion that any program computed.
 
-use super::StressPoint;
+use super::{ExtremeSearch, RowExtremes, RowLayout, RowMap, RowStates};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::series::{ColumnKey, has_column, read_series};
-use flexbody_body::flex_body::{FlexBody, LOAD_COMPONENTS, Recovery, RecoveryState};
+use flexbody_body::flex_body::{FlexBody, Recovery};
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 
@@ -41,15 +41,15 @@ pub struct LoadHistory {
     pub values: Vec<[Vector3<f64>; 2]>,
 }
 
-/// Rows of a recovery over time.
+/// Recoveries of a body over a motion.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RecoveredRows<'b> {
-    /// Recovery of the body.
-    pub recovery: &'b Recovery,
-    /// Values of all rows at each time.
-    pub values: Vec<Vec<f64>>,
-    /// Points with all six stresses among the rows.
-    pub points: Vec<StressPoint>,
+pub struct RecoveredMotion {
+    /// Rows of every recovery, as maps of the states.
+    pub recoveries: Vec<RowMap>,
+    /// States at the instants of the output.
+    pub states: RowStates,
+    /// Largest values of every recovery.
+    pub extremes: Vec<RowExtremes>,
 }
 
 impl LoadedHistory {
@@ -105,48 +105,71 @@ impl LoadedHistory {
         interfaces.map(|interface| interface.name.as_str()).filter(|name| !known(name)).collect()
     }
 
-    /// Returns the rows of recoveries of `body` at each time: all of them, or those with the given names.
+    /// Returns recoveries of `body` over this motion: all of them, or those with the given names. Their largest values
+    /// are those at the instants.
     ///
     /// # Errors
     /// [`RecoveryUnknown`](Code::RecoveryUnknown) if the body has no recovery, or none of a name; FB215 if the history
-    /// has no angular velocity and rows depend on it; FB212 for a torque at an interface whose nodes lie on one line.
-    pub fn recover<'b>(&self, body: &'b FlexBody, names: &[String]) -> Result<Vec<RecoveredRows<'b>>> {
+    /// has no angular velocity and rows depend on it; FB212 for a torque at an interface whose nodes lie on one line,
+    /// and for loads at an interface without static columns.
+    pub fn recover(&self, body: &FlexBody, names: &[String]) -> Result<RecoveredMotion> {
         let chosen = chosen(body, names)?;
         self.refuse_torque_without_rotation(body)?;
-        chosen.into_iter().map(|recovery| self.rows(body, recovery)).collect()
+        let layout = RowLayout::new(body.n_modes(), chosen.iter().copied());
+        let recoveries: Vec<RowMap> = chosen.iter().map(|one| RowMap::new(one, &layout)).collect();
+        self.refuse_unknown_spin(&recoveries)?;
+        let states = self.states(body, layout)?;
+        let mut search = ExtremeSearch::new(recoveries.len(), false);
+        search.see(&recoveries, &states);
+        Ok(RecoveredMotion { recoveries, states, extremes: search.finish() })
     }
 
-    fn rows<'b>(&self, body: &FlexBody, recovery: &'b Recovery) -> Result<RecoveredRows<'b>> {
-        if self.angular_velocity.is_none() && recovery.spin.norm_max() > 0.0 {
-            let message = format!(
-                "recovery `{}` depends on the angular velocity, whose columns are missing: {}",
-                recovery.name,
-                SPIN_COLUMNS.join(", ")
-            );
-            let help = "write the angular velocity of the body along the axes of the model, or zeros for a body that does not turn";
-            return Err(Diagnostic::new(Code::SeriesColumn, message)
-                .in_file(&self.path)
-                .with_help(help)
-                .into());
-        }
+    /// Returns the states that rows depend on, along the axes of the body.
+    fn states(&self, body: &FlexBody, layout: RowLayout) -> Result<RowStates> {
         let to_body = body.frame().axes.transpose();
-        let value = |i: usize| {
-            let load = |interface: &String| {
-                let given = self.loads.iter().find(|load| load.interface == *interface);
-                let mut load = [0.0; LOAD_COMPONENTS];
-                for (part, vector) in given.into_iter().flat_map(|given| &given.values[i]).enumerate() {
-                    let along_body = to_body * vector;
-                    (0..3).for_each(|k| load[3 * part + k] = along_body[k]);
+        let mut places = Vec::new();
+        for load in &self.loads {
+            let is_loaded = load.values.iter().flatten().any(|vector| *vector != Vector3::zeros());
+            match layout.interface(&load.interface) {
+                Some(place) => places.push((place, load)),
+                None if is_loaded => {
+                    let message = format!(
+                        "the recoveries have no static columns for the loads at interface `{}`",
+                        load.interface
+                    );
+                    let help = "convert the model with an interface that is not `coupling = \"free\"`";
+                    return Err(Diagnostic::new(Code::SceneBody, message)
+                        .in_file(&self.path)
+                        .with_help(help)
+                        .into());
                 }
-                load
-            };
-            let loads: Vec<_> = recovery.loads.iter().map(|one| load(&one.interface)).collect();
-            let angular_velocity =
-                self.angular_velocity.as_ref().map_or_else(Vector3::zeros, |omega| to_body * omega[i]);
-            recovery.values(&RecoveryState { q: &self.q[i], angular_velocity, loads: &loads })
-        };
-        let points = StressPoint::among(&recovery.rows);
-        Ok(RecoveredRows { recovery, values: (0..self.time.len()).map(value).collect(), points })
+                None => {}
+            }
+        }
+        let mut states = RowStates::new(layout);
+        for (i, &time) in self.time.iter().enumerate() {
+            let spin = self.angular_velocity.as_ref().map_or_else(Vector3::zeros, |omega| to_body * omega[i]);
+            let mut z = states.layout.state(&self.q[i], &spin);
+            for (place, load) in &places {
+                let [force, torque] = load.values[i].map(|vector| to_body * vector);
+                states.layout.add_load(&mut z, *place, &force, &torque);
+            }
+            states.push(time, &z);
+        }
+        Ok(states)
+    }
+
+    /// Refuses recoveries that depend on an angular velocity that the history does not have.
+    fn refuse_unknown_spin(&self, recoveries: &[RowMap]) -> Result<()> {
+        let needs = recoveries.iter().find(|one| self.angular_velocity.is_none() && one.depends_on_spin());
+        let Some(recovery) = needs else { return Ok(()) };
+        let message = format!(
+            "recovery `{}` depends on the angular velocity, whose columns are missing: {}",
+            recovery.name,
+            SPIN_COLUMNS.join(", ")
+        );
+        let help = "write the angular velocity of the body along the axes of the model, or zeros for a body that does not turn";
+        Err(Diagnostic::new(Code::SeriesColumn, message).in_file(&self.path).with_help(help).into())
     }
 
     /// Refuses torques at interfaces whose nodes do not determine a rotation.
@@ -189,27 +212,4 @@ fn chosen<'b>(body: &'b FlexBody, names: &[String]) -> Result<Vec<&'b Recovery>>
         })
     };
     names.iter().map(find).collect()
-}
-
-impl RecoveredRows<'_> {
-    /// Returns the equivalent stress of von Mises of every point at the instant `at`.
-    pub fn von_mises(&self, at: usize) -> impl Iterator<Item = f64> + '_ {
-        self.points.iter().map(move |point| point.von_mises(&self.values[at]))
-    }
-
-    /// Returns the point and the instant of the largest equivalent stress, by index, with its value; `None` without
-    /// points.
-    pub fn largest_von_mises(&self) -> Option<(usize, usize, f64)> {
-        let all = (0..self.values.len())
-            .flat_map(|at| self.von_mises(at).enumerate().map(move |(p, v)| (p, at, v)));
-        all.reduce(|most, one| if one.2 > most.2 { one } else { most })
-    }
-
-    /// Returns the row and the instant of the largest magnitude among all values, by index, with the value; `None` if
-    /// there are no values.
-    pub fn largest(&self) -> Option<(usize, usize, f64)> {
-        let all = self.values.iter().enumerate();
-        let all = all.flat_map(|(t, rows)| rows.iter().enumerate().map(move |(row, &value)| (row, t, value)));
-        all.reduce(|most, one| if one.2.abs() > most.2.abs() { one } else { most })
-    }
 }

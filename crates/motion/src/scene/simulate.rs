@@ -3,6 +3,7 @@
 use super::conditions::MeanAxes;
 use super::extremes::Survey;
 use super::prepared::{PARTS, Prepared, damped};
+use super::scene_rows::SceneRows;
 use super::{Extremes, FramedScene, Path, Recording, Scene, Setting};
 use crate::dynamics::{BodyPoint, Evaluation, Motion};
 use crate::integration::{Failure, ObserverEvent, Work};
@@ -51,19 +52,31 @@ pub fn simulate(
     let time: Vec<f64> = (0..=outputs).map(|i| run.duration * (i as f64 / outputs as f64)).collect();
     let mut recorder = Recorder::new(body, scene, &run, time.len());
     let mut survey = Survey::new(body, &run.watched);
+    let (mut rows, unseen) = SceneRows::new(body, scene).unzip();
     let record = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if event != ObserverEvent::Instant {
             context.fraction(time / run.duration);
-            return run.survey(&mut survey, event, time, state, motion).map(|_| ());
+            run.survey(&mut survey, event, time, state, motion)?;
+        } else {
+            recorder.record(time, state, motion)?;
         }
-        recorder.record(time, state, motion)
+        if let Some(rows) = &mut rows {
+            let now = motion.evaluate(time, state)?;
+            match event {
+                ObserverEvent::Instant => rows.record(time, &now, &run.forces),
+                _ => rows.see(time, &now, &run.forces),
+            }
+        }
+        Ok::<(), Failure>(())
     };
     let finished = run.integrate(&time, PARTS, record)?;
     // Add the work and the extremes, and warn of motions beyond the range of the model.
     let mut recording = recorder.recording;
     recording.work = finished.work;
     recording.extremes = survey.extremes(finished.size, finished.least_energy);
-    let found = [framed.found, remarks(body, scene, &recording.extremes)].concat();
+    recording.recovered = rows.map(SceneRows::finish);
+    let found =
+        [framed.found, unseen.unwrap_or_default(), remarks(body, scene, &recording.extremes)].concat();
     Ok((recording, found))
 }
 
@@ -94,6 +107,7 @@ impl<'r> Recorder<'r> {
                 paths: scene.watched.iter().map(|point| Path::new(point.to_string())).collect(),
                 work: Work::default(),
                 extremes: Extremes::default(),
+                recovered: None,
             },
             watched: &run.watched,
             conditions,

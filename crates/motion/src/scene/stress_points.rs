@@ -1,6 +1,7 @@
 //! Points with all six stresses among the rows of a recovery, and their equivalent stress.
 
 use flexbody_body::flex_body::{Quantity, RecoveryRow};
+use nalgebra::Matrix3;
 
 /// Components of a stress, in the order of [`StressPoint::rows`].
 const COMPONENTS: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
@@ -50,6 +51,29 @@ impl StressPoint {
         let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
         (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
     }
+
+    /// Returns the principal stresses for the values of all rows of the recovery, the largest first.
+    pub fn principal(&self, values: &[f64]) -> [f64; 3] {
+        Self::principal_of(&self.rows.map(|row| values[row]))
+    }
+
+    /// Returns the equivalent stress of von Mises with the sign of the principal stress of the largest magnitude.
+    pub fn signed_von_mises(&self, values: &[f64]) -> f64 {
+        let [most, _, least] = self.principal(values);
+        self.von_mises(values).copysign(if most >= -least { 1.0 } else { -1.0 })
+    }
+
+    /// Returns the principal stresses of the stress xx, yy, zz, xy, yz, xz, the largest first; NaN for a stress that is
+    /// not finite.
+    pub(super) fn principal_of([xx, yy, zz, xy, yz, xz]: &[f64; 6]) -> [f64; 3] {
+        let stress = Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
+        if !stress.iter().all(|v| v.is_finite()) {
+            return [f64::NAN; 3];
+        }
+        let mut values: [f64; 3] = stress.symmetric_eigenvalues().into();
+        values.sort_by(|a, b| b.total_cmp(a));
+        values
+    }
 }
 
 #[cfg(test)]
@@ -84,6 +108,12 @@ mod tests {
         assert_eq!(points[0].von_mises(&values(&[(1, -3.0)])), 3.0);
         assert!((points[0].von_mises(&values(&[(4, 2.0)])) - 12f64.sqrt()).abs() < 1e-15);
         assert_eq!(points[0].von_mises(&values(&[(1, 5.0), (6, 5.0), (3, 5.0)])), 0.0);
+        // Principal stresses of shear, and the sign of tension and of compression.
+        let shear = points[0].principal(&values(&[(4, 2.0)]));
+        assert!(shear.iter().zip([2.0, 0.0, -2.0]).all(|(a, b)| (a - b).abs() < 1e-15), "{shear:?}");
+        assert_eq!(points[0].signed_von_mises(&values(&[(1, 3.0)])), 3.0);
+        assert_eq!(points[0].signed_von_mises(&values(&[(1, -3.0)])), -3.0);
+        assert!(points[0].principal(&values(&[(1, f64::NAN)])).iter().all(|v| v.is_nan()));
         // A row of another node completes no point.
         rows[1].node = Some(9);
         assert!(StressPoint::among(&rows).is_empty());

@@ -6,6 +6,7 @@ use flexbody_motion::dynamics::{
     Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Motion, Terms,
 };
 use flexbody_motion::integration::{Explicit, Failure, Method, integrate};
+use flexbody_motion::scene::{ExtremeSearch, RowLayout, RowMap, RowStates, StressPoint};
 use nalgebra::Vector3;
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::body_of;
@@ -85,4 +86,62 @@ fn stresses_of_a_tumbling_body_are_those_of_all_modes() {
     // The rest is of the order of (0.1 f1 / f7)^2.
     assert!(distance(&with) < 5e-3, "{:e}", distance(&with));
     assert!(distance(&alone) > 20.0 * distance(&with), "{:e}", distance(&alone));
+}
+
+/// Returns numbers between -1 and 1 that look random.
+fn numbers(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+/// The bounded search finds the largest values that the evaluation of all rows at all instants finds, in one piece of
+/// the history or several, and evaluates few of them.
+#[test]
+fn extremes_are_those_of_all_rows_and_instants() {
+    let body = arm(8);
+    let recovery = &body.recoveries()[0];
+    let layout = RowLayout::new(body.n_modes(), [recovery]);
+    let map = RowMap::new(recovery, &layout);
+    for seed in 0..20 {
+        let mut random = numbers(seed);
+        // Three motions of different size and frequency, and a spin that grows.
+        let phases: Vec<[f64; 2]> = (0..body.n_modes()).map(|_| [random(), 4.0 * random()]).collect();
+        let mut states = RowStates::new(layout.clone());
+        for i in 0..300 {
+            let time = 0.01 * f64::from(i);
+            let q: Vec<f64> = phases
+                .iter()
+                .enumerate()
+                .map(|(j, [phase, rate])| 1e-3 / (1.0 + j as f64).powi(3) * (rate * time + phase).sin())
+                .collect();
+            let spin = Vector3::new(0.1, 0.2 * time, -0.05) * random();
+            states.push(time, &layout.state(&q, &spin));
+        }
+        let mut search = ExtremeSearch::new(1, false);
+        search.see(std::slice::from_ref(&map), &states);
+        let found = &search.finish()[0];
+        let values: Vec<Vec<f64>> = states.iter().map(|z| map.values(z)).collect();
+        let largest = |of: &dyn Fn(&[f64]) -> Vec<f64>| {
+            values.iter().flat_map(|rows| of(rows)).fold(0.0f64, |most, value| most.max(value))
+        };
+        let points = |measure: &'static dyn Fn(&StressPoint, &[f64]) -> f64| {
+            let map = &map;
+            move |rows: &[f64]| map.points.iter().map(|point| measure(point, rows)).collect::<Vec<f64>>()
+        };
+        let expected = [
+            largest(&|rows| rows.iter().map(|value| value.abs()).collect()),
+            largest(&points(&StressPoint::von_mises)),
+            largest(&points(&|point, rows| point.principal(rows)[0])),
+            largest(&points(&|point, rows| -point.principal(rows)[2])),
+        ];
+        let own = [found.row, found.von_mises, found.tension, found.compression];
+        for (own, expected) in own.iter().zip(expected) {
+            let own = own.expect("an extreme").value.abs();
+            assert!((own - expected).abs() <= 1e-12 * expected, "{own:e} {expected:e}");
+        }
+        assert!(found.evaluated < map.rows.len() / 2, "{} of {}", found.evaluated, map.rows.len());
+    }
 }

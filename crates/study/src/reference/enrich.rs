@@ -7,7 +7,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::side_by_side;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{LoadCases, Scene, SceneVariation};
+use flexbody_motion::scene::{LoadCases, Scene, SceneVariation, ends_a_run};
 
 /// Largest ratio of the truncation error to that of the previous round at which another round is made. The value is
 /// close to one because the first responses may leave most of the error from inertia to the next round. A smaller value
@@ -27,6 +27,8 @@ pub struct Enrichment {
     /// True if the truncation error must be within [`PART_OF_FINE`] of the tolerances, instead of
     /// [`PART_OF_REFERENCE`].
     pub is_fine: bool,
+    /// True if a load case whose simulation stops asks for nothing, as a standard variation may; false if it is an error.
+    pub passes_over_stopped: bool,
 }
 
 impl Enrichment {
@@ -97,7 +99,10 @@ pub fn enrich_from<B>(
     let (enough, most_rounds) = (enrichment.enough(), enrichment.most_rounds());
     for round in 0..=most_rounds {
         context.phase("error of the reference");
-        let estimate = |scene: &Scene| Estimate::new(model, body(&made), scene, enough, context);
+        let estimate = |scene: &Scene| {
+            let found = Estimate::new(model, body(&made), scene, enough, context);
+            if enrichment.passes_over_stopped { unless_stopped(found, None) } else { found }
+        };
         let estimates = cases.iter().map(estimate).collect::<Result<Vec<_>>>()?;
         if estimates.iter().all(Option::is_none) {
             break;
@@ -123,8 +128,16 @@ pub fn enrich_from<B>(
     Ok(Enriched { made, rounds: enrichments.into_iter().map(|case| case.rounds).collect() })
 }
 
+/// Returns the result, or `otherwise` if a simulation stopped.
+fn unless_stopped<T>(found: Result<T>, otherwise: T) -> Result<T> {
+    match found {
+        Err(error) if error.diagnostics().iter().all(|one| ends_a_run(one.code())) => Ok(otherwise),
+        found => found,
+    }
+}
+
 /// Returns the estimated truncation errors of `body`, made of `model`, in each variation of the load cases. A list is
-/// empty if nothing can be estimated.
+/// empty if nothing can be estimated, or if the simulation of a standard variation stops.
 ///
 /// # Errors
 /// The errors of [`trace`](flexbody_motion::scene::trace).
@@ -140,6 +153,7 @@ pub fn varied_errors(
     }
     let error = |one: &SceneVariation| {
         let estimate = Estimate::new(model, body, &one.scene, PART_OF_REFERENCE, context);
+        let estimate = if cases.states_variations() { estimate } else { unless_stopped(estimate, None) };
         let estimate = estimate.map_err(|error| error.about(format!("variation `{}`", one.name)))?;
         Ok(estimate.map(|own| own.error).into_iter().collect())
     };

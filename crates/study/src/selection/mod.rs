@@ -35,3 +35,5 @@ pub use situation::{Input, Situation};
 pub use trial::{ModeShare, Trial, TrialRuns};
 pub use variation::{Rotation, Variation};
 pub use varied::VariedSelection;
+#[cfg(feature = "hdf5")]
+pub(crate) use varied::stops;

@@ -6,10 +6,10 @@ use super::search::Choice;
 use super::trial::Trial;
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::Result;
+use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
-use flexbody_motion::scene::{LoadCases, Measure, SceneVariation, Trace};
+use flexbody_motion::scene::{LoadCases, Measure, SceneVariation, Trace, ends_a_run};
 
 /// Factor by which the number of modes grows from trial to trial. A smaller value finds fewer modes and takes more
 /// simulations.
@@ -60,10 +60,22 @@ impl VariedSelection {
 
 /// Variations in which a selection is judged, each with the motion of the whole body.
 pub(super) struct VariedRuns<'v> {
-    variations: &'v [SceneVariation],
+    variations: Vec<&'v SceneVariation>,
     cases: Vec<Case<'v>>,
     references: Vec<Trace>,
-    reference_errors: &'v [Vec<ReferenceError>],
+    /// Truncation errors of the whole body in each variation; empty lists if none are known.
+    reference_errors: Vec<&'v [ReferenceError]>,
+    /// Notes about variations that cannot be simulated.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Returns a note that a variation judges nothing, if `error` says that its simulation stopped.
+pub(crate) fn stops(error: &Error, variation: &SceneVariation) -> Option<Diagnostic> {
+    let first = error.diagnostics().first()?;
+    error.diagnostics().iter().all(|one| ends_a_run(one.code())).then(|| {
+        let message = format!("variation `{}` judges nothing: {}", variation.name, first.message());
+        Diagnostic::new(Code::VariationStops, message)
+    })
 }
 
 /// Returns the body and every variation in one frame.
@@ -78,38 +90,57 @@ pub(super) fn framed_variations<'s>(
 }
 
 impl<'v> VariedRuns<'v> {
-    /// Simulates the whole body in every variation. `reference_errors` are its truncation errors there.
+    /// Simulates the whole body in every variation. `reference_errors` are its truncation errors there. Unless the scene
+    /// file states the variations, one whose simulation stops is left out.
     ///
     /// # Errors
     /// The errors of [`trace`](flexbody_motion::scene::trace).
     pub(super) fn new(
-        variations: &'v [SceneVariation],
+        all: &'v [SceneVariation],
+        are_stated: bool,
         framed: &'v [FramedTests<'_>],
         reference_errors: &'v [Vec<ReferenceError>],
         context: &Context<'v>,
     ) -> Result<Self> {
-        let (mut cases, mut references) = (Vec::new(), Vec::new());
-        for (tests, one) in framed.iter().zip(variations) {
+        let mut runs = Self {
+            variations: Vec::new(),
+            cases: Vec::new(),
+            references: Vec::new(),
+            reference_errors: Vec::new(),
+            diagnostics: Vec::new(),
+        };
+        for (at, (tests, one)) in framed.iter().zip(all).enumerate() {
             let case = Case::new(&tests.body, &tests.scene, context)?;
             let motion = case.runs().motion(tests.body.groups());
-            references.push(motion.map_err(|error| error.about(format!("variation `{}`", one.name)))?.0);
-            cases.push(case);
+            match motion {
+                Ok((motion, _)) => runs.references.push(motion),
+                Err(error) => match stops(&error, one).filter(|_| !are_stated) {
+                    Some(note) => {
+                        runs.diagnostics.push(note);
+                        continue;
+                    }
+                    None => return Err(error.about(format!("variation `{}`", one.name))),
+                },
+            }
+            runs.cases.push(case);
+            runs.variations.push(one);
+            runs.reference_errors.push(reference_errors.get(at).map_or(&[], Vec::as_slice));
         }
-        Ok(Self { variations, cases, references, reference_errors })
+        Ok(runs)
+    }
+
+    /// Returns true if there is no variation.
+    pub(super) fn is_empty(&self) -> bool {
+        self.variations.is_empty()
     }
 
     /// Measures a model in every variation; `measures` belong to the references.
     fn measured(&self, measures: &[Measure<'_>], choice: &Choice) -> Result<Vec<Trial>> {
         let trial = |(at, (case, measure)): (usize, (&Case<'v>, &Measure<'_>))| {
-            let budget = ReferenceError::left(self.errors_of(at));
+            let budget = ReferenceError::left(self.reference_errors[at]);
             Ok(case.runs().measured(measure, &choice.modes, choice.groups, budget)?.0)
         };
         self.cases.iter().zip(measures).enumerate().map(trial).collect()
-    }
-
-    /// Returns the truncation errors of the whole body in a variation; empty if none are known.
-    fn errors_of(&self, at: usize) -> &'v [ReferenceError] {
-        self.reference_errors.get(at).map_or(&[], Vec::as_slice)
     }
 
     /// Judges `choice`. Unless the scene limits the cost, modes in the order `ranked` and groups of `held` are added
@@ -150,7 +181,7 @@ impl<'v> VariedRuns<'v> {
             is_stated: cases.states_variations(),
             chosen,
             of_scene: is_changed.then_some(before),
-            reference_errors: self.errors_of(at).to_vec(),
+            reference_errors: self.reference_errors[at].to_vec(),
         };
         Ok(chosen.into_iter().zip(of_scene).enumerate().map(row).collect())
     }

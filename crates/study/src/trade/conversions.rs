@@ -70,7 +70,7 @@ pub fn conversions(
         responses.clone_from(loads);
         conversions.make(&finest, loads, ConvertSettings::default().lumped)
     };
-    let enrichment = Enrichment { grows: true, is_fine: fine };
+    let enrichment = Enrichment { grows: true, is_fine: fine, passes_over_stopped: false };
     let enriched = enrich(model, cases, enrichment, context, make, |(made, _)| made.body())?;
     let Enriched { made: (reference, mut diagnostics), rounds: reference_errors } = enriched;
     diagnostics.extend(warnings(cases, &reference_errors, enrichment.enough()));
@@ -264,14 +264,14 @@ impl<'m> ConversionContext<'m> {
         };
         self.context.phase("reference of the variations");
         let make = |loads: &Mat<f64>| Ok(self.make(finest, loads, Vec::new())?.0);
-        let enrichment = Enrichment { grows: true, is_fine: false };
+        let are_stated = cases.states_variations();
+        let enrichment = Enrichment { grows: true, is_fine: false, passes_over_stopped: !are_stated };
         let Enriched { made, rounds: reference_errors } =
             enrich_from(responses, self.model, &scenes, enrichment, &self.context, make, Source::body)?;
         let warning = |(one, rounds): (&SceneVariation, &Vec<ReferenceError>)| {
             let warning = rounds.last()?.warning(&one.scene, enrichment.enough())?;
             Some(warning.about(format!("variation `{}`", one.name)))
         };
-        let are_stated = cases.states_variations();
         let diagnostics =
             variations.iter().zip(&reference_errors).filter_map(warning).filter(|_| are_stated).collect();
         let related = |source: &Source| source.clone().beside(made.body(), self.model).expect(OF_THE_MODEL);

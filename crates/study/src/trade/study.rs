@@ -158,10 +158,12 @@ pub fn trade(
     });
     let judge = judge.transpose()?;
     let recommended = match &judge {
-        Some(judge) => judge.recommend(&mut rows, in_scene, context)?,
-        None => in_scene,
+        Some(judge) if !judge.variations().is_empty() => judge.recommend(&mut rows, in_scene, context)?,
+        _ => in_scene,
     };
     job.time_what_is_worth_it(&mut rows, recommended, settings.repeat, context)?;
+    let of_variations = judge.as_ref().map_or(&[][..], Judge::diagnostics);
+    let found = cases.iter().flat_map(|case| &case.found).chain(of_variations);
     let seen = |at: usize| TradeCase::new(at, &cases[at], &rows, recommended);
     Ok(Trade {
         scene,
@@ -175,7 +177,7 @@ pub fn trade(
         variations: judge.as_ref().map_or_else(Vec::new, |judge| judge.variations().to_vec()),
         cases: (0..cases.len()).map(seen).collect(),
         rows,
-        diagnostics: cases.iter().flat_map(|case| case.found.iter().cloned()).collect(),
+        diagnostics: found.cloned().collect(),
     })
 }
 

@@ -3,6 +3,7 @@
 use super::case::StudyCase;
 use super::{Candidate, InCase, Measured, Recommendation, Source, TradeRow, front, reserved};
 use crate::reference::ReferenceError;
+use crate::selection::stops;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_linalg::context::Context;
@@ -82,12 +83,15 @@ pub struct InVariations {
 pub(super) struct Judge<'j> {
     cases: Vec<StudyCase<'j>>,
     variations: Vec<TradeVariation>,
+    /// Notes about variations that cannot be simulated.
+    diagnostics: Vec<Diagnostic>,
     /// Number of sources before the first source of the study.
     before: usize,
 }
 
 impl<'j> Judge<'j> {
-    /// Simulates the reference in every variation. `names` are the names of the load cases.
+    /// Simulates the reference in every variation. `names` are the names of the load cases. A standard variation whose
+    /// simulation stops is left out.
     ///
     /// # Errors
     /// The errors of [`trade`](super::trade).
@@ -102,12 +106,21 @@ impl<'j> Judge<'j> {
             false => (&varied.sources[..], 1),
         };
         let reserved = reserved(&varied.reference_errors, false);
-        let (mut cases, mut variations) = (Vec::new(), Vec::new());
+        let (mut cases, mut variations, mut diagnostics) = (Vec::new(), Vec::new(), Vec::new());
         for (at, one) in varied.variations.iter().enumerate() {
             let reserved = reserved.get(at).copied().unwrap_or(0.0);
             let about = format!("variation `{}`", one.name);
-            let case = StudyCase::new(sources, &one.scene, Some(one.name.clone()), None, reserved, context)
-                .map_err(|error| error.about(about))?;
+            let case = StudyCase::new(sources, &one.scene, Some(one.name.clone()), None, reserved, context);
+            let case = match case {
+                Ok(case) => case,
+                Err(error) => match stops(&error, one).filter(|_| !varied.are_stated) {
+                    Some(note) => {
+                        diagnostics.push(note);
+                        continue;
+                    }
+                    None => return Err(error.about(about)),
+                },
+            };
             variations.push(TradeVariation {
                 name: one.name.clone(),
                 case: names.get(one.case).cloned().flatten(),
@@ -118,7 +131,12 @@ impl<'j> Judge<'j> {
             });
             cases.push(case);
         }
-        Ok(Self { cases, variations, before })
+        Ok(Self { cases, variations, diagnostics, before })
+    }
+
+    /// Returns notes about standard variations that cannot be simulated.
+    pub(super) fn diagnostics(&self) -> &[Diagnostic] {
+        &self.diagnostics
     }
 
     /// Returns the variations.

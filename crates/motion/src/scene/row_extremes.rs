@@ -1,0 +1,333 @@
+//! Largest rows and stresses of a recovery over a motion, without the evaluation of all rows at all instants.
+//!
+//! A row is linear in the state z, and a stress measure of a point is bounded by a norm of few rows. With z = D U a and
+//! the directions U in which the history Z varies (the eigenvectors of Z Z'/D^2, with eigenvalues s^2),
+//!
+//! ```text
+//! |F_i z| <= sqrt(max_t sum_j a_j^2 / s_j^2) |F_i D U s|_F        and        |F_i z| <= | |F_i D U| max_t |a| |
+//! ```
+//!
+//! hold at every instant. Rows and points are evaluated in descending order of the smaller bound, until the next bound
+//! is below the largest value found.
+
+use super::{Peak, RowLayout, RowMap, RowStates, StressPoint};
+use faer::{Mat, MatRef};
+use flexbody_linalg::{SymmetricEigen, symmetric_eigen};
+
+/// Directions with a smaller part of the largest eigenvalue of the history are rounding: their part is bounded by
+/// amplitudes alone.
+const ROUNDING: f64 = 1e-24;
+
+/// Relative margin for the rounding of a bound.
+const MARGIN: f64 = 1e-9;
+
+/// Largest magnitude of a row or of a stress measure, with its place and time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RowExtreme {
+    /// Index of the row, or of the point for stress measures.
+    pub place: usize,
+    /// Time.
+    pub time: f64,
+    /// Value, with its sign.
+    pub value: f64,
+}
+
+/// Largest values of a recovery over a motion.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RowExtremes {
+    /// Row of the largest magnitude.
+    pub row: Option<RowExtreme>,
+    /// Point of the largest equivalent stress of von Mises; `None` without points.
+    pub von_mises: Option<RowExtreme>,
+    /// Point of the largest principal stress, if any is positive.
+    pub tension: Option<RowExtreme>,
+    /// Point of the smallest principal stress, if any is negative.
+    pub compression: Option<RowExtreme>,
+    /// Largest number of rows or points that one of these searches evaluated.
+    pub evaluated: usize,
+}
+
+/// Magnitude that is searched: a norm of `rows_of` bounds it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Measure {
+    Row,
+    VonMises,
+    Tension,
+    Compression,
+}
+
+impl Measure {
+    const ALL: [Self; 4] = [Self::Row, Self::VonMises, Self::Tension, Self::Compression];
+
+    /// Returns the linear forms (k x length of z) of one place, whose norm is not below the measure.
+    fn forms(self, map: &RowMap, place: usize) -> Mat<f64> {
+        let m = map.matrix.ncols();
+        if self == Self::Row {
+            return Mat::from_fn(1, m, |_, c| map.matrix[(place, c)]);
+        }
+        let [xx, yy, zz, xy, yz, xz] = map.points[place].rows;
+        let row = |i: usize, c: usize| map.matrix[(i, c)];
+        let (difference, shear) = (0.5f64.sqrt(), 3.0f64.sqrt());
+        match self {
+            // The sum of squares is the square of the equivalent stress.
+            Self::VonMises => Mat::from_fn(6, m, |form, c| match form {
+                0 => difference * (row(xx, c) - row(yy, c)),
+                1 => difference * (row(yy, c) - row(zz, c)),
+                2 => difference * (row(zz, c) - row(xx, c)),
+                form => shear * row([xy, yz, xz][form - 3], c),
+            }),
+            // The Frobenius norm of the stress is not below any principal stress.
+            _ => Mat::from_fn(6, m, |form, c| {
+                let weight = if form < 3 { 1.0 } else { std::f64::consts::SQRT_2 };
+                weight * row([xx, yy, zz, xy, yz, xz][form], c)
+            }),
+        }
+    }
+
+    fn places(self, map: &RowMap) -> usize {
+        if self == Self::Row { map.rows.len() } else { map.points.len() }
+    }
+
+    /// Returns the measure of the values of all forms of a place; not negative.
+    fn of(self, forms: &[f64]) -> f64 {
+        let weight = std::f64::consts::FRAC_1_SQRT_2;
+        let principal = || {
+            let s = |i: usize| if i < 3 { forms[i] } else { weight * forms[i] };
+            StressPoint::principal_of(&[s(0), s(1), s(2), s(3), s(4), s(5)])
+        };
+        match self {
+            Self::Row => forms[0].abs(),
+            Self::VonMises => forms.iter().map(|v| v * v).sum::<f64>().sqrt(),
+            Self::Tension => principal()[0].max(0.0),
+            Self::Compression => (-principal()[2]).max(0.0),
+        }
+    }
+}
+
+/// Directions in which a history varies, and how far.
+struct Directions {
+    /// D U (length of z x directions).
+    vectors: Mat<f64>,
+    /// Eigenvalues s^2.
+    squares: Vec<f64>,
+    /// Largest |a| of each direction.
+    amplitudes: Vec<f64>,
+    /// Largest sum of a^2 / s^2 over the directions above rounding.
+    leverage: f64,
+    /// Largest eigenvalue below which a direction is rounding.
+    least: f64,
+}
+
+impl Directions {
+    /// Returns the directions of a history; `None` if it has numbers that are not finite.
+    fn new(states: &RowStates) -> Option<Self> {
+        let m = states.layout.len();
+        // Numbers of one size: unit and kind of the coordinates do not matter.
+        let mut scale = vec![0.0f64; m];
+        for z in states.iter() {
+            scale.iter_mut().zip(z).for_each(|(most, z)| *most = most.max(z.abs()));
+        }
+        let used: Vec<usize> = (0..m).filter(|&c| scale[c] > 0.0).collect();
+        let mut gram = Mat::<f64>::zeros(used.len(), used.len());
+        for z in states.iter() {
+            for (b, &cb) in used.iter().enumerate() {
+                let right = z[cb] / scale[cb];
+                for (a, &ca) in used[..=b].iter().enumerate() {
+                    gram[(a, b)] += z[ca] / scale[ca] * right;
+                }
+            }
+        }
+        let gram = Mat::from_fn(used.len(), used.len(), |a, b| gram[(a.min(b), a.max(b))]);
+        let SymmetricEigen { values: squares, vectors: turned } = symmetric_eigen(gram.as_ref())?;
+        let least = ROUNDING * squares.iter().fold(0.0f64, |most, s| most.max(*s));
+        // Amplitudes along the directions at every instant.
+        let mut amplitudes = vec![0.0f64; used.len()];
+        let mut leverage = 0.0f64;
+        for z in states.iter() {
+            let mut own = 0.0;
+            for (j, most) in amplitudes.iter_mut().enumerate() {
+                let a: f64 = used.iter().enumerate().map(|(p, &c)| turned[(p, j)] * z[c] / scale[c]).sum();
+                *most = most.max(a.abs());
+                if squares[j] > least {
+                    own += a * a / squares[j];
+                }
+            }
+            leverage = leverage.max(own);
+        }
+        let mut vectors = Mat::zeros(m, used.len());
+        for (p, &c) in used.iter().enumerate() {
+            (0..used.len()).for_each(|j| vectors[(c, j)] = scale[c] * turned[(p, j)]);
+        }
+        Some(Self { vectors, squares, amplitudes, leverage, least })
+    }
+
+    /// Returns a bound of the norm of F z at all instants, for forms F (k x length of z).
+    fn bound(&self, forms: MatRef<'_, f64>) -> f64 {
+        let along = forms * &self.vectors;
+        let (mut of_amplitudes, mut of_energy) = (0.0, 0.0);
+        let mut of_rounding = 0.0;
+        for i in 0..along.nrows() {
+            let (mut sum, mut rest) = (0.0, 0.0);
+            for (j, amplitude) in self.amplitudes.iter().enumerate() {
+                let part = along[(i, j)].abs() * amplitude;
+                sum += part;
+                if self.squares[j] > self.least {
+                    of_energy += along[(i, j)].powi(2) * self.squares[j];
+                } else {
+                    rest += part;
+                }
+            }
+            of_amplitudes += sum * sum;
+            of_rounding += rest * rest;
+        }
+        let of_energy = (self.leverage * of_energy).sqrt() + of_rounding.sqrt();
+        of_amplitudes.sqrt().min(of_energy) * (1.0 + MARGIN)
+    }
+}
+
+/// Search for the extremes of recoveries over a history that arrives in pieces.
+#[derive(Debug, Clone)]
+pub struct ExtremeSearch {
+    /// True if values between the instants are estimated by parabolas.
+    between: bool,
+    found: Vec<RowExtremes>,
+}
+
+impl ExtremeSearch {
+    /// Creates a search over `recoveries` recoveries.
+    ///
+    /// * `between`: true to estimate the largest value between neighbouring instants, for a history that resolves every
+    ///   oscillation.
+    pub fn new(recoveries: usize, between: bool) -> Self {
+        Self { between, found: vec![RowExtremes::default(); recoveries] }
+    }
+
+    /// Takes the next piece of the history.
+    pub fn see(&mut self, maps: &[RowMap], states: &RowStates) {
+        if states.times.is_empty() {
+            return;
+        }
+        let directions = Directions::new(states);
+        for (map, found) in maps.iter().zip(&mut self.found) {
+            for measure in Measure::ALL {
+                let best = match measure {
+                    Measure::Row => &mut found.row,
+                    Measure::VonMises => &mut found.von_mises,
+                    Measure::Tension => &mut found.tension,
+                    Measure::Compression => &mut found.compression,
+                };
+                let evaluated = search(measure, map, states, directions.as_ref(), self.between, best);
+                found.evaluated = found.evaluated.max(evaluated);
+            }
+        }
+    }
+
+    /// Returns the extremes of every recovery.
+    pub fn finish(self) -> Vec<RowExtremes> {
+        self.found
+    }
+}
+
+/// Raises `best` to the largest value of `measure` over all places of `map`. Returns the number of evaluated places.
+fn search(
+    measure: Measure,
+    map: &RowMap,
+    states: &RowStates,
+    directions: Option<&Directions>,
+    between: bool,
+    best: &mut Option<RowExtreme>,
+) -> usize {
+    // Places in descending order of their bounds.
+    let of = |place: usize| {
+        directions.map_or(f64::INFINITY, |known| known.bound(measure.forms(map, place).as_ref()))
+    };
+    let bound = |place: usize| (of(place), place);
+    let mut places: Vec<(f64, usize)> = (0..measure.places(map)).map(bound).collect();
+    places.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    // The largest value at an instant decides where to stop, the largest one between instants what is found.
+    let mut sampled = 0.0f64;
+    let mut evaluated = 0;
+    for (bound, place) in places {
+        let beaten = sampled.max(if between { 0.0 } else { best.map_or(0.0, |best| best.value.abs()) });
+        if bound < beaten {
+            break;
+        }
+        evaluated += 1;
+        let own = Place::new(measure, map, place, states, between);
+        sampled = sampled.max(own.sampled);
+        let is_larger = match best {
+            None => measure == Measure::Row || measure == Measure::VonMises || own.extreme.value != 0.0,
+            Some(best) => own.extreme.value.abs() > best.value.abs() || own.extreme.value.is_nan(),
+        };
+        if is_larger {
+            *best = Some(own.extreme);
+        }
+    }
+    evaluated
+}
+
+/// Largest value of a measure at one place.
+struct Place {
+    extreme: RowExtreme,
+    /// Largest value at an instant.
+    sampled: f64,
+}
+
+impl Place {
+    fn new(measure: Measure, map: &RowMap, place: usize, states: &RowStates, between: bool) -> Self {
+        let forms = measure.forms(map, place);
+        let mut peak = Peak::default();
+        let (mut sampled, mut sign, mut time) = (0.0, 1.0, states.times[0]);
+        let mut values = vec![0.0; forms.nrows()];
+        for (z, &now) in states.iter().zip(&states.times) {
+            for (i, value) in values.iter_mut().enumerate() {
+                *value = z.iter().enumerate().map(|(c, z)| forms[(i, c)] * z).sum();
+            }
+            let value = measure.of(&values);
+            peak.see(now, value);
+            if value > sampled || value.is_nan() {
+                (sampled, time) = (value, now);
+                sign = match measure {
+                    Measure::Row => values[0].signum(),
+                    Measure::Compression => -1.0,
+                    _ => 1.0,
+                };
+            }
+        }
+        let (value, time) = if between { (peak.value, peak.time) } else { (sampled, time) };
+        Self { extreme: RowExtreme { place, time, value: sign * value }, sampled }
+    }
+}
+
+/// Observer of a motion that keeps a piece of the history and searches it when it is full.
+#[derive(Debug)]
+pub(super) struct RowSurvey {
+    piece: RowStates,
+    search: ExtremeSearch,
+    most: usize,
+}
+
+/// Number of values of a piece of the history: 32 MiB.
+const PIECE: usize = 1 << 22;
+/// Number of last instants that the next piece begins with, so that a peak between two pieces is found.
+const OVERLAP: usize = 2;
+
+impl RowSurvey {
+    pub(super) fn new(recoveries: usize, layout: RowLayout) -> Self {
+        let most = (PIECE / layout.len()).max(4 * OVERLAP);
+        Self { piece: RowStates::new(layout), search: ExtremeSearch::new(recoveries, true), most }
+    }
+
+    pub(super) fn see(&mut self, maps: &[RowMap], time: f64, z: &[f64]) {
+        self.piece.push(time, z);
+        if self.piece.times.len() >= self.most {
+            self.search.see(maps, &self.piece);
+            self.piece.keep_last(OVERLAP);
+        }
+    }
+
+    pub(super) fn finish(mut self, maps: &[RowMap]) -> Vec<RowExtremes> {
+        self.search.see(maps, &self.piece);
+        self.search.finish()
+    }
+}

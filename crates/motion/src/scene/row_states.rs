@@ -1,0 +1,173 @@
+//! Everything that rows of recoveries depend on, instant by instant, and the linear map from it to the rows.
+
+use super::StressPoint;
+use faer::Mat;
+use flexbody_body::flex_body::{LOAD_COMPONENTS, Recovery, RecoveryRow};
+use flexbody_model::LoadKind;
+use nalgebra::Vector3;
+
+/// Order of the numbers z = (1, q, f_1 ... f_m, w_k w_l) that rows are linear in: a constant, modal coordinates, force
+/// and torque at each interface, products of the angular velocity in the order of [`LoadKind::SPIN`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RowLayout {
+    modes: usize,
+    interfaces: Vec<String>,
+}
+
+impl RowLayout {
+    /// Creates the order for `recoveries` of one body with the given number of modes: all interfaces that any of them
+    /// has columns of.
+    pub fn new<'r>(modes: usize, recoveries: impl IntoIterator<Item = &'r Recovery>) -> Self {
+        let mut interfaces: Vec<String> = Vec::new();
+        for load in recoveries.into_iter().flat_map(|one| &one.loads) {
+            if !interfaces.contains(&load.interface) {
+                interfaces.push(load.interface.clone());
+            }
+        }
+        Self { modes, interfaces }
+    }
+
+    /// Returns the length of z.
+    pub fn len(&self) -> usize {
+        self.spin() + LoadKind::SPIN.len()
+    }
+
+    /// Returns false: z has at least its constant.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Returns the place of an interface among those with columns.
+    pub fn interface(&self, name: &str) -> Option<usize> {
+        self.interfaces.iter().position(|known| known == name)
+    }
+
+    /// Returns the names of the interfaces with columns, in the order of their loads.
+    pub fn interfaces(&self) -> &[String] {
+        &self.interfaces
+    }
+
+    /// Returns force and torque at an interface in the state z, body axes.
+    pub fn load_of<'z>(&self, z: &'z [f64], interface: usize) -> &'z [f64] {
+        &z[self.load(interface)..][..LOAD_COMPONENTS]
+    }
+
+    fn load(&self, interface: usize) -> usize {
+        1 + self.modes + LOAD_COMPONENTS * interface
+    }
+
+    fn spin(&self) -> usize {
+        self.load(self.interfaces.len())
+    }
+
+    /// Returns z of a state without loads.
+    ///
+    /// * `angular_velocity`: of the frame, body axes.
+    pub fn state(&self, q: &[f64], angular_velocity: &Vector3<f64>) -> Vec<f64> {
+        let mut z = vec![0.0; self.len()];
+        z[0] = 1.0;
+        z[1..=self.modes].copy_from_slice(q);
+        for (at, (k, l)) in (self.spin()..).zip(LoadKind::SPIN) {
+            z[at] = angular_velocity[k] * angular_velocity[l];
+        }
+        z
+    }
+
+    /// Adds force and torque at the reference point of an interface to z, body axes.
+    pub fn add_load(&self, z: &mut [f64], interface: usize, force: &Vector3<f64>, torque: &Vector3<f64>) {
+        let first = self.load(interface);
+        for k in 0..3 {
+            z[first + k] += force[k];
+            z[first + 3 + k] += torque[k];
+        }
+    }
+}
+
+/// States z at successive instants.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RowStates {
+    /// Order of the numbers of a state.
+    pub layout: RowLayout,
+    /// Times, ascending.
+    pub times: Vec<f64>,
+    /// z at each time, one after the other.
+    values: Vec<f64>,
+}
+
+impl RowStates {
+    /// Creates a history without instants.
+    pub fn new(layout: RowLayout) -> Self {
+        Self { layout, times: Vec::new(), values: Vec::new() }
+    }
+
+    /// Appends the state `z` at a time.
+    ///
+    /// # Panics
+    /// When its length differs from that of the layout.
+    pub fn push(&mut self, time: f64, z: &[f64]) {
+        assert_eq!(z.len(), self.layout.len(), "length of a state");
+        self.times.push(time);
+        self.values.extend_from_slice(z);
+    }
+
+    /// Returns z at the instant `at`.
+    pub fn state(&self, at: usize) -> &[f64] {
+        &self.values[at * self.layout.len()..][..self.layout.len()]
+    }
+
+    /// Returns all states in the order of time.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &[f64]> {
+        self.values.chunks_exact(self.layout.len())
+    }
+
+    /// Removes all instants but the last `kept`.
+    pub(super) fn keep_last(&mut self, kept: usize) {
+        let first = self.times.len().saturating_sub(kept);
+        self.times.drain(..first);
+        self.values.drain(..first * self.layout.len());
+    }
+}
+
+/// Rows of a recovery as a linear map of the states z.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RowMap {
+    /// Name of the recovery.
+    pub name: String,
+    /// Label of every row.
+    pub rows: Vec<RecoveryRow>,
+    /// Points with all six stresses among the rows.
+    pub points: Vec<StressPoint>,
+    /// Columns y0, R Psi, R G_r b_a of all interfaces of the layout, -R G_r M c_kl (rows x length of z).
+    pub(super) matrix: Mat<f64>,
+}
+
+impl RowMap {
+    /// Creates the map of `recovery` for states in the order `layout`.
+    pub fn new(recovery: &Recovery, layout: &RowLayout) -> Self {
+        let mut matrix = Mat::zeros(recovery.rows.len(), layout.len());
+        for i in 0..recovery.rows.len() {
+            matrix[(i, 0)] = recovery.offset[i];
+            (0..layout.modes).for_each(|j| matrix[(i, 1 + j)] = recovery.modes[(i, j)]);
+            for load in &recovery.loads {
+                let first =
+                    layout.load(layout.interface(&load.interface).expect("a layout of this recovery"));
+                (0..LOAD_COMPONENTS).for_each(|a| matrix[(i, first + a)] = load.columns[(i, a)]);
+            }
+            (0..LoadKind::SPIN.len()).for_each(|c| matrix[(i, layout.spin() + c)] = recovery.spin[(i, c)]);
+        }
+        let points = StressPoint::among(&recovery.rows);
+        Self { name: recovery.name.clone(), rows: recovery.rows.clone(), points, matrix }
+    }
+
+    /// Returns the values of all rows in the state `z`.
+    pub fn values(&self, z: &[f64]) -> Vec<f64> {
+        let value = |i: usize| z.iter().enumerate().map(|(c, z)| self.matrix[(i, c)] * z).sum();
+        (0..self.rows.len()).map(value).collect()
+    }
+
+    /// Returns true if any row depends on the angular velocity.
+    pub fn depends_on_spin(&self) -> bool {
+        let first = self.matrix.ncols() - LoadKind::SPIN.len();
+        self.matrix.as_ref().subcols(first, LoadKind::SPIN.len()).norm_max() > 0.0
+    }
+}
