@@ -1,6 +1,5 @@
 //! From a checked model to a flexible body: bases, the condensation into invariants, lumped comparators, the
 //! validated body, and its verification against the model. No files and no motion.
-
 #![deny(
     clippy::exit,
     clippy::print_stderr,
@@ -14,4 +13,5 @@ pub mod convert;
 pub mod flex_body;
 pub mod invariants;
 pub mod problems;
+mod recounts;
 pub mod verification;
