@@ -1,20 +1,16 @@
 //! Jobs of Nastran: a deck (.bdf, .dat, .nas), or a punch file with the grids of a superelement, and the matrices in it
 //! or in its folder: DMIG cards, which name their rows, or OUTPUT4, whose rows follow the points.
 
-mod assigned;
 mod bulk;
 mod constraints;
-mod elements;
+mod control;
 mod elimination;
 mod matrices;
-mod outputs;
-mod rows;
-mod sets;
 mod systems;
 
 use super::{Found, JobFile, JobModel, JobReader, condensed};
 use crate::bulk_cards::is_bulk_data;
-use crate::node_file::{NodeFile, Unresolved};
+use crate::node_files::{NodeFile, Unresolved};
 use bulk::Bulk;
 use elimination::GridPlaces;
 use flexbody_base::diagnostic::{Code, Diagnostic};
