@@ -1,13 +1,98 @@
-//! Conversion of the record groups into a body.
+//! MBDyn as an import format, recognised by its record groups, and the body that they describe.
 
-use super::lumped::{Lumped, lumped};
-use super::records::Records;
+use super::checks::checks;
+use super::records::{GROUP, Records, Surplus};
 use crate::import::redundant::has_no_w2;
-use crate::import::{ImportedBody, ImportedFrame};
+use crate::import::{ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::text::InputFile;
 use flexbody_body::flex_body::{GeometricStiffness, LoadKind, UnitLoad};
 use flexbody_body::invariants::{Numbered, TermGroups};
 use nalgebra::{Matrix3, Vector3};
+
+/// Import format of MBDyn.
+pub(crate) struct Mbdyn;
+
+/// Number of bytes within which the first record group must begin.
+const HEAD: usize = 1 << 16;
+
+impl ImportFormat for Mbdyn {
+    fn name(&self) -> &'static str {
+        "mbdyn"
+    }
+
+    fn recognises(&self, file: &InputFile) -> bool {
+        let head = &file.bytes()[..file.bytes().len().min(HEAD)];
+        head.split(|byte| *byte == b'\n').any(|line| line.starts_with(GROUP.as_bytes()))
+    }
+
+    fn read(&self, file: &InputFile) -> Result<ImportedFile> {
+        let records = Records::read(file)?;
+        let Some(read) = body(&records) else {
+            let message = "the file has no mass and inertia: record groups 11 and 12 are both missing";
+            return Err(Diagnostic::new(Code::ForeignIncomplete, message).in_file(file.path()).into());
+        };
+        let newest = (1..=19).rev().find(|group| records.has(*group)).unwrap_or(10);
+        let dialect = if newest > 13 { "level19" } else { "level13" };
+        Ok(ImportedFile {
+            format: "mbdyn",
+            dialect: dialect.to_owned(),
+            notes: notes(&records, newest),
+            checks: checks(&records, &read),
+            unsound: unsound(&records),
+            body: read.body,
+        })
+    }
+}
+
+/// Returns the defects of a file with nonzero numbers that MBDyn skips: the header states other counts of
+/// nodes or modes than the file has, and matrices are read wrongly.
+fn unsound(records: &Records) -> Vec<String> {
+    let numbers = records.skipped.iter().filter(|(_, surplus)| surplus.numbers && !surplus.zero);
+    let sentence = |(group, surplus): &(Option<usize>, Surplus)| {
+        let place = group
+            .map_or_else(|| "before record group 1".to_owned(), |group| format!("of record group {group}"));
+        format!("line {}: {} words {place} exceed the count in the header", surplus.line, surplus.words)
+    };
+    numbers.map(sentence).collect()
+}
+
+fn notes(records: &Records, newest: usize) -> Vec<String> {
+    let mut notes = vec![
+        format!("revision {}, {} nodes, {} modes", records.revision, records.n_nodes, records.n_modes),
+        format!(
+            "the last record group is {newest}; programs that do not know groups 14 to 19 reject files with a group above 13"
+        ),
+    ];
+    if from_masses(records) {
+        notes.push(
+            "the invariants are computed from the lumped masses, as MBDyn does; MBDyn uses invariant 9 only if the joint has `use invariant 9`"
+                .to_owned(),
+        );
+    }
+    if COUPLING.iter().any(|group| records.has(*group)) {
+        notes.push("invariants 4 and 8 are taken about the origin of the nodes: MBDyn does not move them with the origin of the joint".to_owned());
+    }
+    if records.general {
+        notes.push(
+            "the file states that the mass does not commute with rotations: record groups 9 and 18 need not agree"
+                .to_owned(),
+        );
+    }
+    let moves = |group: usize| records.get(group).is_some_and(|values| values.iter().any(|v| *v != 0.0));
+    if moves(3) || moves(4) {
+        notes.push(
+            "the initial values of the modes (record groups 3 and 4) are not converted: a body has none"
+                .to_owned(),
+        );
+    }
+    if !records.ended {
+        notes.push("the last line `** END OF FILE` is missing".to_owned());
+    }
+    notes
+}
 
 /// Groups of the invariants that couple rigid motion and modes.
 pub(crate) const COUPLING: [usize; 5] = [14, 15, 16, 17, 18];
@@ -31,7 +116,7 @@ pub(crate) fn missing(records: &Records) -> Vec<String> {
 
 /// Returns the body with mass, centre of mass and inertia from group 12, or from lumped masses; `None` if
 /// both are missing.
-pub(crate) fn body(records: &Records) -> Option<Read> {
+fn body(records: &Records) -> Option<Read> {
     let nf = records.n_modes;
     let square = |values: &[f64]| Mat::from_fn(nf, nf, |i, j| values[i * nf + j]);
     let matrix = |group: usize| records.get(group).map(square);
@@ -81,7 +166,7 @@ pub(crate) fn body(records: &Records) -> Option<Read> {
 
 /// Storage order of the three-row matrices in groups 14 to 18.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Order {
+enum Order {
     /// Row by row, as MBDyn reads them.
     Rows,
     /// Column by column, as the manual of MBDyn describes.
@@ -181,4 +266,75 @@ fn stiffening(
         }
     }
     (all, named)
+}
+
+// Invariants that MBDyn computes from lumped masses (record group 11) in Modal.cc, as sums over the nodes.
+
+/// Invariants of the lumped masses of the nodes, and their negative masses.
+pub(crate) struct Lumped {
+    /// Invariants I1 to I9 about the origin; I6 is the modal mass of the lumped masses.
+    pub(crate) numbered: Numbered,
+    /// Number of nodes with a negative mass.
+    pub(crate) negative: usize,
+    /// Sum of the magnitudes of negative masses divided by the sum of all magnitudes.
+    pub(crate) negative_share: f64,
+}
+
+/// Returns the lumped masses of record groups 8 and 11; `None` without group 11.
+fn lumped(records: &Records) -> Option<Lumped> {
+    let diagonal = records.get(11)?;
+    let (n, nf) = (records.n_nodes, records.n_modes);
+    let mut numbered = Numbered {
+        i1: 0.0,
+        i2: Vector3::zeros(),
+        i3: Mat::zeros(3, nf),
+        i4: Mat::zeros(3, nf),
+        i5: None,
+        i6: Mat::zeros(nf, nf),
+        i7: Matrix3::zeros(),
+        i8: vec![Matrix3::zeros(); nf],
+        i9: None,
+        groups: TermGroups::ALL,
+    };
+    let (mut i5, mut i9) = (Mat::zeros(3 * nf, nf), Mat::zeros(3 * nf, 3 * nf));
+    let (mut negative, mut below, mut all) = (0, 0.0, 0.0);
+    // Sums over the nodes with mass m, inertia J about the node, position x, shape psi and rotation theta.
+    for node in 0..n {
+        let [mass, _, _, jx, jy, jz] = *diagonal[6 * node..].first_chunk::<6>().expect("six per node");
+        let x = Vector3::from(records.position(node));
+        let inertia = Matrix3::from_diagonal(&Vector3::new(jx, jy, jz));
+        let shape = |first: usize, j: usize| Vector3::from_fn(|k, _| records.shape(node, first + k, j));
+        negative += usize::from(mass < 0.0);
+        below += (-mass).max(0.0);
+        all += mass.abs();
+        // Rigid body: sum m, sum m x, sum J - m x~ x~.
+        numbered.i1 += mass;
+        numbered.i2 += x * mass;
+        numbered.i7 += inertia - x.cross_matrix() * x.cross_matrix() * mass;
+        for j in 0..nf {
+            // Linear in a mode: sum m psi, sum m x~ psi + J theta, -sum m x~ psi~.
+            let (psi, turn) = (shape(0, j), shape(3, j));
+            let coupled = x.cross(&psi) * mass + inertia * turn;
+            for a in 0..3 {
+                numbered.i3[(a, j)] += mass * psi[a];
+                numbered.i4[(a, j)] += coupled[a];
+            }
+            numbered.i8[j] -= x.cross_matrix() * psi.cross_matrix() * mass;
+            for k in 0..nf {
+                // Quadratic: sum m psi_j . psi_k + theta_j . J theta_k, sum m psi_j x psi_k, sum m psi_j~
+                // psi_k~.
+                let other = shape(0, k);
+                numbered.i6[(j, k)] += psi.dot(&other) * mass + turn.dot(&(inertia * shape(3, k)));
+                let (cross, double) = (psi.cross(&other), psi.cross_matrix() * other.cross_matrix());
+                for a in 0..3 {
+                    i5[(a * nf + j, k)] += mass * cross[a];
+                    for b in 0..3 {
+                        i9[(a * nf + j, b * nf + k)] += mass * double[(a, b)];
+                    }
+                }
+            }
+        }
+    }
+    (numbered.i5, numbered.i9) = (Some(i5), Some(i9));
+    Some(Lumped { numbered, negative, negative_share: if all > 0.0 { below / all } else { 0.0 } })
 }

@@ -1,10 +1,12 @@
-//! Drawn parts of a body: points, and triangles and lines between them, in model axes.
+//! Shared code of pictures of a body: the drawn points, lines and triangles, the names of modes, the played
+//! motion.
 
-use crate::export::Points;
 use crate::export::frames::{ExportFrame, frames};
+use crate::export::{ExportOptions, Points};
 use faer::MatRef;
-use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
-use nalgebra::{Matrix3, Vector3};
+use flexbody_body::flex_body::{FlexBody, SurfaceMesh, is_static};
+use flexbody_file::RecordedMotion;
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::collections::HashMap;
 
 /// Points of a body with their motion in every mode: nodes in the order of the body, then the reference
@@ -154,4 +156,157 @@ fn surface_nodes(body: &FlexBody) -> Vec<usize> {
 fn indices(body: &FlexBody, numbers: &[i64]) -> Vec<usize> {
     let index: HashMap<i64, usize> = body.nodes().ids.iter().copied().zip(0..).collect();
     numbers.iter().filter_map(|number| index.get(number).copied()).collect()
+}
+
+// Names of modes in pictures, and names of files.
+
+/// Number of significant digits of a frequency.
+const DIGITS: usize = 5;
+
+/// Returns `mode_001 (123.4 Hz)` for each of the first `count` modes, or `mode_021 (residual vector: tip x)`
+/// for a static shape, whose frequency is no resonance.
+pub(crate) fn mode_names(body: &FlexBody, count: usize) -> Vec<String> {
+    let width = body.n_modes().to_string().len().max(3);
+    let name = |(j, hertz): (usize, &f64)| {
+        let origin = body.modes().provenance.get(j).map(String::as_str).unwrap_or_default();
+        let what = if is_static(origin) { printable(origin) } else { format!("{} Hz", rounded(*hertz)) };
+        format!("mode_{:0width$} ({what})", j + 1)
+    };
+    body.frequencies_hz().iter().enumerate().take(count).map(name).collect()
+}
+
+/// Returns a text of a body for a picture file. Characters that XML forbids or that control a terminal are
+/// replaced.
+pub(crate) fn printable(text: &str) -> String {
+    let strange = |c: char| c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}');
+    text.chars().map(|c| if strange(c) { '\u{fffd}' } else { c }).collect()
+}
+
+/// Returns advice on the file name if viewers, which detect formats by the extension, would not recognise it.
+pub(crate) fn named(options: &ExportOptions, extension: &str) -> Option<String> {
+    let name = options.name.as_ref()?;
+    let known = name.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
+    let wanted = name.with_extension(extension);
+    let wanted = wanted.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    (!known).then(|| format!("viewers recognise this format by the extension of the file: name it {wanted}"))
+}
+
+/// Returns a number with a few digits.
+pub(crate) fn rounded(value: f64) -> String {
+    let text = format!("{value:.*e}", DIGITS - 1);
+    match text.parse::<f64>() {
+        Ok(value) if value == 0.0 || (1e-3..1e7).contains(&value) => value.to_string(),
+        Ok(value) => format!("{value:e}"),
+        Err(_) => text,
+    }
+}
+
+// A motion for playback in pictures.
+
+/// Selected output times of a motion.
+pub(crate) struct Played<'m> {
+    motion: &'m RecordedMotion,
+    /// Indices of the selected times.
+    chosen: Vec<usize>,
+}
+
+impl<'m> Played<'m> {
+    /// Selects at most `most` output times of a motion.
+    pub(crate) fn new(motion: &'m RecordedMotion, most: usize) -> Self {
+        Self { motion, chosen: motion.some_instants(most) }
+    }
+
+    /// Returns the name of the scene.
+    pub(crate) fn scene(&self) -> &'m str {
+        &self.motion.scene
+    }
+
+    /// Returns the number of selected times.
+    pub(crate) fn len(&self) -> usize {
+        self.chosen.len()
+    }
+
+    /// Returns a selected time.
+    pub(crate) fn time(&self, instant: usize) -> f64 {
+        self.motion.time[self.chosen[instant]]
+    }
+
+    /// Returns the duration from the first to the last selected time.
+    pub(crate) fn duration(&self) -> f64 {
+        self.len().checked_sub(1).map_or(0.0, |last| self.time(last) - self.time(0))
+    }
+
+    /// Returns the modal coordinates at a selected time.
+    pub(crate) fn q(&self, instant: usize) -> &'m [f64] {
+        let (at, modes) = (self.chosen[instant], self.motion.modes);
+        &self.motion.q[at * modes..(at + 1) * modes]
+    }
+
+    /// Returns the origin of the frame at a selected time, world axes.
+    pub(crate) fn origin(&self, instant: usize) -> Vector3<f64> {
+        Vector3::from_column_slice(&self.motion.origins[3 * self.chosen[instant]..][..3])
+    }
+
+    /// Returns the rotation from the model axes, which turn with the body, to the world axes.
+    pub(crate) fn attitude(&self, instant: usize) -> UnitQuaternion<f64> {
+        let [w, i, j, k] = [0, 1, 2, 3].map(|part| self.motion.attitudes[4 * self.chosen[instant] + part]);
+        UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 0.0).unwrap_or_default()
+    }
+
+    /// Returns the origin of the frame in model coordinates.
+    pub(crate) fn origin_in_model(&self) -> Vector3<f64> {
+        self.motion.origin_in_model.into()
+    }
+
+    /// Returns the positions of points at a selected time, and their deflections from the undeformed body,
+    /// both in world axes; `shapes` are the shapes of the modes in the picture.
+    pub(crate) fn places(
+        &self,
+        instant: usize,
+        positions: &[[f64; 3]],
+        shapes: &[Vec<[f64; 3]>],
+    ) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
+        let (q, turn, origin) = (self.q(instant), self.attitude(instant), self.origin(instant));
+        let deflection = |point: usize| -> Vector3<f64> {
+            shapes.iter().zip(q).map(|(shape, q)| Vector3::from(shape[point]) * *q).sum()
+        };
+        let one = |(point, x): (usize, &[f64; 3])| -> ([f64; 3], [f64; 3]) {
+            let u = turn * deflection(point);
+            let rigid = origin + turn * (Vector3::from(*x) - self.origin_in_model());
+            ((rigid + u).into(), u.into())
+        };
+        positions.iter().enumerate().map(one).unzip()
+    }
+
+    /// Returns the number of times in words: `all 101 instants`, `50 of 101 instants`.
+    pub(crate) fn in_words(&self) -> String {
+        match (self.len(), self.motion.time.len()) {
+            (some, all) if some == all => format!("all {all} instants"),
+            (some, all) => format!("{some} of {all} instants"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frequencies_have_five_digits() {
+        for (value, text) in [
+            (123.4, "123.4"),
+            (1_234_567.0, "1234600"),
+            (0.012_345_678, "0.012346"),
+            (1e-9, "1e-9"),
+            (0.0, "0"),
+            (3.0e15, "3e15"),
+        ] {
+            assert_eq!(rounded(value), text);
+        }
+    }
+
+    #[test]
+    fn what_xml_cannot_hold_is_replaced() {
+        assert_eq!(printable("a\u{1}b\n\u{fffe}é"), "a\u{fffd}b\u{fffd}\u{fffd}é");
+    }
 }

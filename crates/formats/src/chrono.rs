@@ -1,29 +1,123 @@
-//! Coordinates of a Chrono assembly in which the automatic gravity of Chrono acts correctly on the body.
+//! Project Chrono: matrices for `ChModalAssembly::DoModalReduction(M, K, Cq, ...)` and
+//! `ChModalDampingReductionR(R)` as Matrix Market files.
 //!
-//! `ChModalAssembly` multiplies M with the acceleration of gravity on the translations of all nodes,
-//! including internal nodes, and keeps the rows of translations only. Modal amplitudes in the place of
-//! internal translations would get a weight that they do not have, and torques of gravity at the boundary
-//! nodes would be lost. Both are correct if gravity on all translations is a rigid translation of the body,
-//! and if M times it has no rows of rotations.
-//!
-//! The translation of the first internal node is therefore the displacement of the centre of mass,
-//! `N^-1 R' M q`, with the rigid translations R in the coordinates q and N = R' M R. All of the weight then
-//! acts there, and the reduction of Chrono transfers it to boundary nodes and modes with its torques.
-//! Translations of further internal nodes are modal amplitudes on top of that displacement; rotations are
-//! amplitudes alone.
-//!
-//! The modes need not move the centre of mass in all directions. Three further coordinates, displacements of
-//! the mass that moves in no mode (the *rest*), complete the basis. Uncoupled modes fill the last node: the
-//! eigensolvers of Chrono require fewer modes than coordinates and a positive definite mass matrix.
-//! Frequencies of both lie above those of all modes. A reduction to the number of modes of the body thus
-//! removes them and reproduces the body.
+//! These calls take the matrices of boundary nodes, then of internal nodes, six coordinates each. The
+//! boundary nodes are the frames; [`Assembly`] defines the internal nodes. The format also writes a table of the
+//! nodes.
 
-use crate::export::interface_matrices::InterfaceMatrices;
+use crate::export::Holding::{Lost, NotApplicable};
+use crate::export::interface_matrices::{InterfaceMatrices, matrix_checklist};
+use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::combine;
 use nalgebra::Matrix3;
+use std::fmt::Write;
+
+/// Export format of Project Chrono.
+pub(crate) struct Chrono;
+
+impl ExportFormat for Chrono {
+    fn name(&self) -> &'static str {
+        "chrono"
+    }
+
+    fn reader(&self) -> &'static str {
+        "Project Chrono, ChModalAssembly: matrices for DoModalReduction"
+    }
+
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
+        ExportChecklist {
+            gravity: Lost(
+                "the point of action of gravity on the deformed body: Chrono distributes the weight over the nodes as on the undeformed body"
+                    .to_owned(),
+            ),
+            units: NotApplicable,
+            ..matrix_checklist(body, options)
+        }
+    }
+
+    fn needs(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
+        let Ok(given) = InterfaceMatrices::of(body, "chrono") else { return Vec::new() };
+        let modes = Assembly::modes_to_request(given.mass.nrows() - 6 * given.frames.len());
+        vec![
+            format!(
+                "DoModalReduction must request {modes} modes with SetReductionType(CRAIG_BAMPTON) and SetUseStaticCorrection(false): the body has no more"
+            ),
+            "gravity acts with SetModalAutomaticGravity(true) alone, the default: nodes and meshes have no mass \
+             of their own"
+                .to_owned(),
+        ]
+    }
+
+    fn write(&self, body: &FlexBody, _: &ExportOptions) -> Result<Exported> {
+        let given = InterfaceMatrices::of(body, "chrono")?;
+        let assembly = Assembly::of(&given)?;
+        let mut beside = vec![
+            ("M.mtx".into(), matrix_market(&assembly.mass)),
+            ("K.mtx".into(), matrix_market(&assembly.stiffness)),
+        ];
+        beside.extend(assembly.damping.as_ref().map(|damping| ("R.mtx".into(), matrix_market(damping))));
+        Ok(Exported { file: table(&given, &assembly, centre_of_mass(body)), beside })
+    }
+}
+
+/// Returns the centre of mass in the body frame.
+fn centre_of_mass(body: &FlexBody) -> [f64; 3] {
+    (body.invariants().first_moment() / body.invariants().mass()).into()
+}
+
+/// Returns the table of the boundary nodes, with a remark about the internal ones.
+fn table(given: &InterfaceMatrices<'_>, assembly: &Assembly, [x, y, z]: [f64; 3]) -> Vec<u8> {
+    let internal = assembly.mass.nrows() / 6 - given.frames.len();
+    let mut table = format!(
+        "# boundary nodes in the order of the matrices, then {internal} internal nodes, all at the centre of mass \
+         {x:e} {y:e} {z:e}; modes to request: {}\nname,x,y,z\n",
+        Assembly::modes_to_request(assembly.n_modes)
+    );
+    for (name, [x, y, z]) in &given.frames {
+        let name = name.replace('"', "\"\"");
+        writeln!(table, "\"{name}\",{x:e},{y:e},{z:e}").expect("writing to a String cannot fail");
+    }
+    table.into_bytes()
+}
+
+/// Returns a symmetric matrix with all its nonzero entries in the general form of Matrix Market, which more
+/// readers support than the symmetric form.
+fn matrix_market(a: &Mat<f64>) -> Vec<u8> {
+    let size = a.nrows();
+    let places = (0..size).flat_map(|j| (0..size).map(move |i| (i, j)));
+    let entries: Vec<(usize, usize, f64)> =
+        places.map(|(i, j)| (i + 1, j + 1, a[(i, j)])).filter(|(_, _, v)| *v != 0.0).collect();
+    let mut text =
+        format!("%%MatrixMarket matrix coordinate real general\n{size} {size} {}\n", entries.len());
+    for (i, j, v) in entries {
+        writeln!(text, "{i} {j} {v:e}").expect("writing to a String cannot fail");
+    }
+    text.into_bytes()
+}
+
+// Coordinates of a Chrono assembly in which the automatic gravity of Chrono acts correctly on the body.
+//
+// `ChModalAssembly` multiplies M with the acceleration of gravity on the translations of all nodes,
+// including internal nodes, and keeps the rows of translations only. Modal amplitudes in the place of
+// internal translations would get a weight that they do not have, and torques of gravity at the boundary
+// nodes would be lost. Both are correct if gravity on all translations is a rigid translation of the body,
+// and if M times it has no rows of rotations.
+//
+// The translation of the first internal node is therefore the displacement of the centre of mass,
+// `N^-1 R' M q`, with the rigid translations R in the coordinates q and N = R' M R. All of the weight then
+// acts there, and the reduction of Chrono transfers it to boundary nodes and modes with its torques.
+// Translations of further internal nodes are modal amplitudes on top of that displacement; rotations are
+// amplitudes alone.
+//
+// The modes need not move the centre of mass in all directions. Three further coordinates, displacements of
+// the mass that moves in no mode (the *rest*), complete the basis. Uncoupled modes fill the last node: the
+// eigensolvers of Chrono require fewer modes than coordinates and a positive definite mass matrix.
+// Frequencies of both lie above those of all modes. A reduction to the number of modes of the body thus
+// removes them and reproduces the body.
 
 /// Frequency of the rest mass relative to the highest fixed-interface mode. Higher values cost digits of the
 /// stiffness: 4 has an error of 3e-11 of a deflection, 10 of 4e-10 (cantilever with two interfaces and six
@@ -39,21 +133,21 @@ const FILL_FREQUENCY: f64 = 2.0;
 const REST_MASS_SHARE: f64 = 0.01;
 
 /// Matrices of boundary nodes and internal nodes, six coordinates each.
-pub(super) struct Assembly {
+struct Assembly {
     /// Mass matrix M.
-    pub(super) mass: Mat<f64>,
+    mass: Mat<f64>,
     /// Stiffness matrix K.
-    pub(super) stiffness: Mat<f64>,
+    stiffness: Mat<f64>,
     /// Damping matrix R; `None` for a body without damping.
-    pub(super) damping: Option<Mat<f64>>,
+    damping: Option<Mat<f64>>,
     /// Number of fixed-interface modes.
-    pub(super) n_modes: usize,
+    n_modes: usize,
 }
 
 impl Assembly {
     /// Returns the number of modes to request from Chrono. Its eigensolvers need at least one: for a body
     /// without fixed-interface modes the three of the rest mass are requested.
-    pub(super) fn modes_to_request(n_modes: usize) -> usize {
+    fn modes_to_request(n_modes: usize) -> usize {
         if n_modes == 0 { 3 } else { n_modes }
     }
 
@@ -62,7 +156,7 @@ impl Assembly {
     /// # Errors
     /// [`ExportLoses`](Code::ExportLoses) if the mass matrix is not that of a body, or numbers leave double
     /// precision.
-    pub(super) fn of(given: &InterfaceMatrices<'_>) -> Result<Self> {
+    fn of(given: &InterfaceMatrices<'_>) -> Result<Self> {
         let refuse = |what: &str| {
             let message = format!(
                 "chrono needs the centre of mass of the body, which its matrices do not determine: {what}"
