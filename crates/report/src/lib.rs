@@ -1,7 +1,6 @@
 //! Reports: facts computed once and rendered as text, JSON and HTML. Covers bodies, the comparison of two
 //! bodies, simulations, selections, trade studies, frequency responses, audits, and the page that shows a
 //! body in motion.
-
 #![deny(
     clippy::exit,
     clippy::print_stderr,
@@ -13,11 +12,9 @@
 mod advice;
 mod audit;
 mod batch;
-mod body_lumped;
 mod body_modes;
 mod body_report;
 mod chart;
-mod clusters;
 mod common_modes;
 mod comparison;
 mod comparison_report;
@@ -25,14 +22,11 @@ mod completeness;
 mod craig_bampton;
 mod csv;
 mod document;
-mod errors_in_words;
+mod errors;
 mod facts;
 mod geometric_stiffness;
-mod glossary;
 mod guarantee;
-mod heat_map;
 mod html;
-mod identities;
 mod lumped;
 mod lumped_effect;
 mod mass_properties;
@@ -41,12 +35,10 @@ mod numbers;
 mod output;
 mod picture;
 mod recovered;
-mod reference_error;
 mod render;
 mod response;
 mod run_data;
 mod selection;
-mod selection_cases;
 mod selection_verdict;
 mod simulation;
 mod summary;
@@ -55,13 +47,7 @@ mod text;
 #[cfg(feature = "hdf5")]
 mod trade;
 #[cfg(feature = "hdf5")]
-mod trade_cases;
-#[cfg(feature = "hdf5")]
-mod trade_nodes;
-#[cfg(feature = "hdf5")]
 mod trade_verdict;
-mod unit_names;
-mod variations;
 #[cfg(feature = "hdf5")]
 mod view;
 
@@ -71,9 +57,8 @@ pub use batch::{BatchFacts, BatchRow};
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};
 pub use comparison_report::{ComparisonFormat, ComparisonReport};
 pub use facts::Facts;
-pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use measured_run::MeasuredRunFacts;
-pub use output::output_json;
+pub use output::{diagnostics_json, identities_json, identities_text, output_json};
 pub use recovered::{RecoveredFacts, recovered_csv};
 pub use render::{Format, render};
 pub use response::{ResponseFacts, response_csv};
