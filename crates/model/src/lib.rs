@@ -1,5 +1,4 @@
 //! Finite element model of one free body: nodes, degrees of freedom, K, M. Independent of file formats.
-
 #![deny(
     clippy::exit,
     clippy::print_stderr,
@@ -10,33 +9,20 @@
 
 mod assemble;
 mod assembled;
-mod body_number;
 mod checks;
-mod columns;
-mod common_units;
-mod connections;
 mod damping;
-mod damping_bands;
+mod decimate;
 mod density;
 mod director_blocks;
 mod director_mass;
 mod drilling;
-mod elements;
-mod empty_rows;
-mod exchanged;
 mod fe_model;
 mod geometric_stiffness;
 mod given_rows;
 mod inertial_rows;
 mod interface;
-mod interface_centre;
 mod layout;
-mod load_checks;
-mod local_mass;
-mod magnitude;
 mod mass_structure;
-mod matrix_checks;
-mod node_moments;
 mod node_pairs;
 mod nodes;
 mod raw;
@@ -48,27 +34,21 @@ mod rigid_motion;
 mod rows;
 mod separate_bodies;
 mod stress;
+mod stress_loads;
 mod surface;
-mod tolerance;
-mod unplaced_rows;
 mod wording;
 
-pub use body_number::BodyNumber;
-pub use checks::{CheckedModel, Plausibility, check};
-pub use damping::{Damping, DampingBand, DampingRatios, ratio_at};
-pub use damping_bands::{DAMPING_BAND_KEYS, damping_bands};
-pub use density::Densities;
-pub use director_mass::DirectorMass;
-pub use elements::{ElementShape, Elements};
-pub use empty_rows::filled_rows;
+pub use checks::{BodyNumber, CheckedModel, Plausibility, check};
+pub use damping::{DAMPING_BAND_KEYS, Damping, DampingBand, DampingRatios, damping_bands, ratio_at};
+pub use density::{Densities, SoundSpeed};
+pub use director_mass::{DirectorMass, NodeMoments, RigidAcceleration};
 pub use fe_model::FeModel;
 pub use geometric_stiffness::{GeometricStiffness, LoadKind, UnitLoad};
 pub use given_rows::{GivenRows, LostRow, NodeAxes, RowMap};
 pub use inertial_rows::InertialRows;
 pub use interface::{Coupling, InterfaceMotion, NodeSet, Reference};
-pub use local_mass::SoundSpeed;
-pub use node_moments::{NodeMoments, RigidAcceleration};
-pub use nodes::{DofLabel, Nodes};
+pub use layout::filled_rows;
+pub use nodes::{DofLabel, ElementShape, Elements, Nodes};
 pub use raw::{RawMatrix, RawModel, RawModes, RawShapes};
 pub use recovery::{ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
 pub use rigid::{centre_and_length, extents, rigid_axes, rigid_count, rigid_fields, span};

@@ -5,10 +5,8 @@
 //! addition: the error also counts the distance that a node moves. On a flat plate the planes alone would
 //! leave two triangles, which cannot show its bending; with the distance, triangles keep about equal sizes.
 
-use super::SurfaceMesh;
-use super::features::normal;
-use super::quadric::Quadric;
-use nalgebra::Vector3;
+use super::surface::SurfaceMesh;
+use nalgebra::{Matrix3, Vector3};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
@@ -243,10 +241,103 @@ impl Decimation {
     }
 }
 
+// Sums of squared distances from planes and points, as functions of the position.
+
+/// Quadratic function x'Ax - 2 b'x + c.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Quadric {
+    a: Matrix3<f64>,
+    b: Vector3<f64>,
+    c: f64,
+}
+
+impl Quadric {
+    /// Returns `weight` times the squared distance from the plane through `point` with the unit normal
+    /// `normal`.
+    pub(super) fn plane(normal: Vector3<f64>, point: Vector3<f64>, weight: f64) -> Self {
+        let distance = normal.dot(&point);
+        Self {
+            a: weight * normal * normal.transpose(),
+            b: weight * distance * normal,
+            c: weight * distance * distance,
+        }
+    }
+
+    /// Returns `weight` times the squared distance from `point`.
+    pub(super) fn point(point: Vector3<f64>, weight: f64) -> Self {
+        Self { a: Matrix3::identity() * weight, b: weight * point, c: weight * point.norm_squared() }
+    }
+
+    /// Returns the value at `x`; negative rounding becomes zero.
+    pub(super) fn at(&self, x: Vector3<f64>) -> f64 {
+        (x.dot(&(self.a * x)) - 2.0 * self.b.dot(&x) + self.c).max(0.0)
+    }
+}
+
+impl std::ops::AddAssign for Quadric {
+    fn add_assign(&mut self, other: Self) {
+        self.a += other.a;
+        self.b += other.b;
+        self.c += other.c;
+    }
+}
+
+// Feature edges that show the form of a surface.
+
+/// Angle between two surfaces, in degrees, above which there is an edge between them.
+const FEATURE_ANGLE_DEGREES: f64 = 30.0;
+
+/// Side of a triangle that is an edge of its element.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Side {
+    /// Nodes of the side, in the direction of the triangle.
+    pub step: [u32; 2],
+    pub triangle: u32,
+}
+
+impl Side {
+    fn key(&self) -> [u32; 2] {
+        let [a, b] = self.step;
+        [a.min(b), a.max(b)]
+    }
+}
+
+/// Returns the sides where triangles meet at an angle, where more than two of them meet, and where the
+/// surface ends; ascending.
+pub(super) fn feature_edges(
+    triangles: &[[u32; 3]],
+    mut sides: Vec<Side>,
+    positions: &[[f64; 3]],
+) -> Vec<[u32; 2]> {
+    let normal = |side: &Side| normal(triangles[side.triangle as usize], positions);
+    sides.sort_by_key(|side| (side.key(), side.triangle));
+    let is_feature = |sharing: &&[Side]| match sharing {
+        [one, other] => {
+            // If both run along the edge in one direction, one of the shells is turned over.
+            let turned = if one.step == other.step { -1.0 } else { 1.0 };
+            let cosine = turned * normal(one).dot(&normal(other));
+            // Triangles without area have no normal, and no feature edge.
+            cosine < FEATURE_ANGLE_DEGREES.to_radians().cos()
+                && normal(one) != Vector3::zeros()
+                && normal(other) != Vector3::zeros()
+        }
+        _ => true,
+    };
+    let groups = sides.chunk_by(|a, b| a.key() == b.key());
+    groups.filter(is_feature).map(|sharing| sharing[0].key()).collect()
+}
+
+/// Returns the unit normal of a triangle; zero if it has no area.
+fn normal([a, b, c]: [u32; 3], positions: &[[f64; 3]]) -> Vector3<f64> {
+    let x = |i: u32| Vector3::from(positions[i as usize]);
+    let cross = (x(b) - x(a)).cross(&(x(c) - x(a)));
+    cross.try_normalize(0.0).unwrap_or_default()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::elements::{ElementShape, Elements};
+    use crate::nodes::{ElementShape, Elements};
     use crate::{Nodes, skin};
 
     /// Returns a box of n x n x n bricks with sides of length 1.
@@ -298,5 +389,13 @@ mod tests {
             let fewer = mesh.decimated(&nodes.positions, most).expect("a mesh");
             assert!(fewer.triangles().len() <= most, "{most}: {}", fewer.triangles().len());
         }
+    }
+
+    #[test]
+    fn distances_from_planes_and_points_add_up() {
+        let mut sum = Quadric::plane(Vector3::z(), Vector3::new(5.0, 6.0, 1.0), 2.0);
+        sum += Quadric::point(Vector3::x(), 3.0);
+        let value = sum.at(Vector3::new(1.0, 2.0, 4.0));
+        assert!((value - (2.0 * 9.0 + 3.0 * (4.0 + 16.0))).abs() < 1e-12, "{value}");
     }
 }
