@@ -1,6 +1,5 @@
 //! Foundations of all other crates: errors and the table of diagnostic codes, units, provenance, memory, text files,
 //! and files that appear whole or not at all. This crate does not depend on matrices, models or bodies.
-
 #![deny(
     clippy::exit,
     clippy::print_stderr,
@@ -13,7 +12,6 @@ pub mod children;
 pub mod diagnostic;
 pub mod error;
 mod exit_code;
-mod file_mode;
 #[cfg(feature = "hdf5")]
 pub mod hdf5_file;
 pub mod memory;
