@@ -1,5 +1,6 @@
 //! Foundations of all other crates: errors and the table of diagnostic codes, units, provenance, memory, text files,
 //! and files that appear whole or not at all. This crate does not depend on matrices, models or bodies.
+
 #![deny(
     clippy::exit,
     clippy::print_stderr,

@@ -1,5 +1,6 @@
 //! From a checked model to a flexible body: bases, the condensation into invariants, lumped comparators, the
 //! validated body, and its verification against the model. No files and no motion.
+
 #![deny(
     clippy::exit,
     clippy::print_stderr,

@@ -1,6 +1,7 @@
 //! Computations on a cluster and batches: the files that a cluster needs to find the modes of a model (`prepare`), its
 //! results (`found`, `condensed`), the program that runs there (`driver.py`), its local start (`engine`), and lists of
 //! bodies (`batch`).
+
 #![deny(
     clippy::exit,
     clippy::print_stderr,

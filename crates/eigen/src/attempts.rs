@@ -1,6 +1,7 @@
 //! The attempts by iterations: cycles without a factor, Lanczos with a factor in single precision, and Lanczos with
 //! factors in double precision, with one shift below the modes or with a second shift among them.
 //!
+//! Cycles suit compact bodies, whose factor would take most of the time and of the memory.
 //! Cycles, and a factor in single precision, find rough modes, which are corrected against the true K and M in double
 //! precision until the true residuals keep the tolerance. The factor T of K + tau M in single precision is accurate to
 //! about 1e-7 times its condition number, so that Lanczos on its operator finds the modes to 1e-2 or 1e-4. A correction

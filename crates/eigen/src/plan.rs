@@ -178,7 +178,7 @@ pub(super) struct Goal {
     pub round: usize,
 }
 
-/// Algorithm behind a [`Way`](Way).
+/// Algorithm behind a [`Way`].
 pub(super) trait Attempt: Sync {
     /// Returns the memory and time that a search for `wanted` modes takes.
     ///

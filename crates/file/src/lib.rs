@@ -1,4 +1,5 @@
 //! The flex-body file: HDF5, one table for writer, reader, validator and documentation; and the file of a motion.
+
 #![deny(
     clippy::exit,
     clippy::print_stderr,

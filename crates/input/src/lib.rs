@@ -1,6 +1,7 @@
 //! Reads manifests, matrices, tables of nodes and degrees of freedom, and jobs of FE programs. Each matrix format has
 //! one file behind [`Reader`] and [`READERS`], each FE program one in `jobs`. The contracts with users are
 //! `docs/reference/input.md` and `docs/how_to/from_fe_programs.md`.
+
 #![deny(
     clippy::exit,
     clippy::print_stderr,
@@ -40,7 +41,6 @@ mod reader;
 mod recipes;
 mod recovery_files;
 mod region;
-mod row_axes;
 mod scipy_npz;
 mod shapes;
 mod tables;

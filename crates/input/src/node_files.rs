@@ -5,7 +5,6 @@ mod cdb;
 mod exodus;
 mod gmsh;
 mod vtk_legacy;
-mod vtk_numbers;
 mod vtk_xml;
 
 use super::bulk_cards::is_bulk_data;

@@ -1,7 +1,7 @@
 //! Reads all files of a model and collects all their problems.
 
 use super::jobs::{JobModel, comparable, read_job};
-use super::mapping::Mapping;
+use super::mapping::{Mapping, Turn};
 use super::mesh::MeshReading;
 use super::model_files::{
     InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource, RecoverySource,
@@ -9,7 +9,6 @@ use super::model_files::{
 use super::node_files::{NodeFile, NodeSets, Unresolved, read_node_file};
 use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::recovery_files::{read_offset, read_operator};
-use super::row_axes::Turn;
 use super::tables::{read_masses, read_node_list, read_recovery_rows};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};

@@ -1,4 +1,5 @@
 //! Finite element model of one free body: nodes, degrees of freedom, K, M. Independent of file formats.
+
 #![deny(
     clippy::exit,
     clippy::print_stderr,

@@ -1,8 +1,8 @@
 //! Audit of a file of another program as text and as JSON.
 
 use super::document::Block;
+use super::identities::{check_row, check_table};
 use super::numbers::significant;
-use super::output::{check_row, check_table};
 use super::text::{self, Screen};
 use flexbody_base::provenance::generator;
 use flexbody_formats::import::{Audit, AuditCheck};

@@ -1,6 +1,7 @@
 //! Reports: facts computed once and rendered as text, JSON and HTML. Covers bodies, the comparison of two
 //! bodies, simulations, selections, trade studies, frequency responses, audits, and the page that shows a
 //! body in motion.
+
 #![deny(
     clippy::exit,
     clippy::print_stderr,
@@ -27,6 +28,7 @@ mod facts;
 mod geometric_stiffness;
 mod guarantee;
 mod html;
+mod identities;
 mod lumped;
 mod lumped_effect;
 mod mass_properties;
@@ -57,8 +59,9 @@ pub use batch::{BatchFacts, BatchRow};
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};
 pub use comparison_report::{ComparisonFormat, ComparisonReport};
 pub use facts::Facts;
+pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use measured_run::MeasuredRunFacts;
-pub use output::{diagnostics_json, identities_json, identities_text, output_json};
+pub use output::output_json;
 pub use recovered::{RecoveredFacts, recovered_csv};
 pub use render::{Format, render};
 pub use response::{ResponseFacts, response_csv};

@@ -1,13 +1,8 @@
 //! JSON object that every command prints with `--json` (`schemas/output.schema.json`).
 
-use super::document::{Block, Inline, Table, cells};
-use super::numbers::significant;
-use super::text::{self, Screen};
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 use flexbody_base::error::ExitCode;
-use flexbody_body::invariants::IdentityCheck;
 use serde::Serialize;
-use serde_json::{Value, json};
 
 #[derive(Serialize)]
 struct Output<'a> {
@@ -54,46 +49,4 @@ pub fn output_json(
     // break, so that every line break can be indented.
     let results = results.unwrap_or("null").trim_end().replace('\n', "\n  ");
     format!("{},\n  \"results\": {results}\n}}\n", head.trim_end_matches("\n}"))
-}
-
-/// Renders a table of identities with failed ones marked, and their count.
-pub fn identities_text(checks: &[IdentityCheck]) -> String {
-    let rows = checks.iter().map(|c| check_row(c.name, [c.value, c.limit], c.formula, c.passed)).collect();
-    let failed = checks.iter().filter(|c| !c.passed).count();
-    let end = match (failed, checks.len()) {
-        (0, 1) => "the identity holds".to_owned(),
-        (0, all) => format!("all {all} identities hold"),
-        (failed, all) => format!("{failed} of {all} identities FAILED"),
-    };
-    text::render(&[Block::Table(check_table("identity", rows)), Block::Line(end)], Screen::default())
-}
-
-/// Returns the row of a check: name, value, limit, formula, and a mark of failure.
-pub(super) fn check_row(name: &str, [value, limit]: [f64; 2], formula: &str, passed: bool) -> Vec<Inline> {
-    let mark = if passed { "" } else { "FAILED" };
-    cells([name, &significant(value, 2), &significant(limit, 2), formula, mark].map(str::to_owned))
-}
-
-/// Returns the table of checks for a terminal.
-pub(super) fn check_table(kind: &str, rows: Vec<Vec<Inline>>) -> Table {
-    let heads = [kind, "value", "limit", "identity", ""];
-    Table::new("", heads, &[0, 3, 4], rows).in_text(|_| true)
-}
-
-/// Returns an array of objects with `name`, `formula`, `value` (null if not finite), `limit`, `passed`.
-pub fn identities_json(checks: &[IdentityCheck]) -> Value {
-    let object = |c: &IdentityCheck| json!({ "name": c.name, "formula": c.formula, "value": c.value, "limit": c.limit, "passed": c.passed });
-    checks.iter().map(object).collect()
-}
-
-/// Returns an object with the counts `errors`, `warnings`, `notes` and the array `diagnostics`: `code`,
-/// `severity`, `message`, `file`, `line`, `help`.
-pub fn diagnostics_json(diagnostics: &[Diagnostic]) -> Value {
-    let count = |severity| diagnostics.iter().filter(|d| d.severity() == severity).count();
-    json!({
-        "errors": count(Severity::Error),
-        "warnings": count(Severity::Warning),
-        "notes": count(Severity::Note),
-        "diagnostics": diagnostics,
-    })
 }

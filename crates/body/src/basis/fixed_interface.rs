@@ -68,7 +68,7 @@ impl FixedInterface {
 // corrections y = (T'KT)^-1 b lie in W and give the coupling G = y'K y = b'y and the mass H = y'M y. With
 // the cut mu, a lower bound of every eigenvalue of W, the eigenvalues below mu obey by Sylvester's law
 //
-// eigenvalues of (K_V, M_V + c G) <= lambda_j <= eigenvalues of (\[K_V, 0; 0, G\], \[M_V, G; G, H\]), c =
+// eigenvalues of (K_V, M_V + c G) <= lambda_j <= eigenvalues of ([K_V, 0; 0, G], [M_V, G; G, H]), c =
 // theta_j mu / (mu - theta_j),
 //
 // where theta_j >= lambda_j are the eigenvalues of the reduced body. The right side adds the corrections

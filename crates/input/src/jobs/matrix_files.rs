@@ -1,7 +1,8 @@
 //! Matrices as lines of text, as Abaqus and CalculiX write them.
 //!
-//! Lines with labels (Abaqus with FORMAT=MATRIX INPUT or LABELS) name node and direction of row and column; other lines
-//! are `row column value` without a header.
+//! Lines with labels (Abaqus with FORMAT=MATRIX INPUT or LABELS) name node and direction of row and column: `node,
+//! direction, node, direction, value`; the rows are the labels in ascending order. Other lines are `row column value`
+//! without a header.
 
 use super::deck::fields;
 use super::{Found, FromFile, both};

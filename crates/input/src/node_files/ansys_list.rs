@@ -59,7 +59,8 @@ fn decimal(field: &[u8]) -> Option<f64> {
     real(&text)
 }
 
-/// Returns the unit vectors along the rows of a node; `None` if all angles are zero.
+/// Returns the unit vectors along the rows of a node; `None` if all angles are zero. The angles are in degrees: THXY
+/// about z, THYZ about the rotated x, THZX about the rotated y.
 pub(super) fn axes([xy, yz, zx]: [f64; 3]) -> Option<NodeAxes> {
     if [xy, yz, zx] == [0.0; 3] {
         return None;

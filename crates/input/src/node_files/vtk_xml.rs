@@ -2,7 +2,7 @@
 //! unstructured grids.
 //! <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>
 
-use super::vtk_numbers::{Base64, NumberType, Packing, Unpacked};
+use super::vtk_legacy::{Base64, NumberType, Packing, Unpacked};
 use super::{Found, NodeFile, refused};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{number, words};

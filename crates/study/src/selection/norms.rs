@@ -167,7 +167,7 @@ impl CentrifugalLoad {
     }
 }
 
-// Significance of every term of the equations of motion for a body and a scene: dimensionless (\[WP19\] eq. 28 and 36
+// Significance of every term of the equations of motion for a body and a scene: dimensionless ([WP19] eq. 28 and 36
 // to 40, as corrected in the theory, section 11), and with the invariants of the body.
 
 /// Size of a term relative to the term that it is compared with.

@@ -1,8 +1,8 @@
 //! The content of bulk data and case control of a deck: positions, axes of rows, boundary, supports, sets.
 
 use super::constraints::Constraints;
-use super::control::{Assigned, SetLines};
 use super::systems::{Definition, Grid, SystemCard, SystemKind};
+use super::{Assigned, SetLines};
 use crate::bulk_cards::{Card, Item, components, read_deck};
 use crate::dmig::Dmigs;
 use crate::jobs::Found;
