@@ -13,7 +13,6 @@ pub mod children;
 pub mod diagnostic;
 pub mod error;
 mod exit_code;
-mod file_mode;
 #[cfg(feature = "hdf5")]
 pub mod hdf5_file;
 pub mod memory;

@@ -14,4 +14,5 @@ pub mod convert;
 pub mod flex_body;
 pub mod invariants;
 pub mod problems;
+mod recounts;
 pub mod verification;

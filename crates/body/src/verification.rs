@@ -1,6 +1,7 @@
 //! Verification of a body against its model: every invariant and every mode is recomputed from the
 //! matrices.
 
+use super::recounts::{interface_checks, recounts};
 use crate::convert::{BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, rigid_mass};
 use crate::flex_body::{FlexBody, Guarantee, ReferenceConditions, Storage};
 use crate::invariants::{
@@ -12,12 +13,7 @@ use flexbody_base::error::{Error, Result};
 use flexbody_eigen::{relative_residual, residual_scale, rounding_residual};
 use flexbody_linalg::{SymmetricMatrix, gram, larger, largest, largest_entry};
 use flexbody_model::{Damping, FeModel, GeometricStiffness, UnitLoad};
-use interfaces::interface_checks;
 use nalgebra::Vector3;
-use recounts::recounts;
-
-mod interfaces;
-mod recounts;
 
 /// Limit for recomputed invariants, relative to their Cauchy-Schwarz bounds: the rounding of their sums.
 const MAX_RECOMPUTED_DIFFERENCE: f64 = 1e-12;

@@ -1,7 +1,6 @@
 //! Local run of the driver, with MPI and the Python packages of PETSc and SLEPc.
 
-use super::prepare::DRIVER_SOURCE;
-use super::prepared::DRIVER;
+use super::prepare::{DRIVER, DRIVER_SOURCE};
 use flexbody_base::children;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;

@@ -10,22 +10,18 @@
     clippy::unwrap_used
 )]
 
-mod batch_list;
-mod condensed;
+mod batch;
 mod engine;
 mod found;
-mod ledger;
 mod petsc;
 mod prepare;
-mod prepared;
-mod row_order;
-mod schedule;
 mod sealed;
 
-pub use batch_list::{BatchBody, BatchList, read_batch_list};
+pub use batch::{
+    BatchBody, BatchList, Budget, DoneBody, Ledger, conversion_bytes, inputs_fingerprint, read_batch_list,
+};
 pub use engine::{Engine, Solver};
 pub use found::{ClusterModes, read_found};
-pub use ledger::{DoneBody, Ledger, inputs_fingerprint};
-pub use prepare::{Preparation, PrepareSettings, prepare};
-pub use prepared::{ModelReference, Prepared, WantedModes, read_prepared};
-pub use schedule::{Budget, conversion_bytes};
+pub use prepare::{
+    ModelReference, Preparation, PrepareSettings, Prepared, WantedModes, prepare, read_prepared,
+};

@@ -8,10 +8,8 @@
 //! double-double arithmetic, with a bound of the rounding of that arithmetic.
 
 use super::canonical::clusters;
-use super::completeness::count_below;
-use super::failure::EigenFailure;
-use super::problem::Task;
-use super::solution::EigenvalueBounds;
+use super::problem::{EigenFailure, EigenvalueBounds, Task};
+use super::solve::count_below;
 use faer::{Mat, MatRef};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{

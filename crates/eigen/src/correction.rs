@@ -3,17 +3,14 @@
 //! nodes, turn the residual forces of the modes into corrections; Rayleigh-Ritz on all vectors of the search space
 //! makes modes of them.
 
-use super::attempt::Goal;
 use super::canonical::{CLUSTER_GAP, cluster_end};
-use super::completeness::size_along;
-use super::failure::EigenFailure;
-use super::problem::{EigenProblem, Task};
-use super::refine::{FoundModes, Refined, residuals};
-use super::refine::{independent, leave_unbalanced, small_ritz};
+use super::plan::Goal;
+use super::problem::{EigenFailure, EigenProblem, Task};
+use super::refine::{FoundModes, Refined, independent, leave_unbalanced, residuals, small_ritz};
+use super::solve::size_along;
 use faer::Mat;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::multigrid::DeflationSpace;
-use flexbody_linalg::multigrid::{CorrectionTarget, Levels};
+use flexbody_linalg::multigrid::{CorrectionTarget, DeflationSpace, Levels};
 use flexbody_linalg::{
     Solve, Tall, combine, combine_in_place, combine_into, gram, largest, parallel, subtract_combination,
 };

@@ -4,14 +4,11 @@
 //! product. M may be singular: it is only ever multiplied. Full reorthogonalisation (twice) finds the copies of
 //! repeated eigenvalues; the later inertia count proves that none is missing.
 
-use super::attempt::Goal;
 use super::canonical::{CLUSTER_GAP, cluster_end};
-use super::failure::EigenFailure;
 use super::krylov::Krylov;
-use super::problem::EigenProblem;
-use super::refine::{FoundModes, Refined, residuals};
-use super::zero_energy::NOISE_DEVIATIONS;
-use super::zero_energy::{energy_noise, is_noisy};
+use super::plan::Goal;
+use super::problem::{EigenFailure, EigenProblem};
+use super::refine::{FoundModes, NOISE_DEVIATIONS, Refined, energy_noise, is_noisy, residuals};
 use faer::Mat;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{Solve, SymmetricEigen, symmetric_eigen};

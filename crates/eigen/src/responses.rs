@@ -1,11 +1,9 @@
 //! Responses to loads on the M-orthogonal complement of known motions: static responses by conjugate gradients,
 //! preconditioned by the factor of K + tau M, and harmonic responses with the factor of K - w^2 M.
 
-use super::failure::EigenFailure;
-use super::problem::EigenProblem;
-use super::settings::Precision;
-use super::shift::factorise;
-use super::zero_energy::rounding_residual;
+use super::attempts::factorise;
+use super::problem::{EigenFailure, EigenProblem, Precision};
+use super::refine::rounding_residual;
 use faer::{Mat, MatRef, Scale};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{

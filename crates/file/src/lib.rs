@@ -8,17 +8,11 @@
     clippy::unwrap_used
 )]
 
-#[cfg(feature = "hdf5")]
-mod assemble;
 mod contents;
-#[cfg(feature = "hdf5")]
-mod derived;
 #[cfg(feature = "hdf5")]
 mod digest;
 mod document;
 mod draft;
-#[cfg(feature = "hdf5")]
-mod extents;
 mod item;
 mod names;
 #[cfg(feature = "hdf5")]
@@ -31,8 +25,6 @@ mod scan;
 mod schema;
 #[cfg(feature = "hdf5")]
 mod simulation;
-#[cfg(feature = "hdf5")]
-mod simulation_read;
 #[cfg(feature = "hdf5")]
 mod structure;
 mod value;
@@ -48,9 +40,7 @@ pub use recorded_motion::RecordedMotion;
 #[cfg(feature = "hdf5")]
 pub use recovered::fill_recovered;
 #[cfg(feature = "hdf5")]
-pub use simulation::fill_simulation;
-#[cfg(feature = "hdf5")]
-pub use simulation_read::read_simulation;
+pub use simulation::{fill_simulation, read_simulation};
 #[cfg(feature = "hdf5")]
 pub use structure::structure;
 #[cfg(feature = "hdf5")]

@@ -1,14 +1,19 @@
 //! Reads a body file: format, entries, assembly, and checks of derived entries and digests.
 
-use super::assemble::assemble;
-use super::derived::check_derived;
-use super::scan::Scan;
-use super::schema::{FORMAT, MAJOR};
-use super::value::Value;
+use super::draft::Draft;
+use super::item::{
+    DERIVED_TOLERANCE, EntrySet, Extent, Item, Membership, Origin, Per, SHORT_TOLERANCE, SchemaGroup,
+};
+use super::names::place;
+use super::scan::{Scan, index, key};
+use super::schema::{FORMAT, MAJOR, TABLE};
+use super::value::{ReadValue, Value, View};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_base::hdf5_file::{self as hdf5_file, open_with_checked_texts};
-use flexbody_body::flex_body::FlexBody;
+use flexbody_base::hdf5_file;
+use flexbody_base::hdf5_file::open_with_checked_texts;
+use flexbody_base::units::UnitSystem;
+use flexbody_body::flex_body::{FlexBody, Parts};
 use hdf5_metno as hdf5;
 use std::path::Path;
 
@@ -121,5 +126,137 @@ fn check_format(file: &hdf5::File, path: &Path) -> Result<()> {
         }
         // Other values of the version are reported with the other entries.
         _ => Ok(()),
+    }
+}
+
+// Assembles the parts of a body from the values of a file, row by row of the table.
+
+/// Assembles the parts of a body. Returns `None` if texts or counts are invalid, or if entries are missing that belong
+/// together; the reason is then among the problems of `scan`.
+///
+/// `scan` must have no problems before: every required entry then exists, of its kind and with its shape.
+fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
+    check_together(scan);
+    let groups = scan.held()?;
+    let mut draft = Draft::new(units, scan.storage, groups);
+    draft.n_coordinates = Some(scan.sizes.of(Extent::Coordinates)).filter(|size| *size > 0);
+    for group in TABLE {
+        for (at, (name, path)) in instances(scan, group).into_iter().enumerate() {
+            if let Err(problem) = draft.begin(group.per, at, &name) {
+                scan.add(format!("{path}: {problem}"));
+            }
+            group.entries().for_each(|item| put(scan, &mut draft, &path, item));
+        }
+    }
+    let mut problems = Vec::new();
+    let parts = draft.finish(&mut problems);
+    problems.into_iter().for_each(|problem| scan.add(problem));
+    scan.problems.is_empty().then_some(parts)
+}
+
+/// Returns names and paths of the instances of a group.
+fn instances(scan: &Scan, group: &SchemaGroup) -> Vec<(String, String)> {
+    match group.per {
+        Per::Body => vec![(String::new(), group.path.to_owned())],
+        _ => {
+            let named = scan.instances(group.parent()).into_iter();
+            named.map(|(name, link)| (name, place(group, Some(&link)))).collect()
+        }
+    }
+}
+
+/// Moves the value of an entry from the scan into the draft.
+fn put(scan: &mut Scan, draft: &mut Draft, path: &str, item: &Item) {
+    let Some(put) = item.put else { return };
+    let name = key(path, item);
+    let value = match item.origin {
+        // The value is kept: it is compared with that of the finished body.
+        Origin::Derived(..) => scan.values.get(&name).cloned(),
+        _ => scan.values.remove(&name),
+    };
+    let Some(value) = value else { return };
+    let columns = item.shape().and_then(|shape| shape.last()).map_or(0, |extent| scan.sizes.of(*extent));
+    if let Err(problem) = put(draft, ReadValue { value, columns }) {
+        scan.add(format!("{name}: {problem}"));
+    }
+}
+
+/// Entries of a file that must occur together.
+struct FoundSet {
+    set: &'static EntrySet,
+    /// Keys of the entries; true for each that the file holds.
+    entries: Vec<(String, bool)>,
+    /// True if an entry is missing that the set requires.
+    is_incomplete: bool,
+}
+
+/// Adds a problem for every set of entries of which the file holds some but not all required ones.
+fn check_together(scan: &mut Scan) {
+    let mut sets: Vec<FoundSet> = Vec::new();
+    for group in TABLE {
+        for item in group.entries() {
+            let Some(Membership { set, required }) = item.together else { continue };
+            let name = if group.per == Per::Body { key(group.path, item) } else { group.parent().to_owned() };
+            let there = scan.values.contains_key(&name) || !scan.instances(&name).is_empty();
+            let at = sets.iter().position(|known| std::ptr::eq(known.set, set)).unwrap_or_else(|| {
+                sets.push(FoundSet { set, entries: Vec::new(), is_incomplete: false });
+                sets.len() - 1
+            });
+            sets[at].is_incomplete |= required && !there;
+            sets[at].entries.push((name, there));
+        }
+    }
+    for FoundSet { set, entries, .. } in sets.into_iter().filter(|set| set.is_incomplete) {
+        if entries.iter().any(|(_, there)| *there) {
+            scan.add((set.problem)(&entries));
+        }
+    }
+}
+
+// Comparison of derived entries of a file with the values that follow from the body.
+
+/// Adds a problem for every derived entry of the scanned file that contradicts `body`, which was assembled from the
+/// primary entries.
+fn check_derived(scan: &mut Scan, body: &Parts) {
+    for group in TABLE {
+        let links: Vec<Option<String>> = match group.per {
+            Per::Body => vec![None],
+            _ => scan.instances(group.parent()).into_iter().map(|(_, link)| Some(link)).collect(),
+        };
+        for ((_, view), link) in group.instances(body).into_iter().zip(links) {
+            check_group(scan, group, &place(group, link.as_deref()), &view);
+        }
+    }
+}
+
+fn check_group(scan: &mut Scan, group: &SchemaGroup, path: &str, view: &View<'_>) {
+    for item in group.entries() {
+        let Origin::Derived(get, scale) = item.origin else { continue };
+        let name = key(path, item);
+        let (Some(found), Some(expected)) = (scan.values.remove(&name), get(view)) else { continue };
+        match (&found, &expected) {
+            (Value::Floats(found), Value::Floats(expected)) => {
+                let largest = match group.entries().find(|i| i.name == scale).and_then(|i| i.value(view)) {
+                    Some(Value::Floats(values)) => values.iter().fold(0.0f64, |m, v| m.max(v.abs())),
+                    _ => 0.0,
+                };
+                let tolerance =
+                    if item.is_short(view.body.storage) { SHORT_TOLERANCE } else { DERIVED_TOLERANCE };
+                let differs = |(a, b): (&f64, &f64)| (a - b).abs() > tolerance * largest;
+                if let Some(i) = found.iter().zip(expected).position(differs) {
+                    let at = index(i, &item.dims(view));
+                    let (found, expected) = (found[i], expected[i]);
+                    scan.add_as(
+                        Code::BodyIdentity,
+                        format!("{name}: found {found:e} at {at}, but the primary data give {expected:e}"),
+                    );
+                }
+            }
+            (Value::Int(a), Value::Int(b)) if a != b => scan.add(format!("{name}: expected {b}, found {a}")),
+            (Value::Text(a), Value::Text(b)) if a != b => {
+                scan.add(format!("{name}: expected `{b}`, found {a:?}"));
+            }
+            _ => {}
+        }
     }
 }

@@ -125,7 +125,7 @@ fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOpt
 /// All import formats in the order in which files are recognised.
 pub const IMPORT_FORMATS: &[&dyn ImportFormat] = &[
     &sid::import::SidFile,
-    &mbdyn::import::Mbdyn,
+    &mbdyn::read::Mbdyn,
     #[cfg(feature = "hdf5")]
     &mbsim::read::Mbsim,
     #[cfg(feature = "hdf5")]

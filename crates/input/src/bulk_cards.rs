@@ -1,19 +1,17 @@
 //! Decks of Nastran: lines of case control, then bulk data cards in free, small and large fields, with continuations,
 //! comments and included files.
 
-mod apart;
-mod matrix_lines;
-mod replication;
+mod lines;
 
-use apart::Apart;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{self, Lines, excerpt, field, line_number, real, whole};
-pub(super) use matrix_lines::MatrixLines;
-use replication::{Replication, ReplicationRequest};
+use lines::{Apart, Replication, ReplicationRequest};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+
+pub(super) use lines::MatrixLines;
 
 /// Depth of included files above which a file is taken to include itself.
 const MAX_INCLUDE_DEPTH: usize = 20;

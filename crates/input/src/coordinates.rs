@@ -5,17 +5,12 @@
 use super::assemble::{Entry, Sides, check_size, refuse_beyond_memory};
 use super::digits::{COUNTED, written_digits};
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::{Compression, broken};
-use flexbody_base::text::scanner::BadLines;
+use flexbody_base::text::scanner::{BadLines, excerpt, expected, line_end, real, words};
 use flexbody_linalg::parallel;
 use std::io::Read;
 use std::path::Path;
-
-mod line;
-mod text;
-
-pub(crate) use line::Limits;
-pub(crate) use text::{Blocks, line_aligned, most_entries};
 
 /// Entries of a file, and the problems of its lines.
 pub(super) struct Coordinates {
@@ -100,7 +95,7 @@ impl Coordinates {
     }
 
     fn parse(&mut self, block: &[u8]) {
-        let parsed = parallel::map(line_aligned(block), |piece| line::parse(piece, self.limits));
+        let parsed = parallel::map(line_aligned(block), |piece| parse_lines(piece, self.limits));
         for piece in parsed {
             let before = self.lines;
             self.count += (piece.entries.len() + piece.bad.count()) as u64;
@@ -144,5 +139,307 @@ impl Coordinates {
         };
         let bad = self.bad.clone().into_diagnostics(Code::MatrixSyntax, "line");
         bad.into_iter().map(located).collect()
+    }
+}
+
+// Text in blocks that end at line ends, so that at most two blocks of a file are in memory.
+
+/// Bytes per block. Larger blocks would be newly mapped pages each time.
+const BLOCK: usize = 8 << 20;
+
+/// Bytes of the first block at the start. It grows with the text, because most files are small.
+const FIRST_BLOCK: usize = 1 << 16;
+
+/// Factor by which the first block grows. The allocator keeps the smaller blocks: doubling would leave as much as the
+/// largest block again.
+const GROWTH: usize = 16;
+
+/// Bytes per piece that one thread parses.
+const PIECE: usize = 1 << 20;
+
+/// Source of a text, block by block.
+pub(crate) struct Blocks<'a> {
+    stream: Box<dyn Read + Send + 'a>,
+    /// Beginning of the next line, which was read with the last block.
+    carry: Vec<u8>,
+    /// Memory of a block that is no longer used.
+    spare: Vec<u8>,
+    newline: bool,
+}
+
+impl<'a> Blocks<'a> {
+    /// Returns the blocks of the unpacked text of a file.
+    pub(crate) fn of(file: &'a InputFile, compression: Compression) -> Self {
+        Self::new(compression.stream_of(file))
+    }
+
+    fn new(stream: Box<dyn Read + Send + 'a>) -> Self {
+        Self { stream, carry: Vec::new(), spare: Vec::new(), newline: true }
+    }
+
+    /// Returns the next block. It ends at a line end, at the end of the file, or anywhere within a line longer than a
+    /// block.
+    pub(crate) fn next(&mut self) -> std::io::Result<Option<Vec<u8>>> {
+        let mut block = std::mem::take(&mut self.spare);
+        let (mut filled, mut ends) = (self.carry.len(), false);
+        block.resize(block.len().clamp(FIRST_BLOCK.max(filled), BLOCK.max(filled)), 0);
+        block[..filled].copy_from_slice(&self.carry);
+        self.carry.clear();
+        while !ends && filled < BLOCK {
+            if filled == block.len() {
+                block.resize((GROWTH * filled).min(BLOCK), 0);
+            }
+            let count = self.stream.read(&mut block[filled..])?;
+            filled += count;
+            ends = count == 0;
+        }
+        let end = whole_lines(&block[..filled], ends);
+        self.carry.extend_from_slice(&block[end..filled]);
+        block.truncate(end);
+        let Some(&last) = block.last() else { return Ok(None) };
+        self.newline = last == b'\n';
+        Ok(Some(block))
+    }
+
+    /// Takes back the memory of a block that is no longer used.
+    pub(crate) fn take_back(&mut self, block: Vec<u8>) {
+        self.spare = block;
+    }
+
+    /// Returns true when the text so far ends with a line end.
+    fn ends_with_newline(&self) -> bool {
+        self.newline
+    }
+}
+
+/// Returns the length of the whole lines of a block: all of it if it ends the file or has no line end.
+fn whole_lines(block: &[u8], ends_file: bool) -> usize {
+    match block.iter().rposition(|&b| b == b'\n') {
+        Some(at) if !ends_file => at + 1,
+        _ => block.len(),
+    }
+}
+
+/// Returns an upper bound of the number of entries in a text: one per line, of which `1 1 1` is the shortest. Entries
+/// are held until all are read, so their capacity must not exceed this bound.
+pub(crate) fn most_entries(text: &[u8]) -> usize {
+    (memchr::memchr_iter(b'\n', text).count() + 1).min(text.len() / 6 + 1)
+}
+
+/// Cuts a block at line ends into pieces of about [`PIECE`] bytes.
+pub(crate) fn line_aligned(block: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let mut rest = block;
+    std::iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
+        let target = PIECE.min(rest.len());
+        let end = rest[target..].iter().position(|&b| b == b'\n').map_or(rest.len(), |at| target + at + 1);
+        let (piece, after) = rest.split_at(end);
+        rest = after;
+        Some(piece)
+    })
+}
+
+// Data lines: a fast path for the form of nearly all files, and a slow path that reads every dialect and describes
+// errors. The fast path goes from byte to byte, without finding the line and its fields first; the slow path has them
+// from the text scanner.
+
+/// Limits from the header that apply to every line.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    pub n: u32,
+    pub integer: bool,
+}
+
+/// Parsed piece of a file.
+#[derive(Debug, Default)]
+struct EntryLines {
+    pub entries: Vec<Entry>,
+    pub lines: usize,
+    /// Bad lines, numbered from 1 within the piece.
+    pub bad: BadLines,
+    /// First lines (from 1) with a nonzero entry below and above the diagonal.
+    pub lower: Option<usize>,
+    pub upper: Option<usize>,
+    /// Largest number of written significant digits among the first entries of the piece.
+    pub written: u8,
+}
+
+/// Parses whole lines.
+fn parse_lines(text: &[u8], limits: Limits) -> EntryLines {
+    let mut piece = EntryLines { entries: Vec::with_capacity(most_entries(text)), ..EntryLines::default() };
+    let mut at = 0;
+    while at < text.len() {
+        piece.lines += 1;
+        at = skip_blanks(text, at);
+        if let Some((entry, number, next)) = fast(text, at, limits) {
+            piece.push(entry, number);
+            at = next;
+            continue;
+        }
+        let end = line_end(text, at);
+        let line = text[at..end].trim_ascii();
+        if !line.is_empty() && line[0] != b'%' {
+            match slow(line, limits) {
+                Ok((entry, number)) => piece.push(entry, number),
+                Err(bad) => piece.bad.add(bad.at_line(piece.lines)),
+            }
+        }
+        at = end;
+    }
+    piece
+}
+
+impl EntryLines {
+    fn push(&mut self, entry: Entry, number: &[u8]) {
+        if self.entries.len() < COUNTED && entry.value != 0.0 {
+            self.written = self.written.max(written_digits(number));
+        }
+        if entry.row != entry.col && entry.value != 0.0 {
+            let side = if entry.row > entry.col { &mut self.lower } else { &mut self.upper };
+            side.get_or_insert(self.lines);
+        }
+        self.entries.push(entry);
+    }
+}
+
+/// Parses `row col value` with blanks, plain exponents and a line end; returns `None` for other forms. Returns also the
+/// number as written and the start of the next line.
+fn fast(text: &[u8], at: usize, limits: Limits) -> Option<(Entry, &[u8], usize)> {
+    let (row, at) = fast_index(text, at, limits.n)?;
+    let (col, at) = fast_index(text, at, limits.n)?;
+    let (value, length) = fast_float2::parse_partial::<f64, _>(&text[at..]).ok()?;
+    let end = skip_blanks(text, at + length);
+    if !value.is_finite()
+        || text.get(end).is_some_and(|&b| b != b'\n')
+        || (limits.integer && value.fract() != 0.0)
+    {
+        return None;
+    }
+    Some((Entry { row, col, value }, &text[at..at + length], end + 1))
+}
+
+/// Parses an index from 1 to n with blanks after it. Returns it from 0.
+fn fast_index(text: &[u8], start: usize, n: u32) -> Option<(u32, usize)> {
+    let (mut index, mut at) = (0u64, start);
+    while let Some(digit @ b'0'..=b'9') = text.get(at) {
+        index = index * 10 + u64::from(digit - b'0');
+        at += 1;
+        if at - start > 10 {
+            return None;
+        }
+    }
+    let next = skip_blanks(text, at);
+    (next > at && index >= 1 && index <= u64::from(n)).then(|| (index as u32 - 1, next))
+}
+
+fn skip_blanks(text: &[u8], mut at: usize) -> usize {
+    while matches!(text.get(at), Some(b' ' | b'\t' | b'\r')) {
+        at += 1;
+    }
+    at
+}
+
+/// Parses a trimmed line with content in any dialect.
+fn slow(line: &[u8], limits: Limits) -> Result<(Entry, &[u8]), Diagnostic> {
+    let content = line.split(|&b| b == b'%').next().unwrap_or(line); // a comment may follow the value
+    let fields: Vec<&[u8]> = words(content).take(5).collect();
+    let &[row, col, number] = fields.as_slice() else {
+        return Err(expected(Code::MatrixSyntax, "row, column and value", line));
+    };
+    let (row, col) = (index(row, "row", limits.n)?, index(col, "column", limits.n)?);
+    let value = real(number).ok_or_else(|| {
+        let message = format!("value `{}` is not a number", excerpt(number));
+        let bad = Diagnostic::new(Code::MatrixSyntax, message);
+        if number.contains(&b',') { bad.with_help("write numbers with a decimal point") } else { bad }
+    })?;
+    let place = format!("entry ({}, {})", row + 1, col + 1);
+    if !value.is_finite() {
+        return Err(Diagnostic::new(Code::MatrixNotFinite, format!("{place} is `{}`", excerpt(number))));
+    }
+    if limits.integer && value.fract() != 0.0 {
+        let message = format!("{place} is `{}` in a matrix declared integer", excerpt(number));
+        let help = "write `real` instead of `integer` in the first line";
+        return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(help));
+    }
+    Ok((Entry { row, col, value }, number))
+}
+
+fn index(field: &[u8], which: &str, n: u32) -> Result<u32, Diagnostic> {
+    let text = std::str::from_utf8(field).ok();
+    match text.and_then(|t| t.parse::<i128>().ok()) {
+        Some(index) if index >= 1 && index <= i128::from(n) => Ok((index - 1) as u32),
+        Some(index) => {
+            let message = format!("{which} {index} is out of range, expected 1 to {n}");
+            Err(Diagnostic::new(Code::MatrixIndex, message))
+        }
+        None => {
+            let message = format!("{which} `{}` is not a whole number", excerpt(field));
+            Err(Diagnostic::new(Code::MatrixSyntax, message))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_and_blocks_put_together_are_the_text_and_end_at_lines() {
+        let mut text = String::new();
+        for k in 0..3_000_000u32 {
+            text += &format!("{k} {k} {k}.5\n");
+        }
+        text += "no line end";
+        assert!(text.len() > 2 * BLOCK, "more than two blocks");
+        let packed =
+            ruzstd::encoding::compress_to_vec(text.as_bytes(), ruzstd::encoding::CompressionLevel::Fastest);
+        for (compression, bytes) in [(Compression::None, text.as_bytes()), (Compression::Zstd, &packed)] {
+            let mut blocks = Blocks::new(compression.stream(bytes));
+            let mut at = 0;
+            while let Some(block) = blocks.next().unwrap() {
+                for piece in line_aligned(&block) {
+                    assert!(text.as_bytes()[at..].starts_with(piece));
+                    at += piece.len();
+                    assert!(piece.ends_with(b"\n") || at == text.len());
+                }
+                blocks.take_back(block);
+            }
+            assert_eq!(at, text.len());
+            assert!(!blocks.ends_with_newline());
+        }
+    }
+
+    const LIMITS: Limits = Limits { n: 9, integer: false };
+
+    #[test]
+    fn the_fast_and_the_slow_path_agree() {
+        for text in ["1 2 3.5", "9 9 -1e-3", "3 1 0", "4 4 +7", "5 6 1E300"] {
+            let (entry, number, next) = fast(text.as_bytes(), 0, LIMITS).expect(text);
+            assert_eq!(slow(text.as_bytes(), LIMITS).expect(text), (entry, number));
+            assert_eq!(next, text.len() + 1);
+        }
+    }
+
+    #[test]
+    fn the_fast_path_never_reads_into_the_next_line() {
+        for text in
+            ["1 2\n3 4 5\n", "1\n2 3 4\n", "1 2 3 4\n", "1 2 1e999\n", "0 1 1\n", "10 1 1\n", "1 2 nan\n"]
+        {
+            assert!(fast(text.as_bytes(), 0, LIMITS).is_none(), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn bad_lines_are_numbered_and_counted() {
+        let piece =
+            parse_lines(b"% c\n1 1 1\n\n1 2\nx 1 1\n2 2 nan\n1 0 1 % c\n3 3 1 %c\n1 1 1 1\n4 4 z\n", LIMITS);
+        assert_eq!(piece.entries.len(), 2);
+        assert_eq!((piece.lines, piece.bad.count()), (10, 6));
+        let bad = piece.bad.into_diagnostics(Code::MatrixSyntax, "line");
+        assert_eq!(bad.iter().filter_map(Diagnostic::line).collect::<Vec<_>>(), [4, 5, 6, 7, 9, 10]);
+        assert_eq!(bad[2].code(), Code::MatrixNotFinite);
+        assert_eq!(bad[3].code(), Code::MatrixIndex);
     }
 }

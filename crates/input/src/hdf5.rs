@@ -1,5 +1,9 @@
 //! Sparse matrices in HDF5 files: opens the file, and finds the group with the matrix.
 
+mod exodus;
+mod group;
+mod values;
+
 use super::named_matrices::NamedMatrices;
 use super::reader::{MatrixRole, MatrixSource, Reader};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -8,18 +12,12 @@ use flexbody_base::hdf5_file::{by_utf8_name, without_plugins};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, is_hdf5};
 use flexbody_model::RawMatrix;
-use hdf5_metno::{File, Group};
-
-mod array;
-mod exodus;
-mod group;
-mod members;
-mod values;
-
-pub(super) use array::read_array;
-pub(super) use exodus::read_exodus;
-use members::Members;
+use hdf5_metno::{File, Group, LinkType};
+use std::collections::BTreeMap;
 use values::Found;
+
+pub(super) use exodus::read_exodus;
+pub(super) use values::read_array;
 
 /// Reader of HDF5 files.
 pub(super) struct Hdf5;
@@ -150,4 +148,64 @@ fn listing(found: &[(String, Group)]) -> String {
 
 fn layout(message: String) -> Diagnostic {
     Diagnostic::new(Code::Hdf5Layout, message)
+}
+
+// The members of a group, and the names under which it holds a sparse matrix.
+
+const INDICES: &[&str] = &["indices", "ir"];
+const POINTERS: &[&str] = &["indptr", "jc"];
+const VALUES: &[&str] = &["data", "values", "val"];
+const ROWS: &[&str] = &["row", "rows", "i"];
+const COLUMNS: &[&str] = &["col", "cols", "j"];
+
+/// Links of a group by name.
+struct Members(BTreeMap<String, LinkType>);
+
+impl Members {
+    /// Returns the links of `group`; none if they cannot be listed.
+    fn of(group: &Group) -> Self {
+        let mut links = BTreeMap::new();
+        // A group that cannot be listed is reported as a group without a matrix.
+        let _ = group.iter_visit_default(|name, info| {
+            links.insert(name.to_owned(), info.link_type);
+            Ok(())
+        });
+        Self(links)
+    }
+
+    fn link(&self, name: &str) -> Option<LinkType> {
+        self.0.get(name).copied()
+    }
+
+    /// Returns true when `name` is a hard link. A soft link may lead to another file.
+    fn is_here(&self, name: &str) -> bool {
+        self.link(name) == Some(LinkType::Hard)
+    }
+
+    /// Returns true when `name` is a soft or external link. Such links are not followed.
+    fn is_elsewhere(&self, name: &str) -> bool {
+        self.link(name).is_some_and(|link| link != LinkType::Hard)
+    }
+
+    fn hard_links(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().filter(|(_, link)| **link == LinkType::Hard).map(|(name, _)| name.as_str())
+    }
+
+    fn first(&self, names: &[&'static str]) -> Option<&'static str> {
+        names.iter().copied().find(|name| self.0.contains_key(*name))
+    }
+
+    /// Returns the names of values, indices and pointers; `None` if one is missing.
+    fn compressed(&self) -> Option<(&'static str, &'static str, &'static str)> {
+        Some((self.first(VALUES)?, self.first(INDICES)?, self.first(POINTERS)?))
+    }
+
+    /// Returns the names of values, rows and columns; `None` if one is missing.
+    fn coordinates(&self) -> Option<(&'static str, &'static str, &'static str)> {
+        Some((self.first(VALUES)?, self.first(ROWS)?, self.first(COLUMNS)?))
+    }
+
+    fn look_like_a_matrix(&self) -> bool {
+        self.compressed().is_some() || self.coordinates().is_some()
+    }
 }

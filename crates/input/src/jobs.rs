@@ -2,34 +2,30 @@
 //! has one file behind [`JobReader`] and [`JOBS`].
 
 mod abaqus;
-mod abaqus_rows;
 mod abaqus_substructure;
 mod calculix;
-mod coordinate_files;
 mod deck;
 mod deck_mesh;
 mod deck_sets;
-mod deck_surfaces;
-mod distributing_couplings;
 mod element_kinds;
 mod expanded;
-mod labelled_lines;
+mod matrix_files;
 mod nastran;
-mod rotation_nodes;
 
-use super::node_file::{NodeFile, NodeSets, Unresolved};
+use super::node_files::{NodeFile, NodeSets, Unresolved};
 use abaqus::Abaqus;
 use calculix::Calculix;
 use deck::Deck;
-pub(super) use deck::comparable;
 use deck_mesh::DeckMesh;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::compression::refuse_packed;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
 use nastran::Nastran;
-pub(super) use nastran::nodes_of_bulk;
 use std::path::{Path, PathBuf};
+
+pub(super) use deck::comparable;
+pub(super) use nastran::nodes_of_bulk;
 
 /// Job of an FE program: its main file, and the program if the user named it.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -13,7 +13,6 @@
 mod array;
 mod assemble;
 mod bulk_cards;
-mod compressed;
 mod coordinates;
 mod digits;
 mod dmig;
@@ -33,24 +32,18 @@ mod mesh;
 mod mode_files;
 mod model_files;
 mod named_matrices;
-mod nastran_names;
-mod node_file;
 mod node_files;
 mod npy;
 mod output4;
 mod petsc;
 mod read_model;
 mod reader;
-mod readers;
-mod recent;
 mod recipes;
 mod recovery_files;
 mod region;
-mod row_axes;
 mod scipy_npz;
 mod shapes;
 mod tables;
-mod upright_order;
 
 pub use assemble::check_size;
 pub use jobs::{JobFile, is_job, job_programs};
@@ -60,8 +53,7 @@ pub use model_files::{
     RecoverySource, TableFiles, parse_units,
 };
 pub use read_model::{read_matrix, read_model, read_nodal_masses};
-pub use reader::{HEAD, MatrixRole, MatrixSource, Reader};
-pub use readers::READERS;
+pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use recipes::{RECIPES, Recipe, Step};
 pub use region::Region;
 pub use shapes::{ImportedColumns, read_imported, read_shapes};

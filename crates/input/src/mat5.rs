@@ -3,15 +3,14 @@
 
 use super::named_matrices::NamedMatrices;
 use super::reader::{MatrixRole, MatrixSource, Reader};
+use crate::array::Compressed;
+use crate::assemble::{check_size, most_entries_of};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_model::RawMatrix;
-
-mod elements;
-mod variable;
-
-use elements::{Found, Order};
-use variable::{Variable, VariableKind};
+use std::io::{ErrorKind, Read};
+use std::path::Path;
 
 /// Reader of MAT-files.
 pub(super) struct Mat5;
@@ -124,4 +123,334 @@ fn search<'v, 'a>(variables: &'v [Variable<'a>], role: MatrixRole) -> Found<&'v 
 
 fn paths<'v, 'a: 'v>(variables: impl IntoIterator<Item = &'v Variable<'a>>) -> Vec<String> {
     variables.into_iter().map(|variable| format!("/{}", variable.name)).collect()
+}
+
+// A variable of a MAT-file: its kind, and its matrix.
+
+/// Largest number of bytes of the flags, the extents and the name of a variable, each.
+const HEAD_BYTES: u64 = 1 << 16;
+
+const REAL: &str = "save a matrix of real numbers: K = sparse(real(K)); save('FILE.mat', 'K')";
+const BOTH_TRIANGLES: &str = "save both triangles: K + tril(K, -1)'";
+
+/// Kind of the content of a variable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum VariableKind {
+    Sparse,
+    /// Full array of real numbers with two extents.
+    Full,
+    /// Content that is no matrix, in words.
+    Other(&'static str),
+}
+
+/// Variable whose head has been read.
+struct Variable<'a> {
+    pub name: String,
+    pub kind: VariableKind,
+    pub rows: u64,
+    pub columns: u64,
+    single: bool,
+    /// Kind of its values, if they are no real numbers.
+    not_real: Option<&'static str>,
+    body: &'a [u8],
+    compressed: bool,
+    order: Order,
+}
+
+impl<'a> Variable<'a> {
+    /// Reads the head of the variable in `body`.
+    ///
+    /// # Errors
+    /// FB103 for damaged packed bytes, FB301, FB304.
+    fn open(body: &'a [u8], compressed: bool, order: Order) -> Found<Self> {
+        let [flags, extents, name] = Self::head(&mut Elements::of(body, compressed, order)?)?;
+        let flags = flags.whole(0).unwrap_or(0);
+        let extent = |k: usize| extents.whole(k).and_then(|extent| u64::try_from(extent).ok()).unwrap_or(0);
+        let kind = match (flags & 0xff, extents.len()) {
+            (5, 2) => VariableKind::Sparse,
+            (6..=15, 2) => VariableKind::Full,
+            (6..=15, _) => VariableKind::Other("an array of more than two extents"),
+            (1, _) => VariableKind::Other("a cell array"),
+            (2, _) => VariableKind::Other("a struct"),
+            (4, _) => VariableKind::Other("a text"),
+            _ => VariableKind::Other("an object"),
+        };
+        let not_real = match flags >> 8 {
+            flags if flags & 8 != 0 => Some("complex numbers"),
+            flags if flags & 2 != 0 => Some("logical values"),
+            _ => None,
+        };
+        Ok(Self {
+            name: String::from_utf8_lossy(&name.bytes).into_owned(),
+            kind,
+            rows: extent(0),
+            columns: extent(1),
+            single: flags & 0xff == 7,
+            not_real,
+            body,
+            compressed,
+            order,
+        })
+    }
+
+    /// Reads flags, extents and name.
+    fn head(elements: &mut Elements<'a>) -> Found<[Numbers; 3]> {
+        let mut next = || elements.next(HEAD_BYTES);
+        let head = [next()?, next()?, next()?];
+        if head[0].len() < 2 || !head[0].is_whole() || !head[1].is_whole() {
+            let message = "a variable does not begin with its flags and extents";
+            return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP));
+        }
+        Ok(head)
+    }
+
+    /// Returns the matrix of the variable.
+    ///
+    /// # Errors
+    /// FB302 for a variable that is no matrix of real numbers, FB103, and the errors of matrices.
+    fn matrix(&self, path: &Path) -> Found<RawMatrix> {
+        let mut elements = Elements::of(self.body, self.compressed, self.order)?;
+        Self::head(&mut elements)?;
+        let raw = match (self.kind, self.not_real) {
+            (VariableKind::Other(what), _) | (_, Some(what)) => {
+                let message = format!("variable `{}` holds {what}, not a matrix of real numbers", self.name);
+                return Err(Diagnostic::new(Code::MatrixKind, message).with_help(REAL));
+            }
+            (VariableKind::Sparse, None) => {
+                let (indices, values) = (self.most_entries() * 4, self.most_entries() * 8);
+                let pointers = self.columns.saturating_add(1).saturating_mul(8);
+                let arrays = [elements.next(indices)?, elements.next(pointers)?, elements.next(values)?];
+                self.sparse(arrays, path)?
+            }
+            (VariableKind::Full, None) => {
+                let places = self.rows.saturating_mul(self.columns);
+                self.full(&elements.next(places.saturating_mul(8))?, path)?
+            }
+        };
+        elements.finish()?;
+        Ok(RawMatrix { digits: if self.single { raw.digits.min(7) } else { raw.digits }, ..raw })
+    }
+
+    /// Returns the largest number of entries of a matrix of this size.
+    fn most_entries(&self) -> u64 {
+        most_entries_of(self.columns).min(u64::MAX / 8)
+    }
+
+    fn sparse(&self, [indices, pointers, values]: [Numbers; 3], path: &Path) -> Found<RawMatrix> {
+        let n = check_size(self.rows, self.columns, values.len() as u64)?;
+        let pointers: Vec<u64> = (0..pointers.len())
+            .map(|k| pointers.whole(k).and_then(|at| u64::try_from(at).ok()).unwrap_or(u64::MAX))
+            .collect();
+        // The arrays may have capacity for more entries than are used.
+        let count = indices.len().min(values.len());
+        let entries = pointers.last().map_or(0, |last| (*last).min(count as u64) as usize);
+        let compressed = Compressed {
+            n,
+            by_rows: false,
+            pointers,
+            pointers_name: "the list of columns (jc)",
+            entries,
+            entry: &|k| (indices.whole(k).unwrap_or(-1), values.real(k).unwrap_or(f64::NAN)),
+            help: HELP,
+            both_triangles: BOTH_TRIANGLES,
+        };
+        compressed.assemble(path)
+    }
+
+    fn full(&self, values: &Numbers, path: &Path) -> Found<RawMatrix> {
+        if self.rows.checked_mul(self.columns) != Some(values.len() as u64) {
+            let (rows, columns, count) = (self.rows, self.columns, values.len());
+            let message =
+                format!("variable `{}` has {rows} x {columns} places and {count} values", self.name);
+            return Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP));
+        }
+        let n = check_size(self.rows, self.columns, values.len() as u64)?;
+        let compressed = Compressed {
+            n,
+            by_rows: false,
+            pointers: (0..=n as u64).map(|column| column * n as u64).collect(),
+            pointers_name: "the list of columns",
+            entries: n * n,
+            entry: &|k| ((k % n) as i64, values.real(k).unwrap_or(f64::NAN)),
+            help: HELP,
+            both_triangles: BOTH_TRIANGLES,
+        };
+        compressed.assemble(path)
+    }
+}
+
+// Data elements of a MAT-file: a tag with type and number of bytes, and the bytes.
+
+type Found<T> = std::result::Result<T, Diagnostic>;
+
+/// Byte order of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    Little,
+    Big,
+}
+
+impl Order {
+    /// Returns the byte order of a file of version 5 that begins with `head`; `None` for other files.
+    fn of(head: &[u8]) -> Option<Self> {
+        match head.get(124..128)? {
+            b"\x00\x01IM" => Some(Self::Little),
+            b"\x01\x00MI" => Some(Self::Big),
+            _ => None,
+        }
+    }
+
+    /// Returns the bytes as a number, without regard to a sign.
+    fn digits(self, bytes: &[u8]) -> u64 {
+        let append = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
+        match self {
+            Self::Little => bytes.iter().rev().fold(0, append),
+            Self::Big => bytes.iter().fold(0, append),
+        }
+    }
+
+    /// Returns two whole numbers of four bytes.
+    fn two(self, bytes: &[u8; 8]) -> [u32; 2] {
+        [self.digits(&bytes[..4]) as u32, self.digits(&bytes[4..]) as u32]
+    }
+}
+
+/// Consecutive elements of a variable.
+struct Elements<'a> {
+    stream: Box<dyn Read + 'a>,
+    order: Order,
+}
+
+impl<'a> Elements<'a> {
+    /// Returns the elements in the body of a variable.
+    fn of(body: &'a [u8], compressed: bool, order: Order) -> Found<Self> {
+        let mut elements = Self { stream: Box::new(body), order };
+        if compressed {
+            elements.stream = Box::new(flate2::read::ZlibDecoder::new(body));
+            // Packed bytes hold a variable with its tag.
+            elements.take(8)?;
+        }
+        Ok(elements)
+    }
+
+    /// Returns the next element.
+    ///
+    /// # Errors
+    /// FB103 for damaged packed bytes, FB304 if the variable ends within the element or the element has more than
+    /// `most` bytes, FB601.
+    fn next(&mut self, most: u64) -> Found<Numbers> {
+        let tag: [u8; 8] = self.take(8)?.try_into().expect("eight bytes were read");
+        let [kind, length] = self.order.two(&tag);
+        // An element of up to four bytes is stored in the tag itself.
+        if kind >> 16 != 0 {
+            let bytes = tag[4..].get(..(kind >> 16) as usize).ok_or_else(|| {
+                Diagnostic::new(
+                    Code::MatrixSyntax,
+                    "an element that is stored in its tag is longer than 4 bytes",
+                )
+                .with_help(HELP)
+            })?;
+            return Ok(Numbers { kind: kind & 0xffff, bytes: bytes.to_vec(), order: self.order });
+        }
+        if u64::from(length) > most {
+            let message = format!("a variable has {length} bytes, but its extents allow at most {most}");
+            return Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP));
+        }
+        let what = "reading a variable";
+        refuse_beyond(left(), f64::from(length), what, "use a larger machine")
+            .map_err(|error| error.first_error().clone())?;
+        let bytes = self.take(u64::from(length))?;
+        let padding = u64::from(length).next_multiple_of(8) - u64::from(length);
+        // The padding of the last element of a file may be missing.
+        self.read(padding)?;
+        Ok(Numbers { kind, bytes, order: self.order })
+    }
+
+    /// Reads to the end, where the checksum of packed bytes is verified.
+    fn finish(mut self) -> Found<()> {
+        std::io::copy(&mut self.stream, &mut std::io::sink()).map_err(damaged).map(|_| ())
+    }
+
+    fn take(&mut self, length: u64) -> Found<Vec<u8>> {
+        let bytes = self.read(length)?;
+        if bytes.len() as u64 == length {
+            return Ok(bytes);
+        }
+        let message = "a variable ends within its data: the file may be cut off";
+        Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP))
+    }
+
+    /// Returns the next `length` bytes, or fewer at the end.
+    fn read(&mut self, length: u64) -> Found<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.stream.by_ref().take(length).read_to_end(&mut bytes).map_err(damaged)?;
+        Ok(bytes)
+    }
+}
+
+fn damaged(error: std::io::Error) -> Diagnostic {
+    let message = match error.kind() {
+        ErrorKind::UnexpectedEof => "a compressed variable ends before its data do".to_owned(),
+        _ => format!("a compressed variable is damaged: {error}"),
+    };
+    Diagnostic::new(Code::FileCompressionBroken, message).with_help(HELP)
+}
+
+/// Content of an element: numbers of one type, or text.
+struct Numbers {
+    kind: u32,
+    pub bytes: Vec<u8>,
+    order: Order,
+}
+
+impl Numbers {
+    /// Returns the bytes per number; `None` if the element holds no numbers.
+    fn width(&self) -> Option<usize> {
+        Some(match self.kind {
+            1 | 2 => 1,
+            3 | 4 => 2,
+            5..=7 => 4,
+            9 | 12 | 13 => 8,
+            _ => return None,
+        })
+    }
+
+    /// Returns the number of numbers.
+    fn len(&self) -> usize {
+        self.width().map_or(0, |width| self.bytes.len() / width)
+    }
+
+    fn is_real(&self) -> bool {
+        matches!(self.kind, 7 | 9)
+    }
+
+    /// Returns true when the type of the numbers is an integer.
+    fn is_whole(&self) -> bool {
+        self.width().is_some() && !self.is_real()
+    }
+
+    /// Returns the k-th number if it is an integer that fits into i64.
+    fn whole(&self, k: usize) -> Option<i64> {
+        if !self.is_whole() {
+            return None;
+        }
+        let width = self.width()?;
+        let number = self.order.digits(self.bytes.get(k * width..(k + 1) * width)?);
+        let unused = 64 - 8 * width as u32;
+        match self.kind {
+            2 | 4 | 6 | 13 => i64::try_from(number).ok(),
+            _ => Some(((number << unused) as i64) >> unused),
+        }
+    }
+
+    /// Returns the k-th number.
+    fn real(&self, k: usize) -> Option<f64> {
+        let digits = |width: usize| Some(self.order.digits(self.bytes.get(k * width..(k + 1) * width)?));
+        match self.kind {
+            7 => Some(f64::from(f32::from_bits(digits(4)? as u32))),
+            9 => Some(f64::from_bits(digits(8)?)),
+            13 => Some(digits(8)? as f64),
+            _ => self.whole(k).map(|number| number as f64),
+        }
+    }
 }

@@ -53,3 +53,134 @@ impl NamedMatrices {
         format!("name the {0} as {1}:/{0}; the file has {shown}{more}", self.holder, self.file)
     }
 }
+
+// The choice of a matrix among several in a file of Nastran, by their names, whose first letter is the role.
+
+/// Returns true when Nastran gives this name to a matrix of this role: `K...`, `M...`, `B...`, and `KD...` for
+/// differential stiffness. `K4...` is structural damping.
+fn is_called(role: MatrixRole, name: &str) -> bool {
+    let name = name.to_ascii_uppercase();
+    let begins = |head: &str| name.starts_with(head);
+    match role {
+        MatrixRole::Stiffness => begins("K") && !begins("K4") && !begins("KD"),
+        MatrixRole::Mass => begins("M"),
+        MatrixRole::Damping => begins("B") || begins("D"),
+        MatrixRole::GeometricStiffness => begins("KD") || begins("KG"),
+    }
+}
+
+/// Returns the index of the matrix that a user has named, or of the only one of its role.
+///
+/// # Errors
+/// FB310 if there is none, or more than one.
+pub(super) fn choose(names: &[String], role: MatrixRole, group: Option<&str>) -> Result<usize, Diagnostic> {
+    let refused = |message: String| Diagnostic::new(Code::Hdf5Layout, message).with_help(listing(names));
+    if let Some(group) = group {
+        let wanted = group.trim_matches('/');
+        let mut found = (0..names.len()).filter(|&k| names[k].eq_ignore_ascii_case(wanted));
+        return match (found.next(), found.next()) {
+            (Some(only), None) => Ok(only),
+            (None, _) => Err(refused(format!("the file has no matrix `{wanted}`"))),
+            _ => Err(refused(format!("the file has several matrices `{wanted}`"))),
+        };
+    }
+    let mut of_role = (0..names.len()).filter(|&k| is_called(role, &names[k]));
+    match (of_role.next(), of_role.next(), names) {
+        (Some(only), None, _) => Ok(only),
+        (None, _, [only]) => {
+            let other = MatrixRole::ALL.iter().find(|other| is_called(**other, only));
+            match other {
+                None => Ok(0),
+                Some(other) => {
+                    let message = format!(
+                        "the only matrix of the file, `{only}`, is named like a {} matrix",
+                        other.name()
+                    );
+                    Err(refused(message))
+                }
+            }
+        }
+        (first, _, _) => {
+            let count = if first.is_none() { "none" } else { "several" };
+            let message = format!(
+                "of {} matrices {count} {} named like a {} matrix",
+                names.len(),
+                if first.is_none() { "is" } else { "are" },
+                role.name()
+            );
+            Err(refused(message))
+        }
+    }
+}
+
+fn listing(names: &[String]) -> String {
+    const MAX_SHOWN: usize = 12;
+    if names.is_empty() {
+        return "write the matrix again".to_owned();
+    }
+    let more = if names.len() > MAX_SHOWN { ", ..." } else { "" };
+    let shown = &names[..names.len().min(MAX_SHOWN)];
+    format!("name the matrix as FILE:/NAME; the file has {}{more}", shown.join(", "))
+}
+
+/// Returns the indices of the stiffness and mass matrix that a user has named; their names may begin with a `/`.
+///
+/// # Errors
+/// An empty list of pairs, if there is not exactly one matrix of each name.
+pub(super) fn named_pair(
+    names: &[String],
+    stated: &[String; 2],
+) -> Result<(usize, usize), Vec<(usize, usize)>> {
+    let [k, m] = stated.each_ref().map(|wanted| {
+        let is_wanted = |k: &usize| names[*k].eq_ignore_ascii_case(wanted.trim_matches('/'));
+        let mut found = (0..names.len()).filter(is_wanted);
+        found.next().filter(|_| found.next().is_none())
+    });
+    k.zip(m).ok_or_else(Vec::new)
+}
+
+/// Returns the pair of stiffness and mass matrix among the matrices of a job: names that differ in their first letter
+/// only, or the only two.
+///
+/// # Errors
+/// The candidate pairs, if there is not exactly one.
+pub(super) fn pair(names: &[String]) -> Result<(usize, usize), Vec<(usize, usize)>> {
+    let of = |role| (0..names.len()).filter(move |&k| is_called(role, &names[k])).collect::<Vec<_>>();
+    let (stiffness, mass) = (of(MatrixRole::Stiffness), of(MatrixRole::Mass));
+    let rest = |k: usize| names[k].get(1..).unwrap_or_default();
+    let all = || stiffness.iter().flat_map(|&k| mass.iter().map(move |&m| (k, m)));
+    let alike: Vec<(usize, usize)> = all().filter(|&(k, m)| rest(k).eq_ignore_ascii_case(rest(m))).collect();
+    let pairs = if alike.is_empty() { all().collect() } else { alike };
+    match pairs.as_slice() {
+        &[pair] => Ok(pair),
+        _ => Err(pairs),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(text: &str) -> Vec<String> {
+        text.split(' ').map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn a_pair_has_names_that_differ_in_their_first_letter() {
+        assert_eq!(pair(&names("KAAX MAAX K4AAX BAAX PAX")), Ok((0, 1)));
+        assert_eq!(pair(&names("STIFF MASS KMAT")), Ok((2, 1)));
+        assert_eq!(pair(&names("KGG MGG KAA MAA")), Err(vec![(0, 1), (2, 3)]));
+        assert_eq!(pair(&names("KGG KAA")), Err(vec![]));
+    }
+
+    #[test]
+    fn a_matrix_is_chosen_by_its_name_or_its_role() {
+        let all = names("KAAX MAAX K4AAX KDAA");
+        assert_eq!(choose(&all, MatrixRole::Stiffness, None), Ok(0));
+        assert_eq!(choose(&all, MatrixRole::GeometricStiffness, None), Ok(3));
+        assert_eq!(choose(&all, MatrixRole::Stiffness, Some("/k4aax")), Ok(2));
+        assert!(choose(&all, MatrixRole::Damping, None).is_err());
+        assert!(choose(&names("MGG"), MatrixRole::Stiffness, None).is_err());
+        assert_eq!(choose(&names("XYZ"), MatrixRole::Stiffness, None), Ok(0));
+    }
+}

@@ -1,25 +1,21 @@
 //! Files with node positions: tables, and files of FE programs and meshers. Each format is recognised by its content.
 
-mod ansys_axes;
 mod ansys_list;
 mod cdb;
 mod exodus;
 mod gmsh;
-mod vtk_cells;
 mod vtk_legacy;
-mod vtk_numbers;
 mod vtk_xml;
-mod xml_elements;
 
 use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};
-pub(super) use super::node_file::NodeFile;
 use super::tables::read_nodes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::refuse_packed;
 use flexbody_base::text::scanner::expected;
-use std::collections::HashSet;
+use flexbody_model::{DofLabel, Elements, NodeAxes, Nodes};
+use std::collections::{HashMap, HashSet};
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
@@ -107,6 +103,26 @@ fn unexpected(file: &InputFile, line: usize, what: &str, found: &[u8]) -> Vec<Di
 /// Returns FB115 about a file without lines.
 fn refused(file: &InputFile, message: String, help: &str) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).with_help(help)]
+}
+
+/// Named sets of nodes, in the order of their file.
+pub(super) type NodeSets = Vec<(String, Vec<i64>)>;
+
+/// Names of node sets that cannot be resolved, with the reason, which becomes an error if such a set is requested.
+pub(super) type Unresolved = Vec<(String, Diagnostic)>;
+
+/// Nodes, sets and elements of a file.
+#[derive(Debug, Default)]
+pub(super) struct NodeFile {
+    pub nodes: Nodes,
+    pub sets: NodeSets,
+    /// Sets whose nodes are unknown.
+    pub unresolved: Unresolved,
+    pub elements: Elements,
+    /// Rows that follow others by constraints of a deck, by the names of the constraints.
+    pub followers: Vec<(String, Vec<DofLabel>)>,
+    /// Unit vectors along the rows of nodes, where these are not the axes of the model.
+    pub axes: HashMap<i64, NodeAxes>,
 }
 
 #[cfg(test)]

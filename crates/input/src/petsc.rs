@@ -3,8 +3,8 @@
 //! values 4, 8 or 16 bytes, by the configuration of PETSc. The file does not state these sizes, but they follow from
 //! its first number and its length.
 
+use super::array::Compressed;
 use super::assemble::check_size;
-use super::compressed::Compressed;
 use super::reader::{MatrixSource, Reader};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};

@@ -1,17 +1,14 @@
 //! Reads all files of a model and collects all their problems.
 
 use super::jobs::{JobModel, comparable, read_job};
-use super::mapping::Mapping;
+use super::mapping::{Mapping, Turn};
 use super::mesh::MeshReading;
 use super::model_files::{
     InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource, RecoverySource,
 };
-use super::node_file::{NodeFile, NodeSets, Unresolved};
-use super::node_files::read_node_file;
-use super::reader::{MatrixRole, MatrixSource};
-use super::readers::reader_for;
+use super::node_files::{NodeFile, NodeSets, Unresolved, read_node_file};
+use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::recovery_files::{read_offset, read_operator};
-use super::row_axes::Turn;
 use super::tables::{read_masses, read_node_list, read_recovery_rows};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};

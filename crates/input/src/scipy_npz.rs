@@ -1,11 +1,11 @@
 //! Sparse matrices of SciPy (`scipy.sparse.save_npz`): an archive of the arrays of a matrix in CSC, CSR, COO
 //! or BSR form, <https://docs.scipy.org/doc/scipy/reference/generated/scipy.sparse.save_npz.html>.
 
+use super::array::{Compressed, EntryCheck};
 use super::assemble::{
     Entry, StoredEntries, assemble, check_extents, check_size, push, refuse_beyond_memory,
     undeclared_triangle,
 };
-use super::compressed::{Compressed, EntryCheck};
 use super::npy;
 use super::reader::{MatrixSource, Reader};
 use super::recovery_files::Rectangular;

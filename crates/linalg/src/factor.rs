@@ -1,14 +1,11 @@
 //! Sparse Cholesky factor of K + tau M by the multifrontal method (Duff and Reid, ACM TOMS 9 (1983) 302; Liu, SIAM
 //! Review 34 (1992) 82), in double or single precision. One symbolic analysis serves all shifts.
 
-use super::assembly_tree::AssemblyTree;
+use super::assembly_tree::{AssemblyTree, Needs, TreeWalk};
+use super::dense::largest;
 use super::front::{self, Real, Trapezoid, extend_add};
-use super::largest::largest;
 use super::ordering::{nested_dissection, smallest_graph, vertex_graph};
-use super::parallel;
-use super::substitution;
-use super::tree_walk::{Needs, TreeWalk};
-use super::{Pencil, SymmetricMatrix};
+use super::{Pencil, SymmetricMatrix, parallel, substitution};
 use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
 use std::convert::Infallible;

@@ -2,8 +2,8 @@
 //! first, which here takes longer than the products. Sums run over blocks of rows, and within these over lanes, in a
 //! fixed order.
 
-use super::contiguous::{contiguous, contiguous_mut};
-use super::instructions::prefetch;
+use super::dense::{contiguous, contiguous_mut};
+use super::parallel::prefetch;
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, MatRef};
 use pulp::{Arch, Simd, WithSimd};

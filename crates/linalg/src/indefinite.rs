@@ -1,17 +1,15 @@
 //! Factor K - sigma M = L B L' with pivoting inside the panels of each front, kept for solutions: the dynamic stiffness
 //! at a frequency in double precision, and inertia counts in single precision.
 
-use super::Pencil;
-use super::contiguous::contiguous_mut;
+use super::dense::contiguous_mut;
 use super::factor::{Analysis, COLUMNS_PER_SOLVE, Solve, substitute};
 use super::front::{PANEL_COLUMNS, ROWS_PER_PIECE, Real, Trapezoid};
 use super::inertia::{Blocks, Contribution, Inertia, eliminate_front};
-use super::parallel;
-use super::random::normal;
 use super::substitution::{
     MIN_PARALLEL_ENTRIES, solve_lower, solve_transposed, subtract_product, subtract_transposed,
 };
-use super::tall::{Tall, column_norms, subtract_columns};
+use super::tall::{Tall, column_norms, normal, subtract_columns};
+use super::{Pencil, parallel};
 use faer::MatMut;
 use faer::prelude::ReborrowMut;
 use std::convert::Infallible;

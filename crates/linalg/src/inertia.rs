@@ -1,14 +1,13 @@
 //! Inertia of K - sigma M by L B L' with pivoting inside the panels of each front. A count alone does not keep the
 //! factor.
 
-use super::Pencil;
+use super::dense::largest;
 use super::factor::{Analysis, Scaled};
 use super::front::{
     MIN_PARALLEL_MULTIPLICATIONS, PANEL_COLUMNS, ROWS_PER_PIECE, Real, Trapezoid, divide_rows,
     drop_negligible, extend_add, subtract_eliminated, subtract_from_rest,
 };
-use super::largest::largest;
-use super::parallel;
+use super::{Pencil, parallel};
 use dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor as lblt;
 use faer::{Mat, MatRef, Par, Spec};

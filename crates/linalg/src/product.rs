@@ -4,9 +4,8 @@
 //! and every gathered row is one cache line (measured: 6 times faster than column by column). Each result row is one
 //! sum in storage order, so that the bits do not depend on the number of threads.
 
-use super::SymmetricMatrix;
-use super::contiguous::{contiguous, contiguous_mut};
-use super::parallel;
+use super::dense::{contiguous, contiguous_mut};
+use super::{SymmetricMatrix, parallel};
 use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
 use pulp::{Arch, Simd, WithSimd};

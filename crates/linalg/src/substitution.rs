@@ -3,8 +3,7 @@
 //! read once. Large panels are cut into fixed pieces of rows.
 
 use super::front::{PANEL_COLUMNS, Real, Trapezoid};
-use super::instructions::{instructions_for_rows, prefetch};
-use super::parallel;
+use super::parallel::{self, instructions_for_rows, prefetch};
 use faer::traits::ComplexField;
 use faer::traits::math_utils::recip;
 use pulp::bytemuck::{cast_slice, cast_slice_mut};

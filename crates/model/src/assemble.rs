@@ -3,19 +3,19 @@
 
 use super::assembled::Assembled;
 use super::drilling::{Following, with_following_rotations};
+use super::geometric_stiffness::check_loads;
 use super::layout::{Layout, layout};
-use super::load_checks::check_loads;
-use super::magnitude::check_magnitudes;
-use super::matrix_checks::{check_diagonal, check_diagonals, check_matrix, symmetric};
 use super::recovery_checks::{RowsOfFiles, checked_recoveries};
 use super::references::resolve_references;
-use super::rigid::rigid_count;
+use super::rigid::{extents, rigid_count};
 use super::wording::name_some;
-use super::{Damping, GeometricStiffness, Nodes, RawMatrix, RawModel, SurfaceMesh};
+use super::{Damping, DofLabel, GeometricStiffness, Nodes, RawMatrix, RawModel, SurfaceMesh};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
-use flexbody_linalg::SymmetricMatrix;
+use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
 use std::collections::HashSet;
+use std::ops::Range;
+use std::path::Path;
 
 /// Name of geometric stiffness in messages.
 const GEOMETRIC_STIFFNESS: &str = "geometric stiffness";
@@ -225,4 +225,198 @@ fn check_names(raw: &RawModel, found: &mut Vec<Diagnostic>) {
     if raw.name.contains('\0') {
         found.push(Diagnostic::new(Code::ManifestSyntax, "the model name has a NUL character in it"));
     }
+}
+
+// Conditions on each matrix by itself: finite, symmetric to rounding, no negative diagonal entry.
+
+/// Adds an error for a matrix that is not square, empty, or not finite.
+fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnostic>) {
+    let matrix = &raw.matrix;
+    if matrix.n_rows() != matrix.n_cols() {
+        let message = format!("{name} matrix has {} rows and {} columns", matrix.n_rows(), matrix.n_cols());
+        found.push(Diagnostic::new(Code::MatrixNotSquare, message).in_file(&raw.path));
+    } else if matrix.nnz() == 0 {
+        let message = format!("{name} matrix has no nonzero entries");
+        found.push(Diagnostic::new(Code::MatrixEmpty, message).in_file(&raw.path));
+    }
+    let not_finite = |values: &[f64]| values.iter().any(|v| !v.is_finite());
+    if parallel::any(matrix.values().chunks(1 << 16), not_finite) {
+        let at = matrix.values().iter().position(|v| !v.is_finite()).expect("just found");
+        let column = matrix.col_ptr().partition_point(|&p| p <= at);
+        let message = format!(
+            "{name} matrix has {} in row {}, column {column}",
+            matrix.values()[at],
+            matrix.row_idx()[at] + 1
+        );
+        found.push(Diagnostic::new(Code::MatrixNotFinite, message).in_file(&raw.path));
+    }
+}
+
+/// Takes a matrix out of `raw` and returns it symmetric and in internal order; `None` with a diagnostic if
+/// it is not symmetric to rounding.
+fn symmetric(
+    raw: &mut RawMatrix,
+    layout: &Layout,
+    name: &str,
+    label: impl Fn(usize) -> DofLabel,
+    found: &mut Vec<Diagnostic>,
+) -> Option<SymmetricMatrix> {
+    let matrix = std::mem::take(&mut raw.matrix);
+    let ordered = if layout.is_identity() { matrix } else { matrix.permuted(&layout.row_to_internal) };
+    let ordered = match SymmetricMatrix::try_from(ordered) {
+        Ok(symmetric) => return Some(symmetric),
+        Err(ordered) => ordered,
+    };
+    let n = ordered.n_cols();
+    let Asymmetry { worst, at, one_sided } = Asymmetry::of(&ordered);
+    if worst > rounding(raw.digits, 2) {
+        let (i, j) = at;
+        let message = format!(
+            "{name} matrix is not symmetric: {} at ({}, {}), {} at the mirrored place",
+            ordered.get(i, j),
+            label(i),
+            label(j),
+            ordered.get(j, i)
+        );
+        let mut diagnostic = Diagnostic::new(Code::MatrixAsymmetric, message).in_file(&raw.path);
+        if one_sided * 2 >= ordered.nnz().saturating_sub(n) * 2 && one_sided > 0 {
+            diagnostic = diagnostic.with_help("declare the matrix symmetric: only one triangle is stored");
+        }
+        found.push(diagnostic);
+        return None;
+    }
+    Some(SymmetricMatrix::symmetrised(ordered))
+}
+
+/// Difference between a matrix and its transpose.
+#[derive(Clone, Copy, Default)]
+struct Asymmetry {
+    /// Largest difference relative to the size of the entries or of their diagonal entries, and the first
+    /// entry with this difference.
+    worst: f64,
+    at: (usize, usize),
+    /// Number of entries without a mirrored entry.
+    one_sided: usize,
+}
+
+impl Asymmetry {
+    fn of(matrix: &CscMatrix) -> Self {
+        /// Number of columns per parallel task.
+        const COLUMNS_PER_TASK: usize = 256;
+        let n = matrix.n_cols();
+        let size: Vec<f64> = (0..n).map(|i| matrix.get(i, i).abs().sqrt()).collect();
+        let of_column = |j: usize| {
+            let mut task = Self::default();
+            let (rows, values) = matrix.column(j);
+            for (&i, &v) in rows.iter().zip(values) {
+                let i = i as usize;
+                let other = matrix.get(j, i);
+                task.one_sided += usize::from(other == 0.0);
+                // An entry larger than the root of its diagonal entries, which occurs in indefinite
+                // matrices only, is compared with itself.
+                let scale = (size[i] * size[j]).max(v.abs()).max(other.abs());
+                let difference = (v - other).abs() / scale;
+                if difference > task.worst {
+                    (task.worst, task.at) = (difference, (i, j));
+                }
+            }
+            task
+        };
+        let of_columns = |columns: Range<usize>| columns.map(of_column).fold(Self::default(), Self::and);
+        let parts = parallel::map(parallel::ranges(n, COLUMNS_PER_TASK), of_columns);
+        parts.into_iter().fold(Self::default(), Self::and)
+    }
+
+    /// Combines the results of some columns and of the columns after them.
+    fn and(self, next: Self) -> Self {
+        let first = if next.worst > self.worst { next } else { self };
+        Self { one_sided: self.one_sided + next.one_sided, ..first }
+    }
+}
+
+fn check_diagonals(
+    stiffness: &SymmetricMatrix,
+    mass: &SymmetricMatrix,
+    label: impl Fn(usize) -> DofLabel,
+    raw: &RawModel,
+    found: &mut Vec<Diagnostic>,
+) {
+    check_diagonal(stiffness, "stiffness", &raw.stiffness.path, &label, found);
+    check_diagonal(mass, "mass", &raw.mass.path, &label, found);
+    let empty = |m: &SymmetricMatrix, i: usize| m.row(i).0.is_empty();
+    let both: Vec<DofLabel> =
+        (0..stiffness.n()).filter(|&i| empty(stiffness, i) && empty(mass, i)).map(&label).collect();
+    if !both.is_empty() {
+        let message = format!("{} rows are empty in both matrices: {}", both.len(), name_some(&both));
+        found.push(Diagnostic::new(Code::PencilSingular, message).in_file(&raw.stiffness.path));
+    }
+}
+
+fn check_diagonal(
+    matrix: &SymmetricMatrix,
+    name: &str,
+    path: &Path,
+    label: impl Fn(usize) -> DofLabel,
+    found: &mut Vec<Diagnostic>,
+) {
+    let negative: Vec<DofLabel> =
+        matrix.diagonal().iter().enumerate().filter(|(_, d)| **d < 0.0).map(|(i, _)| label(i)).collect();
+    if !negative.is_empty() {
+        let message = format!(
+            "{} diagonal entries of the {name} matrix are negative: {}",
+            negative.len(),
+            name_some(&negative)
+        );
+        found.push(Diagnostic::new(Code::DiagonalNegative, message).in_file(path));
+    }
+}
+
+/// Largest size, and reciprocal of the smallest, of a quantity: squares of all quantities then stay
+/// twenty-eight decades within the range of double precision, a margin for modes and rounding errors.
+const MAX_MAGNITUDE: f64 = 1e140;
+
+/// Returns an error if K, M, the size of the body, or quantities derived from them are so large or small
+/// that products overflow or vanish.
+fn check_magnitudes(
+    stiffness: &SymmetricMatrix,
+    mass: &SymmetricMatrix,
+    nodes: &Nodes,
+    raw: &RawModel,
+) -> Option<Diagnostic> {
+    let largest = |m: &SymmetricMatrix| {
+        let of_part = |part: &[f64]| part.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        parallel::map(m.as_csc().values().chunks(1 << 16), of_part).into_iter().fold(0.0, f64::max)
+    };
+    let (k, m) = (largest(stiffness), largest(mass));
+    let far = nodes.positions.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let size = extents(&nodes.positions).into_iter().fold(0.0, f64::max);
+    if [k, m, size].contains(&0.0) {
+        return None; // other checks report zeros
+    }
+    let (stiffness_file, mass_file, nodes_file) = (&raw.stiffness.path, &raw.mass.path, &raw.nodes_path);
+    let quantities = [
+        ("stiffness", k, stiffness_file),
+        ("mass", m, mass_file),
+        ("length", size, nodes_file),
+        ("distance from the origin", far.max(size), nodes_file),
+        ("stiffness / mass", k / m, mass_file),
+        ("mass length^2", m * size * size, mass_file),
+    ];
+    let fits = |value: f64| (MAX_MAGNITUDE.recip()..=MAX_MAGNITUDE).contains(&value);
+    let (name, value, file) = quantities.into_iter().find(|&(_, value, _)| !fits(value))?;
+    let message = format!(
+        "{name} is of the order of {value:.0e}, not within {:.0e} and {MAX_MAGNITUDE:.0e}",
+        MAX_MAGNITUDE.recip()
+    );
+    Some(Diagnostic::new(Code::MagnitudeExtreme, message).in_file(file))
+}
+
+/// Returns the relative difference that rounding of values with `digits` significant digits explains.
+pub(super) fn rounding(digits: u8, margin: i32) -> f64 {
+    10f64.powi(margin - i32::from(digits)).clamp(1e-12, 1e-4)
+}
+
+/// Returns the relative deviation of a mass block from a multiple of the identity that rounding explains.
+pub(super) fn block_tolerance(digits: u8) -> f64 {
+    rounding(digits, 3).max(1e-10)
 }

@@ -1,22 +1,17 @@
 //! Checks of a model before any work: each failure is reported with its facts.
 
-use super::assemble::assemble;
+use super::assemble::{assemble, block_tolerance, rounding};
 use super::assembled::Assembled;
-use super::connections::check_connections;
-use super::density::{Densities, check_density};
-use super::exchanged::check_exchanged_matrices;
-use super::load_checks::missing_components;
-use super::local_mass::{LocalMass, SoundSpeed, check_exchanged, check_speed};
+use super::density::{Densities, LocalMass, SoundSpeed, check_density, check_exchanged, check_speed};
+use super::geometric_stiffness::missing_components;
 use super::mass_structure::{MassForm, mass_form};
 use super::node_pairs::check_mass_pairs;
 use super::recovery_checks::check_rigid_responses;
 use super::rigid::{centre_and_length, extents, rigid_residuals};
-use super::rigid_motion::{check_inertia, check_rigid_motion};
+use super::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
 use super::stress::check_stress;
-use super::tolerance::{block_tolerance, rounding};
-use super::unplaced_rows::{check_massless, misplaced, recover};
-use super::wording::name_some;
-use super::{BodyNumber, Damping, DofLabel, FeModel, Nodes, RawModel};
+use super::wording::{in_words, name_some};
+use super::{Damping, DofLabel, FeModel, Nodes, RawModel, Rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
 use flexbody_linalg::{SymmetricMatrix, largest};
@@ -251,5 +246,93 @@ fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, fou
         let message =
             format!("{total:.3e} kg in a box of {x:.3e} x {y:.3e} x {z:.3e} m is {density:.1e} kg/m^3");
         found.push(Diagnostic::new(Code::InertiaImplausible, message));
+    }
+}
+
+/// Checks that K and M together make one body, and that K alone holds it together.
+fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
+    let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
+    let component = rows.components(&[stiffness]);
+    if component.iter().all(|&c| c == 0) {
+        return;
+    }
+    let bodies = groups(&rows.components(&[stiffness, mass]), rows, nodes);
+    if bodies.len() > 1 {
+        let message = format!("the matrices hold {} separate bodies: {}", bodies.len(), in_words(&bodies));
+        found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&raw.stiffness.path));
+        return;
+    }
+    // K R = 0 holds for each part by itself: each has rigid motions of its own for any mass coupling.
+    let parts = groups(&component, rows, nodes);
+    let message = format!(
+        "the stiffness matrix separates {} parts that only the mass matrix couples, each with its rigid motions: {}",
+        parts.len(),
+        in_words(&parts)
+    );
+    found.push(Diagnostic::new(Code::Mechanism, message).in_file(&raw.stiffness.path));
+}
+
+/// Returns the node numbers of every component, in the order of their first nodes.
+pub(super) fn groups(component: &[usize], rows: &Rows, nodes: &Nodes) -> Vec<Vec<i64>> {
+    let mut groups = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
+    for (vertex, &c) in component.iter().enumerate() {
+        groups[c].push(rows.number(nodes, vertex));
+    }
+    groups
+}
+
+/// Row sum of a stiffness, relative to that of its absolute values, below which translations leave the row
+/// free.
+const FREE_ROW_SUM: f64 = 1e-6;
+
+/// Returns an error if translations leave M free but not K.
+fn check_exchanged_matrices(body: &Assembled) -> Option<Diagnostic> {
+    let Assembled { raw, rows, stiffness, mass, .. } = body;
+    let (free_in_mass, free_in_stiffness) = (free_rows(mass, rows), free_rows(stiffness, rows));
+    (free_in_mass > 0.5 && free_in_stiffness < 0.1).then(|| {
+        let message = format!(
+            "the matrix given as mass ({}) does not resist translations, like a stiffness matrix, and the one given as stiffness ({}) does, like a mass matrix: they are exchanged",
+            raw.mass.path.display(),
+            raw.stiffness.path.display()
+        );
+        Diagnostic::new(Code::MatricesExchanged, message).in_file(&raw.stiffness.path)
+    })
+}
+
+/// Returns the part of the nonempty rows of displacements without force under translations along all axes.
+fn free_rows(matrix: &SymmetricMatrix, rows: &Rows) -> f64 {
+    let (d, displacements) = (rows.dimension, rows.dimension * rows.nodes);
+    let (mut held, mut free) = (0, 0);
+    for row in 0..displacements {
+        let (columns, values) = matrix.row(row);
+        let (mut sums, mut size) = ([0.0; 3], 0.0);
+        for (&column, &value) in
+            columns.iter().zip(values).take_while(|(j, _)| (**j as usize) < displacements)
+        {
+            sums[column as usize % d] += value;
+            size += value.abs();
+        }
+        match sums.iter().all(|sum: &f64| sum.abs() <= FREE_ROW_SUM * size) {
+            _ if size == 0.0 => {}
+            true => free += 1,
+            false => held += 1,
+        }
+    }
+    f64::from(free) / f64::from((free + held).max(1))
+}
+
+/// Number of a model among several bodies in one pair of matrices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BodyNumber {
+    /// Number from 1, in the order of the first node of each body in the node table.
+    pub number: usize,
+    /// Number of all bodies.
+    pub of: usize,
+}
+
+impl std::fmt::Display for BodyNumber {
+    /// Formats the number as `body 1 of 2`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "body {} of {}", self.number, self.of)
     }
 }

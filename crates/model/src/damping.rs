@@ -1,5 +1,8 @@
 //! Damping given by the user.
 
+use flexbody_base::text::walk::{Value, Walk};
+use toml::de::DeValue;
+
 /// Damping of a body. `D` is the type of the matrix: a path, a matrix as read, or the checked matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Damping<D> {
@@ -162,6 +165,31 @@ impl<D> Damping<D> {
             Self::Matrix(_) => None,
         }
     }
+}
+
+/// Keys of a damping band.
+pub const DAMPING_BAND_KEYS: &[&str] = &["to_hz", "ratio"];
+
+/// Reads damping ratios by frequency from manifests and scenes: a list of `{ to_hz, ratio }` with ends in
+/// hertz. The values are not checked. If it returns `None`, it has added a diagnostic to `walk`.
+pub fn damping_bands(walk: &mut Walk<'_>, value: &Value) -> Option<Vec<DampingBand>> {
+    const EXPECTED: &str = "a list of tables { to_hz, ratio }, the last without to_hz";
+    let DeValue::Array(list) = value.get_ref() else {
+        walk.mistyped("bands", value, EXPECTED);
+        return None;
+    };
+    let mut bands = Vec::new();
+    for item in list.iter() {
+        let DeValue::Table(table) = item.get_ref() else {
+            walk.mistyped("bands", item, EXPECTED);
+            return None;
+        };
+        walk.known_keys(table, "a damping band", DAMPING_BAND_KEYS);
+        let end = table.contains_key("to_hz").then(|| walk.number(table, "to_hz", &item.span()));
+        let ratio = walk.number(table, "ratio", &item.span())?;
+        bands.push(DampingBand { to_hz: end.unwrap_or(Some(f64::INFINITY))?, ratio });
+    }
+    Some(bands)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Mass matrix of a model by node blocks, converted to a mass of points and directors.
 
-use super::columns::Columns;
+use super::mass_structure::Columns;
 use super::rows::Rows;
 use flexbody_linalg::{SymmetricMatrix, parallel};
 use std::ops::Range;

@@ -14,8 +14,8 @@
 //! term depends on n' theta_i, so the term is zero in every static response and every mode for any k: the
 //! body does not change, and the rotation moves with its element. Rigid motion leaves the term zero.
 
+use super::assemble::rounding;
 use super::node_pairs::neighbours;
-use super::tolerance::rounding;
 use super::wording::name_some;
 use super::{Nodes, RawModel, Rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -1,6 +1,6 @@
 //! Rows that the inertia of a model acts on, for any mass matrix.
 
-use super::node_moments::{NodeMoments, RigidAcceleration};
+use super::director_mass::{NodeMoments, RigidAcceleration};
 use super::rigid::centre_and_length;
 use super::{DirectorMass, FeModel};
 use faer::{Mat, MatRef};

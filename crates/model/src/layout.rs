@@ -3,9 +3,9 @@
 
 use super::rows::{Recovered, Rows};
 use super::wording::name_some;
-use super::{Damping, DofLabel, Nodes, RawModel, filled_rows};
+use super::{Damping, DofLabel, Nodes, RawModel};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_linalg::parallel;
+use flexbody_linalg::{CscMatrix, parallel};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
@@ -359,4 +359,18 @@ fn sort_without_place(
     let message = format!("{} nodes have no coordinates: {}", missing.len(), name_some(&missing));
     found.push(Diagnostic::new(Code::NodesMissing, message).in_file(&raw.nodes_path));
     None
+}
+
+/// Returns for each of `n` rows true if one of the matrices has an entry in its row or its column. Both are
+/// tested, since symmetry is checked later.
+pub fn filled_rows<'m>(matrices: impl IntoIterator<Item = &'m CscMatrix>, n: usize) -> Vec<bool> {
+    let mut filled = vec![false; n];
+    for matrix in matrices {
+        for column in 0..n.min(matrix.n_cols()) {
+            let (rows, _) = matrix.column(column);
+            filled[column] |= !rows.is_empty();
+            rows.iter().filter(|row| (**row as usize) < n).for_each(|&row| filled[row as usize] = true);
+        }
+    }
+    filled
 }

@@ -3,8 +3,7 @@
 
 use super::assemble::assemble;
 use super::assembled::Assembled;
-use super::checks::{CheckedModel, check_body};
-use super::connections::groups;
+use super::checks::{CheckedModel, check_body, groups};
 use super::recovery_checks::{recoveries_of_body, refuse_several_bodies};
 use super::wording::{in_words, name_some};
 use super::{BodyNumber, Damping, FeModel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};

@@ -1,8 +1,9 @@
 //! Comparison of two bodies that does not depend on the signs of modes, the basis inside repeated
 //! eigenvalues, the order of the nodes or the body frame.
 
-use super::clusters::clusters;
-use super::common_modes::CommonModes;
+mod entries;
+
+use super::common_modes::{CommonModes, clusters};
 use super::comparison_report::{ComparisonFormat, ComparisonReport};
 use super::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com};
 use faer::linalg::matmul::matmul;
@@ -17,11 +18,6 @@ use serde::Serialize;
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
-
-mod interfaces;
-mod modal_matrices;
-mod nodal_rows;
-mod not_compared;
 
 /// Largest relative differences that pass.
 ///
@@ -128,7 +124,7 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     let pair = Pair { a, b, change, in_a, groups };
     // Mode by mode with common nodes, otherwise by norms over clusters of modes.
     let order = common_nodes(&a.nodes().ids, &b.nodes().ids);
-    comparison.not_compared = not_compared::entries(a, b, order.is_some());
+    comparison.not_compared = entries::not_compared(a, b, order.is_some());
     let basis = match order {
         Some(order) => Some(comparison.mode_by_mode(&pair, &order, tolerances)),
         None => {

@@ -13,11 +13,9 @@
 mod advice;
 mod audit;
 mod batch;
-mod body_lumped;
 mod body_modes;
 mod body_report;
 mod chart;
-mod clusters;
 mod common_modes;
 mod comparison;
 mod comparison_report;
@@ -25,12 +23,10 @@ mod completeness;
 mod craig_bampton;
 mod csv;
 mod document;
-mod errors_in_words;
+mod errors;
 mod facts;
 mod geometric_stiffness;
-mod glossary;
 mod guarantee;
-mod heat_map;
 mod html;
 mod identities;
 mod lumped;
@@ -41,12 +37,10 @@ mod numbers;
 mod output;
 mod picture;
 mod recovered;
-mod reference_error;
 mod render;
 mod response;
 mod run_data;
 mod selection;
-mod selection_cases;
 mod selection_verdict;
 mod simulation;
 mod summary;
@@ -55,13 +49,7 @@ mod text;
 #[cfg(feature = "hdf5")]
 mod trade;
 #[cfg(feature = "hdf5")]
-mod trade_cases;
-#[cfg(feature = "hdf5")]
-mod trade_nodes;
-#[cfg(feature = "hdf5")]
 mod trade_verdict;
-mod unit_names;
-mod variations;
 #[cfg(feature = "hdf5")]
 mod view;
 

@@ -2,7 +2,7 @@
 
 use super::Format;
 use super::document::{Block, Document, State, Term};
-use super::errors_in_words::errors_in_words;
+use super::errors::errors_in_words;
 use super::numbers::{counted, significant};
 use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;

@@ -2,14 +2,13 @@
 
 use super::Format;
 use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
-use super::errors_in_words::{errors_in_words, ranges};
+use super::errors::{
+    ReferenceErrorFacts, VariationFacts, errors_in_words, in_words, part_in_words, ranges, reference_in_words,
+};
 use super::numbers::significant;
-use super::reference_error::{ReferenceErrorFacts, reference_in_words};
 use super::run_data::RunData;
-use super::selection_cases::{CaseFacts, cases_table};
 use super::selection_verdict::SelectionVerdict;
 use super::text::{self, Screen};
-use super::variations::{VariationFacts, in_words};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{TermDecision, TermGroup};
@@ -117,7 +116,7 @@ struct SignificanceFacts {
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct TrialFacts<'a> {
+struct TrialFacts<'a> {
     kept: Vec<&'static str>,
     modes: usize,
     multiplications: usize,
@@ -429,4 +428,93 @@ impl<'a> SelectionFacts<'a> {
 /// Returns a number with three digits; empty if it is unknown.
 fn known(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| significant(value, 3))
+}
+
+// Facts of a selection for each of several load cases.
+
+/// Facts of a load case.
+#[derive(Debug, Clone, Serialize)]
+struct CaseFacts<'a> {
+    name: &'a str,
+    tolerance: PerQuantity<f64>,
+    /// Errors of the selected model.
+    errors: Option<OutputErrors>,
+    /// Largest error of the selected model over its tolerance.
+    worst: Option<f64>,
+    /// Output with that largest error.
+    output: Option<&'static str>,
+    /// Fraction of the tolerances left by the reference.
+    budget: Option<f64>,
+    passed: bool,
+    /// Parts of the selection that this case decides, because it needs them most: groups, and `modes`.
+    binds: Vec<&'static str>,
+    /// Errors of the body, and of its versions before enrichment, relative to the model in this case.
+    reference: Vec<ReferenceErrorFacts>,
+}
+
+impl<'a> CaseFacts<'a> {
+    pub(crate) fn new(case: &'a CaseSelection) -> Self {
+        let tolerance = &case.tolerance;
+        let chosen = case.chosen.as_ref();
+        let errors = chosen.and_then(|trial| trial.errors);
+        let groups = case.binds_groups.iter().copied().map(TermGroup::name);
+        Self {
+            name: &case.name,
+            tolerance: tolerance.errors,
+            errors,
+            worst: chosen.map(|trial| trial.worst).filter(|worst| worst.is_finite()),
+            output: errors.map(|errors| errors.decisive(tolerance).0),
+            budget: chosen.map(|trial| trial.budget),
+            passed: chosen.is_none_or(|trial| trial.passed()),
+            binds: groups.chain(case.binds_modes.then_some("modes")).collect(),
+            reference: case.reference_errors.iter().map(ReferenceErrorFacts::new).collect(),
+        }
+    }
+
+    fn binds_in_words(&self) -> String {
+        if self.binds.is_empty() { "nothing".to_owned() } else { self.binds.join(", ") }
+    }
+
+    fn reference_error_in_words(&self) -> String {
+        self.reference.last().map_or_else(|| "not known".to_owned(), ReferenceErrorFacts::parts)
+    }
+
+    /// Returns the case in words: `braking: stress 1.2 %, 60 % of what is allowed; decides W1, modes`.
+    pub(crate) fn in_words(&self) -> String {
+        let binds = if self.binds.is_empty() {
+            "decides nothing".to_owned()
+        } else {
+            format!("decides {}", self.binds_in_words())
+        };
+        match &self.errors {
+            Some(errors) => {
+                let beyond = if self.passed { "" } else { ", exceeded" };
+                let errors = errors_in_words(errors);
+                format!(
+                    "{}: {errors}: {} of the tolerance{beyond}; {binds}",
+                    self.name,
+                    part_in_words(self.worst)
+                )
+            }
+            None => format!("{}: {binds}", self.name),
+        }
+    }
+}
+
+/// Returns the table of the errors of the selected model in every load case, and of the effect of each case
+/// on the selection.
+fn cases_table(cases: &[CaseFacts<'_>]) -> Table {
+    let heads = ["Load case", "Errors", "Error / tolerance", "Decides", "Error of the body (estimated)"];
+    let row = |case: &CaseFacts<'_>| {
+        let errors = case.errors.as_ref().map_or_else(|| "not measured".to_owned(), errors_in_words);
+        cells([
+            case.name.to_owned(),
+            errors,
+            part_in_words(case.worst),
+            case.binds_in_words(),
+            case.reference_error_in_words(),
+        ])
+    };
+    let caption = "The selected model in each load case, compared with the body with all its terms and modes. A case decides a group or the number of modes if it is the case in which the model without them exceeds the tolerances most.";
+    Table::new(caption, heads, &[1, 3, 4], cases.iter().map(row).collect())
 }

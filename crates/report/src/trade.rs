@@ -1,17 +1,12 @@
 //! Report on a trade study: facts, verdict, candidates and the plot of error against cost.
 
-use super::Format;
 use super::chart::{Axis, Chart, Mark, Panel, Series};
-use super::csv;
 use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
-use super::errors_in_words::{errors_in_words, ranges};
+use super::errors::{ReferenceErrorFacts, VariationFacts, errors_in_words, ranges, reference_in_words};
 use super::numbers::{bytes, counted, duration, significant, times};
-use super::reference_error::{ReferenceErrorFacts, reference_in_words};
 use super::run_data::RunData;
-use super::trade_cases::{TradeCaseFacts, case_facts, cases_table};
-use super::trade_nodes::NodalFacts;
-use super::trade_verdict::{varied_line, verdict_lines};
-use super::variations::VariationFacts;
+use super::trade_verdict::{NodalFacts, TradeCaseFacts, case_facts, cases_table, varied_line, verdict_lines};
+use super::{Format, csv};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::Storage;

@@ -8,7 +8,6 @@ pub mod scanner;
 pub mod series;
 pub mod table;
 pub mod walk;
-mod zstd_frames;
 
 pub use compression::Compression;
 pub use input_file::InputFile;

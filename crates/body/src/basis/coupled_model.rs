@@ -1,15 +1,18 @@
-//! Model with the couplings that all modes of a body preserve: interfaces that move as rigid bodies (theory
-//! section 5).
+//! Model with the couplings that all modes of a body preserve: interfaces that move as rigid bodies (theory section 5);
+//! and its responses to harmonic forces, for estimates.
 
-use super::echelon::Echelon;
+use super::failure::explain;
 use super::interface_rows::{CoupledInterface, coupled_sets};
-use super::modal_basis::problem_of_span;
-use super::rigid_modes::rigid_modes;
+use super::modal_basis::{problem_of_span, rigid_modes};
 use faer::{Mat, MatRef};
 use flexbody_base::error::Result;
-use flexbody_eigen::EigenProblem;
-use flexbody_linalg::{Dependents, Elimination, Pencil, ReducedPencil, combine, gram, larger};
+use flexbody_eigen::{EigenFailure, EigenProblem, dynamic_responses_twice};
+use flexbody_linalg::context::Context;
+use flexbody_linalg::{
+    Dependents, Elimination, Pencil, ReducedPencil, combine, gram, larger, side_by_side, subtract_combination,
+};
 use flexbody_model::{Coupling, FeModel, NodeSet};
+use nalgebra::DMatrix;
 use std::borrow::Cow;
 use std::collections::HashSet;
 use std::ops::Range;
@@ -160,5 +163,116 @@ fn rigid_rows(joint: &CoupledInterface) -> Dependents {
         rows: others.iter().map(|&j| joint.rows[j]).collect(),
         on: pivots.iter().map(|&j| joint.rows[j]).collect(),
         weights: Mat::from_fn(others.len(), pivots.len(), weight),
+    }
+}
+
+/// Returns the responses x = (K - w^2 M)^-1 f to harmonic `loads` f (N x m) at w, and the responses
+/// y = (K - w^2 M)^-1 M x to their inertia, as \[x, y\]. With x and y in its basis, a reduced model has the exact
+/// transfer functions of the loads at w, and their slope. Returns `None` if w^2 is an eigenvalue to
+/// rounding.
+///
+/// * `conditions`: C' (N x c) of a model with constraints, C x = C y = 0; `None`: the free model, without
+///   rigid motion.
+/// * `square`: w^2 > 0.
+///
+/// # Errors
+/// Failures of the factorisation: exit code 3.
+pub fn oscillating_responses(
+    model: &CoupledModel<'_>,
+    loads: Mat<f64>,
+    conditions: Option<&Mat<f64>>,
+    square: f64,
+) -> Result<Option<Mat<f64>>> {
+    let rigid = match conditions {
+        Some(_) => Mat::zeros(model.pencil().n(), 0),
+        None => model.rigid_modes()?,
+    };
+    let problem = model.problem(rigid.as_ref());
+    let count = loads.ncols();
+    let no_conditions = Mat::zeros(loads.nrows(), 0);
+    let conditions = model.restrict(conditions.unwrap_or(&no_conditions).clone());
+    // The constraint forces C'm make C x = 0: compute the response to C' together with the others.
+    let (mut x, mut to_conditions) = (Mat::new(), Mat::new());
+    let further = |all: &Mat<f64>| {
+        to_conditions = all.as_ref().subcols(count, conditions.ncols()).to_owned();
+        x = all.as_ref().subcols(0, count).to_owned();
+        hold(&mut x, &conditions, &to_conditions);
+        model.pencil().apply_mass(x.as_ref())
+    };
+    let all = side_by_side(&[model.restrict(loads).as_ref(), conditions.as_ref()]);
+    let [_, mut y] = match dynamic_responses_twice(&problem, all, further, square, &Context::QUIET) {
+        Ok(responses) => responses,
+        Err(EigenFailure::Inaccurate { .. }) => return Ok(None),
+        Err(failure) => return Err(explain(model.model(), failure)),
+    };
+    hold(&mut y, &conditions, &to_conditions);
+    let both = side_by_side(&[x.as_ref(), y.as_ref()]);
+    Ok(both.is_all_finite().then(|| model.expand(&both).into_owned()))
+}
+
+/// x <- x - X_C (C X_C)^-1 C x, with the responses X_C to the `conditions` C'. Gives NaN if the conditions
+/// depend on each other.
+fn hold(x: &mut Mat<f64>, conditions: &Mat<f64>, to_conditions: &Mat<f64>) {
+    let count = conditions.ncols();
+    if count == 0 {
+        return;
+    }
+    let product = gram(conditions.as_ref(), to_conditions.as_ref());
+    let inverse = DMatrix::from_fn(count, count, |i, j| product[(i, j)]).try_inverse();
+    let inverse =
+        Mat::from_fn(count, count, |i, j| inverse.as_ref().map_or(f64::NAN, |inverse| inverse[(i, j)]));
+    let moved = combine(inverse.as_ref(), gram(conditions.as_ref(), x.as_ref()).as_ref());
+    subtract_combination(x.as_mut(), to_conditions.as_ref(), moved.as_ref());
+}
+
+// Solution of linear conditions for some of their unknowns.
+
+/// Reduced echelon form \[1, W\] of a matrix A (r x n) with reordered columns. Its number of rows is the
+/// rank of A; the pivots are found by complete pivoting.
+pub(super) struct Echelon {
+    /// Columns of A that form the unit matrix, and all others.
+    pub pivots: Vec<usize>,
+    pub others: Vec<usize>,
+    /// W (rank x others).
+    pub weights: Mat<f64>,
+}
+
+impl Echelon {
+    /// Pivots below this part of the first pivot count as rounding.
+    const ROUNDING_PIVOT: f64 = 1e-9;
+
+    /// Computes the echelon form of `a`.
+    pub(super) fn new(mut a: Mat<f64>) -> Self {
+        let (r, columns) = (a.nrows(), a.ncols());
+        let mut pivots: Vec<usize> = Vec::new();
+        let mut first = 0.0;
+        for step in 0..r.min(columns) {
+            // Largest entry among the remaining rows and columns.
+            let places = (step..r).flat_map(|i| (0..columns).map(move |j| (i, j)));
+            let open = places.filter(|(_, j)| !pivots.contains(j));
+            let Some((i, j)) = open.max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs())) else { break };
+            if step == 0 {
+                first = a[(i, j)].abs();
+            }
+            if a[(i, j)].abs() <= Self::ROUNDING_PIVOT * first {
+                break;
+            }
+            // Exchange rows, scale the pivot row, and eliminate its column in all other rows.
+            for column in 0..columns {
+                let (upper, lower) = (a[(step, column)], a[(i, column)]);
+                (a[(step, column)], a[(i, column)]) = (lower, upper);
+            }
+            let pivot = a[(step, j)];
+            (0..columns).for_each(|column| a[(step, column)] /= pivot);
+            for other in (0..r).filter(|&other| other != step) {
+                let factor = a[(other, j)];
+                (0..columns).for_each(|column| a[(other, column)] -= factor * a[(step, column)]);
+            }
+            pivots.push(j);
+        }
+        // The remaining columns are W.
+        let others: Vec<usize> = (0..columns).filter(|j| !pivots.contains(j)).collect();
+        let weights = Mat::from_fn(pivots.len(), others.len(), |i, j| a[(i, others[j])]);
+        Self { pivots, others, weights }
     }
 }

@@ -8,14 +8,14 @@
 //! search, proof of completeness and residuals of any other eigenproblem.
 
 use super::failure::explain;
-use super::free_estimate::{FreeEstimate, MissingResponses, free_estimate};
+use super::fixed_interface::{FreeEstimate, MissingResponses, free_estimate};
 use super::free_surface::{polynomial_estimate, single_precision_note};
 use super::held_interfaces::{check_prescribable, hold, unit_motions};
-use super::interface_coordinates::{CoordinatesInModelAxes, InterfaceCoordinates};
-use super::interface_rows::{CoupledInterface, coupled_interfaces};
-use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
+use super::interface_rows::{
+    CoordinatesInModelAxes, CoupledInterface, InterfaceCoordinates, coupled_interfaces,
+};
+use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span, rigid_modes};
 use super::pseudo_free_surface::{Independent, independent, largest_shares, named};
-use super::rigid_modes::rigid_modes;
 use super::{BasisKind, FixedInterface, ModeSettings};
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};

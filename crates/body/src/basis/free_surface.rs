@@ -1,9 +1,8 @@
 //! Free-surface modes: mass-normalised modes of the unsupported body, M-orthogonal to its rigid motions.
 
 use super::failure::explain;
-use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
+use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span, rigid_modes};
 use super::residual_vectors::{NamedLoads, interface_truncation, with_residual_vectors};
-use super::rigid_modes::rigid_modes;
 use super::{BasisKind, Loads, ModeSettings};
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};

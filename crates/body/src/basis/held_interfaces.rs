@@ -7,7 +7,7 @@
 //! prescribed displacements. The conditions are well posed if they are independent on the rows that are not
 //! prescribed otherwise.
 
-use super::echelon::Echelon;
+use super::coupled_model::Echelon;
 use super::interface_rows::CoupledInterface;
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -1,31 +1,21 @@
 //! Modal bases: shapes that span the deformation of a body, each kind in one file behind [`Basis`].
 
-mod choice;
-mod columns;
 mod coupled_model;
 mod craig_bampton;
 mod craig_chang;
-mod echelon;
 mod failure;
 mod fixed_interface;
-mod free_estimate;
 mod free_surface;
 mod held_interfaces;
 mod imported;
-mod interface_coordinates;
 mod interface_rows;
-mod kind;
 mod massless;
 mod modal_basis;
-mod nodal_modes;
-mod oscillating;
 mod pseudo_free_surface;
 mod residual_vectors;
-mod rigid_modes;
 mod solved;
 
-pub use choice::BasisChoice;
-pub use coupled_model::CoupledModel;
+pub use coupled_model::{CoupledModel, oscillating_responses};
 pub use craig_bampton::CraigBampton;
 pub use craig_chang::CraigChang;
 pub use fixed_interface::FixedInterface;
@@ -33,13 +23,10 @@ pub use fixed_interface::FixedInterface;
 pub use flexbody_eigen::EigenSettings as ModeSettings;
 pub use free_surface::{FreeSurface, first_eigenvalue_estimate, free_surface, search_plan};
 pub use imported::ImportedShapes;
-pub use interface_coordinates::{CoordinatesInModelAxes, InterfaceCoordinates};
-pub use kind::BasisKind;
-pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
-pub use oscillating::oscillating_responses;
+pub use interface_rows::{CoordinatesInModelAxes, InterfaceCoordinates};
+pub use modal_basis::{Basis, BasisChoice, BasisKind, ModalBasis, Task, Truncation, rigid_modes};
 pub use residual_vectors::{
     Loads, UserLoads, free_static_responses, free_static_responses_twice, interface_loads,
 };
 pub(crate) use residual_vectors::{accurate_static_responses, centrifugal_loads};
-pub use rigid_modes::rigid_modes;
 pub use solved::{CountElsewhere, SolvedModes};

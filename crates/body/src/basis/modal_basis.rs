@@ -1,13 +1,18 @@
-//! Common interface of all bases, and the checks common to all modes.
+//! Common interface of all bases, their names, the choice among them, the checks common to all modes, and the rigid
+//! modes, which are removed from every basis.
 
-use super::{BasisKind, CoordinatesInModelAxes, FixedInterface, ModeSettings};
-use faer::MatRef;
+use super::{
+    CoordinatesInModelAxes, CraigBampton, CraigChang, FixedInterface, FreeSurface, ImportedShapes, Loads,
+    ModeSettings, SolvedModes,
+};
+use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::Result;
+use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::SourceFile;
 use flexbody_eigen::{EigenProblem, EigenSolution, Wanted, energy_noise};
 use flexbody_linalg::context::Context;
-use flexbody_linalg::{gram, larger};
-use flexbody_model::FeModel;
+use flexbody_linalg::{Pencil, combine, gram, larger, symmetric_eigen};
+use flexbody_model::{FeModel, centre_and_length};
 
 /// A kind of basis. A new kind needs one file in this folder and one variant of
 /// [`BasisChoice`](super::BasisChoice).
@@ -180,4 +185,183 @@ fn noise_note(model: &FeModel, noise: f64) -> Option<Diagnostic> {
             "nothing to do: double precision has no more digits for a body as thin or stiff as this",
         )
     })
+}
+
+/// Kind of basis: the shapes that span the deformation of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BasisKind {
+    /// Free-surface modes, and the residual vectors that the model or the scene requests.
+    #[default]
+    Free,
+    /// Modes with the interfaces held, and the static responses to motions of the interfaces (Craig and
+    /// Bampton).
+    CraigBampton,
+    /// Free-surface modes, and the static responses to loads at the interfaces (Craig and Chang).
+    CraigChang,
+    /// Shapes computed elsewhere and read from a file.
+    Imported,
+    /// Smallest set of shapes that spans the motion of a scene; another motion may need others.
+    Scene,
+}
+
+impl BasisKind {
+    /// All kinds, in the order of the documentation.
+    pub const ALL: [Self; 5] =
+        [Self::Free, Self::CraigBampton, Self::CraigChang, Self::Imported, Self::Scene];
+
+    /// Returns the name in files, reports and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Free => "free",
+            Self::CraigBampton => "craig-bampton",
+            Self::CraigChang => "craig-chang",
+            Self::Imported => "imported",
+            Self::Scene => "scene",
+        }
+    }
+
+    /// Returns the kind with the given name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.name() == name)
+    }
+
+    /// Returns true if the basis consists of free-surface modes only, or if its shapes are chosen from
+    /// them. Residual vectors for the loads of a scene may be added, and the frequency band of the scene
+    /// may set the number of modes.
+    pub fn follows_scene(self) -> bool {
+        matches!(self, Self::Free | Self::Scene)
+    }
+
+    /// Returns true if the search is for free-surface modes, to which residual vectors may be added.
+    pub fn searches_free_modes(self) -> bool {
+        self.follows_scene() || self == Self::CraigChang
+    }
+}
+
+/// Choice of the basis of a body: every implementation of [`Basis`] has a variant here.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BasisChoice {
+    /// Free-surface modes, with residual vectors if requested.
+    Free(FreeSurface),
+    /// Shapes computed elsewhere.
+    Imported(ImportedShapes),
+    /// Free-surface modes found by another eigen-solver.
+    Solved(SolvedModes),
+    /// Modes with the interfaces held, and constraint modes.
+    CraigBampton(CraigBampton),
+    /// Free-surface modes, and attachment modes of the interfaces.
+    CraigChang(CraigChang),
+}
+
+impl Default for BasisChoice {
+    /// Returns free-surface modes without residual vectors.
+    fn default() -> Self {
+        Self::Free(FreeSurface::default())
+    }
+}
+
+impl BasisChoice {
+    /// Returns the files that were read for the basis.
+    pub fn sources(&self) -> Vec<&SourceFile> {
+        match self {
+            Self::Imported(shapes) => shapes.source().into_iter().collect(),
+            Self::Solved(modes) => vec![&modes.source],
+            _ => self.residual_vectors().iter().filter_map(Loads::source).collect(),
+        }
+    }
+
+    /// Returns the chosen basis.
+    pub fn basis(&self) -> &dyn Basis {
+        match self {
+            Self::Free(free) => free,
+            Self::Imported(shapes) => shapes,
+            Self::Solved(modes) => modes,
+            Self::CraigBampton(fixed) => fixed,
+            Self::CraigChang(free) => free,
+        }
+    }
+
+    /// Returns this basis with residual vectors for the forces that a motion leaves unbalanced at the nodes
+    /// (N x m); `None` for a basis without residual vectors.
+    pub fn with_motion(&self, loads: &Mat<f64>) -> Option<Self> {
+        let mut choice = self.clone();
+        let residual_vectors = match &mut choice {
+            Self::Free(FreeSurface { residual_vectors })
+            | Self::CraigChang(CraigChang { residual_vectors }) => residual_vectors,
+            Self::Imported(_) | Self::Solved(_) | Self::CraigBampton(_) => return None,
+        };
+        if loads.ncols() > 0 {
+            residual_vectors.push(Loads::Motion(loads.clone()));
+        }
+        Some(choice)
+    }
+
+    /// Returns the eigen-solver that found the modes, if it was not this program.
+    pub fn engine(&self) -> Option<&str> {
+        match self {
+            Self::Solved(modes) => Some(&modes.engine),
+            _ => None,
+        }
+    }
+
+    /// Returns the loads requested by the user whose responses are added to the modes.
+    pub fn residual_vectors(&self) -> &[Loads] {
+        match self {
+            Self::Free(FreeSurface { residual_vectors })
+            | Self::CraigChang(CraigChang { residual_vectors }) => residual_vectors,
+            Self::Imported(_) | Self::Solved(_) | Self::CraigBampton(_) => &[],
+        }
+    }
+}
+
+/// Returns the rigid modes of a model from its node positions (N x 6, in the plane N x 3), orthonormal in
+/// the mass of `pencil`.
+///
+/// # Errors
+/// [`BodyDegenerate`](Code::BodyDegenerate) if the nodes or the mass lie on one line.
+pub fn rigid_modes(model: &FeModel, pencil: &Pencil<'_>) -> Result<Mat<f64>> {
+    let positions = &model.nodes().positions;
+    let (centre, length) = centre_and_length(positions);
+    let fields = model.rigid_fields(centre, length);
+    let orthonormal = |r: &Mat<f64>| {
+        let mass = gram(r.as_ref(), pencil.apply_mass(r.as_ref()).as_ref());
+        let eigen = symmetric_eigen(mass.as_ref())?;
+        let largest = eigen.values.last().copied().unwrap_or(0.0);
+        // A body on one line has a rotation that moves nothing.
+        if eigen.values[0].is_nan() || eigen.values[0] <= 1e-14 * largest {
+            return None;
+        }
+        let root = Mat::from_fn(r.ncols(), r.ncols(), |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
+        Some(combine(r.as_ref(), root.as_ref()))
+    };
+    // Orthonormalise twice: the second pass removes the error due to the condition of the first Gram
+    // matrix.
+    orthonormal(&fields)
+        .and_then(|once| orthonormal(&once))
+        .ok_or_else(|| Error::from(degenerate(model, centre, length)))
+}
+
+/// Returns the error FB416, which says if the nodes lie on one line, or only their mass.
+fn degenerate(model: &FeModel, centre: [f64; 3], length: f64) -> Diagnostic {
+    /// Distance from a line, relative to the extent of the body, below which nodes lie on it.
+    const COLLINEAR_DISTANCE: f64 = 1e-7;
+    let positions = &model.nodes().positions;
+    let nodes = positions.len();
+    if model.dimension() == 2 {
+        return Diagnostic::new(
+            Code::BodyDegenerate,
+            format!("all mass of the {nodes} nodes lies in one point"),
+        );
+    }
+    let from_centre = Mat::from_fn(positions.len(), 3, |node, k| (positions[node][k] - centre[k]) / length);
+    let spread = symmetric_eigen(gram(from_centre.as_ref(), from_centre.as_ref()).as_ref());
+    let is_line = spread.is_none_or(|eigen| eigen.values[1] <= COLLINEAR_DISTANCE.powi(2) * eigen.values[2]);
+    if is_line {
+        let message = format!("the {nodes} nodes lie on one line, and nothing has inertia about it");
+        return Diagnostic::new(Code::BodyDegenerate, message);
+    }
+    let message =
+        format!("the {nodes} nodes do not lie on one line, but all mass does: nothing has inertia about it");
+    let help = "use C3D8 or C3D20, or two rows of elements, in a bar of one row of elements of reduced integration (C3D8R), which have their mass in their middles; else look for nodes without mass";
+    Diagnostic::new(Code::BodyDegenerate, message).with_help(help)
 }

@@ -1,14 +1,13 @@
 //! Residual vectors: static responses K^+ f, or responses at chosen frequencies, without the contribution
 //! of the modes of a truncated basis (theory section 8).
 
-use super::columns::{Given, columns};
 use super::coupled_model::CoupledModel;
 use super::failure::explain;
+use super::imported::{Given, columns};
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
 use super::massless::on_mass;
-use super::modal_basis::{ModalBasis, problem_of_span};
+use super::modal_basis::{ModalBasis, problem_of_span, rigid_modes};
 use super::pseudo_free_surface::{independent, norm_in_words};
-use super::rigid_modes::rigid_modes;
 use super::{ModeSettings, Truncation};
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -3,8 +3,7 @@
 
 use super::BasisKind;
 use super::failure::explain;
-use super::modal_basis::{Basis, ModalBasis, Task, problem_of_span};
-use super::rigid_modes::rigid_modes;
+use super::modal_basis::{Basis, ModalBasis, Task, problem_of_span, rigid_modes};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};

@@ -8,25 +8,16 @@
 //! ```
 
 mod body_modes;
-mod certificate;
-mod condensation;
 mod conversion;
-mod damping;
-mod geometric_stiffness;
-mod interface_frame;
 mod lumped;
+mod modal_matrices;
 mod modal_model;
 mod recovery;
-mod remarks;
 mod settings;
 
-pub use body_modes::{BodyModes, NodesInFrame, rigid_mass};
-pub use condensation::Condensation;
-pub use conversion::{Conversion, convert};
-pub use damping::modal_damping;
-pub use geometric_stiffness::modal_geometric_stiffness;
-pub use interface_frame::interfaces_in_frame;
+pub use body_modes::{BodyModes, NodesInFrame, interfaces_in_frame, rigid_mass};
+pub use conversion::{Conversion, convert, interface_compliance, poor_fits};
 pub use lumped::LumpedPipeline;
-pub use modal_model::ModalModel;
-pub use remarks::{interface_compliance, poor_fits};
+pub use modal_matrices::{modal_damping, modal_geometric_stiffness};
+pub use modal_model::{Condensation, ModalModel};
 pub use settings::{ConvertSettings, Lumping, MeshChoice};

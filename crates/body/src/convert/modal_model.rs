@@ -1,14 +1,13 @@
-//! First stage of a conversion: a model with its modes, in the frame of its body.
+//! First stages of a conversion: a model with its modes, in the frame of its body, and the condensation of the mass into
+//! invariants, in one or two steps.
 
-use super::body_modes::{reduced, reduced_in_twice_the_precision};
-use super::{
-    BodyModes, ConvertSettings, NodesInFrame, interface_frame, modal_geometric_stiffness, rigid_mass,
-};
+use super::body_modes::{self, reduced, reduced_in_twice_the_precision};
+use super::{BodyModes, ConvertSettings, NodesInFrame, modal_geometric_stiffness, rigid_mass};
 use crate::basis::{BasisChoice, ModalBasis, Task};
-use crate::flex_body::Interface;
+use crate::flex_body::{Guarantee, Interface, TermDecision, TermGroup, TermGroups};
 use crate::invariants::{
-    BodyFrame, Frame, FrameChoice, InertiaStiffness, LumpedMasses, MassProperties, choose_frame,
-    choose_general_frame, choose_plane_frame,
+    BodyFrame, Frame, FrameChoice, InertiaStiffness, Invariants, LumpedMasses, MassProperties, choose_frame,
+    choose_general_frame, choose_plane_frame, condense_certified,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -64,7 +63,7 @@ impl<'m> ModalModel<'m> {
         let place = NodesInFrame::new(model, frame);
         let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
         if let Some(name) = settings.frame.interface() {
-            interface_frame::constrain(model, &place, name, coupled, &mut found)?;
+            body_modes::constrain(model, &place, name, coupled, &mut found)?;
         }
         // Modes with canonical signs along the body axes.
         let modes = BodyModes::new(model, &place, std::mem::replace(&mut found.solution.vectors, Mat::new()));
@@ -81,7 +80,7 @@ impl<'m> ModalModel<'m> {
             modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes, &shift)?;
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
         let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
-        let interfaces = interface_frame::interfaces_in_frame(model, &frame, coupled);
+        let interfaces = body_modes::interfaces_in_frame(model, &frame, coupled);
         Ok(Self {
             model,
             settings,
@@ -129,7 +128,7 @@ fn refuse_uncertifiable(model: &FeModel, accuracy: Accuracy) -> Result<()> {
 ///
 /// # Errors
 /// [`Usage`](Code::Usage) together with settings that need free modes; the errors of
-/// [`frame_of_interface`](interface_frame::frame_of_interface).
+/// [`frame_of_interface`](body_modes::frame_of_interface).
 fn given_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame>> {
     let Some(name) = settings.frame.interface() else { return Ok(None) };
     let refuse = |message: &str, help: &str| {
@@ -143,7 +142,7 @@ fn given_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Fra
         let message = "--lumped-modes compares modes of the free body; it cannot compare modes relative to a frame that is fixed to an interface";
         return refuse(message, "leave --lumped-modes out, or use a frame at the centre of mass");
     }
-    interface_frame::frame_of_interface(model, name).map(Some)
+    body_modes::frame_of_interface(model, name).map(Some)
 }
 
 /// Returns the requested body frame, and the mass properties in model axes.
@@ -158,4 +157,86 @@ fn body_frame(model: &FeModel, wanted: &FrameChoice) -> Result<(Frame, MassPrope
         (Some(mass), _) => choose_frame(mass, positions, wanted),
         (None, d) => choose_general_frame(|about| rigid_mass(model, &about), positions, d, wanted),
     }
+}
+
+/// Mass of a model condensed on its modes: the invariants, their guaranteed digits, and the dropped groups.
+///
+/// Without W2 and W3, M is multiplied by rigid motion only, and for solids no nf x nf arrays except K_ff
+/// and m_ff are formed (theory section 4).
+#[derive(Debug, Clone)]
+pub struct Condensation {
+    pub(super) invariants: Invariants,
+    /// Guaranteed bounds of accuracy `certified`.
+    pub(super) guarantee: Option<Guarantee>,
+    /// Reason for keeping or dropping each group; empty if no selection was made.
+    pub(super) terms: Vec<TermDecision>,
+    /// Number of columns multiplied by M.
+    pub(super) columns: u64,
+}
+
+impl ModalModel<'_> {
+    /// Condenses I0 and W1, enough for a scene to decide about the groups W2 and W3.
+    pub fn condense_linear(&self) -> Condensation {
+        let stiffness = self.modal_stiffness.clone();
+        let invariants = self.modes.condensed_linear(self.model, &self.place, stiffness);
+        Condensation {
+            terms: invariants.groups().dropped().map(not_computed).collect(),
+            invariants,
+            guarantee: None,
+            columns: self.modes.condensed_columns(self.model, true),
+        }
+    }
+
+    /// Condenses all groups.
+    pub fn condense(&self) -> Condensation {
+        let columns = self.modes.condensed_columns(self.model, false);
+        let (invariants, guarantee) = match self.certified() {
+            Some((invariants, guarantee)) => (invariants, Some(guarantee)),
+            None => {
+                let stiffness = self.modal_stiffness.clone();
+                (self.modes.condensed(self.model, &self.place, stiffness), None)
+            }
+        };
+        Condensation { invariants, guarantee, terms: Vec::new(), columns }
+    }
+
+    /// Condenses the groups that `terms` keep; `linear` holds the data already known. Accuracy `certified`
+    /// condenses everything first, since its digits refer to all data.
+    pub fn condense_selected(&self, linear: Condensation, terms: Vec<TermDecision>) -> Condensation {
+        let dropped = terms.iter().filter(|term| !term.kept);
+        let groups =
+            dropped.fold(TermGroups::ALL, |groups, term| groups.and(TermGroups::without(term.group)));
+        let is_enough = !groups.w2 && !groups.w3 && self.found.solution.bounds.is_none();
+        let condensed = if is_enough {
+            linear
+        } else {
+            let whole = self.condense();
+            Condensation { columns: linear.columns + whole.columns, ..whole }
+        };
+        Condensation { invariants: condensed.invariants.with_groups(groups), terms, ..condensed }
+    }
+
+    /// Returns the invariants in double-double arithmetic with guaranteed digits, if the modes have
+    /// guaranteed bounds.
+    fn certified(&self) -> Option<(Invariants, Guarantee)> {
+        let (bounds, mass) = (self.found.solution.bounds.as_ref()?, self.model.scalar_mass()?);
+        let shapes = self.modes.displacements.as_ref();
+        let (positions, axes) = (&self.place.positions, &self.place.frame.axes);
+        let certified = condense_certified(mass, positions, shapes, self.model.stiffness(), axes);
+        let guarantee = Guarantee {
+            shift_below: bounds.shift_below,
+            pivots_below: bounds.pivots_below,
+            eigenvalue_lower: bounds.lower.clone(),
+            eigenvalue_upper: bounds.upper.clone(),
+            shape_error: bounds.shape_error.clone(),
+            digits: certified.digits,
+        };
+        Some((certified.invariants, guarantee))
+    }
+}
+
+/// Returns the placeholder decision about a group that is not computed yet.
+fn not_computed(group: TermGroup) -> TermDecision {
+    let reason = "not computed yet".to_owned();
+    TermDecision { group, kept: false, tier: 0, bound: 0.0, limit: 0.0, reason }
 }

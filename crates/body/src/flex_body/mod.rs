@@ -2,23 +2,17 @@
 
 mod body;
 mod carried;
-mod cross_checks;
-mod frames;
+mod identities;
 mod in_units;
 mod interface;
-mod interface_identities;
 mod modal_change;
 mod model_axes;
-mod model_rows;
 mod parts;
 mod recovery;
-mod reduced;
 mod reference_conditions;
 mod rigid_motion;
-mod rounded;
 mod softening;
 mod storage;
-mod subset;
 mod terms;
 mod validate;
 
@@ -39,5 +33,4 @@ pub use recovery::{LOAD_COMPONENTS, LoadColumns, Recovery, RecoveryState};
 pub use reference_conditions::ReferenceConditions;
 pub use softening::{SOFTENING, axis_in_words};
 pub use storage::Storage;
-pub use subset::Subset;
-pub use terms::TermDecision;
+pub use terms::{Subset, TermDecision};

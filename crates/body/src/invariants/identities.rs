@@ -1,8 +1,7 @@
 //! Identities that hold for every exact body (theory section 10), evaluated from the invariants.
 
-use super::cauchy_schwarz::scaled;
-use super::identity_terms as terms;
-use super::{BodyFrame, CauchySchwarz, Derived, Invariants};
+use super::comparison::scaled;
+use super::{BodyFrame, CauchySchwarz, Derived, Invariants, identity_terms as terms};
 use faer::Mat;
 use nalgebra::Vector3;
 

@@ -1,8 +1,8 @@
 //! Deviations of a body from each identity: dimensionless numbers, NaN if a number of the body is NaN.
 
-use super::cauchy_schwarz::scaled;
-use super::dense::{entries, spectral_norm, symmetric_eigenvalues};
+use super::comparison::scaled;
 use super::derived::{CYCLIC, inertia_of};
+use super::transform::{entries, spectral_norm, symmetric_eigenvalues};
 use super::{CauchySchwarz, Invariants};
 use faer::Mat;
 use flexbody_linalg::{dense_cholesky, larger};

@@ -1,7 +1,9 @@
-//! Primary inertia data of a flexible body and the invariants that depend linearly on them.
+//! Primary inertia data of a flexible body and the invariants that depend linearly on them, the groups of the kinetic
+//! energy that a body holds (theory section 7), and the conditions on the arrays.
 
-use super::TermGroups;
+use crate::problems::Problems;
 use faer::Mat;
+use flexbody_base::diagnostic::Diagnostic;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// Constant inertia data of a body about its frame origin, in frame axes (theory section 2).
@@ -154,4 +156,145 @@ pub struct GeneralTerms {
     /// True for a plane body: only its rotation about z is known, and the entries of J, Ibar and S about
     /// the other axes are those of a lamina that is isotropic about its centre of mass.
     pub plane: bool,
+}
+
+// Groups of the kinetic energy that a body holds (theory section 7).
+
+/// Group of the kinetic energy: all terms that one invariant causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum TermGroup {
+    /// Inertia linear in q, and the constant centrifugal load of the modes.
+    W1,
+    /// Inertia quadratic in q, and the centrifugal load that grows with q.
+    W2,
+    /// Coupling of rotation and modes through q, and the Coriolis force among modes.
+    W3,
+}
+
+impl TermGroup {
+    /// All groups, in the order of the documentation.
+    pub const ALL: [TermGroup; 3] = [Self::W1, Self::W2, Self::W3];
+
+    /// Returns the name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::W1 => "W1",
+            Self::W2 => "W2",
+            Self::W3 => "W3",
+        }
+    }
+}
+
+/// Set of groups of the kinetic energy. Terms independent of q, and W0, always belong to the kinetic
+/// energy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct TermGroups {
+    /// [`TermGroup::W1`].
+    pub w1: bool,
+    /// [`TermGroup::W2`].
+    pub w2: bool,
+    /// [`TermGroup::W3`].
+    pub w3: bool,
+}
+
+impl TermGroups {
+    /// All groups: the exact kinetic energy.
+    pub const ALL: Self = Self { w1: true, w2: true, w3: true };
+    /// No group: the kinetic energy of a body whose inertia does not depend on its deformation.
+    pub const NONE: Self = Self { w1: false, w2: false, w3: false };
+
+    /// Returns true if `group` is in the set.
+    pub fn has(self, group: TermGroup) -> bool {
+        match group {
+            TermGroup::W1 => self.w1,
+            TermGroup::W2 => self.w2,
+            TermGroup::W3 => self.w3,
+        }
+    }
+
+    /// Returns the set with `group` added.
+    pub fn with(mut self, group: TermGroup) -> Self {
+        match group {
+            TermGroup::W1 => self.w1 = true,
+            TermGroup::W2 => self.w2 = true,
+            TermGroup::W3 => self.w3 = true,
+        }
+        self
+    }
+
+    /// Returns the groups that are not in this set.
+    pub fn complement(self) -> Self {
+        Self { w1: !self.w1, w2: !self.w2, w3: !self.w3 }
+    }
+
+    /// Returns all groups but one.
+    pub fn without(group: TermGroup) -> Self {
+        Self { w1: group != TermGroup::W1, w2: group != TermGroup::W2, w3: group != TermGroup::W3 }
+    }
+
+    /// Returns the groups that are in both sets.
+    pub fn and(self, other: Self) -> Self {
+        Self { w1: self.w1 && other.w1, w2: self.w2 && other.w2, w3: self.w3 && other.w3 }
+    }
+
+    /// Returns the groups that are in at least one of the sets.
+    pub fn or(self, other: Self) -> Self {
+        Self { w1: self.w1 || other.w1, w2: self.w2 || other.w2, w3: self.w3 || other.w3 }
+    }
+
+    /// Returns the groups that are missing from this set.
+    pub fn dropped(self) -> impl Iterator<Item = TermGroup> {
+        TermGroup::ALL.into_iter().filter(move |group| !self.has(*group))
+    }
+}
+
+impl Default for TermGroups {
+    /// Returns [`TermGroups::ALL`]: groups are dropped only on request.
+    fn default() -> Self {
+        Self::ALL
+    }
+}
+
+impl Invariants {
+    /// Returns true if every array has the shape that follows from nf, the number of columns of C1.
+    fn has_its_shapes(&self) -> bool {
+        let (data, nf) = (&self.0, self.n_modes());
+        let is = |m: &Mat<f64>, rows: usize, columns: usize| (m.nrows(), m.ncols()) == (rows, columns);
+        data.c1.nrows() == 3
+            && data.ibar.as_flattened().iter().all(|entries| entries.len() == nf)
+            && data.s.as_flattened().iter().all(|s| is(s, nf, nf))
+            && is(&data.modal_stiffness, nf, nf)
+            && data.general.as_ref().is_none_or(|general| {
+                is(&general.w0, 3, 3 * nf) && is(&general.w3, 3 * nf, nf) && is(&general.modal_mass, nf, nf)
+            })
+    }
+
+    /// Returns the errors in the arrays of the invariants called `name`, of a body with `nf` modes.
+    pub(crate) fn problems(&self, name: &str, nf: usize) -> Vec<Diagnostic> {
+        let data = &self.0;
+        let mut problems = Problems::default();
+        problems.finite(&format!("{name}.mass"), [data.mass]);
+        problems.finite(&format!("{name}.first_moment"), data.first_moment.iter().copied());
+        problems.finite(&format!("{name}.second_moment"), data.second_moment.iter().copied());
+        problems.matrix(&format!("{name}.c1"), &data.c1, 3, nf);
+        for k in 0..3 {
+            for l in 0..3 {
+                let block = &data.ibar[k][l];
+                problems.length(&format!("{name}.ibar[{k}][{l}]"), block.len(), nf, "mode");
+                problems.finite(&format!("{name}.ibar[{k}][{l}]"), block.iter().copied());
+                problems.matrix(&format!("{name}.s[{k}][{l}]"), &data.s[k][l], nf, nf);
+            }
+        }
+        problems.matrix(&format!("{name}.modal_stiffness"), &data.modal_stiffness, nf, nf);
+        if let Some(general) = &data.general {
+            problems.matrix(&format!("{name}.w0"), &general.w0, 3, 3 * nf);
+            problems.matrix(&format!("{name}.w3"), &general.w3, 3 * nf, nf);
+            problems.matrix(&format!("{name}.modal_mass"), &general.modal_mass, nf, nf);
+        }
+        // The next check assumes that all arrays have valid shapes.
+        if problems.is_empty() && data.groups != TermGroups::ALL && !self.holds_its_groups_only() {
+            problems.add(format!("`{name}` has entries of groups that it does not hold"));
+        }
+        problems.found()
+    }
 }

@@ -1,7 +1,6 @@
 //! Shared code of the export formats: the trait, frames, losses, containers.
 
 pub(crate) mod arrays;
-mod checklist;
 mod format;
 pub(crate) mod frames;
 #[cfg(feature = "hdf5")]
@@ -9,9 +8,6 @@ pub(crate) mod hdf5_contents;
 pub(crate) mod inertia;
 pub(crate) mod interface_matrices;
 pub(crate) mod losses;
-#[cfg(feature = "hdf5")]
-pub(crate) mod mat5;
 
-pub use checklist::{ExportChecklist, Holding};
-pub use format::{ExportFormat, ExportOptions, Exported, InertiaInScene, Points};
+pub use format::{ExportChecklist, ExportFormat, ExportOptions, Exported, Holding, InertiaInScene, Points};
 pub use frames::{ExportFrame, frames};

@@ -1,7 +1,6 @@
 //! Audit of a file: checks of its format, and identities of every flexible body.
 
-use super::any_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
-use super::kind_of_modes::beside_free_surface;
+use super::import_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia, beside_free_surface};
 use super::{AuditCheck, ImportedBody, ImportedFile, ImportedFrame};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -1,8 +1,12 @@
 //! Trait of import formats, and the result of reading a file.
 
-use super::{AuditCheck, ImportedBody};
+use super::AuditCheck;
+use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_base::text::InputFile;
+use flexbody_base::units::UnitSystem;
+use flexbody_body::invariants::Numbered;
+use flexbody_model::{GeometricStiffness, SurfaceMesh};
 
 /// Result of reading a file of another program.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,4 +43,50 @@ pub trait ImportFormat: Sync {
     /// [`ForeignIncomplete`](flexbody_base::diagnostic::Code::ForeignIncomplete) for a file that does not
     /// even determine the shapes of the arrays.
     fn read(&self, file: &InputFile) -> Result<ImportedFile>;
+}
+
+/// A body described by a file of another program. Only array shapes are checked: modes may be arbitrary,
+/// matrices asymmetric, numbers not finite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedBody {
+    /// Name of the body; empty if the file has none.
+    pub name: String,
+    /// Units, if the file states them.
+    pub units: Option<UnitSystem>,
+    /// Inertia about the origin of the body frame of the file, along its axes.
+    pub inertia: Numbered,
+    /// Modal stiffness K_ff (nf x nf).
+    pub modal_stiffness: Mat<f64>,
+    /// Modal damping D (nf x nf); `None` if the file has none.
+    pub modal_damping: Option<Mat<f64>>,
+    /// Geometric stiffness Psi' K_geo Psi (nf x nf) of unit loads along body axes.
+    pub geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
+    /// Nodes and frames of the body.
+    pub frames: Vec<ImportedFrame>,
+    /// Surface on the places of the body, if the file has one.
+    pub mesh: Option<SurfaceMesh>,
+    /// Data missing in the file or not usable, as fragments of sentences.
+    pub omissions: Vec<String>,
+}
+
+/// A node or frame of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedFrame {
+    /// Label in the file.
+    pub label: String,
+    /// Name of the interface at the frame, if the file states one.
+    pub interface: Option<String>,
+    /// Undeformed position in the body frame.
+    pub position: [f64; 3],
+    /// Displacement of each mode (3 x nf).
+    pub translation: Mat<f64>,
+    /// Rotation of each mode (3 x nf); `None` if the file has none.
+    pub rotation: Option<Mat<f64>>,
+}
+
+impl ImportedBody {
+    /// Returns the number of modes nf.
+    pub fn n_modes(&self) -> usize {
+        self.inertia.i8.len()
+    }
 }

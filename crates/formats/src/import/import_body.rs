@@ -1,7 +1,5 @@
 //! Conversion of the file of another program into a flexible body.
 
-use super::any_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
-use super::kind_of_modes::{beside_diagonal, beside_free_surface, beside_normalised};
 use super::{ImportedBody, ImportedFile, ImportedFrame};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -13,9 +11,14 @@ use flexbody_body::flex_body::{
     ReferenceConditions, Source, Storage, TermDecision, TermGroup, diagonal_eigenvalues, reduced_residuals,
     rigid_motions,
 };
-use flexbody_body::invariants::{BodyFrame, FrameChoice, Invariants, identities, symmetric_part};
+use flexbody_body::invariants::{
+    BodyFrame, Expected, FrameChoice, IdentityCheck, Invariants, Numbered, Turning, identities,
+    symmetric_part,
+};
+use flexbody_body::verification::body_identities;
 use flexbody_linalg::larger;
 use flexbody_model::Nodes;
+use nalgebra::Matrix3;
 use std::collections::HashSet;
 
 /// Largest violation of the inertia identities with which a body can still be computed, relative to their
@@ -378,4 +381,113 @@ fn interfaces(given: &ImportedBody) -> Vec<Interface> {
 fn mean_position(given: &ImportedBody, nodes: &[usize]) -> [f64; 3] {
     let sum = |k: usize| nodes.iter().map(|&i| given.frames[i].position[k]).sum::<f64>();
     [0, 1, 2].map(|k| sum(k) / nodes.len() as f64)
+}
+
+// Tests of the modes of a file: mass-normalised with a diagonal stiffness, free of rigid motion.
+
+/// Largest entry of K_ff off its diagonal for which it counts as diagonal, above the rounding of FE matrices.
+/// Eigenvalues then differ from the diagonal by the square of this value, relative.
+const NEARLY_DIAGONAL: f64 = 1e-5;
+
+/// Returns the distance of the modes from mass-normalised free-surface modes, the largest violation of their
+/// identities; `None` if they are such modes.
+pub(crate) fn beside_free_surface(invariants: &Invariants) -> Option<f64> {
+    beside(invariants, &["modal_mass_identity", "c1_zero", "c2_zero"])
+}
+
+/// Returns the distance of the modes from mass-normalised modes with a diagonal stiffness, for any reference
+/// conditions; `None` if they are such modes.
+fn beside_normalised(invariants: &Invariants) -> Option<f64> {
+    beside(invariants, &["modal_mass_identity"])
+}
+
+/// Returns the largest value of the failed identities `about_modes`; `None` if all hold and K_ff is diagonal,
+/// positive and ascending.
+fn beside(invariants: &Invariants, about_modes: &[&str]) -> Option<f64> {
+    let missed = of_modes(invariants)
+        .into_iter()
+        .filter(|check| about_modes.contains(&check.name) && !check.passed)
+        .map(|check| check.value)
+        .fold(0.0, larger);
+    let beside = beside_diagonal(invariants);
+    let k = invariants.modal_stiffness();
+    let nearly = |j: usize| k[(j - 1, j - 1)] - k[(j, j)] <= DIGITS * k[(j, j)];
+    let ascending = k[(0, 0)] > 0.0 && (1..k.ncols()).all(nearly);
+    let diagonal = beside <= NEARLY_DIAGONAL;
+    let missed = if diagonal { missed } else { missed.max(beside) };
+    // A NaN is not zero and counts as a failure.
+    (missed != 0.0 || !diagonal || !ascending).then_some(missed)
+}
+
+/// Returns the largest entry of K_ff off its diagonal, relative to the diagonal entries of its row and
+/// column.
+fn beside_diagonal(invariants: &Invariants) -> f64 {
+    let diagonal = of_modes(invariants).into_iter().find(|check| check.name == "modal_stiffness_diagonal");
+    diagonal.map_or(f64::NAN, |check| check.value)
+}
+
+/// Returns the identities of mass-normalised free-surface modes with the frequencies from the diagonal of
+/// K_ff.
+fn of_modes(invariants: &Invariants) -> Vec<IdentityCheck> {
+    let eigenvalues: Vec<f64> =
+        (0..invariants.n_modes()).map(|j| invariants.modal_stiffness()[(j, j)]).collect();
+    let expected =
+        Expected { mass_normalised: true, free_surface: true, eigenvalues: Some(&eigenvalues), ..ANY_BODY };
+    identities(invariants, &expected)
+}
+
+// Requirements on every body, for any modes.
+
+/// Expectations for identities that hold for any modes.
+pub(crate) const ANY_BODY: Expected<'static> = Expected {
+    mass_normalised: false,
+    free_surface: false,
+    frame: BodyFrame::Model,
+    origin: nalgebra::Vector3::new(0.0, 0.0, 0.0),
+    eigenvalues: None,
+    eigenvalue_noise: 0.0,
+    eigenvalue_rounding: 0.0,
+    turning: Turning::None,
+};
+
+/// Rounding in files with 10 digits and more, relative to Cauchy-Schwarz bounds. Redundant numbers may differ
+/// by this much.
+pub(crate) const DIGITS: f64 = 1e-9;
+
+/// Meaning of a principal moment of zero.
+pub(crate) const NO_INERTIA: &str = "rotation about an axis through the centre of mass has no inertia: all masses lie on a line, or the inertia of the nodes is missing";
+
+/// Returns the number of principal moments about the centre of mass that are zero up to rounding; NaN if they
+/// cannot be computed.
+pub(crate) fn axes_without_inertia(inertia: &Numbered) -> f64 {
+    const ZERO_MOMENT: f64 = 1e-12;
+    let centre = inertia.i2 / inertia.i1;
+    let steiner = (Matrix3::identity() * centre.norm_squared() - centre * centre.transpose()) * inertia.i1;
+    let about_centre = inertia.i7 - steiner;
+    if about_centre.iter().any(|entry| !entry.is_finite()) {
+        return f64::NAN;
+    }
+    // The scale of rounding is that of the moments about the origin.
+    let size = inertia.i7.amax();
+    let moments = (0.5 * (about_centre + about_centre.transpose())).symmetric_eigenvalues();
+    moments.iter().filter(|moment| moment.abs() <= ZERO_MOMENT * size).count() as f64
+}
+
+/// Returns an error for an imported body that violates an identity of theory section 10: its file contradicts
+/// itself.
+///
+/// # Errors
+/// [`ForeignUnsound`](Code::ForeignUnsound), one diagnostic for every violated identity.
+pub fn accept_imported(imported: &Imported) -> Result<()> {
+    let broken = body_identities(&imported.body).into_iter().filter(|check| !check.passed);
+    let found: Vec<Diagnostic> = broken
+        .map(|check| {
+            let message = format!(
+                "the numbers of the file violate the identity `{}` ({}): {:.1e}, and at most {:.1e} is rounding",
+                check.name, check.formula, check.value, check.limit
+            );
+            Diagnostic::new(Code::ForeignUnsound, message)
+        })
+        .collect();
+    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
 }

@@ -1,8 +1,7 @@
 //! Checks of the record groups.
 
-use super::read::body::{COUPLING, Read, by_columns, from_masses, missing};
-use super::read::records::Records;
-use super::read::words::Surplus;
+use super::read::{COUPLING, Read, by_columns, from_masses, missing};
+use super::records::{Records, Surplus};
 use crate::import::AuditCheck;
 use crate::import::redundant::{ROUNDING, Redundant, asymmetry, in_other_order, relative};
 use flexbody_base::diagnostic::Code;

@@ -1,6 +1,6 @@
 //! The `.fem` file of MBDyn's modal joint.
 
 mod checks;
-pub(super) mod import;
-mod read;
+pub(super) mod read;
+mod records;
 pub(super) mod write;

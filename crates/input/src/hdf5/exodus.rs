@@ -1,10 +1,9 @@
 //! Nodes, node sets and elements of Exodus II meshes in netCDF-4: `coordx`, `coordy`, `coordz` (or `coord`),
 //! `node_num_map`, `node_ns1`, ... and their names `ns_names`, or numbers `ns_prop1`, `connect1`, ....
 
-use super::members::Members;
-use super::opened;
 use super::values::{Found, Heaps, Numbers, Vector, names_of, refuse_beyond_memory, text_of};
-use crate::upright_order::in_order_of_shape;
+use super::{Members, opened};
+use crate::mesh::in_order_of_shape;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_model::{ElementShape, Elements, Nodes};

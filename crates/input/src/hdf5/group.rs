@@ -5,8 +5,8 @@ use super::super::assemble::{
     ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, assembled, check_size, push,
     refuse_beyond_memory, undeclared_triangle,
 };
-use super::members::{Members, POINTERS};
 use super::values::{Found, Heaps, Vector, integers_of, text_of, truth_of};
+use super::{Members, POINTERS};
 use crate::lent::StoredColumns;
 use crate::reader::MatrixSource;
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -1,12 +1,13 @@
 //! Lists of numbers and small attributes of any stored type.
 
-use super::members::Members;
+use super::{MAX_DEPTH, MAX_GROUPS, Members, layout, opened};
+use crate::array::Array;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::hdf5_file::first_broken_heap;
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::InputFile;
 use hdf5_metno::types::{FixedAscii, FixedUnicode, FloatSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
-use hdf5_metno::{Attribute, Dataset, Group, Hyperslab, SliceOrIndex};
+use hdf5_metno::{Attribute, Dataset, File, Group, Hyperslab, SliceOrIndex};
 use std::cell::OnceCell;
 use std::ops::Range;
 
@@ -285,4 +286,108 @@ pub(super) fn text_of(attribute: &Attribute, heaps: &Heaps<'_>) -> Option<String
         _ => return None,
     };
     String::from_utf8(text).ok().map(|text| text.trim().to_owned())
+}
+
+// A dense array in an HDF5 file: the named dataset, or the only one with two extents.
+
+/// Reads the dataset `name`, or the only array of the file.
+pub(crate) fn read_array(file: &InputFile, name: Option<&str>) -> Found<Array> {
+    let opened = opened(file)?;
+    let numbers = match name {
+        Some(name) => named(&opened, name)?,
+        None => search(&opened)?,
+    };
+    let shape = numbers.dataset.shape();
+    let (rows, cols) = match *shape.as_slice() {
+        [rows] => (rows, 1),
+        [rows, cols] => (rows, cols),
+        _ => {
+            let message = format!("dataset {} has the shape {shape:?}, expected two extents", numbers.name);
+            return Err(vec![Diagnostic::new(Code::MatrixKind, message)]);
+        }
+    };
+    let single = numbers.is_single_precision();
+    refuse_beyond_memory(rows.saturating_mul(cols), &numbers.name)?;
+    let values = numbers.dataset.read_raw::<f64>().map_err(|e| {
+        let message = format!("dataset {} cannot be read: {e}", numbers.name);
+        vec![Diagnostic::new(Code::FileUnreadable, message).with_help("write the file again")]
+    })?;
+    Ok(Array { rows, cols, row_major: true, values, digits: if single { 7 } else { 17 } })
+}
+
+fn named(file: &File, name: &str) -> Found<Numbers> {
+    let parts: Vec<&str> = name.split('/').filter(|part| !part.is_empty()).collect();
+    let Some((last, groups)) = parts.split_last() else { return search(file) };
+    let mut group = root(file)?;
+    let mut path = String::new();
+    for part in groups {
+        let missing = || {
+            vec![layout(format!("`{part}` of `{name}` is not a group of the file")).with_help(listing(file))]
+        };
+        if !Members::of(&group).is_here(part) {
+            return Err(missing());
+        }
+        group = group.group(part).map_err(|_| missing())?;
+        path = format!("{path}/{part}");
+    }
+    let members = Members::of(&group);
+    if members.link(last).is_none() {
+        return Err(vec![layout(format!("dataset `{name}` is not in the file")).with_help(listing(file))]);
+    }
+    Numbers::open(&group, &members, &path, last)
+}
+
+fn search(file: &File) -> Found<Numbers> {
+    let mut found = arrays(file);
+    match (found.pop(), found.is_empty()) {
+        (Some((group, path, name)), true) => Numbers::open(&group, &Members::of(&group), &path, &name),
+        (None, _) => Err(vec![layout("file holds no array with two extents".into()).with_help(HELP)]),
+        (Some(_), false) => {
+            let message =
+                format!("file holds {} arrays with two extents; which has the shapes?", found.len() + 1);
+            Err(vec![layout(message).with_help(listing(file))])
+        }
+    }
+}
+
+const HELP: &str = "store the shapes as a dataset with one row for every matrix row";
+
+fn listing(file: &File) -> String {
+    let found = arrays(file);
+    if found.is_empty() {
+        return HELP.to_owned();
+    }
+    let names: Vec<String> = found.iter().take(8).map(|(_, path, name)| format!("{path}/{name}")).collect();
+    let more = if found.len() > names.len() { ", ..." } else { "" };
+    format!("name the dataset as FILE.h5:/dataset; the file has {}{more}", names.join(", "))
+}
+
+fn root(file: &File) -> Found<Group> {
+    file.group("/").map_err(|e| vec![layout(format!("root group cannot be read: {e}"))])
+}
+
+/// Returns all datasets with two extents, breadth first: group, path of the group, and name.
+fn arrays(file: &File) -> Vec<(Group, String, String)> {
+    let mut found = Vec::new();
+    let mut level: Vec<(String, Group)> = root(file).map(|root| (String::new(), root)).into_iter().collect();
+    let mut visited = 0;
+    for _ in 0..MAX_DEPTH {
+        let mut next = Vec::new();
+        for (path, group) in level {
+            let members = Members::of(&group);
+            for child in members.hard_links().filter(|child| !child.starts_with('#')) {
+                visited += 1;
+                if visited > MAX_GROUPS {
+                    return found;
+                }
+                if let Ok(inner) = group.group(child) {
+                    next.push((format!("{path}/{child}"), inner));
+                } else if group.dataset(child).is_ok_and(|dataset| dataset.ndim() == 2) {
+                    found.push((group.clone(), path.clone(), child.to_owned()));
+                }
+            }
+        }
+        level = next;
+    }
+    found
 }

@@ -1,18 +1,19 @@
 //! Jobs of CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes `job.sti`, `job.mas` (upper triangles, 14 digits) and
 //! `job.dof` (a line `node.direction` for every row) into the folder of the deck `job.inp`.
 
-use super::coordinate_files::CoordinateFile;
-use super::deck::Deck;
+use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
-use super::distributing_couplings::{placed_note, reference_places};
+use super::deck_sets::nodes_of_surface;
 use super::expanded::{Once, label_once};
-use super::rotation_nodes::rotation_nodes;
+use super::matrix_files::CoordinateFile;
 use super::{Found, JobFile, JobModel, JobReader, both, is_deck, missing};
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::numbers::significant;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
-use flexbody_base::text::scanner::{Line, Lines, expected, integer};
+use flexbody_base::text::scanner::{Line, Lines, excerpt, expected, integer, real};
 use flexbody_model::{DofLabel, GivenRows, Nodes};
-use std::collections::BTreeMap;
+use nalgebra::Vector3;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
 /// Reader of CalculiX jobs.
@@ -102,4 +103,311 @@ fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
         labels.push(label);
     }
     Ok((labels, file.seen().map_err(|diagnostic| vec![diagnostic])?))
+}
+
+// Nodes of CalculiX whose directions 1 to 3 are rotations of a reference node.
+//
+// ROT NODE of *RIGID BODY names such a node. *COUPLING with *KINEMATIC creates a node that is not in the deck, but its
+// number follows from the deck: CalculiX reads all *NODE cards, then all *COUPLING cards in their order, and then the
+// cards and elements that create further nodes. Each kinematic coupling takes the next number for its rotation node,
+// and further numbers without rows for its equations (see [`Coupling::n_numbers`]).
+
+/// Number of internal nodes of an element with incompatible modes (C3D8I).
+const INTERNAL_NODES: usize = 3;
+
+const ROTATION_HELP: &str = "run CalculiX again if the deck has changed since; else write *RIGID BODY, NSET=SET, REF NODE=A, ROT NODE=B instead of the coupling";
+
+/// Returns the rotation nodes of a deck, each with the reference node that rotates. `labels` are the labels of the rows
+/// by CalculiX.
+///
+/// # Errors
+/// FB111 if the rows that are rotations, or their reference node, cannot be identified.
+fn rotation_nodes(deck: &Deck, mesh: &DeckMesh, labels: &[DofLabel]) -> Found<HashMap<i64, i64>> {
+    let mut rotations = named_rotation_nodes(deck)?;
+    rotations.extend(made_rotation_nodes(deck, mesh, labels)?);
+    let with_rows: BTreeSet<i64> = labels.iter().map(|label| label.node).collect();
+    let mut turned: HashMap<i64, i64> = HashMap::new();
+    let mut nodes = HashMap::new();
+    for Rotation { node, reference, card } in rotations {
+        // A rotation node belongs to one reference node, and a reference node has one rotation node.
+        if let Some(other) = nodes.insert(node, reference).filter(|other| *other != reference) {
+            let message = format!("ROT NODE {node} belongs to two reference nodes, {other} and {reference}");
+            let diagnostic = deck.about(card, Code::DeckUnsupported, message);
+            return Err(vec![diagnostic.with_help("give each *RIGID BODY a separate ROT NODE")]);
+        }
+        if with_rows.contains(&node) && turned.insert(reference, node).is_some_and(|other| other != node) {
+            let message = format!(
+                "REF NODE {reference} of *{} is also the REF NODE of another coupling: its rotations are not unique",
+                card.title
+            );
+            let diagnostic = deck.about(card, Code::DeckUnsupported, message);
+            return Err(vec![diagnostic.with_help("give each coupling a separate REF NODE")]);
+        }
+    }
+    Ok(nodes)
+}
+
+/// Rotation node, its reference node, and the card that defines them.
+struct Rotation<'d> {
+    node: i64,
+    reference: i64,
+    card: &'d Card,
+}
+
+/// Returns the rotation nodes that *RIGID BODY names.
+///
+/// # Errors
+/// FB111 for *RIGID BODY without REF NODE or ROT NODE.
+fn named_rotation_nodes(deck: &Deck) -> Found<Vec<Rotation<'_>>> {
+    let mut rotations = Vec::new();
+    for card in deck.cards().iter().filter(|card| card.keyword == "RIGIDBODY") {
+        let node = |name: &str| {
+            card.parameter(name).and_then(|text| fields(text.as_bytes()).next().and_then(integer))
+        };
+        let message = match (node("REFNODE"), node("ROTNODE")) {
+            (Some(reference), Some(node)) => {
+                rotations.push(Rotation { node, reference, card });
+                continue;
+            }
+            (Some(_), None) => "*RIGID BODY has no ROT NODE: the rows of its rotations cannot be identified",
+            (None, _) => "*RIGID BODY has no REF NODE: its rows cannot be identified",
+        };
+        let diagnostic = deck.about(card, Code::DeckUnsupported, message);
+        return Err(vec![diagnostic.with_help("write *RIGID BODY, NSET=SET, REF NODE=A, ROT NODE=B")]);
+    }
+    Ok(rotations)
+}
+
+/// A *COUPLING with *KINEMATIC.
+struct Coupling<'d> {
+    card: &'d Card,
+    /// Number of lines of directions below *KINEMATIC.
+    n_lines: usize,
+}
+
+impl Coupling<'_> {
+    /// Returns the kinematic couplings of a deck in their order. *DISTRIBUTING only distributes loads over a surface:
+    /// it creates no nodes, and its reference node has no rows.
+    fn all(deck: &Deck) -> Vec<Coupling<'_>> {
+        let cards = deck.cards();
+        let mut couplings = Vec::new();
+        for (k, card) in cards.iter().enumerate().filter(|(_, card)| card.keyword == "COUPLING") {
+            let below = cards[k + 1..].iter().take_while(|card| card.keyword == "KINEMATIC");
+            let counts: Vec<usize> = below.map(|card| deck.data(card).count()).collect();
+            if !counts.is_empty() {
+                couplings.push(Coupling { card, n_lines: counts.iter().sum() });
+            }
+        }
+        couplings
+    }
+
+    /// Returns the number of node numbers that the coupling takes besides that of its rotation node. Each line of
+    /// directions creates one node for each node of the surface. With ORIENTATION every node of the surface creates a
+    /// copy of itself and one node for the equations of the copy, and the lines create none. Returns `None` if the
+    /// nodes of the surface are unknown.
+    fn n_numbers(&self, deck: &Deck, mesh: &DeckMesh) -> Option<i64> {
+        let nodes = nodes_of_surface(deck, mesh, &self.card.name("SURFACE")?)?.len();
+        let for_each = if self.card.parameter("ORIENTATION").is_some() { 2 } else { self.n_lines };
+        i64::try_from(nodes.checked_mul(for_each)?).ok()
+    }
+
+    /// Returns the reference node, given by its number or by a set of one node.
+    ///
+    /// # Errors
+    /// FB111 if REF NODE is neither.
+    fn reference(&self, deck: &Deck, mesh: &DeckMesh) -> Found<i64> {
+        let text = self.card.parameter("REFNODE").unwrap_or_default();
+        let set = || match mesh.set(text)? {
+            [node] => Some(*node),
+            _ => None,
+        };
+        integer(text.as_bytes()).or_else(set).ok_or_else(|| {
+            let message = format!("REF NODE `{text}` of *COUPLING is neither a node nor a set of one node");
+            let diagnostic = deck.about(self.card, Code::DeckUnsupported, message);
+            vec![diagnostic.with_help("write the number of the reference node, as in REF NODE=17")]
+        })
+    }
+
+    /// Returns FB111: the rows of the rotations of the reference node cannot be identified.
+    fn refuse<T>(&self, deck: &Deck, reference: i64, why: &str, help: &str) -> Found<T> {
+        let message = format!(
+            "*COUPLING, *KINEMATIC: the rows of the rotations of REF NODE {reference} cannot be identified: {why}"
+        );
+        Err(vec![deck.about(self.card, Code::DeckUnsupported, message).with_help(help)])
+    }
+}
+
+/// Kinematic coupling with its reference node, and the number of its rotation node by the deck.
+struct Numbered<'d> {
+    coupling: Coupling<'d>,
+    reference: i64,
+    node: i64,
+}
+
+/// Returns the rotation nodes that kinematic couplings create and that have rows.
+///
+/// # Errors
+/// FB111 if rows of nodes outside the deck are not those that its couplings create.
+fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel]) -> Found<Vec<Rotation<'d>>> {
+    let mut next = mesh.nodes.keys().next_back().and_then(|highest| highest.checked_add(1));
+    let mut end = i64::MIN;
+    let mut numbered = Vec::new();
+    for coupling in Coupling::all(deck) {
+        let reference = coupling.reference(deck, mesh)?;
+        let Some(node) = next else {
+            let why = "the nodes of the surface of a coupling above it cannot be counted";
+            let help =
+                "write the *SURFACE of each coupling by nodes or by the faces S1 to S6 of solid elements";
+            return coupling.refuse(deck, reference, why, help);
+        };
+        next = coupling.n_numbers(deck, mesh).and_then(|count| node.checked_add(count)?.checked_add(1));
+        // Numbers below `end` belong to couplings.
+        end = next.unwrap_or(node);
+        numbered.push(Numbered { coupling, reference, node });
+    }
+    let Some(last) = numbered.last() else { return Ok(Vec::new()) };
+    let expected: BTreeSet<i64> = numbered.iter().map(|entry| entry.node).collect();
+    // Nodes with rows but without a position in the deck: rotation nodes, and others with higher numbers.
+    let made: BTreeSet<i64> =
+        labels.iter().map(|label| label.node).filter(|node| !mesh.nodes.contains_key(node)).collect();
+    let others: Vec<i64> = made.difference(&expected).copied().collect();
+    let stray = others.first().filter(|other| **other < end);
+    let n_internal = INTERNAL_NODES * n_with_internal_nodes(mesh);
+    let is_explained = others.len() == n_internal;
+    // A coupling has no rows if all its nodes follow another coupling, or if the deck is not the one that was run.
+    let absent = numbered.iter().find(|entry| entry.coupling.n_lines > 0 && !made.contains(&entry.node));
+    let Numbered { coupling, reference, node } = absent.unwrap_or(last);
+    match stray {
+        Some(stray) => {
+            let why = format!("by the deck they belong to node {node}, but node {stray} has rows");
+            coupling.refuse(deck, *reference, &why, ROTATION_HELP)
+        }
+        None if !is_explained => {
+            let why = format!(
+                "by the deck they belong to node {node}, and elements have {n_internal} internal nodes, but {} nodes beyond those of the deck have rows",
+                made.len()
+            );
+            coupling.refuse(deck, *reference, &why, ROTATION_HELP)
+        }
+        None => {
+            let with_rows = numbered.into_iter().filter(|entry| made.contains(&entry.node));
+            let rotation = |entry: Numbered<'d>| Rotation {
+                node: entry.node,
+                reference: entry.reference,
+                card: entry.coupling.card,
+            };
+            Ok(with_rows.map(rotation).collect())
+        }
+    }
+}
+
+/// Returns the number of elements of a deck that have internal nodes.
+fn n_with_internal_nodes(mesh: &DeckMesh) -> usize {
+    mesh.elements
+        .iter()
+        .filter(|elements| elements.kind == "C3D8I")
+        .map(|elements| elements.members.len())
+        .sum()
+}
+
+// Reference nodes of `*DISTRIBUTING COUPLING` of CalculiX.
+//
+// Such a coupling makes the displacement of its reference node the weighted mean of those of its nodes, and eliminates
+// the first of these nodes. CalculiX does not use the coordinates of the reference node. In a rigid motion it moves as
+// the mean of the node positions, so this mean is the position of its rows.
+
+const COUPLING_HELP: &str = "write *DISTRIBUTING COUPLING, ELSET=E with one element of type DCOUP3D in E and lines `node or set, weight`; or remove it from the deck and name its nodes as an averaging interface: --interface NAME=SET,averaging";
+
+/// Returns the reference nodes of the couplings of a deck, each with the mean of the positions of its nodes.
+///
+/// # Errors
+/// FB111 for a coupling whose reference node or nodes cannot be identified.
+fn reference_places(deck: &Deck, mesh: &DeckMesh) -> Found<BTreeMap<i64, [f64; 3]>> {
+    let is_coupling = |card: &&Card| card.keyword == "DISTRIBUTINGCOUPLING";
+    let mut sums: BTreeMap<i64, Sum<'_>> = BTreeMap::new();
+    for card in deck.cards().iter().filter(is_coupling) {
+        let node = reference_node(card, mesh).map_err(|why| refused(deck, card, &why))?;
+        let sum = sums.entry(node).or_insert(Sum { card, moment: Vector3::zeros(), total: 0.0 });
+        // Data that continue in another file have a separate card.
+        for (line, text) in deck.data(card) {
+            let (places, weight) = weighted(text, mesh).ok_or_else(|| {
+                let text = excerpt(text);
+                let message =
+                    format!("*DISTRIBUTING COUPLING: `{text}` is not a node or node set and its weight");
+                vec![deck.at(card, line, Code::DeckUnsupported, message).with_help(COUPLING_HELP)]
+            })?;
+            sum.moment += places.iter().map(|place| weight * Vector3::from(*place)).sum::<Vector3<f64>>();
+            sum.total += weight * places.len() as f64;
+        }
+    }
+    let mean = |(node, sum): (i64, Sum<'_>)| {
+        let place = sum.moment / sum.total;
+        let why = "the weights of its nodes add up to zero";
+        let is_finite = place.iter().all(|x| x.is_finite());
+        is_finite.then(|| (node, place.into())).ok_or_else(|| refused(deck, sum.card, why))
+    };
+    sums.into_iter().map(mean).collect()
+}
+
+/// Weighted sum of node positions.
+struct Sum<'d> {
+    card: &'d Card,
+    moment: Vector3<f64>,
+    total: f64,
+}
+
+fn refused(deck: &Deck, card: &Card, why: &str) -> Vec<Diagnostic> {
+    let message = format!("*DISTRIBUTING COUPLING: {why}");
+    vec![deck.about(card, Code::DeckUnsupported, message).with_help(COUPLING_HELP)]
+}
+
+/// Returns a note that names the reference nodes with rows, whose positions differ from those in the deck.
+fn placed_note(means: &BTreeMap<i64, [f64; 3]>, labels: &[DofLabel], path: &Path) -> Option<Diagnostic> {
+    let with_rows: BTreeSet<i64> = labels.iter().map(|label| label.node).collect();
+    let named: Vec<String> = means
+        .iter()
+        .filter(|(node, _)| with_rows.contains(node))
+        .map(|(node, x)| format!("{node} at ({})", x.map(|x| significant(x, 6)).join(", ")))
+        .collect();
+    let message = format!(
+        "reference nodes of distributing couplings lie at the weighted mean of their nodes, whatever their coordinates are: {}",
+        named.join("; ")
+    );
+    (!named.is_empty()).then(|| Diagnostic::new(Code::DeckReference, message).in_file(path))
+}
+
+/// Returns the node of the only element of the set of a coupling.
+///
+/// # Errors
+/// The set is missing, or has other elements than one DCOUP3D; the error is in words.
+fn reference_node(card: &Card, mesh: &DeckMesh) -> Result<i64, String> {
+    let set = card.name("ELSET").ok_or("ELSET is missing")?;
+    let members = mesh.element_sets.get(&set).ok_or_else(|| format!("element set `{set}` is unknown"))?;
+    let is_coupling = |kind: &str| kind == "DCOUP3D";
+    let nodes: Vec<i64> = mesh
+        .elements
+        .iter()
+        .filter(|elements| is_coupling(&elements.kind))
+        .flat_map(|elements| &elements.members)
+        .filter(|(id, _)| members.contains(id))
+        .flat_map(|(_, nodes)| nodes.iter().copied())
+        .collect();
+    match (nodes.as_slice(), members.len()) {
+        (&[node], 1) => Ok(node),
+        _ => Err(format!("element set `{set}` is not one element of type DCOUP3D")),
+    }
+}
+
+/// Returns the positions of the nodes that a line names by a number or a set, and the weight of each; `None` for a line
+/// without a weight, or without a node or set of the deck.
+fn weighted(line: &[u8], mesh: &DeckMesh) -> Option<(Vec<[f64; 3]>, f64)> {
+    let mut given = fields(line);
+    let (name, weight) = (given.next()?, given.next()?);
+    let weight = real(weight).filter(|weight| weight.is_finite())?;
+    let nodes: BTreeSet<i64> = match integer(name) {
+        Some(node) => BTreeSet::from([node]),
+        None => mesh.set(&String::from_utf8_lossy(name))?.iter().copied().collect(),
+    };
+    let places: Option<Vec<[f64; 3]>> = nodes.iter().map(|node| mesh.nodes.get(node).copied()).collect();
+    Some((places?, weight))
 }

@@ -1,8 +1,7 @@
 //! Results of CalculiX (.frd, text): the displacements of every mode of a `*FREQUENCY` step, with five decimals, in
 //! fields of fixed width that touch each other.
 
-use super::table::ModeTable;
-use super::{Found, syntax, unexpected, unreadable};
+use super::{Found, ModeTable, syntax, unexpected, unreadable};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, field, integer, real, words};
 use flexbody_model::DofLabel;

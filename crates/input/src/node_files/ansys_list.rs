@@ -1,10 +1,11 @@
 //! Node lists of Ansys: a table with tabs, whose header names the columns in the user's language, and the listing of
 //! NLIST. Decimal commas are read.
 
-use super::ansys_axes::axes;
 use super::{Found, NodeFile, unexpected};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, integer, real, words};
+use flexbody_model::NodeAxes;
+use nalgebra::{Rotation3, Vector3};
 
 /// Returns true when the text begins with a header with tabs and a column X, or with the listing of NLIST.
 pub(super) fn recognises(head: &str) -> bool {
@@ -56,4 +57,31 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
 fn decimal(field: &[u8]) -> Option<f64> {
     let text: Vec<u8> = field.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
     real(&text)
+}
+
+/// Returns the unit vectors along the rows of a node; `None` if all angles are zero. The angles are in degrees: THXY
+/// about z, THYZ about the rotated x, THZX about the rotated y.
+pub(super) fn axes([xy, yz, zx]: [f64; 3]) -> Option<NodeAxes> {
+    if [xy, yz, zx] == [0.0; 3] {
+        return None;
+    }
+    let about = |axis, degrees: f64| Rotation3::from_axis_angle(&axis, degrees.to_radians());
+    let turn = about(Vector3::z_axis(), xy) * about(Vector3::x_axis(), yz) * about(Vector3::y_axis(), zx);
+    Some([Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| (turn * axis).into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A quarter turn about z, then one about the rotated x, which points along y: z then points along x.
+    #[test]
+    fn angles_turn_about_axes_that_are_turned() {
+        let turned = axes([90.0, 90.0, 0.0]).expect("turned");
+        let expected = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
+        for (turned, expected) in turned.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((turned - expected).abs() < 1e-15, "{turned} {expected}");
+        }
+        assert_eq!(axes([0.0; 3]), None);
+    }
 }

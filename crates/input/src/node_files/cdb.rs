@@ -1,12 +1,12 @@
 //! Archives of Ansys (`CDWRITE`, .cdb): nodes in NBLOCK, components of nodes in CMBLOCK, elements in EBLOCK,
 //! all in fields of fixed width.
 
-mod eblock;
-
-use super::ansys_axes::axes;
+use super::ansys_list::axes;
 use super::{Found, NodeFile, syntax};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Lines, excerpt, field, integer, real};
+use flexbody_model::{ElementShape, Elements};
+use std::collections::HashMap;
 
 /// Returns true when the text is an archive.
 pub(super) fn recognises(head: &str) -> bool {
@@ -20,7 +20,7 @@ pub(super) fn recognises(head: &str) -> bool {
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     let text: Vec<&[u8]> = Lines::of(file.bytes()).map(|line| line.text).collect();
     let mut read = NodeFile::default();
-    let mut types = eblock::Types::default();
+    let mut types = Types::default();
     let mut at = 0;
     while at < text.len() {
         let head = String::from_utf8_lossy(text[at]).trim().to_uppercase();
@@ -29,7 +29,7 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
         } else if head.starts_with("CMBLOCK,") {
             component(file, &text, at, &mut read)?
         } else if head.starts_with("EBLOCK,") {
-            eblock::elements(&text, at, &types, &mut read.elements)
+            read_eblock(&text, at, &types, &mut read.elements)
         } else {
             types.learn(&head);
             at + 1
@@ -151,4 +151,168 @@ fn component(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile)
         read.sets.push(((*name).to_owned(), members));
     }
     Ok(head + 2 + lines)
+}
+
+// Elements of an archive of Ansys, for drawing the part. Unreadable elements are left out and reported.
+
+/// Element types by their local numbers, as defined by `ET,1,186`.
+#[derive(Debug, Default)]
+struct Types(HashMap<i64, i64>);
+
+/// Numbers of solid element types.
+const SOLIDS: &[i64] = &[
+    5, 45, 46, 62, 64, 65, 72, 73, 92, 95, 96, 98, 147, 148, 164, 168, 185, 186, 187, 190, 191, 226, 227, 285,
+];
+/// Numbers of shell and plane element types.
+const SHELLS: &[i64] =
+    &[2, 28, 41, 42, 43, 63, 82, 91, 93, 99, 143, 145, 146, 150, 162, 163, 181, 182, 183, 281];
+/// Numbers of beam, pipe and link element types with two end nodes.
+const BEAMS: &[i64] = &[1, 3, 4, 8, 10, 16, 23, 24, 44, 54, 59, 161, 180, 188, 288];
+/// Numbers of beam element types with a middle node.
+const LONG_BEAMS: &[i64] = &[189, 289];
+/// Numbers of element types that are not drawn.
+const NOT_DRAWN: &[i64] = &[
+    14, 21, 27, 39, 40, 50, 151, 152, 153, 154, 156, 169, 170, 171, 172, 173, 174, 175, 176, 177, 178, 179,
+    184,
+];
+
+/// Shape class of the elements of a type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Look {
+    Solid,
+    Shell,
+    /// Two end nodes; a third node defines the orientation of the beam.
+    Beam,
+    /// Two end nodes and a node in the middle.
+    LongBeam,
+    /// Masses, springs, contact and surface loads, which are not drawn.
+    Nothing,
+    Unknown,
+}
+
+impl Types {
+    /// Records a type from a line in upper case, if it is `ET,number,type`.
+    fn learn(&mut self, line: &str) {
+        let mut words = line.split(',').map(str::trim);
+        if words.next() != Some("ET") {
+            return;
+        }
+        let number = words.next().and_then(|word| word.parse().ok());
+        let digits = words.next().map(|word| word.trim_start_matches(|c: char| !c.is_ascii_digit()));
+        if let (Some(number), Some(kind)) = (number, digits.and_then(|digits| digits.parse().ok())) {
+            self.0.insert(number, kind);
+        }
+    }
+
+    fn look(&self, number: i64) -> (String, Look) {
+        let Some(&kind) = self.0.get(&number) else {
+            return (format!("type number {number}"), Look::Unknown);
+        };
+        let looks = [
+            (SOLIDS, Look::Solid),
+            (SHELLS, Look::Shell),
+            (BEAMS, Look::Beam),
+            (LONG_BEAMS, Look::LongBeam),
+            (NOT_DRAWN, Look::Nothing),
+        ];
+        let look =
+            looks.iter().find(|(kinds, _)| kinds.contains(&kind)).map_or(Look::Unknown, |(_, look)| *look);
+        (format!("element type {kind}"), look)
+    }
+}
+
+/// Number of fields of a line of an element before its nodes.
+const BEFORE_NODES: usize = 11;
+
+/// Reads the block whose heading is the line `head`. Returns the index of the line after it.
+fn read_eblock(text: &[&[u8]], head: usize, types: &Types, read: &mut Elements) -> usize {
+    let line = String::from_utf8_lossy(text[head]).to_uppercase();
+    let solid = line.split(',').nth(2).is_some_and(|kind| kind.trim() == "SOLID");
+    let width = text.get(head + 1).and_then(|line| widths(line)).map_or(0, |[(_, width), _]| width);
+    let end = (head + 2..text.len()).find(|&k| text[k].trim_ascii() == b"-1").unwrap_or(text.len());
+    if !solid || width == 0 {
+        read.leave_out("EBLOCK in another form than SOLID", 1);
+        return end + 1;
+    }
+    let mut at = (head + 2).min(end);
+    while at < end {
+        at = match element(&text[at..end], width) {
+            Some(element) => {
+                add(&element, types, read);
+                at + element.lines
+            }
+            None => {
+                read.leave_out("EBLOCK with lines that cannot be read", 1);
+                return end + 1;
+            }
+        };
+    }
+    end + 1
+}
+
+struct Element {
+    type_number: i64,
+    nodes: Vec<i64>,
+    lines: usize,
+}
+
+/// Reads the element that begins on the first of the lines; returns `None` if it cannot be read.
+fn element(text: &[&[u8]], width: usize) -> Option<Element> {
+    let number = |line: &[u8], k: usize| integer(nth_field(line, k, width));
+    let first = *text.first()?;
+    let count = usize::try_from(number(first, 8)?).ok().filter(|count| (1..=100).contains(count))?;
+    let type_number = number(first, 1)?;
+    let mut nodes = Vec::with_capacity(count);
+    let mut lines = 1;
+    let mut k = BEFORE_NODES;
+    while nodes.len() < count {
+        let line = text.get(lines - 1)?;
+        match number(line, k) {
+            Some(node) => {
+                nodes.push(node);
+                k += 1;
+            }
+            // The nodes continue in the next line.
+            None if k > 0 && nth_field(line, k, width).is_empty() => {
+                lines += 1;
+                k = 0;
+            }
+            None => return None,
+        }
+    }
+    Some(Element { type_number, nodes, lines })
+}
+
+fn add(element: &Element, types: &Types, read: &mut Elements) {
+    let (name, look) = types.look(element.type_number);
+    let nodes = &element.nodes;
+    let shape = match (look, nodes.len()) {
+        (Look::Nothing, _) => return,
+        (Look::Solid, 4 | 10) => ElementShape::Tetrahedron,
+        (Look::Solid, 5 | 13) => ElementShape::Pyramid,
+        (Look::Solid, 6 | 15) => ElementShape::Wedge,
+        (Look::Solid, 8 | 20) => ElementShape::Hexahedron,
+        (Look::Shell, 3 | 6) => ElementShape::Triangle,
+        (Look::Shell, 4 | 8) => ElementShape::Quadrilateral,
+        (Look::Beam, 2..) | (Look::LongBeam, 3..) => ElementShape::Line,
+        _ => return read.leave_out(&name, 1),
+    };
+    let nodes = match look {
+        Look::Beam => nodes[..2].to_vec(),
+        Look::LongBeam => nodes[..3].to_vec(),
+        _ => with_all_middles(shape, nodes),
+    };
+    read.add(&name, shape, &nodes);
+}
+
+/// Replaces missing mid-edge nodes, which have the number 0, by a corner of their edge.
+fn with_all_middles(shape: ElementShape, nodes: &[i64]) -> Vec<i64> {
+    let mut nodes = nodes.to_vec();
+    for (k, &[corner, _]) in shape.edges().iter().enumerate() {
+        let corner = nodes[corner];
+        if let Some(middle) = nodes.get_mut(shape.corners() + k).filter(|node| **node == 0) {
+            *middle = corner;
+        }
+    }
+    nodes
 }

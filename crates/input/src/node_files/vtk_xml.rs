@@ -2,13 +2,13 @@
 //! unstructured grids.
 //! <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>
 
-use super::vtk_cells::elements_of;
-use super::vtk_numbers::{Base64, NumberType, Packing, Unpacked};
-use super::xml_elements::{Element, elements};
+use super::vtk_legacy::{Base64, NumberType, Packing, Unpacked};
 use super::{Found, NodeFile, refused};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{number, words};
-use flexbody_model::{Elements, Nodes};
+use flexbody_model::{ElementShape, Elements, Nodes};
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::{Reader, XmlVersion};
 
 const HELP: &str = "write one mesh of points and cells (.vtu) in double precision, as it is or compressed by zlib, or give a table of nodes";
 
@@ -201,4 +201,123 @@ fn ascii(text: &[u8]) -> Unpacked<Vec<f64>> {
     words(text)
         .map(|word| number(word).ok_or_else(|| format!("has `{}` for a number", word.escape_ascii())))
         .collect()
+}
+
+/// Order of the corners of pixels and voxels, which VTK lists along the axes, around the quadrilaterals.
+const AROUND: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
+
+/// Order of the nodes of a wedge from its other end: the first triangle of VTK faces outward, that of the shape inward.
+const TURNED_WEDGE: [usize; 15] = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13];
+
+/// Returns the elements of cells, with points whose numbers are `ids`.
+///
+/// * `connectivity`: points of all cells, from 0; `offsets`: end of each cell in `connectivity`; `types`: cell types of
+///   VTK.
+fn elements_of(connectivity: &[f64], offsets: &[f64], types: &[f64], ids: &[i64]) -> Unpacked<Elements> {
+    if offsets.len() != types.len() {
+        return Err(format!("file has {} ends of cells and {} types", offsets.len(), types.len()));
+    }
+    let id =
+        |point: &f64| ids.get(*point as usize).filter(|_| *point >= 0.0 && point.fract() == 0.0).copied();
+    let mut elements = Elements::default();
+    let mut start = 0;
+    for (&end, &kind) in offsets.iter().zip(types) {
+        let points = connectivity.get(start..end as usize);
+        let points = points.ok_or("the ends of the cells do not ascend up to the number of their points")?;
+        start += points.len();
+        let nodes: Option<Vec<i64>> = points.iter().map(id).collect();
+        let nodes = nodes.ok_or("a cell has a point that does not exist")?;
+        add(&mut elements, kind as u8, nodes);
+    }
+    Ok(elements)
+}
+
+fn add(elements: &mut Elements, kind: u8, nodes: Vec<i64>) {
+    let ordered = |order: &[usize]| order.iter().filter_map(|&k| nodes.get(k).copied()).collect::<Vec<_>>();
+    let (shape, nodes) = match kind {
+        // Vertices are not drawn.
+        1 | 2 => return,
+        3 | 21 => (ElementShape::Line, nodes),
+        5 | 22 | 34 => (ElementShape::Triangle, nodes),
+        8 => (ElementShape::Quadrilateral, ordered(&AROUND[..4])),
+        9 | 23 | 28 => (ElementShape::Quadrilateral, nodes),
+        10 | 24 => (ElementShape::Tetrahedron, nodes),
+        11 => (ElementShape::Hexahedron, ordered(&AROUND)),
+        12 | 25 | 29 => (ElementShape::Hexahedron, nodes),
+        13 | 26 | 32 => (ElementShape::Wedge, ordered(&TURNED_WEDGE)),
+        14 | 27 => (ElementShape::Pyramid, nodes),
+        other => return elements.leave_out(&format!("cells of type {other}"), 1),
+    };
+    elements.add("cells", shape, &nodes);
+}
+
+// The elements of an XML file in their order, each with its attributes and the bytes between its tags.
+
+/// Element of an XML file.
+struct Element<'a> {
+    pub name: String,
+    /// Name of the enclosing element; empty for the outermost.
+    pub parent: String,
+    attributes: Vec<(String, String)>,
+    /// Bytes between its tag and the next one.
+    pub content: &'a [u8],
+}
+
+impl Element<'_> {
+    pub(super) fn attribute(&self, name: &str) -> Option<&str> {
+        self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
+    }
+
+    /// Returns an attribute as a whole number.
+    pub(super) fn number(&self, name: &str) -> Option<u64> {
+        self.attribute(name)?.trim().parse().ok()
+    }
+}
+
+/// Reads the elements up to the end, or up to an element named `last`, whose content is the rest of the file.
+///
+/// # Errors
+/// A description of the problem, if the text is not XML.
+fn elements<'a>(bytes: &'a [u8], last: &str) -> Result<Vec<Element<'a>>, String> {
+    let mut reader = Reader::from_reader(bytes);
+    let mut elements: Vec<Element<'a>> = Vec::new();
+    // Indices of the elements that enclose the next one.
+    let mut open: Vec<usize> = Vec::new();
+    loop {
+        let event = reader.read_event().map_err(|error| format!("file is not XML: {error}"))?;
+        let begins = matches!(event, Event::Start(_));
+        match event {
+            Event::Start(tag) | Event::Empty(tag) => {
+                let parent = open.last().map_or(String::new(), |outer| elements[*outer].name.clone());
+                elements.push(element(&tag, parent)?);
+            }
+            Event::End(_) => {
+                open.pop();
+            }
+            Event::Eof if open.is_empty() => return Ok(elements),
+            Event::Eof => return Err("file ends within an element: it may be cut off".to_owned()),
+            _ => {}
+        }
+        if let (true, Some(element)) = (begins, elements.last_mut()) {
+            let begin = usize::try_from(reader.buffer_position()).unwrap_or(bytes.len());
+            let rest = bytes.get(begin..).unwrap_or_default();
+            if element.name == last {
+                element.content = rest;
+                return Ok(elements);
+            }
+            element.content = &rest[..memchr::memchr(b'<', rest).unwrap_or(rest.len())];
+            open.push(elements.len() - 1);
+        }
+    }
+}
+
+fn element<'a>(tag: &BytesStart<'_>, parent: String) -> Result<Element<'a>, String> {
+    let mut attributes = Vec::new();
+    for attribute in tag.attributes() {
+        let attribute = attribute.map_err(|error| format!("file is not XML: {error}"))?;
+        let value = attribute.normalized_value(XmlVersion::default());
+        let value = value.map_err(|error| format!("file is not XML: {error}"))?;
+        attributes.push((attribute.key.as_ref().to_owned(), value.into_owned()));
+    }
+    Ok(Element { name: tag.name().as_ref().to_owned(), parent, attributes, content: &[] })
 }

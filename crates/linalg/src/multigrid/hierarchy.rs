@@ -2,12 +2,10 @@
 
 use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use super::coarsening::{Block, Motions, SymmetricBlocks};
-use super::corrections::{CorrectionTarget, Corrections, SmallPencil};
-use super::deflation::{Deflation, DeflationSpace};
+use super::corrections::{CorrectionTarget, Corrections, Deflation, DeflationSpace, SmallPencil};
 use super::level::{Coarse, Level};
-use crate::parallel;
 use crate::{
-    Pencil, SymmetricMatrix, combine, contiguous_mut, dense_cholesky, dense_inverse, gram, largest,
+    Pencil, SymmetricMatrix, combine, contiguous_mut, dense_cholesky, dense_inverse, gram, largest, parallel,
     solve_lower,
 };
 use faer::{Mat, MatMut, MatRef};

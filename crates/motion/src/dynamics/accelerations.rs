@@ -2,7 +2,7 @@
 
 use super::Evaluation;
 use super::kernels::{add_scaled, dot};
-use super::prescribed::{NotPositiveDefinite, Prescribed};
+use super::motion::{NotPositiveDefinite, Prescribed};
 use nalgebra::{Vector3, Vector6};
 
 impl Evaluation<'_> {

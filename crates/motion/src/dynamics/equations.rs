@@ -1,11 +1,9 @@
-//! Constants of the equations of motion, laid out for their evaluation.
+//! Constants of the equations of motion, laid out for their evaluation; as plain matrices, for files that other programs
+//! evaluate; and the number of multiplications in an evaluation.
 
-use super::Terms;
-use super::geometric::{Stiffening, stiffness_under};
-use super::kernels::Panels;
-use super::modal_matrix::{ModalMass, ModalMatrix};
+use super::kernels::{ModalMass, ModalMatrix, Panels};
 use faer::Mat;
-use flexbody_body::flex_body::FlexBody;
+use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_body::invariants::Invariants;
 use flexbody_model::LoadKind;
 use nalgebra::{Matrix3, Vector3};
@@ -24,7 +22,7 @@ pub(super) const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (1, 2), (
 pub(super) const W0: usize = 0;
 pub(super) const W1: usize = 9;
 pub(super) const C1: usize = 15;
-pub(super) const C2: usize = 18;
+const C2: usize = 18;
 pub(super) const LINEAR: usize = 21;
 
 /// Equations of motion of one flexible body in constant invariants (theory section 6, which is section 3
@@ -328,5 +326,193 @@ impl<'b> EquationParts<'b> {
     fn stacked(&self, count: usize, entry: &dyn Fn(usize, usize, usize) -> f64) -> Panels {
         let block = |at| Mat::from_fn(self.nf, self.nf, |i, j| entry(at, i, j));
         Panels::stacked(&(0..count).map(block).collect::<Vec<_>>())
+    }
+}
+
+// Stiffness of inertia and geometric stiffness of a body, in the form for the equations of motion.
+
+/// Selection of the stiffness of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stiffening {
+    /// Stiffness of inertia only, which is a part of the kinetic energy.
+    OfInertia,
+    /// Stiffness of inertia and geometric stiffness together.
+    All,
+}
+
+/// Returns the entries (component, i, j) of the stiffness for a kind of load, zero for components that are
+/// not given; `None` if no component is given.
+pub fn stiffness_under<'b>(
+    body: &'b FlexBody,
+    kind: &LoadKind,
+    which: Stiffening,
+) -> Option<impl Fn(usize, usize, usize) -> f64 + use<'b>> {
+    let mut matrices: Vec<Vec<&'b Mat<f64>>> = vec![Vec::new(); kind.components().len()];
+    let of_inertia = body.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+    let given = body.geometric_stiffness().iter().filter(|_| which == Stiffening::All);
+    for one in of_inertia.chain(given).filter(|one| one.load.kind == *kind) {
+        matrices[one.load.component].push(&one.matrix);
+    }
+    matrices.iter().any(|known| !known.is_empty()).then_some(move |component: usize, i, j| {
+        matrices[component].iter().map(|matrix| 0.5 * (matrix[(i, j)] + matrix[(j, i)])).sum()
+    })
+}
+
+/// Included terms, by group of the kinetic energy (theory section 7).
+///
+/// A group is included or dropped in all places: mass matrix, inertia forces, momenta and energy. The
+/// result is the equations of motion of a truncated kinetic energy, which conserve that energy and both
+/// momenta for any choice. m, c, I0, C1, C2, W0 and m_ff are always included. Without W2, W3 and geometric
+/// stiffness the cost of an evaluation is proportional to nf instead of nf^2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Terms {
+    /// W1: inertia linear in q, and the constant centrifugal load of the modes.
+    pub w1: bool,
+    /// W2: inertia quadratic in q, and the centrifugal load that grows with q.
+    pub w2: bool,
+    /// W3: coupling of rotation and modes through q, and the Coriolis force among modes.
+    pub w3: bool,
+    /// Geometric stiffness for the motion of the frame and for forces at interfaces (theory 7.4), if the
+    /// body has it. With W2 the stiffness for spin has no additional cost.
+    pub geometric_stiffness: bool,
+}
+
+impl Terms {
+    /// All terms that the body has: the exact equations.
+    pub const ALL: Self = Self { w1: true, w2: true, w3: true, geometric_stiffness: true };
+    /// No term that depends on the deformation except the first moment c + C1 q.
+    pub const NONE: Self = Self { w1: false, w2: false, w3: false, geometric_stiffness: false };
+
+    /// Returns the terms that a body with `groups` can provide.
+    pub fn held(self, groups: TermGroups) -> Self {
+        Self { w1: self.w1 && groups.w1, w2: self.w2 && groups.w2, w3: self.w3 && groups.w3, ..self }
+    }
+}
+
+impl Default for Terms {
+    /// Returns [`Terms::ALL`]: terms are dropped only on request.
+    fn default() -> Self {
+        Self::ALL
+    }
+}
+
+// Constants of the equations as plain matrices, for files that other programs evaluate.
+
+/// Constants of [`EquationsOfMotion`] for the rigid motions that the body has: T translations (3, in the
+/// plane 2) and A axes that it turns about (3, in the plane 1), with P pairs of axes xx, yy, zz, yz, xz, xy
+/// (in the plane zz). Stacked matrices are nf x nf each.
+pub struct Constants {
+    /// (m, c, I0): 1 + T + P entries.
+    pub rigid: Vec<f64>,
+    /// Arrays linear in q, one row each: W0 (translation by translation, T A rows), W1 (P rows, if held),
+    /// C1 (T), C2 (A).
+    pub linear: Mat<f64>,
+    /// E of each pair (6.7), minus geometric stiffness for spin (7.4).
+    pub w2: Option<Mat<f64>>,
+    /// W3' of each axis, with geometric stiffness for angular acceleration.
+    pub w3: Option<Mat<f64>>,
+    /// W3' - W3 of each axis; `None` if it is twice `w3` because the blocks are skew.
+    pub w3_skew: Option<Mat<f64>>,
+    /// Geometric stiffness for acceleration along each translation.
+    pub acceleration: Option<Mat<f64>>,
+    /// m_ff and L of m_ff = L L'; `None` for the identity.
+    pub modal_mass: Option<(Mat<f64>, Option<Mat<f64>>)>,
+    /// K_ff: full (nf x nf), or its diagonal (nf x 1).
+    pub stiffness: Mat<f64>,
+    /// D: full (nf x nf), or its diagonal (nf x 1); `None` without damping.
+    pub damping: Option<Mat<f64>>,
+}
+
+impl EquationsOfMotion {
+    /// Returns the constants.
+    pub fn constants(&self) -> Constants {
+        let (nf, translations) = (self.nf, self.translations());
+        let has_w1 = self.terms().w1;
+        let pair_rows = |first: usize| {
+            let own = |at: usize| self.axes.len() == 3 || at == 2;
+            (0..6).filter(move |&at| own(at)).map(move |at| first + at)
+        };
+        let w0 = (0..translations).flat_map(|k| self.axes.iter().map(move |b| W0 + 3 * k + b));
+        let w1 = pair_rows(W1).filter(|_| has_w1);
+        let c2 = self.axes.iter().map(|a| C2 + a);
+        let rows: Vec<usize> = w0.chain(w1).chain((0..translations).map(|k| C1 + k)).chain(c2).collect();
+
+        let moment = self.first_moment.iter().take(translations).copied();
+        let inertia = self.pairs.iter().map(|&pair| self.inertia[pair]);
+        let stacked = |panels: &Option<Panels>, count: usize| {
+            let panels = panels.as_ref()?;
+            let rows: Vec<Vec<f64>> = (0..count * nf).map(|row| panels.row(row).collect()).collect();
+            Some(Mat::from_fn(count * nf, nf, |row, j| rows[row][j]))
+        };
+        Constants {
+            rigid: [self.mass].into_iter().chain(moment).chain(inertia).collect(),
+            linear: Mat::from_fn(rows.len(), nf, |row, j| self.row(rows[row])[j]),
+            w2: stacked(&self.w2, self.pairs.len()),
+            w3: stacked(&self.w3, self.axes.len()),
+            w3_skew: stacked(&self.w3_skew, self.axes.len()),
+            acceleration: stacked(&self.accelerated, translations),
+            modal_mass: match &self.modal_mass {
+                ModalMass::Identity => None,
+                ModalMass::Full { matrix, factor } => {
+                    let lower = |at: &Vec<f64>| {
+                        Mat::from_fn(nf, nf, |i, j| if j <= i { at[i * nf + j] } else { 0.0 })
+                    };
+                    let matrix = Mat::from_fn(nf, nf, |i, j| matrix.get(i, j));
+                    Some((matrix, factor.as_ref().map(lower)))
+                }
+            },
+            stiffness: cheapest(&self.stiffness, nf),
+            damping: Some(cheapest(&self.damping, nf))
+                .filter(|d| d.col_iter().any(|column| column.iter().any(|value| *value != 0.0))),
+        }
+    }
+}
+
+fn cheapest(matrix: &ModalMatrix, nf: usize) -> Mat<f64> {
+    match matrix {
+        ModalMatrix::Diagonal(diagonal) => Mat::from_fn(nf, 1, |i, _| diagonal[i]),
+        ModalMatrix::Full { .. } => Mat::from_fn(nf, nf, |i, j| matrix.get(i, j)),
+    }
+}
+
+impl EquationsOfMotion {
+    /// Returns the number of multiplications of one evaluation with
+    /// [`Evaluation::set`](super::Evaluation::set) and
+    /// [`Evaluation::accelerations`](super::Evaluation::accelerations): one call of an explicit integrator,
+    /// here or in the momenta of a motion.
+    ///
+    /// Counted from the arrays in memory, including the rows that pad a panel. With nf modes, r rigid
+    /// motions, a axes and p pairs of axes to turn about, and t axes to move along:
+    ///
+    /// | what | multiplications |
+    /// |---|---|
+    /// | terms linear in q | 2 rows nf, and (3 + 9) nf and, with W1, 6 nf in momenta and forces |
+    /// | W2 | rows nf + 3 p nf |
+    /// | W3 | 2 rows nf + 2 a nf; skew blocks of their own: rows nf more |
+    /// | geometric stiffness for acceleration | 2 rows nf + 5 t nf |
+    /// | elimination of the modes | (r (r + 1) / 2 + 2 r) nf, and r + 2 solutions with the factor of a full m_ff |
+    /// | K_ff and D | 2 nf each, or nf (nf + 1) where they are full |
+    ///
+    /// Some hundred operations with 3-vectors and 6 x 6 matrices, independent of nf, and the forces of the
+    /// surroundings are not counted.
+    pub fn multiplications(&self) -> usize {
+        let (nf, r, a, t) = (self.nf, self.rigid.len(), self.axes.len(), self.translations());
+        let panels = |panels: &Option<Panels>| panels.as_ref().map_or(0, |panels| panels.padded_rows() * nf);
+        let there = |panels: &Option<Panels>, count: usize| if panels.is_some() { count * nf } else { 0 };
+        let w1 = if self.terms().w1 { PAIRS.len() * nf } else { 0 };
+        let linear = 2 * self.linear_panels.padded_rows() * nf + (3 + 9) * nf + w1;
+        let w2 = panels(&self.w2) + there(&self.w2, 3 * self.pairs.len());
+        let w3 = 2 * panels(&self.w3) + there(&self.w3, 2 * a) + panels(&self.w3_skew);
+        let accelerated = 2 * panels(&self.accelerated) + there(&self.accelerated, 5 * t);
+        let triangles = match &self.modal_mass {
+            ModalMass::Identity => 0,
+            ModalMass::Full { .. } => (r + 2) * nf * (nf + 1) / 2,
+        };
+        let elimination = (r * (r + 1) / 2 + 2 * r) * nf + triangles;
+        let internal = [&self.stiffness, &self.damping].map(|matrix| match matrix {
+            ModalMatrix::Diagonal(_) => 2 * nf,
+            ModalMatrix::Full { .. } => nf * (nf + 1),
+        });
+        linear + w2 + w3 + accelerated + elimination + internal[0] + internal[1]
     }
 }

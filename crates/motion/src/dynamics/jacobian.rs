@@ -1,8 +1,9 @@
-//! Derivatives of the forces with respect to coordinates and velocities.
+//! Derivatives of the forces with respect to coordinates and velocities, and the generalised forces of gravity.
 
-use super::Evaluation;
 use super::equations::{PAIRS, W0, W1};
 use super::evaluation::{add_symmetric, spin_product};
+use super::kernels::add_scaled;
+use super::{EquationsOfMotion, Evaluation};
 use nalgebra::{Matrix3, Vector3};
 
 /// Entries of one mode j in the derivatives with respect to q_j and qd_j.
@@ -276,5 +277,138 @@ impl Evaluation<'_> {
                 }
             }
         }
+    }
+}
+
+// Generalised forces of gravity, and their derivatives.
+
+impl Evaluation<'_> {
+    /// Adds the forces of uniform gravity: (m g, s x g, C1(q)'g), the gradient of -g'(m R + A s).
+    ///
+    /// * `gravity`: A'g, in body axes. Unit: length/time^2.
+    /// * `forces`: 6 + nf entries, for a plane body 3 + nf.
+    ///
+    /// # Panics
+    /// When `forces` has another length.
+    pub fn add_gravity(&self, gravity: &Vector3<f64>, forces: &mut [f64]) {
+        let body = self.equations();
+        let modal = body.add_rigid(body.mass * gravity, self.first_moment().cross(gravity), forces);
+        for k in 0..3 {
+            add_scaled(gravity[k], body.coupling_row(&self.coupling, k), modal);
+        }
+    }
+
+    /// Adds the derivatives of the forces of gravity, b = A'g:
+    ///
+    /// ```text
+    /// dtau/dq_j = C1(q)_j x b,    dQ_i/dq_j = K^a_ij . b,    d/dphi = (m b~, s~ b~, C1(q)' b~)
+    /// ```
+    ///
+    /// # Panics
+    /// When a length of `jacobian` is not that of the equations.
+    pub fn add_gravity_jacobian(&self, gravity: &Vector3<f64>, jacobian: &mut LoadJacobian<'_>) {
+        let body = self.equations();
+        let row = |k: usize| body.coupling_row(&self.coupling, k);
+        jacobian.check(body);
+        for j in 0..body.nf {
+            let moved = Vector3::from_fn(|k, _| row(k)[j]);
+            jacobian.add_by_q(body, j, &moved.cross(gravity));
+        }
+        if let Some(accelerated) = &body.accelerated {
+            for k in 0..body.translations() {
+                for i in 0..body.nf {
+                    for (entry, value) in
+                        jacobian.modal_row(body, i).iter_mut().zip(accelerated.row(k * body.nf + i))
+                    {
+                        *entry += gravity[k] * value;
+                    }
+                }
+            }
+        }
+        for (at, &axis) in body.axes.iter().enumerate() {
+            let turned = gravity.cross(&Vector3::ith(axis, 1.0));
+            let torque = self.first_moment().cross(&turned);
+            jacobian.add_by_turn(body, at, &(body.mass * turned), &torque, |j| {
+                (0..3).map(|k| turned[k] * row(k)[j]).sum()
+            });
+        }
+    }
+}
+
+impl EquationsOfMotion {
+    /// Adds a force and a torque about the origin; returns the modal forces.
+    pub(super) fn add_rigid<'f>(
+        &self,
+        force: Vector3<f64>,
+        torque: Vector3<f64>,
+        forces: &'f mut [f64],
+    ) -> &'f mut [f64] {
+        assert_eq!(forces.len(), self.n_velocities(), "one entry per rigid motion and mode");
+        let (rigid, modal) = forces.split_at_mut(self.rigid.len());
+        let mut values = [0.0; 6];
+        self.put_rigid(force, torque, &mut values[..rigid.len()]);
+        rigid.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        modal
+    }
+}
+
+/// Axes in which a load is constant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum LoadAxes {
+    /// World axes: the load keeps its direction while the body turns.
+    World,
+    /// Body axes: the load turns with the body.
+    Body,
+}
+
+/// Accumulated derivatives of the generalised forces of loads; n = 6 + nf rows, for a plane body 3 + nf.
+///
+/// The derivatives belong to the right-hand side; [`Evaluation::jacobian`](super::Evaluation::jacobian)
+/// gives those of the left. Constant loads do not depend on the position R of the body.
+#[derive(Debug)]
+pub struct LoadJacobian<'m> {
+    /// Derivatives by q (n x nf), row-major.
+    pub by_q: &'m mut [f64],
+    /// Derivatives by a small rotation phi in body axes, A becoming A (I + phi~): n x 3, for a plane body n
+    /// x 1, row-major.
+    pub by_turn: &'m mut [f64],
+}
+
+impl LoadJacobian<'_> {
+    pub(super) fn check(&self, body: &EquationsOfMotion) {
+        let n = body.n_velocities();
+        assert!(
+            self.by_q.len() == n * body.nf && self.by_turn.len() == n * body.axes.len(),
+            "n x nf and n x 3 entries, in the plane n x 1"
+        );
+    }
+
+    /// Adds a torque to column j of `by_q`.
+    pub(super) fn add_by_q(&mut self, body: &EquationsOfMotion, j: usize, torque: &Vector3<f64>) {
+        for (i, &axis) in body.rigid.iter().enumerate().filter(|(_, axis)| **axis >= 3) {
+            self.by_q[i * body.nf + j] += torque[axis - 3];
+        }
+    }
+
+    /// Returns the row of mode `i` in `by_q`.
+    pub(super) fn modal_row(&mut self, body: &EquationsOfMotion, i: usize) -> &mut [f64] {
+        &mut self.by_q[(body.rigid.len() + i) * body.nf..][..body.nf]
+    }
+
+    /// Adds a force, a torque about the origin and modal forces to column `at` of `by_turn`, which belongs
+    /// to one axis.
+    pub(super) fn add_by_turn(
+        &mut self,
+        body: &EquationsOfMotion,
+        at: usize,
+        force: &Vector3<f64>,
+        torque: &Vector3<f64>,
+        modal: impl Fn(usize) -> f64,
+    ) {
+        let (width, r) = (body.axes.len(), body.rigid.len());
+        for (i, &axis) in body.rigid.iter().enumerate() {
+            self.by_turn[i * width + at] += if axis < 3 { force[axis] } else { torque[axis - 3] };
+        }
+        (0..body.nf).for_each(|j| self.by_turn[(r + j) * width + at] += modal(j));
     }
 }

@@ -1,8 +1,6 @@
 //! Motion of one body in space as a system for integration.
 
-use super::{
-    Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place, Prescribed, Snapshot,
-};
+use super::{Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place, Snapshot};
 use crate::integration::{Failure, Oscillator, System};
 use nalgebra::{Matrix3, Vector3};
 
@@ -388,5 +386,54 @@ impl System for Motion<'_> {
             let length = square.sqrt();
             e.iter_mut().for_each(|e| *e /= length);
         }
+    }
+}
+
+// Prescribed rigid motion, and the error of a solution for the free motion.
+
+/// The mass matrix at a state is not positive definite: terms were dropped and the deformation is too large
+/// for the remaining ones, or the invariants belong to no physical body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NotPositiveDefinite;
+
+impl std::fmt::Display for NotPositiveDefinite {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("the mass matrix of the deformed body is not positive definite")
+    }
+}
+
+impl std::error::Error for NotPositiveDefinite {}
+
+/// Vector along the axes of the frame of a body. Vectors along world axes are plain vectors; only
+/// [`AlongFrame::in_world`] converts one into the other.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct AlongFrame(pub Vector3<f64>);
+
+impl AlongFrame {
+    /// Returns the vector along the axes of the world, A v.
+    ///
+    /// * `axes`: A, the axes of the frame in the world, in columns.
+    pub fn in_world(&self, axes: &Matrix3<f64>) -> Vector3<f64> {
+        axes * self.0
+    }
+}
+
+/// Prescribed rigid motion: velocities of the frame or, for accelerations, the rates of their components. A
+/// part that is `None` is free.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Prescribed {
+    /// Prescribed V or V'.
+    pub linear: Option<AlongFrame>,
+    /// Prescribed omega or omega'.
+    pub angular: Option<AlongFrame>,
+}
+
+impl Prescribed {
+    /// No prescribed motion: a free body.
+    pub const NOTHING: Self = Self { linear: None, angular: None };
+
+    /// Returns the prescribed value of entry `axis` of (V, omega).
+    pub(super) fn entry(&self, axis: usize) -> Option<f64> {
+        if axis < 3 { self.linear.map(|v| v.0[axis]) } else { self.angular.map(|w| w.0[axis - 3]) }
     }
 }

@@ -1,8 +1,7 @@
 //! Points of a body, where forces and torques act and motion is measured.
 
-use super::geometric::{Stiffening, stiffness_under};
-use super::kernels::{add_scaled, dot};
-use super::modal_matrix::ModalMatrix;
+use super::equations::{Stiffening, stiffness_under};
+use super::kernels::{ModalMatrix, add_scaled, dot};
 use super::{Evaluation, LoadAxes, LoadJacobian, Orientation, RotationVector, Terms};
 use faer::Mat;
 use flexbody_body::flex_body::{FlexBody, Interface};

@@ -1,16 +1,11 @@
 //! Time integration of ordinary differential equations, independent of bodies.
 
-mod dormand_prince;
 mod explicit;
-mod free_oscillation;
 mod gauss;
 mod schedule;
-mod stages;
 mod system;
 
 pub use explicit::Explicit;
-pub use free_oscillation::free_oscillation;
-pub use gauss::Gauss;
+pub use gauss::{Gauss, STAGES, StageMode};
 pub use schedule::{Method, ObserverEvent, integrate, integrate_closely};
-pub use stages::{STAGES, StageMode};
-pub use system::{Failure, Oscillator, System, Work};
+pub use system::{Failure, Oscillator, System, Work, free_oscillation};

@@ -1,10 +1,11 @@
 //! Drawn parts of a body: its surface, with fewer triangles if it is large, or its nodes as points.
 
-use super::arrays::Packed;
+use super::{Packed, Placed};
 use crate::numbers::counted;
 use faer::MatRef;
 use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use std::fmt::Write;
 
 /// Half a step of a 16-bit number, relative to the largest.
 #[cfg(feature = "hdf5")]
@@ -115,13 +116,13 @@ impl<'b> Drawing<'b> {
     }
 
     /// Returns the vertices of every triangle.
-    pub(crate) fn triangle_corners(&self) -> Vec<[u32; 3]> {
+    fn triangle_corners(&self) -> Vec<[u32; 3]> {
         let triangles = self.mesh.iter().flat_map(SurfaceMesh::triangles);
         triangles.filter_map(|nodes| self.vertices_of(nodes)).collect()
     }
 
     /// Returns the vertices of every edge.
-    pub(crate) fn edge_ends(&self) -> Vec<[u32; 2]> {
+    fn edge_ends(&self) -> Vec<[u32; 2]> {
         let edges = self.mesh.iter().flat_map(SurfaceMesh::edges);
         edges.filter_map(|nodes| self.vertices_of(nodes)).collect()
     }
@@ -223,6 +224,229 @@ fn evenly(n: usize, most: usize) -> Vec<u32> {
 pub(super) fn turned(axes: &Matrix3<f64>, vectors: MatRef<'_, f64>) -> Vec<f64> {
     let one = |j: usize| axes * Vector3::from_fn(|k, _| vectors[(k, j)]);
     (0..vectors.ncols()).flat_map(|j| <[f64; 3]>::from(one(j))).collect()
+}
+
+// Still picture of a body for print and for pages without running scripts: SVG, drawn from back to front.
+
+/// Largest number of triangles; more make the page larger.
+const TRIANGLES: usize = 1800;
+/// Size limit for the positions of nodes without a surface, in bytes: some 1500 points.
+const MAX_DRAWING_BYTES: usize = 60_000;
+/// Size on the page in its own units; the height follows the shape of the part.
+const WIDTH: f64 = 560.0;
+const MIN_HEIGHT: f64 = 200.0;
+const MAX_HEIGHT: f64 = 460.0;
+const MARGIN: f64 = 26.0;
+/// Length of the principal axes, relative to the radius of the drawing.
+const AXIS_LENGTH: f64 = 0.75;
+/// Grid steps per page unit for the coordinates of surfaces. A larger value gives finer coordinates and a
+/// larger file.
+const GRID_STEPS_PER_UNIT: f64 = 5.0;
+/// Number of brightness steps of the shading.
+const SHADE_COUNT: f64 = 14.0;
+/// Colour of the part in full light (red, green, blue).
+const PART_COLOUR: [f64; 3] = [185.0, 198.0, 214.0];
+
+/// Returns the picture; `None` if there is nothing to draw.
+pub(crate) fn still(body: &FlexBody) -> Option<String> {
+    let drawing = Drawing::new(body, Some(TRIANGLES), MAX_DRAWING_BYTES, 0);
+    if drawing.vertices() == 0 {
+        return None;
+    }
+    let placed = Placed::of(body);
+    let view = Projection::onto_page(&drawing, &placed, body.dimension() == 2)?;
+    let mut svg = format!(
+        "<svg class=\"still\" viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"The part, undeformed, with its principal axes of inertia 1, 2 and 3 at the centre of mass and the axes of the model in the corner.\">\n",
+        view.height
+    );
+    if drawing.triangle_corners().is_empty() && drawing.edge_ends().is_empty() {
+        points(&mut svg, &drawing, &view)
+    } else {
+        surface(&mut svg, &drawing, &view)
+    }
+    principal_axes(&mut svg, &placed, &view);
+    corner(&mut svg, &view);
+    svg.push_str("</svg>\n");
+    Some(svg)
+}
+
+/// Projection from model coordinates to the page, with the initial view of the moving picture.
+struct Projection {
+    turn: Matrix3<f64>,
+    centre: Vector3<f64>,
+    radius: f64,
+    scale: f64,
+    /// Position on the page of the corner of the box around the part.
+    shift: [f64; 2],
+    height: f64,
+}
+
+impl Projection {
+    fn onto_page(drawing: &Drawing<'_>, placed: &Placed, plane: bool) -> Option<Self> {
+        let turned = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
+        let turn = if plane {
+            turned(Vector3::x_axis(), -0.35)
+        } else {
+            turned(Vector3::x_axis(), -1.12) * turned(Vector3::z_axis(), -0.6)
+        };
+        let mut own = Self {
+            turn: turn.into_inner(),
+            centre: drawing.centre().into(),
+            radius: drawing.radius(),
+            scale: 1.0,
+            shift: [0.0; 2],
+            height: 0.0,
+        };
+        // Box around the part and its principal axes, as seen by the viewer.
+        let axes = placed.principal.map(|axis| placed.axis_end(&axis, AXIS_LENGTH * own.radius));
+        let seen: Vec<Vector3<f64>> = drawing.places().iter().chain(&axes).map(|x| own.turned(x)).collect();
+        let bound =
+            |k: usize, pick: fn(f64, f64) -> f64, from: f64| seen.iter().map(|p| p[k]).fold(from, pick);
+        let low = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
+        let high = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
+        let [wide, tall] = [0, 1].map(|k| high[k] - low[k]);
+        // Largest scale at which the box fits the page within its margins.
+        let inner_size = [WIDTH - 2.0 * MARGIN, MAX_HEIGHT - 2.0 * MARGIN];
+        own.scale = (inner_size[0] / wide).min(inner_size[1] / tall);
+        own.height = (own.scale * tall + 2.0 * MARGIN).max(MIN_HEIGHT);
+        // Centre the box on the page.
+        own.shift = [
+            0.5 * (WIDTH - own.scale * (low[0] + high[0])),
+            0.5 * (own.height + own.scale * (low[1] + high[1])),
+        ];
+        let numbers = [own.scale, own.height, own.shift[0], own.shift[1]];
+        numbers.iter().all(|x| x.is_finite()).then_some(own)
+    }
+
+    /// Returns a point relative to the centre of the part, in the axes of the page; the third axis points to
+    /// the viewer.
+    fn turned(&self, x: &[f64; 3]) -> Vector3<f64> {
+        self.turn * (Vector3::from(*x) - self.centre)
+    }
+
+    fn at(&self, seen: &Vector3<f64>) -> [f64; 2] {
+        [self.shift[0] + self.scale * seen.x, self.shift[1] - self.scale * seen.y]
+    }
+}
+
+/// A path of the drawing with its depth and paint.
+struct PaintedPath {
+    depth: f64,
+    paint: Paint,
+    path: String,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Paint {
+    Face(u8),
+    Edge,
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // colours are from 0 to 255
+/// Draws triangles and edges from back to front; consecutive pieces with the same paint form one path.
+fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
+    let seen: Vec<Vector3<f64>> = drawing.places().iter().map(|x| view.turned(x)).collect();
+    let mut pieces: Vec<PaintedPath> = Vec::new();
+    for corners in drawing.triangle_corners() {
+        let corners = corners.map(|i| seen[i as usize]);
+        let path = path(view, &corners) + "Z";
+        let depth = corners.iter().map(|p| p.z).sum::<f64>() / 3.0;
+        pieces.push(PaintedPath { depth, paint: Paint::Face(shade(&corners)), path });
+    }
+    for ends in drawing.edge_ends() {
+        let ends = ends.map(|i| seen[i as usize]);
+        // An edge is drawn slightly in front of its faces, so that they do not cover it.
+        let depth = 0.5 * (ends[0].z + ends[1].z) + 0.02 * view.radius;
+        pieces.push(PaintedPath { depth, paint: Paint::Edge, path: path(view, &ends) });
+    }
+    pieces.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+    let _ = writeln!(svg, "<g class=\"faces\" transform=\"scale({})\">", 1.0 / GRID_STEPS_PER_UNIT);
+    let mut rest = pieces.as_slice();
+    while let Some(first) = rest.first() {
+        let count = rest.iter().take_while(|piece| piece.paint == first.paint).count();
+        let (run, behind) = rest.split_at(count);
+        let paths: String = run.iter().map(|piece| piece.path.as_str()).collect();
+        let _ = match first.paint {
+            Paint::Face(shade) => {
+                let light = f64::from(shade) / SHADE_COUNT;
+                let [r, g, b] = PART_COLOUR.map(|part| (part * light).round() as u8);
+                writeln!(svg, "<path color=\"#{r:02x}{g:02x}{b:02x}\" d=\"{paths}\"/>")
+            }
+            Paint::Edge => writeln!(svg, "<path class=\"edge\" d=\"{paths}\"/>"),
+        };
+        rest = behind;
+    }
+    svg.push_str("</g>\n");
+}
+
+/// Returns an SVG path, `M10 20l5-3`: the first point, then relative steps.
+fn path(view: &Projection, points: &[Vector3<f64>]) -> String {
+    let mut path = String::new();
+    let mut before = [0.0; 2];
+    for (i, point) in points.iter().enumerate() {
+        let at = view.at(point).map(|x| (GRID_STEPS_PER_UNIT * x).round());
+        let [x, y] = [0, 1].map(|k| at[k] - before[k]);
+        let _ = match i {
+            0 => write!(path, "M{x} {y}l"),
+            _ => write!(path, "{}{x} {y}", if i == 1 || x < 0.0 { "" } else { " " }),
+        };
+        before = at;
+    }
+    path
+}
+
+/// Returns the brightness of a triangle from its angle to the light.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the value is from 0 to SHADES
+fn shade([a, b, c]: &[Vector3<f64>; 3]) -> u8 {
+    let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+    let light = Vector3::new(0.25, 0.35, 1.0).normalize();
+    ((0.45 + 0.55 * normal.dot(&light).abs()) * SHADE_COUNT).round() as u8
+}
+
+/// Draws nodes as points in three layers by depth; points at the back are fainter.
+fn points(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
+    let mut layers = [const { String::new() }; 3];
+    for place in drawing.places() {
+        let seen = view.turned(place);
+        let layer = match seen.z / view.radius {
+            depth if depth < -0.25 => 0,
+            depth if depth < 0.25 => 1,
+            _ => 2,
+        };
+        let [x, y] = view.at(&seen);
+        let _ = write!(layers[layer], "M{x:.1} {y:.1}h0");
+    }
+    let size = if drawing.vertices() > 400 { 2.2 } else { 4.0 };
+    for (layer, path) in layers.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
+        let _ = writeln!(svg, "<path class=\"node n{layer}\" stroke-width=\"{size}\" d=\"{path}\"/>");
+    }
+}
+
+fn principal_axes(svg: &mut String, placed: &Placed, view: &Projection) {
+    let from = view.at(&view.turned(&placed.centre_of_mass));
+    for (k, axis) in placed.principal.iter().enumerate() {
+        let end = placed.axis_end(axis, AXIS_LENGTH * view.radius);
+        arrow(svg, &format!("a{k}"), &(k + 1).to_string(), from, view.at(&view.turned(&end)));
+    }
+}
+
+/// Draws the axes of the model in a corner.
+fn corner(svg: &mut String, view: &Projection) {
+    let from = [34.0, view.height - 34.0];
+    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let axis = view.turn.column(k);
+        arrow(svg, "model", name, from, [from[0] + 24.0 * axis[0], from[1] - 24.0 * axis[1]]);
+    }
+}
+
+/// Draws a line with its name at the end.
+fn arrow(svg: &mut String, class: &str, name: &str, [x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) {
+    let away = |from: f64, to: f64| if (to - from).abs() < 1.0 { 0.0 } else { 9.0 * (to - from).signum() };
+    let (near, below) = (to_x + away(x, to_x), to_y + 0.6 * away(y, to_y) + 4.0);
+    let _ = writeln!(
+        svg,
+        "<line class=\"axis {class}\" x1=\"{x:.1}\" y1=\"{y:.1}\" x2=\"{to_x:.1}\" y2=\"{to_y:.1}\"/><text class=\"{class}\" x=\"{near:.1}\" y=\"{below:.1}\" text-anchor=\"middle\">{name}</text>"
+    );
 }
 
 #[cfg(test)]

@@ -1,10 +1,9 @@
 //! Estimate of the truncation error of a body along its motion in a scene.
 
-use super::grid::Grid;
+use super::compressed::MOST_FORCES;
 use super::residual::NodalView;
-use super::resonance::ResonanceCriteria;
 use super::truncated_motion::{TruncatedMotion, TruncationErrors, energy_scale};
-use super::truncated_responses::TruncatedResponses;
+use super::truncated_responses::{ResonanceCriteria, TruncatedResponses};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -14,8 +13,11 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::not_negative;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{
-    FramedScene, Instant, OutputErrors, Point, Scene, Trace, damped_once, instants, nodal_point, trace,
+    FramedScene, Instant, OutputErrors, Point, Scene, Trace, damped_once, fastest_history,
+    highest_excited_rate, instants, nodal_point, trace,
 };
+use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Part of the tolerances that the truncation error of a study's reference may take without a warning.
 pub const PART_OF_REFERENCE: f64 = 0.1;
@@ -261,4 +263,121 @@ impl ModelComparison<'_> {
 fn complete_below(body: &FlexBody) -> f64 {
     let certificate = body.certificate();
     if certificate.proved_modes.is_some() { not_negative(certificate.shift).sqrt() } else { 0.0 }
+}
+
+// Instants at which the truncation error is evaluated along a motion.
+
+/// Smallest number of intervals of a motion.
+const MIN_INTERVALS: usize = 120;
+
+/// Largest number of amplitudes of modes and forces at all instants together: about 1.5 GB with their rates,
+/// accelerations and derived arrays. A larger value follows longer motions and needs more memory.
+const MOST_AMPLITUDES: usize = 15_000_000;
+
+/// Number of forces with amplitudes: the compressed forces, and as many again for inertia and resonances.
+const FORCES: usize = 2 * MOST_FORCES;
+
+/// Intervals per period of the fastest motion that counts. The second derivative of a spline through an oscillation is
+/// then accurate to 2 %.
+const PER_PERIOD: f64 = 12.0;
+/// Smallest number of intervals per period: the second derivative of the spline is accurate to 5 %.
+const FEWEST_PER_PERIOD: f64 = 8.0;
+
+/// Smallest number of intervals between two breaks.
+const MIN_INTERVALS_PER_PIECE: usize = 3;
+
+/// Modes count if the root of their elastic energy is at least this part of the tolerances.
+const MIN_MODE_SHARE: f64 = 0.1;
+
+/// Stretches between breaks are ignored if they are shorter than this part of the run.
+const SHORTEST: f64 = 1e-9;
+
+/// Distance of the last instant of a stretch from the break after it, as a part of the last interval.
+const BEFORE: f64 = 1e-3;
+
+/// Instants of a motion in ascending order, in pieces without a break.
+pub(super) struct Grid {
+    pub times: Vec<f64>,
+    /// Indices of the instants of every piece. The first instant is at the break before the piece, the last lies just
+    /// before the next break.
+    pub pieces: Vec<Range<usize>>,
+}
+
+impl Grid {
+    /// Builds the grid for the `motion` of a `body`. Returns `None` if too many instants were needed to resolve all
+    /// oscillations and all stretches between breaks.
+    pub(super) fn new(body: &FlexBody, scene: &Scene, motion: &Trace, duration: f64) -> Option<Self> {
+        let frequency = (highest_excited_rate(body, scene, motion, MIN_MODE_SHARE) / TAU)
+            .max(fastest_history(scene, duration));
+        let wanted = PER_PERIOD * frequency * duration;
+        let most = (MOST_AMPLITUDES / (body.n_modes() + FORCES)).max(MIN_INTERVALS);
+        let stretches = stretches(&scene.breaks(), duration);
+        let for_periods = FEWEST_PER_PERIOD / PER_PERIOD * wanted;
+        if for_periods > most as f64 || (MIN_INTERVALS_PER_PIECE + 1) * stretches.len() > most {
+            return None;
+        }
+        // Distribute the intervals over the stretches by length.
+        let intervals = wanted.clamp(MIN_INTERVALS as f64, most as f64);
+        let (mut times, mut pieces) = (Vec::new(), Vec::new());
+        for (start, end) in stretches {
+            let length = end - start;
+            let count = (intervals * length / duration).ceil().max(MIN_INTERVALS_PER_PIECE as f64) as usize;
+            let last = if end < duration { end - BEFORE * length / count as f64 } else { end };
+            let first = times.len();
+            times.extend((0..count).map(|i| start + length * (i as f64 / count as f64)));
+            times.push(last);
+            pieces.push(first..times.len());
+        }
+        Some(Self { times, pieces })
+    }
+
+    /// Returns indices of about [`MIN_INTERVALS`] evenly spaced instants, and of the instants where one of the `histories` (one
+    /// value per instant) is largest. Short shocks are therefore included.
+    pub(super) fn few(&self, histories: impl Iterator<Item = Vec<f64>>) -> Vec<usize> {
+        self.significant_instants(MIN_INTERVALS + 1, histories)
+    }
+
+    /// Returns indices of about `count` evenly spaced instants, and of the instants where one of the `histories` is
+    /// largest.
+    pub(super) fn significant_instants(
+        &self,
+        count: usize,
+        histories: impl Iterator<Item = Vec<f64>>,
+    ) -> Vec<usize> {
+        let stride = self.times.len().div_ceil(count);
+        let mut all: Vec<usize> = (0..self.times.len()).step_by(stride).collect();
+        all.extend(self.times.len().checked_sub(1));
+        all.extend(histories.filter_map(|history| {
+            (0..history.len()).max_by(|&a, &b| history[a].abs().total_cmp(&history[b].abs()))
+        }));
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+}
+
+/// Returns the stretches between the breaks of a run, as start and end times.
+fn stretches(breaks: &[f64], duration: f64) -> Vec<(f64, f64)> {
+    let mut ends = vec![0.0];
+    for &time in breaks {
+        let shortest = SHORTEST * duration;
+        if time > ends[ends.len() - 1] + shortest && time < duration - shortest {
+            ends.push(time);
+        }
+    }
+    ends.push(duration);
+    ends.windows(2).map(|pair| (pair[0], pair[1])).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn breaks_part_a_run_unless_they_are_none() {
+        assert_eq!(stretches(&[], 2.0), vec![(0.0, 2.0)]);
+        assert_eq!(stretches(&[-1.0, 0.0, 0.5, 0.5 + 1e-10, 2.0, 3.0], 2.0), vec![(0.0, 0.5), (0.5, 2.0)]);
+        let many: Vec<f64> = (1..100).map(|i| 0.01 * f64::from(i)).collect();
+        assert_eq!(stretches(&many, 1.0).len(), 100);
+    }
 }

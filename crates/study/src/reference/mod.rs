@@ -4,18 +4,12 @@
 mod compressed;
 mod enrich;
 mod estimate;
-mod grid;
-mod held;
 mod motion_bodies;
 mod motion_shapes;
-mod projected;
-mod reaction;
 mod residual;
-mod resonance;
 mod truncated_equations;
 mod truncated_motion;
 mod truncated_responses;
-mod turning;
 
 pub use enrich::{Enriched, Enrichment, enrich, enrich_from, varied_errors};
 pub use estimate::{CouplingEffect, MAX_REFERENCE_ERROR, PART_OF_FINE, PART_OF_REFERENCE, ReferenceError};

@@ -2,7 +2,7 @@
 //! the inertia of the static responses and their coupling to the modes of the body.
 
 use super::compressed::principal;
-use super::grid::Grid;
+use super::estimate::Grid;
 use faer::Mat;
 use flexbody_body::invariants::symmetric_part;
 use flexbody_linalg::{

@@ -3,7 +3,6 @@
 
 mod band;
 mod direct;
-mod enriched;
 mod errors;
 mod modal_sum;
 mod place;
@@ -11,8 +10,7 @@ mod study;
 
 pub use band::{Band, Resonance, Spacing};
 pub use errors::{At, Effectivity, PairErrors};
-pub use place::{Direction, Place};
-pub use study::{CouplingEffect, Function, Pair, Response, ResponseSettings, Solved, respond};
-
 /// Complex number of a response; the real part is in phase with the force.
 pub use nalgebra::Complex;
+pub use place::{Direction, Place};
+pub use study::{CouplingEffect, Function, Pair, Response, ResponseSettings, Solved, respond};

@@ -1,6 +1,14 @@
 //! Transfer function as a sum over rigid motion and modes.
 
-use faer::Mat;
+use faer::{Mat, MatRef};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::basis::{CoupledModel, free_static_responses};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::{
+    combine, dense_cholesky, gram, side_by_side, solve_lower, solve_upper, subtract_combination,
+    symmetric_eigen,
+};
 use nalgebra::{Complex, DMatrix};
 
 /// Receptances of a free body in coordinates of diagonal stiffness and mass: H(w) = -G / w^2 + C' (diag(k) - w^2
@@ -65,6 +73,159 @@ impl ModalSum {
 
 fn is_diagonal(a: &Mat<f64>) -> bool {
     (0..a.ncols()).all(|j| (0..a.nrows()).all(|i| i == j || a[(i, j)] == 0.0))
+}
+
+// Frequency response with static responses added to the modes: the estimate of the truncation error (theory section
+// 8).
+
+/// Relative residual of a mode below which it counts as an eigenvector and leaves no unbalanced force.
+const EIGENVECTOR: f64 = 1e-6;
+
+/// Smallest part of a load outside rigid motions and modes that gets a static response.
+const MIN_REMAINING_LOAD: f64 = 1e-10;
+
+/// Smallest elastic energy of a direction of the static responses, relative to the largest, that counts as independent.
+const MIN_ENERGY_RATIO: f64 = 1e-9;
+
+/// A body expressed in the rows of its model.
+pub(super) struct NodalModes<'m> {
+    pub model: CoupledModel<'m>,
+    /// Rigid modes Phi (N x 6), orthonormal in M.
+    pub rigid: Mat<f64>,
+    /// Modes Psi (N x nf), M Psi and K Psi.
+    pub vectors: Mat<f64>,
+    pub inertial: Mat<f64>,
+    pub elastic: Mat<f64>,
+    /// Loads B (N x inputs) and outputs L (N x outputs).
+    pub loads: Mat<f64>,
+    pub measured: Mat<f64>,
+}
+
+impl NodalModes<'_> {
+    /// Returns the transfer function in the span of the modes and of the static responses E = K^+ \[(1 - M Phi Phi' - M
+    /// Psi Psi') \[B, L\], K Psi - M Psi Psi'K Psi\], with the modal damping C: D = M Psi C (M Psi)'. Returns `None` if
+    /// the modes leave no unbalanced force.
+    ///
+    /// # Errors
+    /// The errors of [`free_static_responses`]; [`FactorizationFailed`](Code::FactorizationFailed) if the modes and
+    /// responses are linearly dependent.
+    pub(super) fn enriched(&self, body: &FlexBody, damping: Option<&Mat<f64>>) -> Result<Option<ModalSum>> {
+        let Some(static_responses) = self.static_responses(body)? else { return Ok(None) };
+        let stiff = normalised(&self.vectors, &self.elastic);
+        let all = side_by_side(&[stiff.as_ref(), static_responses.as_ref()]);
+        let dependent = || {
+            Diagnostic::new(
+                Code::FactorizationFailed,
+                "the static responses that an estimate needs depend on the modes",
+            )
+        };
+        Ok(Some(self.in_span(&all, damping).ok_or_else(dependent)?))
+    }
+
+    /// Returns E (N x k), orthonormal in K; `None` if there are no unbalanced forces.
+    fn static_responses(&self, body: &FlexBody) -> Result<Option<Mat<f64>>> {
+        let [loads, modes] = [self.unbalanced_loads(), self.unbalanced_modes(body)];
+        let unbalanced = side_by_side(&[loads.as_ref(), modes.as_ref()]);
+        if unbalanced.ncols() == 0 {
+            return Ok(None);
+        }
+        let mut responses = free_static_responses(&self.model, unbalanced, body.modes().eigenvalue[0])?;
+        let along = gram(self.inertial.as_ref(), responses.as_ref());
+        subtract_combination(responses.as_mut(), self.vectors.as_ref(), along.as_ref());
+        let responses =
+            normalised(&responses, &self.model.model().pencil().apply_stiffness(responses.as_ref()));
+        Ok(orthonormal(&responses, &self.model.model().pencil().apply_stiffness(responses.as_ref())))
+    }
+
+    /// Returns the part of the loads B and L outside rigid motions and modes.
+    fn unbalanced_loads(&self) -> Mat<f64> {
+        let loads = side_by_side(&[self.loads.as_ref(), self.measured.as_ref()]);
+        let mut left = loads.clone();
+        let rigid = self.model.model().pencil().apply_mass(self.rigid.as_ref());
+        for (vectors, products) in [(&self.rigid, &rigid), (&self.vectors, &self.inertial)] {
+            let along = gram(vectors.as_ref(), left.as_ref());
+            subtract_combination(left.as_mut(), products.as_ref(), along.as_ref());
+        }
+        self.model.without_inner_forces(&mut left);
+        let kept = (0..loads.ncols())
+            .filter(|&j| left.col(j).norm_l2() > MIN_REMAINING_LOAD * loads.col(j).norm_l2());
+        columns(&left, &kept.collect::<Vec<_>>())
+    }
+
+    /// Returns K psi - M Psi Psi'K psi for the modes that are not eigenvectors.
+    fn unbalanced_modes(&self, body: &FlexBody) -> Mat<f64> {
+        let residual = &body.modes().residual;
+        let kept: Vec<usize> = (0..residual.len()).filter(|&j| residual[j] > EIGENVECTOR).collect();
+        let mut left = columns(&self.elastic, &kept);
+        let along = gram(self.vectors.as_ref(), left.as_ref());
+        subtract_combination(left.as_mut(), self.inertial.as_ref(), along.as_ref());
+        self.model.without_inner_forces(&mut left);
+        left
+    }
+
+    /// Returns the transfer function of motion in the span of rigid motions and the columns of `span`.
+    fn in_span(&self, span: &Mat<f64>, damping: Option<&Mat<f64>>) -> Option<ModalSum> {
+        let pencil = self.model.model().pencil();
+        let stiffness = gram(span.as_ref(), pencil.apply_stiffness(span.as_ref()).as_ref());
+        let mass = gram(span.as_ref(), pencil.apply_mass(span.as_ref()).as_ref());
+        // K = T T' is positive definite on the span, and M may be singular: T^-1 M T^-T = Y diag(m) Y'.
+        let lower = dense_cholesky(stiffness)?;
+        let half = solve_lower(&lower, &mass).transpose().to_owned();
+        let whole = solve_lower(&lower, &half);
+        let symmetric =
+            Mat::from_fn(whole.nrows(), whole.ncols(), |i, j| 0.5 * (whole[(i, j)] + whole[(j, i)]));
+        let eigen = symmetric_eigen(symmetric.as_ref())?;
+        // Coordinates of unit stiffness and diagonal mass; project loads, outputs and damping.
+        let coordinates = solve_upper(&lower, &eigen.vectors);
+        let seen = |columns: MatRef<'_, f64>| {
+            combine(coordinates.transpose().to_owned().as_ref(), gram(span.as_ref(), columns).as_ref())
+        };
+        let rigid = gram(
+            gram(self.rigid.as_ref(), self.measured.as_ref()).as_ref(),
+            gram(self.rigid.as_ref(), self.loads.as_ref()).as_ref(),
+        );
+        let damping = damping.map(|c| {
+            let modal = seen(self.inertial.as_ref());
+            combine(combine(modal.as_ref(), c.as_ref()).as_ref(), modal.transpose().to_owned().as_ref())
+        });
+        Some(ModalSum {
+            stiffness: vec![1.0; eigen.values.len()],
+            mass: eigen.values,
+            damping,
+            inputs: seen(self.loads.as_ref()),
+            outputs: seen(self.measured.as_ref()),
+            rigid,
+        })
+    }
+}
+
+/// Returns the columns with the indices `kept`.
+fn columns(a: &Mat<f64>, kept: &[usize]) -> Mat<f64> {
+    Mat::from_fn(a.nrows(), kept.len(), |i, j| a[(i, kept[j])])
+}
+
+/// Returns the columns x / sqrt(x'p) for columns x of `vectors` and p of `products`. Columns with x'p <= 0 are dropped.
+fn normalised(vectors: &Mat<f64>, products: &Mat<f64>) -> Mat<f64> {
+    let square = |j: usize| (0..vectors.nrows()).map(|i| vectors[(i, j)] * products[(i, j)]).sum::<f64>();
+    let sizes: Vec<(usize, f64)> =
+        (0..vectors.ncols()).map(|j| (j, square(j).sqrt())).filter(|(_, size)| *size > 0.0).collect();
+    Mat::from_fn(vectors.nrows(), sizes.len(), |i, at| vectors[(i, sizes[at].0)] / sizes[at].1)
+}
+
+/// Returns an orthonormal basis of the span of `vectors` in the inner product whose products with them are `products`.
+/// Returns `None` if the span is empty.
+fn orthonormal(vectors: &Mat<f64>, products: &Mat<f64>) -> Option<Mat<f64>> {
+    let square = gram(vectors.as_ref(), products.as_ref());
+    let symmetric =
+        Mat::from_fn(square.nrows(), square.ncols(), |i, j| 0.5 * (square[(i, j)] + square[(j, i)]));
+    let eigen = symmetric_eigen(symmetric.as_ref())?;
+    let largest = eigen.values.last().copied()?;
+    let kept: Vec<usize> =
+        (0..eigen.values.len()).filter(|&j| eigen.values[j] > MIN_ENERGY_RATIO * largest).collect();
+    let turned = Mat::from_fn(eigen.values.len(), kept.len(), |i, j| {
+        eigen.vectors[(i, kept[j])] / eigen.values[kept[j]].sqrt()
+    });
+    (!kept.is_empty()).then(|| combine(vectors.as_ref(), turned.as_ref()))
 }
 
 #[cfg(test)]

@@ -3,9 +3,8 @@
 use super::Complex;
 use super::band::{Band, Frequency, Resonance};
 use super::direct::{DirectSolution, DirectSolver};
-use super::enriched::NodalModes;
 use super::errors::{At, Compared, PairErrors};
-use super::modal_sum::ModalSum;
+use super::modal_sum::{ModalSum, NodalModes};
 use super::place::{Direction, Place, PlaceRows};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};

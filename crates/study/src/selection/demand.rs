@@ -1,7 +1,8 @@
-//! Demands of a scene, or of one of several load cases, on a body.
+//! Demands of a scene, or of one of several load cases, on a body: tolerances, the static responses that a basis must
+//! contain, and those that the selected modes represent (theory section 8).
 
 use super::cases::{Case, PART_OF_BOUNDS, bounded, scenes};
-use super::situation::Situation;
+use super::situation::{PointRows, Situation};
 use super::trial::Trial;
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
@@ -9,8 +10,12 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::BodyPoint;
-use flexbody_motion::scene::{FramedScene, PerQuantity, Scene, Tolerance, damped_once, points_of};
+use flexbody_motion::scene::{
+    FramedScene, Load, LoadCases, PerQuantity, Point, Scene, Tolerance, damped_once, points_of,
+};
+use nalgebra::Vector3;
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 
 /// Body and scene in one frame, with the scenes in which models are tested: this scene and, if it allows faster
 /// rotation than its run has, the scene with its rotation scaled to that.
@@ -109,4 +114,118 @@ impl<'c> Demand<'c> {
             None => said,
         }
     }
+}
+
+/// Loads of a scene whose static responses the basis should contain, so that only modes that the motion excites are
+/// needed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct WantedResponses {
+    /// True if the body turns: static responses to centrifugal loads.
+    pub centrifugal: bool,
+    /// True if forces or torques act at interfaces: static responses to these.
+    pub interfaces: bool,
+}
+
+impl WantedResponses {
+    /// Returns the responses that at least one load case requires.
+    pub fn of_any(cases: &LoadCases) -> Self {
+        cases.iter().map(Self::of).fold(Self::default(), |all, own| Self {
+            centrifugal: all.centrifugal || own.centrifugal,
+            interfaces: all.interfaces || own.interfaces,
+        })
+    }
+
+    /// Returns the responses that `scene` requires.
+    pub fn of(scene: &Scene) -> Self {
+        let motion = scene.requirements.motion.angular_velocity.is_some_and(|range| range.length() > 0.0);
+        let turns = scene.initial.angular_velocity.norm() > 0.0;
+        let at_interface = |load: &Load| matches!(load.at, Point::Interface(_));
+        Self {
+            centrifugal: motion || turns || scene.rotation().is_some(),
+            // The reaction is a load at the interface that carries the body.
+            interfaces: scene.carried.is_some() || scene.loads.iter().any(at_interface),
+        }
+    }
+}
+
+/// Ratio of the highest free mode to the highest frequency of interest. Loads excite modes above it statically. A
+/// larger value gives more modes.
+pub const BEYOND_BAND: f64 = 2.0;
+
+/// Returns the largest eigenvalue of the wanted free modes, from the highest band of the load cases; `None` if no case
+/// states a band.
+pub fn largest_eigenvalue(cases: &LoadCases) -> Option<f64> {
+    let bands = cases.iter().filter_map(|scene| scene.requirements.band);
+    bands.reduce(f64::max).map(|band| (TAU * BEYOND_BAND * band).powi(2))
+}
+
+// Static response to each load that the selected modes represent (theory section 8).
+
+/// Missing part of the static response to a load, relative, in the norm of K: sqrt(1 - sum_kept (f_p^2 / lambda_p) /
+/// sum_all).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Participation {
+    /// Name of the load.
+    pub load: String,
+    /// Part that the selected modes miss of the response of all modes of the body.
+    pub selected: f64,
+    /// Parts that the modes of the body miss of the response of all nodes, with its residual vectors and without them;
+    /// `None` if this was not recorded at the conversion.
+    pub body: Option<(f64, f64)>,
+}
+
+/// Returns the missing parts for the loads of `scene` at `points` and for steady spin about its axis. Each force is
+/// taken in its first direction or, if the direction changes, along every axis that it has. Loads that cause no
+/// deformation are left out.
+pub fn participations(
+    body: &FlexBody,
+    scene: &Scene,
+    points: &[BodyPoint],
+    selected: &[usize],
+) -> Vec<Participation> {
+    let rows = PointRows::new(body);
+    let eigenvalues = &body.modes().eigenvalue;
+    let mut all = Vec::new();
+    let mut add = |load: String, forces: Vec<f64>, recorded: &dyn Fn(&str) -> bool| {
+        // Elastic energy of the static response in each mode: f_p^2 / lambda_p.
+        let part = |j: usize| forces[j] * forces[j] / eigenvalues[j];
+        let whole: f64 = (0..eigenvalues.len()).map(part).sum();
+        let kept: f64 = selected.iter().map(|&j| part(j)).sum();
+        let records = body.modes().truncation.iter().filter(|record| recorded(&record.load));
+        let worst =
+            records.map(|record| (record.after, record.before)).reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
+        if whole > 0.0 && all.iter().all(|one: &Participation| one.load != load) {
+            let selected = (1.0 - kept / whole).max(0.0).sqrt();
+            all.push(Participation { load, selected, body: worst });
+        }
+    };
+    for (load, point) in scene.loads.iter().zip(points) {
+        let psi = rows.of(point);
+        let at_interface = |name: &str| match &load.at {
+            Point::Interface(interface) => {
+                name.strip_prefix(interface.as_str()).is_some_and(|rest| rest.starts_with(' '))
+            }
+            Point::Node(_) => false,
+        };
+        for direction in load.force.directions() {
+            let forces = (0..eigenvalues.len()).map(|j| psi.column(j).dot(&direction)).collect();
+            let [x, y, z] = direction.into();
+            add(format!("force {x}, {y}, {z} at {}", load.at), forces, &at_interface);
+        }
+    }
+    // Steady spin: W1'w w / 2 along its axis.
+    let axis = match scene.rotation() {
+        Some(velocity) => velocity.main_direction(),
+        None => scene.initial.angular_velocity.try_normalize(0.0),
+    };
+    if let (Some(axis), Some(w1)) = (axis, body.invariants().w1()) {
+        let nf = eigenvalues.len();
+        let force = |j: usize| {
+            let row = |b: usize| axis.dot(&Vector3::from_fn(|a, _| w1[(a, b * nf + j)]));
+            (0..3).map(|b| row(b) * axis[b]).sum::<f64>() / 2.0
+        };
+        let centrifugal = |name: &str| name.starts_with("centrifugal");
+        add("centrifugal load of the spin".to_owned(), (0..nf).map(force).collect(), &centrifugal);
+    }
+    all
 }

@@ -1,11 +1,9 @@
 //! Trials of models with fewer terms or modes: by bounds, and by integration.
 
-use super::bounds::{Driven, ErrorBound};
+use super::bounds::{Driven, ErrorBound, Variation};
 use super::dropped_terms::DroppedTerms;
 use super::norms::Norms;
-use super::rows::PointRows;
-use super::situation::Situation;
-use super::variation::Variation;
+use super::situation::{PointRows, Situation};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroups};

@@ -1,6 +1,111 @@
-//! Pareto front and best of the candidates.
+//! Candidate with its errors, cost and times; the Pareto front and the best of the candidates.
 
-use super::{Measured, TradeRow};
+use super::{Candidate, InVariations, TimedRun};
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_motion::integration::Work;
+use flexbody_motion::scene::OutputErrors;
+
+/// Times of a candidate, measured one after the other on one thread.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Timed {
+    /// Time of one evaluation of the equations, the longest of any load case. Unit: s.
+    pub evaluation: f64,
+    /// Cheapest run within the tolerances in every load case.
+    pub runs: Vec<TimedRun>,
+}
+
+impl Timed {
+    /// Returns the time of the runs of all load cases. Unit: s.
+    pub fn seconds(&self) -> f64 {
+        self.runs.iter().map(|run| run.seconds).sum()
+    }
+
+    /// Returns the work of the runs of all load cases.
+    pub fn work(&self) -> Work {
+        self.runs.iter().fold(Work::default(), |all, run| Work {
+            steps: all.steps + run.work.steps,
+            rejected: all.rejected + run.work.rejected,
+            rates: all.rates + run.work.rates,
+        })
+    }
+
+    /// Returns the largest ratio of error to tolerance of these runs.
+    pub fn worst(&self) -> f64 {
+        self.decisive().errors.worst
+    }
+
+    /// Returns the run with the largest ratio of error to tolerance, the first of equal ones.
+    pub fn decisive(&self) -> &TimedRun {
+        let all = self.runs.iter().rev();
+        all.max_by(|a, b| a.errors.worst.total_cmp(&b.errors.worst)).expect("a load case")
+    }
+}
+
+/// Errors of a candidate in a load case, or in a single scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InCase {
+    /// Largest errors, with the steps of the reference.
+    pub errors: OutputErrors,
+    /// Largest ratio of error to tolerance.
+    pub worst: f64,
+    /// Growth of the errors over the run, see [`ErrorHistory::growth`](flexbody_motion::scene::ErrorHistory::growth).
+    pub growth: Option<f64>,
+}
+
+/// Errors, cost and times of a candidate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Errors in every load case; one entry for a single scene.
+    pub by_case: Vec<InCase>,
+    /// Index (from 0) of the load case with the largest ratio of error to tolerance.
+    pub case: usize,
+    /// Number of load cases whose errors exceed the tolerances that the reference leaves.
+    pub beyond: usize,
+    /// Multiplications of one evaluation of the equations, the largest of any case.
+    pub multiplications: usize,
+    /// Size of the file of the body. Unit: bytes.
+    pub bytes: u64,
+    /// Time to make the source body; `None` if unknown. Unit: s.
+    pub preprocessing: Option<f64>,
+    /// Errors in variations of the scene; `None` if the candidate was not judged on any.
+    pub varied: Option<InVariations>,
+    /// Times, for candidates that may be chosen: the reference, the front and the recommended one.
+    pub timed: Option<Timed>,
+}
+
+impl Measured {
+    /// Returns true if the errors of every case are within the tolerances that the reference leaves.
+    pub fn holds(&self) -> bool {
+        self.beyond == 0
+    }
+
+    /// Returns the errors in the case with the largest ratio of error to tolerance.
+    pub fn decisive_case(&self) -> &InCase {
+        &self.by_case[self.case]
+    }
+
+    /// Returns the largest ratio of error to tolerance in any case.
+    pub fn worst(&self) -> f64 {
+        self.decisive_case().worst
+    }
+}
+
+/// Diagnostic of a candidate that could not be measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Failed(pub Diagnostic);
+
+/// Candidate and its measurement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TradeRow {
+    /// Modes, groups and precision of the body.
+    pub candidate: Candidate,
+    /// Name of the source that the candidate is made of.
+    pub source: String,
+    /// Frequency of its last mode, in hertz.
+    pub last_frequency_hz: f64,
+    /// Measurement, or the reason why there is none.
+    pub outcome: std::result::Result<Measured, Failed>,
+}
 
 /// Recommended candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

@@ -1,17 +1,16 @@
 //! The content of bulk data and case control of a deck: positions, axes of rows, boundary, supports, sets.
 
-use super::assigned::Assigned;
 use super::constraints::Constraints;
-use super::elements;
-use super::sets::SetLines;
 use super::systems::{Definition, Grid, SystemCard, SystemKind};
+use super::{Assigned, SetLines};
 use crate::bulk_cards::{Card, Item, components, read_deck};
 use crate::dmig::Dmigs;
 use crate::jobs::Found;
+use crate::mesh::in_order_of_shape;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;
 use flexbody_base::text::scanner::{BadLines, excerpt, whole};
-use flexbody_model::Elements;
+use flexbody_model::{ElementShape, Elements};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
@@ -298,7 +297,7 @@ impl Bulk {
         if is_element {
             self.has_elements = true;
             self.has_rotations |= !SOLIDS.contains(&name);
-            elements::add(card, &mut self.elements);
+            add_element(card, &mut self.elements);
         }
     }
 }
@@ -350,4 +349,46 @@ fn list(card: &Card, at: usize, members: &mut Vec<Members>) -> Option<()> {
         members.push(Members { first, last, components: components.clone() });
     }
     Some(())
+}
+
+/// Elements that are points or connect coincident points, and are not drawn: springs, masses, dampers, fasteners.
+const NOTHING_TO_DRAW: &[&str] =
+    &["CELAS", "CBUSH", "CMASS", "CONM", "CDAMP", "CVISC", "CGAP", "CFAST", "CWELD", "CSEAM", "CHBDY"];
+
+/// Adds the element of a card to the elements for drawing.
+fn add_element(card: &Card, elements: &mut Elements) {
+    let name = card.name.as_str();
+    let Some((shape, first, most)) = shape(name) else {
+        if !NOTHING_TO_DRAW.iter().any(|head| name.starts_with(head)) {
+            elements.leave_out(name, 1);
+        }
+        return;
+    };
+    let grids: Vec<i64> = (first..first + most).map(|k| card.integer(k).unwrap_or(0)).collect();
+    let (corners, middles) = grids.split_at(shape.corners());
+    if corners.iter().any(|&grid| grid <= 0) {
+        elements.leave_out(name, 1);
+    } else if middles.is_empty() || middles.contains(&0) {
+        elements.add(name, shape, corners);
+    } else {
+        elements.add(name, shape, &in_order_of_shape(shape, &grids));
+    }
+}
+
+/// Returns the shape of an element, the field of its first grid, and its largest number of grids.
+fn shape(name: &str) -> Option<(ElementShape, usize, usize)> {
+    Some(match name {
+        "CTETRA" => (ElementShape::Tetrahedron, 2, 10),
+        "CPYRAM" | "CPYRA" => (ElementShape::Pyramid, 2, 13),
+        "CPENTA" => (ElementShape::Wedge, 2, 15),
+        "CHEXA" | "CHEXA20" => (ElementShape::Hexahedron, 2, 20),
+        "CHEXA8" => (ElementShape::Hexahedron, 2, 8),
+        "CTRIA3" | "CTRIAR" => (ElementShape::Triangle, 2, 3),
+        "CTRIA6" => (ElementShape::Triangle, 2, 6),
+        "CQUAD4" | "CQUADR" | "CSHEAR" => (ElementShape::Quadrilateral, 2, 4),
+        "CQUAD8" => (ElementShape::Quadrilateral, 2, 8),
+        "CBAR" | "CBEAM" | "CBEND" | "CROD" | "CTUBE" => (ElementShape::Line, 2, 2),
+        "CONROD" => (ElementShape::Line, 1, 2),
+        _ => return None,
+    })
 }

@@ -1,15 +1,12 @@
 //! Constants of the nodal equations of motion.
 
-use super::NodalError;
-use super::conditions::ReferenceConditions;
-use super::damping::ModalDamping;
-use super::directors::Directors;
-use super::massless::{Massless, NULL_PIVOT};
-use super::motions::{Motions, add_motion, sums};
+use super::conditions::{Motions, ReferenceConditions, add_motion, sums};
+use super::directors::{Directors, Massless, NULL_PIVOT};
+use faer::Mat;
 use flexbody_body::flex_body::{FlexBody, Frame};
 use flexbody_linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
-use flexbody_model::{Damping, FeModel, centre_and_length};
-use nalgebra::{Matrix6, Vector3, Vector6};
+use flexbody_model::{Damping, DofLabel, FeModel, centre_and_length};
+use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
 
 /// Smallest ratio of the smallest to the largest singular value of C R for which the conditions fix the
 /// frame.
@@ -387,3 +384,152 @@ fn equilibrated(matrix: &Matrix6<f64>, length: f64) -> Matrix6<f64> {
     }
     scaled
 }
+
+// Damping of modes as forces on nodes.
+
+/// Damping matrix D = W G W' with W = M Psi (N x nf): the modal damping of a body as forces on the nodes of
+/// its model. With G = m_ff^-1 D_ff m_ff^-1 and m_ff = Psi'M Psi, Psi'D Psi = D_ff; for mass-normalised
+/// modes D = sum_j 2 zeta_j omega_j (M psi_j)(M psi_j)'. Motions M-orthogonal to the modes are not damped.
+#[derive(Debug, Clone)]
+pub(super) struct ModalDamping {
+    /// W.
+    weighted: Mat<f64>,
+    /// G.
+    matrix: DMatrix<f64>,
+}
+
+/// Work arrays for the products of [`ModalDamping`].
+#[derive(Debug, Clone, Default)]
+pub(super) struct Amplitudes {
+    of_modes: Vec<f64>,
+    forces: Vec<f64>,
+}
+
+impl ModalDamping {
+    /// Returns the damping of `body`; the inner option is `None` without damping. Returns `None` if the
+    /// body has other rows than `model`, or modes that depend on each other.
+    pub(super) fn new(model: &FeModel, body: &FlexBody) -> Option<Option<Self>> {
+        let vectors = body.vectors_of(model)?;
+        let damping = body.damping();
+        let nf = damping.nrows();
+        let damping = DMatrix::from_fn(nf, nf, |i, j| damping[(i, j)]);
+        if damping.iter().all(|entry| *entry == 0.0) {
+            return Some(None);
+        }
+        let mass = body.invariants().modal_mass();
+        let mass = DMatrix::from_fn(nf, nf, |i, j| mass[(i, j)]).cholesky()?;
+        let half = mass.solve(&damping);
+        let matrix = mass.solve(&half.transpose());
+        Some(Some(Self { weighted: model.pencil().apply_mass(vectors.as_ref()), matrix }))
+    }
+
+    pub(super) fn workspace(&self) -> Amplitudes {
+        let zeros = || vec![0.0; self.weighted.ncols()];
+        Amplitudes { of_modes: zeros(), forces: zeros() }
+    }
+
+    /// Computes forces += factor D ud.
+    pub(super) fn add(&self, factor: f64, ud: &[f64], forces: &mut [f64], workspace: &mut Amplitudes) {
+        for (j, amplitude) in workspace.of_modes.iter_mut().enumerate() {
+            let column = self.weighted.col_as_slice(j);
+            *amplitude = factor * column.iter().zip(ud).map(|(w, u)| w * u).sum::<f64>();
+        }
+        for (i, force) in workspace.forces.iter_mut().enumerate() {
+            *force = self.matrix.column(i).iter().zip(&workspace.of_modes).map(|(g, a)| g * a).sum();
+        }
+        for (j, force) in workspace.forces.iter().enumerate().filter(|(_, force)| **force != 0.0) {
+            let column = self.weighted.col_as_slice(j);
+            forces.iter_mut().zip(column).for_each(|(sum, w)| *sum += force * w);
+        }
+    }
+}
+
+/// Reason why a model, or a state of it, has no nodal equations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NodalError {
+    /// A condition names a degree of freedom that the model does not have.
+    DofUnknown(DofLabel),
+    /// The number of held degrees of freedom is not six, in the plane three.
+    ConditionCount {
+        /// Number of rigid motions.
+        expected: usize,
+        /// Number of held degrees of freedom.
+        found: usize,
+    },
+    /// The conditions leave a rigid motion free.
+    ConditionsDependent,
+    /// A held degree of freedom without mass.
+    HeldWithoutMass(DofLabel),
+    /// Degrees of freedom are held, and M has null vectors besides its empty rows.
+    HeldMassSingular {
+        /// Number of null vectors besides the empty rows.
+        null_vectors: usize,
+    },
+    /// M is not positive semidefinite, or so nearly singular that its null vectors cannot be identified.
+    MassIndefinite,
+    /// K does not resist a massless motion.
+    MasslessUnheld,
+    /// M has more null vectors than dense storage allows.
+    NullSpaceTooLarge {
+        /// Number of null vectors.
+        null_vectors: usize,
+        /// Number of rows.
+        rows: usize,
+    },
+    /// Damping is given by ratios of modes.
+    DampingOfModes,
+    /// The body does not belong to the model.
+    OtherBody,
+    /// Nodal rotations or rows without a position tie the frame to the body.
+    FrameTied,
+    /// The displacements do not fulfil the reference conditions.
+    ConditionsViolated {
+        /// Size of the rigid motion in the displacements, relative to the largest displacement.
+        part: f64,
+    },
+}
+
+impl std::fmt::Display for NodalError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::DofUnknown(dof) => write!(f, "{dof} is to be held, but is not a degree of freedom of the model"),
+            Self::ConditionCount { expected, found } => write!(
+                f,
+                "{found} degrees of freedom are held, expected {expected}; help: hold as many as the body has rigid motions"
+            ),
+            Self::ConditionsDependent => f.write_str(
+                "the reference conditions leave a rigid motion free; help: hold three degrees of freedom of one node, two of a second and one of a third",
+            ),
+            Self::HeldWithoutMass(dof) => {
+                write!(f, "{dof} is to be held, but carries no mass; help: hold another degree of freedom, or use mean axes")
+            }
+            Self::HeldMassSingular { null_vectors } => write!(
+                f,
+                "degrees of freedom are held, but the mass matrix has {null_vectors} null vectors; help: use mean axes"
+            ),
+            Self::MassIndefinite => f.write_str(
+                "the mass matrix is indefinite or nearly singular; help: export the consistent mass, or use the reduced equations",
+            ),
+            Self::MasslessUnheld => f.write_str(
+                "some degrees of freedom have neither mass nor stiffness; help: remove them, or give them mass",
+            ),
+            Self::NullSpaceTooLarge { null_vectors, rows } => write!(
+                f,
+                "the mass matrix of {rows} rows has {null_vectors} null vectors, too many for dense storage; help: integrate the mass fully, or use the reduced equations"
+            ),
+            Self::DampingOfModes => f.write_str(
+                "damping ratios need the modes of a body, and none is given; help: give the body (`of_body`), Rayleigh damping or a damping matrix",
+            ),
+            Self::OtherBody => f.write_str("the rows of the body and the model differ, or the modes are linearly dependent"),
+            Self::FrameTied => f.write_str(
+                "the frame of a body with nodal rotations or rows without a position cannot be changed; help: start without deformation",
+            ),
+            Self::ConditionsViolated { part } => write!(
+                f,
+                "the displacements contain rigid motion, {part:.1e} of the largest displacement; help: change the frame (`reframed`), or reduce the deformation"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for NodalError {}

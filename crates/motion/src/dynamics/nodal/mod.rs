@@ -2,34 +2,18 @@
 //! reference for every reduced equation.
 
 mod conditions;
-mod damping;
 mod directors;
-mod drive;
 mod driven;
 mod equations;
-mod error;
 mod evaluation;
 mod inversion;
 mod kinetics;
-mod loads;
-mod massless;
-mod modes;
 mod motion;
-mod motions;
-mod observed;
-mod points;
-mod reframe;
-mod settled;
 mod state;
 mod stiff;
-mod turned;
-mod turned_motion;
 
-pub use conditions::ReferenceConditions;
-pub use equations::NodalEquations;
-pub use error::NodalError;
+pub use conditions::{NodalPoint, ReferenceConditions};
+pub use equations::{NodalEquations, NodalError};
 pub use evaluation::NodalEvaluation;
-pub use modes::NodalModes;
 pub use motion::NodalMotion;
-pub use points::NodalPoint;
-pub use state::NodalConfiguration;
+pub use state::{NodalConfiguration, NodalModes};

@@ -1,0 +1,188 @@
+//! Damping and geometric stiffness of the modes: the damping of the model, reduced to the modes, and matrices of unit
+//! loads given by the user, reduced to the modes and turned to body axes.
+
+use super::body_modes::reduced;
+use crate::basis::{BasisChoice, Loads};
+use crate::flex_body::{FlexBody, SOFTENING, axis_in_words, stiffness_about};
+use crate::invariants::Invariants;
+use faer::{Mat, MatRef, Scale};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_eigen::energy_noise;
+use flexbody_linalg::{SymmetricMatrix, symmetric_eigen};
+use flexbody_model::{Damping, FeModel, GeometricStiffness, LoadKind, UnitLoad, ratio_at};
+use nalgebra::{Matrix3, Vector3};
+
+/// Number of standard deviations of the noise due to the digits of D that count as rounding.
+const NOISE_DEVIATIONS: f64 = 30.0;
+
+/// Smallest eigenvalue of the damping, scaled to a unit diagonal, that counts as rounding.
+const MIN_SCALED_EIGENVALUE: f64 = -1e-8;
+
+/// Damping of modes.
+pub struct ModalDamping {
+    /// Psi' D Psi (nf x nf). Unit: 1/time.
+    pub matrix: Mat<f64>,
+    /// Damping ratios: diagonal of `matrix` over 2 omega_j.
+    pub ratio: Vec<f64>,
+    /// Warning about modes damped beyond critical damping.
+    pub warning: Option<Diagnostic>,
+}
+
+/// Returns the damping of the modes `vectors` (N x nf, model axes); `None` if the model has no damping.
+///
+/// # Errors
+/// [`DampingIndefinite`](Code::DampingIndefinite) if the damping adds energy to a motion.
+pub fn modal_damping(
+    model: &FeModel,
+    vectors: MatRef<'_, f64>,
+    eigenvalues: &[f64],
+    invariants: &Invariants,
+) -> Result<Option<ModalDamping>> {
+    let Some(damping) = model.damping() else { return Ok(None) };
+    let critical: Vec<f64> = eigenvalues.iter().map(|lambda| 2.0 * lambda.sqrt()).collect();
+    let from_ratios = |ratio: Vec<f64>| {
+        let diagonal = |i: usize, j: usize| if i == j { ratio[j] * critical[j] } else { 0.0 };
+        (Mat::from_fn(critical.len(), critical.len(), diagonal), ratio)
+    };
+    let from_matrix = |matrix: Mat<f64>| {
+        // Negative values are rounding here: other negative values were rejected.
+        let ratio = critical.iter().enumerate().map(|(j, c)| matrix[(j, j)].max(0.0) / c).collect();
+        (matrix, ratio)
+    };
+    let (matrix, ratio): (Mat<f64>, Vec<f64>) = match damping {
+        Damping::Ratio(ratio) => from_ratios(vec![*ratio; critical.len()]),
+        Damping::Bands(bands) => {
+            let hertz = eigenvalues.iter().map(|&lambda| model.units().frequency_of(lambda));
+            from_ratios(hertz.map(|f| ratio_at(bands, f)).collect())
+        }
+        Damping::Rayleigh { alpha, beta } => {
+            let (m, k) = (invariants.modal_mass(), invariants.modal_stiffness());
+            from_matrix(Mat::from_fn(m.nrows(), m.ncols(), |i, j| alpha * m[(i, j)] + beta * k[(i, j)]))
+        }
+        Damping::Matrix(d) => {
+            let matrix = reduced(d, vectors);
+            check_semidefinite(model, d, vectors, &matrix)?;
+            from_matrix(matrix)
+        }
+    };
+    if let Some(j) = ratio.iter().position(|ratio| !ratio.is_finite()) {
+        let message = format!("damping of mode {} is not a finite number", j + 1);
+        return Err(Diagnostic::new(Code::DampingIndefinite, message).into());
+    }
+    let over = ratio.iter().filter(|ratio| **ratio > 1.0).count();
+    let warning = (over > 0).then(|| {
+        let worst = (0..ratio.len()).fold(0, |w, j| if ratio[j] > ratio[w] { j } else { w });
+        let message = format!(
+            "{over} of {} modes are overdamped, mode {} most: its damping ratio is {:.3e}",
+            ratio.len(),
+            worst + 1,
+            ratio[worst]
+        );
+        Diagnostic::new(Code::ModesOverdamped, message)
+    });
+    Ok(Some(ModalDamping { matrix, ratio, warning }))
+}
+
+/// Returns an error if D adds energy to any motion of the modes beyond the noise of its digits.
+fn check_semidefinite(
+    model: &FeModel,
+    d: &SymmetricMatrix,
+    vectors: MatRef<'_, f64>,
+    reduced: &Mat<f64>,
+) -> Result<()> {
+    let input_error = 0.5 * 10f64.powi(1 - i32::from(model.digits()));
+    let noise = energy_noise(d, vectors, input_error);
+    let raised = |j: usize| reduced[(j, j)] + NOISE_DEVIATIONS * noise[j];
+    let refuse = |message: String| Err(Diagnostic::new(Code::DampingIndefinite, message).into());
+    if let Some(j) = (0..noise.len()).find(|&j| raised(j).is_nan() || raised(j) < 0.0) {
+        return refuse(format!(
+            "damping of mode {} is negative: psi' D psi = {:.3e}",
+            j + 1,
+            reduced[(j, j)]
+        ));
+    }
+    // Scale to a unit diagonal, so that slow modes count as much as fast ones.
+    let size: Vec<f64> = (0..noise.len()).map(|j| raised(j).sqrt().max(f64::MIN_POSITIVE)).collect();
+    let scaled = Mat::from_fn(size.len(), size.len(), |i, j| {
+        if i == j { raised(j) / size[j] / size[j] } else { reduced[(i, j)] / size[i] / size[j] }
+    });
+    match symmetric_eigen(scaled.as_ref()) {
+        Some(eigen) if eigen.values[0] >= MIN_SCALED_EIGENVALUE => Ok(()),
+        Some(eigen) => {
+            let most = (0..size.len()).fold(0, |w, j| {
+                if eigen.vectors[(j, 0)].abs() > eigen.vectors[(w, 0)].abs() { j } else { w }
+            });
+            refuse(format!(
+                "the reduced damping matrix, scaled to a unit diagonal, has the eigenvalue {:.3e}, most of it in mode {}",
+                eigen.values[0],
+                most + 1
+            ))
+        }
+        None => refuse("the reduced damping matrix has entries that are not finite".to_owned()),
+    }
+}
+
+/// Direction cosines up to this magnitude are rounding and count as zero.
+const ROUNDING_COSINE: f64 = 4.0 * f64::EPSILON;
+
+/// Largest entry whose products stay finite.
+const MAX_ENTRY: f64 = 1e290;
+
+/// Returns Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body) for unit
+/// loads along the columns of `axes`. Components that are not given count as zero, so that K_geo of any
+/// load is equal in all axes. Components without any contribution are omitted. Kinds are in the order of
+/// the model, components in their own order.
+///
+/// * `shift`: origin of the frame relative to the point that spin and angular acceleration refer to, frame
+///   axes; zero except for a frame on an interface. Unit: length.
+///
+/// # Errors
+/// [`MatrixNotFinite`](Code::MatrixNotFinite) if the products overflow.
+pub fn modal_geometric_stiffness(
+    model: &FeModel,
+    vectors: MatRef<'_, f64>,
+    axes: &Matrix3<f64>,
+    shift: &Vector3<f64>,
+) -> Result<Vec<GeometricStiffness<Mat<f64>>>> {
+    let mut out: Vec<GeometricStiffness<Mat<f64>>> = Vec::new();
+    for GeometricStiffness { load, matrix } in model.geometric_stiffness() {
+        let reduced_matrix = reduced(matrix, vectors);
+        if reduced_matrix.col_iter().any(|column| column.iter().any(|v| v.is_nan() || v.abs() > MAX_ENTRY)) {
+            let message = format!("geometric stiffness for {load} overflows on the modes");
+            return Err(Diagnostic::new(Code::MatrixNotFinite, message).into());
+        }
+        let along =
+            load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING_COSINE);
+        for (component, factor) in along {
+            let load = UnitLoad { kind: load.kind.clone(), component };
+            let part = &reduced_matrix * Scale(factor);
+            match out.iter_mut().find(|known| known.load == load) {
+                Some(sum) => sum.matrix += part,
+                None => out.push(GeometricStiffness { load, matrix: part }),
+            }
+        }
+    }
+    let mut out = stiffness_about(&out, shift, model.dimension());
+    let place = |kind: &LoadKind| model.geometric_stiffness().iter().position(|one| one.load.kind == *kind);
+    out.sort_by_key(|one| (place(&one.load.kind), one.load.component));
+    Ok(out)
+}
+
+/// Returns a warning if the basis contains centrifugal loads, which means that the body spins, but
+/// geometric stiffness for spin is not given. The warning states the spin rate at which softening becomes
+/// significant.
+pub(super) fn softening_warning(model: &FeModel, basis: &BasisChoice, body: &FlexBody) -> Option<Diagnostic> {
+    let BasisChoice::Free(free) = basis else { return None };
+    let given = model.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
+    if given || !free.residual_vectors.contains(&Loads::Centrifugal) {
+        return None;
+    }
+    let (axis, part) = body.worst_spin().filter(|(_, part)| *part > 0.0)?;
+    let axis = axis_in_words(&axis);
+    let hertz = model.units().frequency_of(SOFTENING / part);
+    let message = format!(
+        "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {hertz:.4e} Hz about axis {axis} of the model"
+    );
+    Some(Diagnostic::new(Code::GeometricStiffnessNone, message))
+}

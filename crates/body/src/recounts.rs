@@ -1,0 +1,246 @@
+//! Checks of the statements of a file against its own numbers and against the model: counts of the certificate, rigid
+//! interfaces, interface coordinates, errors of lumped comparators, and the interfaces of the model.
+
+use crate::convert::interfaces_in_frame;
+use crate::flex_body::{FixedInterface, FlexBody, Interface, InterfaceCoordinates, LumpedBody};
+use crate::invariants::{IdentityCheck, error_norms};
+use faer::Mat;
+use flexbody_linalg::{combine, gram, larger, largest};
+use flexbody_model::{Coupling, FeModel, centre_and_length, rigid_count};
+use std::collections::BTreeSet;
+
+/// Allowed rounding error of a rigid motion of the nodes of an interface, relative to its largest motion.
+const MAX_RIGID_ROUNDING: f64 = 1e-8;
+/// Allowed rounding error of error norms, which are relative differences of nearly equal numbers.
+const MAX_NORM_ROUNDING: f64 = 1e-9;
+/// Allowed rounding error between coordinates computed from the shapes in two ways.
+const MAX_COORDINATE_ROUNDING: f64 = 1e-9;
+
+/// Returns the checks of all statements that the body makes.
+pub(super) fn recounts(body: &FlexBody) -> Vec<IdentityCheck> {
+    let one_each =
+        [counted_modes(body), fixed_interface_modes(body), rigid_interfaces(body), lumped_errors(body)];
+    one_each.into_iter().flatten().chain(coordinates_of_modes(body)).collect()
+}
+
+/// Returns the difference of two counts as a number.
+fn apart(a: usize, b: usize) -> f64 {
+    a.abs_diff(b) as f64
+}
+
+/// Compares the proof with the inertia count and with the eigenvalues below its shift. A body of only the
+/// lowest modes has fewer than were counted.
+fn counted_modes(body: &FlexBody) -> Option<IdentityCheck> {
+    let certificate = body.certificate();
+    let proved = certificate.proved_modes?;
+    let rigid = rigid_count(body.dimension());
+    let below = body.modes().eigenvalue.iter().filter(|lambda| **lambda < certificate.shift).count();
+    let pivots =
+        certificate.negative_pivots.map_or(f64::INFINITY, |n| apart(n, proved.saturating_add(rigid)));
+    let value = pivots + apart(certificate.rigid_modes, rigid) + apart(below, proved.min(body.n_modes()));
+    let formula = "negative pivots = rigid + proved modes; modes below sigma are proved";
+    Some(IdentityCheck::new("counted_modes", formula, value, 0.0))
+}
+
+/// Compares the statements of a Craig-Bampton body about its basis with its interface coordinates.
+fn fixed_interface_modes(body: &FlexBody) -> Option<IdentityCheck> {
+    let fixed = body.certificate().fixed_interface.as_ref()?;
+    let coordinates = body.coordinates()?;
+    let FixedInterface { modes, interface_motions, counted, shift, next, .. } = fixed;
+    let lambda = fixed_eigenvalues(coordinates);
+    let below = lambda.iter().filter(|lambda| **lambda < *shift).count();
+    let count = counted.map_or(0.0, |counted| apart(below, counted.min(*modes)));
+    let order =
+        next.is_some_and(|next| lambda.iter().any(|lambda| *lambda > next * (1.0 + MAX_RIGID_ROUNDING)));
+    let value = apart(lambda.len(), *modes)
+        + apart(coordinates.names.len(), modes.saturating_add(*interface_motions))
+        + count
+        + f64::from(order);
+    let formula = "coordinates = interface motions + fixed-interface modes; those below sigma are counted";
+    Some(IdentityCheck::new("fixed_interface_modes", formula, value, 0.0))
+}
+
+/// True if the coordinate of this name is the amplitude of a fixed-interface mode.
+fn is_amplitude(name: &str) -> bool {
+    name.starts_with("fixed-interface mode ")
+}
+
+/// Returns the eigenvalues of the fixed-interface modes, K_jj / M_jj.
+fn fixed_eigenvalues(coordinates: &InterfaceCoordinates) -> Vec<f64> {
+    let amplitudes = coordinates.names.iter().enumerate().filter(|(_, name)| is_amplitude(name));
+    amplitudes.map(|(j, _)| coordinates.stiffness[(j, j)] / coordinates.mass[(j, j)]).collect()
+}
+
+/// Measures the deformation of interfaces that the basis couples rigidly. Free modes do not consider
+/// couplings; a warning reports their deformation.
+fn rigid_interfaces(body: &FlexBody) -> Option<IdentityCheck> {
+    let coupled = body.certificate().fixed_interface.is_some() || body.coordinates().is_some();
+    if !coupled || !body.has_rigid_interfaces() {
+        return None;
+    }
+    let rigid = body.interfaces().iter().filter(|one| one.coupling == Some(Coupling::Rigid));
+    let value = largest(rigid.map(|interface| deformation(body, interface)));
+    let limit = MAX_RIGID_ROUNDING + 4.0 * body.storage().rounding();
+    let formula = "nodes of rigid interfaces move as their reference points";
+    Some(IdentityCheck::new("rigid_interfaces", formula, value, limit))
+}
+
+/// Returns the deviation of the nodes of an interface from the rigid motion of its reference point;
+/// displacements and rotations are each relative to the largest in any mode.
+fn deformation(body: &FlexBody, interface: &Interface) -> f64 {
+    let modes = body.modes();
+    let rotation = modes.rotation.as_ref();
+    let rows =
+        interface.rows(body.nodes(), modes.shape.as_ref(), rotation.map(Mat::as_ref), body.dimension());
+    let Some(rows) = rows else { return f64::INFINITY };
+    let displaced = rows.deformation().1;
+    let (Some(rotation), Some(turns)) = (rotation, &rows.rotation) else { return displaced };
+    let (mut left, mut size) = (0.0, turns.norm_max());
+    for &node in &interface.nodes {
+        for k in 0..3 {
+            let row = rotation.as_ref().subrows(3 * node + k, 1);
+            let row_size = row.norm_max();
+            // Nodes may have some rotations, or none.
+            if row_size > 0.0 {
+                size = larger(size, row_size);
+                left = larger(left, (row.to_owned() - turns.as_ref().subrows(k, 1)).norm_max());
+            }
+        }
+    }
+    larger(displaced, if left == 0.0 { 0.0 } else { left / size })
+}
+
+/// Compares the interface coordinates of the modes with the motion of the reference points in the modes,
+/// and checks that the momentum of the modes, computed with the mass in interface coordinates, is zero.
+fn coordinates_of_modes(body: &FlexBody) -> Option<IdentityCheck> {
+    let coordinates = body.coordinates()?;
+    let rigid = body.parts().rigid_coordinates()?;
+    let b = &coordinates.of_modes;
+    let momentum = gram(rigid.as_ref(), combine(coordinates.mass.as_ref(), b.as_ref()).as_ref());
+    let inertia = body.parts().rigid_mass();
+    let momentum = (0..momentum.nrows()).flat_map(|i| {
+        let (momentum, size) = (&momentum, inertia[(i, i)].sqrt());
+        (0..momentum.ncols()).map(move |j| momentum[(i, j)].abs() / size)
+    });
+    let value = larger(largest(momentum), reference_difference(body, b));
+    let certificate = body.certificate();
+    let limit = MAX_COORDINATE_ROUNDING
+        + 10.0 * certificate.rigid_noise
+        + certificate.eigenvalue_rounding
+        + body.storage().rounding();
+    let formula = "B = reference points in the modes; R' M B = 0";
+    Some(IdentityCheck::new("interface_modes", formula, value, limit))
+}
+
+/// Returns the largest difference of the coordinates of reference points from their motion in the modes;
+/// translations and rotations are each relative to their largest.
+fn reference_difference(body: &FlexBody, b: &Mat<f64>) -> f64 {
+    let (modes, d) = (body.modes(), body.dimension());
+    let (mut first, mut worst) = (0, 0.0);
+    for interface in body.interfaces() {
+        if interface.reference.is_none() {
+            let nodes: std::collections::BTreeSet<usize> = interface.nodes.iter().copied().collect();
+            first += d * nodes.len();
+            continue;
+        }
+        let rotation = modes.rotation.as_ref().map(Mat::as_ref);
+        let Some(rows) = interface.rows(body.nodes(), modes.shape.as_ref(), rotation, d) else {
+            return f64::INFINITY;
+        };
+        let turns = rigid_count(d) - d;
+        let difference_at = |rows: &Mat<f64>, from: usize, count: usize, at: usize| {
+            let stored = b.as_ref().subrows(at, count);
+            let difference = (stored.to_owned() - rows.as_ref().subrows(from, count)).norm_max();
+            if difference == 0.0 { 0.0 } else { difference / stored.norm_max() }
+        };
+        worst = larger(worst, difference_at(&rows.translation, 0, d, first));
+        if let Some(rotation) = &rows.rotation {
+            worst = larger(worst, difference_at(rotation, 3 - turns, turns, first + d));
+        }
+        first += rigid_count(d);
+    }
+    worst
+}
+
+/// Compares the error norms of lumped comparators with norms recomputed from their invariants; norms of
+/// other programs are not checked.
+fn lumped_errors(body: &FlexBody) -> Option<IdentityCheck> {
+    let recount = |lumped: &LumpedBody| {
+        let norms = error_norms(body.invariants(), &lumped.invariants);
+        let differences: Vec<f64> = lumped
+            .comparison
+            .iter()
+            .filter_map(|(name, stored)| {
+                let (_, value) = norms.iter().find(|(known, _)| known == name)?;
+                Some((stored - value).abs() / value.abs().max(1.0))
+            })
+            .collect();
+        largest(differences)
+    };
+    if body.lumped().is_empty() {
+        return None;
+    }
+    let limit = MAX_NORM_ROUNDING + 100.0 * body.storage().rounding();
+    let formula = "error norms of the lumped comparators";
+    Some(IdentityCheck::new("lumped_errors", formula, largest(body.lumped().iter().map(recount)), limit))
+}
+
+/// Allowed difference of reference points, relative to the coordinates of the nodes: the rounding of the
+/// change of frame.
+const MAX_POINT_DIFFERENCE: f64 = 1e-12;
+
+/// Compares names, nodes, couplings and reference points; empty if neither has interfaces. Bodies from
+/// files of versions without reference points have none. A body of an earlier version has the mean of the
+/// nodes as reference point if the model states none; this is accepted.
+pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<IdentityCheck> {
+    let (stored, in_model) = (body.interfaces(), interfaces_in_frame(model, body.frame(), false));
+    if stored.is_empty() && in_model.is_empty() {
+        return Vec::new();
+    }
+    let of = |name: &str| stored.iter().find(|interface| interface.name == name);
+    let unknown =
+        stored.iter().filter(|interface| in_model.iter().all(|other| other.name != interface.name)).count();
+    let differing = in_model
+        .iter()
+        .filter(|in_model| of(&in_model.name).is_none_or(|stored| !is_same(stored, in_model, model)))
+        .count();
+    let positions = body.nodes().positions.iter().flatten();
+    let size = positions.fold(body.frame().origin.amax().max(f64::MIN_POSITIVE), |m, x| m.max(x.abs()));
+    let apart = |x: [f64; 3], y: [f64; 3]| (0..3).map(|k| (x[k] - y[k]).abs()).fold(0.0, f64::max) / size;
+    let moved = in_model.iter().filter_map(|in_model| {
+        let (x, y) = (in_model.reference?, of(&in_model.name)?.reference?);
+        let away = apart(x, y);
+        let set = model.interfaces().iter().find(|set| set.name == in_model.name)?;
+        let mean = || {
+            let positions: Vec<[f64; 3]> =
+                in_model.nodes.iter().map(|&i| body.nodes().positions[i]).collect();
+            centre_and_length(&positions).0
+        };
+        Some(if set.reference.is_stated() { away } else { away.min(apart(mean(), y)) })
+    });
+    vec![
+        IdentityCheck::new(
+            "interfaces",
+            "number of interfaces with other names, nodes or coupling than in the model",
+            (unknown + differing) as f64,
+            0.0,
+        ),
+        IdentityCheck::new(
+            "reference_points",
+            "x_ref = A' (x_model - origin)",
+            moved.fold(0.0, f64::max),
+            MAX_POINT_DIFFERENCE,
+        ),
+    ]
+}
+
+/// Returns true if `stored` has the nodes, the coupling and the kind of reference point of `in_model`. A basis
+/// that needs a coupling uses `averaging` if the model states none.
+fn is_same(stored: &Interface, in_model: &Interface, model: &FeModel) -> bool {
+    let set = model.interfaces().iter().find(|set| set.name == in_model.name);
+    let taken = set.map(|set| set.coupling());
+    let nodes = |interface: &Interface| interface.nodes.iter().copied().collect::<BTreeSet<_>>();
+    nodes(stored) == nodes(in_model)
+        && (stored.coupling == in_model.coupling || stored.coupling == taken)
+        && (stored.reference.is_some() == in_model.reference.is_some())
+}

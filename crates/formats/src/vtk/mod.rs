@@ -1,6 +1,0 @@
-//! Meshes of VTK, for ParaView and other programs that show results.
-
-mod format;
-mod grid;
-
-pub(crate) use format::Vtk;

@@ -1,0 +1,225 @@
+//! Errors of a recommended body: in words, relative to the model that it was made from, and in variations of its scene.
+
+use super::numbers::{counted, significant};
+use flexbody_base::numbers::joined_runs;
+use flexbody_motion::scene::OutputErrors;
+use flexbody_study::reference::{MAX_REFERENCE_ERROR, ReferenceError};
+use flexbody_study::selection::VariedSelection;
+#[cfg(feature = "hdf5")]
+use flexbody_study::trade::{InCase, Trade, TradeVariation};
+use serde::Serialize;
+
+/// Returns the error of a quantity in words: `0.001 rad` for the attitude, `1 %` for other quantities.
+pub(super) fn error_in_words(quantity: &str, error: f64, digits: usize) -> String {
+    match quantity {
+        "attitude" => format!("{} rad", significant(error, digits)),
+        _ => format!("{} %", significant(100.0 * error, digits)),
+    }
+}
+
+/// Returns errors with three digits: `attitude 1e-4 rad, deflection 0.2 %, stress 0.4 %`.
+pub(super) fn errors_in_words(errors: &OutputErrors) -> String {
+    errors_to_digits(errors, 3)
+}
+
+/// Returns the known errors in words with the given number of significant digits.
+fn errors_to_digits(errors: &OutputErrors, digits: usize) -> String {
+    let part =
+        |(name, error): (&str, Option<f64>)| Some(format!("{name} {}", error_in_words(name, error?, digits)));
+    errors.named().into_iter().filter_map(part).collect::<Vec<_>>().join(", ")
+}
+
+/// Returns ascending numbers with runs joined: 1-4, 7, 9-10.
+pub(super) fn ranges(numbers: &[usize]) -> String {
+    joined_runs(numbers, ", ")
+}
+
+/// Returns the inertia terms of a model: `W1, W2 and W3`.
+pub(super) fn groups_in_words(names: &[&str]) -> String {
+    match names {
+        [] => "the inertia of the undeformed body only".to_owned(),
+        [only] => (*only).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// Returns a ratio as `60 %`, or `not known`.
+pub(super) fn part_in_words(part: Option<f64>) -> String {
+    part.map_or_else(|| "not known".to_owned(), |part| format!("{} %", significant(100.0 * part, 2)))
+}
+
+// Errors of a body relative to the model that it was made from.
+
+/// Errors of a body relative to its model.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct ReferenceErrorFacts {
+    modes: usize,
+    /// Errors by quantity. The attitude error is zero if the rotation is prescribed; the reaction error is
+    /// `None` without prescribed motion.
+    #[serde(flatten)]
+    errors: OutputErrors,
+    /// Largest ratio of error to tolerance; `None` if unknown.
+    worst: Option<f64>,
+    time: f64,
+    /// Reason why the errors are unknown.
+    unknown: Option<&'static str>,
+}
+
+impl ReferenceErrorFacts {
+    pub(crate) fn new(reference: &ReferenceError) -> Self {
+        let (modes, time, unknown) = (reference.modes, reference.time, reference.unknown);
+        let known = |value: f64| unknown.is_none().then_some(value);
+        Self {
+            modes,
+            errors: reference.errors.map(|error| error.and_then(known)),
+            worst: known(reference.worst),
+            time,
+            unknown,
+        }
+    }
+
+    /// Returns the errors in words: `attitude 0.0012 rad, deflection 0.5 %, stress 8.6 %`; with prescribed
+    /// motion also `reaction 1.2 %`.
+    pub(crate) fn parts(&self) -> String {
+        if let Some(reason) = self.unknown {
+            return format!("an unknown amount ({reason})");
+        }
+        let attitude = self.errors.attitude.filter(|angle| *angle > 0.0);
+        errors_to_digits(&OutputErrors { attitude, ..self.errors }, 2)
+    }
+
+    fn in_words(&self) -> String {
+        let (parts, time) = (self.parts(), significant(self.time, 3));
+        match self.unknown {
+            Some(_) => format!("a body of {} modes differs from the FE model by {parts}", self.modes),
+            None => format!(
+                "a body of {} modes differs from the FE model by {parts}, most at t = {time}",
+                self.modes
+            ),
+        }
+    }
+}
+
+/// Returns the error of the reference of all measured errors in words: the last of `rounds`. The first entry
+/// is the error before enrichment.
+pub(super) fn reference_in_words(rounds: &[ReferenceErrorFacts]) -> String {
+    match rounds {
+        [] => "the body with all its modes; its difference from an FE model is not known".to_owned(),
+        [own] => format!("{} (estimated)", own.in_words()),
+        [first, .., own] => format!("{} (estimated; before enrichment {})", own.in_words(), first.in_words()),
+    }
+}
+
+// Errors of a recommended body in variations of its scene.
+
+/// Errors in a variation.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct VariationFacts<'a> {
+    name: &'a str,
+    /// Load case that is varied, if there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    case: Option<&'a str>,
+    /// True if the scene file states the variation; false for a standard one.
+    stated: bool,
+    holds: bool,
+    errors: Option<OutputErrors>,
+    /// Largest ratio of error to tolerance; `None` if the simulation stopped.
+    worst: Option<f64>,
+    /// Part of the tolerances that the truncation error of the reference takes.
+    reference: Option<f64>,
+}
+
+impl<'a> VariationFacts<'a> {
+    pub(super) fn of_selection(own: &'a VariedSelection) -> Self {
+        Self {
+            name: &own.name,
+            case: own.case.as_deref(),
+            stated: own.is_stated,
+            holds: own.holds(),
+            errors: own.chosen.errors,
+            worst: Some(own.chosen.worst).filter(|worst| worst.is_finite()),
+            reference: own.reference_errors.last().map(|reference_errors| reference_errors.worst),
+        }
+    }
+
+    /// Returns the variations of a study with the errors of its recommended row; empty without such a row.
+    #[cfg(feature = "hdf5")]
+    pub(super) fn of_trade(trade: &'a Trade) -> Vec<Self> {
+        let recommended = trade.recommended.row().and_then(|row| trade.rows[row].outcome.as_ref().ok());
+        let Some(varied) = recommended.and_then(|measured| measured.varied.as_ref()) else {
+            return Vec::new();
+        };
+        let facts = |(one, own): (&'a TradeVariation, &Option<InCase>)| Self {
+            name: &one.name,
+            case: one.case.as_deref(),
+            stated: one.is_stated,
+            holds: one.accepts(own.as_ref()),
+            errors: own.map(|own| own.errors),
+            worst: own.map(|own| own.worst),
+            reference: one.reference.as_ref().map(|own| own.worst),
+        };
+        trade.variations.iter().zip(&varied.by_variation).map(facts).collect()
+    }
+
+    fn is_judged(&self) -> bool {
+        self.holds || self.reference.is_none_or(|part| part <= MAX_REFERENCE_ERROR)
+    }
+}
+
+/// Returns the errors in all variations in one sentence; `None` if there are none.
+pub(super) fn in_words(variations: &[VariationFacts<'_>]) -> Option<String> {
+    let count = variations.len();
+    if count == 0 {
+        return None;
+    }
+    let kind = if variations[0].stated { "stated" } else { "standard" };
+    let of = |which: &dyn Fn(&&VariationFacts<'_>) -> bool| -> Vec<&VariationFacts<'_>> {
+        variations.iter().filter(|one| which(one)).collect()
+    };
+    let failing = of(&|one| !one.holds && one.is_judged());
+    let unjudged = of(&|one| !one.is_judged());
+    let size = |one: &VariationFacts<'_>| {
+        let part =
+            one.worst.map_or("stops".to_owned(), |worst| format!("{} %", significant(100.0 * worst, 2)));
+        format!("{}: {part}", one.name)
+    };
+    let list = |some: &[&VariationFacts<'_>]| some.iter().map(|one| size(one)).collect::<Vec<_>>().join(", ");
+    let mut words = format!("{} ({kind}) that did not choose the body", counted(count, "variation"));
+    let worst = variations.iter().filter(|one| one.holds).filter_map(|one| one.worst).fold(0.0, f64::max);
+    if failing.is_empty() && unjudged.is_empty() {
+        let worst = significant(100.0 * worst, 2);
+        words.push_str(&format!(": within the tolerances, largest error {worst} % of its tolerance"));
+    }
+    if !failing.is_empty() {
+        words.push_str(&format!(
+            ": exceeds the tolerances (error in % of the tolerance) in {}; make such a variation a [[case]] of the scene if it can occur",
+            list(&failing)
+        ));
+    }
+    if !unjudged.is_empty() {
+        let names: Vec<&str> = unjudged.iter().map(|one| one.name).collect();
+        words.push_str(&format!(
+            "; cannot be judged in {}: the reference differs too much from the FE model there",
+            names.join(", ")
+        ));
+    }
+    Some(words)
+}
+
+#[cfg(test)]
+mod tests {
+
+    #[test]
+    fn runs_of_numbers_are_drawn_together() {
+        assert_eq!(super::ranges(&[1, 2, 3, 5, 7, 8]), "1-3, 5, 7-8");
+        assert_eq!(super::ranges(&[]), "");
+    }
+
+    #[test]
+    fn groups_are_listed_with_an_and() {
+        let none: &[&str] = &[];
+        let lists = [none, &["W1"][..], &["W1", "W3"][..], &["W1", "W2", "W3"][..]];
+        let expected = ["the inertia of the undeformed body only", "W1", "W1 and W3", "W1, W2 and W3"];
+        assert_eq!(lists.map(super::groups_in_words), expected);
+    }
+}
