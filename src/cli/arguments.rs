@@ -419,6 +419,10 @@ pub struct SimulateArguments {
     /// File to write the rows of all recoveries of the body to, .csv or .h5
     #[arg(long, value_name = "ROWS.csv|ROWS.h5")]
     pub rows: Option<PathBuf>,
+    /// File to write the largest stresses of every point of the recoveries over the motion to: a table (.csv), or the
+    /// body with them at its nodes (.vtu)
+    #[arg(long, value_name = "FILE.csv|FILE.vtu")]
+    pub envelope: Option<PathBuf>,
     /// Report to write, with plots as .html; format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,

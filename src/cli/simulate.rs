@@ -3,7 +3,7 @@
 use super::arguments::{Printing, SimulateArguments};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, marked, refuse_replacing, refuse_replacing_read};
-use super::recover::Kind;
+use super::recover::{EnvelopeKind, Kind};
 use super::resources::{context, use_threads};
 use super::watcher::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -11,13 +11,14 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Event;
-use flexbody_motion::scene::{LoadCases, Scene, simulate, unsettled_rate};
+use flexbody_motion::scene::{LoadCases, Scene, simulate, simulate_with_envelope, unsettled_rate};
 use flexbody_report::{Format, RunData, SimulationFacts, simulation_csv};
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let rows = arguments.rows.as_deref().map(Kind::of).transpose()?;
+    let envelope = arguments.envelope.as_deref().map(EnvelopeKind::of).transpose()?;
     let places = SimulationOutputs::of(arguments, None);
     refuse_replacing([&arguments.body, &arguments.scene].into_iter(), places.all())?;
     // Outputs are checked before reading, although the load cases are known only afterwards.
@@ -38,12 +39,13 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
         all => all.iter().map(SimulationOutputs::reserve).collect::<Result<Vec<_>>>()?,
     };
     let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
-    if rows.is_some() && body.recoveries().is_empty() {
+    if (rows.is_some() || envelope.is_some()) && body.recoveries().is_empty() {
         let message = "the body has no recovery, so there are no rows to write";
         return Err(Diagnostic::new(Code::RecoveryUnknown, message).in_file(&arguments.body).into());
     }
     let printing = arguments.printing;
-    let job = Job { path: &arguments.scene, printing, body: &body, formats: &formats, rows, threads };
+    let job =
+        Job { path: &arguments.scene, printing, body: &body, formats: &formats, rows, envelope, threads };
     let several = cases.len() > 1;
     let done =
         cases.iter().zip(&slots).map(|(scene, slots)| job.simulate(scene, several, &notes, slots, &watcher));
@@ -77,6 +79,7 @@ struct Job<'a> {
     body: &'a FlexBody,
     formats: &'a [Format],
     rows: Option<Kind>,
+    envelope: Option<EnvelopeKind>,
     threads: usize,
 }
 
@@ -95,7 +98,11 @@ impl Job<'_> {
         let watch = |event: Event<'_>| watcher.hear(event);
         let left = || context(None, true, &watch);
         // The motion and its diagnostics, which name the load case if there are several.
-        let run = simulate(self.body, scene, &left()).and_then(|(recording, mut found)| {
+        let simulated = match self.envelope {
+            Some(_) => simulate_with_envelope(self.body, scene, &left()),
+            None => simulate(self.body, scene, &left()),
+        };
+        let run = simulated.and_then(|(recording, mut found)| {
             found.extend(unsettled_rate(self.body, scene, &recording, &left())?);
             Ok((recording, found))
         });
@@ -114,6 +121,10 @@ impl Job<'_> {
         let run =
             RunData { phases: watcher.finish(), diagnostics, threads: self.threads, ..RunData::default() };
         refuse_warnings(self.printing, &run.diagnostics)?;
+        if (self.rows.is_some() || self.envelope.is_some()) && recording.recovered.is_none() {
+            let message = "no recovery of the body is left in this scene, so there are no rows to write";
+            return Err(Diagnostic::new(Code::RecoveryUnknown, message).in_file(self.path).into());
+        }
         // Files are filled here and put in place by the caller, after all load cases.
         let facts = SimulationFacts::new(&recording, self.body.units(), &run);
         if let Some(slot) = &slots.motion {
@@ -124,6 +135,11 @@ impl Job<'_> {
         }
         if let (Some(slot), Some(kind), Some(recovered)) = (&slots.rows, self.rows, &recording.recovered) {
             kind.fill(self.body, recovered, ("scene", &recording.scene), slot)?;
+        }
+        if let (Some(slot), Some(kind), Some(recovered)) =
+            (&slots.envelope, self.envelope, &recording.recovered)
+        {
+            kind.fill(self.body, recovered, slot)?;
         }
         for (slot, format) in slots.reports.iter().zip(self.formats) {
             slot.fill(facts.render(*format).as_bytes())?;
@@ -138,6 +154,7 @@ struct SimulationOutputs {
     motion: Option<PathBuf>,
     table: Option<PathBuf>,
     rows: Option<PathBuf>,
+    envelope: Option<PathBuf>,
     reports: Vec<PathBuf>,
 }
 
@@ -146,6 +163,7 @@ struct Slots {
     motion: Option<OutputSlot>,
     table: Option<OutputSlot>,
     rows: Option<OutputSlot>,
+    envelope: Option<OutputSlot>,
     reports: Vec<OutputSlot>,
 }
 
@@ -158,12 +176,13 @@ impl SimulationOutputs {
             motion: arguments.output.as_ref().map(place),
             table: arguments.csv.as_ref().map(place),
             rows: arguments.rows.as_ref().map(place),
+            envelope: arguments.envelope.as_ref().map(place),
             reports: arguments.report.iter().map(place).collect(),
         }
     }
 
     fn all(&self) -> impl Iterator<Item = &PathBuf> {
-        self.motion.iter().chain(&self.table).chain(&self.rows).chain(&self.reports)
+        self.motion.iter().chain(&self.table).chain(&self.rows).chain(&self.envelope).chain(&self.reports)
     }
 
     fn reserve(&self) -> Result<Slots> {
@@ -171,6 +190,7 @@ impl SimulationOutputs {
             motion: self.motion.as_ref().map(flexbody_file::prepare_output).transpose()?,
             table: self.table.as_ref().map(OutputSlot::prepare).transpose()?,
             rows: self.rows.as_ref().map(OutputSlot::prepare).transpose()?,
+            envelope: self.envelope.as_ref().map(OutputSlot::prepare).transpose()?,
             reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
         })
     }
@@ -178,6 +198,6 @@ impl SimulationOutputs {
 
 impl Slots {
     fn into_all(self) -> impl Iterator<Item = OutputSlot> {
-        self.motion.into_iter().chain(self.table).chain(self.rows).chain(self.reports)
+        self.motion.into_iter().chain(self.table).chain(self.rows).chain(self.envelope).chain(self.reports)
     }
 }

@@ -181,6 +181,7 @@ codes! {
     GeometricStiffnessLoad = "FB441", Error, BadInput, "geometric stiffness is not that of the load that it is given for", "check load, axis, sign and units, and divide the matrix by the size of the load (of spin about the centre of mass or the origin of the model: by the square of the rate in radians per unit of time)";
     GeometricStiffnessRough = "FB442", Warning, Done, "geometric stiffness fulfils its relations with rigid motion roughly", "nothing to do where elements of reduced integration explain it; else check that the matrix holds the stress stiffness alone";
     RecoveryStrained = "FB443", Error, BadInput, "rigid motion of the body strains a recovery: its columns do not belong to the rows of the matrices", "write the operator by the rows of K and M; a row that a rigid motion may change is a `displacement` or `other`";
+    RecoveryScale = "FB444", Warning, Done, "stresses of a recovery do not fit the stiffness of the model", "check the column `unit` of the rows (nothing converts values to it), and that the operator belongs to this model";
     InterfaceCentre = "FB450", Warning, Done, "reference point of an interface is not the mean of its nodes", "nothing to do if the joint belongs there; else state the point: --interface NAME=SET,COUPLING,X/Y/Z, or `reference` in [[interface]]";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
@@ -223,6 +224,7 @@ codes! {
     RecoveryLoadUnseen = "FB553", Warning, Done, "recoveries have no columns for a load", "define an interface with a reference point where the load acts (any coupling but `free`), convert again, and let the load act there";
     RateUnsettled = "FB554", Warning, Done, "angular velocity still changes with the step size of the integration", "give a smaller `tolerance` (or a shorter `step`) in [run] until the angular velocity no longer changes";
     VariationStops = "FB555", Note, Done, "standard variation cannot be simulated and judges nothing", "state what may vary in [[variation]]; nothing to do if the load cannot turn so far";
+    RecoveryLeftOut = "FB556", Note, Done, "recovery of displacements is left out of the motion of a carried body", "watch the nodes in the scene ([[watch]]): displacements of a recovery are relative to the frame of the free body";
     SelectionUnjudged = "FB557", Error, CheckFailed, "body does not meet the tolerances of the scene, or this cannot be judged", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body nevertheless";
     VariationFails = "FB559", Warning, Done, "recommended body does not hold in a variation of the scene", "make the variation a [[case]] of the scene, so that the body is made for it as well; or leave out a [[variation]] that cannot occur";
     CouplingEffect = "FB558", Note, Done, "effect of rigid interfaces that the body and its reference model share", "nothing to do where a stiff part is mounted at the interface; otherwise set coupling = \"averaging\", which lets the interface deform";
@@ -248,6 +250,7 @@ codes! {
     ExportLost = "FB721", Warning, Done, "exported file does not hold all data of the body", "nothing to do if the simulation does not need it";
     ExportNeeds = "FB722", Note, Done, "program uses a part of the file only with a setting", "make the setting named in the message in the input of the program";
     ExportPicture = "FB723", Note, Done, "file is a picture of the body", "use another format for multibody programs: docs/reference/exports.md lists them";
+    ExportRecoveries = "FB724", Note, Done, "exported file has not all of the recoveries", "compute them from a run of the program: flexbody recover";
     ForeignUnreadable = "FB730", Error, BadInput, "flexible-body file of another program cannot be read", "give a SID_FEM, MBDyn .fem, MBSim or Exudyn file as the program writes it";
     ForeignIncomplete = "FB731", Error, BadInput, "data that a body needs are missing in the file", "write the file again with the missing data";
     ForeignChanged = "FB732", Note, Done, "modes of the file are not normalised or contain rigid motions; combinations of them were used", "nothing to do: the motion of the nodes is unchanged, the modal coordinates differ";

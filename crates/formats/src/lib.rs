@@ -32,3 +32,4 @@ mod vtk;
 
 pub use embedded::embedded_markdown;
 pub use registry::{FORMATS, IMPORT_FORMATS, export, find_format, find_import_format, recognise};
+pub use vtk::envelope_vtu;

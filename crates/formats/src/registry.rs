@@ -67,8 +67,12 @@ pub fn export(
     let body = body.as_ref();
     // Losses are warnings if they are allowed, otherwise errors.
     let code = if allow_loss { Code::ExportLost } else { Code::ExportLoses };
-    let losses: Vec<Diagnostic> = format
-        .checklist(body, options)
+    let checklist = format.checklist(body, options);
+    let unread = checklist.left_out_recoveries().map(|what| {
+        let message = format!("the file {what}");
+        Diagnostic::new(Code::ExportRecoveries, message)
+    });
+    let losses: Vec<Diagnostic> = checklist
         .losses()
         .into_iter()
         .map(|loss| Diagnostic::new(code, format!("{} cannot hold {loss}", format.name())))
@@ -80,7 +84,7 @@ pub fn export(
     let left =
         format.leaves_out(body, options).into_iter().map(|what| Diagnostic::new(Code::ExportPicture, what));
     let exported = format.write(body, options)?;
-    Ok((exported, losses.into_iter().chain(needs).chain(left).collect()))
+    Ok((exported, losses.into_iter().chain(needs).chain(left).chain(unread).collect()))
 }
 
 fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOptions) -> Result<()> {

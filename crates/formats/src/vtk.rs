@@ -4,12 +4,13 @@
 //! meshes.
 
 use crate::export::Holding::{Held, NotApplicable};
-use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
+use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, Points};
 use crate::picture::{Drawn, Played, mode_names, named, printable};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_file::RecordedMotion;
-use std::collections::HashSet;
+use flexbody_motion::scene::RecoveredMotion;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
 /// Export format of VTK.
@@ -59,6 +60,7 @@ impl ExportFormat for Vtk {
             origins_of_modes: Held,
             units: Held,
             storage: NotApplicable,
+            recoveries: NotApplicable,
         }
     }
 
@@ -100,6 +102,41 @@ impl ExportFormat for Vtk {
             None => Ok(Exported::single(with_modes(grid, body, &drawn, modes))),
         }
     }
+}
+
+/// Returns the undeformed body with the largest stresses of a motion at every node: for each recovery with points at nodes
+/// the arrays `NAME von Mises`, `NAME largest principal` and `NAME smallest principal`, NaN at nodes without stresses.
+/// Returns `None` without such a recovery, or if the motion has no envelopes.
+pub fn envelope_vtu(body: &FlexBody, motion: &RecoveredMotion) -> Option<Vec<u8>> {
+    let drawn = Drawn::places(body, &Points::Nodes);
+    let place: HashMap<i64, usize> = drawn.numbers().iter().enumerate().map(|(at, id)| (*id, at)).collect();
+    let mut grid = Grid::new(&drawn);
+    let mut is_empty = true;
+    for (map, envelope) in motion.recoveries.iter().zip(motion.envelopes.as_ref()?) {
+        let mut values = [0; 3].map(|_| vec![f64::NAN; drawn.len()]);
+        let mut found = false;
+        for (point, own) in map.points.iter().zip(envelope) {
+            let Some(&at) = map.rows[point.rows[0]].node.and_then(|node| place.get(&node)) else { continue };
+            found = true;
+            let own = [own.von_mises.value, own.tension.value, -own.compression.value];
+            for (c, (values, own)) in values.iter_mut().zip(own).enumerate() {
+                // Several elements have a point at this node: the largest, of compression the smallest.
+                let is_further = if c == 2 { own < values[at] } else { own > values[at] };
+                if values[at].is_nan() || is_further {
+                    values[at] = own;
+                }
+            }
+        }
+        if found {
+            is_empty = false;
+            let names = ["von Mises", "largest principal", "smallest principal"];
+            names
+                .iter()
+                .zip(&values)
+                .for_each(|(name, own)| grid.put_scalars(&format!("{} {name}", map.name), own));
+        }
+    }
+    (!is_empty).then(|| grid.file(&drawn.positions()))
 }
 
 /// Returns the undeformed body with a vector at every point for each mode.
@@ -213,6 +250,13 @@ impl Grid {
         let name = self.unique_name(name);
         self.point_data += &self.data.vectors(&name, vectors);
         self.vectors.get_or_insert(name);
+    }
+
+    /// Adds a number at every point.
+    fn put_scalars(&mut self, name: &str, values: &[f64]) {
+        let name = self.unique_name(name);
+        self.point_data +=
+            &self.data.array(&name, "Float64", 1, values.iter().map(|value| value.to_le_bytes()));
     }
 
     fn put_marks(&mut self, name: &str, marks: &[u8]) {

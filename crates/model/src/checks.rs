@@ -7,6 +7,7 @@ use super::geometric_stiffness::missing_components;
 use super::mass_structure::{MassForm, mass_form};
 use super::node_pairs::check_mass_pairs;
 use super::recovery_checks::check_rigid_responses;
+use super::recovery_scale::check_stress_scale;
 use super::rigid::{centre_and_length, extents, rigid_residuals};
 use super::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
 use super::stress::check_stress;
@@ -100,6 +101,8 @@ pub(super) fn check_body(
     let kept = unrotated_mass_note(&model, mass_rounding, [first, second]);
     found.extend(kept.map(|note| note.in_file(&mass_path)));
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
+    let density = plausibility.densities.map(|densities| densities.quartiles[1]);
+    check_stress_scale(&model, density, &mut found);
     stop_on_error(&mut found)?;
     // Compute the fingerprints now, so that the files need not stay open.
     model.find_sources()?;

@@ -173,6 +173,44 @@ impl<'a> RecoveredFacts<'a> {
     }
 }
 
+/// Returns the envelopes of a motion as comma-separated values, one row for each point of each recovery: its name, node
+/// and element, and the largest equivalent stress of von Mises, the largest and the smallest principal stress, each with
+/// its time; empty without envelopes.
+pub fn envelope_csv(motion: &RecoveredMotion) -> String {
+    let mut table = String::new();
+    let head = [
+        "recovery",
+        "point",
+        "node",
+        "element",
+        "unit",
+        "von_mises",
+        "von_mises_time",
+        "largest_principal",
+        "largest_principal_time",
+        "smallest_principal",
+        "smallest_principal_time",
+    ];
+    csv::push_row(&mut table, head.map(str::to_owned));
+    for (map, envelope) in motion.recoveries.iter().zip(motion.envelopes.iter().flatten()) {
+        for (point, own) in map.points.iter().zip(envelope) {
+            let row = &map.rows[point.rows[0]];
+            let number = |id: Option<i64>| id.map_or_else(String::new, |id| id.to_string());
+            let texts = [csv::text(&map.name), csv::text(&point.name), number(row.node), number(row.element)];
+            let (most, least) = (own.tension, own.compression);
+            let values = [
+                (own.von_mises.value, own.von_mises.time),
+                (most.value, most.time),
+                (-least.value, least.time),
+            ];
+            let numbers =
+                values.into_iter().flat_map(|(value, time)| [csv::number(value), csv::number(time)]);
+            csv::push_row(&mut table, texts.into_iter().chain([csv::text(&point.unit)]).chain(numbers));
+        }
+    }
+    table
+}
+
 /// Returns recoveries over time as comma-separated values: the time, then for every recovery a column `RECOVERY ROW` for
 /// every row and, for every point with all six stresses, `RECOVERY POINT von Mises`, `RECOVERY POINT signed von Mises` and
 /// `RECOVERY POINT principal 1` to `3`; numbers round-trip.

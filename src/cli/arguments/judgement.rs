@@ -79,6 +79,10 @@ pub struct RecoverArguments {
     /// Recovery to compute (repeatable) [default: all]
     #[arg(long, value_name = "NAME")]
     pub only: Vec<String>,
+    /// File to write the largest stresses of every point of the recoveries over the run to: a table (.csv), or the body
+    /// with them at its nodes (.vtu)
+    #[arg(long, value_name = "FILE.csv|FILE.vtu")]
+    pub envelope: Option<PathBuf>,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,

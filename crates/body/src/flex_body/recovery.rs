@@ -165,6 +165,33 @@ impl FlexBody {
         recoveries.iter().map(reduced).collect()
     }
 
+    /// Returns the largest part of a static response of a recovery that its static columns hold, and that the modes alone
+    /// leave out, over unit loads at the interfaces and unit products of the angular velocity: the largest value of a
+    /// column relative to that of the response.
+    pub fn part_of_static_columns(&self, recovery: &Recovery) -> f64 {
+        let loads = self.modal_loads();
+        let all: Vec<usize> = (0..self.n_modes()).collect();
+        let part = |columns: &Mat<f64>, modal: Option<&Mat<f64>>| {
+            let mut response = columns.clone();
+            if let Some(modal) = modal {
+                response += &recovery.modes * self.static_response(modal, &all);
+            }
+            let largest =
+                |of: &Mat<f64>, c: usize| of.col(c).iter().fold(0.0f64, |most, v| most.max(v.abs()));
+            let ratio = |c: usize| match largest(&response, c) {
+                0.0 => 0.0,
+                whole => largest(columns, c) / whole,
+            };
+            (0..columns.ncols()).map(ratio).fold(0.0, f64::max)
+        };
+        let at_interface = |load: &LoadColumns| {
+            let own = loads.at_interfaces.iter().find(|(name, _)| *name == load.interface);
+            part(&load.columns, own.map(|(_, modal)| modal))
+        };
+        let of_loads = recovery.loads.iter().map(at_interface);
+        of_loads.fold(part(&recovery.spin, loads.spin.as_ref()), f64::max)
+    }
+
     /// Returns the static response of the modes `of` to modal loads (nf x c), K_ff restricted to these modes. The
     /// stiffness of modes is diagonal, so that the other modes do not take part.
     fn static_response(&self, loads: &Mat<f64>, of: &[usize]) -> Mat<f64> {

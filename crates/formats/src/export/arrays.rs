@@ -26,6 +26,7 @@ pub(crate) const ALL_ENTRIES: ExportChecklist = ExportChecklist {
     origins_of_modes: Held,
     units: Held,
     storage: Held,
+    recoveries: Held,
 };
 
 /// Groups with their attributes, and arrays, by their paths in the flex-body file.

@@ -228,9 +228,20 @@ pub struct ExportChecklist {
     pub units: Holding,
     /// Storage of large arrays in 32-bit floats.
     pub storage: Holding,
+    /// Recoveries. A loss is a note, whatever is allowed, since `recover` computes them from a run of any program; its
+    /// text completes "the file ...".
+    pub recoveries: Holding,
 }
 
 impl ExportChecklist {
+    /// Returns what the file lacks of the recoveries, as completion of "the file ..."; `None` if it lacks nothing.
+    pub fn left_out_recoveries(&self) -> Option<&str> {
+        match &self.recoveries {
+            Holding::Lost(text) => Some(text),
+            Holding::Held | Holding::NotApplicable => None,
+        }
+    }
+
     /// Returns the losses as completions of "FORMAT cannot hold ...", the most important first.
     pub fn losses(self) -> Vec<String> {
         let Self {
@@ -253,6 +264,7 @@ impl ExportChecklist {
             origins_of_modes,
             units,
             storage,
+            recoveries: _,
         } = self;
         let motion = [
             rigid_coupling,

@@ -3,6 +3,7 @@
 
 use super::Holding::{Held, NotApplicable};
 use super::{ExportChecklist, ExportOptions, losses};
+use crate::export::stresses::without_recoveries;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -112,5 +113,6 @@ pub(crate) fn matrix_checklist(body: &FlexBody, options: &ExportOptions) -> Expo
         origins_of_modes: NotApplicable,
         units: Held,
         storage: NotApplicable,
+        recoveries: without_recoveries(body),
     }
 }

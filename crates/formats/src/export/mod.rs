@@ -8,6 +8,7 @@ pub(crate) mod hdf5_contents;
 pub(crate) mod inertia;
 pub(crate) mod interface_matrices;
 pub(crate) mod losses;
+pub(crate) mod stresses;
 
 pub use format::{ExportChecklist, ExportFormat, ExportOptions, Exported, Holding, InertiaInScene, Points};
 pub use frames::{ExportFrame, frames};

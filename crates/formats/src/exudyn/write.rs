@@ -11,6 +11,7 @@ use super::mesh::Mesh;
 use crate::export::Holding::{Held, NotApplicable};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
 use crate::export::inertia::inertia;
+use crate::export::stresses::NodalStresses;
 use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, losses};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -55,6 +56,11 @@ impl ExportFormat for Exudyn {
             origins_of_modes: NotApplicable,
             units: NotApplicable,
             storage: NotApplicable,
+            recoveries: {
+                let numbers = Mesh::new(body, &options.points).numbers;
+                let found = NodalStresses::new(body, numbers.iter().copied());
+                NodalStresses::holding(found.as_ref(), body, false)
+            },
         }
     }
 
@@ -79,7 +85,7 @@ fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     let mut all = vec![
         array("modeBasis", Hdf5Contents::matrix(&mesh.shape)),
         array("trigList", triangles(body, mesh)),
-        Hdf5Contents::Group(Vec::new()).named("postProcessingModes").with("datatype", "dict"),
+        stress_modes(body, mesh),
         modal_mass(body, &numbered),
         array("stiffnessMatrixReduced", Hdf5Contents::matrix(body.invariants().modal_stiffness())),
         array("infoList", Hdf5Contents::Integers(vec![6], info)),
@@ -106,6 +112,20 @@ fn triangles(body: &FlexBody, mesh: &Mesh) -> Hdf5Contents {
         own.triangles().as_flattened().iter().map(|&index| i64::from(index)).collect()
     });
     Hdf5Contents::Integers(vec![corners.len() / 3, 3], corners)
+}
+
+/// Returns the stresses of the mesh nodes in the modes (n x 6 nf, column 6 j + c for the components xx, yy, zz, yz, xz, xy
+/// along body axes) as Exudyn's `StressLocal`; an empty dictionary for a body without stresses of nodes.
+fn stress_modes(body: &FlexBody, mesh: &Mesh) -> Hdf5Entry {
+    const COMPONENTS: [usize; 6] = [0, 1, 2, 4, 5, 3];
+    let found = NodalStresses::new(body, mesh.numbers.iter().copied());
+    let entries = found.map_or_else(Vec::new, |stresses| {
+        let value = |node: usize, column: usize| stresses.in_mode(node, column / 6)[COMPONENTS[column % 6]];
+        let matrix = Hdf5Contents::from_fn(mesh.numbers.len(), 6 * body.n_modes(), value);
+        let kind = Hdf5Contents::Text("OutputVariableType.StressLocal".to_owned());
+        vec![array("matrix", matrix), kind.named("outputVariableType").with("datatype", "str")]
+    });
+    Hdf5Contents::Group(entries).named("postProcessingModes").with("datatype", "dict")
 }
 
 /// Returns m_ff. For a mass that does not commute with rotations an attribute states it, because no array

@@ -8,6 +8,7 @@
 use crate::export::Holding::{self, Held, Lost, NotApplicable};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
 use crate::export::inertia::inertia;
+use crate::export::stresses::NodalStresses;
 use crate::export::{ExportChecklist, ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
 use faer::Mat;
 use flexbody_base::error::Result;
@@ -54,6 +55,11 @@ impl ExportFormat for Mbsim {
             origins_of_modes: NotApplicable,
             units: NotApplicable,
             storage: NotApplicable,
+            recoveries: {
+                let places = frames(body, &options.points);
+                let found = NodalStresses::new(body, places.iter().map(|place| place.id));
+                NodalStresses::holding(found.as_ref(), body, false)
+            },
         }
     }
 
@@ -146,6 +152,11 @@ fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
     ]);
     if places.iter().any(|place| place.rotation.is_some()) {
         all.push(Hdf5Contents::from_fn(3 * places.len(), nf, turn).named("nodal shape matrix of rotation"));
+    }
+    // Six rows xx, yy, zz, xy, yz, zx for each node, along body axes.
+    if let Some(stresses) = NodalStresses::new(body, places.iter().map(|place| place.id)) {
+        let value = |row: usize, j: usize| stresses.in_mode(row / 6, j)[row % 6];
+        all.push(Hdf5Contents::from_fn(6 * places.len(), nf, value).named("nodal stress matrix"));
     }
     all.extend(openmbv_indices(body, places));
     all

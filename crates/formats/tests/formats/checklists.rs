@@ -3,7 +3,9 @@
 
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
-use flexbody_body::flex_body::{FlexBody, InternalRows, Parts, Storage, SurfaceMesh};
+use flexbody_body::flex_body::{
+    FlexBody, InternalRows, Parts, Quantity, Recovery, RecoveryRow, Storage, SurfaceMesh,
+};
 use flexbody_formats::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, Holding};
 use flexbody_formats::{FORMATS, export};
 use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
@@ -54,6 +56,12 @@ const PROPERTIES: &[Property] = &[
         entry: |list| &list.surface,
     },
     Property {
+        name: "recoveries",
+        moves: true,
+        remove: |parts| parts.recoveries.clear(),
+        entry: |list| &list.recoveries,
+    },
+    Property {
         name: "origins of the modes",
         moves: false,
         remove: |parts| parts.modes.provenance.clear(),
@@ -98,7 +106,30 @@ fn body_with_everything() -> FlexBody {
     parts.modes.internal =
         Some(InternalRows { dofs: vec![[9999, 1]], shape: Mat::from_fn(1, nf, |_, j| j as f64) });
     parts.mesh = Some(SurfaceMesh::new(vec![[0, 1, 2]], Vec::new(), n).expect("a surface"));
+    parts.recoveries = vec![nodal_stresses(&parts.nodes.ids[..2], nf)];
     FlexBody::new(parts).expect("a body")
+}
+
+/// Returns made-up stresses of nodes, without static columns.
+pub(crate) fn nodal_stresses(nodes: &[i64], nf: usize) -> Recovery {
+    let row = |node: i64, component: &str| RecoveryRow {
+        name: format!("{node} {component}"),
+        quantity: Quantity::Stress,
+        component: component.to_owned(),
+        unit: "MPa".to_owned(),
+        node: Some(node),
+        element: None,
+    };
+    let of_node = |node: &i64| ["xx", "yy", "zz", "xy", "yz", "xz"].map(|component| row(*node, component));
+    let rows: Vec<RecoveryRow> = nodes.iter().flat_map(of_node).collect();
+    Recovery {
+        name: "stresses".to_owned(),
+        offset: (0..rows.len()).map(|i| 0.5 * i as f64).collect(),
+        modes: Mat::from_fn(rows.len(), nf, |i, j| ((i * nf + j) as f64).sin()),
+        spin: Mat::zeros(rows.len(), 6),
+        loads: Vec::new(),
+        rows,
+    }
 }
 
 fn options(format: &dyn ExportFormat) -> Vec<ExportOptions> {

@@ -10,3 +10,4 @@ mod export_sid;
 mod import_mbs;
 mod import_sid;
 mod round_trips;
+mod stresses;

@@ -1,6 +1,6 @@
 //! Recoveries over time, from a motion that any program computed.
 
-use super::{ExtremeSearch, RowExtremes, RowLayout, RowMap, RowStates};
+use super::{EnvelopeSearch, ExtremeSearch, PointEnvelope, RowExtremes, RowLayout, RowMap, RowStates};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::InputFile;
@@ -50,6 +50,18 @@ pub struct RecoveredMotion {
     pub states: RowStates,
     /// Largest values of every recovery.
     pub extremes: Vec<RowExtremes>,
+    /// Largest stresses of every point of every recovery, if they were asked for.
+    pub envelopes: Option<Vec<Vec<PointEnvelope>>>,
+}
+
+impl RecoveredMotion {
+    /// Adds the largest stresses of every point at the instants.
+    pub fn with_envelope(mut self) -> Self {
+        let mut search = EnvelopeSearch::new(&self.recoveries, false);
+        search.see(&self.recoveries, &self.states);
+        self.envelopes = Some(search.finish());
+        self
+    }
 }
 
 impl LoadedHistory {
@@ -121,7 +133,7 @@ impl LoadedHistory {
         let states = self.states(body, layout)?;
         let mut search = ExtremeSearch::new(recoveries.len(), false);
         search.see(&recoveries, &states);
-        Ok(RecoveredMotion { recoveries, states, extremes: search.finish() })
+        Ok(RecoveredMotion { recoveries, states, extremes: search.finish(), envelopes: None })
     }
 
     /// Returns the states that rows depend on, along the axes of the body.

@@ -12,7 +12,7 @@
 
 use super::{Peak, RowLayout, RowMap, RowStates, StressPoint};
 use faer::{Mat, MatRef};
-use flexbody_linalg::{SymmetricEigen, symmetric_eigen};
+use flexbody_linalg::{SymmetricEigen, parallel, symmetric_eigen};
 
 /// Directions with a smaller part of the largest eigenvalue of the history are rounding: their part is bounded by
 /// amplitudes alone.
@@ -299,11 +299,104 @@ impl Place {
     }
 }
 
+/// Largest stresses of one point over a motion, each with its time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointEnvelope {
+    /// Largest equivalent stress of von Mises.
+    pub von_mises: Peak,
+    /// Largest principal stress; zero if none is positive.
+    pub tension: Peak,
+    /// Magnitude of the smallest principal stress; zero if none is negative.
+    pub compression: Peak,
+}
+
+impl PointEnvelope {
+    /// Creates the envelope of a point over no instant.
+    fn new() -> Self {
+        Self { von_mises: Peak::default(), tension: Peak::default(), compression: Peak::default() }
+    }
+
+    /// Takes the states of a point whose stresses are `forms` (6 x length of z) times them, in the weights of
+    /// [`Measure::Tension`].
+    fn see(&mut self, forms: &Mat<f64>, states: &RowStates, between: bool) {
+        let mut values = [0.0; 6];
+        for (z, &time) in states.iter().zip(&states.times) {
+            for (i, value) in values.iter_mut().enumerate() {
+                *value = z.iter().enumerate().map(|(c, z)| forms[(i, c)] * z).sum();
+            }
+            let von_mises = von_mises_of(&values);
+            match between {
+                true => self.von_mises.see(time, von_mises),
+                false => raise(&mut self.von_mises, time, von_mises),
+            }
+            // The norm bounds the principal stresses, whose computation is the costly part.
+            let norm = values.iter().map(|v| v * v).sum::<f64>().sqrt();
+            if norm.is_nan() || norm > self.tension.value.min(self.compression.value) {
+                raise(&mut self.tension, time, Measure::Tension.of(&values));
+                raise(&mut self.compression, time, Measure::Compression.of(&values));
+            }
+        }
+    }
+}
+
+/// Keeps the larger of a peak and a value at a time.
+fn raise(peak: &mut Peak, time: f64, value: f64) {
+    if value > peak.value || value.is_nan() {
+        *peak = Peak::at(time, value);
+    }
+}
+
+/// Returns the equivalent stress of the weighted stresses of [`Measure::Tension`].
+fn von_mises_of([xx, yy, zz, xy, yz, xz]: &[f64; 6]) -> f64 {
+    let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
+    (0.5 * normal + 1.5 * (xy * xy + yz * yz + xz * xz)).sqrt()
+}
+
+/// Largest stresses of every point of recoveries over a history that arrives in pieces.
+#[derive(Debug, Clone)]
+pub struct EnvelopeSearch {
+    between: bool,
+    found: Vec<Vec<PointEnvelope>>,
+}
+
+impl EnvelopeSearch {
+    /// Creates a search for `recoveries`; `between` as for [`ExtremeSearch::new`].
+    pub fn new(recoveries: &[RowMap], between: bool) -> Self {
+        Self {
+            between,
+            found: recoveries.iter().map(|one| vec![PointEnvelope::new(); one.points.len()]).collect(),
+        }
+    }
+
+    /// Takes the next piece of the history.
+    pub fn see(&mut self, maps: &[RowMap], states: &RowStates) {
+        let between = self.between;
+        for (map, found) in maps.iter().zip(&mut self.found) {
+            let known = found.clone();
+            let envelope = |point: usize| {
+                let mut own = known[point];
+                own.see(&Measure::Tension.forms(map, point), states, between);
+                own
+            };
+            *found = parallel::concat(known.len(), POINTS, |points| points.map(envelope).collect());
+        }
+    }
+
+    /// Returns the envelopes of the points of every recovery.
+    pub fn finish(self) -> Vec<Vec<PointEnvelope>> {
+        self.found
+    }
+}
+
+/// Number of points that one thread takes at once.
+const POINTS: usize = 64;
+
 /// Observer of a motion that keeps a piece of the history and searches it when it is full.
 #[derive(Debug)]
 pub(super) struct RowSurvey {
     piece: RowStates,
     search: ExtremeSearch,
+    envelope: Option<EnvelopeSearch>,
     most: usize,
 }
 
@@ -313,21 +406,31 @@ const PIECE: usize = 1 << 22;
 const OVERLAP: usize = 2;
 
 impl RowSurvey {
-    pub(super) fn new(recoveries: usize, layout: RowLayout) -> Self {
+    /// Creates an observer; `envelope` asks for the largest stresses of every point.
+    pub(super) fn new(maps: &[RowMap], layout: RowLayout, envelope: bool) -> Self {
         let most = (PIECE / layout.len()).max(4 * OVERLAP);
-        Self { piece: RowStates::new(layout), search: ExtremeSearch::new(recoveries, true), most }
+        let envelope = envelope.then(|| EnvelopeSearch::new(maps, true));
+        Self { piece: RowStates::new(layout), search: ExtremeSearch::new(maps.len(), true), envelope, most }
+    }
+
+    fn search(&mut self, maps: &[RowMap]) {
+        self.search.see(maps, &self.piece);
+        if let Some(envelope) = &mut self.envelope {
+            envelope.see(maps, &self.piece);
+        }
     }
 
     pub(super) fn see(&mut self, maps: &[RowMap], time: f64, z: &[f64]) {
         self.piece.push(time, z);
         if self.piece.times.len() >= self.most {
-            self.search.see(maps, &self.piece);
+            self.search(maps);
             self.piece.keep_last(OVERLAP);
         }
     }
 
-    pub(super) fn finish(mut self, maps: &[RowMap]) -> Vec<RowExtremes> {
-        self.search.see(maps, &self.piece);
-        self.search.finish()
+    /// Returns the extremes of every recovery and, if asked for, the envelopes of its points.
+    pub(super) fn finish(mut self, maps: &[RowMap]) -> (Vec<RowExtremes>, Option<Vec<Vec<PointEnvelope>>>) {
+        self.search(maps);
+        (self.search.finish(), self.envelope.map(EnvelopeSearch::finish))
     }
 }

@@ -21,7 +21,9 @@ pub(super) struct SceneRows {
 impl SceneRows {
     /// Creates the recoveries of a body in a scene in one frame, with warnings about loads that they do not see;
     /// `None` for a body without recoveries.
-    pub(super) fn new(body: &FlexBody, scene: &Scene) -> Option<(Self, Vec<Diagnostic>)> {
+    ///
+    /// * `envelope`: true to find the largest stresses of every point.
+    pub(super) fn new(body: &FlexBody, scene: &Scene, envelope: bool) -> Option<(Self, Vec<Diagnostic>)> {
         let all = body.recoveries();
         if all.is_empty() {
             return None;
@@ -45,7 +47,7 @@ impl SceneRows {
             loaded: scene.loads.iter().map(|load| column(&load.at)).collect(),
             carrier: scene.carried.as_ref().and_then(|carried| column(&carried.by)),
             states: RowStates::new(layout.clone()),
-            survey: RowSurvey::new(recoveries.len(), layout.clone()),
+            survey: RowSurvey::new(&recoveries, layout.clone(), envelope),
             recoveries,
         };
         Some((rows, Vec::from_iter(unseen_loads(&unseen))))
@@ -82,8 +84,8 @@ impl SceneRows {
 
     /// Returns the recoveries over the motion.
     pub(super) fn finish(self) -> RecoveredMotion {
-        let extremes = self.survey.finish(&self.recoveries);
-        RecoveredMotion { recoveries: self.recoveries, states: self.states, extremes }
+        let (extremes, envelopes) = self.survey.finish(&self.recoveries);
+        RecoveredMotion { recoveries: self.recoveries, states: self.states, extremes, envelopes }
     }
 }
 

@@ -41,8 +41,30 @@ pub fn simulate(
     scene: &Scene,
     context: &Context<'_>,
 ) -> Result<(Recording, Vec<Diagnostic>)> {
+    simulate_recording(body, scene, false, context)
+}
+
+/// Does the work of [`simulate`], and finds the largest stresses of every point of the recoveries as well.
+///
+/// # Errors
+/// The errors of [`simulate`].
+pub fn simulate_with_envelope(
+    body: &FlexBody,
+    scene: &Scene,
+    context: &Context<'_>,
+) -> Result<(Recording, Vec<Diagnostic>)> {
+    simulate_recording(body, scene, true, context)
+}
+
+fn simulate_recording(
+    body: &FlexBody,
+    scene: &Scene,
+    envelope: bool,
+    context: &Context<'_>,
+) -> Result<(Recording, Vec<Diagnostic>)> {
     // Body and scene in one frame, with the damping of the scene, ready to integrate.
     let framed = FramedScene::new(body, scene)?;
+    let left_out = left_out(body, &framed.body);
     let body = &*damped(&framed.body, &framed.scene)?;
     let scene = &*framed.scene;
     let run = Prepared::new(body, scene)?;
@@ -52,7 +74,7 @@ pub fn simulate(
     let time: Vec<f64> = (0..=outputs).map(|i| run.duration * (i as f64 / outputs as f64)).collect();
     let mut recorder = Recorder::new(body, scene, &run, time.len());
     let mut survey = Survey::new(body, &run.watched);
-    let (mut rows, unseen) = SceneRows::new(body, scene).unzip();
+    let (mut rows, unseen) = SceneRows::new(body, scene, envelope).unzip();
     let record = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if event != ObserverEvent::Instant {
             context.fraction(time / run.duration);
@@ -76,8 +98,21 @@ pub fn simulate(
     recording.extremes = survey.extremes(finished.size, finished.least_energy);
     recording.recovered = rows.map(SceneRows::finish);
     let found =
-        [framed.found, unseen.unwrap_or_default(), remarks(body, scene, &recording.extremes)].concat();
+        [framed.found, left_out, unseen.unwrap_or_default(), remarks(body, scene, &recording.extremes)]
+            .concat();
     Ok((recording, found))
+}
+
+/// Returns notes about recoveries of `body` that it does not have in the frame of the scene.
+fn left_out(body: &FlexBody, framed: &FlexBody) -> Vec<Diagnostic> {
+    let kept = |name: &str| framed.recoveries().iter().any(|one| one.name == name);
+    let lost = body.recoveries().iter().filter(|one| !kept(&one.name));
+    lost.map(|one| {
+        let message =
+            format!("recovery `{}` has displacements, which a carrier changes: it is left out", one.name);
+        Diagnostic::new(Code::RecoveryLeftOut, message)
+    })
+    .collect()
 }
 
 /// Recording under construction.

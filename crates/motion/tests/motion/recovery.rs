@@ -1,26 +1,35 @@
 //! Stresses of a tumbling body: a few modes with static columns, against all modes.
 
-use flexbody_body::flex_body::{FlexBody, RecoveryState};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_body::flex_body::{FlexBody, Quantity, RecoveryState};
 use flexbody_body::invariants::BodyFrame;
+use flexbody_linalg::context::Context;
+use flexbody_model::{NodeSet, RawModel, RecoveryOperator};
 use flexbody_motion::dynamics::{
     Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Motion, Terms,
 };
 use flexbody_motion::integration::{Explicit, Failure, Method, integrate};
-use flexbody_motion::scene::{ExtremeSearch, RowLayout, RowMap, RowStates, StressPoint};
+use flexbody_motion::scene::{
+    ExtremeSearch, LoadCases, RowLayout, RowMap, RowStates, StressPoint, simulate_with_envelope,
+};
 use nalgebra::Vector3;
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::body_of;
 use oracle::mesh::{Mesh, grid};
 
 /// Returns a rubber-like arm without symmetry, with its stresses.
-fn arm(modes: usize) -> FlexBody {
+fn arm_model() -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([6, 2, 1]), |[x, y, z]| {
         [0.3 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.25 * z * (1.0 + 0.1 * y)]
     });
     let mut raw = mesh.assemble(&rubber, MassRule::Consistent).raw_model();
     raw.recoveries = vec![mesh.stresses(&rubber)];
-    body_of(raw, modes, BodyFrame::Com)
+    raw
+}
+
+fn arm(modes: usize) -> FlexBody {
+    body_of(arm_model(), modes, BodyFrame::Com)
 }
 
 /// Returns the spinning body at rest in its frame: with the modes at their static response to the spin.
@@ -143,5 +152,46 @@ fn extremes_are_those_of_all_rows_and_instants() {
             assert!((own - expected).abs() <= 1e-12 * expected, "{own:e} {expected:e}");
         }
         assert!(found.evaluated < map.rows.len() / 2, "{} of {}", found.evaluated, map.rows.len());
+    }
+}
+
+/// Displacements relative to the frame of the free body are left out of a carried body, and named (FB556); its stresses
+/// stay.
+#[test]
+fn a_carried_body_has_its_stresses_and_no_displacements() {
+    let mut raw = arm_model();
+    let mut displacements = raw.recoveries[0].clone();
+    "place".clone_into(&mut displacements.name);
+    if let RecoveryOperator::Rows { labels, .. } = &mut displacements.operator {
+        labels.iter_mut().for_each(|label| label.quantity = Quantity::Displacement);
+    }
+    raw.recoveries.push(displacements);
+    raw.interfaces = vec![NodeSet::new("root", (1..=6).collect())];
+    let body = body_of(raw, 6, BodyFrame::Com);
+    let scene = "[run]\nduration = 0.01\n[carried]\ninterface = \"root\"\n[carried.spin]\naxis = [0, 0, 1]\nrate = 1\n";
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, scene).expect("written");
+    let scene = LoadCases::read_single(&path, None).expect("a scene");
+    let (recording, found) = simulate_with_envelope(&body, &scene, &Context::QUIET).expect("a motion");
+    let names_it =
+        |one: &Diagnostic| one.code() == Code::RecoveryLeftOut && one.message().contains("`place`");
+    assert!(found.iter().any(names_it), "{found:?}");
+    let recovered = recording.recovered.expect("recoveries");
+    assert_eq!(recovered.recoveries.len(), 1);
+    // The envelope of the points has the largest of all, and no point is below its value at an output.
+    let envelope = &recovered.envelopes.as_ref().expect("envelopes")[0];
+    let largest = envelope.iter().fold(0.0f64, |most, own| most.max(own.von_mises.value));
+    let known = recovered.extremes[0].von_mises.expect("stresses").value;
+    assert!((largest - known).abs() <= 1e-9 * known, "{largest} {known}");
+    let map = &recovered.recoveries[0];
+    for z in recovered.states.iter() {
+        let rows = map.values(z);
+        for (point, own) in map.points.iter().zip(envelope) {
+            let [most, _, least] = point.principal(&rows);
+            let limit = |value: f64| 1.01 * value + 1e-3 * known;
+            assert!(point.von_mises(&rows) <= limit(own.von_mises.value));
+            assert!(most <= limit(own.tension.value) && -least <= limit(own.compression.value));
+        }
     }
 }

@@ -3,6 +3,7 @@
 use super::dialect::{Blocks, Dialect};
 use super::text::Taylor;
 use crate::export::losses::is_damped;
+use crate::export::stresses::NodalStresses;
 use crate::export::{ExportFrame, frames};
 use faer::Mat;
 use flexbody_body::flex_body::FlexBody;
@@ -171,10 +172,12 @@ pub(crate) struct StiffenedFrame {
     pub(crate) frame: ExportFrame,
     force: Option<Vec<Mat<f64>>>,
     moment: Option<Vec<Mat<f64>>>,
+    /// Stresses of the undeformed body (6 x 1) and in every mode; `None` for a body without stresses of nodes.
+    stresses: Option<(Mat<f64>, Vec<Mat<f64>>)>,
 }
 
 impl StiffenedFrame {
-    /// Returns origin, phi, psi and AP. The second-order motion (7.5) is in phi1 and psi1.
+    /// Returns origin, phi, psi, AP and, for a body with stresses of nodes, sigma (xx, yy, zz, xy, yz, xz). The second-order motion (7.5) is in phi1 and psi1.
     pub(crate) fn objects(&self) -> Vec<Taylor> {
         let ExportFrame { position, translation, rotation, .. } = &self.frame;
         let nf = translation.ncols();
@@ -196,7 +199,8 @@ impl StiffenedFrame {
             });
             Mat::from_fn(3, 3, |i, j| skew[(i, j)])
         };
-        vec![
+        let sigma = self.stresses.clone().map(|(rest, modes)| Taylor::linear("sigma", rest, modes));
+        let objects = vec![
             Taylor::linear(
                 "origin",
                 Mat::from_fn(3, 1, |a, _| position[a]),
@@ -205,7 +209,8 @@ impl StiffenedFrame {
             phi,
             psi,
             Taylor::linear("AP", Mat::identity(3, 3), per_mode(nf, turned)),
-        ]
+        ];
+        objects.into_iter().chain(sigma).collect()
     }
 
     /// Returns true if a force or moment of this kind acts at the frame and the file has its stiffness.
@@ -221,7 +226,9 @@ impl StiffenedFrame {
 
 /// Returns the frames of the file. Stiffness of forces at an interface belongs to the reference point.
 pub(crate) fn places(body: &FlexBody, points: &crate::export::Points) -> Vec<StiffenedFrame> {
-    let place = |frame: ExportFrame| {
+    let frames = frames(body, points);
+    let stresses = NodalStresses::new(body, frames.iter().map(|frame| frame.id));
+    let place = |(at, frame): (usize, ExportFrame)| {
         let interface = body
             .interfaces()
             .iter()
@@ -230,7 +237,10 @@ pub(crate) fn places(body: &FlexBody, points: &crate::export::Points) -> Vec<Sti
             interface.and_then(|interface| stiffness(body, &kind(interface.name.clone())))
         };
         let moment = if frame.rotation.is_some() { stiffness_for(LoadKind::Moment) } else { None };
-        StiffenedFrame { force: stiffness_for(LoadKind::Force), moment, frame }
+        let column = |values: [f64; 6]| Mat::from_fn(6, 1, |c, _| values[c]);
+        let of_modes = |own: &NodalStresses<'_>| per_mode(body.n_modes(), |k| column(own.in_mode(at, k)));
+        let stresses = stresses.as_ref().map(|own| (column(own.at_rest(at)), of_modes(own)));
+        StiffenedFrame { force: stiffness_for(LoadKind::Force), moment, stresses, frame }
     };
-    frames(body, points).into_iter().map(place).collect()
+    frames.into_iter().enumerate().map(place).collect()
 }

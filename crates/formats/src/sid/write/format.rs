@@ -5,7 +5,8 @@ use super::dialect::{DIALECTS, Dialect, EMBS, Limits, ModalName, NAMES};
 use super::text::Text;
 use crate::export::Holding::{self, Held, NotApplicable};
 use crate::export::losses::{general_w0, geometric_stiffness, internal_rows, plane};
-use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
+use crate::export::stresses::NodalStresses;
+use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, frames};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroup};
@@ -62,6 +63,11 @@ impl ExportFormat for Sid {
             origins_of_modes: NotApplicable,
             units: Held,
             storage: NotApplicable,
+            recoveries: {
+                let places = frames(body, &options.points);
+                let found = NodalStresses::new(body, places.iter().map(|place| place.id));
+                NodalStresses::holding(found.as_ref(), body, true)
+            },
         }
     }
 

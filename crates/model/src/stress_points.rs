@@ -1,6 +1,6 @@
 //! Points with all six stresses among the rows of a recovery, and their equivalent stress.
 
-use flexbody_body::flex_body::{Quantity, RecoveryRow};
+use super::{Quantity, RecoveryRow};
 use nalgebra::Matrix3;
 
 /// Components of a stress, in the order of [`StressPoint::rows`].
@@ -65,7 +65,7 @@ impl StressPoint {
 
     /// Returns the principal stresses of the stress xx, yy, zz, xy, yz, xz, the largest first; NaN for a stress that is
     /// not finite.
-    pub(super) fn principal_of([xx, yy, zz, xy, yz, xz]: &[f64; 6]) -> [f64; 3] {
+    pub fn principal_of([xx, yy, zz, xy, yz, xz]: &[f64; 6]) -> [f64; 3] {
         let stress = Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
         if !stress.iter().all(|v| v.is_finite()) {
             return [f64::NAN; 3];
