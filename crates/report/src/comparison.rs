@@ -133,6 +133,7 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
         }
     };
     comparison.modal_matrices(&pair, basis.as_ref(), tolerances.invariants);
+    comparison.recoveries(&pair, tolerances.invariants);
     comparison.interfaces(&pair, tolerances.centre_of_mass);
     // Notes on the limits of the comparison.
     if !placed {

@@ -165,31 +165,44 @@ impl FlexBody {
         recoveries.iter().map(reduced).collect()
     }
 
-    /// Returns the largest part of a static response of a recovery that its static columns hold, and that the modes alone
-    /// leave out, over unit loads at the interfaces and unit products of the angular velocity: the largest value of a
-    /// column relative to that of the response.
-    pub fn part_of_static_columns(&self, recovery: &Recovery) -> f64 {
+    /// Returns the rows of a recovery under constant unit loads, modes and static columns together, along the axes of the
+    /// model: `spin` holds those of unit products of the angular velocity, `loads` those of unit forces and torques at
+    /// the interfaces. They depend neither on the modes nor on the frame. There are no modes in the result.
+    pub fn static_rows(&self, recovery: &Recovery) -> Recovery {
         let loads = self.modal_loads();
         let all: Vec<usize> = (0..self.n_modes()).collect();
-        let part = |columns: &Mat<f64>, modal: Option<&Mat<f64>>| {
-            let mut response = columns.clone();
-            if let Some(modal) = modal {
-                response += &recovery.modes * self.static_response(modal, &all);
-            }
-            let largest =
-                |of: &Mat<f64>, c: usize| of.col(c).iter().fold(0.0f64, |most, v| most.max(v.abs()));
-            let ratio = |c: usize| match largest(&response, c) {
+        let whole = |columns: &Mat<f64>, modal: Option<&Mat<f64>>| match modal {
+            Some(modal) => columns + &recovery.modes * self.static_response(modal, &all),
+            None => columns.clone(),
+        };
+        let at_interface = |load: &LoadColumns| {
+            let own = loads.at_interfaces.iter().find(|(name, _)| *name == load.interface);
+            LoadColumns { columns: whole(&load.columns, own.map(|(_, modal)| modal)), ..load.clone() }
+        };
+        let along_body = Recovery {
+            modes: Mat::zeros(recovery.rows.len(), 0),
+            spin: whole(&recovery.spin, loads.spin.as_ref()),
+            loads: recovery.loads.iter().map(at_interface).collect(),
+            ..recovery.clone()
+        };
+        along_body.in_axes(&self.frame().axes.transpose())
+    }
+
+    /// Returns the largest part of a static response of a recovery that its static columns hold, and that the modes alone
+    /// leave out, over unit loads at the interfaces and unit products of the angular velocity along the axes of the
+    /// model: the largest value of a column relative to that of the response.
+    pub fn part_of_static_columns(&self, recovery: &Recovery) -> f64 {
+        let (columns, whole) = (recovery.in_axes(&self.frame().axes.transpose()), self.static_rows(recovery));
+        let largest = |of: &Mat<f64>, c: usize| of.col(c).iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        let part = |(columns, whole): (&Mat<f64>, &Mat<f64>)| {
+            let ratio = |c: usize| match largest(whole, c) {
                 0.0 => 0.0,
                 whole => largest(columns, c) / whole,
             };
             (0..columns.ncols()).map(ratio).fold(0.0, f64::max)
         };
-        let at_interface = |load: &LoadColumns| {
-            let own = loads.at_interfaces.iter().find(|(name, _)| *name == load.interface);
-            part(&load.columns, own.map(|(_, modal)| modal))
-        };
-        let of_loads = recovery.loads.iter().map(at_interface);
-        of_loads.fold(part(&recovery.spin, loads.spin.as_ref()), f64::max)
+        let loads = columns.loads.iter().zip(&whole.loads).map(|(own, whole)| (&own.columns, &whole.columns));
+        std::iter::once((&columns.spin, &whole.spin)).chain(loads).map(part).fold(0.0, f64::max)
     }
 
     /// Returns the static response of the modes `of` to modal loads (nf x c), K_ff restricted to these modes. The

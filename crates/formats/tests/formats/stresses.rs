@@ -2,7 +2,7 @@
 
 use crate::checklists::nodal_stresses;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_formats::export::ExportOptions;
+use flexbody_formats::export::{ExportOptions, Points};
 use flexbody_formats::{FORMATS, export};
 use hdf5_metno::File;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -29,9 +29,10 @@ fn expected(body: &FlexBody, node: usize, mode: usize) -> Matrix3<f64> {
     axes.transpose() * stress * axes
 }
 
-fn written(format: &str, body: &FlexBody) -> (tempfile::NamedTempFile, Vec<String>) {
+fn written(format: &str, body: &FlexBody, points: Points) -> (tempfile::NamedTempFile, Vec<String>) {
     let format = FORMATS.iter().find(|one| one.name() == format).expect("a format");
-    let (exported, said) = export(body, *format, &ExportOptions::default(), true).expect("an export");
+    let (exported, said) = export(body, *format, &ExportOptions { points, ..ExportOptions::default() }, true)
+        .expect("an export");
     let file = tempfile::NamedTempFile::new().expect("a file");
     std::fs::write(file.path(), &exported.file).expect("written");
     (file, said.iter().map(|one| format!("{}: {}", one.code().id(), one.message())).collect())
@@ -40,7 +41,7 @@ fn written(format: &str, body: &FlexBody) -> (tempfile::NamedTempFile, Vec<Strin
 #[test]
 fn exudyn_has_them_by_modes_in_its_order() {
     let body = body();
-    let (file, said) = written("exudyn", &body);
+    let (file, said) = written("exudyn", &body, Points::Nodes);
     let file = File::open(file.path()).expect("HDF5");
     let matrix =
         file.dataset("postProcessingModes/matrix").expect("stresses").read_2d::<f64>().expect("numbers");
@@ -61,7 +62,7 @@ fn exudyn_has_them_by_modes_in_its_order() {
 #[test]
 fn mbsim_has_six_rows_of_each_node() {
     let body = body();
-    let (file, _) = written("mbsim", &body);
+    let (file, _) = written("mbsim", &body, Points::Nodes);
     let file = File::open(file.path()).expect("HDF5");
     let matrix = file.dataset("nodal stress matrix").expect("stresses").read_2d::<f64>().expect("numbers");
     let ids = file.dataset("node numbers").expect("numbers").read_raw::<i64>().expect("numbers");
@@ -80,7 +81,7 @@ fn mbsim_has_six_rows_of_each_node() {
 #[test]
 fn sid_has_the_stresses_of_the_undeformed_body_too() {
     let body = body();
-    let (file, said) = written("sid", &body);
+    let (file, said) = written("sid", &body, Points::Nodes);
     let text = std::fs::read_to_string(file.path()).expect("text");
     let objects = |name: &str| text.lines().filter(|line| line.trim() == name).count();
     assert!(
@@ -95,13 +96,14 @@ fn sid_has_the_stresses_of_the_undeformed_body_too() {
 #[test]
 fn formats_without_a_place_say_so() {
     let body = body();
-    for format in ["adams", "mbdyn"] {
-        let (_, said) = written(format, &body);
+    // The reference points of interfaces have no stresses.
+    for format in ["adams-invariants", "mbdyn", "mbsim"] {
+        let (_, said) = written(format, &body, Points::Usual);
         assert!(
             said.iter().any(|one| one.contains("FB724") && one.contains("`stresses`")),
             "{format}: {said:?}"
         );
     }
-    let (_, said) = written("npz", &body);
+    let (_, said) = written("npz", &body, Points::Usual);
     assert!(!said.iter().any(|one| one.contains("FB724")), "{said:?}");
 }

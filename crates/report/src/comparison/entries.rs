@@ -4,7 +4,9 @@
 use super::{BodyComparison, Pair, is_placed, product, relative, turned};
 use crate::mass_properties::gyration_radius;
 use faer::{Mat, MatRef};
-use flexbody_body::flex_body::{FlexBody, GeometricStiffness, Interface, InternalRows, LoadKind, UnitLoad};
+use flexbody_body::flex_body::{
+    FlexBody, GeometricStiffness, Interface, InternalRows, LoadKind, Recovery, UnitLoad,
+};
 use flexbody_body::invariants::InertiaStiffness;
 use flexbody_linalg::{gram, larger, largest_entry};
 use nalgebra::Vector3;
@@ -261,6 +263,92 @@ impl BodyComparison {
     }
 }
 
+// Comparison of recoveries: by their rows in the modes and under constant unit loads.
+
+/// Kinds of unit loads of a recovery: their columns have units of their own.
+const COLUMNS: [Range<usize>; 2] = [0..3, 3..6];
+
+impl BodyComparison {
+    /// Compares the recoveries of the same names: labels and loads, rows in the modes by groups of modes, values of the
+    /// undeformed body, and rows under constant unit loads, which depend neither on the basis nor on the frame.
+    pub(super) fn recoveries(&mut self, pair: &Pair<'_>, tolerance: f64) {
+        let has = |body: &FlexBody| !body.recoveries().is_empty();
+        let neither = !has(pair.a) && !has(pair.b);
+        if neither || self.leave_out(pair, "recoveries", "/recovery", has) {
+            return;
+        }
+        let (a, b) = (pair.a.recoveries(), pair.b.recoveries());
+        let (mut differing, mut in_modes, mut at_rest) = (0, 0.0, 0.0);
+        for own in a {
+            let other = b.iter().find(|other| other.name == own.name);
+            let Some(other) = other.filter(|other| are_alike(own, other)) else {
+                let what = if other.is_some() {
+                    "differs in its rows or loads"
+                } else {
+                    "is in the first body only"
+                };
+                self.notes.push(format!("recovery `{}` {what}", own.name));
+                differing += 1;
+                continue;
+            };
+            in_modes = larger(in_modes, difference_in_modes(own, other, &pair.groups));
+            let (own, other) = (pair.a.static_rows(own), pair.b.static_rows(other));
+            at_rest = larger(at_rest, difference_at_rest(&own, &other));
+        }
+        for other in b.iter().filter(|other| a.iter().all(|own| own.name != other.name)) {
+            self.notes.push(format!("recovery `{}` is in the second body only", other.name));
+            differing += 1;
+        }
+        let meaning = "number of recoveries that differ in name, rows or loads";
+        self.row("recoveries", meaning, differing as f64, 0.0);
+        let meaning = "norm of a row over a group of modes / largest norm";
+        self.row("rows in the modes", meaning, in_modes, tolerance);
+        let meaning = "under constant unit loads and undeformed / largest row of the load";
+        self.row("rows at rest", meaning, at_rest, tolerance);
+    }
+}
+
+/// Returns true if two recoveries have the same labels and loads.
+fn are_alike(a: &Recovery, b: &Recovery) -> bool {
+    let loads = |one: &Recovery| -> BTreeSet<String> {
+        one.loads.iter().map(|load| load.interface.clone()).collect()
+    };
+    a.rows == b.rows && loads(a) == loads(b)
+}
+
+/// Returns the largest difference of the norms of a row over a group of modes, relative to the largest norm. Norms are the
+/// same in every basis of a repeated eigenvalue.
+fn difference_in_modes(a: &Recovery, b: &Recovery, groups: &[Range<usize>]) -> f64 {
+    let norm = |of: &Recovery, i: usize, g: &Range<usize>| {
+        g.clone().map(|j| of.modes[(i, j)].powi(2)).sum::<f64>().sqrt()
+    };
+    let pairs = || (0..a.rows.len()).flat_map(|i| groups.iter().map(move |g| (i, g)));
+    let size = pairs().map(|(i, g)| larger(norm(a, i, g), norm(b, i, g))).fold(0.0, larger);
+    let difference = pairs().map(|(i, g)| (norm(a, i, g) - norm(b, i, g)).abs()).fold(0.0, larger);
+    relative(difference, size)
+}
+
+/// Returns the largest difference of static rows, relative to the largest of the same kind of load.
+fn difference_at_rest(a: &Recovery, b: &Recovery) -> f64 {
+    let mut worst = relative(
+        a.offset.iter().zip(&b.offset).map(|(a, b)| (a - b).abs()).fold(0.0, larger),
+        a.offset.iter().map(|v| v.abs()).fold(0.0, larger),
+    );
+    let mut see = |a: MatRef<'_, f64>, b: MatRef<'_, f64>| {
+        let size = larger(largest_entry(a), largest_entry(b));
+        worst = larger(worst, relative(largest_entry((a - b).as_ref()), size));
+    };
+    see(a.spin.as_ref(), b.spin.as_ref());
+    for own in &a.loads {
+        let other = b.loads.iter().find(|other| other.interface == own.interface).expect("the same loads");
+        for kind in COLUMNS {
+            let of = |columns: &Mat<f64>| columns.as_ref().subcols(kind.start, kind.len()).to_owned();
+            see(of(&own.columns).as_ref(), of(&other.columns).as_ref());
+        }
+    }
+    worst
+}
+
 /// Stiffness of unit loads of two bodies.
 struct Loads {
     a: OfLoads,
@@ -422,7 +510,6 @@ const NEVER_COMPARED: &[Entries] = &[
         has: |body| !body.lumped().is_empty(),
     },
     Entries { name: "surface", paths: "/mesh", has: |body| body.mesh().is_some() },
-    Entries { name: "recoveries", paths: "/recovery", has: |body| !body.recoveries().is_empty() },
     Entries {
         name: "matrices in interface coordinates, which `flexbody check` holds to the modes",
         paths: "/interface_coordinates",
