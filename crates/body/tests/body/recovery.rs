@@ -676,3 +676,41 @@ fn stresses_that_do_not_fit_the_stiffness_are_reported() {
     // An unknown unit cannot be compared.
     assert!(!said(1.0, "slug/in/s^2"));
 }
+
+/// Rows under constant unit loads belong to the model: they are the same for any modes, basis and frame.
+#[test]
+fn static_rows_depend_neither_on_the_modes_nor_on_the_frame() {
+    let made = |basis: BasisChoice, modes: usize, frame: BodyFrame| {
+        body(bracket(&mesh(), Coupling::Averaging), basis, modes, frame)
+    };
+    let free = || BasisChoice::Free(FreeSurface { residual_vectors: Vec::new() });
+    let whole = made(free(), 8, BodyFrame::Com);
+    let expected = whole.static_rows(&whole.recoveries()[0]);
+    let size = |of: &Mat<f64>| of.norm_max();
+    for (basis, modes, frame) in [
+        (free(), 3, BodyFrame::Principal),
+        (free(), 8, BodyFrame::Model),
+        (
+            BasisChoice::Free(FreeSurface { residual_vectors: vec![Loads::Centrifugal] }),
+            4,
+            BodyFrame::Principal,
+        ),
+    ] {
+        let other = made(basis, modes, frame);
+        let found = other.static_rows(&other.recoveries()[0]);
+        assert!((&found.spin - &expected.spin).norm_max() < 1e-8 * size(&expected.spin), "{modes} {frame:?}");
+        for (own, known) in found.loads.iter().zip(&expected.loads) {
+            assert!(
+                (&own.columns - &known.columns).norm_max() < 1e-8 * size(&known.columns),
+                "{modes} {frame:?}"
+            );
+        }
+    }
+    // With fewer modes the columns hold more.
+    let part = |modes: usize| {
+        let body = made(free(), modes, BodyFrame::Com);
+        body.part_of_static_columns(&body.recoveries()[0])
+    };
+    let (many, few) = (part(12), part(3));
+    assert!(few > 1.05 * many && many > 0.01, "{few} {many}");
+}

@@ -109,7 +109,7 @@ fn left_out(body: &FlexBody, framed: &FlexBody) -> Vec<Diagnostic> {
     let lost = body.recoveries().iter().filter(|one| !kept(&one.name));
     lost.map(|one| {
         let message =
-            format!("recovery `{}` has displacements, which a carrier changes: it is left out", one.name);
+            format!("recovery `{}` has displacements relative to the frame of the file, and the motion is in mean axes: it is left out", one.name);
         Diagnostic::new(Code::RecoveryLeftOut, message)
     })
     .collect()

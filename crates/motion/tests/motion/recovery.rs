@@ -1,7 +1,7 @@
 //! Stresses of a tumbling body: a few modes with static columns, against all modes.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_body::flex_body::{FlexBody, Quantity, RecoveryState};
+use flexbody_body::flex_body::{Carrier, FlexBody, Quantity, RecoveryState};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_linalg::context::Context;
 use flexbody_model::{NodeSet, RawModel, RecoveryOperator};
@@ -155,10 +155,10 @@ fn extremes_are_those_of_all_rows_and_instants() {
     }
 }
 
-/// Displacements relative to the frame of the free body are left out of a carried body, and named (FB556); its stresses
-/// stay.
+/// Envelopes of a carried body are those of its rows. Displacements relative to an interface are left out of a free motion
+/// in mean axes, and named (FB556); stresses stay.
 #[test]
-fn a_carried_body_has_its_stresses_and_no_displacements() {
+fn a_carried_body_has_envelopes_and_a_free_one_no_displacements_of_another_frame() {
     let mut raw = arm_model();
     let mut displacements = raw.recoveries[0].clone();
     "place".clone_into(&mut displacements.name);
@@ -166,19 +166,26 @@ fn a_carried_body_has_its_stresses_and_no_displacements() {
         labels.iter_mut().for_each(|label| label.quantity = Quantity::Displacement);
     }
     raw.recoveries.push(displacements);
-    raw.interfaces = vec![NodeSet::new("root", (1..=6).collect())];
+    raw.interfaces = vec![NodeSet::new("root", (0..6).map(|row| 1 + 7 * row).collect())];
     let body = body_of(raw, 6, BodyFrame::Com);
     let scene = "[run]\nduration = 0.01\n[carried]\ninterface = \"root\"\n[carried.spin]\naxis = [0, 0, 1]\nrate = 1\n";
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, scene).expect("written");
     let scene = LoadCases::read_single(&path, None).expect("a scene");
-    let (recording, found) = simulate_with_envelope(&body, &scene, &Context::QUIET).expect("a motion");
     let names_it =
         |one: &Diagnostic| one.code() == Code::RecoveryLeftOut && one.message().contains("`place`");
+    let at_root = body.carried(&Carrier::Interface("root".to_owned())).expect("a body at its root");
+    let free = folder.path().join("free.toml");
+    std::fs::write(&free, "[run]\nduration = 0.01\n").expect("written");
+    let free = LoadCases::read_single(&free, None).expect("a scene");
+    let (recording, found) = simulate_with_envelope(&at_root, &free, &Context::QUIET).expect("a motion");
     assert!(found.iter().any(names_it), "{found:?}");
+    assert_eq!(recording.recovered.expect("stresses").recoveries.len(), 1);
+    let (recording, found) = simulate_with_envelope(&body, &scene, &Context::QUIET).expect("a motion");
+    assert!(!found.iter().any(names_it), "{found:?}");
     let recovered = recording.recovered.expect("recoveries");
-    assert_eq!(recovered.recoveries.len(), 1);
+    assert_eq!(recovered.recoveries.len(), 2);
     // The envelope of the points has the largest of all, and no point is below its value at an output.
     let envelope = &recovered.envelopes.as_ref().expect("envelopes")[0];
     let largest = envelope.iter().fold(0.0f64, |most, own| most.max(own.von_mises.value));

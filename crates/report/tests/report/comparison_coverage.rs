@@ -356,7 +356,10 @@ fn what_a_file_of_another_program_has_none_of_is_listed() {
 /// The result is the same in other frames, in other bases and without common nodes.
 #[test]
 fn frames_signs_and_node_numbers_make_no_difference_to_what_is_beside_the_invariants() {
-    let body = complete();
+    // The invariants of this body are made up, so that its static responses depend on the frame.
+    let mut parts = complete().into_parts();
+    parts.recoveries.clear();
+    let body = FlexBody::new(parts).expect("less of it");
     let with = |change: &dyn Fn(&mut Parts)| {
         let mut parts = body.clone().into_parts();
         change(&mut parts);
@@ -376,7 +379,6 @@ fn frames_signs_and_node_numbers_make_no_difference_to_what_is_beside_the_invari
         p.geometric_stiffness.iter_mut().for_each(|one| square(&mut one.matrix));
         inertia(p).stiffness.iter_mut().for_each(|one| square(&mut one.matrix));
         p.invariants = p.invariants.with_basis(t.as_ref());
-        p.recoveries.iter_mut().for_each(|one| columns(&mut one.modes));
     });
     for other in [&moved, &flipped] {
         for (a, b) in [(&body, other), (other, &body)] {
