@@ -23,6 +23,7 @@ from importlib import metadata
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process per core instead
+import h5py  # noqa: E402
 import numpy as np  # noqa: E402
 
 from trade_figure import figure  # noqa: E402
@@ -234,7 +235,9 @@ def timed(program, folder, told, scene, model):
     for number in sorted(set(worth_timing(told))):
         row = told["rows"][number - 1]
         # A body starts in its own equilibrium, as `simulate` has it.
-        start = modes_at_the_start(program, folder, folder / f"candidate_{number:03}.flex.h5", scene[0])
+        body = folder / f"candidate_{number:03}.flex.h5"
+        given = row["measured"]["runs"][0].get("initial_modes") if row["measured"]["runs"] else None
+        start = stated_modes(body, given) if given else modes_at_the_start(program, folder, body, scene[0])
         found[number] = Timed(program, folder, row, scene[1], start, measure, most)
     for _ in range(TURNS - 1):
         for one in found.values():
@@ -359,6 +362,16 @@ def bases(told):
         fewest(lambda row: row["source"].endswith("of the motion")),
     ]
     return f"| {told['scene']} | " + " | ".join(cells) + " |"
+
+
+def stated_modes(body, given):
+    """Modal coordinates and rates of the start that `trade` gives a candidate whose scene states those of the reference."""
+    with h5py.File(body) as file:
+        count = len(file["modes/eigenvalue"])
+    q, qd = np.zeros(count), np.zeros(count)
+    for one in given:
+        q[one["number"] - 1], qd[one["number"] - 1] = one["amplitude"], one["rate"]
+    return q, qd
 
 
 def modes_at_the_start(program, folder, body, scene):

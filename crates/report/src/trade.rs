@@ -10,7 +10,7 @@ use super::{Format, csv};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::Storage;
-use flexbody_motion::scene::{OutputErrors, Scheme, Tolerance};
+use flexbody_motion::scene::{ModeStart, OutputErrors, Scheme, Tolerance};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
     CandidateKind, InCase, LumpedMass, Measured, ReferenceKind, Timed, TimedRun, Trade, TradeCase, TradeRow,
@@ -184,6 +184,17 @@ struct TimedRunFacts<'a> {
     worst: f64,
     seconds: f64,
     steps: u64,
+    /// Initial values of the modes of the candidate's own body, numbered from 1.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    initial_modes: Vec<ModeStartFacts>,
+}
+
+/// Initial value of a mode, as in `[initial]` of a scene.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct ModeStartFacts {
+    number: usize,
+    amplitude: f64,
+    rate: f64,
 }
 
 impl<'a> TimedRunFacts<'a> {
@@ -191,6 +202,11 @@ impl<'a> TimedRunFacts<'a> {
         let (tolerance, step) = match run.scheme {
             Scheme::Adaptive { tolerance } => (Some(tolerance), None),
             Scheme::Conserving { step, .. } => (None, step),
+        };
+        let facts = |start: &ModeStart| ModeStartFacts {
+            number: start.mode + 1,
+            amplitude: start.amplitude,
+            rate: start.rate,
         };
         Self {
             case: case.name.as_deref(),
@@ -201,6 +217,7 @@ impl<'a> TimedRunFacts<'a> {
             worst: run.errors.worst,
             seconds: run.seconds,
             steps: run.work.steps,
+            initial_modes: run.start.iter().map(facts).collect(),
         }
     }
 }

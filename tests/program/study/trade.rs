@@ -211,7 +211,7 @@ fn steps_are_the_longest_that_the_tolerances_allow() {
         let timed: Vec<_> = timed.filter_map(|(row, own)| Some((row, own, own.timed.as_ref()?))).collect();
         assert!(timed.len() > 5);
         for (row, measured, timed) in timed {
-            let run = timed.runs[0];
+            let run = &timed.runs[0];
             // Error and time belong to one run.
             let again = errors_of_run(&body, &scene, row, run.scheme).expect("a motion");
             for ((name, a), (_, b)) in again.named().into_iter().zip(run.errors.errors.named()) {

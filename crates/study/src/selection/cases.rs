@@ -329,7 +329,7 @@ impl<'v> VariedRuns<'v> {
     /// The errors of [`trace`](flexbody_motion::scene::trace).
     pub(super) fn new(
         all: &'v [SceneVariation],
-        are_stated: bool,
+        cases: &LoadCases,
         framed: &'v [FramedTests<'_>],
         reference_errors: &'v [Vec<ReferenceError>],
         context: &Context<'v>,
@@ -346,7 +346,7 @@ impl<'v> VariedRuns<'v> {
             let motion = case.runs().motion(tests.body.groups());
             match motion {
                 Ok((motion, _)) => runs.references.push(motion),
-                Err(error) => match stops(&error, one).filter(|_| !are_stated) {
+                Err(error) => match stops(&error, one).filter(|_| !cases.states_variations()) {
                     Some(note) => {
                         runs.diagnostics.push(note);
                         continue;

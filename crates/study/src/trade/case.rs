@@ -169,7 +169,8 @@ impl<'m> StudyCase<'m> {
         let (seconds, work) = timing::integration(body, &scene, repeat)?;
         let evaluation = timing::evaluation(body, scene.run.terms)
             .map_err(|reason| Error::from(Diagnostic::new(Code::SimulationStopped, reason.to_string())))?;
-        Ok((TimedRun { scheme, errors, seconds, work }, evaluation))
+        let start = scene.initial.modes;
+        Ok((TimedRun { scheme, errors, seconds, work, start }, evaluation))
     }
 
     fn own_scene(&self, body: &FlexBody, candidate: &Candidate) -> Scene {

@@ -6,7 +6,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, NotPositiveDefinite, Terms};
 use flexbody_motion::integration::Work;
-use flexbody_motion::scene::{Scene, Scheme, simulate};
+use flexbody_motion::scene::{ModeStart, Scene, Scheme, simulate};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -27,7 +27,7 @@ const MIN_STEPS: f64 = 10.0;
 const SHARE_OF_ERROR: f64 = 0.1;
 
 /// Simulation of a candidate in a load case: errors and time of the same run.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TimedRun {
     /// Method with the cheapest accuracy that meets what is left of the tolerances.
     pub scheme: Scheme,
@@ -37,6 +37,8 @@ pub struct TimedRun {
     pub seconds: f64,
     /// Steps and evaluations of the run.
     pub work: Work,
+    /// Initial values of the modes of the candidate's own body, where the scene states those of the reference.
+    pub start: Vec<ModeStart>,
 }
 
 /// Returns the accuracies of the time integration that a candidate is tried with, the cheapest first. The last is
