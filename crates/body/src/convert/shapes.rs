@@ -8,7 +8,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{gram, largest_entry, side_by_side, subtract_combination};
-use flexbody_model::{FeModel, centre_and_length};
+use flexbody_model::{FeModel, extents};
 
 /// Difference of Psi'K Psi from the stored K_ff, relative to its largest entry, above which the model is another one.
 const MAX_STIFFNESS_DIFFERENCE: f64 = 1e-5;
@@ -16,7 +16,7 @@ const MAX_STIFFNESS_DIFFERENCE: f64 = 1e-5;
 /// Size of a static response outside the modes, relative to the whole response, below which it is rounding.
 const MIN_RESPONSE: f64 = 1e-9;
 
-/// Largest displacement of a shape, relative to the size of the body. Stresses of metals then have the size of their
+/// Largest displacement of a shape, relative to the diagonal of the box around the nodes. Stresses of metals then have the size of their
 /// strength, so that values in tables with few decimals keep their digits.
 const SHAPE_SIZE: f64 = 1e-3;
 
@@ -85,11 +85,12 @@ pub fn recovery_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) 
         j.checked_sub(modes).is_none_or(|at| norms[at] > MIN_RESPONSE * sizes[at] && norms[at] > 0.0)
     };
     let kept: Vec<usize> = (0..columns.len()).filter(is_kept).collect();
-    let (_, length) = centre_and_length(&model.nodes().positions);
+    let size =
+        extents(&model.nodes().positions).into_iter().map(|extent| extent * extent).sum::<f64>().sqrt();
     let displaced = model.dimension() * model.nodes().len();
     let factors: Vec<f64> = kept
         .iter()
-        .map(|&j| SHAPE_SIZE * length / fields.as_ref().subrows(0, displaced).col(j).norm_max())
+        .map(|&j| SHAPE_SIZE * size / fields.as_ref().subrows(0, displaced).col(j).norm_max())
         .collect();
     Ok(RecoveryShapes {
         columns: kept.iter().map(|&j| columns[j].clone()).collect(),
