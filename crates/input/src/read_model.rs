@@ -98,15 +98,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         .iter()
         .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, opened, files)))
         .collect();
-    let recoveries: Vec<ModelRecovery> = files
-        .recoveries
-        .iter()
-        .filter_map(|one| {
-            let (recovery, found) = take(&mut diagnostics, places.recovery(one, opened, files))?;
-            diagnostics.extend(found);
-            Some(recovery)
-        })
-        .collect();
+    let recoveries = places.recoveries(opened, files, &mut diagnostics);
     let mesh_file = parsed.mesh.and_then(|mesh| take(&mut diagnostics, mesh));
     let mesh = matrices.as_ref().map(|matrices| {
         let from = mesh_file.as_ref().zip(files.mesh.as_deref());
@@ -361,6 +353,23 @@ impl<'m> NodeLookup<'m> {
         };
         let (name, coupling, reference) = (interface.name.clone(), interface.coupling, interface.reference);
         Ok(NodeSet { name, nodes, coupling, reference, outline })
+    }
+
+    /// Returns the recoveries of the model; adds errors and warnings.
+    fn recoveries(
+        &self,
+        opened: &OpenFiles,
+        files: &ModelFiles,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Vec<ModelRecovery> {
+        let mut read = Vec::with_capacity(files.recoveries.len());
+        for one in &files.recoveries {
+            if let Some((recovery, found)) = take(diagnostics, self.recovery(one, opened, files)) {
+                diagnostics.extend(found);
+                read.push(recovery);
+            }
+        }
+        read
     }
 
     /// Returns a recovery with an operator by the rows of the files, with shapes, or with the nodes of its cut; and

@@ -64,7 +64,7 @@ pub fn recovery_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) 
     let computed = gram(vectors.as_ref(), model.pencil().apply_stiffness(vectors.as_ref()).as_ref());
     let apart = largest_entry((&computed - stored).as_ref());
     let allowed = (MAX_STIFFNESS_DIFFERENCE + body.storage().rounding()) * largest_entry(stored.as_ref());
-    if !(apart <= allowed) {
+    if apart.is_nan() || apart > allowed {
         return Err(incomparable("the stiffness of the body's modes is not that of the model").into());
     }
     context.phase("static responses");
