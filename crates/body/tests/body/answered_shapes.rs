@@ -131,7 +131,7 @@ fn answers_to_craig_bampton_shapes_keep_rigid_interfaces() {
 fn modes_that_were_not_asked_for_are_refused() {
     let small = made(operator(), free(), 4, BodyFrame::Principal).expect("converts").body;
     let (shapes, _) = answered(&small, &model(bracket(operator())));
-    let error = made(recovery_of(shapes), free(), 6, BodyFrame::Principal).err().expect("refused");
+    let error = made(recovery_of(shapes), free(), 6, BodyFrame::Principal).expect_err("refused");
     assert!(error.has(Code::RecoveryUnanswered), "{error}");
     let message = error.first_error().message();
     assert!(message.contains("mode 5 (") && message.contains("mode 6 ("), "{message}");
@@ -174,7 +174,7 @@ fn another_stiffness_of_the_fe_program_is_refused() {
         recovery_of(AnsweredShapes { energies: Some(energies.collect()), ..shapes.clone() })
     };
     for factor in [1.05, 1e-6] {
-        let error = made(scaled(factor, factor), free(), 4, BodyFrame::Principal).err().expect("refused");
+        let error = made(scaled(factor, factor), free(), 4, BodyFrame::Principal).expect_err("refused");
         assert!(error.has(Code::RecoveryEnergy), "{error}");
     }
     let found = made(scaled(1.0, 0.97), free(), 4, BodyFrame::Principal).expect("converts");
