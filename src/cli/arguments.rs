@@ -5,6 +5,7 @@ mod guidance;
 mod judgement;
 mod names;
 mod response;
+mod shapes;
 
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand};
@@ -20,6 +21,7 @@ use flexbody_study::trade::ReferenceChoice;
 pub(super) use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
 pub(super) use judgement::{AdviseArguments, MeasureArguments, RecoverArguments};
 pub(super) use response::ResponseArguments;
+pub(super) use shapes::{PlacesName, ShapeFormat, ShapesArguments};
 use std::path::PathBuf;
 
 /// Exact flexible bodies for multibody simulation from finite element mass and stiffness matrices.
@@ -93,6 +95,11 @@ pub enum Command {
     /// coordinates, angular velocity and loads
     #[command(after_help = "Example:\n  flexbody recover rod.flex.h5 --history run.csv -o stress.h5")]
     Recover(RecoverArguments),
+    /// Write the modes and static columns of a body as shapes for an FE program, whose stresses then make a recovery
+    #[command(
+        after_help = "Example:\n  flexbody shapes rod.flex.h5 --model model.toml --to calculix -o ask.inp\n  ccx ask"
+    )]
+    Shapes(Box<ShapesArguments>),
     /// Write a body with some of its modes and groups of terms, as a selection or a trade study recommends
     #[command(
         after_help = "Example:\n  flexbody reduce rod.flex.h5 --keep-modes 1,3,5-9 --terms W1 -o small.flex.h5"

@@ -30,6 +30,7 @@ mod reduce;
 mod resources;
 mod response;
 mod select;
+mod shapes;
 #[cfg(unix)]
 mod signals;
 mod simulate;

@@ -6,7 +6,7 @@ use super::resources::{memory_left, use_threads};
 use super::terminal::{colours_of_stderr, for_terminal};
 use super::{
     advise, assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, measure,
-    prepare, recipe, recover, reduce, response, select, simulate, trade, view,
+    prepare, recipe, recover, reduce, response, select, shapes, simulate, trade, view,
 };
 use clap::{CommandFactory, Parser};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
@@ -93,6 +93,7 @@ fn outcome_of(arguments: &Arguments) -> Result<Outcome> {
         Command::Response(arguments) => response::run(arguments),
         Command::Measure(arguments) => measure::run(arguments),
         Command::Recover(arguments) => recover::run(arguments),
+        Command::Shapes(arguments) => shapes::run(arguments),
         Command::Reduce(arguments) => reduce::run(arguments),
         Command::Advise(arguments) => advise::run(arguments),
         Command::View(arguments) => view::run(arguments),
@@ -120,6 +121,7 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
         Command::Response(arguments) => ("response", arguments.printing),
         Command::Measure(arguments) => ("measure", arguments.printing),
         Command::Recover(arguments) => ("recover", arguments.printing),
+        Command::Shapes(arguments) => ("shapes", arguments.printing),
         Command::Reduce(arguments) => ("reduce", arguments.printing),
         Command::Advise(arguments) => ("advise", arguments.printing),
         Command::View(arguments) => ("view", arguments.printing),

@@ -82,6 +82,7 @@ TABLES = {}
 # Those of the peers that have a table of their own.
 PLACES = {
     "calculix.rows": ("docs/validation/fe_programs.md", "calculix"),
+    "calculix_stresses.rows": ("docs/validation/fe_programs.md", "calculix stresses"),
     "public_decks.rows": ("docs/validation/fe_programs.md", "public decks"),
     "nastran.rows": ("docs/validation/fe_programs.md", "nastran"),
     "abaqus.rows": ("docs/validation/fe_programs.md", "abaqus"),
@@ -109,6 +110,7 @@ PEERS = [
     ("trimesh, pygltflib", "pictures.gltf", True),
     ("validator of glTF", "pictures.validator", True),
     ("CalculiX", "calculix.rows", True),
+    ("stresses of CalculiX", "calculix_stresses.rows", True),
     ("public decks of CalculiX", "public_decks.rows", False),
     ("public decks of CalculiX, a part", "public_decks.some", True),
     ("open FE codes", "open_codes.rows", True),

@@ -99,6 +99,8 @@ fn every_command_prints_an_object_of_the_schema() {
         ("convert cut.toml --modes 4 -o cut.h5", 0),
         ("recover cut.h5 --history run.csv -o rows.csv", 0),
         ("recover b.h5 --history run.csv -o rows.csv", 2),
+        ("shapes b.h5 --model model.toml --to csv -o ask.csv", 0),
+        ("shapes b.h5 --model model.toml -o ask.inp", 2),
         ("trade b.h5 --scene scene.toml --repeat 1", 0),
         ("response b.h5 --band 0..1000 --from 1 --to 2", 0),
         (

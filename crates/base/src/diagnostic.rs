@@ -142,6 +142,8 @@ codes! {
     RecoverySize = "FB322", Error, BadInput, "operator of a recovery does not fit the matrices", "give one column for each matrix row, in the order of the matrices, and one value of the offset for each row";
     RecoveryRows = "FB323", Error, BadInput, "table of rows does not describe the operator of its recovery", "write the header `row,name,quantity,component,unit` and one line for each row of the operator; docs/reference/recovery.md has the words";
     RecoveryCut = "FB324", Error, BadInput, "cut of a recovery does not divide the body", "give the nodes of one side, with all nodes of a rigid interface or none";
+    RecoveryShapes = "FB326", Error, BadInput, "answers of an FE program do not belong to the shapes of their recovery", "run the FE program on all shapes that flexbody shapes wrote, and keep the .npz that was written with them beside the results";
+    FeResultsSyntax = "FB327", Error, BadInput, "results of an FE program cannot be read", "write them as docs/how_to/stresses_from_calculix.md says";
     // FB4xx: model
     NodesMissing = "FB401", Error, BadInput, "degrees of freedom refer to nodes without coordinates", "add the nodes to the node table";
     DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "give one row of dofs.csv for each matrix row; without dofs.csv there are three rows for each node";
@@ -182,6 +184,11 @@ codes! {
     GeometricStiffnessRough = "FB442", Warning, Done, "geometric stiffness fulfils its relations with rigid motion roughly", "nothing to do where elements of reduced integration explain it; else check that the matrix holds the stress stiffness alone";
     RecoveryStrained = "FB443", Error, BadInput, "rigid motion of the body strains a recovery: its columns do not belong to the rows of the matrices", "write the operator by the rows of K and M; a row that a rigid motion may change is a `displacement` or `other`";
     RecoveryScale = "FB444", Warning, Done, "stresses of a recovery do not fit the stiffness of the model", "check the column `unit` of the rows (nothing converts values to it), and that the operator belongs to this model";
+    RecoveryUnanswered = "FB445", Error, BadInput, "modes or static columns of the body are not combinations of the shapes of a recovery", "write shapes for this body with flexbody shapes, and run the FE program on them again";
+    RecoveryEnergy = "FB446", Error, BadInput, "FE program computes another strain energy of the shapes than K", "give the FE program the elements, materials and units that K was written with";
+    RecoveryEnergyDiffers = "FB447", Warning, Done, "strain energy of some shapes differs between the FE program and K", "nothing to do for elements of reduced integration, springs and other elements without stresses; else compare the deck with that of K";
+    RecoveryAveraged = "FB448", Warning, Done, "stresses at nodes between materials are means over the materials", "ask for stresses at integration points: flexbody shapes --at integration-points";
+    RecoveryMapped = "FB449", Note, Done, "recovery was computed from the answers of an FE program to shapes", "nothing to do: the misfit bounds the share of each mode that the shapes do not contain";
     InterfaceCentre = "FB450", Warning, Done, "reference point of an interface is not the mean of its nodes", "nothing to do if the joint belongs there; else state the point: --interface NAME=SET,COUPLING,X/Y/Z, or `reference` in [[interface]]";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";

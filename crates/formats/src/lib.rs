@@ -25,6 +25,7 @@ mod npz;
 mod openradioss;
 mod picture;
 mod registry;
+pub mod shapes;
 mod sid;
 #[cfg(feature = "hdf5")]
 mod simscape;

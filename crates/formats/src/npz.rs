@@ -47,7 +47,7 @@ impl ExportFormat for Npz {
 
 /// Returns an archive of uncompressed members: compression reduces shapes by 5 to 20 % only (`store`), and
 /// NumPy maps uncompressed members into memory.
-fn archive(members: Vec<(&str, Vec<u8>)>) -> zip::result::ZipResult<Vec<u8>> {
+pub(crate) fn archive(members: Vec<(&str, Vec<u8>)>) -> zip::result::ZipResult<Vec<u8>> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, bytes) in members {
         // Neither clock nor platform is recorded, so that equal bodies give equal bytes.
@@ -63,7 +63,11 @@ fn archive(members: Vec<(&str, Vec<u8>)>) -> zip::result::ZipResult<Vec<u8>> {
 }
 
 /// Returns an array in row-major order as a member.
-fn npy<const N: usize>(kind: &str, shape: &[usize], values: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
+pub(crate) fn npy<const N: usize>(
+    kind: &str,
+    shape: &[usize],
+    values: impl Iterator<Item = [u8; N]>,
+) -> Vec<u8> {
     let extents: String = shape.iter().map(|extent| format!("{extent}, ")).collect();
     let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({extents}), }}");
     // The header is padded so that the numbers begin at a multiple of 64.
@@ -81,7 +85,7 @@ fn npy<const N: usize>(kind: &str, shape: &[usize], values: impl Iterator<Item =
 const PREFIX: usize = 10;
 
 /// Returns a text as an array without extents: four bytes for each character.
-fn text(text: &str) -> Vec<u8> {
+pub(crate) fn text(text: &str) -> Vec<u8> {
     let characters: Vec<char> = text.chars().collect();
     npy(&format!("<U{}", characters.len()), &[], characters.iter().map(|c| u32::from(*c).to_le_bytes()))
 }

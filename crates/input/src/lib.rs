@@ -16,6 +16,7 @@ mod bulk_cards;
 mod coordinates;
 mod digits;
 mod dmig;
+mod fe_results;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 #[cfg(not(feature = "hdf5"))]
@@ -46,13 +47,13 @@ mod shapes;
 mod tables;
 
 pub use assemble::check_size;
-pub use jobs::{JobFile, is_job, job_programs};
+pub use jobs::{ElementDeck, JobFile, is_job, job_programs};
 pub use manifest::read_manifest;
 pub use model_files::{
     InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource,
     RecoverySource, TableFiles, parse_units,
 };
-pub use read_model::{read_matrix, read_model, read_nodal_masses};
+pub use read_model::{read_matrix, read_model, read_nodal_masses, read_nodes_of_table};
 pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use recipes::{RECIPES, Recipe, Step};
 pub use region::Region;

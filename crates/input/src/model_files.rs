@@ -113,6 +113,15 @@ pub enum OperatorSource {
         /// File of the values of the undeformed body.
         offset: Option<MatrixLocation>,
     },
+    /// Answers of an FE program to shapes.
+    Shapes {
+        /// Stresses and displacements of every shape.
+        answers: PathBuf,
+        /// Displacements of all nodes in the shapes.
+        displacements: PathBuf,
+        /// Printed results with the strain energies of the shapes.
+        energies: Option<PathBuf>,
+    },
     /// Section forces of the nodes on one side of a cut.
     Cut {
         /// Nodes on this side.
@@ -147,6 +156,9 @@ impl RecoverySource {
             OperatorSource::Rows { operator, rows, offset } => {
                 let offset = offset.as_ref().map(|offset| offset.path.as_path());
                 [operator.path.as_path(), rows.as_path()].into_iter().chain(offset).collect()
+            }
+            OperatorSource::Shapes { answers, displacements, energies } => {
+                [answers.as_path(), displacements].into_iter().chain(energies.as_deref()).collect()
             }
             OperatorSource::Cut { nodes: InterfaceNodes::File(path), .. } => vec![path],
             OperatorSource::Cut { .. } => Vec::new(),

@@ -1,5 +1,6 @@
 //! Reads all files of a model and collects all their problems.
 
+use super::fe_results::{AnswerFiles, read_answers};
 use super::jobs::{JobModel, comparable, read_job};
 use super::mapping::{Mapping, Turn};
 use super::mesh::MeshReading;
@@ -97,11 +98,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         .iter()
         .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, opened, files)))
         .collect();
-    let recoveries: Vec<ModelRecovery> = files
-        .recoveries
-        .iter()
-        .filter_map(|one| take(&mut diagnostics, places.recovery(one, opened, files)))
-        .collect();
+    let recoveries = places.recoveries(opened, files, &mut diagnostics);
     let mesh_file = parsed.mesh.and_then(|mesh| take(&mut diagnostics, mesh));
     let mesh = matrices.as_ref().map(|matrices| {
         let from = mesh_file.as_ref().zip(files.mesh.as_deref());
@@ -147,6 +144,14 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
 /// FB101 to FB106 for a file that cannot be read, FB203 to FB205 for an invalid table, FB803 for invalid masses.
 pub fn read_nodal_masses(path: &Path) -> Result<Vec<(i64, f64)>> {
     read_masses(&InputFile::open(path)?).map_err(Error::new)
+}
+
+/// Reads the column `node` of a table.
+///
+/// # Errors
+/// FB101 to FB106 for a file that cannot be read, FB203 to FB205 for an invalid table.
+pub fn read_nodes_of_table(path: &Path) -> Result<Vec<i64>> {
+    read_node_list(&InputFile::open(path)?).map_err(Error::new)
 }
 
 type Found<T> = std::result::Result<T, Vec<Diagnostic>>;
@@ -350,13 +355,31 @@ impl<'m> NodeLookup<'m> {
         Ok(NodeSet { name, nodes, coupling, reference, outline })
     }
 
-    /// Returns a recovery with an operator by the rows of the files, or with the nodes of its cut.
+    /// Returns the recoveries of the model; adds errors and warnings.
+    fn recoveries(
+        &self,
+        opened: &OpenFiles,
+        files: &ModelFiles,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Vec<ModelRecovery> {
+        let mut read = Vec::with_capacity(files.recoveries.len());
+        for one in &files.recoveries {
+            if let Some((recovery, found)) = take(diagnostics, self.recovery(one, opened, files)) {
+                diagnostics.extend(found);
+                read.push(recovery);
+            }
+        }
+        read
+    }
+
+    /// Returns a recovery with an operator by the rows of the files, with shapes, or with the nodes of its cut; and
+    /// warnings about it.
     fn recovery(
         &self,
         source: &RecoverySource,
         opened: &OpenFiles,
         files: &ModelFiles,
-    ) -> Found<ModelRecovery> {
+    ) -> Found<(ModelRecovery, Vec<Diagnostic>)> {
         let name = source.name.clone();
         match &source.operator {
             OperatorSource::Rows { operator, rows, offset } => {
@@ -367,7 +390,16 @@ impl<'m> NodeLookup<'m> {
                     offset.map(|place| read_offset(opened.get(&place.path)?, place.group.as_deref()));
                 let operator_path = operator.path.clone();
                 let operator = RecoveryOperator::Rows { transposed, labels, offset: offset.transpose()? };
-                Ok(ModelRecovery { name, operator, path: operator_path })
+                Ok((ModelRecovery { name, operator, path: operator_path }, Vec::new()))
+            }
+            OperatorSource::Shapes { answers, displacements, energies } => {
+                let answer_files = AnswerFiles {
+                    answers: opened.unread(answers)?,
+                    displacements: opened.unread(displacements)?,
+                    energies: energies.as_ref().map(|path| opened.unread(path)).transpose()?,
+                };
+                let (operator, found) = read_answers(&answer_files, &files.units)?;
+                Ok((ModelRecovery { name, operator, path: answers.clone() }, found))
             }
             OperatorSource::Cut { nodes, about } => {
                 let (coupling, reference) = (None, Reference::Centre);
@@ -378,7 +410,8 @@ impl<'m> NodeLookup<'m> {
                     InterfaceNodes::File(path) => path.clone(),
                     _ => files.manifest.clone().unwrap_or_default(),
                 };
-                Ok(ModelRecovery { name, operator: RecoveryOperator::Cut { nodes, about: *about }, path })
+                let operator = RecoveryOperator::Cut { nodes, about: *about };
+                Ok((ModelRecovery { name, operator, path }, Vec::new()))
             }
         }
     }

@@ -248,10 +248,11 @@ fn same_length(values: &[f64], indices: &[i64], what: &str) -> std::result::Resu
     Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP))
 }
 
-struct Archive<'a>(ZipArchive<Cursor<&'a [u8]>>);
+/// Archive of arrays of NumPy.
+pub(super) struct Archive<'a>(ZipArchive<Cursor<&'a [u8]>>);
 
 impl<'a> Archive<'a> {
-    fn open(bytes: &'a [u8]) -> std::result::Result<Self, Diagnostic> {
+    pub(super) fn open(bytes: &'a [u8]) -> std::result::Result<Self, Diagnostic> {
         ZipArchive::new(Cursor::new(bytes)).map(Self).map_err(|error| damaged(&error))
     }
 
@@ -266,7 +267,7 @@ impl<'a> Archive<'a> {
     }
 
     /// Returns the bytes of the array `name`, verified by its checksum.
-    fn member(&mut self, name: &str) -> std::result::Result<Vec<u8>, Diagnostic> {
+    pub(super) fn member(&mut self, name: &str) -> std::result::Result<Vec<u8>, Diagnostic> {
         let mut member = self.open_member(name)?;
         let mut bytes = Vec::new();
         let mut take = |bytes: &mut Vec<u8>, most: u64| {
@@ -285,7 +286,7 @@ impl<'a> Archive<'a> {
         Ok(bytes)
     }
 
-    fn has(&self, name: &str) -> bool {
+    pub(super) fn has(&self, name: &str) -> bool {
         self.0.index_for_name(&format!("{name}.npy")).is_some()
     }
 

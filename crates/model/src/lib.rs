@@ -53,7 +53,7 @@ pub use interface::{Coupling, InterfaceMotion, NodeSet, Reference};
 pub use layout::filled_rows;
 pub use nodes::{DofLabel, ElementShape, Elements, Nodes};
 pub use raw::{RawMatrix, RawModel, RawModes, RawShapes};
-pub use recovery::{ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
+pub use recovery::{AnsweredShapes, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
 pub use rigid::{centre_and_length, extents, rigid_axes, rigid_count, rigid_fields, span};
 pub use rows::Rows;
 pub use separate_bodies::check_bodies;

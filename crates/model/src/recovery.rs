@@ -1,5 +1,7 @@
 //! Recovery: rows that read stresses, strains, forces or displacements off the deformed body (theory section 12).
 
+use super::DofLabel;
+use faer::Mat;
 use flexbody_linalg::CscMatrix;
 use std::path::PathBuf;
 
@@ -70,6 +72,23 @@ pub struct RecoveryRow {
     pub element: Option<i64>,
 }
 
+/// Shapes whose stresses an FE program has computed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnsweredShapes {
+    /// Node and direction of every row of `displacements`, along the axes of the model, each once.
+    pub dofs: Vec<DofLabel>,
+    /// Displacements of the shapes, one column per shape.
+    pub displacements: Mat<f64>,
+    /// Significant decimal digits of the displacements.
+    pub digits: u8,
+    /// Values of the rows of the recovery under each shape (rows x shapes).
+    pub answers: Mat<f64>,
+    /// Significant decimal digits of the answers.
+    pub answer_digits: u8,
+    /// Strain energy of each shape as computed by the FE program, if it was read.
+    pub energies: Option<Vec<f64>>,
+}
+
 /// Linear map from the displacements of the body to the rows of a recovery.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RecoveryOperator {
@@ -82,6 +101,13 @@ pub enum RecoveryOperator {
         labels: Vec<RecoveryRow>,
         /// Values y0 of the undeformed body, one per row; `None` for zero.
         offset: Option<Vec<f64>>,
+    },
+    /// Rows known by their values under shapes: R u = S x for u = U x with the displacements U and the values S.
+    Shapes {
+        /// The shapes with their values.
+        shapes: AnsweredShapes,
+        /// Label of every row.
+        labels: Vec<RecoveryRow>,
     },
     /// Section forces: resultant force and moment that the nodes of one side of a cut exert on the rest of
     /// the body, along the axes of the model.

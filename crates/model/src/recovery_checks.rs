@@ -2,7 +2,7 @@
 
 use super::rigid::{centre_and_length, rigid_count};
 use super::wording::name_some;
-use super::{GivenRows, LostRow, ModelRecovery, Nodes, RecoveryOperator, RecoveryRow, Rows};
+use super::{AnsweredShapes, GivenRows, LostRow, ModelRecovery, Nodes, RecoveryOperator, RecoveryRow, Rows};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{CscMatrix, larger};
@@ -46,6 +46,8 @@ pub(super) fn checked_recoveries(
                     in_internal_rows(&name, transposed, &labels, offset.as_deref(), of_files)
                         .map(|transposed| RecoveryOperator::Rows { transposed, labels, offset })
                 }
+                RecoveryOperator::Shapes { shapes, labels } => refuse_shapes(&name, &shapes, &labels, nodes)
+                    .map(|()| RecoveryOperator::Shapes { shapes, labels }),
                 RecoveryOperator::Cut { nodes: side, about } => refuse_cut(&name, &side, about, nodes)
                     .map(|()| RecoveryOperator::Cut { nodes: side, about }),
             },
@@ -153,6 +155,42 @@ fn refuse_labels(name: &str, labels: &[RecoveryRow], count: usize) -> Result<(),
     Ok(())
 }
 
+/// Refuses shapes that do not move all nodes, and values that do not fit them.
+fn refuse_shapes(
+    name: &str,
+    shapes: &AnsweredShapes,
+    labels: &[RecoveryRow],
+    nodes: &Nodes,
+) -> Result<(), Problem> {
+    let AnsweredShapes { dofs, displacements, answers, energies, .. } = shapes;
+    refuse_labels(name, labels, answers.nrows())?;
+    let refuse = |message: String| Err((Code::RecoveryShapes, format!("`{name}`: {message}")));
+    let (count, asked) = (answers.ncols(), displacements.ncols());
+    if count != asked || energies.as_ref().is_some_and(|energies| energies.len() != asked) {
+        return refuse(format!("{count} answers belong to {asked} shapes"));
+    }
+    if dofs.len() != displacements.nrows() || asked == 0 {
+        return refuse("its shapes have no displacements".to_owned());
+    }
+    let values = displacements.col_iter().chain(answers.col_iter()).flat_map(|column| column.iter());
+    let energies = energies.iter().flatten();
+    if values.chain(energies).any(|value| !value.is_finite()) {
+        return Err((Code::MatrixNotFinite, format!("`{name}`: a value of its shapes is not finite")));
+    }
+    let moved: HashSet<i64> = dofs.iter().filter(|dof| dof.direction <= 3).map(|dof| dof.node).collect();
+    let mut still: Vec<i64> = nodes.ids.iter().copied().filter(|id| !moved.contains(id)).collect();
+    still.sort_unstable();
+    if !still.is_empty() {
+        return refuse(format!(
+            "its shapes have no displacements of {} of {} nodes: {}",
+            still.len(),
+            nodes.len(),
+            name_some(&still)
+        ));
+    }
+    Ok(())
+}
+
 /// Refuses a cut whose side is empty, unknown, or the whole body.
 fn refuse_cut(name: &str, side: &[i64], about: [f64; 3], nodes: &Nodes) -> Result<(), Problem> {
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
@@ -256,6 +294,9 @@ pub(super) fn recoveries_of_body(all: &[ModelRecovery], kept: &[usize], nodes: &
             .iter()
             .any(|id| known.contains(id))
             .then(|| RecoveryOperator::Cut { nodes: side.clone(), about: *about }),
+        RecoveryOperator::Shapes { shapes, .. } => {
+            shapes.dofs.iter().any(|dof| known.contains(&dof.node)).then(|| one.operator.clone())
+        }
         RecoveryOperator::Rows { transposed, labels, offset } => {
             let mut entries = Vec::new();
             for j in 0..transposed.n_cols() {
@@ -290,6 +331,9 @@ pub(super) fn refuse_several_bodies(
         let mut bodies: Vec<usize> = match &one.operator {
             RecoveryOperator::Rows { transposed, .. } => {
                 transposed.row_idx().iter().map(|row| body_of_row(*row as usize) + 1).collect()
+            }
+            RecoveryOperator::Shapes { shapes, .. } => {
+                shapes.dofs.iter().filter_map(|dof| body_of_node(dof.node)).map(|body| body + 1).collect()
             }
             RecoveryOperator::Cut { nodes, .. } => {
                 nodes.iter().filter_map(|id| body_of_node(*id)).map(|body| body + 1).collect()

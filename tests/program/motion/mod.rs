@@ -4,4 +4,5 @@ mod carried;
 mod joined;
 mod mechanisms;
 mod recovery;
+mod shapes;
 mod simulate;

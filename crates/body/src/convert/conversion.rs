@@ -68,10 +68,12 @@ impl ModalModel<'_> {
             .iter()
             .map(|masses| lumped::pipeline(&self, masses, exact, &without_counter))
             .collect::<Result<_>>()?;
-        let recoveries = self.recoveries(condensed.invariants.groups().w1, &without_counter)?;
+        let (recoveries, of_recoveries) =
+            self.recoveries(condensed.invariants.groups().w1, &without_counter)?;
         let (parts, overdamped) = self.parts(&condensed, lumped, recoveries)?;
         let body = FlexBody::new(parts)?;
-        let diagnostics = self.remarks(overdamped, &body);
+        let mut diagnostics = self.remarks(overdamped, &body);
+        diagnostics.extend(of_recoveries);
         let solution = self.found.solution;
         Ok(Conversion {
             body,

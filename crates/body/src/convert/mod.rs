@@ -7,6 +7,7 @@
 //!         ─ finish ───────────→ Conversion: the body, lumped comparators, remarks
 //! ```
 
+mod answered;
 mod body_modes;
 mod conversion;
 mod lumped;
@@ -14,6 +15,7 @@ mod modal_matrices;
 mod modal_model;
 mod recovery;
 mod settings;
+mod shapes;
 
 pub use body_modes::{BodyModes, NodesInFrame, interfaces_in_frame, rigid_mass};
 pub use conversion::{Conversion, convert, interface_compliance, poor_fits};
@@ -21,3 +23,4 @@ pub use lumped::LumpedPipeline;
 pub use modal_matrices::{modal_damping, modal_geometric_stiffness};
 pub use modal_model::{Condensation, ModalModel};
 pub use settings::{ConvertSettings, Lumping, MeshChoice};
+pub use shapes::{RecoveryShapes, ShapeColumn, recovery_shapes};

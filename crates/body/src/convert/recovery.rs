@@ -2,6 +2,7 @@
 //! section 12).
 
 use super::ModalModel;
+use super::answered::{Targets, mapped_answers};
 use crate::basis::{
     CoupledModel, accurate_static_responses, centrifugal_loads, interface_loads, rigid_modes,
 };
@@ -11,7 +12,8 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{
-    CscMatrix, combine, dense_cholesky, gram, side_by_side, solve_lower, solve_upper, subtract_combination,
+    CscMatrix, column_products, combine, dense_cholesky, gram, side_by_side, solve_lower, solve_upper,
+    subtract_combination,
 };
 use flexbody_model::{Coupling, FeModel, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow, rigid_axes};
 use std::collections::HashSet;
@@ -19,8 +21,11 @@ use std::collections::HashSet;
 /// Names of the components of force and torque.
 const COMPONENTS: [&str; LOAD_COMPONENTS] = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
 
+/// Names of the axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
 impl ModalModel<'_> {
-    /// Returns the recoveries that the model asks for. Their static columns need one factor of K + tau M; cuts need
+    /// Returns the recoveries that the model asks for, with notes and warnings. Their static columns need one factor of K + tau M; cuts need
     /// none.
     ///
     /// * `responds_to_spin`: true if the body holds the group W1, by which the modes respond to spin.
@@ -28,25 +33,42 @@ impl ModalModel<'_> {
     /// # Errors
     /// [`RecoveryCut`](Code::RecoveryCut) for a cut through a rigid interface; failures of the factor, and responses
     /// that are not accurate.
-    pub(super) fn recoveries(&self, responds_to_spin: bool, context: &Context<'_>) -> Result<Vec<Recovery>> {
+    pub(super) fn recoveries(
+        &self,
+        responds_to_spin: bool,
+        context: &Context<'_>,
+    ) -> Result<(Vec<Recovery>, Vec<Diagnostic>)> {
         let asked = self.model.recoveries();
         if asked.is_empty() {
-            return Ok(Vec::new());
+            return Ok(Default::default());
         }
         context.phase("recovery");
-        let basis = FreeBasis::new(self)?;
+        let basis = FreeBasis::new(self.model, &self.modes.vectors, self.modal_stiffness.clone())?;
         let loads = StaticLoads::new(self.model)?;
-        let is_operator = |one: &ModelRecovery| matches!(one.operator, RecoveryOperator::Rows { .. });
-        let responses = match asked.iter().any(is_operator) {
+        let is_cut = |one: &ModelRecovery| matches!(one.operator, RecoveryOperator::Cut { .. });
+        let responses = match !asked.iter().all(is_cut) {
             true => self.responses(&basis, &loads, responds_to_spin, context)?,
             false => Mat::new(),
         };
+        let mut diagnostics = Vec::new();
         let one = |one: &ModelRecovery| match &one.operator {
             RecoveryOperator::Rows { transposed, labels, offset } => {
                 let modes = product(transposed, &self.modes.vectors);
                 let columns = product(transposed, &responses);
                 let offset = offset.clone().unwrap_or_else(|| vec![0.0; labels.len()]);
                 Ok(loads.recovery(&one.name, labels.clone(), offset, modes, &columns))
+            }
+            RecoveryOperator::Shapes { shapes, labels } => {
+                let targets = Targets {
+                    modes: &basis.modes,
+                    responses: &responses,
+                    sizes: basis.sizes_of_responses(&responses, &loads, responds_to_spin),
+                    names: loads.names(),
+                };
+                let mapped = mapped_answers(self.model, one, shapes, &targets)?;
+                diagnostics.extend(mapped.diagnostics);
+                let offset = vec![0.0; labels.len()];
+                Ok(loads.recovery(&one.name, labels.clone(), offset, mapped.modes, &mapped.columns))
             }
             RecoveryOperator::Cut { nodes, about } => {
                 self.refuse_divided_interface(one, nodes, &basis.coupled)?;
@@ -58,7 +80,8 @@ impl ModalModel<'_> {
             }
         };
         let along_model = asked.iter().map(one).collect::<Result<Vec<Recovery>>>()?;
-        Ok(along_model.iter().map(|one| one.in_axes(&self.place.frame.axes)).collect())
+        let recoveries = along_model.iter().map(|one| one.in_axes(&self.place.frame.axes)).collect();
+        Ok((recoveries, diagnostics))
     }
 
     /// Returns the static responses G_r F to all loads (N x m), relative to the frame of the body.
@@ -70,10 +93,7 @@ impl ModalModel<'_> {
         context: &Context<'_>,
     ) -> Result<Mat<f64>> {
         let first = self.found.solution.eigenvalues[0];
-        let mut responses = accurate_static_responses(&basis.coupled, loads.forces.clone(), first, context)?;
-        // Less the part that the modes contain.
-        let amplitudes = basis.static_amplitudes(loads, responds_to_spin);
-        subtract_combination(responses.as_mut(), basis.modes.as_ref(), amplitudes.as_ref());
+        let mut responses = basis.responses(loads, first, responds_to_spin, context)?;
         // A frame on an interface follows its motion.
         if let Some(name) = self.settings.frame.interface()
             && let Some(measure) = interface_loads(self.model, name)?
@@ -111,26 +131,63 @@ impl ModalModel<'_> {
 }
 
 /// Modes without rigid motion, and the model with the couplings that they preserve.
-struct FreeBasis<'m> {
+pub(super) struct FreeBasis<'m> {
     coupled: CoupledModel<'m>,
     /// Rigid motions (N x 6), M-orthonormal.
-    rigid: Mat<f64>,
+    pub(super) rigid: Mat<f64>,
     /// Psi_m = Psi - R R'M Psi (N x nf).
-    modes: Mat<f64>,
+    pub(super) modes: Mat<f64>,
     /// K_ff.
     stiffness: Mat<f64>,
 }
 
 impl<'m> FreeBasis<'m> {
-    fn new(found: &ModalModel<'m>) -> Result<Self> {
-        let (model, vectors) = (found.model, &found.modes.vectors);
+    /// Creates the basis of the modes `vectors` (N x nf) with the stiffness `stiffness`.
+    pub(super) fn new(model: &'m FeModel, vectors: &Mat<f64>, stiffness: Mat<f64>) -> Result<Self> {
         let pencil = model.pencil();
         let rigid = rigid_modes(model, &pencil)?;
         let mut modes = vectors.clone();
         let along = gram(rigid.as_ref(), pencil.apply_mass(modes.as_ref()).as_ref());
         subtract_combination(modes.as_mut(), rigid.as_ref(), along.as_ref());
         let coupled = CoupledModel::of_modes(model, model.interfaces(), vectors.as_ref());
-        Ok(Self { coupled, rigid, modes, stiffness: found.modal_stiffness.clone() })
+        Ok(Self { coupled, rigid, modes, stiffness })
+    }
+
+    /// Returns the static responses G_r F to all loads (N x m), in mean axes.
+    ///
+    /// * `first`: about the first flexible eigenvalue.
+    pub(super) fn responses(
+        &self,
+        loads: &StaticLoads,
+        first: f64,
+        responds_to_spin: bool,
+        context: &Context<'_>,
+    ) -> Result<Mat<f64>> {
+        let mut responses = accurate_static_responses(&self.coupled, loads.forces.clone(), first, context)?;
+        // Less the part that the modes contain.
+        let amplitudes = self.static_amplitudes(loads, responds_to_spin);
+        subtract_combination(responses.as_mut(), self.modes.as_ref(), amplitudes.as_ref());
+        Ok(responses)
+    }
+
+    /// Returns the M-norms of the whole static responses, about |G_r F| + |Psi_m K_ff^-1 Psi_m'F|.
+    pub(super) fn sizes_of_responses(
+        &self,
+        responses: &Mat<f64>,
+        loads: &StaticLoads,
+        responds_to_spin: bool,
+    ) -> Vec<f64> {
+        let amplitudes = self.static_amplitudes(loads, responds_to_spin);
+        let of_modes = combine(self.modes.as_ref(), amplitudes.as_ref());
+        let both = self.norms(responses).into_iter().zip(self.norms(&of_modes));
+        both.map(|(outside, inside)| outside + inside).collect()
+    }
+
+    /// Returns the M-norms of fields (N x m).
+    pub(super) fn norms(&self, fields: &Mat<f64>) -> Vec<f64> {
+        let moved = self.coupled.model().pencil().apply_mass(fields.as_ref());
+        let squares = column_products(fields.as_ref(), moved.as_ref());
+        squares.into_iter().map(|square| square.max(0.0).sqrt()).collect()
     }
 
     /// Returns the amplitudes K_ff^-1 Psi_m'F of the modes under constant loads. Without response to spin they are
@@ -175,7 +232,7 @@ fn solve(a: &Mat<f64>, b: &Mat<f64>) -> Option<Mat<f64>> {
 
 /// Loads of the columns, along the axes of the model: six (in the plane one) centrifugal loads, then six (in the plane
 /// three) for each interface with a reference point.
-struct StaticLoads {
+pub(super) struct StaticLoads {
     /// Nodal forces (N x m).
     forces: Mat<f64>,
     /// Components of [`LoadKind::SPIN`] of the centrifugal loads.
@@ -186,7 +243,7 @@ struct StaticLoads {
 }
 
 impl StaticLoads {
-    fn new(model: &FeModel) -> Result<Self> {
+    pub(super) fn new(model: &FeModel) -> Result<Self> {
         let mut parts = centrifugal_loads(model);
         let mut interfaces = Vec::new();
         for set in model.interfaces().iter().filter(|set| set.coupling() != Coupling::Free) {
@@ -202,6 +259,18 @@ impl StaticLoads {
             interfaces,
             components: rigid_axes(model.dimension()),
         })
+    }
+
+    /// Returns the names of the loads, in their order.
+    pub(super) fn names(&self) -> Vec<String> {
+        let spin = self.spins.iter().map(|&c| {
+            let (k, l) = LoadKind::SPIN[c];
+            format!("spin {}{}", AXES[k], AXES[l])
+        });
+        let at = |interface: &String| {
+            self.components.iter().map(|&c| format!("{interface} {}", COMPONENTS[c])).collect::<Vec<_>>()
+        };
+        spin.chain(self.interfaces.iter().flat_map(at)).collect()
     }
 
     /// Returns the modal loads Psi_m'F (nf x m); those of spin are zero if the modes do not respond to it.

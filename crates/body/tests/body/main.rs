@@ -3,6 +3,7 @@
 #![allow(unreachable_pub)] // tests export nothing
 
 mod accepted;
+mod answered_shapes;
 mod beams;
 mod certified_invariants;
 mod convergence;

@@ -42,6 +42,15 @@ impl Card {
         self.parameters.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 
+    /// Returns the keyword line.
+    pub(super) fn head(&self) -> String {
+        let parameters = self.parameters.iter().map(|(name, value)| match value.as_str() {
+            "" => format!(", {name}"),
+            value => format!(", {name}={value}"),
+        });
+        format!("*{}{}\n", self.title, parameters.collect::<String>())
+    }
+
     /// Returns the value of a parameter in the form in which names are compared.
     pub(super) fn name(&self, parameter: &str) -> Option<String> {
         self.parameter(parameter).map(comparable)

@@ -5,13 +5,25 @@ use crate::model_files::{InterfaceNodes, OperatorSource, RecoverySource};
 use flexbody_base::diagnostic::Code;
 use std::collections::HashSet;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-pub(super) const RECOVERY: &[&str] =
-    &["name", "operator", "rows", "offset", "cut", "set", "box", "cylinder", "plane", "about"];
+pub(super) const RECOVERY: &[&str] = &[
+    "name",
+    "operator",
+    "rows",
+    "offset",
+    "shapes",
+    "displacements",
+    "cut",
+    "set",
+    "box",
+    "cylinder",
+    "plane",
+    "about",
+];
 
 /// Keys of [`RECOVERY`] that define the rows.
-const SOURCES: &[&str] = &["operator", "cut", "set", "box", "cylinder", "plane"];
+const SOURCES: &[&str] = &["operator", "shapes", "cut", "set", "box", "cylinder", "plane"];
 
 impl ManifestWalk<'_, '_> {
     /// Reads the rows to read off the body. Entries with errors are left out; the errors are in `found`.
@@ -47,7 +59,11 @@ impl ManifestWalk<'_, '_> {
             self.complain(Code::ManifestSyntax, span, message);
             return None;
         };
-        let foreign: &[&str] = if key == "operator" { &["about"] } else { &["rows", "offset"] };
+        let foreign: &[&str] = match key {
+            "operator" => &["about", "displacements"],
+            "shapes" => &["about", "rows", "offset"],
+            _ => &["rows", "offset", "displacements"],
+        };
         if let Some(other) = foreign.iter().find(|other| table.contains_key(**other)) {
             let message = format!("recovery `{name}` has `{other}`, which does not belong to `{key}`");
             self.complain(Code::ManifestSyntax, span, message);
@@ -66,6 +82,18 @@ impl ManifestWalk<'_, '_> {
                 false => None,
             };
             OperatorSource::Rows { operator, rows, offset }
+        } else if key == "shapes" {
+            let answers = folder.join(self.string(table, "shapes")?);
+            let displacements = match table.contains_key("displacements") {
+                true => folder.join(self.string(table, "displacements")?),
+                false => answers.with_extension("npz"),
+            };
+            // CalculiX prints the strain energies into a file beside its results.
+            let is_frd = answers.extension().is_some_and(|extension| extension == "frd");
+            let printed = Some(answers.with_extension("dat"));
+            let has_tables = |path: &PathBuf| path.metadata().is_ok_and(|file| file.len() > 0);
+            let energies = printed.filter(|path| is_frd && has_tables(path));
+            OperatorSource::Shapes { answers, displacements, energies }
         } else {
             let nodes = match key {
                 "cut" => InterfaceNodes::File(folder.join(self.string(table, key)?)),

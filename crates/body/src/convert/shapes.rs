@@ -1,0 +1,100 @@
+//! Shapes whose stresses an FE program is asked for: the modes of a body, and the static responses to loads and spin
+//! outside the modes.
+
+use super::recovery::{FreeBasis, StaticLoads};
+use crate::flex_body::FlexBody;
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_linalg::context::Context;
+use flexbody_linalg::{gram, largest_entry, side_by_side, subtract_combination};
+use flexbody_model::{FeModel, extents};
+
+/// Difference of Psi'K Psi from the stored K_ff, relative to its largest entry, above which the model is another one.
+const MAX_STIFFNESS_DIFFERENCE: f64 = 1e-5;
+
+/// Size of a static response outside the modes, relative to the whole response, below which it is rounding.
+const MIN_RESPONSE: f64 = 1e-9;
+
+/// Largest displacement of a shape, relative to the diagonal of the box around the nodes. Stresses of metals then have the size of their
+/// strength, so that values in tables with few decimals keep their digits.
+const SHAPE_SIZE: f64 = 1e-3;
+
+/// Mode or static column that a shape is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ShapeColumn {
+    /// Mode, counted from 1.
+    Mode(usize),
+    /// Static response to the load of this name.
+    Static(String),
+}
+
+impl std::fmt::Display for ShapeColumn {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Mode(number) => write!(f, "mode {number}"),
+            Self::Static(name) => f.write_str(name),
+        }
+    }
+}
+
+/// Shapes of a body, without rigid motion.
+#[derive(Debug, Clone)]
+pub struct RecoveryShapes {
+    /// Mode or column of each shape.
+    pub columns: Vec<ShapeColumn>,
+    /// Factor of each shape: a shape is the factor times its mode or column.
+    pub factors: Vec<f64>,
+    /// Displacements by internal rows of the model (N x s).
+    pub fields: Mat<f64>,
+}
+
+/// Returns the shapes of `body`, whose combinations are its modes and the static columns of every recovery, except
+/// static columns that the modes contain.
+///
+/// # Errors
+/// [`BodyIncomparable`](Code::BodyIncomparable) if the body is not of `model`; failures of the factor.
+pub fn recovery_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) -> Result<RecoveryShapes> {
+    let incomparable = |message: &str| Diagnostic::new(Code::BodyIncomparable, message);
+    let vectors = (body.nodes().ids == model.nodes().ids).then(|| body.vectors_of(model)).flatten();
+    let Some(vectors) = vectors else {
+        return Err(incomparable("the nodes and rows of the body are not those of the model").into());
+    };
+    let stored = body.invariants().modal_stiffness();
+    let computed = gram(vectors.as_ref(), model.pencil().apply_stiffness(vectors.as_ref()).as_ref());
+    let apart = largest_entry((&computed - stored).as_ref());
+    let allowed = (MAX_STIFFNESS_DIFFERENCE + body.storage().rounding()) * largest_entry(stored.as_ref());
+    if apart.is_nan() || apart > allowed {
+        return Err(incomparable("the stiffness of the body's modes is not that of the model").into());
+    }
+    context.phase("static responses");
+    let basis = FreeBasis::new(model, &vectors, stored.clone())?;
+    let loads = StaticLoads::new(model)?;
+    let responds_to_spin = body.groups().w1;
+    let mut responses = basis.responses(&loads, body.modes().eigenvalue[0], responds_to_spin, context)?;
+    let sizes = basis.sizes_of_responses(&responses, &loads, responds_to_spin);
+    let along = gram(basis.rigid.as_ref(), model.pencil().apply_mass(responses.as_ref()).as_ref());
+    subtract_combination(responses.as_mut(), basis.rigid.as_ref(), along.as_ref());
+    let norms = basis.norms(&responses);
+    let modes = basis.modes.ncols();
+    let names = loads.names();
+    let columns = (0..modes).map(|j| ShapeColumn::Mode(j + 1));
+    let columns: Vec<ShapeColumn> = columns.chain(names.into_iter().map(ShapeColumn::Static)).collect();
+    let fields = side_by_side(&[basis.modes.as_ref(), responses.as_ref()]);
+    let is_kept = |j: &usize| {
+        j.checked_sub(modes).is_none_or(|at| norms[at] > MIN_RESPONSE * sizes[at] && norms[at] > 0.0)
+    };
+    let kept: Vec<usize> = (0..columns.len()).filter(is_kept).collect();
+    let size =
+        extents(&model.nodes().positions).into_iter().map(|extent| extent * extent).sum::<f64>().sqrt();
+    let displaced = model.dimension() * model.nodes().len();
+    let factors: Vec<f64> = kept
+        .iter()
+        .map(|&j| SHAPE_SIZE * size / fields.as_ref().subrows(0, displaced).col(j).norm_max())
+        .collect();
+    Ok(RecoveryShapes {
+        columns: kept.iter().map(|&j| columns[j].clone()).collect(),
+        fields: Mat::from_fn(fields.nrows(), kept.len(), |i, j| fields[(i, kept[j])] * factors[j]),
+        factors,
+    })
+}

@@ -1,0 +1,182 @@
+//! Recoveries from the answers of an FE program to shapes, against the operator that gives these answers.
+
+use faer::Mat;
+use flexbody_base::diagnostic::Code;
+use flexbody_base::error::Result;
+use flexbody_body::basis::{BasisChoice, CraigBampton, FreeSurface};
+use flexbody_body::convert::{Conversion, ConvertSettings, ShapeColumn, convert, recovery_shapes};
+use flexbody_body::flex_body::{FlexBody, Recovery};
+use flexbody_body::invariants::{BodyFrame, FrameChoice};
+use flexbody_linalg::context::Context;
+use flexbody_linalg::{column_products, combine};
+use flexbody_model::{AnsweredShapes, Coupling, FeModel, ModelRecovery, NodeSet, RawModel, RecoveryOperator};
+use oracle::craig_bampton::{lowest, model};
+use oracle::elements::{ElementKind, MassRule, Material};
+use oracle::mesh::Mesh;
+
+const CELL: f64 = 0.05;
+
+fn mesh() -> Mesh {
+    let mesh = Mesh::bracket(ElementKind::Hex8, 4, 2, CELL);
+    let skewed = |x: &[f64; 3]| [x[0] + 0.1 * x[1], x[1] * (1.0 + x[0]), x[2] - 0.2 * x[0] * x[1]];
+    Mesh { nodes: mesh.nodes.iter().map(skewed).collect(), elements: mesh.elements }
+}
+
+/// Returns the bracket with interfaces at its ends and a recovery.
+fn bracket(recovery: ModelRecovery) -> RawModel {
+    let mut raw = mesh().assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+    let lattice = Mesh::bracket(ElementKind::Hex8, 4, 2, CELL).nodes;
+    let end = |axis: usize| {
+        let at_end = lattice.iter().enumerate().filter(|(_, x)| (x[axis] - 4.0 * CELL).abs() < 1e-9);
+        at_end.map(|(i, _)| i as i64 + 1).collect()
+    };
+    let set = |(name, axis): (&str, usize)| NodeSet {
+        coupling: Some(Coupling::Averaging),
+        ..NodeSet::new(name, end(axis))
+    };
+    raw.interfaces = [("first", 0), ("second", 2)].map(set).to_vec();
+    raw.recoveries = vec![recovery];
+    raw
+}
+
+fn operator() -> ModelRecovery {
+    mesh().stresses(&Material::STEEL)
+}
+
+fn made(
+    recovery: ModelRecovery,
+    basis: BasisChoice,
+    modes: usize,
+    frame: impl Into<FrameChoice>,
+) -> Result<Conversion> {
+    let settings =
+        ConvertSettings { modes: lowest(modes), basis, frame: frame.into(), ..ConvertSettings::default() };
+    convert(&model(bracket(recovery)), &settings, &Context::QUIET)
+}
+
+fn free() -> BasisChoice {
+    BasisChoice::Free(FreeSurface::default())
+}
+
+/// Returns what an FE program answers to the shapes of `body`.
+fn answered(body: &FlexBody, model: &FeModel) -> (AnsweredShapes, Vec<ShapeColumn>) {
+    let shapes = recovery_shapes(body, model, &Context::QUIET).expect("shapes");
+    let RecoveryOperator::Rows { transposed, .. } = operator().operator else { panic!("an operator") };
+    let u = &shapes.fields;
+    // The rows of this model are in the order of its files.
+    let answer = |row: usize, shape: usize| -> f64 {
+        let (rows, values) = transposed.column(row);
+        rows.iter().zip(values).map(|(at, value)| value * u[(*at as usize, shape)]).sum()
+    };
+    let energies = column_products(u.as_ref(), model.pencil().apply_stiffness(u.as_ref()).as_ref());
+    let answered = AnsweredShapes {
+        dofs: (0..u.nrows()).map(|row| model.label(row)).collect(),
+        displacements: u.clone(),
+        digits: 14,
+        answers: Mat::from_fn(transposed.n_cols(), u.ncols(), answer),
+        answer_digits: 15,
+        energies: Some(energies.into_iter().map(|energy| 0.5 * energy).collect()),
+    };
+    (answered, shapes.columns)
+}
+
+fn recovery_of(shapes: AnsweredShapes) -> ModelRecovery {
+    let RecoveryOperator::Rows { labels, .. } = operator().operator else { panic!("an operator") };
+    ModelRecovery { operator: RecoveryOperator::Shapes { shapes, labels }, ..operator() }
+}
+
+/// Returns the largest difference of two recoveries, relative to the largest entry of each of their arrays.
+fn difference(a: &Recovery, b: &Recovery) -> f64 {
+    let columns = |one: &Recovery| -> Vec<Mat<f64>> {
+        let loads = one.loads.iter().map(|at| at.columns.clone());
+        [one.modes.clone(), one.spin.clone()].into_iter().chain(loads).collect()
+    };
+    let apart = |(a, b): (Mat<f64>, Mat<f64>)| (&a - &b).norm_max() / b.norm_max();
+    columns(a).into_iter().zip(columns(b)).map(apart).fold(0.0, f64::max)
+}
+
+#[test]
+fn answers_to_the_shapes_of_a_body_give_its_recovery() {
+    let frames: [FrameChoice; 2] = [BodyFrame::Principal.into(), FrameChoice::Interface("first".into())];
+    for frame in frames {
+        let expected = made(operator(), free(), 8, frame.clone()).expect("converts").body;
+        let (shapes, columns) = answered(&expected, &model(bracket(operator())));
+        assert_eq!(columns.len(), 8 + 6 + 12);
+        let found = made(recovery_of(shapes), free(), 8, frame).expect("converts");
+        assert!(difference(&found.body.recoveries()[0], &expected.recoveries()[0]) < 1e-9);
+        let codes: Vec<Code> = found.diagnostics.iter().map(|one| one.code()).collect();
+        assert!(codes.contains(&Code::RecoveryMapped), "{codes:?}");
+    }
+}
+
+#[test]
+fn fewer_modes_are_combinations_of_the_same_shapes() {
+    let whole = made(operator(), free(), 8, BodyFrame::Principal).expect("converts").body;
+    let (shapes, _) = answered(&whole, &model(bracket(operator())));
+    let expected = made(operator(), free(), 3, BodyFrame::Principal).expect("converts").body;
+    let found = made(recovery_of(shapes), free(), 3, BodyFrame::Principal).expect("converts").body;
+    assert!(difference(&found.recoveries()[0], &expected.recoveries()[0]) < 1e-9);
+}
+
+#[test]
+fn answers_to_craig_bampton_shapes_keep_rigid_interfaces() {
+    let basis = || BasisChoice::CraigBampton(CraigBampton);
+    let expected = made(operator(), basis(), 6, BodyFrame::Principal).expect("converts").body;
+    let (shapes, _) = answered(&expected, &model(bracket(operator())));
+    let found = made(recovery_of(shapes), basis(), 6, BodyFrame::Principal).expect("converts").body;
+    assert!(difference(&found.recoveries()[0], &expected.recoveries()[0]) < 1e-8);
+}
+
+#[test]
+fn modes_that_were_not_asked_for_are_refused() {
+    let small = made(operator(), free(), 4, BodyFrame::Principal).expect("converts").body;
+    let (shapes, _) = answered(&small, &model(bracket(operator())));
+    let error = made(recovery_of(shapes), free(), 6, BodyFrame::Principal).expect_err("refused");
+    assert!(error.has(Code::RecoveryUnanswered), "{error}");
+    let message = error.first_error().message();
+    assert!(message.contains("mode 5 (") && message.contains("mode 6 ("), "{message}");
+}
+
+#[test]
+fn mixed_and_turned_shapes_give_the_same_recovery() {
+    let expected = made(operator(), free(), 5, BodyFrame::Principal).expect("converts").body;
+    let reference = model(bracket(operator()));
+    let (mut shapes, columns) = answered(&expected, &reference);
+    // Combinations of neighbouring shapes with a rigid translation, as FE programs may have them.
+    let n = columns.len();
+    let mixing = Mat::from_fn(n, n, |i, j| {
+        if i == j {
+            1.0
+        } else if i + 1 == j {
+            0.4
+        } else {
+            0.0
+        }
+    });
+    shapes.displacements = combine(shapes.displacements.as_ref(), mixing.as_ref());
+    shapes.answers = combine(shapes.answers.as_ref(), mixing.as_ref());
+    shapes.energies = None;
+    for (row, dof) in shapes.dofs.iter().enumerate().filter(|(_, dof)| dof.direction == 2) {
+        assert!(dof.node > 0);
+        (0..n).for_each(|j| shapes.displacements[(row, j)] += 1e-3);
+    }
+    let found = made(recovery_of(shapes), free(), 5, BodyFrame::Principal).expect("converts").body;
+    assert!(difference(&found.recoveries()[0], &expected.recoveries()[0]) < 1e-8);
+}
+
+#[test]
+fn another_stiffness_of_the_fe_program_is_refused() {
+    let body = made(operator(), free(), 4, BodyFrame::Principal).expect("converts").body;
+    let (shapes, _) = answered(&body, &model(bracket(operator())));
+    let scaled = |factor: f64, first: f64| {
+        let energies = shapes.energies.iter().flatten().enumerate();
+        let energies = energies.map(|(k, energy)| energy * if k == 0 { first } else { factor });
+        recovery_of(AnsweredShapes { energies: Some(energies.collect()), ..shapes.clone() })
+    };
+    for factor in [1.05, 1e-6] {
+        let error = made(scaled(factor, factor), free(), 4, BodyFrame::Principal).expect_err("refused");
+        assert!(error.has(Code::RecoveryEnergy), "{error}");
+    }
+    let found = made(scaled(1.0, 0.97), free(), 4, BodyFrame::Principal).expect("converts");
+    assert!(found.diagnostics.iter().any(|one| one.code() == Code::RecoveryEnergyDiffers));
+}

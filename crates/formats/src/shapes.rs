@@ -1,0 +1,137 @@
+//! Shapes whose stresses an FE program is asked for, as files for that program: a deck of CalculiX, a table, an archive
+//! of NumPy.
+
+mod calculix;
+
+use super::npz::{archive, npy, text};
+pub use calculix::{StressDeck, StressPlaces};
+use flexbody_body::convert::{RecoveryShapes, ShapeColumn};
+use flexbody_model::FeModel;
+use std::fmt::Write as _;
+
+/// Number of decimals of a displacement. CalculiX refuses fields of more than 20 characters, as -1.2345678901234e-05
+/// has.
+const DECIMALS: usize = 13;
+
+/// Displacements of all nodes in the shapes, with the digits of their files.
+#[derive(Debug, Clone)]
+pub struct NodalShapes {
+    /// Name of the body.
+    pub body: String,
+    /// Numbers of the nodes.
+    nodes: Vec<i64>,
+    /// Mode or column of each shape.
+    columns: Vec<ShapeColumn>,
+    /// Factor of each shape.
+    factors: Vec<f64>,
+    /// Displacements of each shape and node along the axes of the model.
+    displacements: Vec<Vec<[f64; 3]>>,
+    /// Rotations of each shape and node, if nodes have rotations.
+    rotations: Option<Vec<Vec<[f64; 3]>>>,
+}
+
+impl NodalShapes {
+    /// Creates the shapes of a body named `body` by the nodes of its model.
+    pub fn new(shapes: &RecoveryShapes, model: &FeModel, body: &str) -> Self {
+        let (n, d) = (model.nodes().len(), model.dimension());
+        let count = shapes.columns.len();
+        let displacements = (0..count)
+            .map(|j| {
+                let at = |node: usize, k: usize| if k < d { shapes.fields[(d * node + k, j)] } else { 0.0 };
+                (0..n).map(|node| std::array::from_fn(|k| rounded(at(node, k)))).collect()
+            })
+            .collect();
+        let rows = model.rows();
+        let rotations = (!rows.rotations().is_empty()).then(|| {
+            let of_shape = |j: usize| {
+                let mut of_nodes = vec![[0.0; 3]; n];
+                for (after, (node, axis)) in rows.rotations().iter().enumerate() {
+                    let value = shapes.fields[(rows.displacements() + after, j)];
+                    of_nodes[*node as usize][usize::from(*axis)] = rounded(value);
+                }
+                of_nodes
+            };
+            (0..count).map(of_shape).collect()
+        });
+        Self {
+            body: body.to_owned(),
+            nodes: model.nodes().ids.clone(),
+            columns: shapes.columns.clone(),
+            factors: shapes.factors.clone(),
+            displacements,
+            rotations,
+        }
+    }
+
+    /// Returns the number of shapes.
+    pub fn count(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Returns true if nodes have rotations.
+    pub fn has_rotations(&self) -> bool {
+        self.rotations.is_some()
+    }
+
+    /// Returns the mode or column of each shape with its factor.
+    pub fn columns(&self) -> impl Iterator<Item = (&ShapeColumn, f64)> {
+        self.columns.iter().zip(self.factors.iter().copied())
+    }
+
+    /// Returns the archive from which the answers of the FE program are read: the arrays `nodes`, `displacements`
+    /// (shapes x nodes x 3), `rotations` if nodes have them, `factors`, and the JSON text `description`.
+    pub fn npz(&self) -> Vec<u8> {
+        let columns: Vec<String> = self.columns.iter().map(ToString::to_string).collect();
+        let description = serde_json::json!({
+            "format": "flexbody-shapes",
+            "version": 1,
+            "program": format!("flexbody {}", env!("CARGO_PKG_VERSION")),
+            "body": self.body,
+            "columns": columns,
+        });
+        let (count, n) = (self.count(), self.nodes.len());
+        let field = |values: &[Vec<[f64; 3]>]| {
+            let values = values.iter().flatten().flatten().map(|value| value.to_le_bytes());
+            npy("<f8", &[count, n, 3], values)
+        };
+        let mut members = vec![
+            ("nodes", npy("<i8", &[n], self.nodes.iter().map(|node| node.to_le_bytes()))),
+            ("displacements", field(&self.displacements)),
+        ];
+        members.extend(self.rotations.as_ref().map(|rotations| ("rotations", field(rotations))));
+        members.push(("factors", npy("<f8", &[count], self.factors.iter().map(|f| f.to_le_bytes()))));
+        members.push(("description", text(&description.to_string())));
+        archive(members).expect("memory takes every byte, and no two paths are the same")
+    }
+
+    /// Returns the shapes as a table `step,column,node,ux,uy,uz`, with `rx,ry,rz` if nodes have rotations.
+    pub fn csv(&self) -> String {
+        let mut out = String::from("step,column,node,ux,uy,uz");
+        out += if self.rotations.is_some() { ",rx,ry,rz\n" } else { "\n" };
+        for (step, column) in self.columns.iter().enumerate() {
+            for (at, node) in self.nodes.iter().enumerate() {
+                let turned = self.rotations.iter().flat_map(|rotations| rotations[step][at]);
+                let _ = write!(out, "{},{column},{node}", step + 1);
+                for value in self.displacements[step][at].into_iter().chain(turned) {
+                    let _ = write!(out, ",{}", written(value));
+                }
+                out.push('\n');
+            }
+        }
+        out
+    }
+}
+
+/// Returns a value as it is written.
+fn written(value: f64) -> String {
+    format!("{value:.DECIMALS$e}")
+}
+
+/// Returns a value with the digits with which it is written.
+fn rounded(value: f64) -> f64 {
+    // A denormalised value has too long an exponent, and no effect.
+    if value.abs() < 1e-90 {
+        return 0.0;
+    }
+    written(value).parse().expect("a number was written")
+}

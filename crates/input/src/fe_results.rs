@@ -1,0 +1,284 @@
+//! Results of an FE program for shapes with given displacements: stresses step by step, from which a recovery is made.
+//! Each format has one file and is recognised by its content.
+
+mod any_program;
+mod dat;
+mod frd;
+mod shape_archive;
+#[cfg(test)]
+mod tests;
+
+use super::hdf5::Hdf5;
+use super::reader::{HEAD, Reader};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::InputFile;
+use flexbody_base::units::UnitSystem;
+use flexbody_model::{AnsweredShapes, Quantity, RecoveryOperator, RecoveryRow};
+use shape_archive::ShapeArchive;
+use std::collections::HashMap;
+
+type Found<T> = Result<T, Vec<Diagnostic>>;
+
+/// Components of the stress in the order of the rows of a recovery.
+const COMPONENTS: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
+
+/// Smallest tolerance of displacements that an FE program returns, relative to the largest one of their shape. Files
+/// with fewer digits get a tolerance of ten units of their last digit.
+const MIN_TOLERANCE: f64 = 1e-9;
+
+/// Files of the answers of an FE program to shapes.
+pub(super) struct AnswerFiles<'a> {
+    /// Stresses and displacements of every step.
+    pub answers: &'a InputFile,
+    /// Displacements of all nodes in the shapes: the archive that was written with the deck, or results.
+    pub displacements: &'a InputFile,
+    /// Printed results with the strain energy of every step.
+    pub energies: Option<&'a InputFile>,
+}
+
+/// Returns the recovery of the answers of an FE program: six stresses for each node or integration point, with
+/// warnings.
+///
+/// # Errors
+/// FB327 for results that cannot be read; FB326 for results of another number of shapes, of other displacements or
+/// without displacements; the errors of archives of shapes.
+pub(super) fn read_answers(
+    files: &AnswerFiles<'_>,
+    units: &UnitSystem,
+) -> Found<(RecoveryOperator, Vec<Diagnostic>)> {
+    let values = read_values(files.answers)?;
+    let shapes = match ShapeArchive::recognises(files.displacements) {
+        true => ShapeArchive::read(files.displacements)?,
+        false => ShapeArchive::of_results(&read_values(files.displacements)?, files.displacements)?,
+    };
+    let count = shapes.count();
+    if values.steps() != count {
+        let message = format!(
+            "the results have {} steps, {} has {count} shapes",
+            values.steps(),
+            files.displacements.path().display()
+        );
+        return Err(vec![Diagnostic::new(Code::RecoveryShapes, message).in_file(files.answers.path())]);
+    }
+    refuse_other_displacements(&values, &shapes, files)?;
+    let energies = match files.energies {
+        Some(printed) => dat::read(printed)?.energies().map(|energies| (energies, printed)),
+        None => values.energies().map(|energies| (energies, files.answers)),
+    };
+    if let Some((energies, file)) = energies.as_ref().filter(|(energies, _)| energies.len() != count) {
+        let message = format!("strain energies are those of {} steps, expected {count}", energies.len());
+        let help = "remove the file if it belongs to another run";
+        return Err(vec![
+            Diagnostic::new(Code::RecoveryShapes, message).in_file(file.path()).with_help(help),
+        ]);
+    }
+    let averaged = averaged_warning(&values, files.answers);
+    let labels = labels(&values.places, units);
+    let energies = energies.map(|(energies, _)| energies);
+    let ShapeArchive { dofs, displacements, digits } = shapes;
+    let (answers, answer_digits) = (values.stresses(), values.digits);
+    let shapes = AnsweredShapes { dofs, displacements, digits, answers, answer_digits, energies };
+    Ok((RecoveryOperator::Shapes { shapes, labels }, averaged.into_iter().collect()))
+}
+
+/// Reads results in any of the formats.
+fn read_values(file: &InputFile) -> Found<StepValues> {
+    let head = file.first_bytes(HEAD);
+    if Hdf5.recognises(&head) {
+        return any_program::read_hdf5(file);
+    }
+    file.load().map_err(|diagnostic| vec![diagnostic])?;
+    if frd::recognises(&head) {
+        return frd::read(file);
+    }
+    if dat::recognises(&head) {
+        return dat::read(file);
+    }
+    any_program::read_table(file)
+}
+
+/// Returns FB326 if the displacements in the results are not those of the shapes: the results then belong to another
+/// deck.
+fn refuse_other_displacements(
+    values: &StepValues,
+    shapes: &ShapeArchive,
+    files: &AnswerFiles<'_>,
+) -> Found<()> {
+    let refuse = |message: String| {
+        Err(vec![Diagnostic::new(Code::RecoveryShapes, message).in_file(files.answers.path())])
+    };
+    if values.moved.is_empty() {
+        return refuse("the results have no displacements, which show that they belong to the shapes".into());
+    }
+    let place: HashMap<_, usize> = shapes.dofs.iter().enumerate().map(|(at, dof)| (*dof, at)).collect();
+    let tolerance = MIN_TOLERANCE.max(10f64.powi(1 - i32::from(values.digits)));
+    for (step, displacements) in values.displacements.iter().enumerate() {
+        let size = shapes.displacements.col(step).norm_max();
+        let (mut worst, mut at) = (0.0, 0);
+        for (&node, u) in values.moved.iter().zip(displacements) {
+            for (direction, &value) in (1..).zip(u) {
+                let Some(&row) = place.get(&flexbody_model::DofLabel { node, direction }) else {
+                    return refuse(format!("node {node} of the results is not among the shapes"));
+                };
+                let apart = (value - shapes.displacements[(row, step)]).abs();
+                if apart > worst {
+                    (worst, at) = (apart, node);
+                }
+            }
+        }
+        if worst > tolerance * size {
+            return refuse(format!(
+                "displacements of step {} differ from those of its shape in {} by {:.1e} of the largest, at node {at}, expected at most {tolerance:.0e}",
+                step + 1,
+                files.displacements.path().display(),
+                worst / size
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Returns a warning about nodes whose elements have several materials.
+fn averaged_warning(values: &StepValues, file: &InputFile) -> Option<Diagnostic> {
+    let mut nodes = values.averaged.clone();
+    if nodes.is_empty() {
+        return None;
+    }
+    nodes.sort_unstable();
+    let named: Vec<String> = nodes.iter().take(5).map(i64::to_string).collect();
+    let more = if nodes.len() > named.len() { ", ..." } else { "" };
+    let message = format!(
+        "stresses of {} nodes are means over elements of several materials: node {}{more}",
+        nodes.len(),
+        named.join(", ")
+    );
+    Some(Diagnostic::new(Code::RecoveryAveraged, message).in_file(file.path()))
+}
+
+/// Returns six labels for each place.
+fn labels(places: &[Place], units: &UnitSystem) -> Vec<RecoveryRow> {
+    let unit = stress_unit(units);
+    let of_place = |place: &Place| {
+        let (name, node, element) = match *place {
+            Place::Node(node) => (format!("n{node}"), Some(node), None),
+            Place::Point { element, point } => (format!("e{element} p{point}"), None, Some(element)),
+        };
+        COMPONENTS.map(|component| RecoveryRow {
+            name: format!("{name} {component}"),
+            quantity: Quantity::Stress,
+            component: component.to_owned(),
+            unit: unit.clone(),
+            node,
+            element,
+        })
+    };
+    places.iter().flat_map(of_place).collect()
+}
+
+/// Returns the unit of stress that follows from the units of the model.
+fn stress_unit(units: &UnitSystem) -> String {
+    let [mass, length, time] = [&units.mass, &units.length, &units.time];
+    let pascal = mass.to_si() / (length.to_si() * time.to_si().powi(2));
+    for (name, size) in [("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("GPa", 1e9)] {
+        if (pascal / size - 1.0).abs() < 1e-12 {
+            return name.to_owned();
+        }
+    }
+    format!("{pascal:e} Pa")
+}
+
+/// Place of six stresses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// Number of a node.
+    Node(i64),
+    /// Integration point of an element.
+    Point { element: i64, point: i64 },
+}
+
+/// Stresses and displacements of all steps.
+#[derive(Debug, Default)]
+struct StepValues {
+    /// Places of the stresses, equal in all steps.
+    places: Vec<Place>,
+    /// Stresses of each step and place, in the order xx, yy, zz, xy, yz, xz.
+    stresses: Vec<Vec<[f64; 6]>>,
+    /// Nodes of the displacements, equal in all steps.
+    moved: Vec<i64>,
+    /// Displacements of each step and node.
+    displacements: Vec<Vec<[f64; 3]>>,
+    /// Strain energies of the steps; fewer than the steps if some have none.
+    energies: Vec<f64>,
+    /// Significant decimal digits of stresses and displacements.
+    digits: u8,
+    /// Nodes whose stresses are means over several materials.
+    averaged: Vec<i64>,
+}
+
+/// Values of one step.
+#[derive(Debug, Default)]
+struct Step {
+    stresses: Vec<(Place, [f64; 6])>,
+    displacements: Vec<(i64, [f64; 3])>,
+    energy: Option<f64>,
+}
+
+impl StepValues {
+    /// Collects the values of all steps.
+    ///
+    /// # Errors
+    /// FB327 for results without stresses, for steps with different places, and for values that are not finite.
+    fn of(steps: Vec<Step>, digits: u8, file: &InputFile) -> Found<Self> {
+        let mut values = Self { digits, ..Self::default() };
+        for (at, step) in steps.into_iter().enumerate() {
+            let (places, stresses): (Vec<_>, Vec<_>) = step.stresses.into_iter().unzip();
+            let (moved, displacements): (Vec<_>, Vec<_>) = step.displacements.into_iter().unzip();
+            if at == 0 {
+                (values.places, values.moved) = (places, moved);
+            } else if places != values.places || moved != values.moved {
+                let message = format!("step {} has values at other places than step 1", at + 1);
+                return Err(unreadable(file, message));
+            }
+            let finite = stresses.iter().flatten().chain(displacements.iter().flatten());
+            if finite.chain(&step.energy).any(|value| !value.is_finite()) {
+                return Err(unreadable(file, format!("a value of step {} is not finite", at + 1)));
+            }
+            values.stresses.push(stresses);
+            values.displacements.push(displacements);
+            values.energies.extend(step.energy);
+        }
+        Ok(values)
+    }
+
+    /// Refuses values without stresses.
+    ///
+    /// # Errors
+    /// FB327.
+    fn with_stresses(self, file: &InputFile) -> Found<Self> {
+        if self.places.is_empty() {
+            return Err(unreadable(file, "no stresses are in the file"));
+        }
+        Ok(self)
+    }
+
+    /// Returns the number of steps.
+    fn steps(&self) -> usize {
+        self.stresses.len()
+    }
+
+    /// Returns the strain energies; `None` if there are none.
+    fn energies(&self) -> Option<Vec<f64>> {
+        (!self.energies.is_empty()).then(|| self.energies.clone())
+    }
+
+    /// Returns the stresses with six rows for each place and one column for each step.
+    fn stresses(&self) -> Mat<f64> {
+        Mat::from_fn(6 * self.places.len(), self.steps(), |row, step| self.stresses[step][row / 6][row % 6])
+    }
+}
+
+/// Returns FB327 about a file.
+fn unreadable(file: &InputFile, message: impl Into<String>) -> Vec<Diagnostic> {
+    vec![Diagnostic::new(Code::FeResultsSyntax, message).in_file(file.path())]
+}

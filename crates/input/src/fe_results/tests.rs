@@ -1,0 +1,396 @@
+//! Results in every format, written by the tests.
+
+use super::{AnswerFiles, Found, read_answers};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::InputFile;
+use flexbody_base::units::UnitSystem;
+use flexbody_model::{AnsweredShapes, RecoveryOperator, RecoveryRow};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
+
+const NODES: [i32; 4] = [11, 4, 7, 1_000_000];
+
+/// Nodes with results.
+const WATCHED: [i32; 2] = [7, 11];
+
+/// Returns a displacement of a node in a step.
+fn displacement(step: usize, node: i32, k: usize) -> f64 {
+    let x = f64::from(node % 13) + 1.0;
+    1e-3 * (x * (step + 1) as f64 + 0.37 * (k as f64 - 1.0) * x * x).sin()
+}
+
+/// Returns a stress in the order xx, yy, zz, xy, yz, xz.
+fn stress(step: usize, node: i32, component: usize) -> f64 {
+    100.0 * (f64::from(node) + 3.0 * component as f64 + 0.5 * step as f64).cos()
+}
+
+/// Form of a file of results.
+#[derive(Clone, Copy, PartialEq)]
+enum Form {
+    Text,
+    Single,
+    Double,
+}
+
+/// Returns a number in the form of C and Fortran: 1.50000E+02.
+fn exponential(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$E}");
+    let (mantissa, exponent) = text.split_once('E').expect("an exponent");
+    let exponent: i32 = exponent.parse().expect("an exponent");
+    format!("{mantissa}E{}{:02}", if exponent < 0 { '-' } else { '+' }, exponent.abs())
+}
+
+/// Returns results of CalculiX with `steps` steps. Two elements of materials 1 and 2 share node 7.
+fn frd(form: Form, steps: usize) -> Vec<u8> {
+    let flag = match form {
+        Form::Text => 1,
+        Form::Single => 2,
+        Form::Double => 3,
+    };
+    let line = |out: &mut Vec<u8>, text: String| out.extend(format!("{text}\n").into_bytes());
+    let mut out = b"    1C\n    1UPGM               CalculiX\n".to_vec();
+    let number = |out: &mut Vec<u8>, value: f64| match form {
+        Form::Text => out.extend(format!("{:>12}", exponential(value, 5)).into_bytes()),
+        Form::Single => out.extend((value as f32).to_le_bytes()),
+        Form::Double => out.extend(value.to_le_bytes()),
+    };
+    let record = |out: &mut Vec<u8>, node: i32, values: &[f64]| {
+        match form {
+            Form::Text => out.extend(format!(" -1{node:10}").into_bytes()),
+            _ => out.extend(node.to_le_bytes()),
+        }
+        values.iter().for_each(|value| number(out, *value));
+        if form == Form::Text {
+            out.push(b'\n');
+        }
+    };
+    let end = |out: &mut Vec<u8>| {
+        if form == Form::Text {
+            out.extend(b" -3\n");
+        }
+    };
+    let heading = |name: &str, count: usize| format!("{name:>6}{:18}{count:12}{:37}{flag}", "", "");
+    line(&mut out, heading("    2C", NODES.len()));
+    NODES.iter().for_each(|node| record(&mut out, *node, &[0.5, 1.5, 2.5]));
+    end(&mut out);
+    line(&mut out, heading("    3C", 2));
+    for (element, material, nodes) in [(1, 1, [11, 7]), (2, 2, [7, 4])] {
+        if form == Form::Text {
+            line(&mut out, format!(" -1{element:10}{:5}{:5}{material:5}", 11, 0));
+            line(&mut out, format!(" -2{:10}{:10}", nodes[0], nodes[1]));
+        } else {
+            let numbers = [element, 11, 0, material, nodes[0], nodes[1]];
+            numbers.iter().for_each(|number: &i32| out.extend(number.to_le_bytes()));
+        }
+    }
+    end(&mut out);
+    for step in 0..steps {
+        let head = |count: usize| {
+            format!(
+                "  100C{:6}{:12.9}{count:12}{:20}{:2}{:5}{:10}{:2}",
+                "L  101",
+                1.0,
+                "",
+                0,
+                step + 1,
+                "",
+                flag
+            )
+        };
+        line(&mut out, head(WATCHED.len()));
+        line(&mut out, " -4  DISP        4    1".to_owned());
+        for k in 1..=3 {
+            line(&mut out, format!(" -5  D{k}          1    2    {k}    0"));
+        }
+        line(&mut out, " -5  ALL         1    2    0    0    1ALL".to_owned());
+        for node in WATCHED {
+            record(&mut out, node, &[0, 1, 2].map(|k| displacement(step, node, k)));
+        }
+        end(&mut out);
+        line(&mut out, head(WATCHED.len()));
+        line(&mut out, " -4  STRESS      6    1".to_owned());
+        for (k, name) in ["XX", "YY", "ZZ", "XY", "YZ", "ZX"].iter().enumerate() {
+            line(&mut out, format!(" -5  S{name}         1    4{:5}    1", k + 1));
+        }
+        for node in WATCHED {
+            record(&mut out, node, &[0, 1, 2, 3, 4, 5].map(|k| stress(step, node, k)));
+        }
+        end(&mut out);
+    }
+    out.extend(b" 9999\n");
+    out
+}
+
+/// Returns printed results with the strain energy step + 1.
+fn dat(steps: usize, with_stresses: bool) -> String {
+    let mut out = String::new();
+    for step in 0..steps {
+        let time = step as f64 + 1.0;
+        if with_stresses {
+            out += &format!("\n displacements (vx,vy,vz) for set W and time  {time:e}\n\n");
+            for node in WATCHED {
+                let [x, y, z] = [0, 1, 2].map(|k| exponential(displacement(step, node, k), 6));
+                out += &format!("{node:10} {x:>13} {y:>13} {z:>13}\n");
+            }
+            out += &format!(
+                "\n stresses (elem, integ.pnt.,sxx,syy,szz,sxy,sxz,syz) for set E and time  {time:e}\n\n"
+            );
+            for point in WATCHED {
+                let [xx, yy, zz, xy, yz, xz] =
+                    [0, 1, 2, 3, 4, 5].map(|k| exponential(stress(step, point, k), 6));
+                out += &format!("{:10}{point:4} {xx:>13} {yy:>13} {zz:>13} {xy:>13} {xz:>13} {yz:>13}\n", 5);
+            }
+            out += &format!("\n volume (element, volume) for set E and time  {time:e}\n\n 5 1.0\n");
+        }
+        out += &format!("\n total internal energy for set E and time  {time:e}\n\n       {time:.6E}\n");
+    }
+    out
+}
+
+fn csv(steps: usize) -> String {
+    let mut out = "step,node,ux,uy,uz,sxx,syy,szz,sxy,syz,sxz\n".to_owned();
+    for step in 0..steps {
+        for node in WATCHED {
+            let u = [0, 1, 2].map(|k| displacement(step, node, k));
+            let s = [0, 1, 2, 3, 4, 5].map(|k| stress(step, node, k));
+            let values: Vec<String> = u.iter().chain(&s).map(|value| format!("{value:.6e}")).collect();
+            out += &format!("{},{node},{}\n", step + 1, values.join(","));
+        }
+    }
+    out
+}
+
+/// Returns an archive of the displacements of all nodes.
+fn archive(steps: usize) -> Vec<u8> {
+    let npy = |kind: &str, shape: String, bytes: Vec<u8>| {
+        let mut head = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
+        while (head.len() + 11) % 64 != 0 {
+            head.push(' ');
+        }
+        head.push('\n');
+        let length = u16::try_from(head.len()).expect("a short head").to_le_bytes();
+        [b"\x93NUMPY\x01\x00", &length[..], head.as_bytes(), &bytes].concat()
+    };
+    let nodes = NODES.iter().flat_map(|node| i64::from(*node).to_le_bytes()).collect();
+    let at =
+        |step: usize| NODES.iter().flat_map(move |node| (0..3).map(move |k| displacement(step, *node, k)));
+    let values = (0..steps).flat_map(at).flat_map(f64::to_le_bytes).collect();
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut zip = ZipWriter::new(&mut bytes);
+    for (name, content) in [
+        ("nodes.npy", npy("<i8", format!("{},", NODES.len()), nodes)),
+        ("displacements.npy", npy("<f8", format!("{steps}, {}, 3", NODES.len()), values)),
+    ] {
+        zip.start_file(name, SimpleFileOptions::default()).expect("memory");
+        zip.write_all(&content).expect("memory");
+    }
+    zip.finish().expect("memory");
+    bytes.into_inner()
+}
+
+/// Folder with the archive of shapes and results.
+struct Place(TempDir);
+
+impl Place {
+    fn new(shapes: usize) -> Self {
+        let place = Self(tempfile::tempdir().expect("a folder"));
+        place.put("ask.npz", &archive(shapes));
+        place
+    }
+
+    fn put(&self, name: &str, bytes: &[u8]) -> PathBuf {
+        let path = self.0.path().join(name);
+        std::fs::write(&path, bytes).expect("written");
+        path
+    }
+
+    fn read(&self, answers: &str, energies: Option<&str>) -> Found<(RecoveryOperator, Vec<Diagnostic>)> {
+        let open = |name: &str| InputFile::open_unread(self.0.path().join(Path::new(name))).expect("a file");
+        let (answers, displacements) = (open(answers), open("ask.npz"));
+        let energies = energies.map(open);
+        let files =
+            AnswerFiles { answers: &answers, displacements: &displacements, energies: energies.as_ref() };
+        read_answers(&files, &UnitSystem::parse("mm", "t", "s").expect("units"))
+    }
+
+    fn refused(&self, answers: &str, energies: Option<&str>) -> (Code, String) {
+        let found = self.read(answers, energies).expect_err(answers);
+        (found[0].code(), found[0].message().to_owned())
+    }
+}
+
+fn parts(operator: RecoveryOperator) -> (AnsweredShapes, Vec<RecoveryRow>) {
+    let RecoveryOperator::Shapes { shapes, labels } = operator else { panic!("shapes") };
+    (shapes, labels)
+}
+
+fn apart(shapes: &AnsweredShapes) -> f64 {
+    let expected = Mat::from_fn(12, 3, |row, step| stress(step, WATCHED[row / 6], row % 6));
+    (&shapes.answers - &expected).norm_max() / expected.norm_max()
+}
+
+#[test]
+fn every_format_gives_the_same_stresses() {
+    let place = Place::new(3);
+    place.put("text.frd", &frd(Form::Text, 3));
+    place.put("single.frd", &frd(Form::Single, 3));
+    place.put("double.frd", &frd(Form::Double, 3));
+    place.put("points.dat", dat(3, true).as_bytes());
+    place.put("ask.dat", dat(3, false).as_bytes());
+    place.put("table.csv", csv(3).as_bytes());
+    let files: [(&str, Option<&str>, u8, f64); 5] = [
+        ("text.frd", None, 6, 1e-5),
+        ("single.frd", None, 7, 1e-6),
+        ("double.frd", Some("ask.dat"), 15, 1e-15),
+        ("points.dat", None, 7, 1e-6),
+        ("table.csv", None, 6, 1e-6),
+    ];
+    for (name, energies, digits, limit) in files {
+        let (operator, warnings) = place.read(name, energies).expect(name);
+        let (shapes, labels) = parts(operator);
+        assert!(apart(&shapes) <= limit, "{name}: {}", apart(&shapes));
+        assert_eq!((shapes.answer_digits, shapes.dofs.len()), (digits, 12), "{name}");
+        let is_dat = name == "points.dat";
+        let names: Vec<&str> = labels[5..7].iter().map(|row| row.name.as_str()).collect();
+        assert_eq!(names, if is_dat { ["e5 p7 xz", "e5 p11 xx"] } else { ["n7 xz", "n11 xx"] });
+        assert_eq!((labels[0].unit.as_str(), labels[0].node.is_some()), ("MPa", !is_dat));
+        let expected = (is_dat || energies.is_some()).then(|| vec![1.0, 2.0, 3.0]);
+        assert_eq!(shapes.energies, expected, "{name}");
+        // Only the elements of a .frd show their materials.
+        let averaged: Vec<Code> = warnings.iter().map(Diagnostic::code).collect();
+        let is_frd = name.ends_with("frd");
+        assert_eq!(averaged, if is_frd { vec![Code::RecoveryAveraged] } else { Vec::new() }, "{name}");
+        assert!(
+            !is_frd
+                || warnings[0]
+                    .message()
+                    .ends_with("of 1 nodes are means over elements of several materials: node 7"),
+            "{}",
+            warnings[0].message()
+        );
+    }
+}
+
+#[cfg(feature = "hdf5")]
+#[test]
+fn arrays_of_hdf5_are_read_with_their_energies() {
+    let place = Place::new(2);
+    let file = hdf5_metno::File::create(place.0.path().join("answers.h5")).expect("a file");
+    let put = |name: &str, shape: (usize, usize), value: &dyn Fn(usize, usize) -> f64| {
+        let values = ndarray(shape, value);
+        file.new_dataset::<f64>()
+            .shape(shape)
+            .create(name)
+            .and_then(|set| set.write_raw(&values))
+            .expect(name);
+    };
+    put("displacements", (2, 6), &|step, at| displacement(step, WATCHED[at / 3], at % 3));
+    put("stresses", (2, 12), &|step, at| stress(step, WATCHED[at / 6], at % 6));
+    let nodes = WATCHED.map(i64::from);
+    file.new_dataset::<i64>().shape(2).create("nodes").and_then(|set| set.write_raw(&nodes)).expect("nodes");
+    file.new_dataset::<f64>()
+        .shape(2)
+        .create("strain_energy")
+        .and_then(|set| set.write_raw(&[4.0, 5.0]))
+        .expect("energies");
+    file.close().expect("closed");
+    let (shapes, _) = parts(place.read("answers.h5", None).expect("answers").0);
+    assert_eq!(shapes.answers[(11, 1)], stress(1, 11, 5));
+    assert_eq!(shapes.energies, Some(vec![4.0, 5.0]));
+}
+
+#[cfg(feature = "hdf5")]
+fn ndarray(shape: (usize, usize), value: &dyn Fn(usize, usize) -> f64) -> Vec<f64> {
+    (0..shape.0 * shape.1).map(|k| value(k / shape.1, k % shape.1)).collect()
+}
+
+#[test]
+fn results_of_other_shapes_are_refused() {
+    let place = Place::new(3);
+    place.put("fewer.frd", &frd(Form::Double, 2));
+    assert_eq!(place.refused("fewer.frd", None).0, Code::RecoveryShapes);
+    // A displacement of the second step differs by its tenth digit.
+    let mut other = frd(Form::Double, 3);
+    let value = displacement(1, 11, 2);
+    let bytes = value.to_le_bytes();
+    let at = other.windows(8).position(|window| window == bytes).expect("a displacement");
+    other[at..at + 8].copy_from_slice(&(value * 1.00001).to_le_bytes());
+    place.put("other.frd", &other);
+    let (code, message) = place.refused("other.frd", None);
+    assert_eq!(code, Code::RecoveryShapes);
+    assert!(message.contains("step 2") && message.contains("at node 11"), "{message}");
+    place.put("double.frd", &frd(Form::Double, 3));
+    place.put("ask.dat", dat(2, false).as_bytes());
+    assert_eq!(place.refused("double.frd", Some("ask.dat")).0, Code::RecoveryShapes);
+    // Without displacements nothing shows that the results belong to the shapes.
+    let printed = dat(3, true).replace("displacements", "velocities");
+    place.put("still.dat", printed.as_bytes());
+    assert_eq!(place.refused("still.dat", None).0, Code::RecoveryShapes);
+    place.put("ask.npz", b"PK\x03\x04 no archive");
+    assert_eq!(place.refused("double.frd", None).0, Code::RecoveryShapes);
+}
+
+#[test]
+fn results_of_all_nodes_are_their_own_shapes() {
+    let place = Place::new(3);
+    // Blocks with one number, as those of modes and static steps may have, are told apart by their quantities.
+    let same = String::from_utf8(frd(Form::Text, 3))
+        .expect("text")
+        .replace("    2           1\n", "    1           1\n");
+    std::fs::copy(place.put("own.frd", same.as_bytes()), place.0.path().join("ask.npz")).expect("copied");
+    let (shapes, _) = parts(place.read("own.frd", None).expect("shapes").0);
+    assert_eq!((shapes.dofs.len(), shapes.digits, shapes.displacements.ncols()), (6, 6, 3));
+    assert!((shapes.displacements[(4, 1)] - displacement(1, 11, 1)).abs() < 1e-8);
+    assert!(apart(&shapes) < 1e-5);
+}
+
+#[test]
+fn damaged_results_are_refused() {
+    let place = Place::new(2);
+    for form in [Form::Text, Form::Single, Form::Double] {
+        let whole = frd(form, 2);
+        for end in (0..whole.len() - 6).step_by(11) {
+            // The beginning decides about the format.
+            let path = if end < 7 { "short.frd" } else { "cut.frd" };
+            place.put(path, &whole[..end]);
+            if end > 0 {
+                place.read(path, None).expect_err("cut off");
+            }
+        }
+    }
+    let twice = String::from_utf8(frd(Form::Text, 2)).expect("text");
+    let (before, after) = twice.rsplit_once(" -1         7").expect("a node");
+    let elsewhere = format!("{before} -1         8{after}");
+    for (name, text, part) in [
+        ("letters.frd", twice.replacen("E+0", "X+0", 40), "expected"),
+        ("places.frd", elsewhere, "other places"),
+        ("no_stress.frd", twice.replace("STRESS", "STRAIN"), "no stresses"),
+        ("steps.csv", csv(2).replace("\n2,", "\n3,"), "come after"),
+        ("table.csv", csv(2).replace("e-", "x-"), "has `"),
+        ("local.dat", dat(2, true).replace("E+01\n", "E+01 local\n"), "six stresses"),
+    ] {
+        place.put(name, text.as_bytes());
+        let message = place.refused(name, None).1;
+        assert!(message.contains(part), "{name}: {message}");
+    }
+}
+
+#[test]
+fn changed_bytes_end_without_a_panic() {
+    let place = Place::new(2);
+    for form in [Form::Text, Form::Double] {
+        let whole = frd(form, 2);
+        for at in (0..whole.len()).step_by(23) {
+            for value in [b' ', b'-', b'9', 0xff] {
+                let mut changed = whole.clone();
+                changed[at] = value;
+                place.put("changed.frd", &changed);
+                let _ = place.read("changed.frd", None);
+            }
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Command `flexbody shapes`.
+
+use super::arguments::{PlacesName, ShapeFormat, ShapesArguments};
+use super::models::of_manifest_or_job;
+use super::outcome::{Outcome, refuse_warnings};
+use super::places::{refuse_replacing, refuse_replacing_read};
+use super::resources::context;
+use super::watcher::Watcher;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_body::convert::recovery_shapes;
+use flexbody_formats::shapes::{NodalShapes, StressDeck, StressPlaces};
+use flexbody_input::{ElementDeck, ModelFiles, ModelSource, read_model, read_nodes_of_table};
+use flexbody_linalg::context::Event;
+use flexbody_model::{CheckedModel, FeModel, extents};
+use std::collections::HashMap;
+use std::fs::OpenOptions;
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+
+/// Distance of a node of the deck from the node of the model, relative to the largest extent, above which the deck is
+/// that of another model.
+const MAX_DISTANCE: f64 = 1e-5;
+
+pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
+    refuse_options_of_decks(arguments)?;
+    let archive = arguments.output.with_extension("npz");
+    let is_npz = arguments.to == ShapeFormat::Npz;
+    let outputs: Vec<PathBuf> = match is_npz {
+        true => vec![arguments.output.clone()],
+        false => vec![arguments.output.clone(), archive],
+    };
+    // Recoveries of the manifest may name results that do not exist yet.
+    let files =
+        ModelFiles { recoveries: Vec::new(), ..of_manifest_or_job(&arguments.model, &arguments.job)? };
+    let inputs = [&arguments.body, &arguments.model];
+    let deck = arguments.deck.as_ref();
+    let named = files.paths();
+    refuse_replacing(inputs.into_iter().chain(deck).chain(&named), outputs.iter())?;
+    let slots = outputs.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
+    let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
+    let CheckedModel { model, diagnostics: of_model, .. } = FeModel::from_raw(read_model(&files)?)?;
+    diagnostics.extend(of_model);
+    let asked = match arguments.to {
+        ShapeFormat::Calculix => Some(Asked::of(arguments, &files, &model)?),
+        ShapeFormat::Csv | ShapeFormat::Npz => None,
+    };
+    refuse_replacing_read(outputs.iter())?;
+    let watch = |event: Event<'_>| watcher.hear(event);
+    let shapes = recovery_shapes(&body, &model, &context(None, false, &watch))
+        .map_err(|error| error.in_file(&arguments.body))?;
+    let shapes = NodalShapes::new(&shapes, &model, &body.source().name);
+    watcher.finish();
+    refuse_warnings(arguments.printing, &diagnostics)?;
+    match (arguments.to, &asked) {
+        (ShapeFormat::Calculix, Some(asked)) => asked.write(&shapes, &slots[0])?,
+        (ShapeFormat::Csv, _) => slots[0].fill(shapes.csv().as_bytes())?,
+        _ => {}
+    }
+    slots[slots.len() - 1].fill(&shapes.npz())?;
+    OutputSlot::commit_all(slots)?;
+    Ok(outcome(arguments, &outputs, &shapes, asked.as_ref(), diagnostics))
+}
+
+/// Refuses options that only a deck has.
+fn refuse_options_of_decks(arguments: &ShapesArguments) -> Result<()> {
+    let given = [
+        ("--deck", arguments.deck.is_some()),
+        ("--nodes", arguments.nodes != "surface"),
+        ("--at", arguments.at != PlacesName::Nodes),
+    ];
+    let extension = arguments.output.extension().is_some_and(|extension| extension == "npz");
+    let message = match given.iter().find(|(_, given)| *given) {
+        Some((option, _)) if arguments.to != ShapeFormat::Calculix => {
+            format!("{option} applies to --to calculix")
+        }
+        _ if extension && arguments.to != ShapeFormat::Npz => {
+            "the extension .npz is that of the archive beside the output".to_owned()
+        }
+        _ => return Ok(()),
+    };
+    Err(Diagnostic::new(Code::Usage, message).into())
+}
+
+/// Deck that asks CalculiX for stresses, without the shapes.
+struct Asked {
+    deck: ElementDeck,
+    watched: Vec<i64>,
+    places: StressPlaces,
+}
+
+impl Asked {
+    fn of(arguments: &ShapesArguments, files: &ModelFiles, model: &FeModel) -> Result<Self> {
+        if !model.rows().rotations().is_empty() {
+            let message = "nodes of the model have rotations, which CalculiX cannot be given";
+            let help = "write the shapes with --to csv or --to npz for the FE program of the model";
+            return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+        }
+        let path = arguments.deck.clone().or_else(|| deck_of(files)).ok_or_else(|| {
+            let message = "--to calculix needs the deck of the model, which its manifest does not name";
+            Diagnostic::new(Code::Usage, message)
+                .with_help("name the deck with its elements: --deck DECK.inp")
+        })?;
+        let deck = ElementDeck::read(&path)?;
+        if let Some(message) = stranger(&deck, model) {
+            return Err(Diagnostic::new(Code::MeshForeign, message).in_file(path).into());
+        }
+        let watched = watched(arguments, &deck, model)?;
+        let places = match arguments.at {
+            PlacesName::Nodes => StressPlaces::Nodes,
+            PlacesName::IntegrationPoints => StressPlaces::IntegrationPoints,
+        };
+        Ok(Self { deck, watched, places })
+    }
+
+    fn write(&self, shapes: &NodalShapes, slot: &OutputSlot) -> Result<()> {
+        let Self { deck, watched, places } = self;
+        let (elements, solids) = (deck.text.as_slice(), deck.solids.as_slice());
+        let deck = StressDeck { shapes, elements, solids, watched, places: *places };
+        let write = || {
+            let file = OpenOptions::new().write(true).truncate(true).open(slot.temporary())?;
+            let mut out = BufWriter::new(file);
+            deck.write(&mut out)?;
+            out.flush()
+        };
+        write().map_err(|error| slot.failure(&error))
+    }
+}
+
+/// Returns the deck that a model was read from.
+fn deck_of(files: &ModelFiles) -> Option<PathBuf> {
+    let path = match &files.source {
+        ModelSource::Job(job) => &job.path,
+        ModelSource::Tables(tables) => &tables.nodes,
+    };
+    let mesh = files.mesh.as_ref();
+    let is_deck = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "inp");
+    [Some(path), mesh].into_iter().flatten().find(|path| is_deck(path)).cloned()
+}
+
+/// Returns a message about a node of the deck that is not the node of the model.
+fn stranger(deck: &ElementDeck, model: &FeModel) -> Option<String> {
+    let nodes = model.nodes();
+    let place: HashMap<i64, &[f64; 3]> = nodes.ids.iter().copied().zip(&nodes.positions).collect();
+    let allowed = MAX_DISTANCE * extents(&nodes.positions).into_iter().fold(0.0, f64::max);
+    deck.element_nodes.iter().find_map(|id| {
+        let (Some(own), Some(there)) = (place.get(id), deck.nodes.get(id)) else {
+            return Some(format!("node {id} of the elements is not a node of the model"));
+        };
+        let apart = (0..3).map(|k| (own[k] - there[k]).powi(2)).sum::<f64>().sqrt();
+        (apart > allowed)
+            .then(|| format!("node {id} of the deck lies at {there:?}, the node of the model at {own:?}"))
+    })
+}
+
+/// Returns the nodes with stresses.
+fn watched(arguments: &ShapesArguments, deck: &ElementDeck, model: &FeModel) -> Result<Vec<i64>> {
+    let ids = &model.nodes().ids;
+    match arguments.nodes.as_str() {
+        "all" => Ok(ids.clone()),
+        "surface" => Ok(deck.surface.clone()),
+        path => {
+            let listed = read_nodes_of_table(path.as_ref())?;
+            match listed.iter().find(|node| !ids.contains(node)) {
+                None => Ok(listed),
+                Some(unknown) => {
+                    let message = format!("node {unknown} is not a node of the model");
+                    Err(Diagnostic::new(Code::NodeSetUnknown, message).in_file(path).into())
+                }
+            }
+        }
+    }
+}
+
+fn outcome(
+    arguments: &ShapesArguments,
+    outputs: &[PathBuf],
+    shapes: &NodalShapes,
+    asked: Option<&Asked>,
+    diagnostics: Vec<Diagnostic>,
+) -> Outcome {
+    let size = |path: &PathBuf| std::fs::metadata(path).map_or(0, |file| file.len());
+    let mut text = String::new();
+    for path in outputs {
+        text += &format!("{}, {} bytes\n", path.display(), size(path));
+    }
+    let all: Vec<(String, f64)> =
+        shapes.columns().map(|(column, factor)| (column.to_string(), factor)).collect();
+    let modes = all.iter().filter(|(name, _)| name.starts_with("mode ")).count();
+    text += &format!("{} shapes: {modes} modes and {} static columns\n", all.len(), all.len() - modes);
+    if let Some(asked) = asked {
+        let stem = arguments.output.with_extension("");
+        let (ending, places) = match asked.places {
+            StressPlaces::Nodes => ("frd", "nodes"),
+            StressPlaces::IntegrationPoints => ("dat", "the integration points around nodes"),
+        };
+        text += &format!("stresses at {places}: {}\n", asked.watched.len());
+        if !asked.deck.left_out.is_empty() {
+            text += &format!("cards of the deck that are left out: *{}\n", asked.deck.left_out.join(", *"));
+        }
+        let answers = arguments.output.with_extension(ending);
+        text += &format!(
+            "next: ccx {}, then in the manifest\n  [[recovery]]\n  name = \"surface\"\n  shapes = \"{}\"\n",
+            stem.display(),
+            answers.display()
+        );
+    }
+    let file =
+        |path: &PathBuf| serde_json::json!({ "path": path.display().to_string(), "bytes": size(path) });
+    let shape = |(name, factor): &(String, f64)| serde_json::json!({ "column": name, "factor": factor });
+    let json = serde_json::json!({
+        "files": outputs.iter().map(file).collect::<Vec<_>>(),
+        "shapes": all.iter().map(shape).collect::<Vec<_>>(),
+        "watched_nodes": asked.map(|asked| asked.watched.len()),
+        "cards_left_out": asked.map(|asked| asked.deck.left_out.clone()),
+    });
+    Outcome { text, json: format!("{json:#}"), diagnostics, passed: true }
+}
