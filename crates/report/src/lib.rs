@@ -59,7 +59,7 @@ pub use batch::{BatchFacts, BatchRow};
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};
 pub use comparison_report::{ComparisonFormat, ComparisonReport};
 pub use facts::Facts;
-pub use identities::{diagnostics_json, identities_json, identities_text};
+pub use identities::{checks_json, checks_text, diagnostics_json, identities_json, identities_text};
 pub use measured_run::MeasuredRunFacts;
 pub use output::output_json;
 pub use recovered::{RecoveredFacts, envelope_csv, recovered_csv};
