@@ -1,6 +1,6 @@
 //! Diagnostics of the library in Python: exceptions, warnings, and tuples of diagnostics.
 
-use flexbody::{Diagnostic, Error, Severity};
+use flexbody::{Code, Diagnostic, Error, Severity};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -18,10 +18,30 @@ pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
     }
 }
 
+/// Returns the exception for an argument whose value is not possible: an InputError.
+pub fn value_error(py: Python<'_>, message: impl Into<String>) -> PyErr {
+    exception(py, &Diagnostic::new(Code::Argument, message).into())
+}
+
+/// Returns the exception for an argument of a wrong type: an ArgumentError, which is an InputError and a TypeError.
+pub fn type_error(py: Python<'_>, message: impl Into<String>) -> PyErr {
+    let made = diagnostics(py, &[Diagnostic::new(Code::Argument, message)])
+        .and_then(|found| py.import(ERRORS)?.getattr("ArgumentError")?.call1((found, 2)));
+    match made {
+        Ok(exception) => PyErr::from_value(exception),
+        Err(failure) => failure,
+    }
+}
+
+/// Returns a value, or the exception for an error of the library.
+pub fn value<T>(py: Python<'_>, outcome: flexbody::Result<T>) -> PyResult<T> {
+    outcome.map_err(|error| exception(py, &error))
+}
+
 /// Returns the exception for an internal error of the library.
 pub fn bug(py: Python<'_>) -> PyErr {
     let message = "an internal check of the library failed";
-    exception(py, &Diagnostic::new(flexbody::Code::Internal, message).into())
+    exception(py, &Diagnostic::new(Code::Internal, message).into())
 }
 
 /// Returns diagnostics as a tuple of `flexbody.Diagnostic`.

@@ -5,13 +5,8 @@ use super::progress::{Listener, NO_LISTENER, heard};
 use super::{Matrix, Motion, Scene, Selection};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::output::OutputSlot;
-use flexbody_body::convert::interface_compliance;
 use flexbody_body::flex_body::{self, Subset};
-use flexbody_body::verification::body_identities;
-use flexbody_file::RecordedMotion;
-use flexbody_formats::export::ExportOptions;
-use flexbody_formats::{FORMATS, export, find_format};
+use flexbody_body::verification::{accept, body_identities};
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use flexbody_motion::scene::{Point, body_point, simulate, unsettled_rate};
 use flexbody_study::selection::select;
@@ -55,45 +50,6 @@ impl FlexBody {
     #[cfg(feature = "hdf5")]
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         flexbody_file::write(&self.0, path)
-    }
-
-    /// Writes the body in a format of another program, given by its name on the command line
-    /// (docs/reference/exports.md): the file, and further files beside it. Returns warnings about parts of the body
-    /// that the format cannot hold.
-    ///
-    /// # Errors
-    /// FB801 for an unknown format; FB720 if no file of this format can be made of the body; FB104 and FB602 if it
-    /// cannot be written.
-    pub fn export(&self, format: &str, path: impl AsRef<Path>) -> Result<Vec<Diagnostic>> {
-        self.export_as(format, path.as_ref(), ExportOptions::default())
-    }
-
-    /// Writes a picture of the body in motion (`vtk`, `gltf`).
-    ///
-    /// # Errors
-    /// The errors of [`FlexBody::export`]; FB801 for a format without motion, FB735 for the motion of another body.
-    pub fn export_motion(
-        &self,
-        format: &str,
-        motion: &Motion,
-        path: impl AsRef<Path>,
-    ) -> Result<Vec<Diagnostic>> {
-        let motion = Some(RecordedMotion::of(&motion.recording));
-        self.export_as(format, path.as_ref(), ExportOptions { motion, ..ExportOptions::default() })
-    }
-
-    fn export_as(&self, format: &str, path: &Path, options: ExportOptions) -> Result<Vec<Diagnostic>> {
-        let options = ExportOptions { name: Some(path.to_owned()), ..options };
-        let format = find_format(format)?;
-        let (exported, mut diagnostics) = export(&self.0, format, &options, true)?;
-        diagnostics.extend(interface_compliance(&self.0).filter(|_| !format.is_picture()));
-        OutputSlot::commit_all(exported.fill(OutputSlot::prepare(path)?)?)?;
-        Ok(diagnostics)
-    }
-
-    /// Returns the formats of [`FlexBody::export`]: the name of each, and the programs that read it.
-    pub fn export_formats() -> Vec<(&'static str, &'static str)> {
-        FORMATS.iter().map(|format| (format.name(), format.reader())).collect()
     }
 
     /// Returns the number of modes nf.
@@ -212,15 +168,7 @@ impl FlexBody {
 
     /// Checks and returns all identities of the body.
     pub fn identities(&self) -> Vec<Identity> {
-        let checks = body_identities(&self.0).into_iter();
-        checks
-            .map(|check| Identity {
-                name: check.name,
-                value: check.value,
-                limit: check.limit,
-                holds: check.passed,
-            })
-            .collect()
+        body_identities(&self.0).iter().map(Identity::of).collect()
     }
 
     /// Selects the terms and modes that the body needs in a scene, so that every load case is within its tolerances.
@@ -247,11 +195,24 @@ impl FlexBody {
     ///   `I`, `II`, `III`, `IV`.
     ///
     /// # Errors
-    /// FB801 for unknown groups, and for modes that the body does not have.
+    /// FB801 for unknown groups, and for modes that the body does not have; FB714 if an identity does not hold.
     pub fn subset(&self, modes: Option<&[usize]>, terms: &str) -> Result<FlexBody> {
         let modes = modes.map(|modes| Subset::modes_of(modes.to_vec())).transpose()?;
         let subset = Subset { modes, groups: Subset::parse_groups(terms)? };
-        self.0.clone().subset(&subset).map(FlexBody)
+        let made = self.0.clone().subset(&subset)?;
+        accept(&made)?;
+        Ok(FlexBody(made))
+    }
+
+    /// Returns the body with shapes and inertia of the modes rounded to 32-bit floats, like `flexbody reduce --storage
+    /// f32`.
+    ///
+    /// # Errors
+    /// FB703 for a number that is too large for a 32-bit float; FB714 if an identity does not hold.
+    pub fn rounded_to_f32(&self) -> Result<FlexBody> {
+        let made = self.0.rounded_to_f32()?;
+        accept(&made)?;
+        Ok(FlexBody(made))
     }
 
     /// Returns the equations of motion of the body, with all terms that it holds.

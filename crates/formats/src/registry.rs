@@ -2,17 +2,19 @@
 
 use super::export::{ExportFormat, ExportOptions, Exported, Points};
 use super::gltf::Gltf;
-use super::import::{Audit, ImportFormat, audit};
+use super::import::{Audit, ImportFormat, Imported, accept_imported, audit, import_body};
 use super::vtk::Vtk;
 use super::{adams, chrono, embedded, json, mbdyn, npz, openradioss, sid};
 #[cfg(feature = "hdf5")]
 use super::{exudyn, mbsim, simscape};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::InputFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::convert::interface_compliance;
-use flexbody_body::flex_body::FlexBody;
+use flexbody_body::flex_body::{FlexBody, Storage};
+use flexbody_body::invariants::FrameChoice;
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -183,6 +185,33 @@ pub fn audit_file(path: &Path, format: Option<&str>, tolerance: f64) -> Result<A
     let file = InputFile::open(path)?;
     let format = named.map_or_else(|| recognise(&file), Ok)?;
     Ok(audit(&format.read(&file)?, tolerance))
+}
+
+/// Reads a body in a file of another program as a flexible body, in the stated units (m, kg and s for `None`) and with
+/// the floats of `storage`.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) for an unknown format; the errors of [`ImportFormat::read`], [`import_body`] and
+/// [`accept_imported`].
+pub fn import_file(
+    path: &Path,
+    format: &str,
+    units: Option<UnitSystem>,
+    frame: Option<&FrameChoice>,
+    storage: Storage,
+) -> Result<Imported> {
+    let format = find_import_format(format)?;
+    let file = InputFile::open(path)?;
+    let read = format.read(&file);
+    file.refuse_changed()?;
+    let source = SourceFile::new("body", path, file.sha256()?);
+    let imported = import_body(&read?, source, units.unwrap_or_default(), frame);
+    let mut imported = imported.map_err(|error| error.in_file(path))?;
+    if storage == Storage::F32 {
+        imported.body = imported.body.rounded_to_f32()?;
+    }
+    accept_imported(&imported).map_err(|error| error.in_file(path))?;
+    Ok(imported)
 }
 
 /// Returns the format of a file.

@@ -13,6 +13,7 @@ use flexbody_input::LoadSource;
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{Point, Scene};
+use std::ops::RangeInclusive;
 
 /// Request for a frequency response. A scene supplies what is not stated: its loads, watched points, band and damping.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,10 +49,16 @@ impl Default for ResponseRequest {
 }
 
 impl ResponseRequest {
+    /// Possible numbers of frequencies of the curves.
+    pub const POINTS: RangeInclusive<usize> = 2..=100_000;
+    /// Possible numbers of frequencies at which the equations of all nodes are solved.
+    pub const SOLVES: RangeInclusive<usize> = 2..=10_000;
+
     /// Computes the response of `body`, with its errors if its `model` is given. Returns the settings as well.
     ///
     /// # Errors
-    /// FB801 if neither the request nor the scene states the band or the places; the errors of [`respond`].
+    /// FB801 if neither the request nor the scene states the band or the places, and for numbers that are not possible;
+    /// the errors of [`respond`].
     pub fn respond(
         &self,
         model: Option<&FeModel>,
@@ -59,10 +66,31 @@ impl ResponseRequest {
         scene: Option<&Scene>,
         context: &Context<'_>,
     ) -> Result<(Response, ResponseSettings)> {
+        self.refuse_impossible()?;
         let settings = self.settings(scene, body)?;
         let [from, to] = self.places(scene)?;
         let response = respond(model, body, &from, &to, &settings, context)?;
         Ok((response, settings))
+    }
+
+    /// Refuses numbers that are not possible, which a command line does not let pass.
+    fn refuse_impossible(&self) -> Result<()> {
+        let is_positive = self.tolerance.is_finite() && self.tolerance > 0.0;
+        let is_ratio = self.damping.is_none_or(|ratio| ratio.is_finite() && ratio >= 0.0);
+        let message = match () {
+            () if !is_positive => format!("the tolerance is {}, expected a positive number", self.tolerance),
+            () if !is_ratio => {
+                "the damping ratio is not a finite number, 0 or larger (1 is critical)".to_owned()
+            }
+            () if !Self::POINTS.contains(&self.points) => {
+                format!("{} points of the curves, expected 2 to 100000", self.points)
+            }
+            () if !Self::SOLVES.contains(&self.solves) => {
+                format!("{} solves, expected 2 to 10000", self.solves)
+            }
+            () => return Ok(()),
+        };
+        Err(Diagnostic::new(Code::Usage, message).into())
     }
 
     /// Returns the settings, completed by those of the scene.
