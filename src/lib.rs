@@ -120,7 +120,7 @@ pub use api::{
     GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, LoadedHistory, Matrix,
     MeasuredRun, Model, ModelBuilder, Motion, MotionHistory, PointPath, Progress, Quantity, Ranges, Recipe,
     Recovered, RecoveredRows, RecoveryRow, ReportFormat, Response, ResponseOptions, Scene, Selection,
-    SourceFile, SparseMatrix, Step, Tolerances, TransferFunction,
+    SourceFile, SparseMatrix, Step, Tolerances, TransferFunction, unit_names,
 };
 #[cfg(feature = "cli")]
 pub use api::{Batch, BatchOptions, BatchedBody};
@@ -136,6 +136,10 @@ pub mod dynamics {
         NotPositiveDefinite, Orientation, PlaneAngle, Prescribed, RotationVector, Terms,
     };
 }
+
+/// Crates whose types signatures of this library have: vectors and matrices of three rows, values that can be
+/// serialised, and sparse matrices.
+pub use {nalgebra, serde, sprs};
 
 pub use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 pub use flexbody_base::error::{Error, ExitCode, Result};

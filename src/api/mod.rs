@@ -58,3 +58,8 @@ pub use scene::{Scene, Selection};
 pub use trade::{Trade, TradeOptions};
 #[cfg(feature = "hdf5")]
 pub use view::{RecordedMotion, View};
+
+/// Returns the names of the units of length, mass and time that models, bodies and exports may state.
+pub fn unit_names() -> [Vec<&'static str>; 3] {
+    flexbody_base::units::UnitSystem::names()
+}

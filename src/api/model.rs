@@ -132,6 +132,11 @@ impl Model {
         Self::checked(read_model(&files)?, Vec::new())
     }
 
+    /// Returns the names of the FE programs whose output [`Model::read_job`] reads.
+    pub fn programs() -> Vec<&'static str> {
+        flexbody_input::job_programs().collect()
+    }
+
     /// Reads the model that `body` was made of, from its manifest or the output of an FE program, for
     /// [`FlexBody::check`]: all of the matrices, or the part of one of several bodies.
     ///

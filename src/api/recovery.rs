@@ -28,7 +28,7 @@ impl LoadedHistory {
     /// Makes a history of ascending times and the modal coordinates at each time, without loads.
     ///
     /// # Errors
-    /// FB801 if the lengths differ, for no time, and for numbers that are not finite or times that do not ascend.
+    /// FB804 if the lengths differ, for no time, and for numbers that are not finite or times that do not ascend.
     pub fn new(time: Vec<f64>, q: Vec<Vec<f64>>) -> Result<Self> {
         let count = time.len();
         if q.len() != count {
@@ -47,7 +47,7 @@ impl LoadedHistory {
     /// Sets the angular velocity of the body frame at each time.
     ///
     /// # Errors
-    /// FB801 if the number of rows is not that of the times, and for numbers that are not finite.
+    /// FB804 if the number of rows is not that of the times, and for numbers that are not finite.
     pub fn angular_velocity(mut self, rows: &[[f64; 3]]) -> Result<Self> {
         self.0.angular_velocity = Some(self.vectors("angular velocity", rows)?);
         Ok(self)
@@ -57,7 +57,7 @@ impl LoadedHistory {
     /// as unloaded.
     ///
     /// # Errors
-    /// FB801 if a number of rows is not that of the times, for numbers that are not finite, and for an interface that
+    /// FB804 if a number of rows is not that of the times, for numbers that are not finite, and for an interface that
     /// has loads already.
     pub fn load(
         mut self,
@@ -107,7 +107,7 @@ impl LoadedHistory {
 }
 
 fn refused<T>(message: String) -> Result<T> {
-    Err(Diagnostic::new(Code::Usage, message).into())
+    Err(Diagnostic::new(Code::Argument, message).into())
 }
 
 /// Recoveries of a body over a history.
@@ -140,7 +140,7 @@ impl FlexBody {
     /// # Errors
     /// FB221 if the body has no recovery, or none of a name; FB215 if the history has no angular velocity and rows
     /// depend on it; FB212 for loads at an interface that the body does not have, and for a torque at one whose nodes
-    /// lie on one line; FB801 for another number of modal coordinates.
+    /// lie on one line; FB804 for another number of modal coordinates.
     pub fn recover(&self, history: &LoadedHistory, names: &[&str]) -> Result<Recovered<'_>> {
         history.refuse_foreign(self)?;
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();

@@ -278,7 +278,7 @@ fn recover(place: &Place) {
         body.recover(&loaded.expect("a load"), &[]).expect_err("no interface").to_string().contains("FB212")
     );
     let other = LoadedHistory::new(vec![0.0], vec![vec![0.0; 3]]).expect("a history");
-    assert!(body.recover(&other, &[]).expect_err("3 of 4 modes").to_string().contains("FB801"));
+    assert!(body.recover(&other, &[]).expect_err("3 of 4 modes").to_string().contains("FB804"));
     assert!(LoadedHistory::new(vec![0.0, 0.0], vec![vec![]; 2]).is_err());
 }
 
