@@ -18,10 +18,7 @@ pub struct Check {
 }
 
 /// Returns identities as a list of `flexbody.Identity`.
-pub fn identities<'py>(
-    py: Python<'py>,
-    all: &[flexbody::Identity],
-) -> PyResult<Vec<Bound<'py, PyAny>>> {
+pub fn identities<'py>(py: Python<'py>, all: &[flexbody::Identity]) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let class = py.import("flexbody._types")?.getattr("Identity")?;
     all.iter().map(|one| class.call1((one.name, one.value, one.limit, one.holds))).collect()
 }
@@ -71,13 +68,8 @@ pub struct Comparison {
 /// Returns the tolerances of a comparison with those that a caller gives, by their names.
 pub fn tolerances(given: [(&str, Argument<'_, '_>); 5]) -> PyResult<Tolerances> {
     let mut all = Tolerances::default();
-    let places = [
-        &mut all.frequency,
-        &mut all.mass,
-        &mut all.centre_of_mass,
-        &mut all.inertia,
-        &mut all.invariants,
-    ];
+    let places =
+        [&mut all.frequency, &mut all.mass, &mut all.centre_of_mass, &mut all.inertia, &mut all.invariants];
     for ((name, own), place) in given.into_iter().zip(places) {
         if let Some(own) = own {
             *place = not_negative(own, name)?;

@@ -18,9 +18,10 @@ pub fn called<T: Copy>(
     let Ok(name) = given.extract::<String>() else {
         return Err(mistyped(given, what, &format!("one of {}", known())));
     };
-    all.iter().copied().find(|choice| name_of(*choice) == name).ok_or_else(|| {
-        value_error(given.py(), format!("`{what}` is {name:?}, expected one of {}", known()))
-    })
+    all.iter()
+        .copied()
+        .find(|choice| name_of(*choice) == name)
+        .ok_or_else(|| value_error(given.py(), format!("`{what}` is {name:?}, expected one of {}", known())))
 }
 
 /// Returns the names of all choices, for the test that the types of the package state the same ones.
@@ -28,7 +29,8 @@ pub fn called<T: Copy>(
 pub fn _choices(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let all = PyDict::new(py);
     let names = |choices: &[&str]| choices.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-    all.set_item("Basis", names(&crate::model::computed_bases().map(flexbody::Basis::name)))?;
+    let bases = flexbody::Basis::ALL.into_iter().filter(|basis| *basis != flexbody::Basis::Imported);
+    all.set_item("Basis", names(&bases.map(flexbody::Basis::name).collect::<Vec<_>>()))?;
     all.set_item("Accuracy", names(&flexbody::Accuracy::ALL.map(flexbody::Accuracy::name)))?;
     all.set_item("Coupling", names(&flexbody::Coupling::ALL.map(flexbody::Coupling::name)))?;
     all.set_item("Reference", names(&flexbody::ReferenceChoice::ALL.map(flexbody::ReferenceChoice::name)))?;

@@ -1,10 +1,10 @@
 //! The equations of motion of one body.
 
-use crate::arrays::{Given, matrix3, numbers, shaped, vector, vector3};
 use crate::arguments::{text, whole};
+use crate::arrays::{Given, matrix3, numbers, shaped, vector, vector3};
 use crate::errors::{exception, value_error};
-use flexbody::{Code, Diagnostic, FlexBody};
 use flexbody::dynamics::{self, BodyPoint, Evaluation};
+use flexbody::{Code, Diagnostic, FlexBody};
 use nalgebra::Vector3;
 use pyo3::prelude::*;
 use std::sync::Arc;

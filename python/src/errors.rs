@@ -60,6 +60,23 @@ pub fn diagnostics<'py>(py: Python<'py>, found: &[Diagnostic]) -> PyResult<Bound
     PyTuple::new(py, found.iter().map(one).collect::<PyResult<Vec<_>>>()?)
 }
 
+/// Diagnostic as a pickle has it: code, severity, message, file, line, help.
+pub type PickledDiagnostic = (String, String, String, Option<String>, Option<usize>, String);
+
+/// Returns a diagnostic of a pickle; `None` for a code that this version does not know.
+pub fn restored_diagnostic(found: PickledDiagnostic) -> Option<Diagnostic> {
+    let (id, _, message, file, line, help) = found;
+    let code = Code::ALL.iter().find(|code| code.id() == id)?;
+    let mut made = Diagnostic::new(*code, message).with_help(help);
+    if let Some(file) = file {
+        made = made.in_file(file);
+    }
+    Some(match line {
+        Some(line) => made.at_line(line),
+        None => made,
+    })
+}
+
 /// Issues the warnings among `found` on behalf of the calling Python code. Returns an error if the user has turned
 /// warnings into errors.
 pub fn warn(py: Python<'_>, found: &[Diagnostic]) -> PyResult<()> {

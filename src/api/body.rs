@@ -52,6 +52,28 @@ impl FlexBody {
         flexbody_file::write(&self.0, path)
     }
 
+    /// Returns the bytes of the flex-body file that [`FlexBody::write`] writes.
+    ///
+    /// # Errors
+    /// FB104 and FB602 if its temporary file cannot be written.
+    #[cfg(feature = "hdf5")]
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let file = TemporaryBody::new()?;
+        self.write(&file.path)?;
+        std::fs::read(&file.path).map_err(|error| file.failure(&error))
+    }
+
+    /// Reads the bytes of a flex-body file.
+    ///
+    /// # Errors
+    /// The errors of [`FlexBody::read`]; FB104 if the temporary file of the bytes cannot be written.
+    #[cfg(feature = "hdf5")]
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let file = TemporaryBody::new()?;
+        std::fs::write(&file.path, bytes).map_err(|error| file.failure(&error))?;
+        Self::read(&file.path)
+    }
+
     /// Returns the number of modes nf.
     pub fn n_modes(&self) -> usize {
         self.0.n_modes()
@@ -287,5 +309,27 @@ impl FlexBody {
         })?;
         let (units, extent) = (self.0.units().clone(), self.0.extent());
         Ok(Motion { recording, units, extent, diagnostics })
+    }
+}
+
+/// Flex-body file in a temporary folder, since HDF5 reads and writes files.
+#[cfg(feature = "hdf5")]
+struct TemporaryBody {
+    path: std::path::PathBuf,
+    _folder: tempfile::TempDir,
+}
+
+#[cfg(feature = "hdf5")]
+impl TemporaryBody {
+    fn new() -> Result<Self> {
+        let folder = tempfile::tempdir().map_err(|error| {
+            let message = format!("no temporary folder can be made: {error}");
+            Diagnostic::new(Code::OutputUnwritable, message)
+        })?;
+        Ok(Self { path: folder.path().join("body.flex.h5"), _folder: folder })
+    }
+
+    fn failure(&self, error: &std::io::Error) -> flexbody_base::error::Error {
+        Diagnostic::new(Code::OutputUnwritable, error.to_string()).in_file(&self.path).into()
     }
 }

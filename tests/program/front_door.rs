@@ -229,3 +229,15 @@ fn scenes_come_from_text_and_from_values() {
     assert!(Scene::from_values(&values, folder.path()).is_ok());
     assert!(Scene::from_values(&values, folder.path().join("none")).is_err());
 }
+
+#[test]
+fn bodies_become_bytes_and_fragments_of_pages() {
+    let (body, folder) = (body(), tempfile::tempdir().expect("a folder"));
+    let bytes = body.to_bytes().expect("bytes");
+    body.write(folder.path().join("body.flex.h5")).expect("written");
+    assert!(bytes == std::fs::read(folder.path().join("body.flex.h5")).expect("a file"));
+    assert_eq!(FlexBody::from_bytes(&bytes).expect("a body"), body);
+    assert!(FlexBody::from_bytes(&bytes[..bytes.len() / 2]).is_err());
+    let html = body.summary_html();
+    assert!(html.contains("<dl") && html.contains("6 flexible") && !html.contains("<script"), "{html}");
+}

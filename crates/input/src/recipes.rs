@@ -23,12 +23,14 @@ impl Recipe {
     pub fn of(program: &str) -> Result<Self> {
         let found = RECIPES.iter().copied().find(|recipe| recipe.program == program);
         found.ok_or_else(|| {
-            let known: Vec<&str> = RECIPES.iter().map(|recipe| recipe.program).collect();
-            let message = format!("`{program}` has no recipe");
-            Diagnostic::new(Code::Usage, message)
-                .with_help(format!("name one of {}", known.join(", ")))
-                .into()
+            let help = format!("name one of {}", Self::programs().join(", "));
+            Diagnostic::new(Code::Usage, format!("`{program}` has no recipe")).with_help(help).into()
         })
+    }
+
+    /// Returns the names of all programs with a recipe.
+    pub fn programs() -> Vec<&'static str> {
+        RECIPES.iter().map(|recipe| recipe.program).collect()
     }
 }
 

@@ -68,7 +68,7 @@ pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData, SearchAttempt};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
-pub use summary::summary;
+pub use summary::{summary, summary_html};
 pub use term_facts::dropped_text;
 pub use text::Screen;
 #[cfg(feature = "hdf5")]
