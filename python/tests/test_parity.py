@@ -144,7 +144,7 @@ def test_responses(place: Path, body: flexbody.Body) -> None:
     of_body = model.response(node, f"{node}:z", body=body, **arguments)
     assert of_body.csv() == whole.csv() == (place / "response.csv").read_text()
     function = whole.functions[0]
-    assert (function.source, function.target, function.target_direction) == (str(node), str(node), "z")
+    assert (function.source, function.target, function.target_direction) == (f"node {node}", f"node {node}", "z")
     assert function.reduced.shape == function.full.shape == whole.frequencies_hz.shape
     assert function.reduced.dtype == np.complex128 and np.isfinite(function.full).any() and np.isnan(function.full).any()
     with pytest.raises(flexbody.InputError, match="no frequency band") as caught:

@@ -101,11 +101,11 @@ impl ResponseOptions {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct TransferFunction {
-    /// Place of the force: an interface or a node number.
+    /// Place of the force: `interface tip`, `node 17`.
     pub from: String,
     /// Direction of the force or torque: `x`, `y`, `z`, `rx`, `ry` or `rz`.
     pub from_direction: &'static str,
-    /// Place of the displacement.
+    /// Place of the displacement: `interface tip`, `node 17`.
     pub to: String,
     /// Direction of the displacement or rotation.
     pub to_direction: &'static str,

@@ -29,7 +29,8 @@ pub fn summary(facts: &Facts<'_>, screen: Screen) -> String {
 /// Renders the summary as a fragment of a page, without scripts and styles, as a notebook shows it.
 pub fn summary_html(facts: &Facts<'_>) -> String {
     let groups = [body, mass_properties, modes, lumped];
-    let items: Vec<Term> = groups.iter().flat_map(|group| group(facts)).collect();
+    let shown = groups.iter().flat_map(|group| group(facts));
+    let items: Vec<Term> = shown.map(|term| Term { is_in_page: true, ..term }).collect();
     html::terms(&items).into_string()
 }
 

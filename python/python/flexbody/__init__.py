@@ -236,6 +236,8 @@ def convert(
 @overload
 def convert(
     stiffness: Model | _types.Path,
+    mass: None = None,
+    nodes: None = None,
     *,
     modes: int | None = None,
     max_frequency: float | None = None,

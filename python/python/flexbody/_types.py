@@ -157,11 +157,11 @@ class TransferFunction(NamedTuple):
     """The response at one place to a unit force at another, over n frequencies, in the units of the body and radians."""
 
     source: str
-    """Place of the force: an interface or the number of a node."""
+    """Place of the force: "interface tip", "node 17"."""
     source_direction: str
     """Direction of the force or torque: "x", "y", "z", "rx", "ry" or "rz"."""
     target: str
-    """Place of the displacement."""
+    """Place of the displacement: "interface tip", "node 17"."""
     target_direction: str
     """Direction of the displacement or rotation."""
     reduced: NDArray[np.complex128]

@@ -25,12 +25,12 @@ const ONLY_COMMON: &[&str] = &["case", "cost", "variation"];
 /// Reads the load cases of a scene file in its order, one or more, and their variations; a file without `[[case]]` is a
 /// single scene.
 pub(super) fn read_cases(path: &Path) -> Result<(Vec<Scene>, Variations)> {
-    read_toml(path, "scene", Code::SceneSyntax, |walk, top| whole_scene(walk, top))
+    read_toml(path, "scene", Code::SceneSyntax, whole_scene)
 }
 
 /// Reads the load cases of the text of a scene file, like [`read_cases`]; `path` is the file that it stands for.
 pub(super) fn parse_cases(text: &str, path: &Path) -> Result<(Vec<Scene>, Variations)> {
-    parse_toml(text, path, Code::SceneSyntax, |walk, top| whole_scene(walk, top))
+    parse_toml(text, path, Code::SceneSyntax, whole_scene)
 }
 
 fn whole_scene(walk: &mut Walk<'_>, top: &TomlTable<'_>) -> Option<(Vec<Scene>, Variations)> {
