@@ -11,6 +11,7 @@ use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use flexbody_motion::scene::{Point, body_point, simulate, unsettled_rate};
 use flexbody_study::selection::select;
 use nalgebra::{Matrix3, Vector3};
+#[cfg(feature = "hdf5")]
 use std::path::Path;
 
 /// Flexible body: modes, and the constant invariants of the equations of motion of its floating frame (theory section
