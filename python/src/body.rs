@@ -540,10 +540,17 @@ impl Body {
         Ok(Body::new(body, Vec::new()))
     }
 
-    /// Simulates the body in a scene: a Scene, or the path of a scene file without load cases.
-    fn simulate(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Motion> {
+    /// Simulates the body in a scene: a Scene, or a scene as it takes one (a path, a text, a dict) without load cases. With
+    /// `envelope` the largest stresses of every point of the recoveries over the continuous motion are found for
+    /// `Motion.recovered.write_envelope`.
+    #[pyo3(signature = (scene, *, envelope=false))]
+    fn simulate(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, envelope: bool) -> PyResult<Motion> {
         let (scene, body) = (Scene::one(scene)?, Arc::clone(&self.inner));
-        Motion::with_warnings(py, run(py, move |listener| body.simulate_with_progress(&scene, listener))?)
+        let motion = run(py, move |listener| match envelope {
+            true => body.simulate_with_envelope(&scene, listener),
+            false => body.simulate_with_progress(&scene, listener),
+        })?;
+        Motion::with_warnings(py, motion, Arc::clone(&self.inner))
     }
 
     /// Measures the errors of a run of this body in a scene by another program. `history` is the path of a table with the

@@ -5,7 +5,8 @@ use crate::arrays::{ArrayCache, Given, matrix, rows_of, rows_of_many, sequence, 
 use crate::errors::{value, value_error};
 use crate::report::report;
 use crate::work::{brief, run};
-use flexbody::{FlexBody, LoadedHistory, RecoveryRow, Result};
+use flexbody::{FlexBody, LoadedHistory, Matrix, RecoveryRow, ReportFormat};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use std::path::PathBuf;
@@ -14,14 +15,11 @@ use std::sync::Arc;
 /// Keys of a history of numbers.
 const KEYS: [&str; 4] = ["time", "q", "angular_velocity", "loads"];
 
-/// Recoveries of a body over a history: stresses, strains, forces.
+/// Recoveries of a body over a motion, of a run of any program or of a simulation: stresses, strains, forces.
 #[pyclass(frozen, module = "flexbody")]
 pub struct Recovered {
     body: Arc<FlexBody>,
-    history: LoadedHistory,
-    names: Vec<String>,
-    time: Vec<f64>,
-    rows: Vec<flexbody::RecoveredRows>,
+    inner: flexbody::Recovered,
     cache: ArrayCache,
 }
 
@@ -79,6 +77,11 @@ fn with_loads(mut history: LoadedHistory, loads: &Bound<'_, PyAny>) -> PyResult<
 }
 
 impl Recovered {
+    /// Returns recoveries of `body`.
+    pub fn new(body: Arc<FlexBody>, inner: flexbody::Recovered) -> Self {
+        Self { body, inner, cache: ArrayCache::default() }
+    }
+
     /// Computes the recoveries of `body` over the history that a caller gives.
     pub fn of(
         py: Python<'_>,
@@ -88,24 +91,13 @@ impl Recovered {
     ) -> PyResult<Self> {
         let history = history_of(history, &body)?;
         let names = only.map_or_else(|| Ok(Vec::new()), |only| texts(only, "only"))?;
-        run(py, move |_| {
-            let (rows, time) = {
-                let recovered = recovered(&body, &history, &names)?;
-                (recovered.rows(), recovered.times().to_vec())
-            };
-            Ok(Self { body, history, names, time, rows, cache: ArrayCache::default() })
-        })
+        let own = Arc::clone(&body);
+        let inner = run(py, move |_| {
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            own.recover(&history, &names)
+        })?;
+        Ok(Self::new(body, inner))
     }
-}
-
-/// Returns the recoveries in the types of the library, which borrow the body.
-fn recovered<'b>(
-    body: &'b FlexBody,
-    history: &LoadedHistory,
-    names: &[String],
-) -> Result<flexbody::Recovered<'b>> {
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    body.recover(history, &names)
 }
 
 #[pymethods]
@@ -113,49 +105,75 @@ impl Recovered {
     /// Times (nt). Unit: time.
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.cache.get(py, "time", || Ok(vector(py, &self.time)))
+        self.cache.get(py, "time", || Ok(vector(py, self.inner.times())))
     }
 
-    /// Rows by recovery: dict of name to RecoveredRows (labels, values, points, von_mises) with the values of all rows
-    /// (nt x rows) in the units of their labels, and the equivalent stress of von Mises (nt x points) at the points with
-    /// all six stresses.
+    /// Rows by recovery: dict of name to RecoveredRows (labels, values, points, von_mises, signed_von_mises, principal)
+    /// with the values of all rows (nt x rows) in the units of their labels, and the equivalent stresses of von Mises (nt x
+    /// points) and the principal stresses (nt x points x 3) at the points with all six stresses.
     #[getter]
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let types = py.import("flexbody._types")?;
         let (class, label) = (types.getattr("RecoveredRows")?, types.getattr("RowLabel")?);
         let all = PyDict::new(py);
-        for one in &self.rows {
+        for one in &self.inner.rows() {
             let named = |row: &RecoveryRow| {
                 let quantity = row.quantity.name();
                 label.call1((&row.name, quantity, &row.component, &row.unit, row.node, row.element))
             };
             let labels = one.labels.iter().map(named).collect::<PyResult<Vec<_>>>()?;
             let (values, equivalent) = (matrix(py, &one.values)?, matrix(py, &one.von_mises)?);
-            all.set_item(&one.name, class.call1((labels, values, &one.points, equivalent))?)?;
+            let signed = matrix(py, &one.signed_von_mises)?;
+            let principal = principal(py, &one.principal)?;
+            let rows = class.call1((labels, values, &one.points, equivalent, signed, principal))?;
+            all.set_item(&one.name, rows)?;
         }
         Ok(all)
     }
 
-    /// Writes the HDF5 file of `flexbody recover -o FILE.h5`, which appears complete or not at all.
+    /// Writes the HDF5 file of `flexbody recover -o FILE.h5` and `flexbody simulate --rows FILE.h5`, which appears complete
+    /// or not at all.
     fn write(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         let path = self::path(path, "path")?;
-        brief(py, || recovered(&self.body, &self.history, &self.names)?.write(&path))
+        brief(py, || self.inner.write(&self.body, &path))
     }
 
-    /// Returns the table of `flexbody recover -o FILE.csv`, as a str: one line per instant.
+    /// Writes the largest stresses of every point over the motion, like `--envelope`: a table (.csv), or the body with them
+    /// at its nodes (.vtu). Those of a simulation need `Body.simulate(scene, envelope=True)`.
+    fn write_envelope(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        let path = self::path(path, "path")?;
+        brief(py, || self.inner.write_envelope(&self.body, &path))
+    }
+
+    /// Returns the table of `flexbody recover -o FILE.csv` and `flexbody simulate --rows FILE.csv`, as a str: one line per
+    /// instant.
     fn csv(&self, py: Python<'_>) -> PyResult<String> {
-        brief(py, || Ok(recovered(&self.body, &self.history, &self.names)?.csv()))
+        brief(py, || Ok(self.inner.csv()))
     }
 
     /// Returns the report of `flexbody recover`: a dict with the largest values, or "json", "text", "html" as a str.
+    ///
+    /// Raises InputError for rows of a simulation: `Motion.report` has their largest values.
     #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
-        let recovered = value(py, recovered(&self.body, &self.history, &self.names))?;
-        report(py, form, |format| recovered.report(format))
+        if self.inner.report(&self.body, ReportFormat::Json).is_none() {
+            let message = "the largest values of a simulation are in the report of its motion";
+            return Err(value_error(py, message));
+        }
+        report(py, form, |format| self.inner.report(&self.body, format).unwrap_or_default())
     }
 
     fn __repr__(&self) -> String {
-        let names: Vec<&str> = self.rows.iter().map(|one| one.name.as_str()).collect();
-        format!("<flexbody.Recovered: {} at {} instants>", names.join(", "), self.time.len())
+        let rows = self.inner.rows();
+        let names: Vec<&str> = rows.iter().map(|one| one.name.as_str()).collect();
+        format!("<flexbody.Recovered: {} at {} instants>", names.join(", "), self.inner.times().len())
     }
+}
+
+/// Returns three matrices as one array (rows x columns x 3).
+fn principal<'py>(py: Python<'py>, of: &[Matrix; 3]) -> PyResult<Bound<'py, PyAny>> {
+    let (rows, columns) = (of[0].rows(), of[0].columns());
+    let entry = |at: usize| of.each_ref().map(|one| one[(at / columns, at % columns)]);
+    let values: Vec<f64> = (0..rows * columns).flat_map(entry).collect();
+    Ok(PyArray1::from_vec(py, values).reshape([rows, columns, 3])?.into_any())
 }

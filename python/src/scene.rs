@@ -3,12 +3,15 @@
 use crate::arguments::{Argument, mistyped, path, text};
 use crate::arrays::{ArrayCache, shaped, triples, vector};
 use crate::errors::{diagnostics, value, value_error, warn};
+use crate::recovered::Recovered;
 use crate::report::report;
 use crate::work::{alone, brief};
+use flexbody::FlexBody;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyTuple};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// A scene for a body: gravity, loads, prescribed motion, duration, tolerances (docs/reference/scenes.md).
 ///
@@ -197,13 +200,15 @@ impl Selection {
 #[pyclass(frozen, module = "flexbody")]
 pub struct Motion {
     inner: flexbody::Motion,
+    body: Arc<FlexBody>,
     cache: ArrayCache,
 }
 
 impl Motion {
-    pub fn with_warnings(py: Python<'_>, inner: flexbody::Motion) -> PyResult<Self> {
+    /// Returns a motion of `body`, whose warnings are issued.
+    pub fn with_warnings(py: Python<'_>, inner: flexbody::Motion, body: Arc<FlexBody>) -> PyResult<Self> {
         warn(py, inner.diagnostics())?;
-        Ok(Self { inner, cache: ArrayCache::default() })
+        Ok(Self { inner, body, cache: ArrayCache::default() })
     }
 
     /// Returns the motion of the library.
@@ -340,6 +345,12 @@ impl Motion {
             all.set_item(path.name, class.call1((place?, deflection?, velocity?, acceleration?))?)?;
         }
         Ok(all)
+    }
+
+    /// Recoveries of the body over this motion, at its instants; None if the body has none.
+    #[getter]
+    fn recovered(&self) -> Option<Recovered> {
+        self.inner.recovered().map(|rows| Recovered::new(Arc::clone(&self.body), rows))
     }
 
     /// Largest deflection of any node, also between the instants. Unit: length.

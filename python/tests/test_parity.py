@@ -215,6 +215,25 @@ def test_recoveries(place: Path, body: flexbody.Body) -> None:
     xx, yy, zz, xy, yz, xz = rows.values.T
     squares = ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * (xy**2 + yz**2 + xz**2)
     np.testing.assert_allclose(rows.von_mises[:, 0], np.sqrt(squares), rtol=1e-9)
+    assert rows.principal.shape == (len(recovered.time), 1, 3)
+    np.testing.assert_allclose(rows.principal.sum(axis=2)[:, 0], xx + yy + zz, atol=1e-9 * np.abs(rows.values).max())
+    np.testing.assert_allclose(np.abs(rows.signed_von_mises), rows.von_mises)
+    # The rows of a simulation, and the largest stresses.
+    line = ["simulate", place / "body.flex.h5", "--scene", place / "scene.toml", "--quiet"]
+    command(*line, "--rows", place / "command.h5", "--envelope", place / "command.csv")
+    simulated = body.simulate(place / "scene.toml", envelope=True).recovered
+    assert simulated is not None
+    simulated.write(place / "python.h5")
+    simulated.write_envelope(place / "python.csv")
+    assert (place / "python.h5").read_bytes() == (place / "command.h5").read_bytes()
+    assert (place / "python.csv").read_bytes() == (place / "command.csv").read_bytes()
+    with pytest.raises(flexbody.InputError, match="in the report of its motion"):
+        simulated.report()
+    with pytest.raises(flexbody.InputError, match="without the largest stresses"):
+        body.simulate(place / "scene.toml").recovered.write_envelope(place / "none.csv")  # type: ignore[union-attr]
+    command("recover", place / "body.flex.h5", "--history", place / "run.csv", "-o", place / "command.h5", "--envelope", place / "command.csv", "--quiet")
+    recovered.write_envelope(place / "python.csv")
+    assert (place / "python.csv").read_bytes() == (place / "command.csv").read_bytes()
     # The same rows from arrays.
     motion = body.simulate(place / "scene.toml")
     history = {"time": motion.time, "q": motion.modal_coordinates, "angular_velocity": motion.angular_velocity}

@@ -7,8 +7,9 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{self, Subset};
 use flexbody_body::verification::{accept, body_identities};
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
-use flexbody_motion::scene::{Point, body_point, simulate, unsettled_rate};
+use flexbody_motion::scene::{self, Point, body_point, simulate, simulate_with_envelope, unsettled_rate};
 use flexbody_study::selection::select;
 use nalgebra::{Matrix3, Vector3};
 #[cfg(feature = "hdf5")]
@@ -301,6 +302,19 @@ impl FlexBody {
     /// # Errors
     /// The errors of [`FlexBody::simulate`]; FB605 if the listener stops it.
     pub fn simulate_with_progress(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
+        self.simulate_by(simulate, scene, listener)
+    }
+
+    /// Does the work of [`FlexBody::simulate_with_progress`], and finds the largest stresses of every point of the
+    /// recoveries over the continuous motion for [`Recovered::write_envelope`](super::Recovered::write_envelope).
+    ///
+    /// # Errors
+    /// The errors of [`FlexBody::simulate_with_progress`].
+    pub fn simulate_with_envelope(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
+        self.simulate_by(simulate_with_envelope, scene, listener)
+    }
+
+    fn simulate_by(&self, simulate: Simulate, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
         let scene = scene.0.single()?;
         let (recording, diagnostics) = heard(listener, |context| {
             context.phase("simulation");
@@ -312,6 +326,10 @@ impl FlexBody {
         Ok(Motion { recording, units, extent, diagnostics })
     }
 }
+
+/// Simulation of a body in a scene.
+type Simulate =
+    fn(&flex_body::FlexBody, &scene::Scene, &Context<'_>) -> Result<(scene::Recording, Vec<Diagnostic>)>;
 
 /// Flex-body file in a temporary folder, since HDF5 reads and writes files.
 #[cfg(feature = "hdf5")]

@@ -4,10 +4,12 @@ use super::matrix::by_rows;
 use super::{FlexBody, Matrix, ReportFormat};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
 use flexbody_model::RecoveryRow;
-use flexbody_motion::scene::{self, LoadHistory};
-use flexbody_report::{RecoveredFacts, RunData, recovered_csv};
+use flexbody_motion::scene::{self, LoadHistory, RecoveredMotion, RowMap, StressPoint};
+use flexbody_report::{EnvelopeKind, RecoveredFacts, RunData, recovered_csv};
 use nalgebra::Vector3;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Motion and loads of a body that any program computed, at its own instants. Vectors are along the axes of the model,
@@ -110,12 +112,20 @@ fn refused<T>(message: String) -> Result<T> {
     Err(Diagnostic::new(Code::Argument, message).into())
 }
 
-/// Recoveries of a body over a history.
-#[derive(Debug, Clone)]
-pub struct Recovered<'b> {
-    body: &'b FlexBody,
-    history: LoadedHistory,
-    rows: Vec<scene::RecoveredRows<'b>>,
+/// Recoveries of a body over a motion: of a run of any program, or of a simulation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recovered {
+    pub(super) motion: RecoveredMotion,
+    pub(super) source: RowSource,
+}
+
+/// Motion that recoveries are made of.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum RowSource {
+    /// Run of any program.
+    History(LoadedHistory),
+    /// Simulation of the scene with this name.
+    Scene(String),
 }
 
 /// Rows of one recovery over time.
@@ -132,6 +142,10 @@ pub struct RecoveredRows {
     pub points: Vec<String>,
     /// Equivalent stress of von Mises: a row for each instant and a column for each point.
     pub von_mises: Matrix,
+    /// Equivalent stress of von Mises with the sign of the principal stress of the largest magnitude, in the same shape.
+    pub signed_von_mises: Matrix,
+    /// Principal stresses, the largest first, each in the same shape.
+    pub principal: [Matrix; 3],
 }
 
 impl FlexBody {
@@ -141,11 +155,11 @@ impl FlexBody {
     /// FB221 if the body has no recovery, or none of a name; FB215 if the history has no angular velocity and rows
     /// depend on it; FB212 for loads at an interface that the body does not have, and for a torque at one whose nodes
     /// lie on one line; FB804 for another number of modal coordinates.
-    pub fn recover(&self, history: &LoadedHistory, names: &[&str]) -> Result<Recovered<'_>> {
+    pub fn recover(&self, history: &LoadedHistory, names: &[&str]) -> Result<Recovered> {
         history.refuse_foreign(self)?;
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
-        let rows = history.0.recover(&self.0, &names)?;
-        Ok(Recovered { body: self, history: history.clone(), rows })
+        let motion = history.0.recover(&self.0, &names)?;
+        Ok(Recovered { motion, source: RowSource::History(history.clone()) })
     }
 
     /// Returns the names of the recoveries of the body.
@@ -154,47 +168,84 @@ impl FlexBody {
     }
 }
 
-impl Recovered<'_> {
-    /// Returns the times of the history.
+impl Recovered {
+    /// Returns the times of the motion.
     pub fn times(&self) -> &[f64] {
-        &self.history.0.time
+        &self.motion.states.times
     }
 
     /// Returns the rows of every recovery.
     pub fn rows(&self) -> Vec<RecoveredRows> {
-        let instants = self.times().len();
-        let show = |one: &scene::RecoveredRows<'_>| RecoveredRows {
-            name: one.recovery.name.clone(),
-            labels: one.recovery.rows.clone(),
-            values: by_rows(one.recovery.rows.len(), &one.values),
-            points: one.points.iter().map(|point| point.name.clone()).collect(),
-            von_mises: {
-                let all: Vec<Vec<f64>> = (0..instants).map(|at| one.von_mises(at).collect()).collect();
-                by_rows(one.points.len(), &all)
-            },
+        self.motion.recoveries.iter().map(|map| self.rows_of(map)).collect()
+    }
+
+    fn rows_of(&self, map: &RowMap) -> RecoveredRows {
+        let values: Vec<Vec<f64>> = self.motion.states.iter().map(|z| map.values(z)).collect();
+        let of_points = |measure: &dyn Fn(&StressPoint, &[f64]) -> f64| {
+            let row = |row: &Vec<f64>| map.points.iter().map(|point| measure(point, row)).collect();
+            by_rows(map.points.len(), &values.iter().map(row).collect::<Vec<Vec<f64>>>())
         };
-        self.rows.iter().map(show).collect()
+        RecoveredRows {
+            name: map.name.clone(),
+            labels: map.rows.clone(),
+            points: map.points.iter().map(|point| point.name.clone()).collect(),
+            von_mises: of_points(&StressPoint::von_mises),
+            signed_von_mises: of_points(&StressPoint::signed_von_mises),
+            principal: [0, 1, 2].map(|k| of_points(&|point, row| point.principal(row)[k])),
+            values: by_rows(map.rows.len(), &values),
+        }
     }
 
-    /// Returns the report of `flexbody recover`: the largest value of each recovery.
-    pub fn report(&self, format: ReportFormat) -> String {
+    /// Returns the report of `flexbody recover` on the largest values; `None` for rows of a simulation, whose own report
+    /// has them. `body` is the body of the rows, here and in the functions that write files.
+    pub fn report(&self, body: &FlexBody, format: ReportFormat) -> Option<String> {
+        let RowSource::History(history) = &self.source else { return None };
         let run = RunData::default();
-        RecoveredFacts::new(&self.body.0, &self.history.0, &self.rows, &run).render(format.inner())
+        Some(RecoveredFacts::new(&body.0, &history.0, &self.motion, &run).render(format.inner()))
     }
 
-    /// Returns the table of `flexbody recover -o FILE.csv`: one line per instant.
+    /// Returns the table of `flexbody recover -o FILE.csv` and `flexbody simulate --rows FILE.csv`: one line per instant.
     pub fn csv(&self) -> String {
-        recovered_csv(&self.history.0, &self.rows)
+        recovered_csv(&self.motion)
     }
 
-    /// Writes the HDF5 file of `flexbody recover -o FILE.h5`, which appears whole or not at all.
+    /// Writes the HDF5 file of `flexbody recover -o FILE.h5` and `flexbody simulate --rows FILE.h5`, which appears whole
+    /// or not at all.
     ///
     /// # Errors
     /// FB104, FB105, FB107 and FB602 if the file cannot be written.
     #[cfg(feature = "hdf5")]
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
+    pub fn write(&self, body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
+        let history = match &self.source {
+            RowSource::History(history) => history.0.path.display().to_string(),
+            RowSource::Scene(_) => String::new(),
+        };
+        let origin = match &self.source {
+            RowSource::History(_) => ("history", history.as_str()),
+            RowSource::Scene(name) => ("scene", name.as_str()),
+        };
         let slot = flexbody_file::prepare_output(path)?;
-        flexbody_file::fill_recovered(&self.body.0, &self.history.0, &self.rows, &slot)?;
+        flexbody_file::fill_recovered(&body.0, &self.motion, origin, &slot)?;
+        slot.commit()
+    }
+
+    /// Writes the largest stresses of every point over the motion, like `--envelope`: a table (`.csv`), or the body with
+    /// them at its nodes (`.vtu`). Those of a simulation need [`FlexBody::simulate_with_envelope`].
+    ///
+    /// # Errors
+    /// FB801 for another extension; FB804 for a simulation without envelope; FB221 if no recovery has all six stresses of
+    /// a point, or for a mesh if none of its points is a node; FB104 and FB602 if the file cannot be written.
+    pub fn write_envelope(&self, body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
+        let kind = EnvelopeKind::of(path.as_ref())?;
+        let motion = match (&self.motion.envelopes, &self.source) {
+            (Some(_), _) => Cow::Borrowed(&self.motion),
+            (None, RowSource::History(_)) => Cow::Owned(self.motion.clone().with_envelope()),
+            (None, RowSource::Scene(_)) => {
+                return refused("the body was simulated without the largest stresses of points".to_owned());
+            }
+        };
+        let slot = OutputSlot::prepare(path)?;
+        slot.fill(&kind.bytes(&body.0, &motion)?)?;
         slot.commit()
     }
 }

@@ -254,16 +254,25 @@ fn recover(place: &Place) {
     let history = LoadedHistory::read(place.path("run.csv"), &body).expect("a history");
     let recovered = body.recover(&history, &["root"]).expect("rows");
     let results = place.results("recover cut.h5 --history run.csv -o command.csv");
-    assert_same_results(&recovered.report(ReportFormat::Json), &results);
+    assert_same_results(&recovered.report(&body, ReportFormat::Json).expect("a report"), &results);
     assert_eq!(recovered.csv(), fs::read_to_string(place.path("command.csv")).expect("a table"));
     let run = place.path("run.csv").display().to_string();
     place.results(&format!("recover cut.h5 --history {run} -o command.h5"));
-    recovered.write(place.path("library.h5")).expect("written");
+    recovered.write(&body, place.path("library.h5")).expect("written");
     place.assert_same("command.h5", "library.h5");
     // The same rows from numbers.
     let rows = recovered.rows().remove(0);
     assert_eq!((rows.values.rows(), rows.values.columns()), (recovered.times().len(), rows.labels.len()));
     let motion = body.simulate(&place.scene()).expect("a motion");
+    place.results("simulate cut.h5 --scene scene.toml --rows command.h5");
+    let simulated = motion.recovered().expect("rows");
+    simulated.write(&body, place.path("library.h5")).expect("written");
+    place.assert_same("command.h5", "library.h5");
+    // A cut has no stresses: there is no envelope.
+    for rows in [&recovered, &simulated] {
+        assert!(rows.write_envelope(&body, place.path("envelope.csv")).is_err());
+    }
+    assert!(recovered.write_envelope(&body, place.path("envelope.pdf")).is_err());
     let q = (0..motion.times().len()).map(|at| motion.modal_coordinates(at).to_vec()).collect();
     let omega: Vec<[f64; 3]> =
         (0..motion.times().len()).map(|at| motion.angular_velocity(at).into()).collect();

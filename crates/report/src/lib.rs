@@ -62,7 +62,7 @@ pub use facts::Facts;
 pub use identities::{checks_json, checks_text, diagnostics_json, identities_json, identities_text};
 pub use measured_run::MeasuredRunFacts;
 pub use output::output_json;
-pub use recovered::{RecoveredFacts, envelope_csv, recovered_csv};
+pub use recovered::{EnvelopeKind, RecoveredFacts, recovered_csv};
 pub use render::{Format, render};
 pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData, SearchAttempt};

@@ -210,3 +210,7 @@ class RecoveredRows(NamedTuple):
     """Names of the points with all six stresses among the rows."""
     von_mises: NDArray[np.float64]
     """Equivalent stress of von Mises (nt x points)."""
+    signed_von_mises: NDArray[np.float64]
+    """The same with the sign of the principal stress of the largest magnitude (nt x points)."""
+    principal: NDArray[np.float64]
+    """Principal stresses, the largest first (nt x points x 3)."""
