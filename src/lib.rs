@@ -80,15 +80,15 @@
 //! **Hand the body to another program.** Errors carry codes (`docs/reference/codes.md`), with what to do.
 //!
 //! ```
-//! use flexbody::{ConvertOptions, Model};
+//! use flexbody::{ConvertOptions, ExportOptions, Model};
 //! # fn main() -> flexbody::Result<()> {
 //! # let folder = tempfile::tempdir().expect("a folder");
 //! # let path = folder.path().join("cube.sid");
 //! let body = Model::read("fixtures/models/cube_hex8/model.toml")?.convert(&ConvertOptions::default())?.body;
-//! for loss in body.export("sid", &path)? {
-//!     println!("{loss}");
+//! for note in body.export("sid", &path, &ExportOptions::default())? {
+//!     println!("{note}");
 //! }
-//! let unknown = body.export("msc", &path).expect_err("no such format");
+//! let unknown = body.export("msc", &path, &ExportOptions::default()).expect_err("no such format");
 //! println!("{}: {}", unknown.diagnostics()[0].code().id(), unknown.diagnostics()[0].message());
 //! # Ok(())
 //! # }
@@ -115,13 +115,17 @@ mod api;
 mod cli;
 
 pub use api::{
-    Accuracy, Basis, BodyFrame, Conversion, ConvertOptions, Coupling, FlexBody, FrameChoice,
-    GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, Matrix, MeasuredRun, Model,
-    ModelBuilder, Motion, MotionHistory, PointPath, Progress, ReportFormat, Scene, Selection, SourceFile,
-    SparseMatrix,
+    Accuracy, Advice, AttachedMass, Audit, Basis, BodyFrame, Check, Comparison, ComparisonFormat,
+    ComparisonRow, Conversion, ConvertOptions, Coupling, ExportOptions, FlexBody, FrameChoice,
+    GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, LoadedHistory, Matrix,
+    MeasuredRun, Model, ModelBuilder, Motion, MotionHistory, PointPath, Progress, Quantity, Ranges, Recipe,
+    Recovered, RecoveredRows, RecoveryRow, ReportFormat, Response, ResponseOptions, Scene, Selection,
+    SourceFile, SparseMatrix, Step, Tolerances, TransferFunction, unit_names,
 };
+#[cfg(feature = "cli")]
+pub use api::{Batch, BatchOptions, BatchedBody};
 #[cfg(feature = "hdf5")]
-pub use api::{ReferenceChoice, Trade, TradeOptions};
+pub use api::{RecordedMotion, ReferenceChoice, Trade, TradeOptions, View};
 /// The reduced equations of motion of one body, as a reference for other programs: mass matrix, velocity
 /// forces, accelerations, momenta, energies (theory sections 2 and 6). [`FlexBody::equations_of_motion`]
 /// makes them, [`FlexBody::node_point`] and [`FlexBody::interface_point`] the points where joints hold a
@@ -133,6 +137,10 @@ pub mod dynamics {
     };
 }
 
+/// Crates whose types signatures of this library have: vectors and matrices of three rows, values that can be
+/// serialised, and sparse matrices.
+pub use {nalgebra, serde, sprs};
+
 pub use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 pub use flexbody_base::error::{Error, ExitCode, Result};
 
@@ -140,7 +148,9 @@ pub use flexbody_base::error::{Error, ExitCode, Result};
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod program {
-    pub use crate::cli::{Arguments, end, end_without_unfinished_files, parse, run, use_threads};
+    pub use crate::cli::{
+        Arguments, end, end_without_unfinished_files, parse, run, set_program, use_threads,
+    };
     pub use flexbody_base::memory::accepts_failure;
     pub use flexbody_base::output::abandon_unfinished_soon;
 }

@@ -1,9 +1,10 @@
 //! Conversion of arrays to and from numpy.
 
+use crate::arguments::mistyped;
+use crate::errors::value_error;
 use flexbody::Matrix;
 use nalgebra::{Matrix3, Vector3};
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -43,29 +44,65 @@ pub fn triples<'py>(py: Python<'py>, rows: &[[f64; 3]]) -> PyResult<Bound<'py, P
 
 /// Returns the rows of an array (n x 3).
 pub fn rows_of_three(array: &Bound<'_, PyArray2<f64>>, name: &str) -> PyResult<Vec<[f64; 3]>> {
+    let py = array.py();
     let array = array.readonly();
     let array = array.as_array();
     if array.ncols() != 3 {
-        return Err(PyValueError::new_err(format!("`{name}` has {} columns, expected 3", array.ncols())));
+        return Err(value_error(py, format!("`{name}` has {} columns, expected 3", array.ncols())));
     }
     Ok(array.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
 }
 
-/// Numbers from a caller, as an array or a sequence.
-pub type Given<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
+/// Numbers from a caller: an array or a sequence.
+pub type Given<'py> = Bound<'py, PyAny>;
+
+/// Returns the numbers of an array or a sequence with the given number of axes, row by row, and its shape.
+fn array_of(given: &Given<'_>, axes: usize, name: &str) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let array = given.extract::<PyArrayLikeDyn<'_, f64, AllowTypeChange>>().map_err(|_| {
+        let words = if axes == 1 { "numbers" } else { "rows of numbers, all of one length" };
+        mistyped(given, name, &format!("an array or a sequence of {words}"))
+    })?;
+    let array = array.as_array();
+    if array.ndim() != axes {
+        let message = format!("`{name}` has the shape {:?}, expected {axes} axes", array.shape());
+        return Err(value_error(given.py(), message));
+    }
+    Ok((array.iter().copied().collect(), array.shape().to_vec()))
+}
+
+/// Returns the numbers of an array or a sequence.
+pub fn sequence(given: &Given<'_>, name: &str) -> PyResult<Vec<f64>> {
+    Ok(array_of(given, 1, name)?.0)
+}
+
+/// Returns the rows of an array or of a sequence of sequences.
+pub fn rows_of(given: &Given<'_>, name: &str) -> PyResult<Vec<Vec<f64>>> {
+    let (values, shape) = array_of(given, 2, name)?;
+    Ok((0..shape[0]).map(|row| values[row * shape[1]..(row + 1) * shape[1]].to_vec()).collect())
+}
+
+/// Returns the rows of an array with `N` columns, or of a sequence of such rows.
+pub fn rows_of_many<const N: usize>(given: &Given<'_>, name: &str) -> PyResult<Vec<[f64; N]>> {
+    let row = |row: Vec<f64>| {
+        let width = row.len();
+        let wrong = |_| value_error(given.py(), format!("`{name}` has {width} columns, expected {N}"));
+        <[f64; N]>::try_from(row).map_err(wrong)
+    };
+    rows_of(given, name)?.into_iter().map(row).collect()
+}
 
 /// Returns `length` finite numbers from a caller; zeros if nothing is given.
 pub fn numbers(given: Option<&Given<'_>>, length: usize, name: &str) -> PyResult<Vec<f64>> {
     let Some(given) = given else { return Ok(vec![0.0; length]) };
-    let values: Vec<f64> = given.as_array().iter().copied().collect();
+    let values = sequence(given, name)?;
+    let refused = |message| Err(value_error(given.py(), message));
     if values.len() != length {
-        let message = format!("`{name}` has {} entries, expected {length}", values.len());
-        return Err(PyValueError::new_err(message));
+        return refused(format!("`{name}` has {} entries, expected {length}", values.len()));
     }
-    if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
-        return Err(PyValueError::new_err(format!("`{name}` has {} at entry {bad}", values[bad])));
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(bad) => refused(format!("`{name}` has {} at entry {bad}", values[bad])),
+        None => Ok(values),
     }
-    Ok(values)
 }
 
 /// Returns three numbers from a caller.

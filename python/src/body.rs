@@ -1,20 +1,24 @@
 //! Methods of flexible bodies, and functions that read and list them.
 
-use crate::arrays::{Given, by_node, matrix, matrix3, triples, vector};
+use crate::arguments::{Argument, counts, path, positive, real, text, units};
+use crate::arrays::{by_node, matrix, matrix3, triples, vector};
+use crate::body_arguments::{attached_mass, motion_history, points_of, recorded};
 use crate::body_class::Body;
+use crate::checks::{Check, Comparison, View, identities, tolerances};
+use crate::choice::called;
 use crate::equations::EquationsOfMotion;
-use crate::errors::{diagnostics, exception, warn};
-use crate::model::Model;
+use crate::errors::{diagnostics, value, value_error, warn};
+use crate::model::model_for;
+use crate::recovered::Recovered;
 use crate::report::{loads, report};
+use crate::response::{Response, ResponseArguments};
 use crate::scene::{Motion, Scene, Selection};
 use crate::trade::{Trade, options as trade_options};
-use crate::work::{alone, brief, run};
-use flexbody::{FlexBody, Matrix, MotionHistory};
-use numpy::{AllowTypeChange, PyArray1, PyArrayLike2};
-use pyo3::exceptions::PyValueError;
+use crate::work::{brief, run};
+use flexbody::{ExportOptions, FlexBody, Matrix, Ranges};
+use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
-use std::path::PathBuf;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use std::sync::Arc;
 
 #[pymethods]
@@ -310,9 +314,7 @@ impl Body {
 
     /// Checks all identities of the numbers of the body: list of Identity (name, value, limit, holds).
     fn identities<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        let class = py.import("flexbody._types")?.getattr("Identity")?;
-        let all = brief(py, || Ok(self.inner.identities()))?;
-        all.iter().map(|one| class.call1((one.name, one.value, one.limit, one.holds))).collect()
+        identities(py, &brief(py, || Ok(self.inner.identities()))?)
     }
 
     /// Returns the equations of motion of the body, with all terms that it holds.
@@ -322,55 +324,233 @@ impl Body {
 
     /// Writes a flex-body file (HDF5, docs/reference/file_format.md), which appears complete or not at all. The bytes
     /// are those of `flexbody convert` for the same model and settings.
-    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    fn write(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        let path = self::path(path, "path")?;
         brief(py, || self.inner.write(&path))
     }
 
     /// Writes the body in a format of another program, by its name on the command line (docs/reference/exports.md):
-    /// the file, and further files beside it. Properties that the format cannot hold cause warnings. Returns these
-    /// warnings and notes.
-    fn export<'py>(&self, py: Python<'py>, format: &str, path: PathBuf) -> PyResult<Bound<'py, PyTuple>> {
-        let said = brief(py, || self.inner.export(format, &path))?;
+    /// the file, and further files beside it. Returns warnings and notes; warnings are issued as well.
+    ///
+    /// `points` are the places of the body in the file: "nodes", "interfaces", numbers of nodes, or both as in
+    /// "interfaces,17,23". `dialect` is one of the format, `to_units` the units of the file. A picture ("vtk", "gltf")
+    /// shows the first `modes`, or a `motion` (a Motion, or the path of its file). `scene` is one for which the share of
+    /// the stiffness of inertia is reported, if the format cannot hold it. With `allow_loss` the file is written even if
+    /// the format cannot hold all of the body; every loss is then a warning.
+    ///
+    /// Raises InputError for properties that the format cannot hold (FB720), options that it does not have, and the motion
+    /// of another body.
+    #[pyo3(signature = (format, path, *, points=None, dialect=None, to_units=None, modes=None, motion=None, scene=None, allow_loss=false))]
+    #[allow(clippy::too_many_arguments)] // the keywords of a Python function
+    fn export<'py>(
+        &self,
+        py: Python<'py>,
+        format: &Bound<'py, PyAny>,
+        path: &Bound<'py, PyAny>,
+        points: Argument<'_, 'py>,
+        dialect: Argument<'_, 'py>,
+        to_units: Argument<'_, 'py>,
+        modes: Argument<'_, 'py>,
+        motion: Argument<'_, 'py>,
+        scene: Argument<'_, 'py>,
+        allow_loss: bool,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let (format, path) = (text(format, "format")?, self::path(path, "path")?);
+        let mut options = ExportOptions::default();
+        if let Some(points) = points {
+            options = options.points(points_of(points)?);
+        }
+        if let Some(dialect) = dialect {
+            options = options.dialect(text(dialect, "dialect")?);
+        }
+        if let Some(given) = to_units {
+            options = options.to_units(units(given, "to_units")?);
+        }
+        if let Some(modes) = modes {
+            options = options.modes(positive(modes, "modes")?);
+        }
+        if let Some(motion) = motion {
+            options = options.recorded_motion(recorded(motion)?);
+        }
+        if let Some(scene) = scene {
+            options = options.scene(&Scene::whole(scene)?);
+        }
+        if allow_loss {
+            options = options.allow_loss();
+        }
+        let body = Arc::clone(&self.inner);
+        let said = run(py, move |_| body.export(&format, &path, &options))?;
         warn(py, &said)?;
         diagnostics(py, &said)
     }
 
-    /// Writes a picture of the body in the motion of its simulation: "vtk" for ParaView (a .pvd file with a .vtu file
-    /// for each instant beside it), "gltf" for viewers and web pages (a .glb file). Properties that the picture leaves
-    /// out cause warnings. Returns these warnings and notes.
+    /// Checks every identity of the body and, `against` the model that it was made of (a Model, or the path of its
+    /// manifest or job), every invariant and every mode, like `flexbody check`.
+    #[pyo3(signature = (against=None))]
+    fn check(&self, py: Python<'_>, against: Argument<'_, '_>) -> PyResult<Check> {
+        let body = Arc::clone(&self.inner);
+        let model = against.map(|given| model_for(given, "against", Arc::clone(&body))).transpose()?;
+        let inner = run(py, move |_| body.check(model.as_deref()))?;
+        warn(py, inner.diagnostics())?;
+        Ok(Check { inner })
+    }
+
+    /// Compares another body (a Body, or the path of its file) with this one, like `flexbody compare`. With `common` only
+    /// the modes that both have are compared. The tolerances are relative; 1e-9 without, 1e-8 for `invariants`.
+    #[pyo3(signature = (other, *, common=false, frequency=None, mass=None, centre_of_mass=None, inertia=None, invariants=None))]
+    #[allow(clippy::too_many_arguments)] // the keywords of a Python function
+    fn compare(
+        &self,
+        py: Python<'_>,
+        other: &Bound<'_, PyAny>,
+        common: bool,
+        frequency: Argument<'_, '_>,
+        mass: Argument<'_, '_>,
+        centre_of_mass: Argument<'_, '_>,
+        inertia: Argument<'_, '_>,
+        invariants: Argument<'_, '_>,
+    ) -> PyResult<Comparison> {
+        let tolerances = tolerances([
+            ("frequency", frequency),
+            ("mass", mass),
+            ("centre_of_mass", centre_of_mass),
+            ("inertia", inertia),
+            ("invariants", invariants),
+        ])?;
+        let (body, other) = (Arc::clone(&self.inner), Body::given(other, "other")?);
+        let compare = if common { FlexBody::compare_common } else { FlexBody::compare };
+        let inner = run(py, move |_| compare(&body, &other, &tolerances))?;
+        Ok(Comparison { inner })
+    }
+
+    /// Computes the frequency response between places, like `flexbody response` without a model: its errors are unknown.
+    /// `Model.response` computes them, and describes the arguments.
+    #[pyo3(
+        signature = (source=None, target=None, *, band=None, scene=None, damping=None, points=None),
+        text_signature = "($self, source=None, target=None, *, band=None, scene=None, damping=None, points=400)"
+    )]
+    #[allow(clippy::too_many_arguments)] // the keywords of a Python function
+    fn response(
+        &self,
+        py: Python<'_>,
+        source: Argument<'_, '_>,
+        target: Argument<'_, '_>,
+        band: Argument<'_, '_>,
+        scene: Argument<'_, '_>,
+        damping: Argument<'_, '_>,
+        points: Argument<'_, '_>,
+    ) -> PyResult<Response> {
+        let (tolerance, solves) = (None, None);
+        let stated = ResponseArguments { source, target, band, scene, damping, tolerance, points, solves };
+        let (options, body) = (stated.options(py)?, Arc::clone(&self.inner));
+        Response::with_warnings(py, run(py, move |listener| body.response(&options, listener))?, 0)
+    }
+
+    /// Names of the recoveries of the body: stresses, strains and forces that `recover` computes.
+    #[getter]
+    fn recoveries(&self) -> Vec<&str> {
+        self.inner.recoveries()
+    }
+
+    /// Computes the recoveries of the body over a motion of any program, like `flexbody recover`: all, or `only` those
+    /// with these names.
     ///
-    /// Raises InputError for a format without motion, and for the motion of another body.
-    fn export_motion<'py>(
+    /// `history` is the path of a table (docs/reference/recovery.md), or a dict of "time" (nt), "q" (nt x nf),
+    /// "angular_velocity" (nt x 3) and "loads", a dict of interface to a tuple of forces and torques (nt x 3 each) at its
+    /// reference point. Vectors are along the axes of the model, which turn with the body. Interfaces without loads count as
+    /// unloaded.
+    #[pyo3(signature = (history, only=None))]
+    fn recover(
+        &self,
+        py: Python<'_>,
+        history: &Bound<'_, PyAny>,
+        only: Argument<'_, '_>,
+    ) -> PyResult<Recovered> {
+        Recovered::of(py, Arc::clone(&self.inner), history, only)
+    }
+
+    /// Returns the page of `flexbody view`: of the modes of the body, or of a motion (a Motion, or the path of its file).
+    /// `triangles` limits the surface; without it the page stays below 10 MB.
+    #[pyo3(signature = (motion=None, *, triangles=None))]
+    fn view(&self, py: Python<'_>, motion: Argument<'_, '_>, triangles: Argument<'_, '_>) -> PyResult<View> {
+        let motion = motion.map(recorded).transpose()?;
+        let triangles = triangles.map(|given| positive(given, "triangles")).transpose()?;
+        let body = Arc::clone(&self.inner);
+        Ok(View { inner: run(py, move |_| body.view(motion.as_ref(), triangles))? })
+    }
+
+    /// Returns which terms of the equations of motion a body needs for ranges of its motion, like `flexbody advise`, as a
+    /// dict: the largest rotation rate `spin` in Hz, the largest `deflection` of a node (1 % of its extent without), and
+    /// the mass `attached` to it, or a tuple of the mass and the interface that carries it.
+    #[pyo3(
+        signature = (*, spin=None, deflection=None, attached=None, rotation_given=false, limit=None),
+        text_signature = "($self, *, spin=0.0, deflection=None, attached=None, rotation_given=False, limit=0.05)"
+    )]
+    fn advise<'py>(
         &self,
         py: Python<'py>,
-        format: &str,
-        motion: &Motion,
-        path: PathBuf,
-    ) -> PyResult<Bound<'py, PyTuple>> {
-        let said = brief(py, || self.inner.export_motion(format, motion.inner(), &path))?;
-        warn(py, &said)?;
-        diagnostics(py, &said)
+        spin: Argument<'_, 'py>,
+        deflection: Argument<'_, 'py>,
+        attached: Argument<'_, 'py>,
+        rotation_given: bool,
+        limit: Argument<'_, 'py>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let or = |given: Argument<'_, 'py>, name: &str, default: f64| {
+            given.map_or(Ok(default), |given| real(given, name))
+        };
+        let ranges = Ranges {
+            spin_hz: or(spin, "spin", 0.0)?,
+            deflection: deflection.map(|given| real(given, "deflection")).transpose()?,
+            attached: attached.map(attached_mass).transpose()?,
+            is_rotation_given: rotation_given,
+            limit: or(limit, "limit", 0.05)?,
+        };
+        let advice = value(py, self.inner.advise(ranges))?;
+        report(py, None, |format| advice.report(self.inner.name(), format))
     }
 
     /// Decides which terms and modes the body needs in a scene: a Scene, a list of load cases, or the path of a scene
     /// file.
     fn select(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Selection> {
-        let (scene, body) = (Scene::whole(py, scene)?, Arc::clone(&self.inner));
+        let (scene, body) = (Scene::whole(scene)?, Arc::clone(&self.inner));
         Selection::with_warnings(py, run(py, move |listener| body.select_with_progress(&scene, listener))?)
     }
 
     /// Returns the body with some of its modes (numbers from 1, ascending; all by default) and groups of terms: "W1", "W2",
-    /// "W3" with commas, "none", "all", or those of a guideline: "I", "II", "III", "IV".
-    #[pyo3(signature = (modes=None, terms="all"))]
-    fn subset(&self, py: Python<'_>, modes: Option<Vec<usize>>, terms: &str) -> PyResult<Self> {
-        let body = self.inner.subset(modes.as_deref(), terms).map_err(|error| exception(py, &error))?;
+    /// "W3" with commas, "none", "all", or those of a guideline: "I", "II", "III", "IV". With `storage` "f32" its shapes and
+    /// the inertia of its modes are rounded to 32-bit floats. Like `flexbody reduce`.
+    #[pyo3(
+        signature = (modes=None, terms=None, *, storage=None),
+        text_signature = "($self, modes=None, terms=\"all\", *, storage=None)"
+    )]
+    fn subset(
+        &self,
+        py: Python<'_>,
+        modes: Argument<'_, '_>,
+        terms: Argument<'_, '_>,
+        storage: Argument<'_, '_>,
+    ) -> PyResult<Self> {
+        let modes = modes.map(|given| counts(given, "modes")).transpose()?;
+        let terms = terms.map_or_else(|| Ok("all".to_owned()), |terms| text(terms, "terms"))?;
+        let mut body = value(py, self.inner.subset(modes.as_deref(), &terms))?;
+        if let Some(storage) = storage {
+            called("storage", storage, ["f32"], |name| name)?;
+            body = value(py, body.rounded_to_f32())?;
+        }
         Ok(Body::new(body, Vec::new()))
     }
 
-    /// Simulates the body in a scene: a Scene, or the path of a scene file without load cases.
-    fn simulate(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Motion> {
-        let (scene, body) = (Scene::one(py, scene)?, Arc::clone(&self.inner));
-        Motion::with_warnings(py, run(py, move |listener| body.simulate_with_progress(&scene, listener))?)
+    /// Simulates the body in a scene: a Scene, or a scene as it takes one (a path, a text, a dict) without load cases. With
+    /// `envelope` the largest stresses of every point of the recoveries over the continuous motion are found for
+    /// `Motion.recovered.write_envelope`.
+    #[pyo3(signature = (scene, *, envelope=false))]
+    fn simulate(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, envelope: bool) -> PyResult<Motion> {
+        let (scene, body) = (Scene::one(scene)?, Arc::clone(&self.inner));
+        let motion = run(py, move |listener| match envelope {
+            true => body.simulate_with_envelope(&scene, listener),
+            false => body.simulate_with_progress(&scene, listener),
+        })?;
+        Motion::with_warnings(py, motion, Arc::clone(&self.inner))
     }
 
     /// Measures the errors of a run of this body in a scene by another program. `history` is the path of a table with the
@@ -384,37 +564,44 @@ impl Body {
         py: Python<'py>,
         scene: &Bound<'py, PyAny>,
         history: &Bound<'py, PyAny>,
-        reference: Option<&Bound<'py, Self>>,
-        model: Option<&Bound<'py, Model>>,
+        reference: Argument<'_, 'py>,
+        model: Argument<'_, 'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (scene, body) = (Scene::one(py, scene)?, Arc::clone(&self.inner));
-        let history = motion_history(py, history, self.inner.n_modes())?;
+        let (scene, body) = (Scene::one(scene)?, Arc::clone(&self.inner));
+        let history = motion_history(history, self.inner.n_modes())?;
         let reference = match (reference, model) {
             (Some(reference), Some(model)) => {
-                Some((Arc::clone(&reference.get().inner), model.get().shared()))
+                let reference = Body::given(reference, "reference")?;
+                let model = model_for(model, "model", Arc::clone(&reference))?;
+                Some((reference, model))
             }
             (None, None) => None,
-            _ => return Err(PyValueError::new_err("`reference` and `model` belong together")),
+            _ => {
+                return Err(value_error(
+                    py,
+                    "one of `reference` and `model` is given, expected both or none",
+                ));
+            }
         };
         let run = run(py, move |listener| {
             let reference = reference.as_ref().map(|(body, model)| (&**body, &**model));
             body.measure(&scene, &history, reference, listener)
         })?;
         warn(py, run.diagnostics())?;
-        report(py, "dict", |format| run.report(format))
+        report(py, None, |format| run.report(format))
     }
 
     /// Measures accuracy against cost in a scene for reduced versions of this body. `Model.trade` compares conversions.
-    #[pyo3(signature = (scene, *, repeat=3))]
-    fn trade(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, repeat: usize) -> PyResult<Trade> {
-        let (scene, body) = (Scene::whole(py, scene)?, Arc::clone(&self.inner));
-        let options = trade_options(self.inner.n_modes(), repeat, "full")?;
+    #[pyo3(signature = (scene, *, repeat=None), text_signature = "($self, scene, *, repeat=3)")]
+    fn trade(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, repeat: Argument<'_, '_>) -> PyResult<Trade> {
+        let (scene, body) = (Scene::whole(scene)?, Arc::clone(&self.inner));
+        let options = trade_options(None, repeat, None)?;
         Trade::with_warnings(py, run(py, move |listener| body.trade(&scene, &options, listener))?)
     }
 
     /// Returns the report of `flexbody inspect`: a dict with all numbers, or "json", "text", "html" as a str.
-    #[pyo3(signature = (form="dict"))]
-    fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }
 
@@ -425,41 +612,24 @@ impl Body {
         let name = self.inner.name();
         format!("<flexbody.Body {name:?}: {nodes} nodes, {modes} modes, {first:.6} to {last:.6} Hz>")
     }
-}
 
-/// Returns the history that a caller gives: the path of a table, or a tuple of time, q and attitude or None.
-fn motion_history(py: Python<'_>, given: &Bound<'_, PyAny>, n_modes: usize) -> PyResult<MotionHistory> {
-    type Rows<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
-    let history = match given.extract::<(Given<'_>, Rows<'_>, Option<Rows<'_>>)>() {
-        Ok((time, q, attitude)) => {
-            let rows = |rows: &Rows<'_>| -> Vec<Vec<f64>> {
-                rows.as_array().rows().into_iter().map(|row| row.to_vec()).collect()
-            };
-            let four = |row: Vec<f64>| {
-                <[f64; 4]>::try_from(row)
-                    .map_err(|_| PyValueError::new_err("`attitude` does not have four columns"))
-            };
-            let attitude = attitude.map(|all| rows(&all).into_iter().map(four).collect()).transpose()?;
-            MotionHistory::new(time.as_array().to_vec(), rows(&q), attitude)
-        }
-        Err(_) => MotionHistory::read(given.extract::<PathBuf>()?, n_modes),
-    };
-    history.map_err(|error| exception(py, &error))
-}
+    /// Returns the body itself: it cannot be changed.
+    fn __copy__(this: Py<Self>) -> Py<Self> {
+        this
+    }
 
-/// Reads a flex-body file.
-///
-/// Raises InputError if it cannot be read or has a newer format, CheckError if it violates its schema or was changed
-/// since it was written.
-#[pyfunction]
-pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Body> {
-    Ok(Body::new(alone(py, || FlexBody::read(&path))?, Vec::new()))
-}
+    fn __deepcopy__(this: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        this
+    }
 
-/// Returns the formats that `Body.export` writes: dict of name to the programs that read it.
-#[pyfunction]
-pub fn export_formats(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-    let all = PyDict::new(py);
-    FlexBody::export_formats().into_iter().try_for_each(|(name, reader)| all.set_item(name, reader))?;
-    Ok(all)
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let bytes = brief(py, || self.inner.to_bytes())?;
+        let restore = py.import("flexbody._flexbody")?.getattr("_restored")?;
+        let found = diagnostics(py, &self.diagnostics)?;
+        (restore, (PyBytes::new(py, &bytes), found)).into_pyobject(py)
+    }
+
+    fn _repr_html_(&self) -> String {
+        self.inner.summary_html()
+    }
 }

@@ -1,19 +1,49 @@
 //! Choices that Python makes by name.
 
-use pyo3::exceptions::PyValueError;
+use crate::arguments::mistyped;
+use crate::errors::value_error;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-/// Returns the element of `all` that is called `name`, or a ValueError that lists the names of all choices of `what`.
+/// Returns the element of `all` that is called like the argument `given`, or an exception that lists the names of all
+/// choices of `what`.
 pub fn called<T: Copy>(
     what: &str,
-    name: &str,
+    given: &Bound<'_, PyAny>,
     all: impl IntoIterator<Item = T>,
     name_of: fn(T) -> &'static str,
 ) -> PyResult<T> {
     let all: Vec<T> = all.into_iter().collect();
-    let found = all.iter().copied().find(|choice| name_of(*choice) == name);
-    found.ok_or_else(|| {
-        let known = all.into_iter().map(name_of).collect::<Vec<_>>().join(", ");
-        PyValueError::new_err(format!("{what} is `{name}`, expected one of {known}"))
-    })
+    let known = || all.iter().map(|choice| name_of(*choice)).collect::<Vec<_>>().join(", ");
+    let Ok(name) = given.extract::<String>() else {
+        return Err(mistyped(given, what, &format!("one of {}", known())));
+    };
+    all.iter()
+        .copied()
+        .find(|choice| name_of(*choice) == name)
+        .ok_or_else(|| value_error(given.py(), format!("`{what}` is {name:?}, expected one of {}", known())))
+}
+
+/// Returns the names of all choices, for the test that the types of the package state the same ones.
+#[pyfunction]
+pub fn _choices(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let all = PyDict::new(py);
+    let names = |choices: &[&str]| choices.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+    let bases = flexbody::Basis::ALL.into_iter().filter(|basis| *basis != flexbody::Basis::Imported);
+    all.set_item("Basis", names(&bases.map(flexbody::Basis::name).collect::<Vec<_>>()))?;
+    all.set_item("Accuracy", names(&flexbody::Accuracy::ALL.map(flexbody::Accuracy::name)))?;
+    all.set_item("Coupling", names(&flexbody::Coupling::ALL.map(flexbody::Coupling::name)))?;
+    all.set_item("Reference", names(&flexbody::ReferenceChoice::ALL.map(flexbody::ReferenceChoice::name)))?;
+    let formats: Vec<&str> = flexbody::FlexBody::export_formats().iter().map(|(name, _)| *name).collect();
+    let dialects = formats.iter().filter_map(|name| flexbody::FlexBody::export_dialects(name).ok());
+    all.set_item("Dialect", names(&dialects.flatten().copied().collect::<Vec<_>>()))?;
+    all.set_item("ExportFormat", names(&formats))?;
+    all.set_item("ImportFormat", names(&flexbody::FlexBody::import_formats()))?;
+    let [length, mass, time] = flexbody::unit_names();
+    all.set_item("Length", names(&length))?;
+    all.set_item("Mass", names(&mass))?;
+    all.set_item("Time", names(&time))?;
+    all.set_item("Program", names(&flexbody::Model::programs()))?;
+    all.set_item("RecipeProgram", names(&flexbody::Recipe::programs()))?;
+    Ok(all)
 }

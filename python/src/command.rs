@@ -1,5 +1,6 @@
 //! The command `flexbody`.
 
+use crate::batch::words_of_the_command;
 use crate::errors::bug;
 use flexbody::program::{self, Arguments};
 use pyo3::prelude::*;
@@ -12,6 +13,8 @@ use std::ffi::OsString;
 /// the program, without an unfinished file.
 #[pyfunction]
 pub fn run_command(py: Python<'_>, words: Vec<OsString>) -> PyResult<u8> {
+    // The executable of this process is that of Python.
+    program::set_program(words_of_the_command(py)?);
     let arguments: &'static Arguments = match program::parse(&words) {
         Ok(arguments) => Box::leak(Box::new(arguments)),
         Err(code) => return Ok(code as u8),

@@ -1,11 +1,11 @@
 //! The equations of motion of one body.
 
+use crate::arguments::{text, whole};
 use crate::arrays::{Given, matrix3, numbers, shaped, vector, vector3};
-use crate::errors::exception;
-use flexbody::FlexBody;
+use crate::errors::{exception, value_error};
 use flexbody::dynamics::{self, BodyPoint, Evaluation};
+use flexbody::{Code, Diagnostic, FlexBody};
 use nalgebra::Vector3;
-use pyo3::exceptions::{PyArithmeticError, PyValueError};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
@@ -106,7 +106,7 @@ impl EquationsOfMotion {
     /// Returns nu' (n) from Mc(q) nu' = applied - h(q, nu) - (0, 0, K_ff q + D q'); without `applied` for the free
     /// body.
     ///
-    /// Raises ArithmeticError if the mass matrix of the deformed body is not positive definite.
+    /// Raises NumericalError, an ArithmeticError, if the mass matrix of the deformed body is not positive definite.
     #[pyo3(signature = (q, nu, applied=None))]
     fn accelerations<'py>(
         &self,
@@ -119,7 +119,9 @@ impl EquationsOfMotion {
         let applied = numbers(applied.as_ref(), n, "applied")?;
         let mut acceleration = vec![0.0; n];
         let solved = self.at(&q, Some(&nu))?.accelerations(&applied, &mut acceleration);
-        solved.map_err(|error| PyArithmeticError::new_err(error.to_string()))?;
+        solved.map_err(|error| {
+            exception(py, &Diagnostic::new(Code::SimulationStopped, error.to_string()).into())
+        })?;
         Ok(vector(py, &acceleration))
     }
 
@@ -181,14 +183,16 @@ impl EquationsOfMotion {
 
     /// Returns the node of this number (`Body.node_ids`; without `node_ids` its index from 0) as a point for forces and
     /// motion.
-    fn node(&self, py: Python<'_>, number: i64) -> PyResult<Point> {
+    fn node(&self, py: Python<'_>, number: &Bound<'_, PyAny>) -> PyResult<Point> {
+        let number = whole(number, "number")?;
         let inner = self.body.node_point(number).map_err(|error| exception(py, &error))?;
         Ok(Point { equations: Arc::clone(&self.inner), inner, name: format!("node {number}") })
     }
 
     /// Returns the reference point of the interface of this name.
-    fn interface(&self, py: Python<'_>, name: &str) -> PyResult<Point> {
-        let inner = self.body.interface_point(name).map_err(|error| exception(py, &error))?;
+    fn interface(&self, py: Python<'_>, name: &Bound<'_, PyAny>) -> PyResult<Point> {
+        let name = text(name, "name")?;
+        let inner = self.body.interface_point(&name).map_err(|error| exception(py, &error))?;
         Ok(Point { equations: Arc::clone(&self.inner), inner, name: format!("interface {name}") })
     }
 
@@ -259,7 +263,7 @@ impl Point {
 
     /// Returns the generalised forces (n) of a force and a torque at the point.
     ///
-    /// Raises ValueError for a torque at a point without orientation.
+    /// Raises InputError, a ValueError, for a torque at a point without orientation.
     #[pyo3(signature = (q, force, torque=None))]
     fn generalised_force<'py>(
         &self,
@@ -274,7 +278,7 @@ impl Point {
         if let Some(torque) = torque {
             if !self.inner.turns() {
                 let message = format!("{} has no orientation: no torque acts on it", self.name);
-                return Err(PyValueError::new_err(message));
+                return Err(value_error(py, message));
             }
             self.inner.add_torque(&evaluation, &vector3(&torque, "torque")?, &mut forces);
         }

@@ -1,6 +1,6 @@
 //! Diagnostics of the library in Python: exceptions, warnings, and tuples of diagnostics.
 
-use flexbody::{Diagnostic, Error, Severity};
+use flexbody::{Code, Diagnostic, Error, Severity};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -18,10 +18,30 @@ pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
     }
 }
 
+/// Returns the exception for an argument whose value is not possible: an InputError.
+pub fn value_error(py: Python<'_>, message: impl Into<String>) -> PyErr {
+    exception(py, &Diagnostic::new(Code::Argument, message).into())
+}
+
+/// Returns the exception for an argument of a wrong type: an ArgumentError, which is an InputError and a TypeError.
+pub fn type_error(py: Python<'_>, message: impl Into<String>) -> PyErr {
+    let made = diagnostics(py, &[Diagnostic::new(Code::Argument, message)])
+        .and_then(|found| py.import(ERRORS)?.getattr("ArgumentError")?.call1((found, 2)));
+    match made {
+        Ok(exception) => PyErr::from_value(exception),
+        Err(failure) => failure,
+    }
+}
+
+/// Returns a value, or the exception for an error of the library.
+pub fn value<T>(py: Python<'_>, outcome: flexbody::Result<T>) -> PyResult<T> {
+    outcome.map_err(|error| exception(py, &error))
+}
+
 /// Returns the exception for an internal error of the library.
 pub fn bug(py: Python<'_>) -> PyErr {
     let message = "an internal check of the library failed";
-    exception(py, &Diagnostic::new(flexbody::Code::Internal, message).into())
+    exception(py, &Diagnostic::new(Code::Internal, message).into())
 }
 
 /// Returns diagnostics as a tuple of `flexbody.Diagnostic`.
@@ -38,6 +58,23 @@ pub fn diagnostics<'py>(py: Python<'py>, found: &[Diagnostic]) -> PyResult<Bound
         ))
     };
     PyTuple::new(py, found.iter().map(one).collect::<PyResult<Vec<_>>>()?)
+}
+
+/// Diagnostic as a pickle has it: code, severity, message, file, line, help.
+pub type PickledDiagnostic = (String, String, String, Option<String>, Option<usize>, String);
+
+/// Returns a diagnostic of a pickle; `None` for a code that this version does not know.
+pub fn restored_diagnostic(found: PickledDiagnostic) -> Option<Diagnostic> {
+    let (id, _, message, file, line, help) = found;
+    let code = Code::ALL.iter().find(|code| code.id() == id)?;
+    let mut made = Diagnostic::new(*code, message).with_help(help);
+    if let Some(file) = file {
+        made = made.in_file(file);
+    }
+    Some(match line {
+        Some(line) => made.at_line(line),
+        None => made,
+    })
 }
 
 /// Issues the warnings among `found` on behalf of the calling Python code. Returns an error if the user has turned

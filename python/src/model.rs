@@ -1,18 +1,19 @@
 //! Models, and their conversion.
 
+use crate::arguments::{Argument, count, mistyped, path, positive, real, text};
 use crate::arrays::rows_of_three;
 use crate::body_class::Body;
 use crate::choice::called;
-use crate::errors::{diagnostics, exception, warn};
+use crate::errors::{diagnostics, value, value_error, warn};
+use crate::response::{Response, ResponseArguments};
 use crate::scene::Scene;
 use crate::trade::{Trade, options as trade_options};
 use crate::work::run;
 use flexbody::{
-    Accuracy, Basis, ConvertOptions, Coupling, Diagnostic, FrameChoice, ModelBuilder, SparseMatrix,
+    Accuracy, Basis, ConvertOptions, Coupling, Diagnostic, FlexBody, FrameChoice, ModelBuilder, SparseMatrix,
 };
 use numpy::ndarray::ArrayView1;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use std::path::PathBuf;
@@ -39,20 +40,19 @@ pub struct Compressed<'py>(
 impl Compressed<'_> {
     fn matrix(&self, py: Python<'_>) -> PyResult<SparseMatrix> {
         let index = |array: &PyReadonlyArray1<'_, i64>| -> PyResult<Vec<usize>> {
-            let negative = |_| PyValueError::new_err("a sparse matrix has a negative index");
+            let negative = |_| value_error(py, "a sparse matrix has a negative index");
             array.as_array().iter().map(|&i| usize::try_from(i).map_err(negative)).collect()
         };
         let values: Vec<f64> = self.3.as_array().to_vec();
-        SparseMatrix::from_csc(self.0, &index(&self.1)?, &index(&self.2)?, &values)
-            .map_err(|error| exception(py, &error))
+        value(py, SparseMatrix::from_csc(self.0, &index(&self.1)?, &index(&self.2)?, &values))
     }
 }
 
 /// Interface from `flexbody.model`: name, nodes, coupling, reference point.
-type GivenInterface = (String, Vec<i64>, Option<String>, Option<[f64; 3]>);
+type GivenInterface<'py> = (String, Vec<i64>, Option<Bound<'py, PyAny>>, Option<[f64; 3]>);
 
 /// Returns the coupling of this name.
-pub fn coupling(name: Option<&str>) -> PyResult<Option<Coupling>> {
+fn coupling(name: Argument<'_, '_>) -> PyResult<Option<Coupling>> {
     name.map(|name| called("coupling", name, Coupling::ALL, Coupling::name)).transpose()
 }
 
@@ -78,41 +78,72 @@ fn damped(py: Python<'_>, builder: ModelBuilder, damping: &Damping<'_>) -> PyRes
     })
 }
 
+/// Returns the bases that are computed of a model. Imported shapes are read from a file, which is an option of the program
+/// only.
+pub fn computed_bases() -> Vec<Basis> {
+    Basis::ALL.into_iter().filter(|basis| *basis != Basis::Imported).collect()
+}
+
+/// Returns the basis of this name; the default without a name.
+pub fn basis(name: Argument<'_, '_>) -> PyResult<Basis> {
+    name.map_or(Ok(Basis::default()), |name| called("basis", name, computed_bases(), Basis::name))
+}
+
 /// Returns the options of a conversion from names.
-#[allow(clippy::too_many_arguments)] // the keywords of a Python function
 fn convert_options(
-    modes: Option<usize>,
-    max_frequency: Option<f64>,
-    basis: &str,
-    accuracy: &str,
-    frame: &str,
+    modes: Argument<'_, '_>,
+    max_frequency: Argument<'_, '_>,
+    names: [Argument<'_, '_>; 3],
     comparators: bool,
 ) -> PyResult<ConvertOptions> {
-    let mut options = ConvertOptions::default();
-    if modes.is_some() && max_frequency.is_some() {
-        return Err(PyValueError::new_err("give `modes` or `max_frequency`, not both"));
+    let [basis, accuracy, frame] = names;
+    let mut options = ConvertOptions::default().basis(self::basis(basis)?);
+    if let (Some(given), Some(_)) = (modes, max_frequency) {
+        return Err(value_error(given.py(), "`modes` and `max_frequency` are given, expected one of them"));
     }
-    if let Some(count) = modes {
-        options = options.modes(count);
+    if let Some(given) = modes {
+        options = options.modes(count(given, "modes")?);
     }
-    if let Some(hertz) = max_frequency {
-        if !(hertz > 0.0 && hertz.is_finite()) {
-            return Err(PyValueError::new_err(format!(
-                "max_frequency is {hertz}, expected a positive number"
-            )));
+    if let Some(given) = max_frequency {
+        let hertz = real(given, "max_frequency")?;
+        if hertz <= 0.0 {
+            let message = format!("`max_frequency` is {hertz}, expected a positive number");
+            return Err(value_error(given.py(), message));
         }
         options = options.below_hz(hertz);
     }
     if !comparators {
         options = options.without_comparators();
     }
-    let unknown = |expected| PyValueError::new_err(format!("frame is `{frame}`, {expected}"));
-    // Imported shapes are read from a file, which is an option of the program only.
-    let computed = Basis::ALL.into_iter().filter(|basis| *basis != Basis::Imported);
-    Ok(options
-        .basis(called("basis", basis, computed, Basis::name)?)
-        .accuracy(called("accuracy", accuracy, Accuracy::ALL, Accuracy::name)?)
-        .frame(frame.parse::<FrameChoice>().map_err(unknown)?))
+    if let Some(given) = accuracy {
+        options = options.accuracy(called("accuracy", given, Accuracy::ALL, Accuracy::name)?);
+    }
+    if let Some(given) = frame {
+        options = options.frame(frame_choice(given)?);
+    }
+    Ok(options)
+}
+
+/// Returns the frame of this name.
+pub fn frame_choice(given: &Bound<'_, PyAny>) -> PyResult<FrameChoice> {
+    let name = text(given, "frame")?;
+    let unknown = |expected| value_error(given.py(), format!("`frame` is {name:?}, {expected}"));
+    name.parse().map_err(unknown)
+}
+
+/// Returns the model that a caller gives: a `Model`, or the path of a manifest or a job.
+pub fn model_for(
+    given: &Bound<'_, PyAny>,
+    name: &str,
+    body: Arc<FlexBody>,
+) -> PyResult<Arc<flexbody::Model>> {
+    if let Ok(model) = given.cast::<Model>() {
+        return Ok(model.get().shared());
+    }
+    let path: PathBuf =
+        given.extract().map_err(|_| mistyped(given, name, "a Model, or the path of a manifest or a job"))?;
+    let read = run(given.py(), move |_| flexbody::Model::read_for(&body, path))?;
+    Ok(Arc::new(read))
 }
 
 impl Model {
@@ -143,7 +174,7 @@ impl Model {
         positions: Bound<'py, PyArray2<f64>>,
         plane: bool,
         dofs: Option<PyReadonlyArray2<'py, i64>>,
-        interfaces: Vec<GivenInterface>,
+        interfaces: Vec<GivenInterface<'py>>,
         units: Option<[String; 3]>,
         damping: Option<Damping<'py>>,
         residual_vectors: (bool, bool),
@@ -163,7 +194,7 @@ impl Model {
             builder = builder.dofs(labels.as_array().rows().into_iter().map(label).collect::<Vec<_>>());
         }
         for (name, nodes, how, reference) in interfaces {
-            builder = match (coupling(how.as_deref())?, reference) {
+            builder = match (coupling(how.as_ref())?, reference) {
                 (None, None) => builder.interface(name, nodes),
                 (how, reference) => {
                     builder.coupled_interface(name, nodes, how.unwrap_or(Coupling::Averaging), reference)
@@ -171,7 +202,7 @@ impl Model {
             };
         }
         if let Some([length, mass, time]) = &units {
-            builder = builder.units(length, mass, time).map_err(|error| exception(py, &error))?;
+            builder = value(py, builder.units(length, mass, time))?;
         }
         if let Some(damping) = &damping {
             builder = damped(py, builder, damping)?;
@@ -185,28 +216,29 @@ impl Model {
     /// Reads the model of a manifest, or of the job of an FE program, for `flexbody.read_model`.
     #[staticmethod]
     #[pyo3(name = "_read")]
-    fn read(
-        py: Python<'_>,
-        path: PathBuf,
-        program: Option<String>,
+    fn read<'py>(
+        py: Python<'py>,
+        path: &Bound<'py, PyAny>,
+        program: Argument<'_, 'py>,
         units: Option<[String; 3]>,
-        sets: Vec<(String, String, Option<String>)>,
+        sets: Vec<(String, String, Option<Bound<'py, PyAny>>)>,
     ) -> PyResult<Self> {
+        let path = self::path(path, "path")?;
+        let program = program.map(|program| text(program, "program")).transpose()?;
         if path.extension().is_some_and(|extension| extension == "toml") {
             if program.is_some() || units.is_some() || !sets.is_empty() {
-                let message = "program, units and interfaces are given together with a manifest (.toml), which states them itself: leave them out";
-                return Err(PyValueError::new_err(message));
+                let message = "`program`, `units` or `interfaces` is given together with a manifest (.toml), which states them itself: leave it out";
+                return Err(value_error(py, message));
             }
             return Self::with_warnings(py, run(py, move |_| flexbody::Model::read(path))?);
         }
-        let couplings: Vec<Option<Coupling>> =
-            sets.iter().map(|(_, _, how)| coupling(how.as_deref())).collect::<PyResult<_>>()?;
+        let named = |(name, set, how): (String, String, Option<Bound<'py, PyAny>>)| {
+            Ok((name, set, coupling(how.as_ref())?))
+        };
+        let sets: Vec<_> = sets.into_iter().map(named).collect::<PyResult<_>>()?;
         let read = run(py, move |_| {
-            let sets: Vec<_> = sets
-                .iter()
-                .zip(&couplings)
-                .map(|((name, set, _), how)| (name.as_str(), set.as_str(), *how))
-                .collect();
+            let sets: Vec<_> =
+                sets.iter().map(|(name, set, how)| (name.as_str(), set.as_str(), *how)).collect();
             let units = units.as_ref().map(|units| units.each_ref().map(String::as_str));
             flexbody::Model::read_job(path, program.as_deref(), units, &sets)
         })?;
@@ -249,20 +281,23 @@ impl Model {
     /// modes that the scene needs; `Body.terms` gives the reasons.
     ///
     /// Raises InputError, NumericalError or ResourceError.
-    #[pyo3(signature = (*, modes=None, max_frequency=None, basis="free", accuracy="standard", frame="com", comparators=true, scene=None))]
+    #[pyo3(
+        signature = (*, modes=None, max_frequency=None, basis=None, accuracy=None, frame=None, comparators=true, scene=None),
+        text_signature = "($self, *, modes=None, max_frequency=None, basis=\"free\", accuracy=\"standard\", frame=\"com\", comparators=True, scene=None)"
+    )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn convert(
         &self,
         py: Python<'_>,
-        modes: Option<usize>,
-        max_frequency: Option<f64>,
-        basis: &str,
-        accuracy: &str,
-        frame: &str,
+        modes: Argument<'_, '_>,
+        max_frequency: Argument<'_, '_>,
+        basis: Argument<'_, '_>,
+        accuracy: Argument<'_, '_>,
+        frame: Argument<'_, '_>,
         comparators: bool,
-        scene: Option<&Bound<'_, PyAny>>,
+        scene: Argument<'_, '_>,
     ) -> PyResult<Body> {
-        let options = convert_options(modes, max_frequency, basis, accuracy, frame, comparators)?;
+        let options = convert_options(modes, max_frequency, [basis, accuracy, frame], comparators)?;
         let model = Arc::clone(&self.inner);
         let (body, mut found): (flexbody::FlexBody, Vec<Diagnostic>) = match scene {
             None => {
@@ -270,7 +305,7 @@ impl Model {
                 (made.body, made.diagnostics)
             }
             Some(scene) => {
-                let scene = Scene::whole(py, scene)?;
+                let scene = Scene::whole(scene)?;
                 let (made, selection) =
                     run(py, move |listener| model.convert_for_with_progress(&scene, &options, listener))?;
                 (made.body, [made.diagnostics, selection.diagnostics().to_vec()].concat())
@@ -284,18 +319,65 @@ impl Model {
 
     /// Measures accuracy against cost in a scene: candidate bodies against a reference, like `flexbody.trade`. With
     /// several load cases every candidate is measured in each of them and judged by the worst.
-    #[pyo3(signature = (scene, *, modes=20, repeat=3, reference="full"))]
+    #[pyo3(
+        signature = (scene, *, modes=None, repeat=None, reference=None),
+        text_signature = "($self, scene, *, modes=20, repeat=3, reference=\"full\")"
+    )]
     fn trade(
         &self,
         py: Python<'_>,
         scene: &Bound<'_, PyAny>,
-        modes: usize,
-        repeat: usize,
-        reference: &str,
+        modes: Argument<'_, '_>,
+        repeat: Argument<'_, '_>,
+        reference: Argument<'_, '_>,
     ) -> PyResult<Trade> {
-        let (scene, options) = (Scene::whole(py, scene)?, trade_options(modes, repeat, reference)?);
+        let (scene, options) = (Scene::whole(scene)?, trade_options(modes, repeat, reference)?);
         let model = Arc::clone(&self.inner);
         Trade::with_warnings(py, run(py, move |listener| model.trade(&scene, &options, listener))?)
+    }
+
+    /// Computes the frequency response between places, and its difference from the response of all nodes, like `flexbody
+    /// response`: of `body`, which was made of this model, or of a body that is made now.
+    ///
+    /// `source` and `target` are the places of unit forces and of measured displacements: an interface or a node number,
+    /// optionally with a colon and directions ("big_end:z", "17:x,rz"), or a list of these. `band` is (low, high) in Hz. A
+    /// `scene` supplies what is not stated: the places of its loads, its watched points, band and damping. `damping` is a
+    /// ratio, for a body without damping. `points` and `solves` are the approximate numbers of frequencies of the curves,
+    /// and of those at which the equations of all nodes are solved. `modes` and `basis` are those of a body that is made.
+    #[pyo3(
+        signature = (source=None, target=None, *, body=None, band=None, scene=None, damping=None, tolerance=None, points=None, solves=None, modes=None, basis=None),
+        text_signature = "($self, source=None, target=None, *, body=None, band=None, scene=None, damping=None, tolerance=0.05, points=400, solves=80, modes=20, basis=\"free\")"
+    )]
+    #[allow(clippy::too_many_arguments)] // the keywords of a Python function
+    fn response(
+        &self,
+        py: Python<'_>,
+        source: Argument<'_, '_>,
+        target: Argument<'_, '_>,
+        body: Argument<'_, '_>,
+        band: Argument<'_, '_>,
+        scene: Argument<'_, '_>,
+        damping: Argument<'_, '_>,
+        tolerance: Argument<'_, '_>,
+        points: Argument<'_, '_>,
+        solves: Argument<'_, '_>,
+        modes: Argument<'_, '_>,
+        basis: Argument<'_, '_>,
+    ) -> PyResult<Response> {
+        let stated = ResponseArguments { source, target, band, scene, damping, tolerance, points, solves };
+        let mut options = stated.options(py)?.basis(self::basis(basis)?);
+        if let Some(modes) = modes {
+            options = options.modes(positive(modes, "modes")?);
+        }
+        if let (Some(_), Some(given)) = (body, modes.or(basis)) {
+            let message = "`modes` and `basis` are those of a body that is made, and `body` is given";
+            return Err(value_error(given.py(), message));
+        }
+        let body = body.map(|body| Body::given(body, "body")).transpose()?;
+        let (model, known) = (Arc::clone(&self.inner), self.inner.diagnostics().len());
+        let work =
+            move |listener: flexbody::Listener<'_>| model.response(body.as_deref(), &options, listener);
+        Response::with_warnings(py, run(py, work)?, known)
     }
 
     fn __repr__(&self) -> String {

@@ -1,17 +1,24 @@
 //! Scenes, the motion of bodies in them, and the selection of terms and modes.
 
+use crate::arguments::{Argument, mistyped, path, text};
 use crate::arrays::{ArrayCache, shaped, triples, vector};
-use crate::errors::{diagnostics, warn};
+use crate::errors::{diagnostics, value, value_error, warn};
+use crate::recovered::Recovered;
 use crate::report::report;
 use crate::work::{alone, brief};
+use flexbody::FlexBody;
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyDict, PyMapping, PyTuple};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// A scene for a body: gravity, loads, prescribed motion, duration, tolerances (docs/reference/scenes.md).
 ///
-/// Scene(path, case=None) reads a scene file; `case` names the load case of a file that has several.
+/// Scene(source, case=None, folder=None) makes one of the path of a scene file, of its text (a str with line breaks), or
+/// of a dict with its keys: {"run": {"duration": 0.1}, "load": [{"interface": "tip", "force": [0, 0, 1]}]}. `case` names
+/// the load case of a scene that has several. Files of histories are found in the folder of the scene file; for a text
+/// and a dict in `folder`, by default the current one.
 #[pyclass(frozen, module = "flexbody")]
 pub struct Scene {
     inner: flexbody::Scene,
@@ -20,17 +27,30 @@ pub struct Scene {
 #[pymethods]
 impl Scene {
     #[new]
-    #[pyo3(signature = (path, case=None))]
-    fn new(py: Python<'_>, path: PathBuf, case: Option<String>) -> PyResult<Self> {
-        let inner = alone(py, || flexbody::Scene::read_case(&path, case.as_deref()))?;
-        Ok(Self { inner })
+    #[pyo3(signature = (source, case=None, folder=None))]
+    fn new(
+        py: Python<'_>,
+        source: &Bound<'_, PyAny>,
+        case: Argument<'_, '_>,
+        folder: Argument<'_, '_>,
+    ) -> PyResult<Self> {
+        let case = case.map(|case| text(case, "case")).transpose()?;
+        match read(source, folder, "source")? {
+            Source::File(path) => {
+                let inner = alone(py, || flexbody::Scene::read_case(&path, case.as_deref()))?;
+                Ok(Self { inner })
+            }
+            Source::Made(all) => value(py, all.case(case.as_deref())).map(|inner| Self { inner }),
+        }
     }
 
-    /// Returns all load cases of a scene file, in its order; the single scene of a file without cases.
+    /// Returns all load cases of a scene (the path of its file, its text, or a dict), in its order; the single scene if
+    /// it has no cases.
     #[staticmethod]
-    fn cases(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Scene>> {
-        let scene = alone(py, || flexbody::Scene::read(&path))?;
-        Ok(scene.cases().into_iter().map(|inner| Self { inner }).collect())
+    #[pyo3(signature = (source, folder=None))]
+    fn cases(py: Python<'_>, source: &Bound<'_, PyAny>, folder: Argument<'_, '_>) -> PyResult<Vec<Scene>> {
+        let all = read(source, folder, "source")?.whole(py)?;
+        Ok(all.cases().into_iter().map(|inner| Self { inner }).collect())
     }
 
     /// Name of the scene; for a load case the name of the scene, a colon and the name of the case.
@@ -44,28 +64,74 @@ impl Scene {
     }
 }
 
+/// Source of a scene.
+enum Source {
+    /// Path of a scene file.
+    File(PathBuf),
+    /// Scene of a text or of values, with all its load cases.
+    Made(flexbody::Scene),
+}
+
+impl Source {
+    /// Returns the scene with all its load cases.
+    fn whole(self, py: Python<'_>) -> PyResult<flexbody::Scene> {
+        match self {
+            Self::File(path) => alone(py, || flexbody::Scene::read(&path)),
+            Self::Made(all) => Ok(all),
+        }
+    }
+}
+
+/// Returns the source that a caller gives: a path, a text with line breaks, or a dict.
+fn read(given: &Bound<'_, PyAny>, folder: Argument<'_, '_>, name: &str) -> PyResult<Source> {
+    let py = given.py();
+    let beside = folder.map_or_else(|| Ok(PathBuf::new()), |folder| path(folder, "folder"))?;
+    if given.cast::<PyMapping>().is_ok() {
+        let json = py.import("flexbody._inputs")?.getattr("json_of_scene")?.call1((given,))?;
+        let json: String = json.extract()?;
+        let values: serde_json::Value = serde_json::from_str(&json)
+            .map_err(|error| value_error(py, format!("`{name}` cannot be read as values: {error}")))?;
+        return Ok(Source::Made(alone(py, || flexbody::Scene::from_values(&values, beside))?));
+    }
+    if let Ok(text) = given.extract::<String>()
+        && text.contains('\n')
+    {
+        return Ok(Source::Made(alone(py, || flexbody::Scene::parse(&text, beside))?));
+    }
+    let expected = "a Scene, a dict, the text of a scene, or the path of its file";
+    let path: PathBuf = given.extract().map_err(|_| mistyped(given, name, expected))?;
+    if folder.is_some() {
+        let message = "`folder` is given together with a scene file, whose folder counts: leave it out";
+        return Err(value_error(py, message));
+    }
+    Ok(Source::File(path))
+}
+
 impl Scene {
-    /// Returns the single scene that a caller gives: a `Scene`, or the path of a file without load cases.
-    pub fn one(py: Python<'_>, given: &Bound<'_, PyAny>) -> PyResult<flexbody::Scene> {
+    /// Returns the single scene that a caller gives: a `Scene`, or the source of one without load cases.
+    pub fn one(given: &Bound<'_, PyAny>) -> PyResult<flexbody::Scene> {
+        let py = given.py();
         if let Ok(scene) = given.cast::<Self>() {
             return Ok(scene.get().inner.clone());
         }
-        let path: PathBuf = given.extract()?;
-        alone(py, || flexbody::Scene::read_case(&path, None))
+        match read(given, None, "scene")? {
+            Source::File(path) => alone(py, || flexbody::Scene::read_case(&path, None)),
+            Source::Made(all) => value(py, all.case(None)),
+        }
     }
 
-    /// Returns the scene with all load cases that a caller gives: a `Scene`, a list of them, or the path of a file.
-    pub fn whole(py: Python<'_>, given: &Bound<'_, PyAny>) -> PyResult<flexbody::Scene> {
+    /// Returns the scene with all load cases that a caller gives: a `Scene`, a list of them, or the source of one.
+    pub fn whole(given: &Bound<'_, PyAny>) -> PyResult<flexbody::Scene> {
+        let py = given.py();
         if let Ok(scene) = given.cast::<Self>() {
             return Ok(scene.get().inner.clone());
         }
         if let Ok(scenes) = given.extract::<Vec<Bound<'_, Self>>>() {
             let cases = scenes.iter().map(|scene| scene.get().inner.clone());
-            let none = || pyo3::exceptions::PyValueError::new_err("there is no load case");
+            let none = || value_error(py, "`scene` is an empty list, expected one or more load cases");
             return flexbody::Scene::of_cases(cases).ok_or_else(none);
         }
-        let path: PathBuf = given.extract()?;
-        alone(py, || flexbody::Scene::read(&path))
+        read(given, None, "scene")?.whole(py)
     }
 }
 
@@ -110,13 +176,13 @@ impl Selection {
 
     /// Returns the command that makes exactly the selected body from the flex-body file that was judged. None if the body
     /// was made with the selection.
-    fn command(&self, body: &str) -> Option<String> {
-        self.inner.command(body)
+    fn command(&self, body: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
+        Ok(self.inner.command(&path(body, "body")?.display().to_string()))
     }
 
     /// Returns the report of `flexbody select`: a dict with all numbers, or "json", "text", "html" as a str.
-    #[pyo3(signature = (form="dict"))]
-    fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }
 
@@ -134,13 +200,15 @@ impl Selection {
 #[pyclass(frozen, module = "flexbody")]
 pub struct Motion {
     inner: flexbody::Motion,
+    body: Arc<FlexBody>,
     cache: ArrayCache,
 }
 
 impl Motion {
-    pub fn with_warnings(py: Python<'_>, inner: flexbody::Motion) -> PyResult<Self> {
+    /// Returns a motion of `body`, whose warnings are issued.
+    pub fn with_warnings(py: Python<'_>, inner: flexbody::Motion, body: Arc<FlexBody>) -> PyResult<Self> {
         warn(py, inner.diagnostics())?;
-        Ok(Self { inner, cache: ArrayCache::default() })
+        Ok(Self { inner, body, cache: ArrayCache::default() })
     }
 
     /// Returns the motion of the library.
@@ -279,6 +347,12 @@ impl Motion {
         Ok(all)
     }
 
+    /// Recoveries of the body over this motion, at its instants; None if the body has none.
+    #[getter]
+    fn recovered(&self) -> Option<Recovered> {
+        self.inner.recovered().map(|rows| Recovered::new(Arc::clone(&self.body), rows))
+    }
+
     /// Largest deflection of any node, also between the instants. Unit: length.
     #[getter]
     fn largest_deflection(&self) -> f64 {
@@ -306,13 +380,14 @@ impl Motion {
     }
 
     /// Writes the motion to an HDF5 file, like `flexbody simulate -o`. The file appears complete or not at all.
-    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    fn write(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        let path = self::path(path, "path")?;
         brief(py, || self.inner.write(&path))
     }
 
     /// Returns the report of `flexbody simulate`: a dict with all numbers, or "json", "text", "html" as a str.
-    #[pyo3(signature = (form="dict"))]
-    fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }
 

@@ -1,8 +1,9 @@
 //! The cost of accuracy in a scene.
 
+use crate::arguments::{Argument, count, path, positive};
 use crate::body_class::Body;
 use crate::choice::called;
-use crate::errors::{diagnostics, exception, warn};
+use crate::errors::{diagnostics, value, warn};
 use crate::report::report;
 use flexbody::{ReferenceChoice, TradeOptions};
 use pyo3::prelude::*;
@@ -15,9 +16,22 @@ pub struct Trade {
 }
 
 /// Returns the options of a study; `reference` is `full`, `fine` or `nodal`.
-pub fn options(modes: usize, repeat: usize, reference: &str) -> PyResult<TradeOptions> {
-    let reference = called("reference", reference, ReferenceChoice::ALL, ReferenceChoice::name)?;
-    Ok(TradeOptions::default().modes(modes).repeat(repeat).reference(reference))
+pub fn options(
+    modes: Argument<'_, '_>,
+    repeat: Argument<'_, '_>,
+    reference: Argument<'_, '_>,
+) -> PyResult<TradeOptions> {
+    let mut options = TradeOptions::default();
+    if let Some(given) = modes {
+        options = options.modes(positive(given, "modes")?);
+    }
+    if let Some(given) = repeat {
+        options = options.repeat(positive(given, "repeat")?);
+    }
+    if let Some(given) = reference {
+        options = options.reference(called("reference", given, ReferenceChoice::ALL, ReferenceChoice::name)?);
+    }
+    Ok(options)
 }
 
 impl Trade {
@@ -33,7 +47,7 @@ impl Trade {
     /// error over its tolerance, multiplications, bytes, seconds. The first candidate is the reference.
     #[getter]
     fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        report(py, "dict", |format| self.inner.report(format))?.get_item("rows")
+        report(py, None, |format| self.inner.report(format))?.get_item("rows")
     }
 
     /// Index of the recommended candidate, from 0; None if no candidate keeps the tolerances at an allowed cost.
@@ -61,20 +75,22 @@ impl Trade {
     }
 
     /// Returns the body of a candidate, counted from 0.
-    fn body(&self, py: Python<'_>, candidate: usize) -> PyResult<Body> {
-        let body = self.inner.body(candidate).map_err(|error| exception(py, &error))?;
+    fn body(&self, py: Python<'_>, candidate: &Bound<'_, PyAny>) -> PyResult<Body> {
+        let body = value(py, self.inner.body(count(candidate, "candidate")?))?;
         Ok(Body::new(body, Vec::new()))
     }
 
     /// Returns the command that makes exactly the recommended candidate from the files of the study: the model or the
     /// body, and the scene. None if no candidate is recommended.
-    fn command(&self, input: &str, scene: &str) -> Option<String> {
-        self.inner.command(input, scene)
+    fn command(&self, input: &Bound<'_, PyAny>, scene: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
+        let [input, scene] =
+            [path(input, "input")?, path(scene, "scene")?].map(|path| path.display().to_string());
+        Ok(self.inner.command(&input, &scene))
     }
 
     /// Returns the report of `flexbody trade`: a dict with all numbers, or "json", "text", "html" as a str.
-    #[pyo3(signature = (form="dict"))]
-    fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }
 

@@ -247,32 +247,44 @@ def test_supports_in_the_matrix_are_refused(cube: Given) -> None:
         ({"dofs": [[1, 7]]}, "direction that is not 1 to 6"),
         ({"dofs": 5}, "expected 2, 3 or 6"),
         ({"units": ("mm", "t")}, "expected three"),
-        ({"interfaces": {"end": ([1], "glued")}}, "coupling is `glued`"),
+        ({"interfaces": {"end": ([1], "glued")}}, "`coupling` is \"glued\", expected one of rigid, averaging, free"),
         ({"residual_vectors": "wind"}, "'interfaces', 'centrifugal'"),
     ],
 )
 def test_wrong_arguments(cube: Given, change: dict[str, object], message: str) -> None:
     keywords = {"node_ids": cube.node_ids, "dofs": cube.dofs, "nodes": cube.nodes} | change
-    with pytest.raises(ValueError, match=message):
-        flexbody.model(cube.stiffness, cube.mass, **keywords)
+    with pytest.raises(flexbody.InputError, match=message) as caught:
+        flexbody.model(cube.stiffness, cube.mass, **keywords)  # type: ignore[arg-type]
+    assert isinstance(caught.value, ValueError) and caught.value.codes == ("FB804",)
 
 
 def test_wrong_options(cube: Given) -> None:
     model = cube.model()
     for keywords, message in [
-        ({"basis": "rayleigh"}, "basis is `rayleigh`"),
-        ({"accuracy": "best"}, "accuracy is `best`"),
-        ({"frame": "mine"}, "frame is `mine`"),
-        ({"modes": 3, "max_frequency": 10.0}, "not both"),
+        ({"basis": "rayleigh"}, '`basis` is "rayleigh", expected one of free, '),
+        ({"basis": "imported"}, "expected one of free, "),
+        ({"accuracy": "best"}, '`accuracy` is "best"'),
+        ({"frame": "mine"}, '`frame` is "mine"'),
+        ({"modes": 3, "max_frequency": 10.0}, "expected one of them"),
         ({"max_frequency": -1.0}, "positive"),
+        ({"max_frequency": float("nan")}, "finite"),
+        ({"modes": -1}, "`modes` is -1, expected a whole number, 0 or larger"),
+        ({"modes": 2**70}, "`modes` is 1180591620717411303424"),
     ]:
-        with pytest.raises(ValueError, match=message):
-            model.convert(**keywords)
-    with pytest.raises(TypeError, match="K, M and nodes"):
-        flexbody.convert(cube.stiffness, cube.mass)
-    with pytest.raises(TypeError, match="real numbers"):
+        with pytest.raises(flexbody.InputError, match=message) as caught:
+            model.convert(**keywords)  # type: ignore[arg-type]
+        assert caught.value.codes == ("FB804",)
+    for wrong in ({"modes": 2.5}, {"modes": "three"}, {"modes": True}, {"basis": 3}, {"max_frequency": "high"}, {"frame": 1}):
+        (name,) = wrong
+        with pytest.raises(flexbody.ArgumentError, match=f"`{name}` is an? ") as mistyped:
+            model.convert(**wrong)  # type: ignore[arg-type]
+        assert isinstance(mistyped.value, TypeError) and isinstance(mistyped.value, flexbody.InputError)
+    assert model.convert(modes=np.int64(8)).n_modes == 8  # type: ignore[arg-type]
+    with pytest.raises(flexbody.ArgumentError, match="K, M and nodes"):
+        flexbody.convert(cube.stiffness, cube.mass)  # type: ignore[call-overload]
+    with pytest.raises(flexbody.ArgumentError, match="real numbers"):
         flexbody.model(cube.stiffness * 1j, cube.mass, cube.nodes)
-    with pytest.raises(ValueError, match="square"):
+    with pytest.raises(flexbody.InputError, match="square"):
         flexbody.model(cube.stiffness[:, :-1], cube.mass, cube.nodes)
 
 
@@ -286,3 +298,90 @@ def test_jobs_of_fe_programs() -> None:
     assert caught.value.codes
     with pytest.raises(ValueError, match="given together with a manifest"):
         flexbody.read_model(MODELS / "cube_hex8" / "model.toml", units=("m", "kg", "s"))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"nodes": [[0, 0, 0], [1, 0]]},
+        {"nodes": [["a", "b", "c"]]},
+        {"nodes": None},
+        {"stiffness": [[1, 0], [0]]},
+        {"stiffness": "K"},
+        {"node_ids": [1.5, 2.5]},
+        {"node_ids": [2**63, 1]},
+        {"node_ids": [2**70, 1]},
+        {"dofs": "xyz"},
+        {"interfaces": [1, 2]},
+        {"interfaces": {1: [1]}},
+        {"interfaces": {"end": ["a"]}},
+        {"interfaces": {"end": ([1], "rigid", ["a", "b", "c"])}},
+        {"interfaces": {"end": ([1], 3)}},
+        {"units": 3},
+        {"units": ("mm", "t")},
+        {"damping": "much"},
+        {"damping": 10**400},
+        {"damping": ("a", 1.0)},
+        {"damping": [(None, "a")]},
+        {"residual_vectors": 3},
+        {"residual_vectors": [3]},
+        {"name": 3},
+    ],
+)
+def test_every_wrong_value_is_an_error_of_the_package(cube: Given, wrong: dict[str, object]) -> None:
+    whole = {"stiffness": cube.stiffness, "mass": cube.mass, "nodes": cube.nodes}
+    keywords = whole | {"node_ids": cube.node_ids, "dofs": cube.dofs} | wrong
+    with pytest.raises(flexbody.FlexbodyError) as caught:
+        flexbody.model(**keywords)  # type: ignore[arg-type]
+    assert caught.value.codes and caught.value.exit_code == 2
+
+
+def test_wrong_paths_are_errors_of_the_package(cube: Given) -> None:
+    body = cube.model().convert(modes=8)
+    for call in (
+        lambda: flexbody.read(3),
+        lambda: flexbody.read_model(3),
+        lambda: flexbody.read_model("a.inp", interfaces={"a": 3}),
+        lambda: flexbody.read_model("a.inp", interfaces={"a": ("b", 3)}),
+        lambda: flexbody.audit(None),
+        lambda: flexbody.batch([]),
+        lambda: flexbody.recipe(1),
+        lambda: flexbody.import_body("a", 1),
+        lambda: body.write(1),
+        lambda: body.simulate(1),
+        lambda: body.select([1]),
+        lambda: body.report(1),
+        lambda: body.subset(3),
+        lambda: body.subset(["a"]),
+        lambda: body.export("sid", 1),
+        lambda: body.compare(1),
+        lambda: body.check(1),
+        lambda: body.view(1),
+        lambda: body.recover(1),
+        lambda: body.advise(spin="fast"),
+        lambda: body.response(1.5, 1),
+        lambda: body.equations_of_motion().node("a"),
+        lambda: body.equations_of_motion().mass_matrix("abc"),
+        lambda: flexbody.Scene(3),
+        lambda: flexbody.Scene({"run": object()}),
+    ):
+        with pytest.raises(flexbody.ArgumentError) as caught:
+            call()  # type: ignore[no-untyped-call]
+        assert caught.value.codes == ("FB804",) and caught.value.diagnostics[0].help
+    for call in (
+        lambda: body.subset([-1]),
+        lambda: body.subset([10**30]),
+        lambda: body.equations_of_motion().node(2**70),
+        lambda: body.view(triangles=0),
+        lambda: body.response("1", "1", band=(1.0, 2.0, 3.0)),
+        lambda: body.response("1", "1", band=(1.0, 2.0), points=-1),
+        lambda: body.export("vtk", "a.vtu", modes=0),
+        lambda: body.compare(body, mass=-1.0),
+        lambda: flexbody.audit("a", tolerance=0.0),
+        lambda: flexbody.Scene({"gravity": [0.0, 0.0, float("nan")]}),
+        lambda: body.equations_of_motion().mass_matrix([[0.0] * 8]),
+        lambda: body.select([]),
+    ):
+        with pytest.raises(flexbody.InputError) as caught:
+            call()  # type: ignore[no-untyped-call]
+        assert caught.value.codes == ("FB804",)

@@ -60,7 +60,7 @@ def test_every_format_is_written(bracket_body: flexbody.Body, tmp_path: Path) ->
     # Those two need a Craig-Bampton body.
     for name in flexbody.export_formats().keys() - {"chrono", "simscape"}:
         (tmp_path / "own").mkdir(exist_ok=True)
-        said = bracket_body.export(name, tmp_path / "own" / "body.out")
+        said = bracket_body.export(name, tmp_path / "own" / "body.out", allow_loss=True)  # type: ignore[arg-type]
         assert all(one.severity in ("warning", "note") for one in said), name
         assert (tmp_path / "own" / "body.out").stat().st_size > 0
         words = ["export", tmp_path / "body.flex.h5", "--to", name, "--allow-loss", "--quiet", "-o"]
@@ -85,7 +85,7 @@ def test_a_motion_is_drawn_as_the_command_draws_it(bracket_body: flexbody.Body, 
         own, others = tmp_path / format / "python", tmp_path / format / "command"
         own.mkdir(parents=True)
         others.mkdir(parents=True)
-        said = bracket_body.export_motion(format, motion, own / name)
+        said = bracket_body.export(format, own / name, motion=motion)  # type: ignore[arg-type]
         assert "FB723" in [diagnostic.code for diagnostic in said]
         words = ["export", tmp_path / "body.flex.h5", "--simulation", tmp_path / "motion.h5", "--to", format]
         subprocess.run([sys.executable, "-m", "flexbody", *words, "--quiet", "-o", others / name], check=True)
@@ -93,17 +93,21 @@ def test_a_motion_is_drawn_as_the_command_draws_it(bracket_body: flexbody.Body, 
         assert written == {path.relative_to(others): digest(path) for path in others.rglob("*") if path.is_file()}
         assert len(written) == (6 if format == "vtk" else 1)
     with pytest.raises(flexbody.InputError) as shows_no_motion:
-        bracket_body.export_motion("json", motion, tmp_path / "motion.json")
+        bracket_body.export("json", tmp_path / "motion.json", motion=motion)
     assert shows_no_motion.value.codes == ("FB801",)
     other = flexbody.convert(MODELS / "cube_hex8" / "model.toml", modes=4)
     with pytest.raises(flexbody.InputError) as of_another:
-        other.export_motion("gltf", motion, tmp_path / "other.glb")
+        other.export("gltf", tmp_path / "other.glb", motion=tmp_path / "motion.h5")
     assert of_another.value.codes == ("FB735",)
 
 
 def test_losses_are_warned_of(bracket_body: flexbody.Body, tmp_path: Path) -> None:
+    # As by the command, loss is refused unless it is allowed.
+    with pytest.raises(flexbody.InputError) as refused:
+        bracket_body.export("openradioss", tmp_path / "body.rad")
+    assert set(refused.value.codes) == {"FB720"} and not (tmp_path / "body.rad").exists()
     with pytest.warns(flexbody.FlexbodyWarning) as caught:
-        said = bracket_body.export("openradioss", tmp_path / "body.rad")
+        said = bracket_body.export("openradioss", tmp_path / "body.rad", allow_loss=True)
     first = caught[0]
     assert isinstance(first.message, flexbody.FlexbodyWarning) and first.message.diagnostic in said
     assert first.message.diagnostic.code == "FB721"
@@ -117,7 +121,7 @@ def test_files_that_cannot_be(cube: Given, tmp_path: Path) -> None:
         body.write(tmp_path / "no folder" / "body.flex.h5")
     assert caught.value.codes == ("FB105",)
     with pytest.raises(flexbody.InputError) as caught:
-        body.export("msc", tmp_path / "x")
+        body.export("msc", tmp_path / "x")  # type: ignore[arg-type]
     assert caught.value.codes == ("FB801",)
     with pytest.raises(flexbody.InputError):
         flexbody.read(tmp_path / "none.flex.h5")

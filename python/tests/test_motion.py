@@ -118,7 +118,7 @@ def test_points_do_the_power_of_their_forces(bracket_body: flexbody.Body, state:
         equations.node(-1)
     with pytest.raises(ValueError, match="`q` has 2 entries, expected 6"):
         equations.mass_matrix([1.0, 2.0])
-    with pytest.raises(ValueError, match="`nu` has NaN"):
+    with pytest.raises(flexbody.InputError, match="`nu` has NaN"):
         equations.velocity_forces(q, np.full(12, np.nan))
 
 
@@ -153,3 +153,37 @@ def test_scenes(tmp_path: Path) -> None:
     with pytest.raises(flexbody.InputError) as caught:
         flexbody.Scene(bad)
     assert caught.value.diagnostics[0].file == str(bad) and caught.value.diagnostics[0].line == 1
+
+
+def test_scenes_of_text_and_of_dicts(bracket_body: flexbody.Body, tmp_path: Path) -> None:
+    text = 'name = "spin"\n[run]\nduration = 0.004\noutputs = 4\n[initial]\nangular_velocity = [10, 200, 5]\n'
+    values = {
+        "name": "spin",
+        "run": {"duration": np.float64(0.004), "outputs": np.int64(4)},
+        "initial": {"angular_velocity": np.array([10.0, 200.0, 5.0])},
+    }
+    (tmp_path / "spin.toml").write_text(text)
+    expected = bracket_body.simulate(tmp_path / "spin.toml").csv()
+    for scene in (text, values, flexbody.Scene(text), flexbody.Scene(values)):
+        assert bracket_body.simulate(scene).csv() == expected
+    assert repr(flexbody.Scene(values)) == "<flexbody.Scene \"spin\">"
+    cases = {"run": {"duration": 0.004}, "case": [{"name": "a"}, {"name": "b"}]}
+    assert [case.name for case in flexbody.Scene.cases(cases)] == ["scene: a", "scene: b"]
+    assert flexbody.Scene(cases, "b").name == "scene: b"
+    with pytest.raises(flexbody.InputError) as caught:
+        flexbody.Scene(cases)
+    assert caught.value.codes == ("FB219",)
+    with pytest.raises(flexbody.InputError) as caught:
+        flexbody.Scene("[run]\nduration = true\n")
+    assert caught.value.codes == ("FB211",) and caught.value.diagnostics[0].line == 2
+    with pytest.raises(flexbody.InputError, match=r"in \[\[load\]\] 2: `force = 1`"):
+        flexbody.Scene({"load": [{"node": 1, "force": [0, 0, 1]}, {"node": 2, "force": 1}]})
+    # Files of histories lie in the stated folder.
+    (tmp_path / "force.csv").write_text("time,f\n0,1\n0.004,2\n")
+    history = {"file": "force.csv", "time": "time", "value": "f"}
+    load = {"run": {"duration": 0.004}, "load": [{"node": 20000, "force": [0, 0, 1], "history": history}]}
+    assert flexbody.Scene(load, folder=tmp_path).name == "scene"
+    with pytest.raises(flexbody.InputError):
+        flexbody.Scene(load, folder=tmp_path / "none")
+    with pytest.raises(flexbody.InputError, match="whose folder counts"):
+        flexbody.Scene(tmp_path / "spin.toml", folder=tmp_path)

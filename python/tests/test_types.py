@@ -8,11 +8,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 import flexbody
-from flexbody import _flexbody
+from flexbody import _flexbody, _types
 
 needs_mypy = pytest.mark.skipif(importlib.util.find_spec("mypy") is None, reason="mypy is not installed")
 
@@ -20,8 +21,12 @@ needs_mypy = pytest.mark.skipif(importlib.util.find_spec("mypy") is None, reason
 @needs_mypy
 def test_stubs_and_extension_agree(tmp_path: Path) -> None:
     allowed = tmp_path / "allowed.txt"
-    # Names of types that stand in the stub alone.
-    allowed.write_text("flexbody\\._flexbody\\._(_all__|Floats|Path|Scene|Cases|Compressed)\n")
+    # Names of types that stand in the stub alone, and aliases, which stubtest does not understand.
+    aliases = [name for name, value in vars(_types).items() if name[0].isupper() and not isinstance(value, type)]
+    allowed.write_text(
+        "flexbody\\._flexbody\\._(_all__|Floats|Path|Source|Scene|Cases|Compressed)\n"
+        + f"flexbody\\._types\\.({'|'.join(aliases)})\n"
+    )
     words = [sys.executable, "-m", "mypy.stubtest", "flexbody", "--allowlist", str(allowed), "--ignore-unused-allowlist"]
     done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -43,6 +48,49 @@ def test_the_package_and_its_users_are_typed(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
     revealed = done.stdout
     assert "float64" in revealed and "None" in revealed and "PointPath" in revealed
+
+
+@needs_mypy
+def test_misspelt_choices_are_found(tmp_path: Path) -> None:
+    right = (
+        "import flexbody\n"
+        "import numpy as np\n"
+        "body = flexbody.convert('model.toml', basis='craig-bampton', accuracy='fast', frame='interface=tip')\n"
+        "body = flexbody.convert(np.eye(3), np.eye(3), np.zeros((1, 3)), units=('mm', 't', 's'), damping=0.01)\n"
+        "body = flexbody.convert(np.eye(3), np.eye(3), np.zeros((1, 3)), units=(0.001, 1000.0, 's'))\n"
+        "model = flexbody.model(np.eye(3), np.eye(3), np.zeros((1, 3)), interfaces={'tip': ([1, 2], 'rigid')})\n"
+        "body.export('sid', 'body.sid', dialect='py-sid', points=[1, 2], to_units=('m', 'kg', 's'))\n"
+        "body.simulate({'run': {'duration': 1.0}})\n"
+        "model.response('tip:z', 17, band=(0.0, 100.0)).report('html')\n"
+    )
+    wrong = [
+        "flexbody.convert('model.toml', basis='craig_bampton')",
+        "flexbody.convert('model.toml', accuracy='best')",
+        "flexbody.convert('model.toml', mode=3)",
+        "flexbody.read_model('job.inp', units=('mm', 'tons', 's'))",
+        "flexbody.read_model('job.inp', program='ansis')",
+        "flexbody.model(np.eye(3), np.eye(3), np.zeros((1, 3)), interfaces={'tip': ([1, 2], 'rigd')})",
+        "body.export('exudin', 'body.h5')",
+        "body.export('sid', 'body.sid', to_units=('mm', 't', 'sec'))",
+        "body.report('pdf')",
+        "model.trade('scene.toml', reference='all')",
+        "flexbody.recipe('patran')",
+    ]
+    user = tmp_path / "user.py"
+    user.write_text(right + "".join(f"{line}\n" for line in wrong))
+    words = [sys.executable, "-m", "mypy", "--strict", "--no-error-summary", str(user)]
+    environment = os.environ | {"MYPY_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment)
+    lines = {int(line.split(":")[1]) for line in done.stdout.splitlines() if ": error:" in line}
+    first = right.count("\n") + 1
+    assert lines == set(range(first, first + len(wrong))), done.stdout
+
+
+def test_the_stated_choices_are_those_of_the_library() -> None:
+    for name, choices in _flexbody._choices().items():
+        stated = get_args(getattr(_types, name))
+        assert sorted(stated) == sorted(set(choices)), name
+    assert list(flexbody.export_formats()) == list(get_args(_types.ExportFormat))
 
 
 def test_everything_has_a_docstring() -> None:

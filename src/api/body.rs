@@ -5,17 +5,14 @@ use super::progress::{Listener, NO_LISTENER, heard};
 use super::{Matrix, Motion, Scene, Selection};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::output::OutputSlot;
-use flexbody_body::convert::interface_compliance;
 use flexbody_body::flex_body::{self, Subset};
-use flexbody_body::verification::body_identities;
-use flexbody_file::RecordedMotion;
-use flexbody_formats::export::ExportOptions;
-use flexbody_formats::{FORMATS, export, find_format};
+use flexbody_body::verification::{accept, body_identities};
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
-use flexbody_motion::scene::{Point, body_point, simulate, unsettled_rate};
+use flexbody_motion::scene::{self, Point, body_point, simulate, simulate_with_envelope, unsettled_rate};
 use flexbody_study::selection::select;
 use nalgebra::{Matrix3, Vector3};
+#[cfg(feature = "hdf5")]
 use std::path::Path;
 
 /// Flexible body: modes, and the constant invariants of the equations of motion of its floating frame (theory section
@@ -57,43 +54,26 @@ impl FlexBody {
         flexbody_file::write(&self.0, path)
     }
 
-    /// Writes the body in a format of another program, given by its name on the command line
-    /// (docs/reference/exports.md): the file, and further files beside it. Returns warnings about parts of the body
-    /// that the format cannot hold.
+    /// Returns the bytes of the flex-body file that [`FlexBody::write`] writes.
     ///
     /// # Errors
-    /// FB801 for an unknown format; FB720 if no file of this format can be made of the body; FB104 and FB602 if it
-    /// cannot be written.
-    pub fn export(&self, format: &str, path: impl AsRef<Path>) -> Result<Vec<Diagnostic>> {
-        self.export_as(format, path.as_ref(), ExportOptions::default())
+    /// FB104 and FB602 if its temporary file cannot be written.
+    #[cfg(feature = "hdf5")]
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let file = TemporaryBody::new()?;
+        self.write(&file.path)?;
+        std::fs::read(&file.path).map_err(|error| file.failure(&error))
     }
 
-    /// Writes a picture of the body in motion (`vtk`, `gltf`).
+    /// Reads the bytes of a flex-body file.
     ///
     /// # Errors
-    /// The errors of [`FlexBody::export`]; FB801 for a format without motion, FB735 for the motion of another body.
-    pub fn export_motion(
-        &self,
-        format: &str,
-        motion: &Motion,
-        path: impl AsRef<Path>,
-    ) -> Result<Vec<Diagnostic>> {
-        let motion = Some(RecordedMotion::of(&motion.recording));
-        self.export_as(format, path.as_ref(), ExportOptions { motion, ..ExportOptions::default() })
-    }
-
-    fn export_as(&self, format: &str, path: &Path, options: ExportOptions) -> Result<Vec<Diagnostic>> {
-        let options = ExportOptions { name: Some(path.to_owned()), ..options };
-        let format = find_format(format)?;
-        let (exported, mut diagnostics) = export(&self.0, format, &options, true)?;
-        diagnostics.extend(interface_compliance(&self.0).filter(|_| !format.is_picture()));
-        OutputSlot::commit_all(exported.fill(OutputSlot::prepare(path)?)?)?;
-        Ok(diagnostics)
-    }
-
-    /// Returns the formats of [`FlexBody::export`]: the name of each, and the programs that read it.
-    pub fn export_formats() -> Vec<(&'static str, &'static str)> {
-        FORMATS.iter().map(|format| (format.name(), format.reader())).collect()
+    /// The errors of [`FlexBody::read`]; FB104 if the temporary file of the bytes cannot be written.
+    #[cfg(feature = "hdf5")]
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let file = TemporaryBody::new()?;
+        std::fs::write(&file.path, bytes).map_err(|error| file.failure(&error))?;
+        Self::read(&file.path)
     }
 
     /// Returns the number of modes nf.
@@ -212,15 +192,7 @@ impl FlexBody {
 
     /// Checks and returns all identities of the body.
     pub fn identities(&self) -> Vec<Identity> {
-        let checks = body_identities(&self.0).into_iter();
-        checks
-            .map(|check| Identity {
-                name: check.name,
-                value: check.value,
-                limit: check.limit,
-                holds: check.passed,
-            })
-            .collect()
+        body_identities(&self.0).iter().map(Identity::of).collect()
     }
 
     /// Selects the terms and modes that the body needs in a scene, so that every load case is within its tolerances.
@@ -247,11 +219,24 @@ impl FlexBody {
     ///   `I`, `II`, `III`, `IV`.
     ///
     /// # Errors
-    /// FB801 for unknown groups, and for modes that the body does not have.
+    /// FB801 for unknown groups, and for modes that the body does not have; FB714 if an identity does not hold.
     pub fn subset(&self, modes: Option<&[usize]>, terms: &str) -> Result<FlexBody> {
         let modes = modes.map(|modes| Subset::modes_of(modes.to_vec())).transpose()?;
         let subset = Subset { modes, groups: Subset::parse_groups(terms)? };
-        self.0.clone().subset(&subset).map(FlexBody)
+        let made = self.0.clone().subset(&subset)?;
+        accept(&made)?;
+        Ok(FlexBody(made))
+    }
+
+    /// Returns the body with shapes and inertia of the modes rounded to 32-bit floats, like `flexbody reduce --storage
+    /// f32`.
+    ///
+    /// # Errors
+    /// FB703 for a number that is too large for a 32-bit float; FB714 if an identity does not hold.
+    pub fn rounded_to_f32(&self) -> Result<FlexBody> {
+        let made = self.0.rounded_to_f32()?;
+        accept(&made)?;
+        Ok(FlexBody(made))
     }
 
     /// Returns the equations of motion of the body, with all terms that it holds.
@@ -317,6 +302,19 @@ impl FlexBody {
     /// # Errors
     /// The errors of [`FlexBody::simulate`]; FB605 if the listener stops it.
     pub fn simulate_with_progress(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
+        self.simulate_by(simulate, scene, listener)
+    }
+
+    /// Does the work of [`FlexBody::simulate_with_progress`], and finds the largest stresses of every point of the
+    /// recoveries over the continuous motion for [`Recovered::write_envelope`](super::Recovered::write_envelope).
+    ///
+    /// # Errors
+    /// The errors of [`FlexBody::simulate_with_progress`].
+    pub fn simulate_with_envelope(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
+        self.simulate_by(simulate_with_envelope, scene, listener)
+    }
+
+    fn simulate_by(&self, simulate: Simulate, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
         let scene = scene.0.single()?;
         let (recording, diagnostics) = heard(listener, |context| {
             context.phase("simulation");
@@ -326,5 +324,31 @@ impl FlexBody {
         })?;
         let (units, extent) = (self.0.units().clone(), self.0.extent());
         Ok(Motion { recording, units, extent, diagnostics })
+    }
+}
+
+/// Simulation of a body in a scene.
+type Simulate =
+    fn(&flex_body::FlexBody, &scene::Scene, &Context<'_>) -> Result<(scene::Recording, Vec<Diagnostic>)>;
+
+/// Flex-body file in a temporary folder, since HDF5 reads and writes files.
+#[cfg(feature = "hdf5")]
+struct TemporaryBody {
+    path: std::path::PathBuf,
+    _folder: tempfile::TempDir,
+}
+
+#[cfg(feature = "hdf5")]
+impl TemporaryBody {
+    fn new() -> Result<Self> {
+        let folder = tempfile::tempdir().map_err(|error| {
+            let message = format!("no temporary folder can be made: {error}");
+            Diagnostic::new(Code::OutputUnwritable, message)
+        })?;
+        Ok(Self { path: folder.path().join("body.flex.h5"), _folder: folder })
+    }
+
+    fn failure(&self, error: &std::io::Error) -> flexbody_base::error::Error {
+        Diagnostic::new(Code::OutputUnwritable, error.to_string()).in_file(&self.path).into()
     }
 }

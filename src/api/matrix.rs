@@ -50,3 +50,9 @@ pub(super) fn shown(matrix: MatRef<'_, f64>) -> Matrix {
     matrix.col_iter().for_each(|column| values.extend(column.iter().copied()));
     Matrix { rows: matrix.nrows(), columns: matrix.ncols(), values }
 }
+
+/// Returns the matrix with these rows, each of `columns` numbers.
+pub(super) fn by_rows(columns: usize, rows: &[Vec<f64>]) -> Matrix {
+    let values = (0..columns).flat_map(|j| rows.iter().map(move |row| row[j])).collect();
+    Matrix { rows: rows.len(), columns, values }
+}

@@ -27,10 +27,10 @@ impl MotionHistory {
     /// parameters of the axes of the model in the world, the cosine of half the angle first.
     ///
     /// # Errors
-    /// FB801 if the lengths differ, for fewer than two times, and for times that do not ascend.
+    /// FB804 if the lengths differ, for fewer than two times, and for times that do not ascend.
     pub fn new(time: Vec<f64>, q: Vec<Vec<f64>>, attitude: Option<Vec<[f64; 4]>>) -> Result<Self> {
         let count = time.len();
-        let refused = |message: &str| Err(Diagnostic::new(Code::Usage, message).into());
+        let refused = |message: &str| Err(Diagnostic::new(Code::Argument, message).into());
         if q.len() != count || attitude.as_ref().is_some_and(|rows| rows.len() != count) {
             return refused(
                 "a history needs modal coordinates, and an attitude if one is given, for every time",

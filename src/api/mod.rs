@@ -1,36 +1,65 @@
 //! Public interface of the library. It wraps the types of the other crates, so that these can change, and shows arrays
 //! as slices.
 
+mod advice;
 mod arrays;
+#[cfg(feature = "cli")]
+mod batch;
 mod body;
+mod check;
+mod comparison;
 mod conversion;
+mod export;
+mod foreign;
 mod interface;
 mod matrix;
 mod measured_run;
 mod model;
 mod motion;
 mod progress;
+mod recovery;
 mod report;
+mod response;
 mod scene;
 #[cfg(feature = "hdf5")]
 mod trade;
+#[cfg(feature = "hdf5")]
+mod view;
 
+pub use advice::{Advice, AttachedMass, Ranges};
 pub use arrays::{GeometricStiffness, SourceFile};
+#[cfg(feature = "cli")]
+pub use batch::{Batch, BatchOptions, BatchedBody};
 pub use body::{FlexBody, Identity};
+pub use check::Check;
+pub use comparison::Comparison;
 pub use conversion::{Conversion, ConvertOptions};
+pub use export::ExportOptions;
 pub use flexbody_body::basis::BasisKind as Basis;
 pub use flexbody_body::invariants::{BodyFrame, FrameChoice};
 pub use flexbody_eigen::Accuracy;
-pub use flexbody_model::Coupling;
+pub use flexbody_input::{Recipe, Step};
+pub use flexbody_model::{Coupling, Quantity, RecoveryRow};
+pub use flexbody_report::{ComparisonFormat, ComparisonRow, Tolerances};
 #[cfg(feature = "hdf5")]
 pub use flexbody_study::trade::ReferenceChoice;
+pub use foreign::Audit;
 pub use interface::{Interface, InterfaceCoordinates};
 pub use matrix::Matrix;
 pub use measured_run::{MeasuredRun, MotionHistory};
 pub use model::{Model, ModelBuilder, SparseMatrix};
 pub use motion::{Motion, PointPath};
 pub use progress::{Listener, Progress};
+pub use recovery::{LoadedHistory, Recovered, RecoveredRows};
 pub use report::ReportFormat;
+pub use response::{Response, ResponseOptions, TransferFunction};
 pub use scene::{Scene, Selection};
 #[cfg(feature = "hdf5")]
 pub use trade::{Trade, TradeOptions};
+#[cfg(feature = "hdf5")]
+pub use view::{RecordedMotion, View};
+
+/// Returns the names of the units of length, mass and time that models, bodies and exports may state.
+pub fn unit_names() -> [Vec<&'static str>; 3] {
+    flexbody_base::units::UnitSystem::names()
+}

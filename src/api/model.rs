@@ -1,8 +1,10 @@
 //! Finite element model, read from files or made of matrices in memory.
 
+use super::FlexBody;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::units::UnitSystem;
+use flexbody_body::verification::model_of;
 use flexbody_input::{
     InterfaceNodes, InterfaceSource, LoadSource, ModelFiles, check_size, read_manifest, read_model,
 };
@@ -128,6 +130,27 @@ impl Model {
         let path = path.as_ref();
         let files = ModelFiles::from_job(path, program.map(str::to_owned), interfaces, units.as_deref())?;
         Self::checked(read_model(&files)?, Vec::new())
+    }
+
+    /// Returns the names of the FE programs whose output [`Model::read_job`] reads.
+    pub fn programs() -> Vec<&'static str> {
+        flexbody_input::job_programs().collect()
+    }
+
+    /// Reads the model that `body` was made of, from its manifest or the output of an FE program, for
+    /// [`FlexBody::check`]: all of the matrices, or the part of one of several bodies.
+    ///
+    /// # Errors
+    /// The errors of [`Model::read`] and [`Model::read_job`]; FB707 if the matrices hold other bodies.
+    pub fn read_for(body: &FlexBody, path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let is_manifest = path.extension().is_some_and(|extension| extension == "toml");
+        let files = match is_manifest {
+            true => read_manifest(path)?,
+            false => ModelFiles::from_job(path, None, Vec::new(), None)?,
+        };
+        let CheckedModel { model, diagnostics, .. } = model_of(&body.0, read_model(&files)?)?;
+        Ok(Self { checked: model, residual_vectors: files.residual_vectors, diagnostics })
     }
 
     /// Starts a model of matrices in memory. By default the rows are x, y, z of each node, in the order of the nodes.

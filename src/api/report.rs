@@ -35,6 +35,11 @@ impl FlexBody {
     pub fn report(&self, format: ReportFormat) -> String {
         flexbody_report::render(&Facts::new(&self.0, &RunData::default()), format.inner())
     }
+
+    /// Returns the summary of `flexbody inspect` as a fragment of an HTML page, without scripts and styles.
+    pub fn summary_html(&self) -> String {
+        flexbody_report::summary_html(&Facts::new(&self.0, &RunData::default()))
+    }
 }
 
 impl Selection {

@@ -123,12 +123,12 @@ impl Trade {
     /// Returns the body of a candidate.
     ///
     /// # Errors
-    /// FB801 if there is no such candidate; FB703 if lumped masses give no valid body.
+    /// FB804 if there is no such candidate; FB703 if lumped masses give no valid body.
     pub fn body(&self, candidate: usize) -> Result<FlexBody> {
         let Some(row) = self.study.rows.get(candidate) else {
             let message =
                 format!("candidate {candidate} does not exist: the study has {}", self.candidates());
-            return Err(Diagnostic::new(Code::Usage, message).into());
+            return Err(Diagnostic::new(Code::Argument, message).into());
         };
         row.candidate.body(&self.sources[row.candidate.source]).map(FlexBody)
     }

@@ -4,26 +4,24 @@ use super::arguments::ExportArguments;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::refuse_replacing;
 use super::resources::context;
-use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_body::convert::interface_compliance;
-use flexbody_body::flex_body::FlexBody;
 use flexbody_file::read_simulation;
 use flexbody_formats::export::{ExportOptions, Exported, InertiaInScene, Points};
-use flexbody_formats::{export, find_format};
+use flexbody_formats::{export_in_units, find_format};
 use flexbody_input::parse_units;
 use flexbody_linalg::context::Context;
-use flexbody_motion::scene::{LoadCases, inertia_share};
+use flexbody_motion::scene::LoadCases;
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::str::FromStr;
 
 pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let format = find_format(&arguments.to)?;
     let level = arguments.mbdyn_level.as_ref().map(|level| format!("level{level}"));
     let mut options = ExportOptions {
         dialect: arguments.dialect.clone().or(level),
-        points: arguments.points.as_deref().map_or(Ok(Points::Usual), points)?,
+        points: arguments.points.as_deref().map(Points::from_str).transpose()?.unwrap_or_default(),
         modes: arguments.modes.map(|modes| modes as usize),
         motion: arguments.simulation.as_ref().map(read_simulation).transpose()?,
         name: Some(arguments.output.clone()),
@@ -34,17 +32,14 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     refuse_replacing(inputs(), std::iter::once(&arguments.output))?;
     let slot = OutputSlot::prepare(&arguments.output)?;
 
-    let (mut body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
+    let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     if let Some(scene) = &arguments.scene {
-        options.in_scene = inertia_in_scene(&body, scene)?;
+        let limits = context(None, true, Context::QUIET.watch);
+        options.in_scene = InertiaInScene::largest(&body, &LoadCases::read(scene, None)?, &limits)?;
     }
-    if let Some(units) = units {
-        body = body.in_units(&units)?;
-    }
-    let (exported, losses) = export(&body, format, &options, arguments.allow_loss)
+    let (exported, findings) = export_in_units(&body, format, &options, units.as_ref(), arguments.allow_loss)
         .map_err(|error| error.in_file(arguments.simulation.as_ref().unwrap_or(&arguments.body)))?;
-    diagnostics.extend(losses);
-    diagnostics.extend(interface_compliance(&body).filter(|_| !format.is_picture()));
+    diagnostics.extend(findings);
     refuse_warnings(arguments.printing, &diagnostics)?;
     // Files beside the output are known only now: they must not replace an input either.
     let place_and_size = |(ending, bytes): &(Cow<'_, str>, Vec<u8>)| {
@@ -73,39 +68,5 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     Ok(Outcome { text, json: format!("{json:#}"), diagnostics, passed: true })
 }
 
-/// Returns the largest share of the stiffness of inertia over the load cases of a scene; `None` for a body without it.
-fn inertia_in_scene(body: &FlexBody, path: &Path) -> Result<Option<InertiaInScene>> {
-    let mut largest: Option<InertiaInScene> = None;
-    for scene in LoadCases::read(path, None)?.iter() {
-        let Some(share) = inertia_share(body, scene, &context(None, true, Context::QUIET.watch))? else {
-            continue;
-        };
-        if largest.as_ref().is_none_or(|known| known.share < share) {
-            largest = Some(InertiaInScene { scene: scene.name.clone(), share });
-        }
-    }
-    Ok(largest)
-}
-
 /// Number of files up to which each is listed. Of more files the first is listed, with a summary of the others.
 const MOST_LINES: usize = 8;
-
-/// Parses the points: `nodes`, `interfaces`, node numbers with commas, or `interfaces` and node numbers.
-fn points(text: &str) -> Result<Points> {
-    match text {
-        "nodes" => return Ok(Points::Nodes),
-        "interfaces" => return Ok(Points::Interfaces),
-        _ => {}
-    }
-    let (numbers, points): (&str, fn(Vec<i64>) -> Points) = match text.strip_prefix("interfaces,") {
-        Some(numbers) => (numbers, Points::InterfacesAnd),
-        None => (text, Points::Some),
-    };
-    let numbers: Option<Vec<i64>> = numbers.split(',').map(|number| number.trim().parse().ok()).collect();
-    numbers.map(points).ok_or_else(|| {
-        let message = format!("`{text}` is not a set of points of the body");
-        Diagnostic::new(Code::Usage, message)
-            .with_help("give nodes, interfaces, node numbers with commas, or both as in interfaces,17,23")
-            .into()
-    })
-}

@@ -7,37 +7,24 @@ use super::terminal::body_text;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_base::provenance::SourceFile;
-use flexbody_base::text::InputFile;
-use flexbody_body::flex_body::Storage;
-use flexbody_formats::find_import_format;
-use flexbody_formats::import::{accept_imported, import_body};
+use flexbody_formats::{find_import_format, import_file};
 use flexbody_input::parse_units;
 use flexbody_report::{Facts, Format, RunData, render};
 
 pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
-    let format = find_import_format(from)?;
+    find_import_format(from)?;
     let Some(path) = &arguments.model else {
         let message = format!("--from {from} needs the path of the file to convert");
         return Err(Diagnostic::new(Code::Usage, message).into());
     };
-    let units = arguments.job.units.as_deref().map(parse_units).transpose()?.unwrap_or_default();
+    let units = arguments.job.units.as_deref().map(parse_units).transpose()?;
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let outputs = std::iter::once(&arguments.output).chain(&arguments.report);
     refuse_replacing(std::iter::once(path), outputs)?;
     let slot = flexbody_file::prepare_output(&arguments.output)?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
 
-    let file = InputFile::open(path)?;
-    let read = format.read(&file);
-    file.refuse_changed()?;
-    let source = SourceFile::new("body", path, file.sha256()?);
-    let mut imported =
-        import_body(&read?, source, units, arguments.frame.as_ref()).map_err(|error| error.in_file(path))?;
-    if arguments.storage == Storage::F32 {
-        imported.body = imported.body.rounded_to_f32()?;
-    }
-    accept_imported(&imported).map_err(|error| error.in_file(path))?;
+    let imported = import_file(path, from, units, arguments.frame.as_ref(), arguments.storage)?;
     refuse_warnings(arguments.printing, &imported.diagnostics)?;
     flexbody_file::fill_slot(&imported.body, &slot)?;
     let run = RunData { diagnostics: imported.diagnostics, ..RunData::default() };

@@ -41,6 +41,8 @@ mod view;
 mod watcher;
 
 pub use arguments::Arguments;
+pub use batch::set_program;
+pub(crate) use batch::{BatchTask, failed as batch_failure};
 pub use ending::end_without_unfinished_files;
 pub use exit::end;
 pub use output::{parse, run};

@@ -7,9 +7,8 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_formats::envelope_vtu;
 use flexbody_motion::scene::{LoadedHistory, RecoveredMotion};
-use flexbody_report::{Format, RecoveredFacts, RunData, envelope_csv, recovered_csv};
+use flexbody_report::{EnvelopeKind, Format, RecoveredFacts, RunData, recovered_csv};
 use std::path::Path;
 
 /// Kind of a file of recoveries over time.
@@ -33,56 +32,6 @@ impl Kind {
                 let message = format!("output {} has no known extension", path.display());
                 let help = "give it the extension .csv or .h5";
                 Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
-            }
-        }
-    }
-}
-
-/// Kind of a file of the largest stresses of every point.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum EnvelopeKind {
-    Csv,
-    Vtu,
-}
-
-impl EnvelopeKind {
-    /// Returns the kind of a file by its extension.
-    ///
-    /// # Errors
-    /// [`Usage`](Code::Usage) for other extensions.
-    pub(super) fn of(path: &Path) -> Result<Self> {
-        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-        match extension.as_deref() {
-            Some("csv") => Ok(Self::Csv),
-            Some("vtu") => Ok(Self::Vtu),
-            _ => {
-                let message = format!("envelope {} has no known extension", path.display());
-                let help = "give it the extension .csv or .vtu";
-                Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
-            }
-        }
-    }
-
-    /// Writes the envelopes of a motion of `body` to the temporary file of `slot`.
-    ///
-    /// # Errors
-    /// [`RecoveryUnknown`](Code::RecoveryUnknown) if no recovery has all six stresses of a point, or for a mesh if none
-    /// of its points is a node.
-    pub(super) fn fill(self, body: &FlexBody, motion: &RecoveredMotion, slot: &OutputSlot) -> Result<()> {
-        let none = |what: &str| Diagnostic::new(Code::RecoveryUnknown, what.to_owned());
-        if motion.recoveries.iter().all(|one| one.points.is_empty()) {
-            let help =
-                "give the rows of six stresses of a point one name that ends with xx, yy, zz, xy, yz, xz";
-            return Err(none("no recovery has all six stresses of a point").with_help(help).into());
-        }
-        match self {
-            Self::Csv => slot.fill(envelope_csv(motion).as_bytes()),
-            Self::Vtu => {
-                let file = envelope_vtu(body, motion).ok_or_else(|| {
-                    none("no point of the recoveries is a node of the body, so there is nothing to draw")
-                        .with_help("write a table instead: --envelope FILE.csv")
-                })?;
-                slot.fill(&file)
             }
         }
     }
@@ -125,7 +74,7 @@ pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
     refuse_warnings(arguments.printing, &run.diagnostics)?;
     kind.fill(&body, &recovered, ("history", &history.path.display().to_string()), &slot)?;
     if let (Some(kind), Some(slot)) = (envelope, &envelope_slot) {
-        kind.fill(&body, &recovered, slot)?;
+        slot.fill(&kind.bytes(&body, &recovered)?)?;
     }
     let facts = RecoveredFacts::new(&body, &history, &recovered, &run);
     for (slot, format) in reports.iter().zip(formats) {

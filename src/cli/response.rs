@@ -10,17 +10,14 @@ use super::watcher::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_body::basis::{BasisKind, ModeSettings};
-use flexbody_body::convert::{ConvertSettings, convert};
+use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_eigen::Wanted;
 use flexbody_input::LoadSource;
 use flexbody_linalg::context::{Event, Watch};
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{LoadCases, Point, Scene};
+use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, ResponseFacts, RunData, response_csv};
-use flexbody_study::response::{Band, Place, ResponseSettings, respond};
-use flexbody_study::tailoring::computed_basis;
+use flexbody_study::response::{Place, ResponseRequest, converted_for_response};
 use std::path::PathBuf;
 
 pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
@@ -46,10 +43,8 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
         let (body, notes) = flexbody_file::read_with_notes(&arguments.model)?;
         (None, body, notes)
     };
-    let settings = settings(arguments, scene.as_ref(), &body)?;
-    let [from, to] = places(arguments, scene.as_ref())?;
     let context = context(None, arguments.allow_long, &watch);
-    let response = respond(model.as_ref(), &body, &from, &to, &settings, &context)?;
+    let (response, settings) = request(arguments).respond(model.as_ref(), &body, scene.as_ref(), &context)?;
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
     let facts = ResponseFacts::new(&response, &settings, &run);
@@ -67,6 +62,20 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
         diagnostics: run.diagnostics.clone(),
         passed: response.holds(settings.tolerance),
     })
+}
+
+/// Returns what the command line states.
+fn request(arguments: &ResponseArguments) -> ResponseRequest {
+    let places = |named: &[String]| named.iter().map(|text| Place::parse(text)).collect();
+    ResponseRequest {
+        from: places(&arguments.from),
+        to: places(&arguments.to),
+        band: arguments.band,
+        damping: arguments.damping,
+        tolerance: arguments.tolerance,
+        points: arguments.points as usize,
+        solves: arguments.solves as usize,
+    }
 }
 
 fn outputs(arguments: &ResponseArguments) -> impl Iterator<Item = &PathBuf> + Clone {
@@ -112,71 +121,11 @@ fn model_and_body(
         return Ok((model, body, diagnostics));
     }
     let loads = asked.unwrap_or_else(|| files.residual_vectors.clone());
-    let basis = computed_basis(arguments.basis.unwrap_or_default(), &loads, &model)?;
-    let settings = ConvertSettings {
-        modes: ModeSettings {
-            wanted: Wanted::Lowest(
-                arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize),
-            ),
-            ..ModeSettings::default()
-        },
-        basis,
-        lumped: Vec::new(),
-        ..ConvertSettings::default()
-    };
     // Created after the model was read, which takes memory too.
-    let made = convert(&model, &settings, &context(None, arguments.allow_long, watch))?;
+    let context = context(None, arguments.allow_long, watch);
+    let modes = arguments.modes.map(|modes| modes as usize);
+    let basis = arguments.basis.unwrap_or_default();
+    let made = converted_for_response(&model, basis, &loads, modes, &context)?;
     diagnostics.extend(made.diagnostics);
     Ok((model, made.body, diagnostics))
-}
-
-/// Returns the settings of the command line, completed by those of the scene.
-fn settings(
-    arguments: &ResponseArguments,
-    scene: Option<&Scene>,
-    body: &FlexBody,
-) -> Result<ResponseSettings> {
-    let of_scene = scene.and_then(|scene| Band::new(0.0, scene.requirements.band? * body.units().hertz()));
-    let band = arguments.band.or(of_scene).ok_or_else(|| {
-        Diagnostic::new(Code::Usage, "no frequency band is given")
-            .with_help("give --band 0..2000, or a --scene with a [band]")
-    })?;
-    Ok(ResponseSettings {
-        band,
-        points: arguments.points as usize,
-        solves: arguments.solves as usize,
-        damping: arguments.damping.map(Into::into).or_else(|| scene?.requirements.damping.clone()),
-        replaces_damping: arguments.damping.is_none()
-            && scene.is_some_and(|scene| scene.requirements.replaces_damping),
-        tolerance: arguments.tolerance,
-    })
-}
-
-/// Returns the places of forces and of measured displacements.
-fn places(arguments: &ResponseArguments, scene: Option<&Scene>) -> Result<[Vec<Place>; 2]> {
-    let chosen = |named: &[String], of_scene: Vec<&Point>, option: &str, key: &str| -> Result<Vec<Place>> {
-        let mut places: Vec<Place> = named.iter().map(|text| Place::parse(text)).collect();
-        if places.is_empty() {
-            places.extend(of_scene.into_iter().cloned().map(Place::of));
-        }
-        // Remove duplicates: a scene may load a point twice.
-        let mut once: Vec<Place> = Vec::new();
-        places.into_iter().for_each(|place| {
-            if !once.contains(&place) {
-                once.push(place)
-            }
-        });
-        if once.is_empty() {
-            let message = match option {
-                "from" => "no place of forces is given",
-                _ => "no place of displacements is given",
-            };
-            let help = format!("give --{option} INTERFACE or --{option} NODE, or a --scene with [[{key}]]");
-            return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
-        }
-        Ok(once)
-    };
-    let loaded = scene.map_or_else(Vec::new, |scene| scene.loads.iter().map(|load| &load.at).collect());
-    let watched = scene.map_or_else(Vec::new, |scene| scene.watched.iter().collect());
-    Ok([chosen(&arguments.from, loaded, "from", "load")?, chosen(&arguments.to, watched, "to", "watch")?])
 }

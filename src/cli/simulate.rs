@@ -3,7 +3,7 @@
 use super::arguments::{Printing, SimulateArguments};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, marked, refuse_replacing, refuse_replacing_read};
-use super::recover::{EnvelopeKind, Kind};
+use super::recover::Kind;
 use super::resources::{context, use_threads};
 use super::watcher::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -12,7 +12,7 @@ use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Event;
 use flexbody_motion::scene::{LoadCases, Scene, simulate, simulate_with_envelope, unsettled_rate};
-use flexbody_report::{Format, RunData, SimulationFacts, simulation_csv};
+use flexbody_report::{EnvelopeKind, Format, RunData, SimulationFacts, simulation_csv};
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
@@ -139,7 +139,7 @@ impl Job<'_> {
         if let (Some(slot), Some(kind), Some(recovered)) =
             (&slots.envelope, self.envelope, &recording.recovered)
         {
-            kind.fill(self.body, recovered, slot)?;
+            slot.fill(&kind.bytes(self.body, recovered)?)?;
         }
         for (slot, format) in slots.reports.iter().zip(self.formats) {
             slot.fill(facts.render(*format).as_bytes())?;

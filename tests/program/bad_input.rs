@@ -173,6 +173,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB767", "tests/program/cluster.rs"),
     ("FB771", "tests/program/cluster.rs"),
     ("FB999", "tests/program/ends.rs"),
+    ("FB804", "tests/program/library_parity.rs"),
 ];
 
 #[test]

@@ -168,7 +168,7 @@ fn motions_selections_and_studies_tell_their_numbers() {
         .expect("a study");
     assert!(trade.holds() && trade.front().contains(&trade.recommended().expect("a candidate")));
     assert_eq!(trade.body(0).expect("the whole body").n_modes(), 6);
-    assert!(trade.body(trade.candidates()).expect_err("no candidate").has(Code::Usage));
+    assert!(trade.body(trade.candidates()).expect_err("no candidate").has(Code::Argument));
     let nodal = body.trade(&scene, &TradeOptions::default().reference(ReferenceChoice::Nodal), &|_| {
         ControlFlow::Continue(())
     });
@@ -182,4 +182,62 @@ fn motions_selections_and_studies_tell_their_numbers() {
         assert_eq!(report["scene"], scene);
     }
     assert!(body.report(ReportFormat::Html).contains("<html"));
+}
+
+#[test]
+fn scenes_come_from_text_and_from_values() {
+    let text =
+        "name = \"spin\"\n[run]\nduration = 0.01\noutputs = 4\n[initial]\nangular_velocity = [10, 200, 5]\n";
+    let values = serde_json::json!({
+        "name": "spin",
+        "run": { "duration": 0.01, "outputs": 4 },
+        "initial": { "angular_velocity": [10, 200, 5] },
+    });
+    let body = body();
+    let motion = |scene: &Scene| body.simulate(scene).expect("a motion").csv();
+    let parsed = Scene::parse(text, "").expect("a scene");
+    let made = Scene::from_values(&values, "").expect("a scene");
+    assert_eq!((parsed.name(), made.name()), ("spin", "spin"));
+    assert_eq!(motion(&parsed), motion(&made));
+    // Load cases are chosen by name.
+    let cases =
+        serde_json::json!({ "run": { "duration": 0.01 }, "case": [{ "name": "a" }, { "name": "b" }] });
+    let cases = Scene::from_values(&cases, "").expect("two cases");
+    assert_eq!(cases.case(Some("b")).expect("a case").name(), "scene: b");
+    for name in [None, Some("c")] {
+        assert!(cases.case(name).expect_err("no such case").has(Code::SceneCase));
+    }
+    // Errors name the line of a text, and the value among values.
+    let error = Scene::parse("[run]\nduration = true\n", "").expect_err("no number");
+    assert_eq!(error.diagnostics()[0].line(), Some(2));
+    let loads = serde_json::json!({ "load": [{ "node": 1, "force": [0, 0, 1] }, { "node": 2, "force": 1 }] });
+    let error = Scene::from_values(&loads, "").expect_err("no vector");
+    let said = error.diagnostics()[0].message();
+    assert!(said.ends_with(" in [[load]] 2: `force = 1`"), "{said}");
+    assert_eq!((error.diagnostics()[0].file(), error.diagnostics()[0].line()), (None, None));
+    for values in
+        [serde_json::json!({ "run": null }), serde_json::json!(3), serde_json::json!({ "runs": {} })]
+    {
+        assert!(Scene::from_values(&values, "").expect_err("no scene").has(Code::SceneSyntax), "{values}");
+    }
+    // Files of histories lie in the stated folder.
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("force.csv"), "time,f\n0,1\n0.01,2\n").expect("written");
+    let history = serde_json::json!({ "file": "force.csv", "time": "time", "value": "f" });
+    let load = serde_json::json!([{ "node": 1, "force": [0, 0, 1], "history": history }]);
+    let values = serde_json::json!({ "run": { "duration": 0.01 }, "load": load });
+    assert!(Scene::from_values(&values, folder.path()).is_ok());
+    assert!(Scene::from_values(&values, folder.path().join("none")).is_err());
+}
+
+#[test]
+fn bodies_become_bytes_and_fragments_of_pages() {
+    let (body, folder) = (body(), tempfile::tempdir().expect("a folder"));
+    let bytes = body.to_bytes().expect("bytes");
+    body.write(folder.path().join("body.flex.h5")).expect("written");
+    assert!(bytes == std::fs::read(folder.path().join("body.flex.h5")).expect("a file"));
+    assert_eq!(FlexBody::from_bytes(&bytes).expect("a body"), body);
+    assert!(FlexBody::from_bytes(&bytes[..bytes.len() / 2]).is_err());
+    let html = body.summary_html();
+    assert!(html.contains("<dl") && html.contains("6 flexible") && !html.contains("<script"), "{html}");
 }

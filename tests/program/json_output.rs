@@ -38,7 +38,7 @@ fn schema() -> jsonschema::Validator {
 }
 
 /// Creates a folder with a block with a lumped mass, which causes a warning, its body and a scene.
-fn folder() -> TempDir {
+pub fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let mesh = Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.4, 0.15, 0.1]);
     let raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).with_lumped_mass().raw_model();

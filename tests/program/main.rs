@@ -17,6 +17,7 @@ mod jointed;
 mod json_output;
 mod kept_in_files;
 mod language;
+mod library_parity;
 mod licences;
 mod limits;
 mod models;

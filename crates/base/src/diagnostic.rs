@@ -288,6 +288,7 @@ codes! {
     Usage = "FB801", Error, BadInput, "command line not understood", "see flexbody help";
     LumpedScheme = "FB802", Error, BadInput, "unknown lumping scheme", "use row-sum, diagonal-scaling, user=FILE or none";
     LumpedMassTable = "FB803", Error, BadInput, "nodal masses cannot be used", "give a table with the header `node,mass` and one finite mass for each node";
+    Argument = "FB804", Error, BadInput, "argument of a function is not possible", "give the argument as the documentation of the function describes it";
     Internal = "FB999", Error, Bug, "internal error", "report this bug of flexbody with the input";
 }
 

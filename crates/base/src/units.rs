@@ -68,6 +68,11 @@ impl UnitSystem {
         })
     }
 
+    /// Returns the names of the units of length, mass and time.
+    pub fn names() -> [Vec<&'static str>; 3] {
+        [LENGTH, MASS, TIME].map(|table| table.iter().map(|(name, _)| *name).collect())
+    }
+
     /// Returns one frequency unit (cycles per time unit) in hertz.
     pub fn hertz(&self) -> f64 {
         1.0 / self.time.to_si()

@@ -2,7 +2,9 @@
 //! matrices.
 
 use super::recounts::{interface_checks, recounts};
-use crate::convert::{BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, rigid_mass};
+use crate::convert::{
+    BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, poor_fits, rigid_mass,
+};
 use crate::flex_body::{FlexBody, Guarantee, ReferenceConditions, Storage};
 use crate::invariants::{
     BodyFrame, DIGITS, IdentityCheck, Invariants, condense_certified, primary_differences,
@@ -12,7 +14,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_eigen::{relative_residual, residual_scale, rounding_residual};
 use flexbody_linalg::{SymmetricMatrix, gram, larger, largest, largest_entry};
-use flexbody_model::{Damping, FeModel, GeometricStiffness, UnitLoad};
+use flexbody_model::{CheckedModel, Damping, FeModel, GeometricStiffness, RawModel, UnitLoad};
 use nalgebra::Vector3;
 
 /// Limit for recomputed invariants, relative to their Cauchy-Schwarz bounds: the rounding of their sums.
@@ -31,6 +33,50 @@ pub fn body_identities(body: &FlexBody) -> Vec<IdentityCheck> {
     let mut checks = body.identities(frame_of(body));
     checks.extend(recounts(body));
     checks
+}
+
+/// Result of the checks of a body.
+#[derive(Debug, Clone)]
+pub struct Checks {
+    /// All identities and comparisons.
+    pub identities: Vec<IdentityCheck>,
+    /// Warnings about interfaces that the modes deform although they are rigid, and about changed source files.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+impl Checks {
+    /// Evaluates all checks of `body`, and those against the `model` that it was made of if one is given.
+    ///
+    /// # Errors
+    /// The errors of [`verify`].
+    pub fn of(body: &FlexBody, model: Option<&FeModel>) -> Result<Self> {
+        let mut checks = Self { identities: body_identities(body), diagnostics: poor_fits(body) };
+        if let Some(model) = model {
+            checks.diagnostics.extend(changed_sources(body, model));
+            checks.identities.extend(verify(body, model)?);
+        }
+        Ok(checks)
+    }
+
+    /// Returns true if every check passed.
+    pub fn passed(&self) -> bool {
+        self.identities.iter().all(|check| check.passed)
+    }
+}
+
+/// Returns the model that `body` was made of: all of `raw`, or one of the bodies in it.
+///
+/// # Errors
+/// The errors of [`FeModel::from_raw`]; [`BodyIncomparable`](Code::BodyIncomparable) if the model holds other bodies.
+pub fn model_of(body: &FlexBody, raw: RawModel) -> Result<CheckedModel> {
+    let Some(number) = body.source().number else { return FeModel::from_raw(raw) };
+    let bodies = FeModel::bodies_from_raw(raw)?;
+    let count = bodies.len();
+    let found = bodies.into_iter().find(|checked| checked.model.number() == Some(number));
+    found.ok_or_else(|| {
+        let message = format!("the file states {number}, but the matrices of the model hold {count}");
+        Diagnostic::new(Code::BodyIncomparable, message).into()
+    })
 }
 
 /// Returns the intended frame of `body`, as recorded in its settings.

@@ -32,5 +32,8 @@ mod simscape;
 mod vtk;
 
 pub use embedded::embedded_markdown;
-pub use registry::{FORMATS, IMPORT_FORMATS, export, find_format, find_import_format, recognise};
+pub use registry::{
+    FORMATS, IMPORT_FORMATS, audit_file, export, export_in_units, find_format, find_import_format,
+    import_file, recognise,
+};
 pub use vtk::envelope_vtu;

@@ -2,16 +2,21 @@
 
 use super::export::{ExportFormat, ExportOptions, Exported, Points};
 use super::gltf::Gltf;
-use super::import::ImportFormat;
+use super::import::{Audit, ImportFormat, Imported, accept_imported, audit, import_body};
 use super::vtk::Vtk;
 use super::{adams, chrono, embedded, json, mbdyn, npz, openradioss, sid};
 #[cfg(feature = "hdf5")]
 use super::{exudyn, mbsim, simscape};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::InputFile;
-use flexbody_body::flex_body::FlexBody;
+use flexbody_base::units::UnitSystem;
+use flexbody_body::convert::interface_compliance;
+use flexbody_body::flex_body::{FlexBody, Storage};
+use flexbody_body::invariants::FrameChoice;
 use std::borrow::Cow;
+use std::path::Path;
 
 /// All export formats in the order of the documentation.
 pub const FORMATS: &[&dyn ExportFormat] = &[
@@ -87,6 +92,27 @@ pub fn export(
     Ok((exported, losses.into_iter().chain(needs).chain(left).chain(unread).collect()))
 }
 
+/// Writes `body` in a format like [`export`], in other `units` if they are given. The findings include a warning about
+/// interfaces whose static compliance the modes do not contain, except for a picture.
+///
+/// # Errors
+/// The errors of [`export`] and of [`FlexBody::in_units`].
+pub fn export_in_units(
+    body: &FlexBody,
+    format: &dyn ExportFormat,
+    options: &ExportOptions,
+    units: Option<&UnitSystem>,
+    allow_loss: bool,
+) -> Result<(Exported, Vec<Diagnostic>)> {
+    let body = match units {
+        Some(units) => Cow::Owned(body.in_units(units)?),
+        None => Cow::Borrowed(body),
+    };
+    let (exported, mut findings) = export(&body, format, options, allow_loss)?;
+    findings.extend(interface_compliance(&body).filter(|_| !format.is_picture()));
+    Ok((exported, findings))
+}
+
 fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOptions) -> Result<()> {
     let refuse =
         |message: String, help: String| Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
@@ -146,6 +172,46 @@ pub fn find_import_format(name: &str) -> Result<&'static dyn ImportFormat> {
         let message = format!("`{name}` is not an import format");
         Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
     })
+}
+
+/// Reads a body in a file of another program and checks it: in the format with the given name, or in the format that its
+/// content shows.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) for an unknown name; [`ForeignUnreadable`](Code::ForeignUnreadable) for a file that cannot be
+/// read; the errors of [`InputFile::open`].
+pub fn audit_file(path: &Path, format: Option<&str>, tolerance: f64) -> Result<Audit> {
+    let named = format.map(find_import_format).transpose()?;
+    let file = InputFile::open(path)?;
+    let format = named.map_or_else(|| recognise(&file), Ok)?;
+    Ok(audit(&format.read(&file)?, tolerance))
+}
+
+/// Reads a body in a file of another program as a flexible body, in the stated units (m, kg and s for `None`) and with
+/// the floats of `storage`.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) for an unknown format; the errors of [`ImportFormat::read`], [`import_body`] and
+/// [`accept_imported`].
+pub fn import_file(
+    path: &Path,
+    format: &str,
+    units: Option<UnitSystem>,
+    frame: Option<&FrameChoice>,
+    storage: Storage,
+) -> Result<Imported> {
+    let format = find_import_format(format)?;
+    let file = InputFile::open(path)?;
+    let read = format.read(&file);
+    file.refuse_changed()?;
+    let source = SourceFile::new("body", path, file.sha256()?);
+    let imported = import_body(&read?, source, units.unwrap_or_default(), frame);
+    let mut imported = imported.map_err(|error| error.in_file(path))?;
+    if storage == Storage::F32 {
+        imported.body = imported.body.rounded_to_f32()?;
+    }
+    accept_imported(&imported).map_err(|error| error.in_file(path))?;
+    Ok(imported)
 }
 
 /// Returns the format of a file.

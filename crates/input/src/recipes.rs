@@ -1,6 +1,9 @@
 //! The way FE programs write their matrices: the lines of the deck, the run, and the command that continues from there.
 //! `docs/how_to/from_fe_programs.md` shows these lines as well.
 
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+
 /// Way from a deck of one FE program to a flexible body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Recipe {
@@ -10,6 +13,33 @@ pub struct Recipe {
     pub steps: &'static [Step],
     /// Requirements of the model.
     pub mind: &'static str,
+}
+
+impl Recipe {
+    /// Returns the recipe of a program.
+    ///
+    /// # Errors
+    /// FB801 for a program without a recipe, with the programs that have one.
+    pub fn of(program: &str) -> Result<Self> {
+        let found = RECIPES.iter().copied().find(|recipe| recipe.program == program);
+        found.ok_or_else(|| {
+            let help = format!("name one of {}", Self::programs().join(", "));
+            Diagnostic::new(Code::Usage, format!("`{program}` has no recipe")).with_help(help).into()
+        })
+    }
+
+    /// Returns the names of all programs with a recipe.
+    pub fn programs() -> Vec<&'static str> {
+        RECIPES.iter().map(|recipe| recipe.program).collect()
+    }
+}
+
+impl std::fmt::Display for Recipe {
+    /// Writes every step with its place, then the requirements of the model.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.steps.iter().try_for_each(|step| write!(f, "{}:\n\n{}\n\n", step.place, step.lines))?;
+        writeln!(f, "Mind: {}.", self.mind)
+    }
 }
 
 /// Lines with the place where they belong.

@@ -98,6 +98,11 @@ impl BatchFacts {
         self.failed
     }
 
+    /// Returns the bodies, in the order of the list.
+    pub fn bodies(&self) -> &[BatchRow] {
+        &self.bodies
+    }
+
     /// Renders the facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
         Document::render(self, format, || self.document())

@@ -142,7 +142,7 @@ fn verdict(state: State, head: &str, rest: &str) -> Markup {
 }
 
 /// Renders terms; values of one label stand below each other.
-fn terms(items: &[Term]) -> Markup {
+pub(super) fn terms(items: &[Term]) -> Markup {
     let shown: Vec<&Term> = items.iter().filter(|term| term.is_in_page).collect();
     html! {
         @if !shown.is_empty() {

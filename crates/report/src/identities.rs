@@ -2,10 +2,23 @@
 
 use super::document::{Block, Inline, Table, cells};
 use super::numbers::significant;
+use super::term_facts::dropped_text;
 use super::text::{self, Screen};
 use flexbody_base::diagnostic::{Diagnostic, Severity};
+use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::IdentityCheck;
+use flexbody_body::verification::Checks;
 use serde_json::{Value, json};
+
+/// Renders the checks of `body`, with a note for every group that no check covers because it was dropped.
+pub fn checks_text(body: &FlexBody, checks: &Checks) -> String {
+    identities_text(&checks.identities) + &dropped_text(body)
+}
+
+/// Returns the checks as the JSON of `flexbody check`.
+pub fn checks_json(checks: &Checks) -> String {
+    format!("{:#}", json!({ "identities": identities_json(&checks.identities) }))
+}
 
 /// Renders a table of identities with failed ones marked, and their count.
 pub fn identities_text(checks: &[IdentityCheck]) -> String {

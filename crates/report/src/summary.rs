@@ -7,6 +7,7 @@ use super::craig_bampton::CraigBamptonFacts;
 use super::document::{Block, Term, Tone, listed_to};
 use super::facts::{InterfaceFacts, RecoveryFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
+use super::html;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::lumped_effect::scheme_in_words;
 use super::numbers::{bytes, coordinates, counted, duration, frequency, frequency_range, triple};
@@ -23,6 +24,14 @@ pub fn summary(facts: &Facts<'_>, screen: Screen) -> String {
     let blocks: Vec<Block<'_>> =
         groups.iter().flat_map(|group| [Block::Terms(group(facts)), Block::Gap]).collect();
     text::render(&blocks, screen)
+}
+
+/// Renders the summary as a fragment of a page, without scripts and styles, as a notebook shows it.
+pub fn summary_html(facts: &Facts<'_>) -> String {
+    let groups = [body, mass_properties, modes, lumped];
+    let shown = groups.iter().flat_map(|group| group(facts));
+    let items: Vec<Term> = shown.map(|term| Term { is_in_page: true, ..term }).collect();
+    html::terms(&items).into_string()
 }
 
 fn entry(tone: Tone, label: &str, value: impl Into<String>, lines: usize) -> Term {

@@ -10,14 +10,14 @@ the interpreter, and Ctrl-C ends it.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, overload
 
 from numpy.typing import ArrayLike
 
-from . import _inputs
+from . import _inputs, _types
 from ._errors import (
+    ArgumentError,
     CheckError,
     Diagnostic,
     FlexbodyError,
@@ -26,25 +26,52 @@ from ._errors import (
     InternalError,
     NumericalError,
     ResourceError,
+    type_error,
 )
 from ._flexbody import (
+    Audit,
+    Batch,
     Body,
+    Check,
+    Comparison,
     EquationsOfMotion,
     Model,
     Motion,
     Point,
+    Recovered,
+    Response,
     Scene,
     Selection,
     Trade,
+    View,
     __version__,
+    audit,
+    batch,
     export_formats,
+    import_body,
     read,
+    recipe,
 )
-from ._types import Identity, Interface, InterfaceCoordinates, PointPath
+from ._types import (
+    ComparisonRow,
+    Identity,
+    Interface,
+    InterfaceCoordinates,
+    PointPath,
+    RecoveredRows,
+    RowLabel,
+    TransferFunction,
+)
 
 __all__ = [
+    "ArgumentError",
+    "Audit",
+    "Batch",
     "Body",
+    "Check",
     "CheckError",
+    "Comparison",
+    "ComparisonRow",
     "Diagnostic",
     "EquationsOfMotion",
     "FlexbodyError",
@@ -59,31 +86,41 @@ __all__ = [
     "NumericalError",
     "Point",
     "PointPath",
+    "Recovered",
+    "RecoveredRows",
     "ResourceError",
+    "Response",
+    "RowLabel",
     "Scene",
     "Selection",
     "Trade",
+    "TransferFunction",
+    "View",
     "__version__",
+    "audit",
+    "batch",
     "convert",
     "export_formats",
+    "import_body",
     "model",
     "read",
     "read_model",
+    "recipe",
 ]
 
 
 def model(
-    stiffness: Any,
-    mass: Any,
+    stiffness: _types.Matrix,
+    mass: _types.Matrix,
     nodes: ArrayLike,
     *,
     name: str = "model",
     node_ids: ArrayLike | None = None,
     dofs: ArrayLike | int | None = None,
-    interfaces: Mapping[str, Any] | None = None,
-    units: Sequence[object] | None = None,
-    damping: Any = None,
-    residual_vectors: str | Sequence[str] = (),
+    interfaces: Mapping[str, _types.InterfaceNodes] | None = None,
+    units: _types.Units | None = None,
+    damping: _types.Damping | None = None,
+    residual_vectors: _types.ResidualLoads | Sequence[_types.ResidualLoads] = (),
     allow_implausible: bool = False,
 ) -> Model:
     """Creates a finite element model from matrices and checks it.
@@ -122,10 +159,11 @@ def model(
     Raises
     ------
     InputError
-        If matrices, nodes or interfaces are invalid; has all findings.
-    ValueError, TypeError
-        For arrays of the wrong shape or kind.
+        If matrices, nodes or interfaces are invalid; has all findings. It is a ValueError; for an argument of a
+        wrong type an ArgumentError, which is also a TypeError.
     """
+    if not isinstance(name, str):
+        raise type_error(f"name is of type {type(name).__name__}, expected str")
     positions, plane = _inputs.coordinates(nodes)
     ids = _inputs.numbers(node_ids, len(positions))
     return Model._assembled(
@@ -145,11 +183,11 @@ def model(
 
 
 def read_model(
-    path: str | os.PathLike[str],
+    path: _types.Path,
     *,
-    program: str | None = None,
-    units: Sequence[object] | None = None,
-    interfaces: Mapping[str, str | tuple[str, str]] | None = None,
+    program: _types.Program | None = None,
+    units: _types.Units | None = None,
+    interfaces: Mapping[str, str | tuple[str, _types.Coupling | None]] | None = None,
 ) -> Model:
     """Reads a model: a manifest (`model.toml`, docs/reference/input.md), or the files of an FE program
     (docs/how_to/import_modes.md), whose deck is `path`.
@@ -168,10 +206,50 @@ def read_model(
     InputError
         If the files or the model are invalid; has all findings.
     """
-    sets = [
-        (name, *given) if isinstance(given, tuple) else (name, given, None) for name, given in (interfaces or {}).items()
-    ]
-    return Model._read(os.fspath(path), program, _inputs.unit_names(units), sets)
+    return Model._read(path, program, _inputs.unit_names(units), _inputs.set_list(interfaces))
+
+
+@overload
+def convert(
+    stiffness: _types.Matrix,
+    mass: _types.Matrix,
+    nodes: ArrayLike,
+    *,
+    modes: int | None = None,
+    max_frequency: float | None = None,
+    basis: _types.Basis = "free",
+    accuracy: _types.Accuracy = "standard",
+    frame: _types.Frame = "com",
+    comparators: bool = True,
+    scene: Scene | Sequence[Scene] | Mapping[str, Any] | _types.Path | None = None,
+    name: str = "model",
+    node_ids: ArrayLike | None = None,
+    dofs: ArrayLike | int | None = None,
+    interfaces: Mapping[str, _types.InterfaceNodes] | None = None,
+    units: _types.Units | None = None,
+    damping: _types.Damping | None = None,
+    residual_vectors: _types.ResidualLoads | Sequence[_types.ResidualLoads] = (),
+    allow_implausible: bool = False,
+) -> Body: ...
+
+
+@overload
+def convert(
+    stiffness: Model | _types.Path,
+    mass: None = None,
+    nodes: None = None,
+    *,
+    modes: int | None = None,
+    max_frequency: float | None = None,
+    basis: _types.Basis = "free",
+    accuracy: _types.Accuracy = "standard",
+    frame: _types.Frame = "com",
+    comparators: bool = True,
+    scene: Scene | Sequence[Scene] | Mapping[str, Any] | _types.Path | None = None,
+    program: _types.Program | None = None,
+    units: _types.Units | None = None,
+    interfaces: Mapping[str, str | tuple[str, _types.Coupling | None]] | None = None,
+) -> Body: ...
 
 
 def convert(
@@ -181,9 +259,9 @@ def convert(
     *,
     modes: int | None = None,
     max_frequency: float | None = None,
-    basis: str = "free",
-    accuracy: str = "standard",
-    frame: str = "com",
+    basis: _types.Basis = "free",
+    accuracy: _types.Accuracy = "standard",
+    frame: _types.Frame = "com",
     comparators: bool = True,
     scene: Any = None,
     **of_model: Any,
@@ -211,8 +289,8 @@ def convert(
     comparators
         True to compute the results of lumped masses for comparison.
     scene
-        A Scene, a list of load cases, or the path of a scene file, for a body with the terms and modes alone
-        that it needs.
+        A Scene, a list of load cases, or a scene as `flexbody.Scene` takes it (the path of a file, a text, a
+        dict), for a body with the terms and modes alone that it needs.
 
     Raises
     ------
@@ -222,12 +300,12 @@ def convert(
     if mass is None and nodes is None:
         if isinstance(stiffness, Model):
             if of_model:
-                raise TypeError(f"{', '.join(of_model)} cannot be given together with a Model, which states them")
+                raise type_error(f"{', '.join(of_model)} cannot be given together with a Model, which states them")
             made = stiffness
         else:
             made = read_model(stiffness, **of_model)
     elif mass is None or nodes is None:
-        raise TypeError("give convert either K, M and nodes, or one file or Model")
+        raise type_error("convert has some of K, M and nodes, expected all three, or one file or Model")
     else:
         made = model(stiffness, mass, nodes, **of_model)
     return made.convert(

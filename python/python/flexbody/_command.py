@@ -8,6 +8,12 @@ import sys
 from ._flexbody import run_command
 
 
+def words() -> list[str]:
+    """Returns the words that start this command in another process, which finds the package where this process does."""
+    start = f"import sys; sys.path[:] = {sys.path!r}; from flexbody._command import main; sys.exit(main())"
+    return [sys.executable, "-c", start]
+
+
 def main() -> int:
     """Runs the command line of this process and returns the exit code."""
     # The program handles signals that Python does not: a KeyboardInterrupt would wait for the end of the work.

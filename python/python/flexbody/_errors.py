@@ -75,6 +75,10 @@ class InputError(FlexbodyError, ValueError):
     """Bad input. Exit code 2."""
 
 
+class ArgumentError(InputError, TypeError):
+    """An argument of a wrong type. Exit code 2."""
+
+
 class NumericalError(FlexbodyError, ArithmeticError):
     """No trustworthy numerical result: not converged, a mechanism, an indefinite matrix. Exit code 3."""
 
@@ -106,6 +110,23 @@ _CLASSES = {1: CheckError, 2: InputError, 3: NumericalError, 4: ResourceError, 7
 def error_of(exit_code: int, diagnostics: tuple[Diagnostic, ...]) -> FlexbodyError:
     """Returns the exception of the class that belongs to the exit code."""
     return _CLASSES.get(exit_code, FlexbodyError)(diagnostics, exit_code)
+
+
+_HELP = "give the argument as the documentation of the function describes it"
+
+
+def _of_argument(message: str, help_text: str) -> tuple[Diagnostic]:
+    return (Diagnostic("FB804", "error", message, None, None, help_text),)
+
+
+def value_error(message: str, help_text: str = _HELP) -> InputError:
+    """Returns the exception for an argument whose value is not possible."""
+    return InputError(_of_argument(message, help_text), 2)
+
+
+def type_error(message: str, help_text: str = _HELP) -> ArgumentError:
+    """Returns the exception for an argument of a wrong type."""
+    return ArgumentError(_of_argument(message, help_text), 2)
 
 
 def warn(warning: Warning) -> None:

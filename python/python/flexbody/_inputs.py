@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+import numbers as abstract
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._errors import Diagnostic, error_of
+from ._errors import Diagnostic, FlexbodyError, error_of, type_error, value_error
 
 Compressed = tuple[int, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 
 _DIRECTIONS = {2: (1, 2), 3: (1, 2, 3), 6: (1, 2, 3, 4, 5, 6)}
+
+
+def _read(convert: Callable[[], NDArray[Any]], name: str, expected: str) -> NDArray[Any]:
+    """Returns the array of a conversion by numpy, whose exceptions become those of this package."""
+    try:
+        return convert()
+    except (ValueError, OverflowError) as error:
+        raise value_error(f"{name} cannot be read as {expected}: {error}") from error
+    except TypeError as error:
+        raise type_error(f"{name} cannot be read as {expected}: {error}") from error
 
 
 def compressed(matrix: Any, name: str) -> Compressed:
@@ -30,7 +43,7 @@ def compressed(matrix: Any, name: str) -> Compressed:
         pointers, rows = columns.indptr.astype(np.int64), columns.indices.astype(np.int64)
         values = np.ascontiguousarray(columns.data, dtype=np.float64)
     else:
-        dense = np.asarray(matrix)
+        dense = _read(lambda: np.asarray(matrix), name, "a matrix")
         _check(dense.shape, dense.dtype, name)
         columns, rows = np.nonzero(dense.T)
         values = np.ascontiguousarray(dense[rows, columns], dtype=np.float64)
@@ -43,9 +56,9 @@ def compressed(matrix: Any, name: str) -> Compressed:
 
 def _check(shape: tuple[int, ...], kind: np.dtype[Any], name: str) -> None:
     if len(shape) != 2 or shape[0] != shape[1]:
-        raise ValueError(f"{name} has the shape {shape}, expected a square matrix")
+        raise value_error(f"{name} has the shape {shape}, expected a square matrix")
     if kind.kind not in "fiub":
-        raise TypeError(f"{name} has entries of type {kind}, expected real numbers")
+        raise type_error(f"{name} has entries of type {kind}, expected real numbers")
 
 
 def _refuse_one_triangle(pointers: NDArray[np.int64], rows: NDArray[np.int64], name: str) -> None:
@@ -53,16 +66,16 @@ def _refuse_one_triangle(pointers: NDArray[np.int64], rows: NDArray[np.int64], n
     above, below = bool(np.any(rows < columns)), bool(np.any(rows > columns))
     if above != below:
         side = "upper" if above else "lower"
-        raise ValueError(
+        raise value_error(
             f"{name} has only its {side} triangle: give both, {name} + {name}.T - scipy.sparse.diags({name}.diagonal())"
         )
 
 
 def coordinates(nodes: ArrayLike) -> tuple[NDArray[np.float64], bool]:
     """Returns positions (n x 3), and True if they were given for a plane model (n x 2)."""
-    positions = np.array(nodes, dtype=np.float64)
+    positions = _read(lambda: np.array(nodes, dtype=np.float64), "nodes", "numbers")
     if positions.ndim != 2 or positions.shape[1] not in (2, 3):
-        raise ValueError(f"nodes have the shape {positions.shape}, expected n x 3, or n x 2 of a plane model")
+        raise value_error(f"nodes have the shape {positions.shape}, expected n x 3, or n x 2 of a plane model")
     plane = positions.shape[1] == 2
     if plane:
         positions = np.column_stack([positions, np.zeros(len(positions))])
@@ -75,14 +88,16 @@ def numbers(node_ids: ArrayLike | None, count: int) -> NDArray[np.int64]:
         return np.arange(count, dtype=np.int64)
     ids = _integers(node_ids, "node_ids")
     if ids.shape != (count,):
-        raise ValueError(f"node_ids have the shape {ids.shape}, expected ({count},)")
+        raise value_error(f"node_ids have the shape {ids.shape}, expected ({count},)")
     return ids
 
 
 def _integers(given: ArrayLike, name: str) -> NDArray[np.int64]:
-    array = np.asarray(given)
+    array = _read(lambda: np.asarray(given), name, "integers")
     if array.size and array.dtype.kind not in "iu":
-        raise TypeError(f"{name} are of type {array.dtype}, expected integers")
+        raise type_error(f"{name} are of type {array.dtype}, expected integers of 64 bits")
+    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
+        raise value_error(f"{name} have the number {array.max()}, expected integers of 64 bits")
     return np.ascontiguousarray(array, dtype=np.int64)
 
 
@@ -92,24 +107,24 @@ def labels(dofs: ArrayLike | int | None, node_ids: NDArray[np.int64]) -> NDArray
         return None
     if isinstance(dofs, (int, np.integer)):
         if dofs not in _DIRECTIONS:
-            raise ValueError(f"dofs is {dofs}, expected 2, 3 or 6 for each node, or an array of labels")
+            raise value_error(f"dofs is {dofs}, expected 2, 3 or 6 for each node, or an array of labels")
         directions = np.array(_DIRECTIONS[int(dofs)])
         each = np.tile(directions, len(node_ids))
         return np.column_stack([np.repeat(node_ids, len(directions)), each]).astype(np.int64)
     array = _integers(dofs, "dofs")
     if array.ndim != 2 or array.shape[1] != 2:
-        raise ValueError(f"dofs have the shape {array.shape}, expected N x 2: node number and direction of each row")
+        raise value_error(f"dofs have the shape {array.shape}, expected N x 2: node number and direction of each row")
     if np.any((array[:, 1] < 1) | (array[:, 1] > 6)):
-        raise ValueError("dofs have a direction that is not 1 to 6: 1, 2, 3 are displacements, 4, 5, 6 rotations")
+        raise value_error("dofs have a direction that is not 1 to 6: 1, 2, 3 are displacements, 4, 5, 6 rotations")
     return array
 
 
 def _members(nodes: ArrayLike, name: str, node_ids: NDArray[np.int64], numbered: bool) -> list[int]:
     """Returns the node numbers of an interface, given by a mask, by numbers, or (not `numbered`) by positions."""
-    array = np.asarray(nodes)
+    array = _read(lambda: np.asarray(nodes), f"nodes of interface {name!r}", "integers")
     if array.dtype == np.bool_:
         if array.shape != node_ids.shape:
-            raise ValueError(
+            raise value_error(
                 f"the mask of interface {name!r} has the shape {array.shape}, expected {node_ids.shape}: one entry for each node"
             )
         members: list[int] = node_ids[array].tolist()
@@ -137,48 +152,107 @@ def interface_list(
 ) -> list[tuple[str, list[int], str | None, tuple[float, float, float] | None]]:
     """Returns name, nodes, coupling and reference point of every interface."""
     found = []
+    if interfaces is not None and not isinstance(interfaces, Mapping):
+        raise type_error(f"interfaces are of type {type(interfaces).__name__}, expected a mapping of name to nodes")
     for name, given in (interfaces or {}).items():
+        if not isinstance(name, str):
+            raise type_error(f"the name {name!r} of an interface is of type {type(name).__name__}, expected str")
         nodes, coupling, reference = given, None, None
         if isinstance(given, tuple) and len(given) in (2, 3) and isinstance(given[1], (str, type(None))):
             nodes, coupling = given[0], given[1]
             reference = given[2] if len(given) == 3 else None
         ids = _members(nodes, name, node_ids, numbered)
         if reference is not None:
-            point = np.asarray(reference, dtype=np.float64)
+            place = f"the reference point of interface {name!r}"
+            point = _read(lambda: np.asarray(reference, dtype=np.float64), place, "numbers")
             if point.shape != (3,):
-                raise ValueError(f"the reference point of interface {name!r} has the shape {point.shape}, expected (3,)")
+                raise value_error(f"{place} has the shape {point.shape}, expected (3,)")
             reference = (float(point[0]), float(point[1]), float(point[2]))
         found.append((name, ids, coupling, reference))
     return found
 
 
-def unit_names(units: Sequence[object] | None) -> tuple[str, str, str] | None:
+def set_list(interfaces: Mapping[str, Any] | None) -> list[tuple[str, str, str | None]]:
+    """Returns name, node set and coupling of every interface of a job."""
+    if interfaces is not None and not isinstance(interfaces, Mapping):
+        raise type_error(f"interfaces are of type {type(interfaces).__name__}, expected a mapping of name to node set")
+    found = []
+    for name, given in (interfaces or {}).items():
+        words = given if isinstance(given, tuple) else (given, None)
+        if len(words) != 2 or not isinstance(name, str) or not isinstance(words[0], str):
+            raise type_error(f"interface {name!r} is {given!r}, expected a node set, or a tuple of it and a coupling")
+        found.append((name, words[0], words[1]))
+    return found
+
+
+def unit_names(units: Any) -> tuple[str, str, str] | None:
     """Returns units of length, mass and time; a number is a factor to SI."""
     if units is None:
         return None
-    if isinstance(units, str):
-        units = units.split(",")
-    if len(units) != 3:
-        raise ValueError(f"units are {units!r}, expected three: length, mass, time, as in ('mm', 't', 's')")
-    length, mass, time = (str(unit).strip() for unit in units)
+    if not isinstance(units, Iterable):
+        raise type_error(f"units are of type {type(units).__name__}, expected three, as in ('mm', 't', 's')")
+    given = units.split(",") if isinstance(units, str) else list(units)
+    if len(given) != 3:
+        raise value_error(f"units are {units!r}, expected three: length, mass, time, as in ('mm', 't', 's')")
+    length, mass, time = (str(unit).strip() for unit in given)
     return length, mass, time
+
+
+def _real(given: Any, name: str) -> float:
+    """Returns a number; numpy's count as numbers, texts do not."""
+    if not isinstance(given, (abstract.Real, np.bool_)):
+        raise type_error(f"{name} is {given!r}, expected a number")
+    try:
+        return float(given)
+    except OverflowError as error:
+        raise value_error(f"{name} is too large for a number of 64 bits") from error
 
 
 def damping_of(damping: Any) -> Any:
     """Returns a ratio, the two numbers of Rayleigh damping, bands of ratios, or a compressed matrix."""
-    if damping is None or isinstance(damping, (float, int)):
-        return None if damping is None else float(damping)
+    if damping is None:
+        return None
+    if isinstance(damping, abstract.Real):
+        return _real(damping, "damping")
     if isinstance(damping, tuple) and len(damping) == 2:
-        return float(damping[0]), float(damping[1])
+        return _real(damping[0], "alpha of damping"), _real(damping[1], "beta of damping")
     if isinstance(damping, list) and damping and all(isinstance(band, tuple) and len(band) == 2 for band in damping):
-        return [(np.inf if end is None else float(end), float(ratio)) for end, ratio in damping]
+        end, ratio = "an end of a band of damping", "a ratio of damping"
+        return [(np.inf if to is None else _real(to, end), _real(own, ratio)) for to, own in damping]
     return compressed(damping, "damping")
 
 
-def residual_loads(names: Sequence[str]) -> tuple[bool, bool]:
+def residual_loads(names: Any) -> tuple[bool, bool]:
     """Returns two flags for residual vectors: loads at interfaces, and centrifugal loads."""
-    names = [names] if isinstance(names, str) else list(names)
-    unknown = set(names) - {"interfaces", "centrifugal"}
+    if not isinstance(names, Iterable):
+        raise type_error(f"residual_vectors are {names!r}, expected 'interfaces', 'centrifugal' or both")
+    given = [names] if isinstance(names, str) else list(names)
+    unknown = [name for name in given if name not in ("interfaces", "centrifugal")]
     if unknown:
-        raise ValueError(f"residual_vectors are {names}, expected 'interfaces', 'centrifugal' or both")
-    return "interfaces" in names, "centrifugal" in names
+        raise value_error(f"residual_vectors are {given}, expected 'interfaces', 'centrifugal' or both")
+    return "interfaces" in given, "centrifugal" in given
+
+
+def _plain(value: Any) -> Any:
+    """Returns a value of a scene as JSON has it."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise type_error(f"the scene has {value!r} of type {type(value).__name__}, expected numbers, texts, lists and dicts")
+
+
+def json_of_scene(scene: Mapping[str, Any]) -> str:
+    """Returns the JSON of a scene that is given as a dict."""
+    try:
+        return json.dumps(dict(scene), default=_plain, allow_nan=False)
+    except FlexbodyError:
+        raise
+    except (ValueError, RecursionError) as error:
+        raise value_error(f"the scene cannot be read as values: {error}") from error
+    except TypeError as error:
+        raise type_error(f"the scene cannot be read as values: {error}") from error

@@ -31,6 +31,20 @@ pub fn read_toml<T>(
         let line = line_at(file.bytes(), e.valid_up_to());
         Diagnostic::new(syntax, format!("{kind} is not UTF-8 text")).in_file(path).at_line(line)
     })?;
+    parse_toml(text, path, syntax, walk)
+}
+
+/// Reads a TOML document with `walk`, like [`read_toml`]. `path` is the file that messages name, in whose folder other
+/// files are found.
+///
+/// # Errors
+/// All findings, in the order of lines.
+pub fn parse_toml<T>(
+    text: &str,
+    path: &Path,
+    syntax: Code,
+    walk: impl FnOnce(&mut Walk<'_>, &TomlTable<'_>) -> Option<T>,
+) -> Result<T> {
     let mut tables = Walk { path, text, syntax, line_ends: LineEnds::of(text), found: Vec::new() };
     let (document, errors) = DeTable::parse_recoverable(text);
     for error in &errors {

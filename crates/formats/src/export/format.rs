@@ -1,12 +1,16 @@
 //! Trait of export formats, the options and results of an export, and its checklist: every property of a body, and its
 //! holding by the file.
 
+use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_file::RecordedMotion;
+use flexbody_linalg::context::Context;
+use flexbody_motion::scene::{LoadCases, inertia_share};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// A format that other programs read.
 pub trait ExportFormat: Sync {
@@ -82,6 +86,23 @@ pub struct InertiaInScene {
     pub share: f64,
 }
 
+impl InertiaInScene {
+    /// Returns the largest share over the load cases of a scene; `None` for a body without stiffness of inertia.
+    ///
+    /// # Errors
+    /// The errors of [`inertia_share`].
+    pub fn largest(body: &FlexBody, cases: &LoadCases, context: &Context<'_>) -> Result<Option<Self>> {
+        let mut largest: Option<Self> = None;
+        for scene in cases.iter() {
+            let Some(share) = inertia_share(body, scene, context)? else { continue };
+            if largest.as_ref().is_none_or(|known| known.share < share) {
+                largest = Some(Self { scene: scene.name.clone(), share });
+            }
+        }
+        Ok(largest)
+    }
+}
+
 /// Selection of the places of the body in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Points {
@@ -96,6 +117,29 @@ pub enum Points {
     InterfacesAnd(Vec<i64>),
     /// Nodes with these numbers.
     Some(Vec<i64>),
+}
+
+impl FromStr for Points {
+    type Err = Diagnostic;
+
+    /// Parses the points: `nodes`, `interfaces`, node numbers with commas, or `interfaces` and node numbers.
+    fn from_str(text: &str) -> std::result::Result<Self, Diagnostic> {
+        match text {
+            "nodes" => return Ok(Self::Nodes),
+            "interfaces" => return Ok(Self::Interfaces),
+            _ => {}
+        }
+        let (numbers, points): (&str, fn(Vec<i64>) -> Self) = match text.strip_prefix("interfaces,") {
+            Some(numbers) => (numbers, Self::InterfacesAnd),
+            None => (text, Self::Some),
+        };
+        let numbers: Option<Vec<i64>> = numbers.split(',').map(|number| number.trim().parse().ok()).collect();
+        numbers.map(points).ok_or_else(|| {
+            let message = format!("`{text}` is not a set of points of the body");
+            Diagnostic::new(Code::Usage, message)
+                .with_help("give nodes, interfaces, node numbers with commas, or both as in interfaces,17,23")
+        })
+    }
 }
 
 impl Points {

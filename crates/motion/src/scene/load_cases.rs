@@ -1,6 +1,6 @@
 //! Load cases of a scene file.
 
-use super::read_cases::read_cases;
+use super::read_cases::{parse_cases, read_cases};
 use super::{Scene, SceneVariation, Tolerance, Variations};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -46,14 +46,46 @@ impl LoadCases {
     pub fn read(path: impl AsRef<Path>, case: Option<&str>) -> Result<Self> {
         let path = path.as_ref();
         let (cases, variations) = read_cases(path)?;
-        let Some(name) = case else { return Ok(Self { cases, variations }) };
-        let names = names(&cases);
+        let all = Self { cases, variations };
+        let Some(name) = case else { return Ok(all) };
+        all.named(name).map_err(|error| error.in_file(path))
+    }
+
+    /// Reads the load cases of the text of a scene file. `path` is the file that messages name, in whose folder the files
+    /// of histories are found.
+    ///
+    /// # Errors
+    /// The errors of [`LoadCases::read`] apart from FB101, FB106 and FB219 of the scene file.
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
+        let (cases, variations) = parse_cases(text, path)?;
+        Ok(Self { cases, variations })
+    }
+
+    /// Returns the load case with the given name, with its variations.
+    ///
+    /// # Errors
+    /// FB219 if there is no case of that name.
+    pub fn named(&self, name: &str) -> Result<Self> {
+        let names = names(&self.cases);
         match names.iter().position(|other| *other == name) {
             Some(at) => {
-                let variations = variations.of_case(at);
-                Ok(Self { cases: vec![cases[at].clone()], variations })
+                let variations = self.variations.clone().of_case(at);
+                Ok(Self { cases: vec![self.cases[at].clone()], variations })
             }
-            None => Err(unknown_case(name, &names).in_file(path).into()),
+            None => Err(unknown_case(name, &names).into()),
+        }
+    }
+
+    /// Returns the load case with the given name or, for `None`, the scene without load cases.
+    ///
+    /// # Errors
+    /// FB219 if there is no case of that name, or if there are load cases and none is named.
+    pub fn only(&self, case: Option<&str>) -> Result<Self> {
+        let names = names(&self.cases);
+        match case {
+            Some(name) => self.named(name),
+            None if names.is_empty() => Ok(self.clone()),
+            None => Err(ambiguous(&names).into()),
         }
     }
 

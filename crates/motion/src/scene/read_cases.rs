@@ -6,7 +6,7 @@ use super::read_variations::{variations, without_run};
 use super::{CaseName, Scene, Variations, read_requirements};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::text::walk::{TomlTable, Value, Walk, read_toml};
+use flexbody_base::text::walk::{TomlTable, Value, Walk, parse_toml, read_toml};
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
@@ -25,23 +25,28 @@ const ONLY_COMMON: &[&str] = &["case", "cost", "variation"];
 /// Reads the load cases of a scene file in its order, one or more, and their variations; a file without `[[case]]` is a
 /// single scene.
 pub(super) fn read_cases(path: &Path) -> Result<(Vec<Scene>, Variations)> {
-    let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    read_toml(path, "scene", Code::SceneSyntax, |walk, top| match top.get("case") {
-        None => {
-            let only = vec![scene(walk, top, stem)?];
-            let varied = variations(walk, top, std::slice::from_ref(top), &only)?;
-            refuse_without_run(walk, top, &only);
-            Some((only, varied))
-        }
-        Some(list) => {
-            let all = cases(walk, top, list, stem)?;
-            let tables: Vec<TomlTable<'_>> =
-                tables(walk, list)?.iter().map(|(table, _)| merged(top, table)).collect();
-            let varied = variations(walk, top, &tables, &all)?;
-            refuse_without_run(walk, top, &all);
-            Some((all, varied))
-        }
-    })
+    read_toml(path, "scene", Code::SceneSyntax, whole_scene)
+}
+
+/// Reads the load cases of the text of a scene file, like [`read_cases`]; `path` is the file that it stands for.
+pub(super) fn parse_cases(text: &str, path: &Path) -> Result<(Vec<Scene>, Variations)> {
+    parse_toml(text, path, Code::SceneSyntax, whole_scene)
+}
+
+fn whole_scene(walk: &mut Walk<'_>, top: &TomlTable<'_>) -> Option<(Vec<Scene>, Variations)> {
+    let stem = walk.path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let Some(list) = top.get("case") else {
+        let only = vec![scene(walk, top, stem)?];
+        let varied = variations(walk, top, std::slice::from_ref(top), &only)?;
+        refuse_without_run(walk, top, &only);
+        return Some((only, varied));
+    };
+    let all = cases(walk, top, list, stem)?;
+    let tables: Vec<TomlTable<'_>> =
+        tables(walk, list)?.iter().map(|(table, _)| merged(top, table)).collect();
+    let varied = variations(walk, top, &tables, &all)?;
+    refuse_without_run(walk, top, &all);
+    Some((all, varied))
 }
 
 /// Reads the cases. As in this whole module, a result `None` comes with a diagnostic in `found`.

@@ -6,6 +6,7 @@ mod direct;
 mod errors;
 mod modal_sum;
 mod place;
+mod request;
 mod study;
 
 pub use band::{Band, Resonance, Spacing};
@@ -13,4 +14,5 @@ pub use errors::{At, Effectivity, PairErrors};
 /// Complex number of a response; the real part is in phase with the force.
 pub use nalgebra::Complex;
 pub use place::{Direction, Place};
+pub use request::{ResponseRequest, converted_for_response};
 pub use study::{CouplingEffect, Function, Pair, Response, ResponseSettings, Solved, respond};
