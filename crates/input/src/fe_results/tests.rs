@@ -44,85 +44,107 @@ fn exponential(value: f64, decimals: usize) -> String {
     format!("{mantissa}E{}{:02}", if exponent < 0 { '-' } else { '+' }, exponent.abs())
 }
 
-/// Returns results of CalculiX with `steps` steps. Two elements of materials 1 and 2 share node 7.
+/// Results of CalculiX as they are written.
+struct Frd {
+    form: Form,
+    out: Vec<u8>,
+}
+
+impl Frd {
+    fn flag(&self) -> u8 {
+        match self.form {
+            Form::Text => 1,
+            Form::Single => 2,
+            Form::Double => 3,
+        }
+    }
+
+    fn line(&mut self, text: &str) {
+        self.out.extend(format!("{text}\n").into_bytes());
+    }
+
+    fn heading(&mut self, name: &str, count: usize) {
+        self.line(&format!("{name:>6}{:18}{count:12}{:37}{}", "", "", self.flag()));
+    }
+
+    fn record(&mut self, node: i32, values: &[f64]) {
+        match self.form {
+            Form::Text => self.out.extend(format!(" -1{node:10}").into_bytes()),
+            _ => self.out.extend(node.to_le_bytes()),
+        }
+        for &value in values {
+            match self.form {
+                Form::Text => self.out.extend(format!("{:>12}", exponential(value, 5)).into_bytes()),
+                Form::Single => self.out.extend((value as f32).to_le_bytes()),
+                Form::Double => self.out.extend(value.to_le_bytes()),
+            }
+        }
+        if self.form == Form::Text {
+            self.out.push(b'\n');
+        }
+    }
+
+    fn end(&mut self) {
+        if self.form == Form::Text {
+            self.line(" -3");
+        }
+    }
+
+    /// Writes two elements of materials 1 and 2, which share node 7.
+    fn elements(&mut self) {
+        self.heading("    3C", 2);
+        for (element, material, nodes) in [(1, 1, [11, 7]), (2, 2, [7, 4])] {
+            if self.form == Form::Text {
+                self.line(&format!(" -1{element:10}{:5}{:5}{material:5}", 11, 0));
+                self.line(&format!(" -2{:10}{:10}", nodes[0], nodes[1]));
+            } else {
+                let numbers = [element, 11, 0, material, nodes[0], nodes[1]];
+                numbers.iter().for_each(|number: &i32| self.out.extend(number.to_le_bytes()));
+            }
+        }
+        self.end();
+    }
+
+    fn block(&mut self, step: usize, head: &str, components: &[String], values: impl Fn(i32) -> Vec<f64>) {
+        let (count, flag) = (WATCHED.len(), self.flag());
+        self.line(&format!(
+            "  100C{:6}{:12.9}{count:12}{:20}{:2}{:5}{:10}{flag:2}",
+            "L  101",
+            1.0,
+            "",
+            0,
+            step + 1,
+            ""
+        ));
+        self.line(head);
+        components.iter().for_each(|component| self.line(component));
+        WATCHED.iter().for_each(|node| self.record(*node, &values(*node)));
+        self.end();
+    }
+}
+
+/// Returns results of CalculiX with `steps` steps.
 fn frd(form: Form, steps: usize) -> Vec<u8> {
-    let flag = match form {
-        Form::Text => 1,
-        Form::Single => 2,
-        Form::Double => 3,
-    };
-    let line = |out: &mut Vec<u8>, text: String| out.extend(format!("{text}\n").into_bytes());
-    let mut out = b"    1C\n    1UPGM               CalculiX\n".to_vec();
-    let number = |out: &mut Vec<u8>, value: f64| match form {
-        Form::Text => out.extend(format!("{:>12}", exponential(value, 5)).into_bytes()),
-        Form::Single => out.extend((value as f32).to_le_bytes()),
-        Form::Double => out.extend(value.to_le_bytes()),
-    };
-    let record = |out: &mut Vec<u8>, node: i32, values: &[f64]| {
-        match form {
-            Form::Text => out.extend(format!(" -1{node:10}").into_bytes()),
-            _ => out.extend(node.to_le_bytes()),
-        }
-        values.iter().for_each(|value| number(out, *value));
-        if form == Form::Text {
-            out.push(b'\n');
-        }
-    };
-    let end = |out: &mut Vec<u8>| {
-        if form == Form::Text {
-            out.extend(b" -3\n");
-        }
-    };
-    let heading = |name: &str, count: usize| format!("{name:>6}{:18}{count:12}{:37}{flag}", "", "");
-    line(&mut out, heading("    2C", NODES.len()));
-    NODES.iter().for_each(|node| record(&mut out, *node, &[0.5, 1.5, 2.5]));
-    end(&mut out);
-    line(&mut out, heading("    3C", 2));
-    for (element, material, nodes) in [(1, 1, [11, 7]), (2, 2, [7, 4])] {
-        if form == Form::Text {
-            line(&mut out, format!(" -1{element:10}{:5}{:5}{material:5}", 11, 0));
-            line(&mut out, format!(" -2{:10}{:10}", nodes[0], nodes[1]));
-        } else {
-            let numbers = [element, 11, 0, material, nodes[0], nodes[1]];
-            numbers.iter().for_each(|number: &i32| out.extend(number.to_le_bytes()));
-        }
-    }
-    end(&mut out);
+    let mut file = Frd { form, out: b"    1C\n    1UPGM               CalculiX\n".to_vec() };
+    file.heading("    2C", NODES.len());
+    NODES.iter().for_each(|node| file.record(*node, &[0.5, 1.5, 2.5]));
+    file.end();
+    file.elements();
+    let mut moved: Vec<String> = (1..=3).map(|k| format!(" -5  D{k}          1    2    {k}    0")).collect();
+    moved.push(" -5  ALL         1    2    0    0    1ALL".to_owned());
+    let names = ["XX", "YY", "ZZ", "XY", "YZ", "ZX"].iter().zip(1..);
+    let stressed: Vec<String> =
+        names.map(|(name, k)| format!(" -5  S{name}         1    4{k:5}    1")).collect();
     for step in 0..steps {
-        let head = |count: usize| {
-            format!(
-                "  100C{:6}{:12.9}{count:12}{:20}{:2}{:5}{:10}{:2}",
-                "L  101",
-                1.0,
-                "",
-                0,
-                step + 1,
-                "",
-                flag
-            )
-        };
-        line(&mut out, head(WATCHED.len()));
-        line(&mut out, " -4  DISP        4    1".to_owned());
-        for k in 1..=3 {
-            line(&mut out, format!(" -5  D{k}          1    2    {k}    0"));
-        }
-        line(&mut out, " -5  ALL         1    2    0    0    1ALL".to_owned());
-        for node in WATCHED {
-            record(&mut out, node, &[0, 1, 2].map(|k| displacement(step, node, k)));
-        }
-        end(&mut out);
-        line(&mut out, head(WATCHED.len()));
-        line(&mut out, " -4  STRESS      6    1".to_owned());
-        for (k, name) in ["XX", "YY", "ZZ", "XY", "YZ", "ZX"].iter().enumerate() {
-            line(&mut out, format!(" -5  S{name}         1    4{:5}    1", k + 1));
-        }
-        for node in WATCHED {
-            record(&mut out, node, &[0, 1, 2, 3, 4, 5].map(|k| stress(step, node, k)));
-        }
-        end(&mut out);
+        file.block(step, " -4  DISP        4    1", &moved, |node| {
+            (0..3).map(|k| displacement(step, node, k)).collect()
+        });
+        file.block(step, " -4  STRESS      6    1", &stressed, |node| {
+            (0..6).map(|k| stress(step, node, k)).collect()
+        });
     }
-    out.extend(b" 9999\n");
-    out
+    file.line(" 9999");
+    file.out
 }
 
 /// Returns printed results with the strain energy step + 1.
@@ -330,8 +352,8 @@ fn results_of_other_shapes_are_refused() {
     let printed = dat(3, true).replace("displacements", "velocities");
     place.put("still.dat", printed.as_bytes());
     assert_eq!(place.refused("still.dat", None).0, Code::RecoveryShapes);
-    place.put("ask.npz", b"PK\x03\x04 no archive");
-    assert_eq!(place.refused("double.frd", None).0, Code::RecoveryShapes);
+    place.put("ask.npz", &archive(3)[..400]);
+    assert_eq!(place.refused("double.frd", None).0, Code::FileCompressionBroken);
 }
 
 #[test]
