@@ -156,6 +156,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB554", "crates/motion/tests/motion/settled_rates.rs"),
     ("FB555", "tests/program/study/load_cases.rs"),
     ("FB724", "crates/formats/tests/formats/stresses.rs"),
+    ("FB725", "crates/formats/tests/formats/stresses.rs"),
     ("FB556", "crates/motion/tests/motion/recovery.rs"),
     ("FB602", "tests/program/limits.rs"),
     ("FB605", "tests/program/front_door.rs"),

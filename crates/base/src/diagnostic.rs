@@ -258,6 +258,7 @@ codes! {
     ExportNeeds = "FB722", Note, Done, "program uses a part of the file only with a setting", "make the setting named in the message in the input of the program";
     ExportPicture = "FB723", Note, Done, "file is a picture of the body", "use another format for multibody programs: docs/reference/exports.md lists them";
     ExportRecoveries = "FB724", Note, Done, "exported file has not all of the recoveries", "compute them from a run of the program: flexbody recover";
+    ExportNumbers = "FB725", Note, Done, "interfaces have numbers instead of names in the exported file", "join them by these numbers in the model of the program";
     ForeignUnreadable = "FB730", Error, BadInput, "flexible-body file of another program cannot be read", "give a SID_FEM, MBDyn .fem, MBSim or Exudyn file as the program writes it";
     ForeignIncomplete = "FB731", Error, BadInput, "data that a body needs are missing in the file", "write the file again with the missing data";
     ForeignChanged = "FB732", Note, Done, "modes of the file are not normalised or contain rigid motions; combinations of them were used", "nothing to do: the motion of the nodes is unchanged, the modal coordinates differ";

@@ -73,6 +73,12 @@ pub fn export(
     // Losses are warnings if they are allowed, otherwise errors.
     let code = if allow_loss { Code::ExportLost } else { Code::ExportLoses };
     let checklist = format.checklist(body, options);
+    let numbers = format.interface_numbers(body, options);
+    let numbered = (!numbers.is_empty()).then(|| {
+        let all: Vec<String> = numbers.iter().map(|(name, number)| format!("`{name}` is {number}")).collect();
+        let message = format!("interfaces have numbers in the file: {}", all.join(", "));
+        Diagnostic::new(Code::ExportNumbers, message)
+    });
     let unread = checklist.left_out_recoveries().map(|what| {
         let message = format!("the file {what}");
         Diagnostic::new(Code::ExportRecoveries, message)
@@ -89,7 +95,7 @@ pub fn export(
     let left =
         format.leaves_out(body, options).into_iter().map(|what| Diagnostic::new(Code::ExportPicture, what));
     let exported = format.write(body, options)?;
-    Ok((exported, losses.into_iter().chain(needs).chain(left).chain(unread).collect()))
+    Ok((exported, losses.into_iter().chain(needs).chain(left).chain(unread).chain(numbered).collect()))
 }
 
 /// Writes `body` in a format like [`export`], in other `units` if they are given. The findings include a warning about

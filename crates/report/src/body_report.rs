@@ -16,6 +16,9 @@ use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::{FlexBody, MassStructure};
 use flexbody_body::invariants::{ERROR_NORMS, LumpedScheme};
 
+/// Product of inertia, relative to the largest moment, that counts as rounding.
+const INERTIA_ROUNDING: f64 = 1e-14;
+
 /// Builds the report of a body.
 pub(super) fn document<'f>(facts: &'f Facts<'_>) -> Document<'f> {
     // Errors and warnings are shown before the results they affect.
@@ -97,6 +100,15 @@ fn properties(facts: &Facts<'_>) -> Vec<Term> {
             quantity(format!("{inertia} (about the centre of mass)")),
         )
         .in_text("inertia", format!("{inertia} (principal)")),
+        Term::new(
+            "Inertia tensor",
+            quantity(format!(
+                "{} {} (about the centre of mass, model axes)",
+                tensor(&body.inertia_model),
+                units.inertia()
+            )),
+        )
+        .short("tensor"),
         Term::new(word_as("radius of gyration", "Radii of gyration"), quantity(radii.as_str()))
             .in_text("gyration", format!("{radii} (radii)")),
     ]);
@@ -111,6 +123,18 @@ fn properties(facts: &Facts<'_>) -> Vec<Term> {
     );
     items.push(Term::page("Body axes", format!("columns of [{x}; {y}; {z}]")));
     items
+}
+
+/// Returns the six entries of an inertia tensor: `xx 1, yy 2, zz 3, xy 0, yz 0, xz 0`. Products below the rounding of the
+/// moments are zero.
+fn tensor(inertia: &[[f64; 3]; 3]) -> String {
+    let largest = (0..3).map(|k| inertia[k][k].abs()).fold(0.0, f64::max);
+    let entry = |(name, k, l): (&str, usize, usize)| {
+        let value = inertia[k][l];
+        let value = if value.abs() <= INERTIA_ROUNDING * largest { 0.0 } else { value };
+        format!("{name} {}", significant(value, 6))
+    };
+    [("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("yz", 1, 2), ("xz", 0, 2)].map(entry).join(", ")
 }
 
 /// Returns the lengths of the sides of the box around the nodes, along the model axes. Unit: length.
@@ -285,7 +309,7 @@ fn lumped<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     blocks
 }
 
-/// Returns the effect of a scheme in words: `Nodal masses from row sums: 410 NEGATIVE masses, ...`.
+/// Returns the effect of a scheme in words: `Nodal masses from row sums: NEGATIVE masses at 410 nodes, ...`.
 fn in_words(lumped: &LumpedFacts) -> Inline {
     let words = scheme_in_words(&lumped.scheme);
     let whose = match LumpedScheme::from_name(&lumped.scheme) {
@@ -308,8 +332,8 @@ fn in_words(lumped: &LumpedFacts) -> Inline {
 fn in_text(lumped: &LumpedFacts) -> String {
     let negative = match lumped.negative_masses {
         0 => String::new(),
-        1 => "; 1 NEGATIVE mass".to_owned(),
-        count => format!("; {count} NEGATIVE masses"),
+        1 => "; NEGATIVE masses of this scheme at 1 node".to_owned(),
+        count => format!("; NEGATIVE masses of this scheme at {count} nodes"),
     };
     format!("{}: {}{negative}", lumped.scheme, errors(&lumped.errors))
 }

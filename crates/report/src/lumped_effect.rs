@@ -100,7 +100,7 @@ pub(super) fn meaning(invariant: &str) -> &'static str {
     }
 }
 
-/// Returns all defects of lumped masses in words, unphysical ones first: `410 NEGATIVE masses, smallest
+/// Returns all defects of lumped masses in words, unphysical ones first: `NEGATIVE masses at 410 nodes, smallest
 /// inertia +1.4 %, W2 8 % off`. If `explained`, the invariant carries its meaning.
 ///
 /// `norms` are the worst norm of each invariant, by the name of the invariant.
@@ -113,8 +113,8 @@ pub(super) fn in_words(
     let mut found = Vec::new();
     match negative_masses {
         0 => {}
-        1 => found.push("1 NEGATIVE mass".to_owned()),
-        count => found.push(format!("{count} NEGATIVE masses")),
+        1 => found.push("NEGATIVE masses at 1 node".to_owned()),
+        count => found.push(format!("NEGATIVE masses at {count} nodes")),
     }
     found.extend(effect.in_words(explained));
     let modal = norms.iter().copied().filter(|(invariant, _)| !meaning(invariant).is_empty());
@@ -136,9 +136,9 @@ mod tests {
         let norms = [("I0", 0.9), ("W1", 0.02), ("W2", 0.0823)];
         assert_eq!(
             in_words(410, &effect, &norms, false),
-            "410 NEGATIVE masses, smallest inertia +1.4 %, W2 8.2 % off"
+            "NEGATIVE masses at 410 nodes, smallest inertia +1.4 %, W2 8.2 % off"
         );
-        assert!(in_words(1, &effect, &norms, true).starts_with("1 NEGATIVE mass, "));
+        assert!(in_words(1, &effect, &norms, true).starts_with("NEGATIVE masses at 1 node, "));
         let none = LumpedEffect { mass: 0.0, moments: [0.0; 3], centre: 0.0 };
         assert_eq!(in_words(0, &none, &[("W2", 1e-15)], true), "no error above 1e-9");
     }

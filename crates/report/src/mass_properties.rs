@@ -22,6 +22,9 @@ pub(super) struct MassProperties {
     pub centre_of_mass: [f64; 3],
     /// Principal moments of inertia about the centre of mass, ascending. Unit: mass length^2.
     pub principal_inertia: [f64; 3],
+    /// Inertia tensor about the centre of mass along model axes; products of inertia are entries of the tensor, I_xy =
+    /// -int x y dm. Unit: mass length^2.
+    pub inertia_model: [[f64; 3]; 3],
     /// Radius of gyration sqrt(I / m) of each principal moment; NaN (JSON null) for a negative moment. Unit:
     /// length.
     pub radii_of_gyration: [f64; 3],
@@ -52,13 +55,19 @@ impl MassProperties {
             mass: invariants.mass(),
             centre_of_mass: frame.to_model(com.into()),
             principal_inertia: moments,
+            inertia_model: rows(&(frame.axes * inertia * frame.axes.transpose())),
             radii_of_gyration: moments.map(|i| (i / invariants.mass()).sqrt()),
             frame_origin: frame.origin.into(),
-            frame_axes: std::array::from_fn(|k| std::array::from_fn(|l| frame.axes[(k, l)])),
+            frame_axes: rows(&frame.axes),
             frame: describe(body, &inertia),
             in_mean_axes: body.conditions().is_mean(),
         }
     }
+}
+
+/// Returns the rows of a matrix.
+fn rows(a: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    std::array::from_fn(|k| std::array::from_fn(|l| a[(k, l)]))
 }
 
 fn describe(body: &FlexBody, inertia: &Matrix3<f64>) -> String {

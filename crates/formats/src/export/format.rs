@@ -45,6 +45,11 @@ pub trait ExportFormat: Sync {
         Vec::new()
     }
 
+    /// Returns the interfaces that the file has numbers instead of names for, with these numbers.
+    fn interface_numbers(&self, _body: &FlexBody, _options: &ExportOptions) -> Vec<(String, i64)> {
+        Vec::new()
+    }
+
     /// Returns the properties of the body that a picture leaves out with these options, as sentences without
     /// a full stop.
     fn leaves_out(&self, _body: &FlexBody, _options: &ExportOptions) -> Vec<String> {

@@ -42,6 +42,25 @@ pub fn frames(body: &FlexBody, points: &Points) -> Vec<ExportFrame> {
     }
 }
 
+/// Returns the names of the interfaces among `frames` with the numbers that the file has for them.
+pub(crate) fn numbered_interfaces<'f>(
+    frames: impl IntoIterator<Item = (i64, &'f ExportFrame)>,
+) -> Vec<(String, i64)> {
+    frames.into_iter().filter_map(|(number, frame)| Some((frame.name.clone()?, number))).collect()
+}
+
+/// Returns the table of the frames of a file: number in the file, number of the node, name of the interface, position in
+/// body axes.
+pub(crate) fn frame_table<'f>(frames: impl IntoIterator<Item = (i64, &'f ExportFrame)>) -> String {
+    let row = |(number, frame): (i64, &ExportFrame)| {
+        let [x, y, z] = frame.position;
+        let name = frame.name.as_deref().unwrap_or("").replace('"', "\"\"");
+        format!("{number},{},\"{name}\",{x:e},{y:e},{z:e}\n", frame.id)
+    };
+    let rows = frames.into_iter().map(row);
+    std::iter::once("frame,node,interface,x,y,z\n".to_owned()).chain(rows).collect()
+}
+
 /// Returns the nodes with these numbers, in the order of the body.
 pub(crate) fn named_nodes(body: &FlexBody, ids: &[i64]) -> impl Iterator<Item = ExportFrame> {
     (0..body.n_nodes()).filter(|&i| ids.contains(&body.nodes().ids[i])).map(|i| node(body, i))

@@ -6,6 +6,7 @@
 //! S_a. W2 and W3 follow from the same integrals.
 
 use crate::export::Holding::{self, Held, Lost, NotApplicable};
+use crate::export::frames::{frame_table, numbered_interfaces};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
 use crate::export::inertia::inertia;
 use crate::export::stresses::NodalStresses;
@@ -63,8 +64,18 @@ impl ExportFormat for Mbsim {
         }
     }
 
+    fn interface_numbers(&self, body: &FlexBody, options: &ExportOptions) -> Vec<(String, i64)> {
+        numbered_interfaces(frames(body, &options.points).iter().map(|frame| (frame.id, frame)))
+    }
+
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
-        hdf5_bytes(&entries(body, &frames(body, &options.points))).map(Exported::single)
+        let places = frames(body, &options.points);
+        let mut exported = hdf5_bytes(&entries(body, &places)).map(Exported::single)?;
+        if places.iter().any(|place| place.name.is_some()) {
+            let table = frame_table(places.iter().map(|frame| (frame.id, frame)));
+            exported.beside.push(("frames.csv".into(), table.into_bytes()));
+        }
+        Ok(exported)
     }
 }
 

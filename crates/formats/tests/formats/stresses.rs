@@ -107,3 +107,28 @@ fn formats_without_a_place_say_so() {
     let (_, said) = written("npz", &body, Points::Usual);
     assert!(!said.iter().any(|one| one.contains("FB724")), "{said:?}");
 }
+
+/// Interfaces have numbers in SID and MBSim; a note and a table beside the file say which.
+#[test]
+fn numbers_of_interfaces_are_told() {
+    let body = body();
+    let names: Vec<&str> = body.interfaces().iter().map(|one| one.name.as_str()).collect();
+    assert!(!names.is_empty());
+    for format in ["sid", "mbsim"] {
+        let (_, said) = written(format, &body, Points::Usual);
+        let note = said.iter().find(|one| one.contains("FB725")).expect("a note");
+        assert!(names.iter().all(|name| note.contains(&format!("`{name}` is "))), "{note}");
+        let found = FORMATS.iter().find(|one| one.name() == format).expect("a format");
+        let (exported, _) = export(&body, *found, &ExportOptions::default(), true).expect("an export");
+        let (ending, table) = &exported.beside[0];
+        let table = String::from_utf8(table.clone()).expect("text");
+        assert_eq!(ending, "frames.csv");
+        for name in &names {
+            let row = table.lines().find(|line| line.contains(&format!("\"{name}\""))).expect("a row");
+            let number = row.split(',').next().expect("a number");
+            assert!(note.contains(&format!("`{name}` is {number}")), "{note}: {row}");
+        }
+        let (_, said) = written(format, &body, Points::Nodes);
+        assert!(!said.iter().any(|one| one.contains("FB725")), "{said:?}");
+    }
+}

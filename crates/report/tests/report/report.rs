@@ -185,7 +185,7 @@ fn the_summary_keeps_what_the_body_cannot_do() {
         let told = told(change);
         assert!(told.contains(part), "{part}: {told}");
     };
-    has(&|_| {}, "row sums: 312 NEGATIVE masses, smallest inertia +100 %, W2 31 % off");
+    has(&|_| {}, "row sums: NEGATIVE masses at 312 nodes, smallest inertia +100 %, W2 31 % off");
     has(&|p| p.certificate.proved_modes = None, "NOT PROVED");
     has(&|p| p.units = flexbody_base::units::UnitSystem::default(), "m, kg, s assumed, none stated");
     has(&|p| p.source.mass_structure = MassStructure::Diagonal, "DIAGONAL (lumped) mass");
@@ -328,7 +328,7 @@ fn the_lumped_errors_of_every_invariant_are_told_with_the_negative_masses() {
     let body = engine_mount();
     let summary = text(&body, &RunData::default());
     let told = "row-sum: errors modal mass 6.25 %, I0 80.1 %, W1 12.5 %, W2 31 %, W3 24 %, C1 0.025 %, C2 0.025 %; \
-                312 NEGATIVE masses";
+                NEGATIVE masses of this scheme at 312 nodes";
     let words = summary.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(words.contains(told), "{summary}");
     let facts = json(&body, &RunData::default());
@@ -437,7 +437,7 @@ fn the_page_is_whole_without_scripts() {
         "<svg class=\"still\"",
         "812.5",
         "kg m\u{b2}",
-        "<span class=\"error\">312 NEGATIVE masses</span>, smallest principal moment of inertia 100 % too large",
+        "<span class=\"error\">NEGATIVE masses at 312 nodes</span>, smallest principal moment of inertia 100 % too large",
         "the centrifugal forces on the modes (W2) 31 % off",
         "<summary>All error norms</summary>",
         "<abbr title=\"The invariant (3 n x 3 n)",

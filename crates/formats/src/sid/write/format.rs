@@ -4,9 +4,10 @@ use super::arrays::{StiffenedFrame, modal, places};
 use super::dialect::{DIALECTS, Dialect, EMBS, Limits, ModalName, NAMES};
 use super::text::Text;
 use crate::export::Holding::{self, Held, NotApplicable};
+use crate::export::frames::{frame_table, numbered_interfaces};
 use crate::export::losses::{general_w0, geometric_stiffness, internal_rows, plane};
 use crate::export::stresses::NodalStresses;
-use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, frames};
+use crate::export::{ExportChecklist, ExportFormat, ExportFrame, ExportOptions, Exported, frames};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroup};
@@ -71,6 +72,11 @@ impl ExportFormat for Sid {
         }
     }
 
+    fn interface_numbers(&self, body: &FlexBody, options: &ExportOptions) -> Vec<(String, i64)> {
+        let (dialect, places) = (chosen(options), places(body, &options.points));
+        numbered_interfaces(numbered(&places, dialect))
+    }
+
     fn needs(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
         let (dialect, places) = (chosen(options), places(body, &options.points));
         let mut needs = Vec::new();
@@ -106,8 +112,10 @@ impl ExportFormat for Sid {
             return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
         }
         let mut exported = Exported::single(file(body, &places, dialect).into_bytes());
-        if are_counted(&places, dialect) {
-            exported.beside.push(("frames.csv".into(), frame_table(&places).into_bytes()));
+        let is_named = places.iter().any(|place| place.frame.name.is_some());
+        if is_named || are_counted(&places, dialect) {
+            let table = frame_table(numbered(&places, dialect));
+            exported.beside.push(("frames.csv".into(), table.into_bytes()));
         }
         Ok(exported)
     }
@@ -141,15 +149,16 @@ fn are_counted(places: &[StiffenedFrame], dialect: &Dialect) -> bool {
     dialect.largest_frame.is_some_and(beyond)
 }
 
-/// Returns the table of the frames: number in the file, number of the node, name of the interface, position.
-fn frame_table(places: &[StiffenedFrame]) -> String {
-    let row = |(i, place): (usize, &StiffenedFrame)| {
-        let [x, y, z] = place.frame.position;
-        let name = place.frame.name.as_deref().unwrap_or("").replace('"', "\"\"");
-        format!("{},{},\"{name}\",{x:e},{y:e},{z:e}\n", i + 1, place.frame.id)
+/// Returns the frames with their numbers in the file.
+fn numbered<'p>(
+    places: &'p [StiffenedFrame],
+    dialect: &Dialect,
+) -> impl Iterator<Item = (i64, &'p ExportFrame)> {
+    let counted = are_counted(places, dialect);
+    let number = move |(place, number): (&'p StiffenedFrame, i64)| {
+        (if counted { number } else { place.frame.id }, &place.frame)
     };
-    let rows = places.iter().enumerate().map(row);
-    std::iter::once("frame,node,interface,x,y,z\n".to_owned()).chain(rows).collect()
+    places.iter().zip(1i64..).map(number)
 }
 
 fn file(body: &FlexBody, places: &[StiffenedFrame], dialect: &Dialect) -> String {
@@ -170,9 +179,7 @@ fn file(body: &FlexBody, places: &[StiffenedFrame], dialect: &Dialect) -> String
     }
     refmod(body, &mut text);
     text.line(11, "frame");
-    let counted = are_counted(places, dialect);
-    for (place, number) in places.iter().zip(1i64..) {
-        let number = if counted { number } else { place.frame.id };
+    for (place, (number, _)) in places.iter().zip(numbered(places, dialect)) {
         text.value(16, "new node", format_args!("{number:6}"));
         text.value(21, "rframe", "body ref");
         place.objects().iter().for_each(|object| text.taylor(21, object));
