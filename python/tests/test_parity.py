@@ -48,6 +48,7 @@ FUNCTIONS = {
 WITHOUT = {
     "prepare": "writes a folder for another machine: its result is files that `assemble` reads",
     "assemble": "reads a folder of `prepare` after the run of a cluster",
+    "shapes": "writes a deck for an FE program: its result is a file that the program reads",
     "doctor": "describes the program and the machine that it runs on",
     "completions": "is about the command line",
     "man": "is about the command line",

@@ -142,7 +142,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB107", "tests/program/odd_files.rs"),
     ("FB121", "crates/file/tests/file/store_output.rs"),
     ("FB132", "tests/program/hostile_files.rs"),
-    ("FB444", "crates/body/tests/body/recovery.rs"),
+    ("FB444", "crates/body/tests/body/recovery_of_a_model.rs"),
     ("FB445", "crates/body/tests/body/answered_shapes.rs"),
     ("FB446", "crates/body/tests/body/answered_shapes.rs"),
     ("FB447", "crates/body/tests/body/answered_shapes.rs"),

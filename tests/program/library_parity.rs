@@ -30,6 +30,7 @@ const COMMANDS: &[(&str, Counterpart)] = &[
     ("convert", Function("Model::convert, Model::convert_for, FlexBody::import", convert)),
     ("prepare", Absent("writes a folder for another machine: its result is files that `assemble` reads")),
     ("assemble", Absent("reads a folder of `prepare` after the run of a cluster")),
+    ("shapes", Absent("writes a deck for an FE program: its result is a file that the program reads")),
     ("batch", Function("Batch::run", batch)),
     ("inspect", Function("FlexBody::report", inspect)),
     ("check", Function("FlexBody::check", check)),

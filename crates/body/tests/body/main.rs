@@ -27,6 +27,7 @@ mod plans;
 mod precision;
 mod real_models;
 mod recovery;
+mod recovery_of_a_model;
 mod residual_vectors;
 mod second_shift;
 mod single_precision;
