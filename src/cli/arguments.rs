@@ -5,24 +5,24 @@ mod guidance;
 mod judgement;
 mod names;
 mod response;
-mod shapes;
 
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand};
-pub(super) use cluster::{AssembleArguments, BatchArguments, EngineArguments, EngineName, PrepareArguments};
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::Storage;
 use flexbody_body::invariants::FrameChoice;
 use flexbody_eigen::{Accuracy, FactorChoice};
-use flexbody_formats::FORMATS;
-use flexbody_formats::IMPORT_FORMATS;
 use flexbody_formats::export::ExportFormat;
+use flexbody_formats::{FORMATS, IMPORT_FORMATS};
 use flexbody_study::trade::ReferenceChoice;
-pub(super) use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
-pub(super) use judgement::{AdviseArguments, MeasureArguments, RecoverArguments};
-pub(super) use response::ResponseArguments;
-pub(super) use shapes::{PlacesName, ShapeFormat, ShapesArguments};
 use std::path::PathBuf;
+
+pub(super) use cluster::{AssembleArguments, BatchArguments, EngineArguments, EngineName, PrepareArguments};
+pub(super) use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
+pub(super) use judgement::{
+    AdviseArguments, MeasureArguments, PlacesName, RecoverArguments, ShapeFormat, ShapesArguments,
+};
+pub(super) use response::ResponseArguments;
 
 /// Exact flexible bodies for multibody simulation from finite element mass and stiffness matrices.
 #[derive(Debug, Parser)]

@@ -1,13 +1,11 @@
 //! Command `flexbody batch`: makes the bodies of a list, each by a process of its own, as many in parallel as fit into
 //! the memory.
 
-use super::arguments::BatchArguments;
-use super::arguments::{Arguments, Command, ConvertArguments};
+use super::arguments::{Arguments, BatchArguments, Command, ConvertArguments};
 use super::convert::{model_files, wanted};
-use super::outcome::Outcome;
-use super::places::{format_of, refuse_replacing, refuse_replacing_read};
+use super::outcome::{Outcome, format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{for_threads, memory_left};
-use super::watcher::Watcher;
+use super::terminal::Watcher;
 use clap::Parser;
 use flexbody_base::children;
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -1,8 +1,7 @@
 //! Command `flexbody compare`.
 
 use super::arguments::CompareArguments;
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::refuse_replacing;
+use super::outcome::{Outcome, refuse_replacing, refuse_warnings};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;

@@ -1,16 +1,14 @@
 //! Command `flexbody convert`.
 
 use super::arguments::{ConvertArguments, EngineName, EnrichmentName, StatedArguments};
-use super::import;
-use super::like::with_settings_of;
+use super::convert_options::{convert_foreign, refuse_unjudged, with_settings_of};
 use super::mode_source::ModeSource;
 use super::models::of_manifest_or_job;
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::{BodyOutputs, Reserved, format_of, refuse_replacing, refuse_replacing_read};
+use super::outcome::{
+    BodyOutputs, Outcome, Reserved, format_of, refuse_replacing, refuse_replacing_read, refuse_warnings,
+};
 use super::resources::{context, peak_memory_bytes, resident_bytes, use_threads};
-use super::terminal::body_text;
-use super::unjudged::refuse_unjudged;
-use super::watcher::Watcher;
+use super::terminal::{Watcher, body_text};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
@@ -35,7 +33,7 @@ use flexbody_study::tailoring::{
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
-        return import::run(arguments, from);
+        return convert_foreign(arguments, from);
     }
     let repeated = arguments.like.as_ref().map(|path| with_settings_of(arguments, path)).transpose()?;
     let arguments = repeated.as_ref().unwrap_or(arguments);

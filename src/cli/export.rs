@@ -1,8 +1,7 @@
 //! Command `flexbody export`.
 
 use super::arguments::ExportArguments;
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::refuse_replacing;
+use super::outcome::{Outcome, refuse_replacing, refuse_warnings};
 use super::resources::context;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;

@@ -1,8 +1,7 @@
 //! Command `flexbody inspect`.
 
 use super::arguments::InspectArguments;
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::{format_of, refuse_replacing};
+use super::outcome::{Outcome, format_of, refuse_replacing, refuse_warnings};
 use super::terminal::body_text;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;

@@ -2,10 +2,9 @@
 
 use super::arguments::{JobArguments, MeasureArguments};
 use super::models::read_checked;
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::{format_of, refuse_replacing};
+use super::outcome::{Outcome, format_of, refuse_replacing, refuse_warnings};
 use super::resources::context;
-use super::watcher::Watcher;
+use super::terminal::Watcher;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_linalg::context::Event;

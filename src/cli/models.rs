@@ -1,7 +1,7 @@
 //! Models that are given by their manifest or by the job of an FE program.
 
 use super::arguments::JobArguments;
-use super::places::{refuse_replacing, refuse_replacing_read};
+use super::outcome::{refuse_replacing, refuse_replacing_read};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_input::{

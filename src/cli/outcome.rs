@@ -1,8 +1,12 @@
 //! Outcome of a command.
 
-use super::arguments::Printing;
+use super::arguments::{ConvertArguments, Printing};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::output::OutputSlot;
+use flexbody_base::read_files::{FileIdentity, refuse_read, replaces};
+use flexbody_report::Format;
+use std::path::{Path, PathBuf};
 
 /// Outcome of a command: text for stdout, its content as JSON, warnings and notes, and whether its checks passed.
 pub(super) struct Outcome {
@@ -30,4 +34,103 @@ pub(super) fn refuse_warnings(printing: Printing, diagnostics: &[Diagnostic]) ->
     codes.dedup();
     let message = format!("no file was written because of --deny-warnings and {}", codes.join(", "));
     Err(Error::from(Diagnostic::new(Code::WarningsDenied, message)).after(diagnostics.to_vec()))
+}
+
+// Places of outputs: each is reserved before the work, and appears after it.
+
+/// Output files of one body.
+pub(super) struct BodyOutputs {
+    pub body: PathBuf,
+    pub reports: Vec<PathBuf>,
+}
+
+/// Reserved output files of one body.
+pub(super) struct Reserved {
+    pub body: OutputSlot,
+    pub reports: Vec<OutputSlot>,
+}
+
+impl BodyOutputs {
+    /// Returns the outputs that the command line names; for one of several bodies, with a number in every name.
+    pub(super) fn of(arguments: &ConvertArguments, number: Option<usize>) -> Self {
+        let place = |path: &PathBuf| number.map_or_else(|| path.clone(), |number| marked(path, number));
+        Self { body: place(&arguments.output), reports: arguments.report.iter().map(place).collect() }
+    }
+
+    /// Returns all files.
+    pub(super) fn all(&self) -> impl Iterator<Item = &PathBuf> {
+        std::iter::once(&self.body).chain(&self.reports)
+    }
+
+    pub(super) fn reserve(&self) -> Result<Reserved> {
+        Ok(Reserved {
+            body: flexbody_file::prepare_output(&self.body)?,
+            reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
+        })
+    }
+}
+
+/// Returns the format of a report by its file name.
+pub(super) fn format_of(path: &Path) -> Result<Format> {
+    Format::from_path(path).ok_or_else(|| {
+        let message = format!("report {} has no known extension", path.display());
+        Diagnostic::new(Code::Usage, message).with_help("give it the extension .html, .json or .txt").into()
+    })
+}
+
+/// Refuses an output that would replace an input or another output.
+pub(super) fn refuse_replacing<'i, 'o>(
+    inputs: impl Iterator<Item = &'i PathBuf>,
+    outputs: impl Iterator<Item = &'o PathBuf>,
+) -> Result<()> {
+    let mut taken: Vec<FileIdentity> = inputs.map(|path| FileIdentity::of(path)).collect();
+    for output in outputs {
+        let path = FileIdentity::of(output);
+        if taken.iter().any(|other| other.is_same(&path)) {
+            return Err(replaces(output).into());
+        }
+        taken.push(path);
+    }
+    Ok(())
+}
+
+/// Refuses an output that would replace a file that was read, including files that a deck includes or assigns.
+pub(super) fn refuse_replacing_read<'o>(mut outputs: impl Iterator<Item = &'o PathBuf>) -> Result<()> {
+    outputs.try_for_each(|output| refuse_read(output))
+}
+
+/// Returns the path with a number or a name before the extension: `rotor-2.flex.h5` from `rotor.flex.h5`,
+/// `report-2.html` from `report.html`.
+pub(super) fn marked(path: &Path, mark: impl std::fmt::Display) -> PathBuf {
+    let (Some(stem), extension) = (path.file_stem(), path.extension()) else { return path.to_path_buf() };
+    let inner = Path::new(stem);
+    let double = inner.extension().filter(|inner| *inner == "flex");
+    let stem = double.and(inner.file_stem()).unwrap_or(stem);
+    let mut name = stem.to_os_string();
+    name.push(format!("-{mark}"));
+    for extension in double.into_iter().chain(extension) {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_stands_before_the_extension() {
+        for (path, with_number) in [
+            ("a/rotor.flex.h5", "a/rotor-12.flex.h5"),
+            ("rotor.h5", "rotor-12.h5"),
+            ("v1.2/rotor.v3.flex.h5", "v1.2/rotor.v3-12.flex.h5"),
+            ("report.html", "report-12.html"),
+            ("rotor", "rotor-12"),
+            (".flex.h5", ".flex-12.h5"),
+            ("..", ".."),
+        ] {
+            assert_eq!(marked(Path::new(path), 12), Path::new(with_number), "{path}");
+        }
+    }
 }

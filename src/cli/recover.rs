@@ -1,8 +1,7 @@
 //! Command `flexbody recover`.
 
 use super::arguments::RecoverArguments;
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::{format_of, refuse_replacing};
+use super::outcome::{Outcome, format_of, refuse_replacing, refuse_warnings};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;

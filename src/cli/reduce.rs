@@ -2,8 +2,7 @@
 
 use super::arguments::ReduceArguments;
 use super::convert::subset;
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::refuse_replacing;
+use super::outcome::{Outcome, refuse_replacing, refuse_warnings};
 use super::terminal::body_text;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;

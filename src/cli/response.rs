@@ -3,10 +3,9 @@
 use super::arguments::ResponseArguments;
 use super::convert::load_sources;
 use super::models::{is_model, read_checked};
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::{format_of, refuse_replacing, refuse_replacing_read};
+use super::outcome::{Outcome, format_of, refuse_replacing, refuse_replacing_read, refuse_warnings};
 use super::resources::{context, use_threads};
-use super::watcher::Watcher;
+use super::terminal::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;

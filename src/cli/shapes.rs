@@ -2,10 +2,9 @@
 
 use super::arguments::{PlacesName, ShapeFormat, ShapesArguments};
 use super::models::of_manifest_or_job;
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::{refuse_replacing, refuse_replacing_read};
+use super::outcome::{Outcome, refuse_replacing, refuse_replacing_read, refuse_warnings};
 use super::resources::context;
-use super::watcher::Watcher;
+use super::terminal::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;

@@ -1,11 +1,10 @@
 //! Command `flexbody simulate`.
 
 use super::arguments::{Printing, SimulateArguments};
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::{format_of, marked, refuse_replacing, refuse_replacing_read};
+use super::outcome::{Outcome, format_of, marked, refuse_replacing, refuse_replacing_read, refuse_warnings};
 use super::recover::Kind;
 use super::resources::{context, use_threads};
-use super::watcher::Watcher;
+use super::terminal::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;

@@ -1,10 +1,16 @@
 //! Text about a body for the terminal: its width and colours.
 
 use super::arguments::Printing;
+use super::resources::{cpu_seconds, has_thread};
 use flexbody_base::diagnostic::printable;
-use flexbody_report::{Facts, Format, Screen, render, summary};
+use flexbody_linalg::context::Event;
+use flexbody_report::{Facts, Format, Phase, Screen, render, summary};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::borrow::Cow;
+use std::fmt::Write;
 use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 /// Returns the summary of a body, or with `verbose` all facts about it.
 pub(super) fn body_text(facts: &Facts, verbose: bool, printing: Printing) -> String {
@@ -54,6 +60,104 @@ pub(super) fn for_terminal(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
+// Progress on a terminal with the remaining time of each phase, and the duration of each phase.
+
+/// Environment variable for tests: the program panics at the start of the phase that it names.
+const PANIC_AT: &str = "FLEXBODY_TEST_PANIC";
+
+/// Listener of a job: shows a bar for the current phase and adds up the time of each phase.
+pub(super) struct Watcher {
+    bar: ProgressBar,
+    state: Mutex<State>,
+}
+
+struct State {
+    name: String,
+    wall: Instant,
+    cpu: f64,
+    phases: Vec<Phase>,
+}
+
+impl Watcher {
+    /// Starts with the phase `first`. The bar is hidden if `quiet` is set or stderr is not a terminal.
+    pub(super) fn new(quiet: bool, first: &str) -> Self {
+        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(1000) };
+        let style = ProgressStyle::with_template("{spinner} {msg:<22} {bar:30} {elapsed} {left}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar())
+            .with_key("left", |state: &ProgressState, out: &mut dyn Write| {
+                if let Some(left) = time_left(state.elapsed(), state.fraction().into()) {
+                    // Errors of writing the progress are ignored.
+                    let _ = write!(out, "{left}");
+                }
+            });
+        bar.set_style(style);
+        bar.set_message(first.to_owned());
+        // The tick needs a thread of its own.
+        if !bar.is_hidden() && has_thread() {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
+        let state =
+            State { name: first.to_owned(), wall: Instant::now(), cpu: cpu_seconds(), phases: Vec::new() };
+        Self { bar, state: Mutex::new(state) }
+    }
+
+    /// Receives an event of a job.
+    pub(super) fn hear(&self, event: Event<'_>) {
+        match event {
+            Event::Phase(name) => {
+                assert!(std::env::var_os(PANIC_AT).is_none_or(|at| at != name), "{PANIC_AT} is {name}");
+                self.close();
+                self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).name = name.to_owned();
+                self.bar.set_message(name.to_owned());
+                self.bar.reset();
+            }
+            Event::Plan(text) => self.bar.println(text),
+            Event::Fraction(part) => self.bar.set_position((1000.0 * part) as u64),
+        }
+    }
+
+    /// Ends the current phase and returns all phases, in the order of their first occurrence.
+    pub(super) fn finish(&self) -> Vec<Phase> {
+        self.close();
+        self.bar.finish_and_clear();
+        std::mem::take(&mut self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).phases)
+    }
+
+    /// Removes the bar, so that other text can be printed.
+    pub(super) fn clear(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    fn close(&self) {
+        let mut state = self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let (wall, cpu) = (Instant::now(), cpu_seconds());
+        let (wall_seconds, cpu_seconds) = ((wall - state.wall).as_secs_f64(), cpu - state.cpu);
+        let name = state.name.clone();
+        match state.phases.iter_mut().find(|phase| phase.name == name) {
+            Some(phase) => {
+                phase.wall_seconds += wall_seconds;
+                phase.cpu_seconds += cpu_seconds;
+            }
+            None => state.phases.push(Phase { name, wall_seconds, cpu_seconds }),
+        }
+        (state.wall, state.cpu) = (wall, cpu);
+    }
+}
+
+/// Returns the remaining time of a phase in words, if `fraction` of it took `elapsed`; `None` if it is too early for an
+/// estimate.
+fn time_left(elapsed: Duration, fraction: f64) -> Option<String> {
+    if !(0.02..1.0).contains(&fraction) || elapsed < Duration::from_secs(1) {
+        return None;
+    }
+    let seconds = elapsed.as_secs_f64() * (1.0 - fraction) / fraction;
+    Some(match seconds.ceil() as u64 {
+        seconds @ 0..100 => format!("about {seconds} s left"),
+        seconds @ 100..6000 => format!("about {} min left", seconds.div_ceil(60)),
+        seconds => format!("about {:.1} h left", seconds as f64 / 3600.0),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -76,5 +180,16 @@ mod tests {
         assert_eq!(columns(Some("many"), Some(120)), Some(120));
         assert_eq!(columns(None, Some(0)), None);
         assert_eq!(columns(None, None), None);
+    }
+
+    #[test]
+    fn the_time_left_is_told_when_there_is_something_to_tell_it_from() {
+        let left = |seconds, fraction| time_left(Duration::from_secs(seconds), fraction);
+        assert_eq!(left(10, 0.25).as_deref(), Some("about 30 s left"));
+        assert_eq!(left(100, 0.25).as_deref(), Some("about 5 min left"));
+        assert_eq!(left(3600, 0.25).as_deref(), Some("about 3.0 h left"));
+        for (seconds, fraction) in [(0, 0.5), (10, 0.0), (10, 0.01), (10, 1.0), (10, f64::NAN)] {
+            assert_eq!(left(seconds, fraction), None, "{seconds} {fraction}");
+        }
     }
 }

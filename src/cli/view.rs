@@ -1,8 +1,7 @@
 //! Command `flexbody view`.
 
 use super::arguments::ViewArguments;
-use super::outcome::{Outcome, refuse_warnings};
-use super::places::refuse_replacing;
+use super::outcome::{Outcome, refuse_replacing, refuse_warnings};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_file::read_simulation;

@@ -2,7 +2,7 @@
 //! here.
 
 use super::item::{DERIVED_TOLERANCE, Extent, Item, ItemKind, Origin, SchemaGroup};
-use super::schema::terms::KEPT;
+use super::schema::certificate::KEPT;
 use super::schema::{FORMAT, MAJOR, MINOR, TABLE};
 use super::value::Units;
 use flexbody_body::flex_body::TermGroup;

@@ -4,12 +4,11 @@
 use super::digest::{self, Numbers, digests_of, of_numbers};
 use super::item::{Extent, Item, ItemKind, Origin, Per, SchemaGroup};
 use super::names::{self, place};
-use super::schema::terms::{DROPPED, KEPT};
+use super::schema::certificate::{DROPPED, KEPT};
 use super::schema::{DIGESTS_SINCE, LIST, TABLE, WHOLE};
 use super::value::Value;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::hdf5_file;
-use flexbody_base::hdf5_file::{Array, Element, Stored, elements};
+use flexbody_base::hdf5_file::{self, Array, Element, Stored, elements};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{Storage, TermGroup, TermGroups};
 use hdf5_metno as hdf5;

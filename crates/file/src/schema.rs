@@ -1,31 +1,28 @@
 //! The table of the flex-body file, from which writer, reader, validator, `docs/reference/file_format.md` and the JSON
 //! schema follow.
 
-use super::draft::node_indices;
-use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, Triangles};
-use super::item::ItemKind::{Floats, Indices, Int, Ints, Text};
-use super::item::Origin::{ConstantInt, ConstantText, Primary};
-use super::item::{Access, EntrySet, Item, ItemKind, Origin, Per, SchemaGroup, both, field, put, written};
-use super::value::{Stored, Units, Value, indices, json_list, shape_rows, text};
-use certificate::{CERTIFICATE, CERTIFIED, CRAIG_BAMPTON, INVARIANT_DIGITS};
-use flexbody_base::provenance;
-use flexbody_body::flex_body::{MassStructure, Parts, ReferenceConditions, Storage};
-use flexbody_model::NodeMoments;
-use geometric_stiffness::{GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS};
-use interfaces::{COORDINATES, INTERFACES};
-use invariants::{COMPARISON, DAMPING, INVARIANTS, LUMPED};
-use nalgebra::{Matrix3, Vector3};
-use recovery::RECOVERY;
-#[cfg(feature = "hdf5")]
-pub(super) use recovery::labels_json;
-use terms::TERMS;
-
-mod certificate;
-mod geometric_stiffness;
+pub(super) mod certificate;
 mod interfaces;
 mod invariants;
 mod recovery;
-pub(super) mod terms;
+
+use super::draft::node_indices;
+use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, Triangles};
+use super::item::ItemKind::{self, Floats, Indices, Int, Ints, Text};
+use super::item::Origin::{self, ConstantInt, ConstantText, Primary};
+use super::item::{Access, EntrySet, Item, Per, SchemaGroup, both, field, put, written};
+use super::value::{Stored, Units, Value, indices, json_list, shape_rows, text};
+use certificate::{CERTIFICATE, CERTIFIED, CRAIG_BAMPTON, INVARIANT_DIGITS, TERMS};
+use flexbody_base::provenance;
+use flexbody_body::flex_body::{MassStructure, Parts, ReferenceConditions, Storage};
+use flexbody_model::NodeMoments;
+use interfaces::{COORDINATES, INTERFACES};
+use invariants::{COMPARISON, DAMPING, GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS, INVARIANTS, LUMPED};
+use nalgebra::{Matrix3, Vector3};
+use recovery::RECOVERY;
+
+#[cfg(feature = "hdf5")]
+pub(super) use recovery::labels_json;
 
 /// Name of the root attribute with the list of digests: a line `SHA-256  path` for each group and dataset, by path.
 pub(super) const LIST: &str = "digests";

@@ -6,7 +6,7 @@
 //! nodes.
 
 use crate::export::Holding::{Lost, NotApplicable};
-use crate::export::interface_matrices::{InterfaceMatrices, matrix_checklist};
+use crate::export::matrices::{InterfaceMatrices, matrix_checklist};
 use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -160,7 +160,7 @@ fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOpt
 
 /// All import formats in the order in which files are recognised.
 pub const IMPORT_FORMATS: &[&dyn ImportFormat] = &[
-    &sid::import::SidFile,
+    &sid::SidFile,
     &mbdyn::read::Mbdyn,
     #[cfg(feature = "hdf5")]
     &mbsim::read::Mbsim,

@@ -3,7 +3,7 @@
 //! `arm.P0`, `arm.K`, `arm.M`, `arm.C`.
 
 use super::export::hdf5_contents::{Hdf5Contents, hdf5_bytes};
-use super::export::interface_matrices::{InterfaceMatrices, matrix_checklist};
+use super::export::matrices::{InterfaceMatrices, matrix_checklist};
 use super::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -2,7 +2,6 @@
 //! has one file behind [`JobReader`] and [`JOBS`].
 
 mod abaqus;
-mod abaqus_substructure;
 mod calculix;
 mod deck;
 mod deck_mesh;
@@ -18,7 +17,6 @@ use abaqus::Abaqus;
 use calculix::Calculix;
 use deck::Deck;
 use deck_mesh::DeckMesh;
-pub use deck_of_elements::ElementDeck;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::compression::refuse_packed;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
@@ -27,6 +25,7 @@ use nastran::Nastran;
 use std::path::{Path, PathBuf};
 
 pub(super) use deck::comparable;
+pub use deck_of_elements::ElementDeck;
 pub(super) use nastran::nodes_of_bulk;
 
 /// Job of an FE program: its main file, and the program if the user named it.

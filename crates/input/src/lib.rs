@@ -41,7 +41,6 @@ mod read_model;
 mod reader;
 mod recipes;
 mod recovery_files;
-mod region;
 mod scipy_npz;
 mod shapes;
 mod tables;
@@ -51,10 +50,9 @@ pub use jobs::{ElementDeck, JobFile, is_job, job_programs};
 pub use manifest::read_manifest;
 pub use model_files::{
     InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource,
-    RecoverySource, TableFiles, parse_units,
+    RecoverySource, Region, TableFiles, parse_units,
 };
 pub use read_model::{read_matrix, read_model, read_nodal_masses, read_nodes_of_table};
 pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use recipes::{RECIPES, Recipe, Step};
-pub use region::Region;
 pub use shapes::{ImportedColumns, read_imported, read_shapes};

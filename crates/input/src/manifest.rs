@@ -1,22 +1,19 @@
 //! The manifest `model.toml`. Its machine-readable contract is `schemas/manifest.schema.json`.
 
+mod interface;
+mod recovery;
+
 use super::jobs::JobFile;
 use super::model_files::{MatrixLocation, ModelFiles, ModelSource, TableFiles, stem};
+use crate::LoadSource;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::text::walk::{TomlTable, Value, Walk, integer, read_toml, real};
 use flexbody_base::units::UnitSystem;
-use std::ops::Range;
-use std::ops::{Deref, DerefMut};
+use flexbody_model::{Damping, GeometricStiffness, LoadKind, UnitLoad, damping_bands};
+use std::ops::{Deref, DerefMut, Range};
 use std::path::Path;
 use toml::de::DeValue;
-
-mod basis;
-mod damping;
-mod geometric_stiffness;
-mod interface;
-mod recovery;
-mod region;
 
 const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "recovery", "basis"];
 const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible"];
@@ -235,14 +232,186 @@ impl ManifestWalk<'_, '_> {
     }
 }
 
+// The table `[basis]`: settings of the basis that are stored with the model. Settings on the command line replace
+// them.
+
+const BASIS: &[&str] = &["residual_vectors", "loads"];
+
+impl ManifestWalk<'_, '_> {
+    /// Reads the loads of residual vectors. The list is empty without the table; errors are in `found`.
+    fn residual_vectors(&mut self, top: &TomlTable) -> Vec<LoadSource> {
+        let Some((table, _)) = self.table(top, "basis") else { return Vec::new() };
+        self.known_keys(table, "[basis]", BASIS);
+        let mut loads = self.load_sets(table);
+        loads.extend(self.load_file(table));
+        loads
+    }
+
+    /// Reads the file of nodal forces of the user.
+    fn load_file(&mut self, table: &TomlTable) -> Option<LoadSource> {
+        let file = self.string(table, "loads")?;
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        Some(LoadSource::File(MatrixLocation::parse(file).relative_to(folder)))
+    }
+
+    fn load_sets(&mut self, table: &TomlTable) -> Vec<LoadSource> {
+        const EXPECTED: &str = "a list of \"centrifugal\" and \"interfaces\", each also with a frequency as in \"interfaces@500\"";
+        let Some(value) = table.get("residual_vectors") else { return Vec::new() };
+        let DeValue::Array(list) = value.get_ref() else {
+            self.mistyped("residual_vectors", value, EXPECTED);
+            return Vec::new();
+        };
+        let mut sets = Vec::new();
+        for item in list.iter() {
+            let DeValue::String(text) = item.get_ref() else {
+                self.mistyped("residual_vectors", item, EXPECTED);
+                continue;
+            };
+            let (name, hertz) = LoadSource::with_frequency(text);
+            let known = match name {
+                "centrifugal" => Some(LoadSource::Centrifugal),
+                "interfaces" => Some(LoadSource::Interfaces),
+                "loads" if hertz > 0.0 => self.load_file(table),
+                _ => None,
+            };
+            let Some(loads) = known else {
+                let message =
+                    format!("`{text}` is not a set of loads for residual vectors, expected {EXPECTED}");
+                let complaint = self.at(Code::ManifestSyntax, item.span(), message);
+                self.found.push(complaint.with_help(
+                    "give other nodal forces in the file `loads`; \"loads@500\" names its responses at a frequency",
+                ));
+                continue;
+            };
+            let set = loads.at(hertz);
+            if sets.contains(&set) {
+                let message = "`residual_vectors` names loads twice".to_owned();
+                self.complain(Code::ManifestSyntax, item.span(), message);
+            } else {
+                sets.push(set);
+            }
+        }
+        sets
+    }
+}
+
+const DAMPING: &[&str] = &["ratio", "bands", "rayleigh", "matrix"];
+const RAYLEIGH: &[&str] = &["alpha", "beta"];
+
+impl ManifestWalk<'_, '_> {
+    /// Reads the damping. `None` means that there is no table, or that `found` has errors.
+    fn damping(&mut self, top: &TomlTable) -> Option<Damping<MatrixLocation>> {
+        let (table, span) = self.table(top, "damping")?;
+        self.known_keys(table, "[damping]", DAMPING);
+        let given: Vec<&str> = DAMPING.iter().copied().filter(|key| table.contains_key(*key)).collect();
+        let &[key] = given.as_slice() else {
+            let found = if given.is_empty() { "nothing".to_owned() } else { given.join(", ") };
+            let message = format!("[damping] has {found}, expected one of {}", DAMPING.join(", "));
+            self.complain(Code::ManifestSyntax, span, message);
+            return None;
+        };
+        let damping = match key {
+            "ratio" => Damping::Ratio(self.number(table, key, &span)?),
+            "bands" => Damping::Bands(damping_bands(self, table.get(key)?)?),
+            "rayleigh" => {
+                let (table, span) = self.table(table, key)?;
+                self.known_keys(table, "`rayleigh`", RAYLEIGH);
+                let (alpha, beta) = (self.number(table, "alpha", &span), self.number(table, "beta", &span));
+                Damping::Rayleigh { alpha: alpha?, beta: beta? }
+            }
+            _ => {
+                let folder = self.path.parent().unwrap_or(Path::new(""));
+                Damping::Matrix(MatrixLocation::parse(self.string(table, key)?).relative_to(folder))
+            }
+        };
+        if let Some(problem) = damping.problem() {
+            self.complain(Code::ManifestSyntax, span, problem);
+            return None;
+        }
+        Some(damping)
+    }
+}
+
+/// Keys `file`, `interface`, and the kinds of loads.
+const GEOMETRIC_STIFFNESS: &[&str] = &[
+    "file",
+    "interface",
+    LoadKind::NAMES[0],
+    LoadKind::NAMES[1],
+    LoadKind::NAMES[2],
+    LoadKind::NAMES[3],
+    LoadKind::NAMES[4],
+    LoadKind::NAMES[5],
+];
+
+impl ManifestWalk<'_, '_> {
+    /// Reads the geometric stiffness of unit loads. Entries with errors are left out; the errors are in `found`.
+    fn geometric_stiffness(&mut self, top: &TomlTable) -> Vec<GeometricStiffness<MatrixLocation>> {
+        let tables = self.tables(top, "geometric_stiffness").unwrap_or_default();
+        tables.into_iter().filter_map(|(table, span)| self.one_geometric_stiffness(table, span)).collect()
+    }
+
+    fn one_geometric_stiffness(
+        &mut self,
+        table: &TomlTable,
+        span: Range<usize>,
+    ) -> Option<GeometricStiffness<MatrixLocation>> {
+        self.known_keys(table, "[[geometric_stiffness]]", GEOMETRIC_STIFFNESS);
+        if !table.contains_key("file") {
+            let message = "key `file` is missing in [[geometric_stiffness]]".to_owned();
+            self.complain(Code::ManifestSyntax, span.clone(), message);
+        }
+        let file = self.string(table, "file");
+        let load = self.unit_load(table, span)?;
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        Some(GeometricStiffness { load, matrix: MatrixLocation::parse(file?).relative_to(folder) })
+    }
+
+    /// Reads the load that causes the stress: one key with the axis (or the name of the load) as its value.
+    fn unit_load(&mut self, table: &TomlTable, span: Range<usize>) -> Option<UnitLoad> {
+        let given: Vec<&str> =
+            LoadKind::NAMES.iter().copied().filter(|name| table.contains_key(*name)).collect();
+        let &[key] = given.as_slice() else {
+            let found = if given.is_empty() { "no load".to_owned() } else { given.join(", ") };
+            let message = format!(
+                "[[geometric_stiffness]] has {found}, expected one of {}",
+                LoadKind::NAMES.join(", ")
+            );
+            self.complain(Code::ManifestSyntax, span, message);
+            return None;
+        };
+        let value = self.string(table, key)?;
+        let needs = matches!(key, "force" | "moment");
+        if needs != table.contains_key("interface") {
+            let message = if needs {
+                format!("`{key}` acts at an interface: key `interface` is missing in [[geometric_stiffness]]")
+            } else {
+                format!("`{key}` acts at no interface, but `interface` is given in [[geometric_stiffness]]")
+            };
+            self.complain(Code::ManifestSyntax, span, message);
+            return None;
+        }
+        let kind = match key {
+            "acceleration" => LoadKind::Acceleration,
+            "angular_acceleration" => LoadKind::AngularAcceleration,
+            "spin" => LoadKind::Spin,
+            "force" => LoadKind::Force(self.string(table, "interface")?),
+            "moment" => LoadKind::Moment(self.string(table, "interface")?),
+            _ => return Some(UnitLoad { kind: LoadKind::Named(value), component: 0 }),
+        };
+        let component = kind.components().iter().position(|axis| *axis == value);
+        if component.is_none() {
+            let message = format!("`{key}` is `{value}`, expected one of {}", kind.components().join(", "));
+            self.complain(Code::ManifestSyntax, span, message);
+        }
+        Some(UnitLoad { component: component?, kind })
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::basis::BASIS;
-    use super::damping::{DAMPING, RAYLEIGH};
-    use super::geometric_stiffness::GEOMETRIC_STIFFNESS;
-    use super::interface::INTERFACE;
+    use super::interface::{BOX, CYLINDER, INTERFACE, NEAREST, PLANE};
     use super::recovery::RECOVERY;
-    use super::region::{BOX, CYLINDER, NEAREST, PLANE};
     use super::*;
     use flexbody_model::DAMPING_BAND_KEYS;
 

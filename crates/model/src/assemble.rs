@@ -1,15 +1,16 @@
 //! Conversion from a model as delivered by the readers to matrices in the internal order, with the checks
 //! of matrices and tables by themselves.
 
-use super::assembled::Assembled;
 use super::drilling::{Following, with_following_rotations};
 use super::geometric_stiffness::check_loads;
 use super::layout::{Layout, layout};
-use super::recovery_checks::{RowsOfFiles, checked_recoveries};
+use super::recovery::{RowsOfFiles, checked_recoveries};
 use super::references::resolve_references;
-use super::rigid::{extents, rigid_count};
+use super::rows::{extents, rigid_count};
 use super::wording::name_some;
-use super::{Damping, DofLabel, GeometricStiffness, Nodes, RawMatrix, RawModel, SurfaceMesh};
+use super::{
+    Damping, DofLabel, GeometricStiffness, ModelRecovery, Nodes, RawMatrix, RawModel, Rows, SurfaceMesh,
+};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
@@ -419,4 +420,29 @@ pub(super) fn rounding(digits: u8, margin: i32) -> f64 {
 /// Returns the relative deviation of a mass block from a multiple of the identity that rounding explains.
 pub(super) fn block_tolerance(digits: u8) -> f64 {
     rounding(digits, 3).max(1e-10)
+}
+
+/// Model in the internal order whose matrices are valid by themselves.
+pub(super) struct Assembled {
+    /// Model as read, without matrices, nodes, surface and labels.
+    pub raw: RawModel,
+    /// Nodes with degrees of freedom.
+    pub nodes: Nodes,
+    /// Surface on these nodes.
+    pub mesh: Option<SurfaceMesh>,
+    /// Meaning of the rows; the motion of rows without a position is not known yet.
+    pub rows: Rows,
+    /// K.
+    pub stiffness: SymmetricMatrix,
+    /// M.
+    pub mass: SymmetricMatrix,
+    /// Internal row of each matrix row, `u32::MAX` for rows that are left out; `None` if the orders are
+    /// equal, or for one of several bodies.
+    pub row_to_internal: Option<Vec<u32>>,
+    /// Damping; a matrix is in the internal order.
+    pub damping: Option<Damping<SymmetricMatrix>>,
+    /// Geometric stiffness, in the internal order.
+    pub geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
+    /// Rows to read off the body, in the internal order.
+    pub recoveries: Vec<ModelRecovery>,
 }

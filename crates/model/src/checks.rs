@@ -1,16 +1,15 @@
 //! Checks of a model before any work: each failure is reported with its facts.
 
-use super::assemble::{assemble, block_tolerance, rounding};
-use super::assembled::Assembled;
+use super::assemble::{Assembled, assemble, block_tolerance, rounding};
 use super::density::{Densities, LocalMass, SoundSpeed, check_density, check_exchanged, check_speed};
 use super::geometric_stiffness::missing_components;
 use super::mass_structure::{MassForm, mass_form};
 use super::node_pairs::check_mass_pairs;
-use super::recovery_checks::check_rigid_responses;
-use super::recovery_scale::check_stress_scale;
-use super::rigid::{centre_and_length, extents, rigid_residuals};
+use super::recovery::check_rigid_responses;
 use super::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
+use super::rows::{centre_and_length, extents, rigid_residuals};
 use super::stress::check_stress;
+use super::stress_points::check_stress_scale;
 use super::wording::{in_words, name_some};
 use super::{Damping, DofLabel, FeModel, Nodes, RawModel, Rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};

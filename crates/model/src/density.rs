@@ -7,7 +7,7 @@
 //! characteristics. Curved elements are measured by their corners, which changes their volume by some
 //! percent.
 
-use super::assembled::Assembled;
+use super::assemble::Assembled;
 use super::node_pairs::neighbours;
 use super::wording::name_some;
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -1,7 +1,7 @@
 //! Checked model: every used node has d displacements (d: the dimension), and row d i + k is direction k of
 //! node i; other rows follow in the order of [`Rows`].
 
-use super::assembled::Assembled;
+use super::assemble::Assembled;
 use super::mass_structure::MassForm;
 use super::{
     BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, ModelRecovery, NodeSet,

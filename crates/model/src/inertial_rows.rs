@@ -1,7 +1,7 @@
 //! Rows that the inertia of a model acts on, for any mass matrix.
 
 use super::director_mass::{NodeMoments, RigidAcceleration};
-use super::rigid::centre_and_length;
+use super::rows::centre_and_length;
 use super::{DirectorMass, FeModel};
 use faer::{Mat, MatRef};
 use flexbody_linalg::{contiguous_mut, gram, parallel};

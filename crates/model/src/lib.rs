@@ -9,7 +9,6 @@
 )]
 
 mod assemble;
-mod assembled;
 mod checks;
 mod damping;
 mod decimate;
@@ -28,10 +27,7 @@ mod node_pairs;
 mod nodes;
 mod raw;
 mod recovery;
-mod recovery_checks;
-mod recovery_scale;
 mod references;
-mod rigid;
 mod rigid_motion;
 mod rows;
 mod separate_bodies;
@@ -54,8 +50,7 @@ pub use layout::filled_rows;
 pub use nodes::{DofLabel, ElementShape, Elements, Nodes};
 pub use raw::{RawMatrix, RawModel, RawModes, RawShapes};
 pub use recovery::{AnsweredShapes, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
-pub use rigid::{centre_and_length, extents, rigid_axes, rigid_count, rigid_fields, span};
-pub use rows::Rows;
+pub use rows::{Rows, centre_and_length, extents, rigid_axes, rigid_count, rigid_fields, span};
 pub use separate_bodies::check_bodies;
 pub use stress_points::StressPoint;
 pub use surface::{Skin, SurfaceMesh, skin};

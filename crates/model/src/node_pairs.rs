@@ -1,7 +1,7 @@
 //! Pairs of nodes coupled by each matrix. An element that gives two nodes common mass couples them by its
 //! stiffness too.
 
-use super::assembled::Assembled;
+use super::assemble::Assembled;
 use super::rows::Rows;
 use super::wording::name_some;
 use flexbody_base::diagnostic::{Code, Diagnostic};

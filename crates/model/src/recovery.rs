@@ -1,8 +1,13 @@
 //! Recovery: rows that read stresses, strains, forces or displacements off the deformed body (theory section 12).
 
-use super::DofLabel;
+use super::rows::{centre_and_length, rigid_count};
+use super::wording::name_some;
+use super::{DofLabel, GivenRows, LostRow, Nodes, Rows};
 use faer::Mat;
-use flexbody_linalg::CscMatrix;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::{CscMatrix, larger};
+use nalgebra::Vector3;
+use std::collections::HashSet;
 use std::path::PathBuf;
 
 /// Physical quantity of a row of a recovery.
@@ -128,4 +133,347 @@ pub struct ModelRecovery {
     pub operator: RecoveryOperator,
     /// File of the operator or of the nodes, for messages; empty for data in memory.
     pub path: PathBuf,
+}
+
+// Checks of recoveries, and their conversion to the internal order of rows.
+
+/// Longest name of a recovery in bytes, since the name becomes a group name in the file.
+const MAX_NAME_BYTES: usize = 200;
+
+/// Largest value of a row of stress, strain, force or moment under a rigid motion, relative to the sum of the
+/// magnitudes of its terms, about the middle of its own nodes. Operators of sound models reach 1e-16, written with six
+/// digits 1e-5; exchanged nodes and exchanged directions give 1e-2 to 1 in the rows concerned. A larger limit lets
+/// exchanged nodes pass.
+const MAX_RIGID_RESPONSE: f64 = 1e-3;
+
+/// Rows of the files of a model and their way to the internal order.
+pub(super) struct RowsOfFiles<'a> {
+    pub given: &'a GivenRows,
+    /// Number of rows of K.
+    pub matrix_rows: usize,
+    /// Internal row of each row of K, `u32::MAX` for rows that are left out.
+    pub to: &'a [u32],
+}
+
+/// Returns the recoveries with operators in the internal order; adds an error for each that is not valid.
+pub(super) fn checked_recoveries(
+    asked: Vec<ModelRecovery>,
+    of_files: &RowsOfFiles<'_>,
+    nodes: &Nodes,
+    found: &mut Vec<Diagnostic>,
+) -> Vec<ModelRecovery> {
+    let mut names = HashSet::new();
+    let mut checked = Vec::with_capacity(asked.len());
+    for ModelRecovery { name, operator, path } in asked {
+        let complain =
+            |(code, message): Problem| Diagnostic::new(code, format!("recovery {message}")).in_file(&path);
+        let result = match refuse_name(&name, &mut names) {
+            Err(problem) => Err(problem),
+            Ok(()) => match operator {
+                RecoveryOperator::Rows { transposed, labels, offset } => {
+                    in_internal_rows(&name, transposed, &labels, offset.as_deref(), of_files)
+                        .map(|transposed| RecoveryOperator::Rows { transposed, labels, offset })
+                }
+                RecoveryOperator::Shapes { shapes, labels } => refuse_shapes(&name, &shapes, &labels, nodes)
+                    .map(|()| RecoveryOperator::Shapes { shapes, labels }),
+                RecoveryOperator::Cut { nodes: side, about } => refuse_cut(&name, &side, about, nodes)
+                    .map(|()| RecoveryOperator::Cut { nodes: side, about }),
+            },
+        };
+        match result {
+            Ok(operator) => checked.push(ModelRecovery { name, operator, path }),
+            Err(problem) => found.push(complain(problem)),
+        }
+    }
+    checked
+}
+
+/// Code and message about a recovery.
+type Problem = (Code, String);
+
+fn refuse_name(name: &str, seen: &mut HashSet<String>) -> Result<(), Problem> {
+    let wrong = match name {
+        "" => "has no name".to_owned(),
+        _ if name.len() > MAX_NAME_BYTES || name.chars().any(char::is_control) => format!(
+            "`{}` has a name that is longer than {MAX_NAME_BYTES} bytes or has control characters in it",
+            name.escape_debug()
+        ),
+        _ if !seen.insert(name.to_owned()) => format!("`{name}` is given twice"),
+        _ => return Ok(()),
+    };
+    Err((Code::ManifestSyntax, wrong))
+}
+
+/// Returns R' in the internal order of rows.
+fn in_internal_rows(
+    name: &str,
+    transposed: CscMatrix,
+    labels: &[RecoveryRow],
+    offset: Option<&[f64]>,
+    of_files: &RowsOfFiles<'_>,
+) -> Result<CscMatrix, Problem> {
+    let (n, count) = (transposed.n_rows(), transposed.n_cols());
+    let known: Vec<usize> = std::iter::once(of_files.matrix_rows).chain(of_files.given.counts()).collect();
+    if !known.contains(&n) {
+        let message = format!(
+            "`{name}`: its operator is {count} x {n}, the matrices have {} rows",
+            of_files.matrix_rows
+        );
+        return Err((Code::RecoverySize, message));
+    }
+    refuse_labels(name, labels, count)?;
+    if let Some(offset) = offset.filter(|offset| offset.len() != count) {
+        let message = format!("`{name}`: its offset has {} values for {count} rows", offset.len());
+        return Err((Code::RecoverySize, message));
+    }
+    for j in 0..count {
+        if let Some(value) = transposed.column(j).1.iter().find(|value| !value.is_finite()) {
+            return Err((
+                Code::MatrixNotFinite,
+                format!("`{name}`: row {} of its operator has {value}", j + 1),
+            ));
+        }
+    }
+    if let Some(j) = offset.and_then(|offset| offset.iter().position(|value| !value.is_finite())) {
+        return Err((
+            Code::MatrixNotFinite,
+            format!("`{name}`: value {} of its offset is not finite", j + 1),
+        ));
+    }
+    let lost = |LostRow| {
+        (Code::RecoverySize, format!("`{name}`: its operator has entries in rows that K and M leave empty"))
+    };
+    let given = of_files.given.sparse_forces(transposed).map_err(lost)?;
+    let mut entries = Vec::with_capacity(given.nnz());
+    for j in 0..count {
+        let (rows, values) = given.column(j);
+        for (&row, &value) in rows.iter().zip(values) {
+            let to = of_files.to[row as usize];
+            if to == u32::MAX {
+                return Err(lost(LostRow));
+            }
+            entries.push((to, j as u32, value));
+        }
+    }
+    let internal = of_files.to.iter().filter(|to| **to != u32::MAX).count();
+    Ok(CscMatrix::from_triplets(internal, count, &entries))
+}
+
+/// Refuses labels that do not describe `count` rows.
+fn refuse_labels(name: &str, labels: &[RecoveryRow], count: usize) -> Result<(), Problem> {
+    let refuse = |message: String| Err((Code::RecoveryRows, format!("`{name}`: {message}")));
+    if labels.len() != count {
+        return refuse(format!("its table names {} rows, its operator has {count}", labels.len()));
+    }
+    let mut seen = HashSet::new();
+    for (at, row) in labels.iter().enumerate() {
+        if row.name.is_empty() {
+            return refuse(format!("row {} has no name", at + 1));
+        }
+        if [&row.name, &row.component, &row.unit].into_iter().any(|text| text.chars().any(char::is_control)) {
+            return refuse(format!("row {} has control characters in its label", at + 1));
+        }
+        if !seen.insert(row.name.as_str()) {
+            return refuse(format!("the row name `{}` occurs twice", row.name));
+        }
+        if row.quantity.has_unit() && row.unit.is_empty() {
+            return refuse(format!("row `{}` is a {} without a unit", row.name, row.quantity.name()));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses shapes that do not move all nodes, and values that do not fit them.
+fn refuse_shapes(
+    name: &str,
+    shapes: &AnsweredShapes,
+    labels: &[RecoveryRow],
+    nodes: &Nodes,
+) -> Result<(), Problem> {
+    let AnsweredShapes { dofs, displacements, answers, energies, .. } = shapes;
+    refuse_labels(name, labels, answers.nrows())?;
+    let refuse = |message: String| Err((Code::RecoveryShapes, format!("`{name}`: {message}")));
+    let (count, asked) = (answers.ncols(), displacements.ncols());
+    if count != asked || energies.as_ref().is_some_and(|energies| energies.len() != asked) {
+        return refuse(format!("{count} answers belong to {asked} shapes"));
+    }
+    if dofs.len() != displacements.nrows() || asked == 0 {
+        return refuse("its shapes have no displacements".to_owned());
+    }
+    let values = displacements.col_iter().chain(answers.col_iter()).flat_map(|column| column.iter());
+    let energies = energies.iter().flatten();
+    if values.chain(energies).any(|value| !value.is_finite()) {
+        return Err((Code::MatrixNotFinite, format!("`{name}`: a value of its shapes is not finite")));
+    }
+    let moved: HashSet<i64> = dofs.iter().filter(|dof| dof.direction <= 3).map(|dof| dof.node).collect();
+    let mut still: Vec<i64> = nodes.ids.iter().copied().filter(|id| !moved.contains(id)).collect();
+    still.sort_unstable();
+    if !still.is_empty() {
+        return refuse(format!(
+            "its shapes have no displacements of {} of {} nodes: {}",
+            still.len(),
+            nodes.len(),
+            name_some(&still)
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses a cut whose side is empty, unknown, or the whole body.
+fn refuse_cut(name: &str, side: &[i64], about: [f64; 3], nodes: &Nodes) -> Result<(), Problem> {
+    let known: HashSet<i64> = nodes.ids.iter().copied().collect();
+    let members: HashSet<i64> = side.iter().copied().collect();
+    let mut unknown: Vec<i64> = members.difference(&known).copied().collect();
+    unknown.sort_unstable();
+    let message = if side.is_empty() {
+        format!("`{name}`: no node lies on this side of the cut")
+    } else if !unknown.is_empty() {
+        format!("`{name}`: its cut names {} unknown nodes: {}", unknown.len(), name_some(&unknown))
+    } else if members.len() == known.len() {
+        format!("`{name}`: all {} nodes lie on this side of the cut", known.len())
+    } else if about.iter().any(|x| !x.is_finite()) {
+        format!("`{name}`: the point of its moments is not finite")
+    } else {
+        return Ok(());
+    };
+    Err((Code::RecoveryCut, message))
+}
+
+/// Returns an error for each recovery with rows of stress, strain, force or moment that a rigid motion changes.
+pub(super) fn check_rigid_responses(all: &[ModelRecovery], rows: &Rows, nodes: &Nodes) -> Vec<Diagnostic> {
+    if all.is_empty() {
+        return Vec::new();
+    }
+    let (centre, _) = centre_and_length(&nodes.positions);
+    let fields = rows.rigid_fields(&nodes.positions, centre, 1.0);
+    all.iter().filter_map(|one| strained(one, &fields, rows)).collect()
+}
+
+fn strained(recovery: &ModelRecovery, fields: &Mat<f64>, rows: &Rows) -> Option<Diagnostic> {
+    let RecoveryOperator::Rows { transposed, labels, .. } = &recovery.operator else { return None };
+    let response = |j: usize| response_to_rigid_motion(transposed.column(j), fields, rows);
+    let checked = (0..labels.len()).filter(|&j| labels[j].quantity.ignores_rigid_motion());
+    let wrong: Vec<(usize, f64)> =
+        checked.map(|j| (j, response(j))).filter(|(_, part)| *part > MAX_RIGID_RESPONSE).collect();
+    let &(worst, part) = wrong.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let row = &labels[worst];
+    let message = format!(
+        "recovery `{}`: a rigid motion of the body gives {} of {} rows a value, most of all the {} `{}`: {part:.1e} of the sum of its terms, expected below {MAX_RIGID_RESPONSE:e}",
+        recovery.name,
+        wrong.len(),
+        labels.len(),
+        row.quantity.name(),
+        row.name
+    );
+    Some(Diagnostic::new(Code::RecoveryStrained, message).in_file(&recovery.path))
+}
+
+/// Returns the largest |sum r_i t_i| / sum |r_i t_i| of a row r over the rigid motions t: translations, and rotations
+/// about the middle of the nodes of the row.
+///
+/// * `fields`: rigid motions about the centre of the body, rotations with unit angle.
+fn response_to_rigid_motion((at, values): (&[u32], &[f64]), fields: &Mat<f64>, rows: &Rows) -> f64 {
+    let d = rows.dimension;
+    let middle = middle_of(at, fields, d, d * rows.nodes);
+    let part = |c: usize| {
+        // A rotation about the middle is one about the centre less the translation of the middle.
+        let shift = match c.checked_sub(d) {
+            Some(turn) => Vector3::ith(if d == 2 { 2 } else { turn }, 1.0).cross(&middle),
+            None => Vector3::zeros(),
+        };
+        let term = |(&row, value): (&u32, &f64)| {
+            let translated: f64 = (0..d).map(|k| shift[k] * fields[(row as usize, k)]).sum();
+            value * (fields[(row as usize, c)] - translated)
+        };
+        let (sum, size) = at
+            .iter()
+            .zip(values)
+            .map(term)
+            .fold((0.0, 0.0), |(sum, size): (f64, f64), term| (sum + term, size + term.abs()));
+        if size > 0.0 { sum.abs() / size } else { 0.0 }
+    };
+    (0..rigid_count(d)).map(part).fold(0.0, larger)
+}
+
+/// Returns the mean position, from the centre of the body, of the nodes whose displacements are in `at`; `displaced`
+/// rows are displacements of nodes.
+fn middle_of(at: &[u32], fields: &Mat<f64>, d: usize, displaced: usize) -> Vector3<f64> {
+    let mut nodes: Vec<usize> =
+        at.iter().map(|&row| row as usize).filter(|row| *row < displaced).map(|row| row / d).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let place = |node: usize| {
+        if d == 2 {
+            return Vector3::new(fields[(2 * node + 1, 2)], -fields[(2 * node, 2)], 0.0);
+        }
+        // e_z moves x along y by x, e_x along z by y, and e_y along x by z.
+        Vector3::new(fields[(3 * node + 1, 5)], fields[(3 * node + 2, 3)], fields[(3 * node, 4)])
+    };
+    let count = nodes.len().max(1) as f64;
+    nodes.into_iter().map(place).sum::<Vector3<f64>>() / count
+}
+
+/// Returns the parts of the recoveries that belong to the body with the rows `kept` and the `nodes`: an operator with
+/// entries, or a cut with nodes, in this body.
+pub(super) fn recoveries_of_body(all: &[ModelRecovery], kept: &[usize], nodes: &Nodes) -> Vec<ModelRecovery> {
+    let known: HashSet<i64> = nodes.ids.iter().copied().collect();
+    let operator = |one: &ModelRecovery| match &one.operator {
+        RecoveryOperator::Cut { nodes: side, about } => side
+            .iter()
+            .any(|id| known.contains(id))
+            .then(|| RecoveryOperator::Cut { nodes: side.clone(), about: *about }),
+        RecoveryOperator::Shapes { shapes, .. } => {
+            shapes.dofs.iter().any(|dof| known.contains(&dof.node)).then(|| one.operator.clone())
+        }
+        RecoveryOperator::Rows { transposed, labels, offset } => {
+            let mut entries = Vec::new();
+            for j in 0..transposed.n_cols() {
+                let (rows, values) = transposed.column(j);
+                let places = rows.iter().map(|row| kept.binary_search(&(*row as usize)));
+                entries.extend(
+                    places
+                        .zip(values)
+                        .filter_map(|(place, value)| Some((place.ok()? as u32, j as u32, *value))),
+                );
+            }
+            (!entries.is_empty()).then(|| RecoveryOperator::Rows {
+                transposed: CscMatrix::from_triplets(kept.len(), transposed.n_cols(), &entries),
+                labels: labels.clone(),
+                offset: offset.clone(),
+            })
+        }
+    };
+    let one = |one: &ModelRecovery| Some(ModelRecovery { operator: operator(one)?, ..one.clone() });
+    all.iter().filter_map(one).collect()
+}
+
+/// Adds an error for each recovery that reads several bodies. `body_of` returns the body of an internal row, or of a
+/// node.
+pub(super) fn refuse_several_bodies(
+    all: &[ModelRecovery],
+    body_of_row: impl Fn(usize) -> usize,
+    body_of_node: impl Fn(i64) -> Option<usize>,
+    found: &mut Vec<Diagnostic>,
+) {
+    for one in all {
+        let mut bodies: Vec<usize> = match &one.operator {
+            RecoveryOperator::Rows { transposed, .. } => {
+                transposed.row_idx().iter().map(|row| body_of_row(*row as usize) + 1).collect()
+            }
+            RecoveryOperator::Shapes { shapes, .. } => {
+                shapes.dofs.iter().filter_map(|dof| body_of_node(dof.node)).map(|body| body + 1).collect()
+            }
+            RecoveryOperator::Cut { nodes, .. } => {
+                nodes.iter().filter_map(|id| body_of_node(*id)).map(|body| body + 1).collect()
+            }
+        };
+        bodies.sort_unstable();
+        bodies.dedup();
+        if bodies.len() > 1 {
+            let message =
+                format!("recovery `{}` reads {} bodies: {}", one.name, bodies.len(), name_some(&bodies));
+            let diagnostic = Diagnostic::new(Code::BodiesCoupled, message).in_file(&one.path);
+            found.push(diagnostic.with_help("give one [[recovery]] for each body"));
+        }
+    }
 }

@@ -1,9 +1,8 @@
 //! Checks that K leaves rigid motion free and that M gives it the inertia of a body, and diagnosis of wrong
 //! labels if not.
 
-use super::assembled::Assembled;
-use super::rigid::{centre_and_length, rigid_count, rigid_fields, rigid_residuals};
-use super::rows::{Recovered, Rows};
+use super::assemble::Assembled;
+use super::rows::{Recovered, Rows, centre_and_length, rigid_count, rigid_fields, rigid_residuals};
 use super::wording::name_some;
 use super::{DofLabel, Nodes};
 use faer::Mat;

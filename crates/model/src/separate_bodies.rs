@@ -1,10 +1,9 @@
 //! Several bodies in one pair of matrices: found by the graph of K and M together, each made a model of its
 //! own.
 
-use super::assemble::assemble;
-use super::assembled::Assembled;
+use super::assemble::{Assembled, assemble};
 use super::checks::{CheckedModel, check_body, groups};
-use super::recovery_checks::{recoveries_of_body, refuse_several_bodies};
+use super::recovery::{recoveries_of_body, refuse_several_bodies};
 use super::wording::{in_words, name_some};
 use super::{BodyNumber, Damping, FeModel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};

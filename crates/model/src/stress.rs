@@ -2,7 +2,7 @@
 
 use super::stress_loads::UnitLoads;
 use crate::assemble::rounding;
-use crate::rigid::{centre_and_length, rigid_axes};
+use crate::rows::{centre_and_length, rigid_axes};
 use crate::wording::name_some;
 use crate::{FeModel, GeometricStiffness, RawMatrix, UnitLoad};
 use flexbody_base::diagnostic::{Code, Diagnostic};

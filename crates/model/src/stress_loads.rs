@@ -1,6 +1,6 @@
 //! Loads of geometric stiffness as forces at nodes, and the difference of other forces from them.
 
-use crate::rigid::{centre_and_length, rigid_axes};
+use crate::rows::{centre_and_length, rigid_axes};
 use crate::{Coupling, FeModel, InertialRows, LoadKind, NodeSet, UnitLoad};
 use faer::Mat;
 use flexbody_linalg::{gram, larger};

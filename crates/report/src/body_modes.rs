@@ -2,12 +2,11 @@
 
 use super::body_report::{word, word_as};
 use super::chart::{Cells, DECADES, STEPS, step};
-use super::completeness::Completeness;
+use super::completeness::{Completeness, GuaranteeFacts, cut};
 use super::craig_bampton::CraigBamptonFacts;
 use super::document::{Block, Inline, Span, Table, Term, cells, heading, listed, quantity};
 use super::facts::{Facts, ModeFacts};
 use super::geometric_stiffness::softening_in_words;
-use super::guarantee::{GuaranteeFacts, cut};
 use super::numbers::{counted, frequencies as frequencies_of, frequency, percent, significant};
 use faer::Mat;
 use flexbody_body::basis::BasisKind;

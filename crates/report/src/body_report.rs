@@ -4,8 +4,9 @@ use super::body_modes::{heat_maps, modes};
 use super::chart::{Axis, Bar, Bars};
 use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading, listed, quantity};
 use super::facts::{Facts, InterfaceFacts, ModelFacts, RunFacts};
-use super::lumped::{ErrorNorm, Errors, LumpedFacts, LumpedModesFacts, distinct};
-use super::lumped_effect::{NEGLIGIBLE, scheme_in_words};
+use super::lumped::{
+    ErrorNorm, Errors, LumpedFacts, LumpedModesFacts, NEGLIGIBLE, distinct, scheme_in_words,
+};
 use super::numbers::{
     bytes, coordinates, counted, duration, frequency, frequency_range, percent, sentence, significant, times,
     triple,

@@ -1,9 +1,11 @@
 //! Completeness of the modes in a sentence that claims no more than the certificate proves.
 
 use super::craig_bampton;
-use super::numbers::{counted, frequency, plain};
+use super::numbers::{counted, frequency, plain, significant};
 use flexbody_body::basis::BasisKind;
-use flexbody_body::flex_body::{FlexBody, is_static};
+use flexbody_body::flex_body::{FlexBody, TermGroup, is_static};
+use flexbody_body::invariants::DIGITS;
+use serde::{Serialize, Serializer};
 
 /// Judged certificate of a body.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -148,4 +150,144 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
         std::cmp::Ordering::Equal => (true, format!("proved: {proof}")),
         std::cmp::Ordering::Greater => (true, format!("proved: {proof}, the lowest {nf} of them kept")),
     }
+}
+
+// Guarantees of the accuracy `certified` in quotable numbers.
+
+/// Guarantees of a body.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct GuaranteeFacts {
+    /// Lower bound of each eigenvalue. Unit: 1/time^2.
+    pub eigenvalue_lower: Vec<f64>,
+    /// Upper bound of each eigenvalue. Unit: 1/time^2.
+    pub eigenvalue_upper: Vec<f64>,
+    /// Guaranteed digits of each eigenvalue: -log10 of the larger distance to a bound, relative to the
+    /// eigenvalue.
+    pub eigenvalue_digits: Vec<f64>,
+    pub shape_error: Vec<f64>,
+    #[serde(serialize_with = "as_map")]
+    pub invariant_digits: Vec<(&'static str, f64)>,
+    /// Shift between the rigid modes and the first flexible one. Unit: 1/time^2.
+    pub shift_below: f64,
+    pub shift_below_hz: f64,
+    pub negative_pivots_below: usize,
+}
+
+fn as_map<S: Serializer>(pairs: &[(&'static str, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(pairs.iter().copied())
+}
+
+impl GuaranteeFacts {
+    pub(crate) fn of(body: &FlexBody) -> Option<Self> {
+        let guarantee = body.certificate().guarantee.as_ref()?;
+        let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
+        let digits = |(value, (lower, upper)): (&f64, (&f64, &f64))| {
+            let error = (value - lower).max(upper - value) / value;
+            (-error.log10()).clamp(0.0, 16.0)
+        };
+        Some(Self {
+            eigenvalue_digits: body.modes().eigenvalue.iter().zip(bounds).map(digits).collect(),
+            eigenvalue_lower: guarantee.eigenvalue_lower.clone(),
+            eigenvalue_upper: guarantee.eigenvalue_upper.clone(),
+            shape_error: guarantee.shape_error.clone(),
+            invariant_digits: DIGITS.into_iter().zip(guarantee.digits).collect(),
+            shift_below: guarantee.shift_below,
+            shift_below_hz: body.units().frequency_of(guarantee.shift_below.max(0.0)),
+            negative_pivots_below: guarantee.pivots_below,
+        })
+    }
+
+    /// Returns the guarantees of the eigenvalues and the inertia count below them in words.
+    pub(crate) fn eigenvalues(&self) -> String {
+        let (digits, mode) = least(self.eigenvalue_digits.iter().copied().zip(1..));
+        let rigid = counted(self.negative_pivots_below, "rigid mode");
+        format!(
+            "every eigenvalue to {digits} digits or more (mode {mode} worst); only {rigid} below {} (inertia count {})",
+            frequency(self.shift_below_hz, 5),
+            self.negative_pivots_below
+        )
+    }
+
+    /// Returns the guarantees of the invariants, and the distance of the modes from the exact modes, in
+    /// words.
+    pub(crate) fn invariants(&self) -> String {
+        let (digits, name) = least(self.invariant_digits.iter().map(|&(name, digits)| (digits, name)));
+        let shape = self.shape_error.iter().copied().fold(0.0, f64::max);
+        format!(
+            "invariants of the stored modes to {digits} digits or more ({name} worst); modes within {} of the exact modes",
+            significant(shape, 2)
+        )
+    }
+}
+
+/// Returns a number of digits rounded down to one decimal, never more than is guaranteed.
+pub(super) fn cut(digits: f64) -> String {
+    significant((10.0 * digits).floor() / 10.0, 3)
+}
+
+/// Returns the smallest number of digits and its name.
+fn least<T>(digits: impl Iterator<Item = (f64, T)>) -> (String, T) {
+    let (digits, whose) =
+        digits.min_by(|a, b| a.0.total_cmp(&b.0)).expect("bodies have modes and invariants");
+    (cut(digits), whose)
+}
+
+// Groups of the kinetic energy in a body, with the reasons for keeping or dropping them.
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct TermFacts {
+    /// Name of the group: `W1`, `W2`, `W3`.
+    pub group: &'static str,
+    pub kept: bool,
+    /// Decision about the group; `None` if no selection was made.
+    pub decision: Option<DecisionFacts>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct DecisionFacts {
+    pub tier: u8,
+    /// Bound of the error without the group; infinite if unknown.
+    pub bound: f64,
+    /// Limit of the error; infinite without a limit.
+    pub limit: f64,
+    pub reason: String,
+}
+
+impl TermFacts {
+    /// Collects the facts of every group.
+    pub(crate) fn of(body: &FlexBody) -> Vec<Self> {
+        let facts = |group: TermGroup| Self {
+            group: group.name(),
+            kept: body.groups().has(group),
+            decision: body.terms().iter().find(|term| term.group == group).map(|term| DecisionFacts {
+                tier: term.tier,
+                bound: term.bound,
+                limit: term.limit,
+                reason: term.reason.clone(),
+            }),
+        };
+        TermGroup::ALL.map(facts).to_vec()
+    }
+
+    /// Returns the group in words: `W1 dropped, error without it up to 0.0001 of 0.001 allowed: slow spin`.
+    pub(crate) fn in_words(&self) -> String {
+        let what = if self.kept { "kept" } else { "dropped" };
+        let Some(decision) = &self.decision else { return format!("{} {what}", self.group) };
+        let error = match (decision.bound.is_finite(), decision.limit.is_finite()) {
+            (false, _) => String::new(),
+            (true, false) => format!(", error without it up to {}", significant(decision.bound, 3)),
+            (true, true) => format!(
+                ", error without it up to {}, tolerance {}",
+                significant(decision.bound, 3),
+                significant(decision.limit, 3)
+            ),
+        };
+        format!("{} {what}{error}: {}", self.group, decision.reason)
+    }
+}
+
+/// Returns a note for every group that `body` dropped, since no check covers it.
+pub fn dropped_text(body: &FlexBody) -> String {
+    let note = |group: TermGroup| format!("note: {} was dropped and is not checked\n", group.name());
+    body.groups().dropped().map(note).collect()
 }

@@ -1,14 +1,12 @@
 //! Facts of a body and of the run that made it, computed once and rendered in every format.
 
-use super::completeness::Completeness;
+use super::completeness::{Completeness, GuaranteeFacts, TermFacts};
 use super::craig_bampton::CraigBamptonFacts;
 use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz};
-use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
 use super::numbers::{coordinates, counted, percent, significant};
 use super::run_data::{Phase, RunData, SearchAttempt};
-use super::term_facts::TermFacts;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::{self, SourceFile};
 use flexbody_base::units::UnitSystem;

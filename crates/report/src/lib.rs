@@ -11,11 +11,11 @@
 )]
 
 mod advice;
-mod audit;
 mod batch;
 mod body_modes;
 mod body_report;
 mod chart;
+mod checks;
 mod common_modes;
 mod comparison;
 mod comparison_report;
@@ -26,15 +26,11 @@ mod document;
 mod errors;
 mod facts;
 mod geometric_stiffness;
-mod guarantee;
 mod html;
-mod identities;
 mod lumped;
-mod lumped_effect;
 mod mass_properties;
 mod measured_run;
 mod numbers;
-mod output;
 mod picture;
 mod recovered;
 mod render;
@@ -44,7 +40,6 @@ mod selection;
 mod selection_verdict;
 mod simulation;
 mod summary;
-mod term_facts;
 mod text;
 #[cfg(feature = "hdf5")]
 mod trade;
@@ -54,22 +49,22 @@ mod trade_verdict;
 mod view;
 
 pub use advice::AdviceFacts;
-pub use audit::{audit_json, audit_text};
 pub use batch::{BatchFacts, BatchRow};
+pub use checks::{
+    audit_json, audit_text, checks_json, checks_text, diagnostics_json, identities_json, identities_text,
+};
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};
 pub use comparison_report::{ComparisonFormat, ComparisonReport};
+pub use completeness::dropped_text;
 pub use facts::Facts;
-pub use identities::{checks_json, checks_text, diagnostics_json, identities_json, identities_text};
 pub use measured_run::MeasuredRunFacts;
-pub use output::output_json;
 pub use recovered::{EnvelopeKind, RecoveredFacts, recovered_csv};
-pub use render::{Format, render};
+pub use render::{Format, output_json, render};
 pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData, SearchAttempt};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
 pub use summary::{summary, summary_html};
-pub use term_facts::dropped_text;
 pub use text::Screen;
 #[cfg(feature = "hdf5")]
 pub use trade::{TradeFacts, trade_csv};

@@ -1,7 +1,9 @@
-//! Formats of a report.
+//! Formats of a report, and the JSON object that every command prints with `--json` (`schemas/output.schema.json`).
 
 use super::document::Document;
 use super::{Facts, body_report};
+use flexbody_base::diagnostic::{Diagnostic, Severity};
+use flexbody_base::error::ExitCode;
 use serde::Serialize;
 use std::path::Path;
 
@@ -37,4 +39,53 @@ pub(super) fn json(facts: &impl Serialize) -> String {
 /// Renders the facts in a format, ending with a line break.
 pub fn render(facts: &Facts<'_>, format: Format) -> String {
     Document::render(facts, format, || body_report::document(facts))
+}
+
+// JSON object that every command prints with `--json` (`schemas/output.schema.json`).
+
+#[derive(Serialize)]
+struct Output<'a> {
+    flexbody: &'static str,
+    format: &'static str,
+    format_major: u32,
+    format_minor: u32,
+    command: Option<&'a str>,
+    passed: bool,
+    exit_code: u8,
+    errors: usize,
+    warnings: usize,
+    notes: usize,
+    diagnostics: &'a [Diagnostic],
+}
+
+/// Returns the JSON object of `command` (`None` if the command line names none), which ends with `code`.
+/// `results` are the results as JSON; `None` if the command failed before it had results.
+///
+/// # Panics
+/// Never: the head of the object has text keys and finite numbers.
+pub fn output_json(
+    command: Option<&str>,
+    code: ExitCode,
+    diagnostics: &[Diagnostic],
+    results: Option<&str>,
+) -> String {
+    let count = |severity| diagnostics.iter().filter(|d| d.severity() == severity).count();
+    let head = Output {
+        flexbody: env!("CARGO_PKG_VERSION"),
+        format: "flexbody-output",
+        format_major: 1,
+        format_minor: 0,
+        command,
+        passed: code == ExitCode::Done,
+        exit_code: code as u8,
+        errors: count(Severity::Error),
+        warnings: count(Severity::Warning),
+        notes: count(Severity::Note),
+        diagnostics,
+    };
+    let head = serde_json::to_string_pretty(&head).expect("texts and numbers");
+    // Results keep the order of their keys and the digits of their numbers. Texts in JSON contain no line
+    // break, so that every line break can be indented.
+    let results = results.unwrap_or("null").trim_end().replace('\n', "\n  ");
+    format!("{},\n  \"results\": {results}\n}}\n", head.trim_end_matches("\n}"))
 }

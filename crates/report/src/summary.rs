@@ -1,17 +1,15 @@
 //! Summary of a body on one screen: properties, completeness of the modes, errors of lumped masses, and all
 //! limitations.
 
-use super::Facts;
 use super::body_modes::first_and_last;
 use super::craig_bampton::CraigBamptonFacts;
 use super::document::{Block, Term, Tone, listed_to};
 use super::facts::{InterfaceFacts, RecoveryFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
-use super::html;
-use super::lumped::{LumpedFacts, LumpedModesFacts};
-use super::lumped_effect::scheme_in_words;
+use super::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
 use super::numbers::{bytes, coordinates, counted, duration, frequency, frequency_range, triple};
 use super::text::{self, Screen};
+use super::{Facts, html};
 use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::MassStructure;
 

@@ -11,7 +11,7 @@
 //! frame is the motion of the interface, so that no constraint is left to solve. The body held at the
 //! interface has the eigenpairs of (K_ff, m_ff), with m_ff of the new modes.
 
-use super::rigid_motion::{rotations_without, shapes_without, stacked};
+use super::modal_change::{rotations_without, shapes_without, stacked};
 use super::{FlexBody, LoadKind, ReferenceConditions, TermGroups};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};

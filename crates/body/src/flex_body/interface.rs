@@ -1,6 +1,6 @@
 //! Interfaces of a body with the data that a joint needs.
 
-use super::rigid_motion::{has_rotations, stacked};
+use super::modal_change::{has_rotations, stacked};
 use faer::{Mat, MatRef};
 use flexbody_linalg::combine;
 use flexbody_model::{Coupling, InterfaceMotion, Nodes};

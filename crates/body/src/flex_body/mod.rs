@@ -10,7 +10,6 @@ mod model_axes;
 mod parts;
 mod recovery;
 mod reference_conditions;
-mod rigid_motion;
 mod softening;
 mod storage;
 mod terms;

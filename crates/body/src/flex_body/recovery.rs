@@ -222,7 +222,7 @@ impl FlexBody {
             let rows = interface.rows(self.nodes(), modes.shape.as_ref(), rotation, self.dimension())?;
             let reference = Vector3::from(interface.reference?);
             let turning = rows.rotation.unwrap_or_else(|| Mat::zeros(3, self.n_modes()));
-            let motion = super::rigid_motion::stacked(&rows.translation, &turning);
+            let motion = super::modal_change::stacked(&rows.translation, &turning);
             let loads = Mat::from_fn(self.n_modes(), LOAD_COMPONENTS, |j, a| {
                 let resultant = resultant_of(a, &reference);
                 motion[(a, j)] - (0..6).map(|k| taken[(k, j)] * resultant[k]).sum::<f64>()

@@ -5,9 +5,8 @@ mod format;
 pub(crate) mod frames;
 #[cfg(feature = "hdf5")]
 pub(crate) mod hdf5_contents;
-pub(crate) mod inertia;
-pub(crate) mod interface_matrices;
 pub(crate) mod losses;
+pub(crate) mod matrices;
 pub(crate) mod stresses;
 
 pub use format::{ExportChecklist, ExportFormat, ExportOptions, Exported, Holding, InertiaInScene, Points};

@@ -1,9 +1,8 @@
 //! Reader and checks of Exudyn files. Names follow FEM.py of Exudyn 1.13.6; row or column 3 j + a of a large
 //! array belongs to axis a of mode j.
 
-use crate::import::hdf5_arrays::Hdf5Arrays;
+use crate::import::hdf5_arrays::{Hdf5Arrays, surface};
 use crate::import::redundant::{ROUNDING, Redundant, has_no_w2, in_other_order, relative};
-use crate::import::surface::surface;
 use crate::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use faer::Mat;
 use flexbody_base::diagnostic::Code;

@@ -2,17 +2,13 @@
 //! into a flexible body.
 
 mod audit;
-pub(crate) mod check;
 pub(crate) mod digits;
 mod format;
 #[cfg(feature = "hdf5")]
 pub(crate) mod hdf5_arrays;
 mod import_body;
 pub(crate) mod redundant;
-#[cfg(feature = "hdf5")]
-pub(crate) mod surface;
 
 pub use audit::{Audit, audit};
-pub use check::AuditCheck;
-pub use format::{ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
+pub use format::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 pub use import_body::{Imported, accept_imported, import_body};

@@ -8,7 +8,7 @@
 //! column 3 (j nf + k) + b.
 
 use crate::export::Holding::{self, Held, NotApplicable};
-use crate::export::inertia::inertia;
+use crate::export::matrices::inertia;
 use crate::export::stresses::without_recoveries;
 use crate::export::{ExportChecklist, ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
 use faer::Mat;

@@ -1,8 +1,7 @@
 //! Reader and checks of MBSim files. Names follow external_flexible_ffr_body.cc.
 
-use crate::import::hdf5_arrays::Hdf5Arrays;
+use crate::import::hdf5_arrays::{Hdf5Arrays, surface};
 use crate::import::redundant::{ROUNDING, asymmetry, relative};
-use crate::import::surface::surface;
 use crate::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use faer::Mat;
 use flexbody_base::diagnostic::Code;

@@ -8,7 +8,7 @@
 use crate::export::Holding::{self, Held, Lost, NotApplicable};
 use crate::export::frames::{frame_table, numbered_interfaces};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
-use crate::export::inertia::inertia;
+use crate::export::matrices::inertia;
 use crate::export::stresses::NodalStresses;
 use crate::export::{ExportChecklist, ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
 use faer::Mat;

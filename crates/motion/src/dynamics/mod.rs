@@ -2,7 +2,6 @@
 //! and of all its nodes. Forces, momenta, energies, accelerations and Jacobians, without an allocation per
 //! evaluation; and its motion as a system to integrate.
 
-mod accelerations;
 mod equations;
 mod evaluation;
 mod jacobian;

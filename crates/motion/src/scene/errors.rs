@@ -1,8 +1,7 @@
 //! Error measures: the distance of a motion from a reference motion, in the quantities that have tolerances
 //! in a scene.
 
-use super::active_nodes::{ActiveNodes, along_principal_directions, longest};
-use super::peak::Peak;
+use super::extremes::{ActiveNodes, Peak, along_principal_directions, longest};
 use super::{Extremes, PerQuantity, Tolerance, Trace};
 use crate::dynamics::EulerParameters;
 use faer::MatRef;

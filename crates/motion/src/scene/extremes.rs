@@ -1,11 +1,10 @@
 //! Largest values of all quantities over a continuous motion.
 
-use super::active_nodes::{ActiveNodes, longest_of_all};
-use super::peak::Peak;
 use crate::dynamics::{Balance, BodyPoint};
+use faer::MatRef;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::{larger, not_negative};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Number of roundings of the largest total energy below which differences of energies count as rounding.
 const ROUNDINGS: f64 = 16.0;
@@ -256,5 +255,189 @@ impl Differences {
             linear: self.linear / self.most_linear.max(momentum),
             angular: self.angular / self.most_angular.max(momentum * radius),
         }
+    }
+}
+
+// Largest value of a smooth function sampled at some times.
+
+/// Ratio of neighbouring intervals above which no parabola is fitted: the samples are at a break.
+const MAX_INTERVAL_RATIO: f64 = 8.0;
+
+/// Largest value of a function f >= 0 of time sampled at ascending times, and its time.
+///
+/// Between the samples f^2 is approximated by the parabola through a largest value and its neighbours,
+/// since vector lengths have smooth squares. With twenty samples per period of a vibration a peak is found
+/// within 9e-4, with sixty within 1.2e-5. At the stability limit of the explicit method a mode has six and
+/// a half samples per period (error 0.06); error control keeps the motion of such a mode small.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Peak {
+    /// Largest value.
+    pub value: f64,
+    /// Time of the largest value.
+    pub time: f64,
+    /// Times and squares of the last two samples, the earlier first.
+    last: [Option<(f64, f64)>; 2],
+}
+
+impl Peak {
+    /// Takes the sample `value` at `time`.
+    pub fn see(&mut self, time: f64, value: f64) {
+        self.offer(time, value);
+        let now = (time, value * value);
+        if let [Some(before), Some(middle)] = self.last
+            && let Some((time, square)) = vertex(before, middle, now)
+        {
+            self.offer(time, square.sqrt());
+        }
+        self.last = [self.last[1], Some(now)];
+    }
+
+    /// Keeps the larger value; NaN counts as the largest of all.
+    fn offer(&mut self, time: f64, value: f64) {
+        if value > self.value || value.is_nan() {
+            (self.value, self.time) = (value, time);
+        }
+    }
+
+    /// Creates a known peak.
+    pub fn at(time: f64, value: f64) -> Self {
+        Self { value, time, ..Self::default() }
+    }
+
+    /// Returns the peak of `values` at `times`.
+    pub fn of(times: &[f64], values: impl IntoIterator<Item = f64>) -> Self {
+        let mut peak = Self::default();
+        times.iter().zip(values).for_each(|(&time, value)| peak.see(time, value));
+        peak
+    }
+}
+
+/// Returns time and value of the maximum of the parabola through three points, if the middle one is the
+/// largest of them.
+fn vertex(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<(f64, f64)> {
+    let (before, after) = (b.0 - a.0, c.0 - b.0);
+    let (largest, even) = (
+        b.1 >= a.1 && b.1 >= c.1,
+        before < MAX_INTERVAL_RATIO * after && after < MAX_INTERVAL_RATIO * before,
+    );
+    if !largest || !even {
+        return None;
+    }
+    let (rise, fall) = ((b.1 - a.1) / before, (c.1 - b.1) / after);
+    let bend = (rise - fall) / (before + after);
+    let slope = (rise * after + fall * before) / (before + after);
+    (bend > 0.0).then(|| (b.0 + 0.5 * slope / bend, b.1 + 0.25 * slope * slope / bend))
+}
+
+// Nodes with the largest displacements, which suffice to find the deflection of a body.
+
+/// Nodes of a body, and their rows of the modes: three per node, each with nf entries.
+#[derive(Debug, Clone)]
+pub(super) struct ActiveNodes {
+    rows: Vec<f64>,
+    nf: usize,
+}
+
+impl ActiveNodes {
+    /// Takes the given nodes (from 0).
+    pub(super) fn new(body: &FlexBody, nodes: &[usize]) -> Self {
+        let nf = body.n_modes();
+        let rows = nodes.iter().flat_map(|i| 3 * i..3 * i + 3);
+        let row = |row: usize| (0..nf).map(move |j| body.modes().shape[(row, j)]);
+        Self { rows: rows.flat_map(row).collect(), nf }
+    }
+
+    /// Takes the node that moves most in each mode.
+    pub(super) fn of_modes(body: &FlexBody) -> Self {
+        let shape = body.modes().shape.as_ref();
+        let square = |i: usize, j: usize| (0..3).map(|k| shape[(3 * i + k, j)].powi(2)).sum::<f64>();
+        let most = (0..body.n_modes()).map(|j| largest_of(body.n_nodes(), |i| square(i, j)));
+        Self::new(body, &distinct(most.collect()))
+    }
+
+    /// Returns the displacements of the nodes.
+    pub(super) fn displacements<'s>(&'s self, q: &'s [f64]) -> impl Iterator<Item = Vector3<f64>> + 's {
+        let product = move |row: &[f64]| row.iter().zip(q).map(|(a, q)| a * q).sum::<f64>();
+        let displacement = move |rows: &[f64]| {
+            let mut rows = rows.chunks_exact(q.len());
+            Vector3::from_fn(|_, _| rows.next().map_or(0.0, product))
+        };
+        self.rows.chunks_exact(3 * self.nf.max(1)).map(displacement)
+    }
+
+    /// Returns the longest displacement.
+    pub(super) fn longest(&self, q: &[f64]) -> f64 {
+        longest(self.displacements(q))
+    }
+}
+
+/// Returns, for every mode, the nodes that move most along the principal directions of its displacements,
+/// which are the eigenvectors of sum_i psi_i psi_i' and turn with the body. Ascending, without duplicates.
+pub(super) fn along_principal_directions(body: &FlexBody) -> Vec<usize> {
+    let shape = &body.modes().shape;
+    let of_mode = |j: usize| {
+        let displacement = |i: usize| Vector3::from_fn(|k, _| shape[(3 * i + k, j)]);
+        let sum = (0..body.n_nodes()).fold(Matrix3::zeros(), |sum: Matrix3<f64>, i| {
+            sum + displacement(i) * displacement(i).transpose()
+        });
+        let directions = sum.symmetric_eigen().eigenvectors;
+        [0, 1, 2].map(|k| largest_of(body.n_nodes(), |i| directions.column(k).dot(&displacement(i)).abs()))
+    };
+    distinct((0..body.n_modes()).flat_map(of_mode).collect())
+}
+
+/// Returns the first index of the largest value.
+fn largest_of(count: usize, value: impl Fn(usize) -> f64) -> usize {
+    (1..count).fold(0, |best, i| if value(i) > value(best) { i } else { best })
+}
+
+fn distinct(mut nodes: Vec<usize>) -> Vec<usize> {
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
+}
+
+/// Returns the length of the longest displacement.
+pub(super) fn longest(displacements: impl Iterator<Item = Vector3<f64>>) -> f64 {
+    displacements.map(|d| d.norm()).fold(0.0, larger)
+}
+
+/// Returns the longest displacement of any node for the modal coordinates `q`.
+fn longest_of_all(shape: MatRef<'_, f64>, q: &[f64]) -> f64 {
+    let component = |row: usize| -> f64 { q.iter().enumerate().map(|(j, q)| shape[(row, j)] * q).sum() };
+    longest((0..shape.nrows() / 3).map(|i| Vector3::from_fn(|k, _| component(3 * i + k))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peak_between_instants_is_found() {
+        for (per_period, error) in [(6.5, 0.062), (20.0, 9e-4), (60.0, 1.2e-5)] {
+            for phase in 0..40 {
+                let wave = |t: f64| (t + 0.1 * f64::from(phase)).sin().abs();
+                let times: Vec<f64> =
+                    (0..200).map(|i| f64::from(i) * std::f64::consts::TAU / per_period).collect();
+                let peak = Peak::of(&times, times.iter().map(|&t| wave(t)));
+                assert!((peak.value - 1.0).abs() < error, "{per_period} {phase}: {peak:?}");
+                assert!(wave(peak.time) > 1.0 - 4.0 * error, "{peak:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_parabola_is_exact_at_uneven_instants() {
+        let times = [0.0, 0.5, 1.7, 2.1];
+        let peak = Peak::of(&times, times.iter().map(|t| (4.0 - (t - 1.3) * (t - 1.3)).sqrt()));
+        assert!((peak.value - 2.0).abs() < 1e-14 && (peak.time - 1.3).abs() < 1e-14, "{peak:?}");
+    }
+
+    #[test]
+    fn jumps_and_numbers_that_are_none_are_not_smoothed() {
+        let jump = Peak::of(&[0.0, 1.0, 1.0 + 1e-15, 2.0], [1.0, 2.0, 0.5, 0.5]);
+        assert_eq!((jump.value, jump.time), (2.0, 1.0));
+        assert!(Peak::of(&[0.0, 1.0, 2.0], [1.0, f64::NAN, 0.5]).value.is_nan());
+        assert!(Peak::of(&[0.0, 1.0, 2.0], [0.0; 3]).value == 0.0);
     }
 }

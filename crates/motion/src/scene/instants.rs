@@ -1,12 +1,14 @@
 //! Complete state of a motion at given times, for evaluations of the equations of all nodes.
 
 use super::prepared::{Prepared, damped};
-use super::{FramedScene, Scene};
+use super::{FramedScene, Recording, Scene, Scheme, Trace, simulate, trace};
 use crate::dynamics::Motion;
 use crate::integration::{Failure, ObserverEvent};
+use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
-use nalgebra::Vector3;
+use flexbody_linalg::context::Context;
+use nalgebra::{Matrix3, Vector3};
 
 /// State, accelerations and loads of a body at one time. Vectors are along the axes of the frame of the
 /// [`FramedScene`], about its origin.
@@ -84,4 +86,175 @@ fn see(
         qd: configuration.qd,
         qdd,
     })
+}
+
+// Check of a rotation rate for changes with finer integration steps.
+
+/// Largest relative error of a rate due to the error of the momentum, above which the run is repeated with
+/// finer steps. The limit is 1e4 times the error of a needle of 1:1e5, so that few bodies are simulated
+/// twice without need: with the default tolerance those beyond 1:1000.
+const MAX_RATE_ERROR: f64 = 1e-3;
+
+/// Error of the momentum per step of the conserving method, relative to the momentum: the method conserves
+/// the whole momentum, but not its component about an axis of the body.
+const CONSERVING_ERROR: f64 = 1e-9;
+
+/// Change of a rate by finer steps, relative to the largest value of this rate, above which a warning
+/// reports it.
+const MAX_RATE_CHANGE: f64 = 1e-2;
+
+/// Rate, relative to the largest rate about any axis, below which changes are not reported: a body that
+/// turns about a perpendicular axis has a rate about this axis that is rounding.
+const SMALL_RATE: f64 = 1e-3;
+
+/// Tolerance of the finer run, relative to that of the scene.
+const FINER_TOLERANCE: f64 = 1e-2;
+/// Step length of the finer run, relative to that of the scene.
+const FINER_STEP: f64 = 0.5;
+
+/// Finest tolerance requested from the adaptive method.
+const FINEST_TOLERANCE: f64 = 1e-13;
+
+/// Returns a warning if the rate about the axis of least inertia changes by more than 1 % with finer steps.
+///
+/// A rate is a momentum over an inertia. The momentum about each axis has the error of the whole momentum,
+/// and for the axis of a needle this error is divided by an inertia that may be ten decades smaller. The
+/// run is repeated with finer steps only if the error of a step could be significant. The rates of both
+/// runs are compared at the output times of `recording`.
+///
+/// * `recording`: the motion of `body` in `scene`.
+/// * `context`: its memory limits the second recording.
+///
+/// # Errors
+/// The errors of [`FramedScene::new`]. If the finer run would take too long, the result is `None`.
+pub fn unsettled_rate(
+    body: &FlexBody,
+    scene: &Scene,
+    recording: &Recording,
+    context: &Context<'_>,
+) -> Result<Option<Diagnostic>> {
+    if scene.prescribes() {
+        return Ok(None);
+    }
+    let framed = FramedScene::new(body, scene)?;
+    let inertia = framed.body.invariants().inertia();
+    let Some(finer) = finer(&inertia, scene, recording.scheme) else { return Ok(None) };
+    let Ok((finer, _)) = simulate(body, &finer, &context.without_listener()) else { return Ok(None) };
+    Ok(change(&inertia, recording, &finer))
+}
+
+/// Returns the scene with finer steps, if the error of a step could be significant for the rate about the
+/// axis of least inertia.
+fn finer(inertia: &Matrix3<f64>, scene: &Scene, scheme: Scheme) -> Option<Scene> {
+    let principal = inertia.symmetric_eigenvalues();
+    let (least, most) = (principal.min(), principal.max());
+    let (error, scheme) = match scheme {
+        Scheme::Adaptive { tolerance } => {
+            let finer = (FINER_TOLERANCE * tolerance).max(FINEST_TOLERANCE);
+            (tolerance, (finer < tolerance).then_some(Scheme::Adaptive { tolerance: finer })?)
+        }
+        Scheme::Conserving { order, step } => {
+            (CONSERVING_ERROR, Scheme::Conserving { order, step: Some(FINER_STEP * step?) })
+        }
+    };
+    let is_suspect = least > 0.0 && error * most > MAX_RATE_ERROR * least;
+    is_suspect.then(|| {
+        let mut finer = scene.clone();
+        finer.run.scheme = scheme;
+        finer
+    })
+}
+
+/// Returns a warning if finer steps change the rate about the axis of least inertia significantly.
+fn change(inertia: &Matrix3<f64>, recording: &Recording, finer: &Recording) -> Option<Diagnostic> {
+    let eigen = inertia.symmetric_eigen();
+    let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
+    let rates = |recording: &Recording| -> Vec<f64> {
+        recording.states.iter().map(|state| axis.dot(&state.omega)).collect()
+    };
+    let (coarse, fine) = (rates(recording), rates(finer));
+    let largest =
+        |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |most, value| most.max(value.abs()));
+    let of_axis = largest(&mut fine.iter().copied());
+    let of_all = largest(&mut finer.states.iter().map(|state| state.omega.norm()));
+    let differences: Vec<f64> = coarse.iter().zip(&fine).map(|(a, b)| a - b).collect();
+    let changed = largest(&mut differences.iter().copied());
+    if changed <= MAX_RATE_CHANGE * of_axis || changed <= SMALL_RATE * of_all {
+        return None;
+    }
+    let at = differences.iter().position(|d| d.abs() == changed)?;
+    let [x, y, z] = axis.map(|c| if c.abs() < 5e-4 { 0.0 } else { c }).into();
+    let ratio = eigen.eigenvalues.max() / eigen.eigenvalues.min();
+    let message = format!(
+        "the angular velocity about the axis of least inertia ({x:.3}, {y:.3}, {z:.3}) depends on the step: at time {:.4e} it is {:.4e}, with finer steps {:.4e}; the inertias differ by a factor of {ratio:.1e}",
+        recording.time[at], coarse[at], fine[at]
+    );
+    Some(Diagnostic::new(Code::RateUnsettled, message))
+}
+
+// Ratio of the stiffness of inertia to the stiffness of a body in a scene.
+
+/// Returns the largest ratio of the stiffness of inertia to the stiffness against any deformation of `body`
+/// during the motion of `scene`: an upper bound over the directions of spin and acceleration. Returns
+/// `None` if the body has no stiffness of inertia.
+///
+/// The bound at one time is |omega|^2 s_w + |omega'| s_alpha + |a| s_a with the shares s of
+/// [`InertiaShares`](flexbody_body::invariants::InertiaShares) and a = V' + omega x V - g.
+///
+/// # Errors
+/// The errors of [`simulate`](super::simulate).
+pub fn inertia_share(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<Option<f64>> {
+    let framed = FramedScene::new(body, scene)?;
+    let Some(inertia) = framed.body.inertia_stiffness() else { return Ok(None) };
+    let stiffness = framed.body.invariants().modal_stiffness();
+    let Some(shares) = inertia.shares(stiffness.as_ref()) else { return Ok(None) };
+    let (motion, _) = trace(body, scene, &context.without_listener())?;
+    let seen = instants(body, scene, &motion.time)?;
+    let at = seen.iter().map(|now| {
+        let acceleration = now.velocity_rate + now.omega.cross(&now.velocity) - now.gravity;
+        now.omega.norm_squared() * shares.spin_squared
+            + now.omega_rate.norm() * shares.angular_acceleration
+            + acceleration.norm() * shares.acceleration
+    });
+    Ok(Some(at.fold(0.0, f64::max)))
+}
+
+// Frequency of the modes that contribute to a motion.
+
+/// Ratio of neighbouring intervals above which differences are not taken: the samples are at a break.
+const MAX_INTERVAL_RATIO: f64 = 8.0;
+
+/// Returns the largest circular frequency of the modes that contribute to the motion: modes whose root of
+/// the elastic energy is at least this `part` of the tolerances. For a carried body the frequencies are not
+/// above those of the free body. A mode that merely follows slow forces does not oscillate at its natural frequency
+/// omega; the criterion is therefore the amplitude q'' / omega^2 that its acceleration q'' would have there.
+pub fn highest_excited_rate(body: &FlexBody, scene: &Scene, motion: &Trace, part: f64) -> f64 {
+    let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
+    let roots = rates.iter().zip(&motion.extremes.amplitudes).map(|(rate, amplitude)| rate * amplitude.abs());
+    let tolerance = &scene.requirements.tolerance.errors;
+    let least = part * tolerance.stress.min(tolerance.deflection) * roots.fold(0.0, f64::max);
+    let largest_accelerations = accelerations(motion, rates.len());
+    let counts =
+        |j: &usize| largest_accelerations[*j] > 0.0 && largest_accelerations[*j] / rates[*j] >= least;
+    (0..rates.len()).rev().find(counts).map_or(0.0, |last| rates[last])
+}
+
+/// Returns the largest |q''| of every mode, by differences between samples with similar spacing.
+fn accelerations(motion: &Trace, modes: usize) -> Vec<f64> {
+    let mut largest = vec![0.0f64; modes];
+    for (times, q) in motion.time.windows(3).zip(motion.q.windows(3)) {
+        let (before, after) = (times[1] - times[0], times[2] - times[1]);
+        if !(before > 0.0
+            && after > 0.0
+            && before < MAX_INTERVAL_RATIO * after
+            && after < MAX_INTERVAL_RATIO * before)
+        {
+            continue;
+        }
+        for (j, largest) in largest.iter_mut().enumerate() {
+            let slopes = [(q[1][j] - q[0][j]) / before, (q[2][j] - q[1][j]) / after];
+            *largest = largest.max(2.0 * (slopes[1] - slopes[0]).abs() / (before + after));
+        }
+    }
+    largest
 }

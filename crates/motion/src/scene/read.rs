@@ -1,14 +1,13 @@
 //! Reader of a scene from `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
 
-use super::contradictions::contradictions;
-use super::read_attitude::turning;
-use super::read_carried::carried;
-use super::read_columns::{HistoryFiles, columns_history};
-use super::read_numbers::{finite, place_of, positive};
+use super::read_columns::{HistoryFiles, columns_history, finite, place_of, positive};
 use super::read_requirements::{self, requirements};
-use super::read_values::{EVERY, axes, history, list, mode_number, place, transposed, vector};
+use super::read_values::{
+    EVERY, axes, direction, history, list, mode_number, place, transposed, turning, vector,
+};
 use super::{
-    Axes, History, Initial, Interpolation, Load, ModeStart, Run, Scene, Scheme, Spin, VectorHistory,
+    Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, ModeStart, Run, Scene, Scheme,
+    Spin, VectorHistory,
 };
 use crate::dynamics::Terms;
 use flexbody_base::diagnostic::Code;
@@ -276,12 +275,229 @@ fn spin(walk: &mut Walk<'_>, files: &HistoryFiles, table: &TomlTable, span: Rang
     Some(Spin { velocity: turning.velocity, axes: turning.axes, start: turning.start, hold: hold? })
 }
 
+// Reader of the table of a scene about the carrier of the body.
+
+const CARRIED: &[&str] = &["node", "interface", "spin", "translation"];
+const CARRIED_SPIN: &[&str] = &["axis", "axes", "through", "rate", "angular_velocity_from", "attitude_from"];
+const TRANSLATION: &[&str] = &[
+    "direction",
+    "displacement",
+    "velocity",
+    "acceleration",
+    "displacement_from",
+    "velocity_from",
+    "acceleration_from",
+];
+
+/// Reads the carrier. As in this whole module, a result `None` comes with a diagnostic in `found`.
+fn carried(
+    walk: &mut Walk<'_>,
+    files: &HistoryFiles,
+    table: &TomlTable,
+    span: Range<usize>,
+) -> Option<Carried> {
+    walk.known_keys(table, "[carried]", CARRIED);
+    let by = place(walk, table, span);
+    let mut part = |key: &str| {
+        let found = walk.table(table, key);
+        // The key exists but is no table; a diagnostic reports it.
+        if found.is_none() && table.contains_key(key) { Err(()) } else { Ok(found) }
+    };
+    let (spin_table, translation_table) = (part("spin"), part("translation"));
+    let spin = spin_table.map(|found| found.map(|(table, span)| carried_spin(walk, files, table, span)));
+    let translation =
+        translation_table.map(|found| found.map(|(table, span)| translation(walk, files, table, span)));
+    Some(Carried { by: by?, spin: transposed(spin.ok()?)?, translation: transposed(translation.ok()?)? })
+}
+
+fn carried_spin(
+    walk: &mut Walk<'_>,
+    files: &HistoryFiles,
+    table: &TomlTable,
+    span: Range<usize>,
+) -> Option<CarriedSpin> {
+    walk.known_keys(table, "[carried.spin]", CARRIED_SPIN);
+    let through = table.get("through").map(|value| vector(walk, "through", value));
+    let turning = turning(walk, files, table, span, "[carried.spin]")?;
+    Some(CarriedSpin {
+        velocity: turning.velocity,
+        axes: turning.axes,
+        start: turning.start,
+        through: transposed(through)?,
+    })
+}
+
+/// Function that makes a drive of a history.
+type Driven = fn(VectorHistory) -> Drive;
+
+/// Derivatives that can define a translation: the key of a history along a direction, the key of three
+/// columns, and the constructor of the drive.
+const DERIVATIVES: [(&str, &str, Driven); 3] = [
+    ("displacement", "displacement_from", Drive::Displacement),
+    ("velocity", "velocity_from", Drive::Velocity),
+    ("acceleration", "acceleration_from", Drive::Acceleration),
+];
+
+fn translation(
+    walk: &mut Walk<'_>,
+    files: &HistoryFiles,
+    table: &TomlTable,
+    span: Range<usize>,
+) -> Option<Drive> {
+    walk.known_keys(table, "[carried.translation]", TRANSLATION);
+    let all = DERIVATIVES
+        .into_iter()
+        .flat_map(|(along, columns, drive)| [(along, false, drive), (columns, true, drive)]);
+    let given: Vec<_> = all.filter(|(key, ..)| table.contains_key(*key)).collect();
+    let [(key, has_columns, drive)] = given[..] else {
+        let message = if given.is_empty() {
+            "[carried.translation] has none of `displacement`, `velocity` and `acceleration`"
+        } else {
+            "[carried.translation] has more than one of `displacement`, `velocity` and `acceleration`"
+        };
+        walk.wrong(span, message.to_owned());
+        return None;
+    };
+    let value = table.get(key)?;
+    let mut has_direction = true;
+    let history = if has_columns {
+        if let Some(direction) = table.get("direction") {
+            let message = format!(
+                "`direction` of [carried.translation] has no effect: `{key}` has all three components"
+            );
+            walk.complain(Code::SceneContradicts, direction.span(), message);
+            return None;
+        }
+        columns_history(walk, files, key, value, Interpolation::Cubic)?
+    } else {
+        if !table.contains_key("direction") {
+            walk.wrong(span, "key `direction` is missing in [carried.translation]".to_owned());
+        }
+        let direction = direction(walk, table, "direction");
+        let factor = history(walk, files, key, value)?;
+        // Check the history even if the direction is invalid.
+        has_direction = direction.is_some();
+        VectorHistory::Along { direction: direction.unwrap_or_default(), factor }
+    };
+    if matches!(drive(VectorHistory::nothing()), Drive::Displacement(_)) && !history.is_smooth() {
+        let message = format!(
+            "`{key}` is linear between its points, so that the velocity jumps there: give `interpolation` = \"cubic\", a sine or a ramp, or prescribe a velocity or an acceleration"
+        );
+        walk.wrong(value.span(), message);
+        return None;
+    }
+    has_direction.then(|| drive(history))
+}
+
+// Contradictions and repetitions within a scene.
+
+/// Adds a diagnostic for every entry that another part of the scene would silently override.
+fn contradictions(walk: &mut Walk<'_>, top: &TomlTable) {
+    let spin = table_of(top, "spin");
+    let holds = spin
+        .and_then(|spin| spin.get("hold"))
+        .is_some_and(|value| matches!(value.get_ref(), DeValue::Boolean(true)));
+    let carried = top.contains_key("carried");
+    let by = match (carried, spin) {
+        (true, _) => Some("[carried] prescribes the motion of the body"),
+        (_, Some(_)) => Some("[spin] prescribes the rotation"),
+        _ => None,
+    };
+    if let (true, Some(value)) = (carried, top.get("spin")) {
+        let message = "[spin] contradicts [carried], which prescribes the motion of the body: give [carried.spin] instead";
+        walk.complain(Code::SceneContradicts, value.span(), message.to_owned());
+    }
+    if let Some(initial) = table_of(top, "initial") {
+        let mut refuse = |key: &str, by: Option<&str>| {
+            if let (Some(value), Some(by)) = (initial.get(key), by) {
+                let message = format!("`{key}` of [initial] has no effect: {by}");
+                walk.complain(Code::SceneContradicts, value.span(), message);
+            }
+        };
+        refuse("angular_velocity", by);
+        let carried_spin = table_of(top, "carried").and_then(|carried| table_of(carried, "spin"));
+        let has_attitude =
+            |table: Option<&TomlTable>| table.is_some_and(|table| table.contains_key("attitude_from"));
+        let by_attitude = (has_attitude(spin) || has_attitude(carried_spin))
+            .then_some("`attitude_from` prescribes the attitude at the start");
+        refuse("rotation", by_attitude);
+        refuse("velocity", by.filter(|_| carried).or(holds.then_some("`hold` of [spin] holds the body")));
+        if !initial.contains_key("angular_velocity") {
+            refuse("axes", Some("[initial] has no `angular_velocity` in these axes"));
+        }
+        if initial.contains_key("mode") {
+            refuse("deformation", Some("[[initial.mode]] prescribes the deformation at the start"));
+        }
+        twice(walk, initial.get("mode"), "mode", numbered);
+    }
+    let is_list = |table: &TomlTable, key: &str| {
+        table.get(key).is_some_and(|value| matches!(value.get_ref(), DeValue::Array(_)))
+    };
+    for (name, keys) in
+        [("motion", &["angular_velocity", "angular_acceleration"][..]), ("attachment", &["inertia"])]
+    {
+        let Some(table) = table_of(top, name) else { continue };
+        if let (Some(value), false) = (table.get("axes"), keys.iter().any(|key| is_list(table, key))) {
+            let message = format!("`axes` of [{name}] has no effect: no value in [{name}] has components");
+            walk.complain(Code::SceneContradicts, value.span(), message);
+        }
+    }
+    let limits = table_of(top, "limits");
+    twice(walk, limits.and_then(|limits| limits.get("mode")), "mode", numbered);
+    twice(walk, top.get("watch"), "watched", placed);
+    let terms = table_of(top, "run").and_then(|run| run.get("terms"));
+    twice(walk, terms, "term", |value| match value.get_ref() {
+        DeValue::String(text) => Some(text.to_string()),
+        _ => None,
+    });
+}
+
+fn table_of<'t>(top: &'t TomlTable<'_>, key: &str) -> Option<&'t TomlTable<'t>> {
+    match top.get(key)?.get_ref() {
+        DeValue::Table(table) => Some(table),
+        _ => None,
+    }
+}
+
+/// Adds a diagnostic for items of a list with equal `name`.
+fn twice(
+    walk: &mut Walk<'_>,
+    list: Option<&Value<'_>>,
+    what: &str,
+    name: impl Fn(&Value<'_>) -> Option<String>,
+) {
+    let Some(DeValue::Array(items)) = list.map(|list| list.get_ref()) else { return };
+    let mut seen = Vec::new();
+    for item in items.iter() {
+        let Some(name) = name(item) else { continue };
+        if seen.contains(&name) {
+            walk.complain(Code::SceneContradicts, item.span(), format!("{what} {name} is listed twice"));
+        }
+        seen.push(name);
+    }
+}
+
+fn numbered(value: &Value<'_>) -> Option<String> {
+    let DeValue::Table(table) = value.get_ref() else { return None };
+    Some(integer(table.get("number")?)?.to_string())
+}
+
+fn placed(value: &Value<'_>) -> Option<String> {
+    let DeValue::Table(table) = value.get_ref() else { return None };
+    match (table.get("node"), table.get("interface")) {
+        (Some(node), None) => Some(format!("node {}", integer(node)?)),
+        (None, Some(value)) => match value.get_ref() {
+            DeValue::String(text) => Some(format!("interface {text}")),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::read_attitude::ATTITUDE;
-    use super::super::read_carried::{CARRIED, CARRIED_SPIN, TRANSLATION};
     use super::super::read_columns::{COLUMN, COLUMNS};
-    use super::super::read_values::HISTORIES;
+    use super::super::read_values::{ATTITUDE, HISTORIES};
     use super::*;
 
     /// The schema and the reader name the same keys.
@@ -310,7 +526,7 @@ mod tests {
         let required = required.iter().map(|(name, keys)| (format!("/properties/{name}/properties"), *keys));
         let top = [TOP, &read_requirements::TABLES.map(|(name, _)| name)].concat();
         let of_case = super::super::read_cases::known_keys();
-        let of_variation = super::super::read_variations::known();
+        let of_variation = super::super::read_cases::variation_keys();
         let lists = lists.into_iter().map(|(pointer, keys)| (pointer.to_owned(), keys));
         let whole = [
             ("/properties", &top[..]),

@@ -1,10 +1,9 @@
 //! Reader of the tables of a scene with the requirements for the body.
 
-use super::Axes;
-use super::PerQuantity;
-use super::read_numbers::{finite, place_of, positive};
+use super::read_columns::{finite, place_of, positive};
 use super::read_values::{axes, list, mode_number, vector};
 use super::requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
+use super::{Axes, PerQuantity};
 use flexbody_base::text::walk::{TomlTable, Value, Walk, integer, real};
 use flexbody_model::{DampingRatios, damping_bands};
 use nalgebra::{Matrix3, Vector3};

@@ -1,11 +1,11 @@
-//! The simulation of a scene.
+//! The simulation of a scene, and its results.
 
-use super::conditions::MeanAxes;
 use super::extremes::Survey;
+use super::framed_scene::{UNCOUPLED, is_uncoupled};
 use super::prepared::{PARTS, Prepared, damped};
-use super::scene_rows::SceneRows;
-use super::{Extremes, FramedScene, Path, Recording, Scene, Setting};
-use crate::dynamics::{BodyPoint, Evaluation, Motion};
+use super::recovered::SceneRows;
+use super::{Drift, Extremes, FramedScene, RecoveredMotion, Scene, Scheme};
+use crate::dynamics::{Balance, BodyPoint, Configuration, Evaluation, Motion, Orientation, RotationVector};
 use crate::integration::{Failure, ObserverEvent, Work};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -13,7 +13,7 @@ use flexbody_base::memory::refuse_beyond;
 use flexbody_body::flex_body::{FlexBody, SOFTENING, axis_in_words};
 use flexbody_linalg::context::Context;
 use flexbody_model::LoadKind;
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, DVector, Vector3};
 
 /// Deflection, relative to the extent of the body, up to which linear elasticity holds.
 const LINEAR_RANGE: f64 = 0.1;
@@ -240,4 +240,202 @@ fn softening(body: &FlexBody, extremes: &Extremes) -> Option<Diagnostic> {
 /// Returns the value rounded to four digits, for messages.
 fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
+}
+
+/// Motion of a body at the output times of its scene. Numbers are in the units of the body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the model of the body.
+    pub body: String,
+    /// Integration scheme, with the actual step length.
+    pub scheme: Scheme,
+    /// Output times.
+    pub time: Vec<f64>,
+    /// State at every output time.
+    pub states: Vec<Configuration>,
+    /// Energies, momenta, work and impulses at every output time.
+    pub balances: Vec<Balance>,
+    /// Frame of the numbers, and the conditions that the body is exposed to.
+    pub setting: Setting,
+    /// Force and torque of the prescribed motion about the origin of the frame, axes of the model; `None`
+    /// without prescribed motion.
+    pub reactions: Option<Vec<(Vector3<f64>, Vector3<f64>)>>,
+    /// Torque of the reference conditions about the origin of the frame, axes of the model; their force is
+    /// zero. `None` if the frame is no mean-axis frame: `reactions` then contain everything.
+    pub conditions: Option<Vec<Vector3<f64>>>,
+    /// Paths of the watched points.
+    pub paths: Vec<Path>,
+    /// Steps and evaluations of the integration.
+    pub work: Work,
+    /// Extremes of the motion, including times between the output times.
+    pub extremes: Extremes,
+    /// Recoveries of the body; `None` for a body without.
+    pub recovered: Option<RecoveredMotion>,
+}
+
+/// Frame of a recording, and the conditions that the body is exposed to.
+///
+/// The frame of a recording is that of the scene ([`FramedScene`](super::FramedScene)). Its axes are those of the model
+/// and turn with the body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// Name of the interface or node that carries the body.
+    pub carrier: Option<String>,
+    /// Origin of the frame in model coordinates: the centre of mass of the undeformed body, or the
+    /// reference point of the carrier.
+    pub origin: Vector3<f64>,
+    /// Gravity at the start, axes of the model.
+    pub gravity_model: Option<Vector3<f64>>,
+    /// Eigenvalues of the carried body; empty without a carrier. Unit: 1/time^2.
+    pub eigenvalues: Vec<f64>,
+}
+
+impl Setting {
+    /// Creates the setting of a body in its framed scene.
+    pub(super) fn new(body: &FlexBody, scene: &Scene) -> Self {
+        let start = RotationVector(scene.initial.rotation).axes();
+        let carrier = scene.carried.as_ref().map(|carried| carried.by.to_string());
+        let eigenvalues = carrier.as_ref().and_then(|_| body.eigenvalues_in_frame());
+        Self {
+            carrier,
+            origin: body.frame().origin,
+            gravity_model: scene.gravity.map(|gravity| start.tr_mul(&gravity)),
+            eigenvalues: eigenvalues.unwrap_or_default(),
+        }
+    }
+
+    /// Returns a description of the origin of the frame.
+    pub fn origin_in_words(&self) -> String {
+        match &self.carrier {
+            Some(carrier) => format!("reference point of {carrier}"),
+            None => "centre of mass of the undeformed body".to_owned(),
+        }
+    }
+}
+
+/// Smallest deformation that is compared: errors are relative to the largest deformation of the motion, but
+/// at least to this one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resolution {
+    /// Smallest deflection. Unit: length.
+    pub deflection: f64,
+    /// Root of the smallest elastic energy: the energy of the mode that needs least of it to deflect some
+    /// node by `deflection`.
+    pub root_energy: f64,
+}
+
+impl Resolution {
+    /// Default of the smallest deflection, relative to the largest extent of the body: 10 micrometres per
+    /// metre.
+    const SMALLEST_DEFLECTION: f64 = 1e-5;
+
+    /// Creates the resolution for `body`; `least` is the smallest deflection, if given.
+    pub fn new(body: &FlexBody, least: Option<f64>) -> Self {
+        let deflection = least.unwrap_or(Self::SMALLEST_DEFLECTION * body.extent());
+        let modes = &body.modes().eigenvalue;
+        let root_energy =
+            |(j, lambda): (usize, &f64)| (0.5 * lambda).sqrt() * deflection / body.largest_displacement(j);
+        let root_energy = modes.iter().enumerate().map(root_energy).fold(f64::INFINITY, f64::min);
+        Self { deflection, root_energy }
+    }
+}
+
+/// Path of a point of the body. The axes of the model turn with the body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// Name of the point in the scene.
+    pub name: String,
+    /// Position at every output time, world axes.
+    pub place: Vec<Vector3<f64>>,
+    /// Deflection from the undeformed body at every output time, axes of the model (turning with the body).
+    pub deflection: Vec<Vector3<f64>>,
+    /// Velocity of the position at every output time, world axes.
+    pub velocity: Vec<Vector3<f64>>,
+    /// Acceleration of the position at every output time, world axes; where a load or motion jumps, the
+    /// value after the jump.
+    pub acceleration: Vec<Vector3<f64>>,
+}
+
+impl Recording {
+    /// Returns the drift of energy and momenta.
+    pub fn drift(&self) -> Drift {
+        self.extremes.drift
+    }
+}
+
+impl Path {
+    /// Creates a path without positions.
+    pub(super) fn new(name: String) -> Self {
+        let none = Vec::new;
+        Self { name, place: none(), deflection: none(), velocity: none(), acceleration: none() }
+    }
+}
+
+// Reactions of the reference conditions of a body: the forces that keep its frame in the position that the
+// conditions define.
+
+/// Reaction of mean axes (Tisserand), the reference conditions of free-surface modes.
+///
+/// Displacements u of the nodes refer to a frame that conditions C u = 0 tie to the body, with multipliers
+/// lambda in the equations of all nodes (theory 6.10). C'lambda has no resultant force and the torque about
+/// the origin of the frame
+///
+/// ```text
+/// sum_i u_i x (K u + D u')_i = Q'W3 m_ff^-1 (K_ff q + D_ff qd)
+/// ```
+///
+/// (theory 6.12): the moment of linear elastic and damping forces about the deformed body. It does no work
+/// and acts on no mode. It measures the difference, of second order in q, between elasticity that is linear
+/// in a floating frame and elasticity that turns with the material. The right side equals the left one if
+/// the modes are eigenvectors (K Psi = M Psi Lambda); for other shapes it contains the part of the elastic
+/// forces in the span of the modes.
+#[derive(Debug, Clone)]
+struct MeanAxes {
+    /// Blocks of W3 for the axes about which the body turns.
+    w3: Vec<(usize, DMatrix<f64>)>,
+    /// m_ff^-1 K_ff and m_ff^-1 D_ff.
+    stiffness: DMatrix<f64>,
+    damping: DMatrix<f64>,
+}
+
+impl MeanAxes {
+    /// Creates the reaction for `body`. Returns `None` if its frame is no mean-axis frame (C1 and C2 do not
+    /// vanish, as for a carried body), if it does not hold W3, or if its mass matrix is general: couples on
+    /// nodes that turn are no sums over the invariants.
+    pub(super) fn new(body: &FlexBody) -> Option<Self> {
+        let (invariants, nf) = (body.invariants(), body.n_modes());
+        let w3 = invariants.w3()?;
+        if invariants.general().is_some() || !is_uncoupled(body) || !turns_no_mode(body) {
+            return None;
+        }
+        let m = invariants.modal_mass();
+        let mass = DMatrix::from_fn(nf, nf, |i, j| m[(i, j)]).cholesky()?;
+        let (k, d) = (invariants.modal_stiffness(), body.damping());
+        let axes = if body.dimension() == 2 { 2..3 } else { 0..3 };
+        Some(Self {
+            w3: axes.map(|a| (a, DMatrix::from_fn(nf, nf, |i, j| w3[(a * nf + i, j)]))).collect(),
+            stiffness: mass.solve(&DMatrix::from_fn(nf, nf, |i, j| k[(i, j)])),
+            damping: mass.solve(&DMatrix::from_fn(nf, nf, |i, j| d[(i, j)])),
+        })
+    }
+
+    /// Returns the torque about the origin of the frame, axes of the frame.
+    pub(super) fn torque(&self, q: &[f64], qd: &[f64]) -> Vector3<f64> {
+        let (q, qd) = (DVector::from_column_slice(q), DVector::from_column_slice(qd));
+        let internal = &self.stiffness * &q + &self.damping * qd;
+        let mut torque = Vector3::zeros();
+        self.w3.iter().for_each(|(a, w3)| torque[*a] = q.dot(&(w3 * &internal)));
+        torque
+    }
+}
+
+/// Returns true if angular accelerations of the frame excite no mode.
+fn turns_no_mode(body: &FlexBody) -> bool {
+    let invariants = body.invariants();
+    let (c2, inertia, modal) = (invariants.c2(), invariants.inertia(), invariants.modal_mass());
+    let largest = inertia.trace();
+    (0..body.n_modes())
+        .all(|j| (0..3).all(|k| c2[(k, j)].abs() <= UNCOUPLED * (largest * modal[(j, j)]).sqrt()))
 }

@@ -5,7 +5,6 @@ mod compressed;
 mod enrich;
 mod estimate;
 mod motion_bodies;
-mod motion_shapes;
 mod residual;
 mod truncated_equations;
 mod truncated_motion;

@@ -10,7 +10,6 @@ mod inversion;
 mod kinetics;
 mod motion;
 mod state;
-mod stiff;
 
 pub use conditions::{NodalPoint, ReferenceConditions};
 pub use equations::{NodalEquations, NodalError};

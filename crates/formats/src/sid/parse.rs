@@ -1,7 +1,6 @@
 //! Structure of the file: `part`, `new modal`, `refmod`, `frame` and the objects.
 
-use super::head::Head;
-use super::lines::{Line, Lines};
+use super::lines::{Head, Line, Lines};
 use super::taylor::{ModeIndex, Taylor};
 use crate::import::digits::Digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
