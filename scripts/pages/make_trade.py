@@ -289,14 +289,17 @@ def time_in_words(seconds):
 
 
 def drawn(told, times, name):
-    """The figure: error and seconds of the runs in Exudyn."""
+    """The figure: error and seconds of the runs in Exudyn. Returns its line in the page; empty if Exudyn has no run of a candidate."""
     points = []
     for row in shown(told):
         one = times.get(row["number"])
         seconds = one.median("exudyn") if one else None
         if seconds:
             points.append((seconds, 100 * one.errors["exudyn"], described(row), bool(row["lumped"]), row["number"] == told["recommended"]))
+    if not points:
+        return []
     (ROOT / "docs/images" / f"trade_{name}.svg").write_text(figure(told["scene"], points))
+    return [f"![error over seconds](../images/trade_{name}.svg)"]
 
 
 def summary(told, times):
@@ -334,10 +337,10 @@ def scene_part(program, name, model, modes):
         took = time.perf_counter() - begin
         told = json.loads((folder / "trade.json").read_text())
         times = timed(program, folder, told, (path, read_scene(path)), manifest)
-    drawn(told, times, name)
+    picture = drawn(told, times, name)
     verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:]).replace(f"{ROOT}/", "")
     said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s."
-    parts = [f"## {told['scene']}", said, verdict, measured(told, times), f"![error over seconds](../images/trade_{name}.svg)"]
+    parts = [f"## {told['scene']}", said, verdict, measured(told, times), *picture]
     return "\n\n".join(parts) + "\n\n", summary(told, times), bases(told)
 
 

@@ -25,6 +25,8 @@ FEWEST, INSTANTS = 40, 20_000
 TRIALS, CLOSE = 5, 1.3
 # Ratio of error to tolerance that the integration may add where a body exceeds the tolerances anyway, relative to the error of the body.
 SHARE = 0.1
+# Change of the error with the steps, relative to it, below which the integration no longer matters.
+SETTLED = 0.02
 # A scene that names no such frequency is followed up to this many times the first one of the body.
 WITHOUT_BAND = 5
 # The Runge-Kutta method of order 4 is stable up to 2.83 / omega.
@@ -508,7 +510,7 @@ def cheapest(program, measure, task, worst, most, folder):
     """
     allowed = most if worst <= most else (1 + SHARE) * worst
     room = max(allowed - worst, SHARE * allowed)
-    steps, best, too_few = max(task.first_steps, program.fewest), None, program.fewest - 1
+    steps, best, too_few, last = max(task.first_steps, program.fewest), None, program.fewest - 1, np.inf
     for _ in range(TRIALS):
         try:
             run = program.run(steps)
@@ -519,6 +521,10 @@ def cheapest(program, measure, task, worst, most, folder):
             best = run, error
         else:
             too_few = max(too_few, steps)
+        if error > allowed and abs(error - last) < SETTLED * error:
+            # More steps change nothing: the program lacks a term of the body.
+            break
+        last = error
         added = abs(error - worst) if np.isfinite(error) else np.inf
         factor = np.clip((added / room) ** (1 / program.order) * 1.1, 0.25, 4.0)
         wanted = int(np.ceil(steps * factor))
