@@ -22,7 +22,7 @@ mod transformations;
 const FEW: u64 = 30;
 
 /// Number of crossings of the slow test: within three minutes on two cores.
-const MANY: u64 = 200;
+const MANY: u64 = 100;
 
 #[test]
 fn crossings_keep_the_physics() {
