@@ -119,8 +119,8 @@ pub use api::{
     ComparisonRow, Conversion, ConvertOptions, Coupling, ExportOptions, FlexBody, FrameChoice,
     GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, LoadedHistory, Matrix,
     MeasuredRun, Model, ModelBuilder, Motion, MotionHistory, PointPath, Progress, Quantity, Ranges, Recipe,
-    Recovered, RecoveredRows, RecoveryRow, ReportFormat, Response, ResponseOptions, Scene, Selection,
-    SourceFile, SparseMatrix, Step, Tolerances, TransferFunction, unit_names,
+    RecipeStep, Recovered, RecoveredRows, RecoveryRow, ReportFormat, Response, ResponseOptions, Scene,
+    Selection, SourceFile, SparseMatrix, Tolerances, TransferFunction, unit_names,
 };
 #[cfg(feature = "cli")]
 pub use api::{Batch, BatchOptions, BatchedBody};

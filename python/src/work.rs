@@ -52,7 +52,7 @@ pub fn run<T: Send + 'static>(
     let (send, mut receive) = sync_channel(1);
     let with_warnings = Arc::clone(&stopped);
     let worker = std::thread::Builder::new().name("flexbody".to_owned()).stack_size(STACK);
-    worker.spawn(move || {
+    let started = worker.spawn(move || {
         let listener = |_: flexbody::Progress<'_>| {
             if with_warnings.load(Ordering::Relaxed) {
                 ControlFlow::Break(())
@@ -62,7 +62,11 @@ pub fn run<T: Send + 'static>(
         };
         // The result is dropped if the caller was interrupted.
         let _ = send.send(catch_unwind(AssertUnwindSafe(|| work(&listener))));
-    })?;
+    });
+    if let Err(error) = started {
+        let message = format!("not enough memory to start a thread: {error}");
+        return Err(exception(py, &Diagnostic::new(Code::MemoryShort, message).into()));
+    }
     loop {
         let outcome;
         (outcome, receive) = py.detach(move || (receive.recv_timeout(INTERVAL), receive));

@@ -38,7 +38,7 @@ pub use export::ExportOptions;
 pub use flexbody_body::basis::BasisKind as Basis;
 pub use flexbody_body::invariants::{BodyFrame, FrameChoice};
 pub use flexbody_eigen::Accuracy;
-pub use flexbody_input::{Recipe, Step};
+pub use flexbody_input::{Recipe, Step as RecipeStep};
 pub use flexbody_model::{Coupling, Quantity, RecoveryRow};
 pub use flexbody_report::{ComparisonFormat, ComparisonRow, Tolerances};
 #[cfg(feature = "hdf5")]
