@@ -48,7 +48,8 @@ pub(super) fn read_answers(
     units: &UnitSystem,
 ) -> Found<(RecoveryOperator, Vec<Diagnostic>)> {
     let values = read_values(files.answers)?;
-    let shapes = match ShapeArchive::recognises(files.displacements) {
+    let is_archive = ShapeArchive::recognises(files.displacements);
+    let shapes = match is_archive {
         true => ShapeArchive::read(files.displacements)?,
         false => ShapeArchive::of_results(&read_values(files.displacements)?, files.displacements)?,
     };
@@ -66,6 +67,8 @@ pub(super) fn read_answers(
         Some(printed) => dat::read(printed)?.energies().map(|energies| (energies, printed)),
         None => values.energies().map(|energies| (energies, files.answers)),
     };
+    // An FE program prints no strain energies of modes that it has chosen itself.
+    let energies = energies.filter(|(energies, _)| is_archive || energies.len() == count);
     if let Some((energies, file)) = energies.as_ref().filter(|(energies, _)| energies.len() != count) {
         let message = format!("strain energies are those of {} steps, expected {count}", energies.len());
         let help = "remove the file if it belongs to another run";
