@@ -43,8 +43,6 @@ def own_modes(flexbody, ccx, folder):
     steps = deck[deck.index("** step 11") :]
     (place / "own.inp").write_text(deck[: deck.index("** step 1:")] + modes + steps.replace("NSET=FLEXBODY_WATCHED, ", ""))
     subprocess.run([ccx, "-i", "own"], cwd=place, check=True, capture_output=True)
-    # Of a frequency step CalculiX prints no strain energies.
-    (place / "own.dat").unlink()
     manifest = (place / "model.toml").read_text().replace('"ask.frd"', '"own.frd"\ndisplacements = "own.frd"')
     (place / "own.toml").write_text(manifest)
     options = ["--modes", "10", "--frame", "com", "--lumped", "none", "--quiet"]
