@@ -158,6 +158,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB724", "crates/formats/tests/formats/stresses.rs"),
     ("FB725", "crates/formats/tests/formats/stresses.rs"),
     ("FB556", "crates/motion/tests/motion/recovery.rs"),
+    ("FB560", "crates/study/tests/study/recovery_limits.rs"),
     ("FB602", "tests/program/limits.rs"),
     ("FB605", "tests/program/front_door.rs"),
     ("FB606", "python/tests/test_running.py"),

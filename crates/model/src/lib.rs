@@ -52,5 +52,5 @@ pub use raw::{RawMatrix, RawModel, RawModes, RawShapes};
 pub use recovery::{AnsweredShapes, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
 pub use rows::{Rows, centre_and_length, extents, rigid_axes, rigid_count, rigid_fields, span};
 pub use separate_bodies::check_bodies;
-pub use stress_points::StressPoint;
+pub use stress_points::{StressPoint, pascals};
 pub use surface::{Skin, SurfaceMesh, skin};

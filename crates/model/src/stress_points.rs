@@ -107,6 +107,11 @@ const UNITS: [(&str, f64); 12] = [
     ("lbf/in^2", 6_894.757_293_168_361),
 ];
 
+/// Returns one unit of stress in pascals; `None` for an unknown unit.
+pub fn pascals(unit: &str) -> Option<f64> {
+    UNITS.iter().find(|(name, _)| *name == unit).map(|(_, pascals)| *pascals)
+}
+
 /// Adds a warning for each recovery whose stresses do not fit the stiffness of the model.
 ///
 /// * `density`: of the solid elements, in the units of the model; without it nothing is compared.

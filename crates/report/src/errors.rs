@@ -2,17 +2,19 @@
 
 use super::numbers::{counted, significant};
 use flexbody_base::numbers::joined_runs;
-use flexbody_motion::scene::OutputErrors;
+use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::reference::{MAX_REFERENCE_ERROR, ReferenceError};
 use flexbody_study::selection::VariedSelection;
 #[cfg(feature = "hdf5")]
 use flexbody_study::trade::{InCase, Trade, TradeVariation};
 use serde::Serialize;
 
-/// Returns the error of a quantity in words: `0.001 rad` for the attitude, `1 %` for other quantities.
+/// Returns the error of a quantity in words: `0.001 rad` for the attitude, `60 % of its limit` for recoveries, `1 %` for
+/// other quantities.
 pub(super) fn error_in_words(quantity: &str, error: f64, digits: usize) -> String {
     match quantity {
         "attitude" => format!("{} rad", significant(error, digits)),
+        "recovery" => format!("{} % of its limit", significant(100.0 * error, digits)),
         _ => format!("{} %", significant(100.0 * error, digits)),
     }
 }
@@ -20,6 +22,14 @@ pub(super) fn error_in_words(quantity: &str, error: f64, digits: usize) -> Strin
 /// Returns errors with three digits: `attitude 1e-4 rad, deflection 0.2 %, stress 0.4 %`.
 pub(super) fn errors_in_words(errors: &OutputErrors) -> String {
     errors_to_digits(errors, 3)
+}
+
+/// Returns the tolerances of a scene in words; a recovery has a limit of its own.
+pub(super) fn tolerances_in_words(tolerances: &PerQuantity<f64>) -> String {
+    let stated =
+        OutputErrors { recovery: None, ..tolerances.map(|limit| limit.is_finite().then_some(limit)) };
+    let words = errors_in_words(&stated);
+    if tolerances.recovery.is_finite() { format!("{words}, recoveries within their limits") } else { words }
 }
 
 /// Returns the known errors in words with the given number of significant digits.

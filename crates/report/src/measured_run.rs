@@ -2,7 +2,7 @@
 
 use super::Format;
 use super::document::{Block, Document, State, Term};
-use super::errors::errors_in_words;
+use super::errors::{errors_in_words, tolerances_in_words};
 use super::numbers::{counted, significant};
 use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
@@ -93,7 +93,7 @@ impl<'a> MeasuredRunFacts<'a> {
             Term::new("Run", run),
             Term::new("Reference", reference),
             Term::new("Errors", format!("{}: {worst}", errors_in_words(&self.errors))),
-            Term::new("Tolerances", errors_in_words(&self.tolerance.errors.map(Some))),
+            Term::new("Tolerances", tolerances_in_words(&self.tolerance.errors)),
         ];
         terms.extend(growth);
         let head = format!("{}{}.", verdict[..1].to_uppercase(), &verdict[1..]);

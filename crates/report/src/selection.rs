@@ -3,7 +3,8 @@
 use super::Format;
 use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
 use super::errors::{
-    ReferenceErrorFacts, VariationFacts, errors_in_words, in_words, part_in_words, ranges, reference_in_words,
+    ReferenceErrorFacts, VariationFacts, errors_in_words, in_words, part_in_words, ranges,
+    reference_in_words, tolerances_in_words,
 };
 use super::numbers::significant;
 use super::run_data::RunData;
@@ -102,6 +103,9 @@ struct ShareFacts {
     amplitude: f64,
     deflection: f64,
     stress: f64,
+    /// Contribution to a recovery over its limit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    recovery: Option<f64>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -193,6 +197,7 @@ impl<'a> SelectionFacts<'a> {
             amplitude: share.amplitude,
             deflection: share.deflection,
             stress: share.stress,
+            recovery: share.recovery,
         });
         let significance = selection.significances.iter().map(|one| SignificanceFacts {
             term: one.term,
@@ -304,7 +309,7 @@ impl<'a> SelectionFacts<'a> {
                 Block::Table(cases_table(&self.cases)),
             ]);
         }
-        let tolerances = errors_in_words(&self.tolerance.map(Some));
+        let tolerances = tolerances_in_words(&self.tolerance);
         let input = |input: &InputFacts<'_>| {
             let value = significant(input.value, 4);
             Term::new(input.name, format!("{}: {}", significant(input.value, 5), input.source))
@@ -406,22 +411,34 @@ impl<'a> SelectionFacts<'a> {
 
     fn shares(&self) -> Table {
         let mut shares = self.modes.shares.clone();
-        shares.sort_by(|a, b| b.stress.max(b.deflection).total_cmp(&a.stress.max(a.deflection)));
+        let size = |one: &ShareFacts| one.recovery.unwrap_or_else(|| one.stress.max(one.deflection));
+        shares.sort_by(|a, b| size(b).total_cmp(&size(a)));
+        let with_recoveries = shares.iter().any(|share| share.recovery.is_some());
         shares.truncate(MODES_SHOWN);
         let row = |share: &ShareFacts| {
             let verdict = if share.kept { "kept" } else { "dropped" };
             let [deflection, stress] =
                 [share.deflection, share.stress].map(|part| significant(100.0 * part, 3));
             let amplitude = significant(share.amplitude, 3);
-            cells([share.number.to_string(), amplitude, deflection, stress, verdict.to_owned()])
+            let recovery = share.recovery.map(|part| significant(100.0 * part, 3));
+            let numbers = [share.number.to_string(), amplitude, deflection, stress];
+            numbers.into_iter().chain(recovery).chain([verdict.to_owned()]).map(Inline::from).collect()
         };
-        let heads = ["Mode", "Amplitude", "Deflection, %", "Stress, %", "Verdict"];
+        let recovery = with_recoveries.then_some("Recovery, % of limit");
+        let heads: Vec<&str> = ["Mode", "Amplitude", "Deflection, %", "Stress, %"]
+            .into_iter()
+            .chain(recovery)
+            .chain(["Verdict"])
+            .collect();
+        let of_recovery =
+            if with_recoveries { "; contribution to the recoveries, over their limits" } else { "" };
         let caption = format!(
-            "Modes with the largest contributions ({} of {}): largest amplitude, and deflection and stress of the mode alone relative to all modes together.",
+            "Modes with the largest contributions ({} of {}): largest amplitude, and deflection and stress of the mode alone relative to all modes together{of_recovery}.",
             shares.len(),
             self.modes.of
         );
-        Table::new(caption, heads, &[4], shares.iter().map(row).collect())
+        let text = [heads.len() - 1];
+        Table::new(caption, heads, &text, shares.iter().map(row).collect())
     }
 }
 

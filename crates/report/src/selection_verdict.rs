@@ -61,10 +61,13 @@ fn asked(selection: &Selection) -> String {
             cases_in_words(selection)
         );
     }
-    let parts = selection.tolerance.named().map(|(name, most)| {
-        let name = if name == "reaction" { "reactions" } else { name };
-        format!("{} in {name}", error_in_words(name, most, 2))
-    });
+    let stated = selection.tolerance.named().into_iter().filter(|(_, most)| most.is_finite());
+    let part = |(name, most): (&str, f64)| match name {
+        "recovery" => "the limits of the recoveries".to_owned(),
+        "reaction" => format!("{} in reactions", error_in_words(name, most, 2)),
+        _ => format!("{} in {name}", error_in_words(name, most, 2)),
+    };
+    let parts: Vec<String> = stated.map(part).collect();
     format!("{}{}: errors of at most {}", selection.scene, cases_in_words(selection), parts.join(", "))
 }
 

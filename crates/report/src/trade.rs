@@ -2,7 +2,7 @@
 
 use super::chart::{Axis, Chart, Mark, Panel, Series};
 use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
-use super::errors::{ReferenceErrorFacts, VariationFacts, errors_in_words, ranges, reference_in_words};
+use super::errors::{ReferenceErrorFacts, VariationFacts, ranges, reference_in_words, tolerances_in_words};
 use super::numbers::{bytes, counted, duration, significant, times};
 use super::run_data::RunData;
 use super::trade_verdict::{NodalFacts, TradeCaseFacts, case_facts, cases_table, varied_line, verdict_lines};
@@ -29,12 +29,15 @@ const COSTS: [Column; 2] = [
     ("File", |own| bytes(own.file_bytes).into()),
 ];
 /// Errors of a body.
-const ERRORS: [Column; 4] = [
+const ERRORS: [Column; 5] = [
     ("Attitude (rad)", |own| number(own.errors.attitude)),
     ("Deflection", |own| number(own.errors.deflection)),
     ("Stress", |own| number(own.errors.stress)),
     ("Reaction", |own| number(own.errors.reaction)),
+    (OF_RECOVERIES, |own| number(own.errors.recovery)),
 ];
+/// Errors of recoveries, shown where a scene limits them.
+const OF_RECOVERIES: &str = "Recovery / limit";
 /// Cheapest run within the tolerances.
 const RUN: [Column; 4] = [
     ("Step accuracy", |own| own.accuracy.clone().unwrap_or_else(none).into()),
@@ -398,7 +401,7 @@ impl<'a> TradeFacts<'a> {
     }
 
     fn tolerances_in_words(&self) -> String {
-        errors_in_words(&self.tolerance.errors.map(Some))
+        tolerances_in_words(&self.tolerance.errors)
     }
 
     fn against(&self) -> &'static str {
@@ -438,7 +441,9 @@ impl<'a> TradeFacts<'a> {
         blocks.extend([Block::Gap, heading("Pareto front"), front, Block::Gap]);
         // A body read from a file is the only source, and the time of its preprocessing is unknown.
         let preprocessing = self.has_several_sources().then_some(PREPROCESSING);
-        let of_bodies = COSTS.into_iter().chain(preprocessing).chain(ERRORS).chain([WORST]).chain(case);
+        let has_limits = self.tolerance.errors.recovery.is_finite();
+        let errors = ERRORS.into_iter().filter(|(head, _)| has_limits || *head != OF_RECOVERIES);
+        let of_bodies = COSTS.into_iter().chain(preprocessing).chain(errors).chain([WORST]).chain(case);
         let every_row: Vec<_> = self.rows.iter().collect();
         let caption = "All candidates in the order of their simulation";
         let all = self.table(caption, &every_row, &of_bodies.collect::<Vec<_>>());
@@ -577,7 +582,7 @@ fn finest(measured: Option<&MeasuredFacts<'_>>, of: fn(&TimedRunFacts<'_>) -> Op
 /// Returns the study as comma-separated values with one row per candidate; numbers round-trip.
 pub fn trade_csv(trade: &Trade) -> String {
     let mut table = "number,source,kind,modes,last_frequency_hz,groups,lumped,lumped_part,storage,multiplications,evaluation_seconds,\
-                   integration_seconds,preprocessing_seconds,steps,run_tolerance,run_step,run_worst,file_bytes,attitude,deflection,stress,reaction,worst,\
+                   integration_seconds,preprocessing_seconds,steps,run_tolerance,run_step,run_worst,file_bytes,attitude,deflection,stress,reaction,recovery,worst,\
                    case,on_front,recommended,failed\n"
         .to_owned();
     for (at, row) in trade.rows.iter().enumerate() {
@@ -610,6 +615,7 @@ pub fn trade_csv(trade: &Trade) -> String {
             csv::number(errors.deflection),
             csv::number(errors.stress),
             csv::number(errors.reaction),
+            csv::number(errors.recovery),
             csv::number(m.map(|m| m.worst)),
             csv::text(m.and_then(|m| m.case).unwrap_or_default()),
             trade.front.contains(&at).to_string(),

@@ -69,13 +69,13 @@ pub fn measured_run(
     let sampled = trace_at(whole, scene, &history.time, context)?;
     let motion = Trace { extremes: continuous.extremes, ..sampled };
     let own = Trace::of_history(body, scene, &history, &motion)?;
-    let framed_whole = FramedScene::new(whole, scene)?.body;
+    let framed_whole = FramedScene::new(whole, scene)?;
     let framed_body = FramedScene::new(body, scene)?.body;
-    let measure = Measure::new(&framed_whole, &motion);
+    let measure = Measure::new(&framed_whole.body, &framed_whole.scene, &motion);
     let errors = match &shared {
         Some(shared) => {
             let modes =
-                OtherModes::new(&framed_body, &framed_whole, shared.as_ref()).ok_or_else(unrelated)?;
+                OtherModes::new(&framed_body, &framed_whole.body, shared.as_ref()).ok_or_else(unrelated)?;
             measure.of_other(&own, &modes)
         }
         None => measure.of_subset(&own, &(0..body.n_modes()).collect::<Vec<_>>()),

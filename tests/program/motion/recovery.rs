@@ -297,3 +297,62 @@ fn rows_of_a_simulation_are_those_of_its_table() {
     fs::write(place.join("scene.toml"), format!("{free}{at_node}")).expect("written");
     refused(place, "simulate body.h5 --scene scene.toml --deny-warnings", "FB553");
 }
+
+/// A scene that limits the errors of recoveries: `select`, `trade` with all nodes and `measure` judge by them, and
+/// limits that cannot be understood are refused.
+#[test]
+fn limits_of_recoveries_decide_selections_and_trades() {
+    let (folder, _) = folder();
+    let place = folder.path();
+    runs(place, "convert model.toml --modes 20 -o body.h5 --quiet");
+    let scene = "[run]\nduration = 2e-3\n[initial]\nangular_velocity = [100, 50, 300]\ndeformation = \"static\"\n\
+                 [[load]]\ninterface = \"right\"\nforce = [300, -200, 1000]\nhistory = { amplitude = 1, frequency = 700 }\n";
+    let judged = |limits: &str, line: &str| -> Value {
+        fs::write(place.join("scene.toml"), format!("{scene}[tolerance]\n{limits}\n")).expect("written");
+        let run = flexbody(place, &line.split_whitespace().collect::<Vec<_>>());
+        assert!(run.status.code() < Some(2), "{line}: {}", String::from_utf8_lossy(&run.stderr));
+        serde_json::from_slice(&run.stdout).expect("JSON")
+    };
+    let select = "select body.h5 --scene scene.toml --json";
+    let modes = |told: &Value| told["results"]["modes"]["kept"].as_array().map_or(0, Vec::len);
+    let with_columns =
+        judged("recovery = { stress = 0.05, root = 0.05 }\ndeflection = 1.5\nattitude = 1.0", select);
+    let alone = judged(
+        "recovery = { stress = { limit = 0.05, static_columns = false } }\ndeflection = 1.5\nattitude = 1.0",
+        select,
+    );
+    for told in [&with_columns, &alone] {
+        let (chosen, tolerance) = (&told["results"]["chosen"], &told["results"]["tolerance"]);
+        let error = chosen["errors"]["recovery"].as_f64().expect("an error");
+        assert!(error > 0.0 && error <= 1.0, "{chosen}");
+        assert!(tolerance["recovery"] == 1.0 && tolerance["stress"].is_null(), "{tolerance}");
+    }
+    assert!(0 < modes(&with_columns) && modes(&with_columns) < modes(&alone), "{with_columns} {alone}");
+    // Errors relative to all nodes, with a value as limit.
+    let limit = "recovery = { stress = \"1 MPa\" }\nstress = 0.5";
+    let trade = "trade model.toml --modes 6 --scene scene.toml --reference nodal --repeat 1 --json";
+    let told = judged(limit, trade);
+    let rows = told["results"]["rows"].as_array().expect("rows");
+    let errors: Vec<f64> =
+        rows.iter().filter_map(|row| row["measured"]["errors"]["recovery"].as_f64()).collect();
+    assert!(errors.len() > 5 && errors.iter().any(|error| *error > 1.0), "{errors:?}");
+    assert_eq!(told["results"]["tolerance"]["stress"], 0.5);
+    // The run of the body itself has no error but that of its steps.
+    runs(place, "simulate body.h5 --scene scene.toml --csv run.csv --quiet");
+    let told =
+        judged("recovery = { stress = 0.01 }", "measure body.h5 --history run.csv --scene scene.toml --json");
+    let error = told["results"]["errors"]["recovery"].as_f64().expect("an error");
+    assert!(error < 1e-3, "{told}");
+    for (limits, code) in [
+        ("recovery = { stress = \"5\" }", "FB211"),
+        ("recovery = { stress = -1 }", "FB211"),
+        ("recovery = { stress = { limit = 0.1, columns = true } }", "FB211"),
+        ("recovery = { stress = { static_columns = false } }", "FB211"),
+        ("recovery = 0.01", "FB211"),
+        ("recovery = { gauges = 0.01 }", "FB221"),
+        ("recovery = { stress = \"5 mm\" }", "FB212"),
+    ] {
+        fs::write(place.join("scene.toml"), format!("{scene}[tolerance]\n{limits}\n")).expect("written");
+        refused(place, "select body.h5 --scene scene.toml", code);
+    }
+}

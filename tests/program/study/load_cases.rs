@@ -76,7 +76,7 @@ fn measured(whole: &FlexBody, selection: &Selection, scene: &Scene) -> f64 {
     let (reference, _) = trace(whole, scene, &Context::QUIET).expect("a motion");
     let motion = trace_at(&own, &scene.of_modes(&selection.modes), &reference.time, &Context::QUIET)
         .expect("a motion");
-    let errors = Measure::new(whole, &reference).of_subset(&motion, &selection.modes).largest();
+    let errors = Measure::new(whole, scene, &reference).of_subset(&motion, &selection.modes).largest();
     errors.worst(&scene.requirements.tolerance)
 }
 

@@ -318,6 +318,20 @@ fn product(transposed: &CscMatrix, x: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(transposed.n_cols(), x.ncols(), entry)
 }
 
+/// Returns the rows of a recovery of `model` for displacements x of all rows of the model (rows x columns of x), without
+/// the values of the undeformed body: R x, and T_S'K x for a cut. `None` for a recovery that is known for some shapes
+/// only.
+pub fn recovered_rows(model: &FeModel, recovery: &ModelRecovery, x: &Mat<f64>) -> Option<Mat<f64>> {
+    match &recovery.operator {
+        RecoveryOperator::Rows { transposed, .. } => Some(product(transposed, x)),
+        RecoveryOperator::Shapes { .. } => None,
+        RecoveryOperator::Cut { nodes, about } => {
+            let forces = model.pencil().apply_stiffness(x.as_ref());
+            Some(gram(one_side(model, nodes, *about).as_ref(), forces.as_ref()))
+        }
+    }
+}
+
 /// Returns T_S (N x 6, in the plane N x 3): rigid motions about a point, of the rows of some nodes alone.
 fn one_side(model: &FeModel, side: &[i64], about: [f64; 3]) -> Mat<f64> {
     let members: HashSet<i64> = side.iter().copied().collect();

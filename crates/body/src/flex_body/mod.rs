@@ -28,7 +28,7 @@ pub use model_axes::stiffness_about;
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, is_static,
 };
-pub use recovery::{LOAD_COMPONENTS, LoadColumns, Recovery, RecoveryState};
+pub use recovery::{LOAD_COMPONENTS, LoadColumns, Recovery, RecoveryState, StaticCoordinates};
 pub use reference_conditions::ReferenceConditions;
 pub use softening::{SOFTENING, axis_in_words};
 pub use storage::Storage;

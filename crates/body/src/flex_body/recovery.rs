@@ -120,6 +120,16 @@ struct ModalLoads {
     at_interfaces: Vec<(String, Mat<f64>)>,
 }
 
+/// Static response of modal coordinates to unit loads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StaticCoordinates {
+    /// Response (nf x 6) to unit products of the angular velocity, in the order of [`LoadKind::SPIN`]; `None` if the body
+    /// does not hold W1.
+    pub spin: Option<Mat<f64>>,
+    /// Response (nf x 6) to unit forces and torques at each interface, by its name.
+    pub at_interfaces: Vec<(String, Mat<f64>)>,
+}
+
 impl FlexBody {
     /// Returns the recoveries of this body after a reduction to the modes `kept` (indices, ascending) and the `groups`:
     /// static columns take over what the dropped modes contributed to the static response, so that rows under constant
@@ -210,6 +220,22 @@ impl FlexBody {
     fn static_response(&self, loads: &Mat<f64>, of: &[usize]) -> Mat<f64> {
         let stiffness = self.invariants().modal_stiffness();
         Mat::from_fn(of.len(), loads.ncols(), |p, c| loads[(of[p], c)] / stiffness[(of[p], of[p])])
+    }
+
+    /// Returns the static response of the modal coordinates to unit loads at the interfaces and to unit products of the
+    /// angular velocity, along the axes of the body.
+    pub fn static_modal_coordinates(&self) -> StaticCoordinates {
+        let loads = self.modal_loads();
+        let all: Vec<usize> = (0..self.n_modes()).collect();
+        let response = |load: &Mat<f64>| self.static_response(load, &all);
+        StaticCoordinates {
+            spin: loads.spin.as_ref().map(response),
+            at_interfaces: loads
+                .at_interfaces
+                .iter()
+                .map(|(name, load)| (name.clone(), response(load)))
+                .collect(),
+        }
     }
 
     fn modal_loads(&self) -> ModalLoads {

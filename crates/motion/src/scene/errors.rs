@@ -2,7 +2,7 @@
 //! in a scene.
 
 use super::extremes::{ActiveNodes, Peak, along_principal_directions, longest};
-use super::{Extremes, PerQuantity, Tolerance, Trace};
+use super::{Extremes, PerQuantity, RecoveryMeasure, Scene, Tolerance, Trace};
 use crate::dynamics::EulerParameters;
 use faer::MatRef;
 use flexbody_body::flex_body::FlexBody;
@@ -93,9 +93,10 @@ impl ErrorHistory {
         let own = |(errors, allowed): (&Option<Vec<f64>>, f64)| {
             errors.as_ref().and_then(|errors| growth(self.halves(errors), allowed))
         };
-        let PerQuantity { attitude, deflection, stress, .. } =
+        let PerQuantity { attitude, deflection, stress, recovery, .. } =
             self.errors.as_ref().zip(tolerance.errors).map(own);
-        let beyond_motion = [deflection, stress].into_iter().flatten().map(|growth| growth / motion.max(1.0));
+        let beyond_motion =
+            [deflection, stress, recovery].into_iter().flatten().map(|growth| growth / motion.max(1.0));
         let most = beyond_motion.chain(attitude).reduce(f64::max);
         most.filter(|growth| *growth > MIN_REPORTED_GROWTH)
     }
@@ -117,6 +118,8 @@ pub struct DeformationDifference {
     pub deflection: Vec<f64>,
     /// Largest deflection of the compared nodes in the reference.
     pub largest_deflection: f64,
+    /// Errors of recoveries relative to their limits; `None` if none has a limit.
+    pub recovery: Option<Vec<f64>>,
 }
 
 impl ErrorHistory {
@@ -125,10 +128,10 @@ impl ErrorHistory {
     ///
     /// # Panics
     /// When the motions were sampled at different times.
-    pub fn new(reference: &Trace, candidate: &Trace, apart: &DeformationDifference) -> Self {
+    pub fn new(reference: &Trace, candidate: &Trace, apart: DeformationDifference) -> Self {
         assert!(reference.time == candidate.time, "motions that were looked at in the same places");
         let attitudes = reference.attitude.iter().zip(&candidate.attitude);
-        let (deflection, scale) = deflections(reference, candidate, apart);
+        let (deflection, scale) = deflections(reference, candidate, &apart);
         let roots = reference.elastic.iter().map(|energy| energy.max(0.0).sqrt());
         let energy = Peak::of(&reference.time, roots).value;
         let stress = apart.energy.iter().map(|energy| energy.sqrt()).collect();
@@ -139,6 +142,7 @@ impl ErrorHistory {
                 deflection: relative(deflection, scale.max(reference.resolution.deflection)),
                 stress: relative(stress, energy.max(reference.resolution.root_energy)),
                 reaction: reactions(reference, candidate),
+                recovery: apart.recovery,
             },
         }
     }
@@ -217,19 +221,21 @@ pub struct Measure<'r> {
     nodes: Vec<usize>,
     rows: ActiveNodes,
     largest_deflection: f64,
+    recoveries: Option<RecoveryMeasure>,
 }
 
 impl<'r> Measure<'r> {
-    /// Creates a measure against `trace`, a motion of `body`.
+    /// Creates a measure against `trace`, a motion of `body` in `scene`, all in one frame.
     ///
     /// # Panics
     /// When the motion has another number of modes than the body.
-    pub fn new(body: &'r FlexBody, trace: &'r Trace) -> Self {
+    pub fn new(body: &'r FlexBody, scene: &Scene, trace: &'r Trace) -> Self {
         assert!(trace.q.iter().all(|q| q.len() == body.n_modes()), "a motion of the body");
         let nodes = if trace.deflections.is_empty() { along_principal_directions(body) } else { Vec::new() };
         let rows = ActiveNodes::new(body, &nodes);
         let largest_deflection = Peak::of(&trace.time, trace.q.iter().map(|q| rows.longest(q))).value;
-        Self { body, trace, nodes, rows, largest_deflection }
+        let recoveries = RecoveryMeasure::new(body, scene, trace.recovered.as_ref());
+        Self { body, trace, nodes, rows, largest_deflection, recoveries }
     }
 
     /// Returns the body.
@@ -240,6 +246,11 @@ impl<'r> Measure<'r> {
     /// Returns the motion of the reference.
     pub fn trace(&self) -> &'r Trace {
         self.trace
+    }
+
+    /// Returns the measure of recoveries with a limit; `None` if none has one.
+    pub fn recoveries(&self) -> Option<&RecoveryMeasure> {
+        self.recoveries.as_ref()
     }
 
     /// Returns the errors of the motion of a body that has the modes `kept` (from 0) of the reference, in
@@ -255,7 +266,7 @@ impl<'r> Measure<'r> {
             let energy = 0.5 * quadratic(energy.as_ref(), &difference);
             (energy, self.rows.longest(&difference))
         });
-        ErrorHistory::new(self.trace, candidate, &apart)
+        ErrorHistory::new(self.trace, candidate, apart)
     }
 
     /// Returns the errors of the motion of a body with other modes of the same model.
@@ -273,7 +284,7 @@ impl<'r> Measure<'r> {
             let deflection = longest(displacements.map(|(own, reference)| own - reference));
             (0.5 * (quadratic(energy.as_ref(), difference.as_slice()) + outside), deflection)
         });
-        ErrorHistory::new(self.trace, candidate, &apart)
+        ErrorHistory::new(self.trace, candidate, apart)
     }
 
     fn apart(
@@ -283,7 +294,9 @@ impl<'r> Measure<'r> {
     ) -> DeformationDifference {
         let (energy, deflection) =
             self.trace.q.iter().zip(&candidate.q).map(|(a, b)| difference(a, b)).unzip();
-        DeformationDifference { energy, deflection, largest_deflection: self.largest_deflection }
+        let recovery = self.recoveries.as_ref().zip(self.trace.recovered.as_ref());
+        let recovery = recovery.map(|(measure, own)| measure.errors(own, candidate.recovered.as_ref()));
+        DeformationDifference { energy, deflection, largest_deflection: self.largest_deflection, recovery }
     }
 }
 

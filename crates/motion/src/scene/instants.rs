@@ -1,6 +1,8 @@
 //! Complete state of a motion at given times, for evaluations of the equations of all nodes.
 
 use super::prepared::{Prepared, damped};
+use super::recovery_errors::TracedRecoveries;
+use super::row_states::RowSampler;
 use super::{FramedScene, Recording, Scene, Scheme, Trace, simulate, trace};
 use crate::dynamics::Motion;
 use crate::integration::{Failure, ObserverEvent};
@@ -35,6 +37,8 @@ pub struct Instant {
     /// Force and torque of every load of the scene; the torque as generalised force on the rotation vector
     /// of its point.
     pub loads: Vec<(Vector3<f64>, Vector3<f64>)>,
+    /// State that the rows of recoveries with a limit are linear in ([`RowLayout`](super::RowLayout)); empty without.
+    pub row_state: Vec<f64>,
 }
 
 /// Computes the motion of `body` in `scene` at `times`, ascending from 0 to the end of the scene.
@@ -45,10 +49,11 @@ pub fn instants(body: &FlexBody, scene: &Scene, times: &[f64]) -> Result<Vec<Ins
     let framed = FramedScene::new(body, scene)?;
     let body = &*damped(&framed.body, &framed.scene)?;
     let run = Prepared::new(body, &framed.scene)?;
+    let sampler = TracedRecoveries::new(body, &framed.scene)?.map(|(_, sampler)| sampler);
     let mut seen = Vec::with_capacity(times.len());
     let look = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if event == ObserverEvent::Instant {
-            seen.push(see(&run, time, state, motion)?);
+            seen.push(see(&run, sampler.as_ref(), time, state, motion)?);
         }
         Ok::<(), Failure>(())
     };
@@ -58,6 +63,7 @@ pub fn instants(body: &FlexBody, scene: &Scene, times: &[f64]) -> Result<Vec<Ins
 
 fn see(
     run: &Prepared<'_>,
+    sampler: Option<&RowSampler>,
     time: f64,
     state: &[f64],
     motion: &mut Motion<'_>,
@@ -82,6 +88,7 @@ fn see(
         omega_rate: angular,
         gravity: run.forces.gravity(place),
         loads: worked.collect(),
+        row_state: sampler.map_or_else(Vec::new, |sampler| sampler.state(time, &now, &run.forces)),
         q: configuration.q,
         qd: configuration.qd,
         qdd,
@@ -231,8 +238,8 @@ const MAX_INTERVAL_RATIO: f64 = 8.0;
 pub fn highest_excited_rate(body: &FlexBody, scene: &Scene, motion: &Trace, part: f64) -> f64 {
     let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
     let roots = rates.iter().zip(&motion.extremes.amplitudes).map(|(rate, amplitude)| rate * amplitude.abs());
-    let tolerance = &scene.requirements.tolerance.errors;
-    let least = part * tolerance.stress.min(tolerance.deflection) * roots.fold(0.0, f64::max);
+    let tolerance = &scene.requirements.tolerance;
+    let least = part * tolerance.of_deformation() * roots.fold(0.0, f64::max);
     let largest_accelerations = accelerations(motion, rates.len());
     let counts =
         |j: &usize| largest_accelerations[*j] > 0.0 && largest_accelerations[*j] / rates[*j] >= least;

@@ -14,6 +14,7 @@ mod read_columns;
 mod read_requirements;
 mod read_values;
 mod recovered;
+mod recovery_errors;
 mod requirements;
 mod row_extremes;
 mod row_states;
@@ -37,8 +38,10 @@ pub use instants::{Instant, highest_excited_rate, inertia_share, instants, unset
 pub use load_cases::LoadCases;
 pub use prepared::{damped, damped_once, ends_a_run, fastest_history, find_nodal_point, nodal_point};
 pub use recovered::{LoadHistory, LoadedHistory, RecoveredMotion};
+pub use recovery_errors::{RecoveryMeasure, TracedRecoveries};
 pub use requirements::{
-    Attachment, AttachmentKind, Limits, MotionRange, PerQuantity, Range, Requirements, Tolerance,
+    Attachment, AttachmentKind, Limits, MotionRange, PerQuantity, Range, RecoveryLimit, RecoveryTolerance,
+    Requirements, Tolerance,
 };
 pub use row_extremes::{EnvelopeSearch, ExtremeSearch, PointEnvelope, RowExtreme, RowExtremes};
 pub use row_states::{RowLayout, RowMap, RowStates};

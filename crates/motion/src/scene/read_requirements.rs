@@ -2,7 +2,10 @@
 
 use super::read_columns::{finite, place_of, positive};
 use super::read_values::{axes, list, mode_number, vector};
-use super::requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
+use super::requirements::{
+    Attachment, AttachmentKind, Limits, MotionRange, Range, RecoveryLimit, RecoveryTolerance, Requirements,
+    Tolerance,
+};
 use super::{Axes, PerQuantity};
 use flexbody_base::text::walk::{TomlTable, Value, Walk, integer, real};
 use flexbody_model::{DampingRatios, damping_bands};
@@ -16,7 +19,7 @@ pub(super) const TABLES: [(&str, &[&str]); 7] = [
     ("limits", &["deflection", "stress", "mode_stress", "mode"]),
     ("band", &["frequency"]),
     ("damping", &["ratio", "bands", "replace"]),
-    ("tolerance", &["attitude", "deflection", "stress", "reaction", "least_deflection"]),
+    ("tolerance", &["attitude", "deflection", "stress", "reaction", "recovery", "least_deflection"]),
     ("cost", &["multiplications"]),
 ];
 
@@ -55,10 +58,14 @@ impl Section<'_, '_> {
             "limits" => requirements.limits = limits(self.walk, self.table, &self.span)?,
             "band" => requirements.band = Some(positive(self.walk, self.table, "frequency", &self.span)?),
             "damping" => {
-                let (ratios, replaces) = (self.damping_ratios(), self.replaces_damping());
+                let (ratios, replaces) =
+                    (self.damping_ratios(), flag(self.walk, self.table, "replace", false));
                 (requirements.damping, requirements.replaces_damping) = (Some(ratios?), replaces?);
             }
-            "tolerance" => requirements.tolerance = self.tolerance()?,
+            "tolerance" => {
+                requirements.recoveries = self.recoveries()?;
+                requirements.tolerance = self.tolerance(!requirements.recoveries.is_empty())?;
+            }
             _ => requirements.multiplications = Some(self.multiplications()?),
         }
         Some(())
@@ -109,23 +116,68 @@ impl Section<'_, '_> {
         }
     }
 
-    fn replaces_damping(&mut self) -> Option<bool> {
-        let Some(value) = self.table.get("replace") else { return Some(false) };
-        let DeValue::Boolean(replaces) = value.get_ref() else {
-            self.walk.mistyped("replace", value, "true or false");
-            return None;
-        };
-        Some(*replaces)
-    }
-
-    fn tolerance(&mut self) -> Option<Tolerance> {
-        let default = Tolerance::default();
-        let mut or_default = |(key, default)| Some(self.optional(key)?.unwrap_or(default));
-        let [attitude, deflection, stress, reaction] = default.errors.named().map(&mut or_default);
+    /// Reads the tolerances of all quantities; `with_recoveries` is true if recoveries have limits. They then stand for
+    /// the stress that the elastic energy estimates, unless that has a tolerance too.
+    fn tolerance(&mut self, with_recoveries: bool) -> Option<Tolerance> {
+        let mut default = Tolerance::default().errors;
+        if with_recoveries {
+            (default.stress, default.recovery) = (f64::INFINITY, 1.0);
+        }
+        let mut or_default = |key, default| Some(self.optional(key)?.unwrap_or(default));
+        let [attitude, deflection, stress, reaction] = [
+            ("attitude", default.attitude),
+            ("deflection", default.deflection),
+            ("stress", default.stress),
+            ("reaction", default.reaction),
+        ]
+        .map(|(key, default)| or_default(key, default));
         let least_deflection = self.optional("least_deflection");
         let (attitude, deflection) = (attitude?, deflection?);
-        let errors = PerQuantity { attitude, deflection, stress: stress?, reaction: reaction? };
+        let (stress, reaction, recovery) = (stress?, reaction?, default.recovery);
+        let errors = PerQuantity { attitude, deflection, stress, reaction, recovery };
         Some(Tolerance { errors, least_deflection: least_deflection? })
+    }
+
+    /// Reads the table `recovery`: a limit for each recovery, as a part of the largest value, as a text with a value and
+    /// its unit, or as a table with `limit` and `static_columns`.
+    fn recoveries(&mut self) -> Option<Vec<RecoveryTolerance>> {
+        let Some((table, _)) = self.walk.table(self.table, "recovery") else {
+            return (!self.table.contains_key("recovery")).then(Vec::new);
+        };
+        let mut all = Vec::new();
+        let mut complete = true;
+        for (name, value) in table {
+            match self.recovery(name.get_ref(), value) {
+                Some(one) => all.push(one),
+                None => complete = false,
+            }
+        }
+        complete.then_some(all)
+    }
+
+    fn recovery(&mut self, name: &str, value: &Value) -> Option<RecoveryTolerance> {
+        const EXPECTED: &str = "a part of the largest value such as 0.01, or a value with the unit of the rows such as \"5 MPa\"";
+        let (limit, static_columns) = match value.get_ref() {
+            DeValue::Table(table) => {
+                self.walk.known_keys(table, "[tolerance.recovery]", &["limit", "static_columns"]);
+                let static_columns = flag(self.walk, table, "static_columns", true)?;
+                let Some(limit) = table.get("limit") else {
+                    self.walk.wrong(value.span(), format!("`{name}` has no `limit`: {EXPECTED}"));
+                    return None;
+                };
+                (limit, static_columns)
+            }
+            _ => (value, true),
+        };
+        let found = match limit.get_ref() {
+            DeValue::String(text) => absolute_limit(text),
+            _ => real(limit).filter(|part| part.is_finite() && *part > 0.0).map(RecoveryLimit::Relative),
+        };
+        let Some(limit) = found else {
+            self.walk.mistyped(name, limit, EXPECTED);
+            return None;
+        };
+        Some(RecoveryTolerance { recovery: name.to_owned(), limit, static_columns })
     }
 
     fn multiplications(&mut self) -> Option<usize> {
@@ -138,6 +190,24 @@ impl Section<'_, '_> {
         }
         count
     }
+}
+
+/// Reads `true` or `false`, or returns the `default` if the key is absent.
+fn flag(walk: &mut Walk<'_>, table: &TomlTable, key: &str, default: bool) -> Option<bool> {
+    let Some(value) = table.get(key) else { return Some(default) };
+    let DeValue::Boolean(flag) = value.get_ref() else {
+        walk.mistyped(key, value, "true or false");
+        return None;
+    };
+    Some(*flag)
+}
+
+/// Reads a positive value with a unit, separated by a blank.
+fn absolute_limit(text: &str) -> Option<RecoveryLimit> {
+    let (value, unit) = text.trim().split_once(char::is_whitespace)?;
+    let value = value.parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0)?;
+    let unit = unit.trim();
+    (!unit.is_empty()).then(|| RecoveryLimit::Absolute { value, unit: unit.to_owned() })
 }
 
 /// Reads axes that turn with the body.

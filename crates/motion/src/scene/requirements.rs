@@ -27,6 +27,8 @@ pub struct Requirements {
     pub replaces_damping: bool,
     /// Largest allowed errors.
     pub tolerance: Tolerance,
+    /// Largest allowed errors of recoveries, by name.
+    pub recoveries: Vec<RecoveryTolerance>,
     /// Largest number of multiplications per evaluation of the equations of motion, in place of tolerances.
     pub multiplications: Option<usize>,
 }
@@ -174,16 +176,53 @@ pub struct Tolerance {
 
 impl Default for Tolerance {
     /// Returns the default tolerance: one thousandth of a radian and one per cent, below the uncertainty of
-    /// material data and damping.
+    /// material data and damping. Recoveries have none.
     fn default() -> Self {
-        Self { errors: PerQuantity { attitude: 1e-3, ..PerQuantity::all(0.01) }, least_deflection: None }
+        let errors = PerQuantity { attitude: 1e-3, recovery: f64::INFINITY, ..PerQuantity::all(0.01) };
+        Self { errors, least_deflection: None }
     }
+}
+
+impl Tolerance {
+    /// Returns the tolerance of deformations, which decides how closely a motion is followed: the smaller one of
+    /// deflection and stress.
+    pub fn of_deformation(&self) -> f64 {
+        self.errors.deflection.min(self.errors.stress)
+    }
+}
+
+/// Largest allowed error of a recovery.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecoveryTolerance {
+    /// Name of the recovery.
+    pub recovery: String,
+    /// Largest error at any time.
+    pub limit: RecoveryLimit,
+    /// True if the rows are those of modes and static columns; false for a program that superposes modes only.
+    pub static_columns: bool,
+}
+
+/// Limit of the error of a recovery: of the equivalent stress of von Mises of the difference, for points with all six
+/// stresses; of the value, for other rows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RecoveryLimit {
+    /// Part of the largest von Mises stress of any point; for other rows of the largest value of any row of the same
+    /// quantity and unit.
+    Relative(f64),
+    /// Value in the unit of the rows.
+    Absolute {
+        /// Largest error.
+        value: f64,
+        /// Unit, as the rows state it.
+        unit: String,
+    },
 }
 
 // Quantities of a motion that have tolerances in a scene.
 
 /// One value for each quantity of a motion that has a tolerance in a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+#[serde(bound = "T: serde::Serialize + Unstated")]
 pub struct PerQuantity<T> {
     /// Attitude of the frame. The error is the angle between the frames. Unit: rad.
     pub attitude: T,
@@ -199,6 +238,28 @@ pub struct PerQuantity<T> {
     /// or to one thousandth of w^2 m r or w^2 I, with the radius of gyration r and I = m r^2, or to one
     /// hundredth of the largest T / r or F r.
     pub reaction: T,
+    /// Recoveries with a tolerance. The error is the largest ratio of the error of one of them to its own limit
+    /// ([`RecoveryTolerance`]), so that the tolerance is 1; without such limits it is infinite.
+    #[serde(skip_serializing_if = "Unstated::is_unstated")]
+    pub recovery: T,
+}
+
+/// Value that is not written where a scene has no tolerance of recoveries.
+pub trait Unstated {
+    /// Returns true if the value is not written.
+    fn is_unstated(&self) -> bool;
+}
+
+impl Unstated for f64 {
+    fn is_unstated(&self) -> bool {
+        self.is_infinite()
+    }
+}
+
+impl Unstated for Option<f64> {
+    fn is_unstated(&self) -> bool {
+        self.is_none()
+    }
 }
 
 impl<T> PerQuantity<T> {
@@ -209,6 +270,7 @@ impl<T> PerQuantity<T> {
             deflection: change(self.deflection),
             stress: change(self.stress),
             reaction: change(self.reaction),
+            recovery: change(self.recovery),
         }
     }
 
@@ -219,6 +281,7 @@ impl<T> PerQuantity<T> {
             deflection: (self.deflection, other.deflection),
             stress: (self.stress, other.stress),
             reaction: (self.reaction, other.reaction),
+            recovery: (self.recovery, other.recovery),
         }
     }
 
@@ -229,16 +292,18 @@ impl<T> PerQuantity<T> {
             deflection: &self.deflection,
             stress: &self.stress,
             reaction: &self.reaction,
+            recovery: &self.recovery,
         }
     }
 
     /// Returns the values with the names of their quantities.
-    pub fn named(self) -> [(&'static str, T); 4] {
+    pub fn named(self) -> [(&'static str, T); 5] {
         [
             ("attitude", self.attitude),
             ("deflection", self.deflection),
             ("stress", self.stress),
             ("reaction", self.reaction),
+            ("recovery", self.recovery),
         ]
     }
 }
@@ -246,6 +311,12 @@ impl<T> PerQuantity<T> {
 impl<T: Clone> PerQuantity<T> {
     /// Returns one value for all quantities.
     pub fn all(value: T) -> Self {
-        Self { attitude: value.clone(), deflection: value.clone(), stress: value.clone(), reaction: value }
+        Self {
+            attitude: value.clone(),
+            deflection: value.clone(),
+            stress: value.clone(),
+            reaction: value.clone(),
+            recovery: value,
+        }
     }
 }

@@ -1,4 +1,5 @@
-//! Largest rows and stresses of a recovery over a motion, without the evaluation of all rows at all instants.
+//! Largest rows and stresses of a recovery over a motion, or of the difference between two, without the evaluation of
+//! all rows at all instants.
 //!
 //! A row is linear in the state z, and a stress measure of a point is bounded by a norm of few rows. With z = D U a and
 //! the directions U in which the history Z varies (the eigenvectors of Z Z'/D^2, with eigenvalues s^2),
@@ -10,6 +11,7 @@
 //! hold at every instant. Rows and points are evaluated in descending order of the smaller bound, until the next bound
 //! is below the largest value found.
 
+use super::row_states::SampledStates;
 use super::{Peak, RowLayout, RowMap, RowStates, StressPoint};
 use faer::{Mat, MatRef};
 use flexbody_linalg::{SymmetricEigen, parallel, symmetric_eigen};
@@ -47,26 +49,41 @@ pub struct RowExtremes {
     pub evaluated: usize,
 }
 
-/// Magnitude that is searched: a norm of `rows_of` bounds it.
+/// Rows as linear forms of states.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LinearRows<'a> {
+    /// Coefficients (rows x length of a state).
+    pub matrix: MatRef<'a, f64>,
+    /// Points with all six stresses among the rows.
+    pub points: &'a [StressPoint],
+}
+
+impl<'a> LinearRows<'a> {
+    pub(super) fn of(map: &'a RowMap) -> Self {
+        Self { matrix: map.matrix.as_ref(), points: &map.points }
+    }
+}
+
+/// Magnitude of a row, or of the stress at a point, that is searched. A norm of its linear forms bounds it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Measure {
+pub(super) enum Magnitude {
     Row,
     VonMises,
     Tension,
     Compression,
 }
 
-impl Measure {
+impl Magnitude {
     const ALL: [Self; 4] = [Self::Row, Self::VonMises, Self::Tension, Self::Compression];
 
     /// Returns the linear forms (k x length of z) of one place, whose norm is not below the measure.
-    fn forms(self, map: &RowMap, place: usize) -> Mat<f64> {
-        let m = map.matrix.ncols();
+    pub(super) fn forms(self, rows: &LinearRows<'_>, place: usize) -> Mat<f64> {
+        let m = rows.matrix.ncols();
         if self == Self::Row {
-            return Mat::from_fn(1, m, |_, c| map.matrix[(place, c)]);
+            return Mat::from_fn(1, m, |_, c| rows.matrix[(place, c)]);
         }
-        let [xx, yy, zz, xy, yz, xz] = map.points[place].rows;
-        let row = |i: usize, c: usize| map.matrix[(i, c)];
+        let [xx, yy, zz, xy, yz, xz] = rows.points[place].rows;
+        let row = |i: usize, c: usize| rows.matrix[(i, c)];
         let (difference, shear) = (0.5f64.sqrt(), 3.0f64.sqrt());
         match self {
             // The sum of squares is the square of the equivalent stress.
@@ -84,12 +101,12 @@ impl Measure {
         }
     }
 
-    fn places(self, map: &RowMap) -> usize {
-        if self == Self::Row { map.rows.len() } else { map.points.len() }
+    fn places(self, rows: &LinearRows<'_>) -> usize {
+        if self == Self::Row { rows.matrix.nrows() } else { rows.points.len() }
     }
 
     /// Returns the measure of the values of all forms of a place; not negative.
-    fn of(self, forms: &[f64]) -> f64 {
+    pub(super) fn of(self, forms: &[f64]) -> f64 {
         let weight = std::f64::consts::FRAC_1_SQRT_2;
         let principal = || {
             let s = |i: usize| if i < 3 { forms[i] } else { weight * forms[i] };
@@ -105,7 +122,7 @@ impl Measure {
 }
 
 /// Directions in which a history varies, and how far.
-struct Directions {
+pub(super) struct Directions {
     /// D U (length of z x directions).
     vectors: Mat<f64>,
     /// Eigenvalues s^2.
@@ -120,8 +137,8 @@ struct Directions {
 
 impl Directions {
     /// Returns the directions of a history; `None` if it has numbers that are not finite.
-    fn new(states: &RowStates) -> Option<Self> {
-        let m = states.layout.len();
+    pub(super) fn new(states: SampledStates<'_>) -> Option<Self> {
+        let m = states.width;
         // Numbers of one size: unit and kind of the coordinates do not matter.
         let mut scale = vec![0.0f64; m];
         for z in states.iter() {
@@ -207,16 +224,25 @@ impl ExtremeSearch {
         if states.times.is_empty() {
             return;
         }
+        let states = states.sampled();
         let directions = Directions::new(states);
         for (map, found) in maps.iter().zip(&mut self.found) {
-            for measure in Measure::ALL {
-                let best = match measure {
-                    Measure::Row => &mut found.row,
-                    Measure::VonMises => &mut found.von_mises,
-                    Measure::Tension => &mut found.tension,
-                    Measure::Compression => &mut found.compression,
+            let rows = LinearRows::of(map);
+            for magnitude in Magnitude::ALL {
+                let best = match magnitude {
+                    Magnitude::Row => &mut found.row,
+                    Magnitude::VonMises => &mut found.von_mises,
+                    Magnitude::Tension => &mut found.tension,
+                    Magnitude::Compression => &mut found.compression,
                 };
-                let evaluated = search(measure, map, states, directions.as_ref(), self.between, best);
+                let search = Search {
+                    magnitude,
+                    rows,
+                    states,
+                    directions: directions.as_ref(),
+                    between: self.between,
+                };
+                let evaluated = search.raise(0..magnitude.places(&rows), best, |_| {});
                 found.evaluated = found.evaluated.max(evaluated);
             }
         }
@@ -228,75 +254,93 @@ impl ExtremeSearch {
     }
 }
 
-/// Raises `best` to the largest value of `measure` over all places of `map`. Returns the number of evaluated places.
-fn search(
-    measure: Measure,
-    map: &RowMap,
-    states: &RowStates,
-    directions: Option<&Directions>,
-    between: bool,
-    best: &mut Option<RowExtreme>,
-) -> usize {
-    // Places in descending order of their bounds.
-    let of = |place: usize| {
-        directions.map_or(f64::INFINITY, |known| known.bound(measure.forms(map, place).as_ref()))
-    };
-    let bound = |place: usize| (of(place), place);
-    let mut places: Vec<(f64, usize)> = (0..measure.places(map)).map(bound).collect();
-    places.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    // The largest value at an instant decides where to stop, the largest one between instants what is found.
-    let mut sampled = 0.0f64;
-    let mut evaluated = 0;
-    for (bound, place) in places {
-        let beaten = sampled.max(if between { 0.0 } else { best.map_or(0.0, |best| best.value.abs()) });
-        if bound < beaten {
-            break;
-        }
-        evaluated += 1;
-        let own = Place::new(measure, map, place, states, between);
-        sampled = sampled.max(own.sampled);
-        let is_larger = match best {
-            None => measure == Measure::Row || measure == Measure::VonMises || own.extreme.value != 0.0,
-            Some(best) => own.extreme.value.abs() > best.value.abs() || own.extreme.value.is_nan(),
+/// Search for the place with the largest magnitude over sampled states.
+pub(super) struct Search<'a> {
+    pub magnitude: Magnitude,
+    pub rows: LinearRows<'a>,
+    pub states: SampledStates<'a>,
+    /// Directions of the states; `None` if nothing bounds the values.
+    pub directions: Option<&'a Directions>,
+    /// True if values between the instants are estimated by parabolas.
+    pub between: bool,
+}
+
+impl Search<'_> {
+    /// Raises `best` to the largest value at any of `places`. `see` receives the values of every evaluated place at all
+    /// instants. Returns the number of evaluated places.
+    pub(super) fn raise(
+        &self,
+        places: impl Iterator<Item = usize>,
+        best: &mut Option<RowExtreme>,
+        mut see: impl FnMut(&[f64]),
+    ) -> usize {
+        // Places in descending order of their bounds.
+        let bound = |place: usize| {
+            let forms = || self.magnitude.forms(&self.rows, place);
+            (self.directions.map_or(f64::INFINITY, |known| known.bound(forms().as_ref())), place)
         };
-        if is_larger {
-            *best = Some(own.extreme);
+        let mut places: Vec<(f64, usize)> = places.map(bound).collect();
+        places.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        // The largest value at an instant decides where to stop, the largest one between instants what is found.
+        let mut sampled = 0.0f64;
+        let mut evaluated = 0;
+        for (bound, place) in places {
+            let beaten =
+                sampled.max(if self.between { 0.0 } else { best.map_or(0.0, |best| best.value.abs()) });
+            if bound < beaten {
+                break;
+            }
+            evaluated += 1;
+            let own = self.place(place);
+            see(&own.values);
+            sampled = sampled.max(own.sampled);
+            let first = matches!(self.magnitude, Magnitude::Row | Magnitude::VonMises);
+            let is_larger = match best {
+                None => first || own.extreme.value != 0.0,
+                Some(best) => own.extreme.value.abs() > best.value.abs() || own.extreme.value.is_nan(),
+            };
+            if is_larger {
+                *best = Some(own.extreme);
+            }
         }
+        evaluated
     }
-    evaluated
-}
 
-/// Largest value of a measure at one place.
-struct Place {
-    extreme: RowExtreme,
-    /// Largest value at an instant.
-    sampled: f64,
-}
-
-impl Place {
-    fn new(measure: Measure, map: &RowMap, place: usize, states: &RowStates, between: bool) -> Self {
-        let forms = measure.forms(map, place);
+    /// Evaluates a place at all instants.
+    fn place(&self, place: usize) -> Place {
+        let forms = self.magnitude.forms(&self.rows, place);
         let mut peak = Peak::default();
-        let (mut sampled, mut sign, mut time) = (0.0, 1.0, states.times[0]);
-        let mut values = vec![0.0; forms.nrows()];
-        for (z, &now) in states.iter().zip(&states.times) {
-            for (i, value) in values.iter_mut().enumerate() {
+        let (mut sampled, mut sign, mut time) = (0.0, 1.0, self.states.times[0]);
+        let mut own = vec![0.0; forms.nrows()];
+        let mut values = Vec::with_capacity(self.states.times.len());
+        for (z, &now) in self.states.iter().zip(self.states.times) {
+            for (i, value) in own.iter_mut().enumerate() {
                 *value = z.iter().enumerate().map(|(c, z)| forms[(i, c)] * z).sum();
             }
-            let value = measure.of(&values);
+            let value = self.magnitude.of(&own);
+            values.push(value);
             peak.see(now, value);
             if value > sampled || value.is_nan() {
                 (sampled, time) = (value, now);
-                sign = match measure {
-                    Measure::Row => values[0].signum(),
-                    Measure::Compression => -1.0,
+                sign = match self.magnitude {
+                    Magnitude::Row => own[0].signum(),
+                    Magnitude::Compression => -1.0,
                     _ => 1.0,
                 };
             }
         }
-        let (value, time) = if between { (peak.value, peak.time) } else { (sampled, time) };
-        Self { extreme: RowExtreme { place, time, value: sign * value }, sampled }
+        let (value, time) = if self.between { (peak.value, peak.time) } else { (sampled, time) };
+        Place { extreme: RowExtreme { place, time, value: sign * value }, sampled, values }
     }
+}
+
+/// Values of a magnitude at one place.
+struct Place {
+    extreme: RowExtreme,
+    /// Largest value at an instant.
+    sampled: f64,
+    /// Values at all instants.
+    values: Vec<f64>,
 }
 
 /// Largest stresses of one point over a motion, each with its time.
@@ -317,7 +361,7 @@ impl PointEnvelope {
     }
 
     /// Takes the states of a point whose stresses are `forms` (6 x length of z) times them, in the weights of
-    /// [`Measure::Tension`].
+    /// [`Magnitude::Tension`].
     fn see(&mut self, forms: &Mat<f64>, states: &RowStates, between: bool) {
         let mut values = [0.0; 6];
         for (z, &time) in states.iter().zip(&states.times) {
@@ -332,8 +376,8 @@ impl PointEnvelope {
             // The norm bounds the principal stresses, whose computation is the costly part.
             let norm = values.iter().map(|v| v * v).sum::<f64>().sqrt();
             if norm.is_nan() || norm > self.tension.value.min(self.compression.value) {
-                raise(&mut self.tension, time, Measure::Tension.of(&values));
-                raise(&mut self.compression, time, Measure::Compression.of(&values));
+                raise(&mut self.tension, time, Magnitude::Tension.of(&values));
+                raise(&mut self.compression, time, Magnitude::Compression.of(&values));
             }
         }
     }
@@ -346,7 +390,7 @@ fn raise(peak: &mut Peak, time: f64, value: f64) {
     }
 }
 
-/// Returns the equivalent stress of the weighted stresses of [`Measure::Tension`].
+/// Returns the equivalent stress of the weighted stresses of [`Magnitude::Tension`].
 fn von_mises_of([xx, yy, zz, xy, yz, xz]: &[f64; 6]) -> f64 {
     let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
     (0.5 * normal + 1.5 * (xy * xy + yz * yz + xz * xz)).sqrt()
@@ -375,7 +419,7 @@ impl EnvelopeSearch {
             let known = found.clone();
             let envelope = |point: usize| {
                 let mut own = known[point];
-                own.see(&Measure::Tension.forms(map, point), states, between);
+                own.see(&Magnitude::Tension.forms(&LinearRows::of(map), point), states, between);
                 own
             };
             *found = parallel::concat(known.len(), POINTS, |points| points.map(envelope).collect());

@@ -1,8 +1,10 @@
 //! Everything that rows of recoveries depend on, instant by instant, and the linear map from it to the rows.
 
-use super::StressPoint;
+use super::surroundings::SceneForces;
+use super::{Point, Scene, StressPoint};
+use crate::dynamics::Snapshot;
 use faer::Mat;
-use flexbody_body::flex_body::{LOAD_COMPONENTS, Recovery, RecoveryRow};
+use flexbody_body::flex_body::{LOAD_COMPONENTS, Recovery, RecoveryRow, StaticCoordinates};
 use flexbody_model::LoadKind;
 use nalgebra::Vector3;
 
@@ -30,6 +32,11 @@ impl RowLayout {
     /// Returns the length of z.
     pub fn len(&self) -> usize {
         self.spin() + LoadKind::SPIN.len()
+    }
+
+    /// Returns the number of modal coordinates in z, which follow its constant.
+    pub(super) fn modes(&self) -> usize {
+        self.modes
     }
 
     /// Returns false: z has at least its constant.
@@ -71,6 +78,37 @@ impl RowLayout {
             z[at] = angular_velocity[k] * angular_velocity[l];
         }
         z
+    }
+
+    /// Returns z with the modal coordinates `q`, and with the loads and the spin of a state `of` in another order.
+    pub(super) fn with_loads_of(&self, order: &Self, of: &[f64], q: &[f64]) -> Vec<f64> {
+        let mut z = vec![0.0; self.len()];
+        z[0] = 1.0;
+        z[1..=self.modes].copy_from_slice(q);
+        for (at, name) in self.interfaces.iter().enumerate() {
+            if let Some(known) = order.interface(name) {
+                z[self.load(at)..][..LOAD_COMPONENTS].copy_from_slice(order.load_of(of, known));
+            }
+        }
+        z[self.spin()..].copy_from_slice(&of[order.spin()..]);
+        z
+    }
+
+    /// Returns the static response of the modal coordinates to every number of z (nf x length of z).
+    pub(super) fn static_coordinates(&self, of: &StaticCoordinates) -> Mat<f64> {
+        let mut all = Mat::zeros(self.modes, self.len());
+        let mut place = |first: usize, part: &Mat<f64>| {
+            all.as_mut().subcols_mut(first, part.ncols()).copy_from(part);
+        };
+        for (name, part) in &of.at_interfaces {
+            if let Some(at) = self.interface(name) {
+                place(self.load(at), part);
+            }
+        }
+        if let Some(spin) = &of.spin {
+            place(self.spin(), spin);
+        }
+        all
     }
 
     /// Adds force and torque at the reference point of an interface to z, body axes.
@@ -120,11 +158,82 @@ impl RowStates {
         self.values.chunks_exact(self.layout.len())
     }
 
+    /// Returns the states as plain numbers.
+    pub(super) fn sampled(&self) -> SampledStates<'_> {
+        SampledStates { times: &self.times, values: &self.values, width: self.layout.len() }
+    }
+
     /// Removes all instants but the last `kept`.
     pub(super) fn keep_last(&mut self, kept: usize) {
         let first = self.times.len().saturating_sub(kept);
         self.times.drain(..first);
         self.values.drain(..first * self.layout.len());
+    }
+}
+
+/// Numbers of one length at successive instants.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SampledStates<'a> {
+    pub times: &'a [f64],
+    /// Numbers at each time, one instant after the other.
+    pub values: &'a [f64],
+    /// Length of the numbers of an instant.
+    pub width: usize,
+}
+
+impl<'a> SampledStates<'a> {
+    /// Returns the numbers of all instants in the order of time.
+    pub(super) fn iter(self) -> impl ExactSizeIterator<Item = &'a [f64]> {
+        self.values.chunks_exact(self.width)
+    }
+}
+
+/// States z of a body in its scene, both in one frame.
+#[derive(Debug, Clone)]
+pub(super) struct RowSampler {
+    pub layout: RowLayout,
+    /// Interface of each load of the scene among those with static columns; `None` for a place without.
+    loaded: Vec<Option<usize>>,
+    /// Interface that carries the body.
+    carrier: Option<usize>,
+}
+
+impl RowSampler {
+    /// Creates the states in the order `layout` for `scene`.
+    pub(super) fn new(layout: RowLayout, scene: &Scene) -> Self {
+        let column = |place: &Point| match place {
+            Point::Interface(name) => layout.interface(name),
+            Point::Node(_) => None,
+        };
+        Self {
+            loaded: scene.loads.iter().map(|load| column(&load.at)).collect(),
+            carrier: scene.carried.as_ref().and_then(|carried| column(&carried.by)),
+            layout,
+        }
+    }
+
+    /// Returns the places of loads and of a carrier without static columns.
+    pub(super) fn unseen<'s>(&self, scene: &'s Scene) -> Vec<&'s Point> {
+        let loads = scene.loads.iter().map(|load| &load.at).zip(self.loaded.iter().copied());
+        let carrier = scene.carried.iter().map(|carried| (&carried.by, self.carrier));
+        loads.chain(carrier).filter(|(_, column)| column.is_none()).map(|(place, _)| place).collect()
+    }
+
+    /// Returns z of the body at a state of its motion.
+    pub(super) fn state(&self, time: f64, now: &Snapshot<'_>, forces: &SceneForces<'_>) -> Vec<f64> {
+        let evaluation = now.evaluation();
+        let mut z = self.layout.state(evaluation.modal_coordinates(), &evaluation.rigid_velocity().1);
+        for (place, (_, force, torque)) in self.loaded.iter().zip(forces.acting(time, now.place())) {
+            if let Some(place) = *place {
+                self.layout.add_load(&mut z, place, &force, &torque);
+            }
+        }
+        // The frame of a carried body has its origin at the reference point of the carrier.
+        if let Some(carrier) = self.carrier {
+            let (force, torque) = now.reaction();
+            self.layout.add_load(&mut z, carrier, &force, &torque);
+        }
+        z
     }
 }
 

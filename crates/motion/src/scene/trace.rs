@@ -2,6 +2,8 @@
 
 use super::extremes::Survey;
 use super::prepared::{Finished, PARTS, Prepared, Reaction, Stop, damped};
+use super::recovery_errors::TracedRecoveries;
+use super::row_states::RowSampler;
 use super::simulate::remarks;
 use super::{Extremes, FramedScene, Resolution, Scene, Scheme};
 use crate::dynamics::{BodyPoint, Configuration, EulerParameters, Motion};
@@ -37,6 +39,8 @@ pub struct Trace {
     pub reactions: Option<Vec<(Vector3<f64>, Vector3<f64>)>>,
     /// Deflections of every watched point from the undeformed body, axes of the model.
     pub deflections: Vec<Vec<Vector3<f64>>>,
+    /// Recoveries with a limit in the scene; `None` without.
+    pub recovered: Option<TracedRecoveries>,
     /// State at the start.
     pub start: Configuration,
     /// Extremes of the motion.
@@ -66,7 +70,10 @@ impl Trace {
         refuse_other_coordinates(body, scene)?;
         let framed = FramedScene::new(body, scene)?;
         let run = Prepared::new(&framed.body, &framed.scene)?;
-        let mut trace = Tracer::new(&run).trace;
+        let mut trace = Tracer::new(&run)?.trace;
+        let same =
+            |own: TracedRecoveries| Some(fallback.recovered.as_ref()?.with_coordinates(own, &history.q));
+        trace.recovered = trace.recovered.and_then(same);
         trace.time.clone_from(&history.time);
         trace.attitude.clone_from(history.attitude.as_ref().unwrap_or(&fallback.attitude));
         trace.q.clone_from(&history.q);
@@ -79,18 +86,18 @@ impl Trace {
 
     /// Returns the number of bytes of this motion for a body with `modes` modes.
     pub fn bytes(&self, modes: usize) -> f64 {
-        self.time.len() as f64 * Self::bytes_of_instant(modes, self.deflections.len())
+        self.time.len() as f64 * self.bytes_of_instant(modes)
     }
 
-    /// Returns the number of bytes per sample for a body with `modes` modes in a scene with `watched`
-    /// points.
-    fn bytes_of_instant(modes: usize, watched: usize) -> f64 {
+    /// Returns the number of bytes per sample for a body with `modes` modes.
+    fn bytes_of_instant(&self, modes: usize) -> f64 {
         const NUMBER: f64 = 8.0;
         /// Number of values besides q and deflections: time, attitude, energy, reaction, and the header of
         /// the vector of modal coordinates.
         const PLAIN: usize = 1 + 4 + 1 + 6 + 3;
         // Growing vectors reserve up to twice their length.
-        2.0 * NUMBER * (PLAIN + modes + 3 * watched) as f64
+        let rows = self.recovered.as_ref().map_or(0, TracedRecoveries::bytes_of_instant);
+        2.0 * (NUMBER * (PLAIN + modes + 3 * self.deflections.len()) as f64 + rows as f64)
     }
 }
 
@@ -106,9 +113,9 @@ pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(T
     let scene = &*framed.scene;
     let run = Prepared::new(body, scene)?;
     // Samples at steps and within them until the memory is full; the extremes are surveyed there too.
-    let bytes = Trace::bytes_of_instant(body.n_modes(), run.watched.len());
+    let mut tracer = Tracer::new(&run)?;
+    let bytes = tracer.trace.bytes_of_instant(body.n_modes());
     let most = context.memory.map_or(f64::INFINITY, |memory| memory as f64 / bytes);
-    let mut tracer = Tracer::new(&run);
     let mut survey = Survey::new(body, &run.watched);
     let look = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if event == ObserverEvent::Instant {
@@ -119,7 +126,7 @@ pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(T
         }
         context.fraction(time / run.duration);
         let reaction = run.survey(&mut survey, event, time, state, motion)?;
-        tracer.see(time, state, motion, reaction);
+        tracer.see(time, state, motion, reaction)?;
         Ok(())
     };
     let finished = run.integrate(&[0.0, run.duration], PARTS, look)?;
@@ -141,19 +148,19 @@ pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64], context: &Context
     let framed = FramedScene::new(body, scene)?;
     let body = &*damped(&framed.body, &framed.scene)?;
     let run = Prepared::new(body, &framed.scene)?;
-    let needed = times.len() as f64 * Trace::bytes_of_instant(body.n_modes(), run.watched.len());
+    let mut tracer = Tracer::new(&run)?;
+    let needed = times.len() as f64 * tracer.trace.bytes_of_instant(body.n_modes());
     refuse_beyond(
         context.memory,
         needed,
         &format!("the motion at {} instants", times.len()),
         "simulate a shorter `duration`",
     )?;
-    let mut tracer = Tracer::new(&run);
     let look = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if event == ObserverEvent::Instant {
             let prescribes = framed.scene.prescribes();
             let reaction = if prescribes { Some(motion.evaluate(time, state)?.reaction()) } else { None };
-            tracer.see(time, state, motion, reaction);
+            tracer.see(time, state, motion, reaction)?;
         }
         Ok::<(), Failure>(())
     };
@@ -176,11 +183,14 @@ fn refuse_other_coordinates(body: &FlexBody, scene: &Scene) -> Result<()> {
 struct Tracer<'r> {
     run: &'r Prepared<'r>,
     trace: Trace,
+    /// States of recoveries with a limit; `None` without.
+    sampler: Option<RowSampler>,
 }
 
 impl<'r> Tracer<'r> {
-    fn new(run: &'r Prepared<'r>) -> Self {
+    fn new(run: &'r Prepared<'r>) -> Result<Self> {
         let scene = run.scene;
+        let (recovered, sampler) = TracedRecoveries::new(run.body, scene)?.unzip();
         let trace = Trace {
             scheme: run.scheme,
             time: Vec::new(),
@@ -189,17 +199,24 @@ impl<'r> Tracer<'r> {
             elastic: Vec::new(),
             reactions: scene.prescribes().then(Vec::new),
             deflections: vec![Vec::new(); run.watched.len()],
+            recovered,
             start: run.start.clone(),
             extremes: Extremes::default(),
             work: Work::default(),
             size: (0.0, 0.0),
             resolution: Resolution::new(run.body, scene.requirements.tolerance.least_deflection),
         };
-        Self { run, trace }
+        Ok(Self { run, trace, sampler })
     }
 
     /// Stores a sample of the motion.
-    fn see(&mut self, time: f64, state: &[f64], motion: &Motion<'_>, reaction: Option<Reaction>) {
+    fn see(
+        &mut self,
+        time: f64,
+        state: &[f64],
+        motion: &mut Motion<'_>,
+        reaction: Option<Reaction>,
+    ) -> std::result::Result<(), Failure> {
         let (attitude, q) = motion.shape(state);
         let trace = &mut self.trace;
         trace.time.push(time);
@@ -212,6 +229,11 @@ impl<'r> Tracer<'r> {
         if let Some(reactions) = &mut trace.reactions {
             reactions.extend(reaction);
         }
+        if let (Some(recovered), Some(sampler)) = (&mut trace.recovered, &self.sampler) {
+            let z = sampler.state(time, &motion.evaluate(time, state)?, &self.run.forces);
+            recovered.states.push(time, &z);
+        }
+        Ok(())
     }
 
     fn finish(self, finished: Finished, extremes: Extremes) -> Trace {

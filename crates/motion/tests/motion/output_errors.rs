@@ -45,8 +45,9 @@ fn most(values: impl Iterator<Item = f64>) -> f64 {
 fn a_motion_is_no_distance_from_itself() {
     let body = soft_block(6);
     let recording = motion(&body, &scene(30.0));
-    let errors = Measure::new(&body, &recording).of_subset(&recording, &[0, 1, 2, 3, 4, 5]).largest();
-    let none = OutputErrors { reaction: None, ..OutputErrors::all(Some(0.0)) };
+    let errors =
+        Measure::new(&body, &scene(30.0), &recording).of_subset(&recording, &[0, 1, 2, 3, 4, 5]).largest();
+    let none = OutputErrors { reaction: None, recovery: None, ..OutputErrors::all(Some(0.0)) };
     assert_eq!(errors, none);
     assert!(errors.within(&Tolerance::default()));
 }
@@ -66,7 +67,7 @@ fn the_attitude_is_apart_by_the_angle_of_a_turn() {
             *attitude = EulerParameters(both.map(|e| -e));
         }
         let axes = (recording.attitude[7].axes().transpose() * turned.attitude[7].axes()).trace();
-        let found = Measure::new(&body, &recording)
+        let found = Measure::new(&body, &scene(30.0), &recording)
             .of_subset(&turned, &[0, 1, 2, 3])
             .largest()
             .attitude
@@ -80,7 +81,7 @@ fn the_attitude_is_apart_by_the_angle_of_a_turn() {
 fn deformations_are_apart_by_their_elastic_energy_and_the_nodes_that_move_most() {
     let body = soft_block(5);
     let recording = motion(&body, &scene(30.0));
-    let measure = Measure::new(&body, &recording);
+    let measure = Measure::new(&body, &scene(30.0), &recording);
     let amplitude = 1e-3;
     let other = changed(&recording, |_, q| q[2] += amplitude);
     let errors = measure.of_subset(&other, &[0, 1, 2, 3, 4]).largest();
@@ -112,7 +113,7 @@ fn modes_that_are_not_there_are_missing() {
     let recording = motion(&body, &scene(30.0));
     let kept = [4, 1];
     let fewer = changed(&recording, |_, q| *q = kept.iter().map(|&j| q[j]).collect());
-    let stress = Measure::new(&body, &recording).of_subset(&fewer, &kept).largest().stress;
+    let stress = Measure::new(&body, &scene(30.0), &recording).of_subset(&fewer, &kept).largest().stress;
     let energy = |q: &[f64], modes: &[usize]| -> f64 {
         modes.iter().map(|&j| 0.5 * body.modes().eigenvalue[j] * q[j].powi(2)).sum()
     };
@@ -144,7 +145,7 @@ fn watched_points_and_reactions_count_relative_to_their_largest() {
     a.deflections = vec![along_x(recording.time.clone()), along_x(vec![0.0; instants])];
     let tenth = recording.time.iter().map(|t| 0.1 * t).collect();
     b.deflections = vec![along_x(recording.time.clone()), along_x(tenth)];
-    let history = Measure::new(&body, &a).of_subset(&b, &[0, 1, 2, 3]);
+    let history = Measure::new(&body, &scene(20.0), &a).of_subset(&b, &[0, 1, 2, 3]);
     let errors = history.largest();
     assert!((errors.reaction.expect("a reaction") - 0.02).abs() < 1e-4);
     assert!((errors.deflection.expect("a path") - 0.1).abs() < 1e-15);
@@ -166,7 +167,7 @@ fn what_is_too_small_to_count_is_measured_against_the_least_that_counts() {
     let at_rest = Scene { initial: Initial::default(), ..scene(1.0) };
     let recording = motion(&body, &at_rest);
     let other = changed(&recording, |_, q| q[0] += 1e-20);
-    let errors = Measure::new(&body, &recording).of_subset(&other, &[0, 1, 2, 3]).largest();
+    let errors = Measure::new(&body, &scene(30.0), &recording).of_subset(&other, &[0, 1, 2, 3]).largest();
     // The extent of a body is measured along the axes of the model.
     let least = Resolution::new(&FramedScene::new(&body, &at_rest).expect("a stage").body, None);
     let lambda = body.modes().eigenvalue[0];
@@ -214,7 +215,7 @@ fn two_bases_of_one_model_are_apart_by_the_energy_of_the_difference_of_displacem
     turning.initial.angular_velocity *= 0.3 * rate;
     let whole = motion(&reference, &turning);
     let recordings = [trace_at(&candidate, &turning, &whole.time, &Context::QUIET).expect("a motion"), whole];
-    let found = Measure::new(&reference, &recordings[1]).of_other(&recordings[0], &modes).largest();
+    let found = Measure::new(&reference, &turning, &recordings[1]).of_other(&recordings[0], &modes).largest();
 
     // Displacements of all rows and their energy, one time after the other.
     let displacements = |which: usize, i: usize| {
@@ -234,6 +235,7 @@ fn two_bases_of_one_model_are_apart_by_the_energy_of_the_difference_of_displacem
     // A basis has zero distance from itself, to the square root of the rounding in K.
     let own = gram(vectors[1].as_ref(), weighted(&vectors[1]).as_ref());
     let itself = OtherModes::new(&reference, &reference, own.as_ref()).expect("one body");
-    let errors = Measure::new(&reference, &recordings[1]).of_other(&recordings[1], &itself).largest();
+    let errors =
+        Measure::new(&reference, &turning, &recordings[1]).of_other(&recordings[1], &itself).largest();
     assert!(errors.stress.expect("a deformed body") < 1e-6 && errors.attitude == Some(0.0));
 }

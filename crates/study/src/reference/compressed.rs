@@ -258,6 +258,7 @@ mod tests {
             qd: many(i, 2),
             qdd: many(i, 3),
             gravity: vector(i, 5),
+            row_state: Vec::new(),
             loads: vec![(vector(i, 6), vector(i, 7))],
         };
         (0..BLOCK + 3).map(at).collect()

@@ -79,6 +79,7 @@ impl CouplingEffect {
             ("deflection", self.errors.deflection),
             ("stress", self.errors.stress),
             ("reaction", self.errors.reaction),
+            ("recovery", self.errors.recovery),
         ];
         let parts: Vec<String> = parts
             .into_iter()
@@ -100,7 +101,7 @@ impl ReferenceError {
     /// Returns unknown (infinite) errors of a body with `modes` modes.
     fn unknown(modes: usize, reason: &'static str) -> Self {
         let all = f64::INFINITY;
-        let errors = OutputErrors { reaction: None, ..OutputErrors::all(Some(all)) };
+        let errors = OutputErrors { reaction: None, recovery: None, ..OutputErrors::all(Some(all)) };
         Self { modes, errors, worst: all, time: 0.0, unknown: Some(reason), coupling: None }
     }
 
@@ -116,9 +117,18 @@ impl ReferenceError {
         (1.0 - error.map_or(0.0, |own| own.worst)).max(0.0)
     }
 
-    /// Returns the remark about rigid interfaces that the body and the compared model have in common.
-    pub fn coupling_remark(&self) -> Option<Diagnostic> {
-        self.coupling.as_ref().map(CouplingEffect::remark)
+    /// Returns remarks about what the errors do not contain: the effect of rigid interfaces that the body and the compared
+    /// model have in common, and recoveries with a limit that are known for some shapes only.
+    pub fn remarks(&self, scene: &Scene) -> Vec<Diagnostic> {
+        let limited = scene.requirements.recoveries.first();
+        let unjudged = limited.filter(|_| self.unknown.is_none() && self.errors.recovery.is_none()).map(|one| {
+            let message = format!(
+                "the error of recovery `{}` relative to the FE model is not known, only that relative to the body with all its modes: an FE program has computed its rows for the shapes of the body alone",
+                one.recovery
+            );
+            Diagnostic::new(Code::RecoveryUnjudged, message)
+        });
+        self.coupling.as_ref().map(CouplingEffect::remark).into_iter().chain(unjudged).collect()
     }
 
     /// Returns a warning if the truncation error exceeds `enough` of the tolerances, or is unknown.
@@ -238,7 +248,7 @@ impl ModelComparison<'_> {
     fn estimate(&self, view: &NodalView<'_>, allowed: f64) -> Result<Estimate> {
         let &Self { body, scene, motion, grid, sampled, watched } = self;
         let tolerance = &scene.requirements.tolerance;
-        let least = tolerance.errors.stress.min(tolerance.errors.deflection);
+        let least = tolerance.of_deformation();
         // A resonance counts above a small part of the tolerances; a free body has no missing mode below the
         // certificate.
         let criteria = ResonanceCriteria {
@@ -249,7 +259,7 @@ impl ModelComparison<'_> {
         let missed = TruncatedResponses::new(view, body, sampled, grid, &criteria)?;
         let truncated_motion =
             TruncatedMotion::new(view, body, &missed, sampled, grid, scene.initial.settled);
-        let TruncationErrors { errors, time } = truncated_motion.errors(scene, motion, watched);
+        let TruncationErrors { errors, time } = truncated_motion.errors(body, scene, motion, watched);
         let worst = errors.worst(tolerance);
         let modes = body.n_modes();
         let error = ReferenceError { modes, worst, time, errors, unknown: None, coupling: None };

@@ -138,7 +138,7 @@ impl<'m> MotionBodies<'m> {
 impl Case<'_> {
     /// Returns the measure for errors relative to the reference motion.
     fn measure(&self) -> Measure<'_> {
-        Measure::new(&self.framed_body, &self.motion)
+        Measure::new(&self.framed_body, self.scene, &self.motion)
     }
 
     /// Returns the largest errors of the motion of `body`. `shared` is the stiffness Psi'K Psi_r that couples its modes

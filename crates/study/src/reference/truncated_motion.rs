@@ -5,10 +5,11 @@ use super::residual::{BLOCK, NodalView};
 use super::truncated_equations::{TruncatedAmplitudes, TruncatedDamping, TruncatedEquations};
 use super::truncated_responses::TruncatedResponses;
 use faer::{Mat, MatRef};
+use flexbody_body::convert::recovered_rows;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::symmetric_part;
 use flexbody_linalg::{combine, gram, larger, not_negative, side_by_side};
-use flexbody_motion::scene::{Instant, OutputErrors, Peak, Scene, Trace, reaction_errors};
+use flexbody_motion::scene::{Instant, OutputErrors, Peak, RecoveryMeasure, Scene, Trace, reaction_errors};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Number of instants at which nodal displacements and reactions are evaluated. With so many samples at arbitrary
@@ -90,7 +91,13 @@ impl<'a> TruncatedMotion<'a> {
     }
 
     /// Computes errors relative to the motion of all nodes, which is the `motion` of the body plus its truncated part.
-    pub(super) fn errors(&self, scene: &Scene, motion: &Trace, watched: &[Mat<f64>]) -> TruncationErrors {
+    pub(super) fn errors(
+        &self,
+        body: &FlexBody,
+        scene: &Scene,
+        motion: &Trace,
+        watched: &[Mat<f64>],
+    ) -> TruncationErrors {
         let (stress, time) = self.stress(motion);
         let free = !scene.prescribes();
         let errors = OutputErrors {
@@ -98,6 +105,7 @@ impl<'a> TruncatedMotion<'a> {
             deflection: self.deflection(motion, watched),
             stress: Some(stress),
             reaction: if free { None } else { self.reaction(scene, motion) },
+            recovery: self.recovery(body, scene, motion),
         };
         TruncationErrors { errors, time }
     }
@@ -150,6 +158,29 @@ impl<'a> TruncatedMotion<'a> {
                 .for_each(|(longest, moved)| *longest = larger(*longest, moved.norm()));
         }
         longest
+    }
+
+    /// Returns the largest error of the recoveries with a limit, relative to it: the rows of X y less what the static
+    /// columns of the body hold. `None` if no recovery has a limit, or if one is known for some shapes only.
+    fn recovery(&self, body: &FlexBody, scene: &Scene, motion: &Trace) -> Option<f64> {
+        let measure = RecoveryMeasure::new(body, scene, motion.recovered.as_ref())?;
+        let model = self.view.model;
+        let rows = |name: &str| {
+            let asked = model.recoveries().iter().find(|one| one.name == name)?;
+            recovered_rows(model, asked, &self.columns)
+        };
+        let truncated = measure.names().map(rows).collect::<Option<Vec<_>>>()?;
+        let differences: Vec<Mat<f64>> =
+            truncated.iter().enumerate().map(|(at, rows)| measure.beyond_columns(at, rows)).collect();
+        // States: y, and what the static columns depend on.
+        let y = &self.answer.value;
+        let state = |(i, now): (usize, &'a Instant)| {
+            let amplitudes = (0..y.nrows()).map(move |row| y[(row, i)]);
+            amplitudes.chain(now.row_state[1 + now.q.len()..].iter().copied())
+        };
+        let states: Vec<f64> = self.sampled.iter().enumerate().flat_map(state).collect();
+        let history = measure.of_differences(&differences, &self.grid.times, &states);
+        Some(Peak::of(&self.grid.times, history).value)
     }
 
     /// Returns the largest angle by which the truncated part rotates a free body.
@@ -353,6 +384,7 @@ mod tests {
             qd: Vec::new(),
             qdd: Vec::new(),
             gravity: Vector3::zeros(),
+            row_state: Vec::new(),
             loads: vec![(force, Vector3::zeros())],
         };
         (0..=steps).map(at).collect()

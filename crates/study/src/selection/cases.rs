@@ -388,7 +388,7 @@ impl<'v> VariedRuns<'v> {
         // The measures look at all nodes and instants of the references: made once for all models.
         let both = self.cases.iter().zip(&self.references);
         let measures: Vec<Measure<'_>> =
-            both.map(|(case, reference)| Measure::new(case.runs().body, reference)).collect();
+            both.map(|(case, reference)| Measure::new(case.body, case.scene, reference)).collect();
         let of_scene = self.measured(&measures, choice)?;
         let mut chosen = of_scene.clone();
         let passed = |trials: &[Trial]| trials.iter().all(Trial::passed);

@@ -5,7 +5,7 @@ use super::cases::{Case, SLACK_OF_RANGE, VariedRuns, VariedSelection, sets_in, t
 use super::demand::{BEYOND_BAND, Demand};
 use super::situation::PointRows;
 use super::trial::{ModeShare, Trial, TrialRuns, multiplications};
-use crate::reference::{PART_OF_REFERENCE, ReferenceError};
+use crate::reference::PART_OF_REFERENCE;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
@@ -39,8 +39,8 @@ impl<'s> SelectionState<'s> {
             diagnostics.extend(demand.found.iter().cloned().map(|said| demand.about(said)));
             let warning =
                 demand.reference_errors.last().and_then(|own| own.warning(demand.scene, PART_OF_REFERENCE));
-            let remark = demand.reference_errors.last().and_then(ReferenceError::coupling_remark);
-            diagnostics.extend(remark.into_iter().chain(warning).map(|said| demand.about(said)));
+            let remarks = demand.reference_errors.last().map(|own| own.remarks(demand.scene));
+            diagnostics.extend(remarks.into_iter().flatten().chain(warning).map(|said| demand.about(said)));
             let case = (demands.len() > 1).then_some(at);
             trials.extend(demand.bounds.iter().map(|trial| Trial { case, ..trial.clone() }));
         }
@@ -121,7 +121,7 @@ impl<'s> SelectionState<'s> {
             scenes: scenes
                 .map(|(case, trace)| TestScene {
                     runs: case.runs(),
-                    measure: Measure::new(demand.body, trace),
+                    measure: Measure::new(demand.body, case.runs().scene, trace),
                 })
                 .collect(),
             budget: demand.budget(),
@@ -251,10 +251,12 @@ impl Choice {
     }
 }
 
-/// Returns the contribution of each mode relative to the tolerances: the larger of deflection and stress.
+/// Returns the contribution of each mode relative to the tolerances: the largest of deflection, stress and recoveries.
 fn weights(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<f64> {
     let weight = |share: &ModeShare| {
-        (share.deflection / tolerance.errors.deflection).max(share.stress / tolerance.errors.stress)
+        let plain =
+            (share.deflection / tolerance.errors.deflection).max(share.stress / tolerance.errors.stress);
+        share.recovery.map_or(plain, |recovery| plain.max(recovery))
     };
     shares.iter().map(weight).collect()
 }
@@ -366,6 +368,7 @@ impl SelectionSearch<'_> {
                     share.amplitude = share.amplitude.max(other.amplitude);
                     share.deflection = share.deflection.max(other.deflection);
                     share.stress = share.stress.max(other.stress);
+                    share.recovery = [share.recovery, other.recovery].into_iter().flatten().reduce(f64::max);
                 }
             }
         }

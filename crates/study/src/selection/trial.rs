@@ -6,12 +6,12 @@ use super::norms::Norms;
 use super::situation::{PointRows, Situation};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, TermGroups};
+use flexbody_body::flex_body::{FlexBody, Subset, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
-    ErrorHistory, LEAST_REACTION, Load, Measure, OutputErrors, Recording, Resolution, Scene, Spin, Trace,
-    ends_a_run, simulate, trace, trace_at,
+    ErrorHistory, LEAST_REACTION, Load, Measure, OutputErrors, Recording, RecoveryMeasure, Resolution, Scene,
+    Spin, Trace, ends_a_run, simulate, trace, trace_at,
 };
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
@@ -115,8 +115,9 @@ impl TrialRuns<'_> {
     fn highest_excited_rate(&self, motion: &Recording) -> f64 {
         let roots: Vec<f64> = self.body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
         let energies = || roots.iter().zip(&motion.extremes.amplitudes).map(|(root, q)| root * q.abs());
-        let least =
-            MIN_MODE_SHARE * self.scene.requirements.tolerance.errors.stress * energies().fold(0.0, f64::max);
+        let least = MIN_MODE_SHARE
+            * self.scene.requirements.tolerance.of_deformation()
+            * energies().fold(0.0, f64::max);
         let excited = roots.iter().zip(energies()).filter(|(_, energy)| *energy > least);
         excited.map(|(root, _)| *root).fold(0.0, f64::max)
     }
@@ -155,11 +156,14 @@ impl TrialRuns<'_> {
         budget: f64,
     ) -> Result<(Trial, Option<ErrorHistory>)> {
         let whole = measure.body();
+        // The static columns of recoveries hold what dropped groups leave out, so that they belong to the groups too.
+        let held = whole.invariants().groups();
+        let groups = if measure.recoveries().is_some() { held.and(kept) } else { held };
         let own;
-        let body = if modes.len() == whole.n_modes() {
+        let body = if modes.len() == whole.n_modes() && groups == held {
             whole
         } else {
-            own = whole.reduced(modes, whole.invariants().groups(), Vec::new())?;
+            own = whole.clone().subset(&Subset { modes: Some(modes.to_vec()), groups })?;
             &own
         };
         let mut scene =
@@ -286,6 +290,12 @@ impl TrialRuns<'_> {
             deflection: Some(relative(self.reach() * error.energy, &paths, least.deflection)),
             stress: Some(relative(error.energy / 2f64.sqrt(), &energies, least.root_energy)),
             reaction: self.scene.spin.is_some().then(|| relative(torque, &torques, least_torque)),
+            recovery: RecoveryMeasure::of_recording(
+                self.body,
+                self.scene,
+                run.and_then(|run| run.recovered.as_ref()),
+            )
+            .map(|measure| measure.bound(error.energy)),
         }
     }
 
@@ -338,6 +348,10 @@ impl TrialRuns<'_> {
         } else {
             extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max)
         };
+        let recovery = RecoveryMeasure::new(self.body, self.scene, trace.recovered.as_ref());
+        let recovery = recovery.zip(trace.recovered.as_ref()).map(|(measure, recovered)| {
+            measure.contributions(&extremes.amplitudes, &recovered.dynamic_amplitudes(self.body))
+        });
         let share = |j: usize| {
             let amplitude = extremes.amplitudes[j];
             let moved = longest[j] * amplitude;
@@ -346,6 +360,7 @@ impl TrialRuns<'_> {
                 amplitude,
                 deflection: moved / deflection.max(trace.resolution.deflection),
                 stress: root_energy / energy.max(trace.resolution.root_energy),
+                recovery: recovery.as_ref().map(|all| all[j]),
                 kept: true,
             }
         };
@@ -363,6 +378,9 @@ pub struct ModeShare {
     pub deflection: f64,
     /// Root of its largest elastic energy, relative to the largest of all modes together.
     pub stress: f64,
+    /// Largest contribution to a recovery over its limit, without the part that static columns hold; `None` if no
+    /// recovery has a limit.
+    pub recovery: Option<f64>,
     /// True if the mode is kept.
     pub kept: bool,
 }

@@ -87,7 +87,7 @@ impl<'m> StudyCase<'m> {
 
     /// Returns the measure of errors relative to the motion of the reference.
     pub(super) fn measure(&self) -> Measure<'_> {
-        Measure::new(self.sources[0].body(), &self.motion)
+        Measure::new(self.sources[0].body(), &self.scene, &self.motion)
     }
 
     /// Returns the body of `candidate` in the frame of the case.

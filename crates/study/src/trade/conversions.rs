@@ -106,16 +106,18 @@ pub fn conversions(
     Ok(Conversions { sources, reference_errors, varied, diagnostics })
 }
 
-/// Returns warnings about the truncation error of the reference, each with its load case if there are several.
+/// Returns warnings and remarks about the truncation error of the reference, each with its load case if there are several.
 fn warnings(cases: &LoadCases, reference_errors: &[Vec<ReferenceError>], enough: f64) -> Vec<Diagnostic> {
-    let of = |(at, rounds): (usize, &Vec<ReferenceError>)| {
-        let warning = rounds.last()?.warning(&cases[at], enough)?;
-        Some(match cases.case_name(at) {
-            Some(name) => warning.about(format!("case `{name}`")),
-            None => warning,
-        })
-    };
-    reference_errors.iter().enumerate().filter_map(of).collect()
+    let mut all = Vec::new();
+    for (at, rounds) in reference_errors.iter().enumerate() {
+        let Some(own) = rounds.last() else { continue };
+        let found = own.warning(&cases[at], enough).into_iter().chain(own.remarks(&cases[at]));
+        all.extend(found.map(|said| match cases.case_name(at) {
+            Some(name) => said.about(format!("case `{name}`")),
+            None => said,
+        }));
+    }
+    all
 }
 
 /// Part of the remaining tolerances that bodies of the fewest shapes may take. The rest is for dropped terms.

@@ -1,15 +1,17 @@
 //! Motion of all nodes as the reference of a study, and the estimate of its time and memory before it is computed.
 
 use super::nodal_trace::{NodalSetup, NodalTrace, refused};
+use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
+use flexbody_body::convert::recovered_rows;
 use flexbody_body::flex_body::{FlexBody, LoadKind};
 use flexbody_linalg::Analysis;
 use flexbody_linalg::context::Context;
-use flexbody_model::FeModel;
+use flexbody_model::{FeModel, ModelRecovery, RecoveryOperator};
 use flexbody_motion::scene::{
-    ErrorHistory, Scene, Scheme, Trace, fastest_history, highest_excited_rate, nodal_point,
+    ErrorHistory, RecoveryMeasure, Scene, Scheme, Trace, fastest_history, highest_excited_rate, nodal_point,
 };
 use std::f64::consts::TAU;
 
@@ -43,7 +45,76 @@ pub struct NodalReference<'m> {
     model: &'m FeModel,
     seen: NodalTrace,
     largest_deflection: f64,
+    recoveries: Option<NodalRecoveries<'m>>,
     error: Option<f64>,
+}
+
+/// Recoveries with a limit, from the displacements of all nodes.
+#[derive(Debug, Clone)]
+struct NodalRecoveries<'m> {
+    model: &'m FeModel,
+    measure: RecoveryMeasure,
+    /// Recoveries of the model and their values of the undeformed body.
+    asked: Vec<(&'m ModelRecovery, Vec<f64>)>,
+}
+
+/// Number of instants whose rows are computed together.
+const BLOCK: usize = 64;
+
+impl<'m> NodalRecoveries<'m> {
+    /// Creates the recoveries that have limits in `scene`, for a reference `motion` of `body`; `None` without limits.
+    ///
+    /// # Errors
+    /// FB801 for a recovery that is known for some shapes only.
+    fn new(model: &'m FeModel, body: &FlexBody, scene: &Scene, motion: &Trace) -> Result<Option<Self>> {
+        let Some(measure) = RecoveryMeasure::new(body, scene, motion.recovered.as_ref()) else {
+            return Ok(None);
+        };
+        let one = |name: &str| {
+            let known = model.recoveries().iter().find(|one| one.name == name);
+            let of_shapes = |one: &&ModelRecovery| !matches!(one.operator, RecoveryOperator::Shapes { .. });
+            let asked = known.filter(of_shapes).ok_or_else(|| {
+                refused(format!("recovery `{name}` is not known for the displacements of all nodes"))
+            })?;
+            let offset = body.recoveries().iter().find(|one| one.name == name).map(|one| one.offset.clone());
+            Ok((asked, offset.unwrap_or_default()))
+        };
+        let asked = measure.names().map(one).collect::<Result<Vec<_>>>()?;
+        Ok(Some(Self { model, measure, asked }))
+    }
+
+    /// Returns the errors of `candidate` relative to the limits, at the instants of the `displacements` of all nodes.
+    fn errors(&self, displacements: MatRef<'_, f64>, candidate: &Trace) -> Vec<f64> {
+        let instants = displacements.ncols();
+        let Some(traced) = &candidate.recovered else { return vec![f64::INFINITY; instants] };
+        let mut errors = Vec::with_capacity(instants);
+        for first in (0..instants).step_by(BLOCK) {
+            let block = first..instants.min(first + BLOCK);
+            let u = displacements.subcols(first, block.len()).to_owned();
+            let difference = |(at, (asked, offset)): (usize, &(&ModelRecovery, Vec<f64>))| {
+                let whole = recovered_rows(self.model, asked, &u).expect("rows of all nodes");
+                let own = self.measure.rows_of(at, traced, block.clone());
+                Mat::from_fn(own.nrows(), own.ncols(), |i, j| own[(i, j)] - offset[i] - whole[(i, j)])
+            };
+            let rows: Vec<Mat<f64>> = self.asked.iter().enumerate().map(difference).collect();
+            errors.extend(self.measure.of_rows(&rows));
+        }
+        errors
+    }
+
+    /// Returns the errors relative to the limits between two motions of all nodes.
+    fn between(&self, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Vec<f64> {
+        let mut errors = Vec::with_capacity(a.ncols());
+        for first in (0..a.ncols()).step_by(BLOCK) {
+            let count = BLOCK.min(a.ncols() - first);
+            let difference = a.subcols(first, count) - b.subcols(first, count);
+            let rows = |(asked, _): &(&ModelRecovery, Vec<f64>)| {
+                recovered_rows(self.model, asked, &difference).expect("rows of all nodes")
+            };
+            errors.extend(self.measure.of_rows(&self.asked.iter().map(rows).collect::<Vec<_>>()));
+        }
+        errors
+    }
 }
 
 impl<'m> NodalReference<'m> {
@@ -101,10 +172,11 @@ impl<'m> NodalReference<'m> {
         };
         effort.refuse_large(instants, way, context.memory)?;
         let setup = NodalSetup::new(model, body, scene, motion)?;
+        let recoveries = NodalRecoveries::new(model, body, scene, motion)?;
         let end = motion.time.last().copied().unwrap_or(0.0);
         let whole = |seen: NodalTrace, error: Option<f64>| {
             let largest_deflection = seen.largest_deflection(model);
-            Ok(Self { model, seen, largest_deflection, error })
+            Ok(Self { model, seen, largest_deflection, recoveries: recoveries.clone(), error })
         };
         match (way, motion.scheme) {
             (Way::Explicit, scheme) => {
@@ -120,7 +192,8 @@ impl<'m> NodalReference<'m> {
                 whole(divided(in_parts, is_allowed)?.0, None)
             }
             (Way::Implicit { step, .. }, _) => {
-                let halving = Halving { model, setup: &setup, effort, longest: context.longest, end };
+                let (longest, recoveries) = (context.longest, recoveries.as_ref());
+                let halving = Halving { model, setup: &setup, effort, longest, end, recoveries };
                 let (seen, error) = halving.run(step, context)?;
                 whole(seen, Some(error))
             }
@@ -163,7 +236,8 @@ impl<'m> NodalReference<'m> {
         let vectors = body.vectors_of(self.model)?;
         let own =
             |first: usize, count: usize| NodalTrace::of_modes(vectors.as_ref(), candidate, first, count);
-        Some(self.seen.errors(self.model, candidate, self.largest_deflection, own))
+        let recovery = self.recoveries.as_ref().map(|all| all.errors(self.seen.displacements(), candidate));
+        Some(self.seen.errors(self.model, candidate, self.largest_deflection, recovery, own))
     }
 }
 
@@ -174,6 +248,7 @@ struct Halving<'h, 'm> {
     effort: Effort,
     longest: Option<f64>,
     end: f64,
+    recoveries: Option<&'h NodalRecoveries<'m>>,
 }
 
 impl Halving<'_, '_> {
@@ -192,7 +267,10 @@ impl Halving<'_, '_> {
             // Error of the coarser steps, relative to the finer ones.
             let scale = fine.largest_deflection(self.model);
             let own = |first: usize, count: usize| coarse.displacements().subcols(first, count).to_owned();
-            let error = fine.errors(self.model, &coarse.trace, scale, own).largest().worst(tolerance);
+            let recovery =
+                self.recoveries.map(|all| all.between(coarse.displacements(), fine.displacements()));
+            let errors = fine.errors(self.model, &coarse.trace, scale, recovery, own);
+            let error = errors.largest().worst(tolerance);
             if error <= MAX_STEP_ERROR || !is_allowed(2 * refinement) {
                 return Ok((fine, error));
             }

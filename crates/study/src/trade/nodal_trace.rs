@@ -45,6 +45,7 @@ impl NodalTrace {
             elastic: Vec::new(),
             reactions: motion.reactions.as_ref().map(|_| Vec::new()),
             deflections: vec![Vec::new(); motion.deflections.len()],
+            recovered: None,
             start: motion.start.clone(),
             extremes: Extremes::default(),
             work: Work::default(),
@@ -112,12 +113,14 @@ impl NodalTrace {
     }
 
     /// Returns the errors of `candidate` relative to this motion. `of` receives the first instant and a count, and
-    /// returns the displacements of the candidate there (N x count).
+    /// returns the displacements of the candidate there (N x count); `recovery` has the errors of recoveries, if any has a
+    /// limit.
     pub(super) fn errors(
         &self,
         model: &FeModel,
         candidate: &Trace,
         largest_deflection: f64,
+        recovery: Option<Vec<f64>>,
         of: impl Fn(usize, usize) -> Mat<f64>,
     ) -> ErrorHistory {
         let (mut energy, mut deflection) = (Vec::new(), Vec::new());
@@ -138,7 +141,7 @@ impl NodalTrace {
         ErrorHistory::new(
             &self.trace,
             candidate,
-            &DeformationDifference { energy, deflection, largest_deflection },
+            DeformationDifference { energy, deflection, largest_deflection, recovery },
         )
     }
 

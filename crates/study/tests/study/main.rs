@@ -6,6 +6,7 @@ mod advice;
 mod continuous_motion;
 mod nodal_reference;
 mod random_verdicts;
+mod recovery_limits;
 mod reference;
 mod scene_frames;
 mod selection_bounds;

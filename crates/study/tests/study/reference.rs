@@ -467,7 +467,7 @@ fn errors_beside(model: &FeModel, whole: &FlexBody, body: &FlexBody, scene: &Sce
     let [psi, all] = [&own, &of_whole].map(|framed| framed.body.vectors_of(model).expect("of this model"));
     let shared = gram(psi.as_ref(), model.pencil().apply_stiffness(all.as_ref()).as_ref());
     let modes = OtherModes::new(&own.body, &of_whole.body, shared.as_ref()).expect("of one model");
-    Measure::new(&of_whole.body, &motion).of_other(&moved, &modes).largest()
+    Measure::new(&of_whole.body, &of_whole.scene, &motion).of_other(&moved, &modes).largest()
 }
 
 /// A Craig-Bampton body keeps its rigid root rigid. With all fixed-interface modes it agrees with a model

@@ -117,7 +117,7 @@ fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
     let all: Vec<usize> = (0..body.n_modes()).collect();
     let whole = tested.recording(TermGroups::ALL);
     let continuous = tested.whole();
-    let measure = Measure::new(body, &continuous);
+    let measure = Measure::new(body, scene, &continuous);
     let mut found = Broken::default();
     for kept in combinations() {
         let own = tested.recording(kept);

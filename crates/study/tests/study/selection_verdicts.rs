@@ -41,7 +41,7 @@ fn measured(whole: &FlexBody, selection: &Selection, scene: &Scene) -> Option<f6
     let own = reduced(whole, selection);
     let motion = trace_at(&own, &scene.of_modes(&selection.modes), &reference.time, &Context::QUIET)
         .expect("a motion");
-    let errors = Measure::new(whole, &reference).of_subset(&motion, &selection.modes).largest();
+    let errors = Measure::new(whole, scene, &reference).of_subset(&motion, &selection.modes).largest();
     Some(errors.worst(&scene.requirements.tolerance))
 }
 
