@@ -153,4 +153,5 @@ pub mod program {
     };
     pub use flexbody_base::memory::accepts_failure;
     pub use flexbody_base::output::abandon_unfinished_soon;
+    pub use flexbody_base::provenance::state_command;
 }

@@ -2,7 +2,7 @@
 
 mod process;
 
-use flexbody::program::{Arguments, end_without_unfinished_files, parse, run};
+use flexbody::program::{Arguments, end_without_unfinished_files, parse, run, state_command};
 use flexbody::{Code, Diagnostic, ExitCode};
 use std::io::Write;
 
@@ -33,6 +33,7 @@ fn command() -> ExitCode {
         Ok(arguments) => Box::leak(Box::new(arguments)),
         Err(code) => return code,
     };
+    state_command(&std::env::args_os().collect::<Vec<_>>());
     end_without_unfinished_files(arguments);
     run(arguments)
 }

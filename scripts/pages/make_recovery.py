@@ -27,6 +27,14 @@ ROOT = Path(__file__).resolve().parents[2]
 # Model, modes, digits of the answers.
 MODELS = [("bracket_hex20", 10, 15), ("bracket_hex20", 10, 7), ("bracket_hex20", 10, 6), ("robot_link", 10, 15), ("connecting_rod", 10, 15)]
 SPIN = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+# Model, modes of its body, and the scenes that are tried: with the frequency of the load and the rate of the spin over the first frequency.
+SELECTED = [("bracket_hex20", 40), ("robot_link", 40)]
+SCENES = [("load at 0.1 f1", 0.1, 0.0), ("load at 0.4 f1", 0.4, 0.0), ("load at 0.8 f1, spin at 0.02 f1", 0.8, 0.02)]
+LIMITS = [
+    ("elastic energy", "stress = 0.01"),
+    ("stresses of modes and static columns", "recovery = { all = 0.01 }"),
+    ("stresses of modes alone", "recovery = { all = { limit = 0.01, static_columns = false } }"),
+]
 HEAD = """<!-- Written by scripts/pages/make_recovery.py -->
 
 # Stresses beside CalculiX
@@ -34,6 +42,13 @@ HEAD = """<!-- Written by scripts/pages/make_recovery.py -->
 Stresses of bodies with 10 modes whose recovery was made by [one run of CalculiX {calculix}](../how_to/stresses_from_calculix.md), beside static runs of CalculiX with all nodes.
 Written by `./scripts/make.sh pages recovery`. The error is the largest difference of a component at any node, relative to the largest component. Digits: those of the answers of CalculiX to the shapes.
 Modes follow the load statically; the bodies spin about the principal axis of their largest moment of inertia.
+"""
+SELECTION = """
+## Modes that 1 % takes
+
+Modes that `select` keeps of bodies with {modes} modes, for an error of 1 % at any instant in the estimate by elastic energy or in the von Mises stress at any node ([limits of recoveries](../reference/recovery.md#limits-of-the-error)). A sine of
+two periods of the first frequency f1 acts at one interface in all directions, from equilibrium; no variations. The reference is the body with all its modes and static columns; "more" than that: the modes alone do not reach 1 %.
+
 """
 TAIL = """
 ## Limits of each figure
@@ -106,6 +121,36 @@ class Case:
         nodes, found = stresses(self.folder / f"{name}.frd")
         place = {node: at for at, node in enumerate(nodes)}
         return found[[place[node] for node in self.ids]]
+
+    def selected(self, program, swing, spin, tolerance):
+        """Number of modes that `select` keeps; None if all of them are too few."""
+        with h5py.File(self.folder / "body.flex.h5") as body:
+            first = float(np.sqrt(body["modes/eigenvalue"][0]) / (2 * np.pi))
+        point = list(self.sets)[-1]
+        scene = f"""[run]
+duration = {2 / first!r}
+[initial]
+deformation = "static"
+angular_velocity = [0, {2 * np.pi * spin * first!r}, {np.pi * spin * first!r}]
+[[load]]
+interface = "{point}"
+force = [1.0, 2.0, 3.0]
+history = {{ amplitude = 1e-3, frequency = {swing * first!r} }}
+[[variation]]
+name = "the same"
+speed = 1.0
+[tolerance]
+attitude = 10.0
+deflection = 10.0
+{tolerance}
+"""
+        (self.folder / "scene.toml").write_text(scene)
+        words = [program, "select", "body.flex.h5", "--scene", "scene.toml", "--json"]
+        done = subprocess.run([str(word) for word in words], cwd=self.folder, capture_output=True, text=True)
+        if done.returncode > 1:
+            sys.exit(done.stdout + done.stderr)
+        results = json.loads(done.stdout)["results"]
+        return len(results["modes"]["kept"]) if results["chosen"]["passed"] else None
 
     def supports(self):
         """Node and direction of six supports that hold the body as far from each other as possible: the pivots of the rigid motions."""
@@ -215,7 +260,17 @@ def main():
         print(*rows[-3:], sep="\n")
     table = "| model | digits | nodes | load | modes alone | with static columns |\n|---|---|---|---|---|---|\n"
     table += "".join(f"| {name} | {nodes} | {what} | {100 * alone:.2g} % | {both:.1e} |\n" for name, nodes, what, alone, both in rows)
-    given.output.write_text(HEAD.format(calculix=version) + "\n" + table + TAIL)
+    chosen = "| model | scene | " + " | ".join(name for name, _ in LIMITS) + " |\n|---|---|" + "---|" * len(LIMITS) + "\n"
+    for name, modes in SELECTED:
+        with tempfile.TemporaryDirectory() as folder:
+            case = Case(given.program.resolve(), ccx, name, modes, Path(folder))
+            for scene, swing, spin in SCENES:
+                counts = [case.selected(given.program.resolve(), swing, spin, tolerance) for _, tolerance in LIMITS]
+                words = " | ".join("more" if count is None else str(count) for count in counts)
+                chosen += f"| {name} | {scene} | {words} |\n"
+                print(name, scene, counts)
+    counts = " and ".join(sorted({str(modes) for _, modes in SELECTED}))
+    given.output.write_text(HEAD.format(calculix=version) + "\n" + table + SELECTION.format(modes=counts) + chosen + TAIL)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ use super::craig_bampton::CraigBamptonFacts;
 use super::document::{Block, Inline, Span, Table, Term, cells, heading, listed, quantity};
 use super::facts::{Facts, ModeFacts};
 use super::geometric_stiffness::softening_in_words;
+use super::held::HeldFacts;
 use super::numbers::{counted, frequencies as frequencies_of, frequency, percent, significant};
 use faer::Mat;
 use flexbody_body::basis::BasisKind;
@@ -22,6 +23,7 @@ pub(super) fn modes<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     let mut blocks =
         vec![Block::Terms(in_short(facts)), heading("Frequencies"), Block::Table(frequencies(facts))];
     blocks.extend(modes.craig_bampton.as_ref().and_then(CraigBamptonFacts::held_hz).map(held_frequencies));
+    blocks.extend(modes.held.iter().map(HeldFacts::block));
     blocks.extend(truncation(&modes.truncation));
     blocks.push(Block::Heading(Inline::from(word_as("completeness", "Completeness")).then(" of the modes")));
     blocks.push(Block::Terms(completeness(facts)));

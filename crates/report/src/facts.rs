@@ -3,6 +3,7 @@
 use super::completeness::{Completeness, GuaranteeFacts, TermFacts};
 use super::craig_bampton::CraigBamptonFacts;
 use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz};
+use super::held::HeldFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
 use super::numbers::{coordinates, counted, percent, significant};
@@ -17,7 +18,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major version breaks readers, a newer minor version only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 8;
+const MINOR: u32 = 9;
 
 /// All facts of a report. The JSON form follows the schema `schemas/report.schema.json`.
 ///
@@ -234,6 +235,9 @@ pub(super) struct ModeFacts {
     /// Coordinates of a Craig-Bampton body, and its frequencies compared with the free body; `None` for other
     /// bodies.
     pub craig_bampton: Option<CraigBamptonFacts>,
+    /// Modes of the body held at each interface that can carry it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub held: Vec<HeldFacts>,
     /// Damping of the modes; `None` if none was given.
     pub damping: Option<DampingFacts>,
     /// Geometric stiffness for each unit load.
@@ -342,6 +346,7 @@ impl<'b> Facts<'b> {
                 softening_hz: softening_hz(body),
                 worst_residual: worst_residual(body),
                 craig_bampton: CraigBamptonFacts::of(body),
+                held: HeldFacts::of(body),
             },
             terms: TermFacts::of(body),
             completeness: Completeness::of(body),

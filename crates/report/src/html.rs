@@ -6,6 +6,7 @@ use super::document::{Block, Document, Inline, Span, State, Table, Term};
 use super::numbers::plain;
 use super::picture::Embedded;
 use flexbody_base::diagnostic::{Diagnostic, Severity};
+use flexbody_base::provenance::started;
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 const STYLE: &str = include_str!("report.css");
@@ -73,7 +74,11 @@ pub(super) fn render(document: &Document<'_>) -> String {
                 style { (PreEscaped(STYLE)) (PreEscaped(page.style)) }
             }
             body { "\n"
-                header { h1 { (name) } p class="quiet" { (document.kind) ", " (document.generator) } }
+                header { h1 { (name) } p class="quiet" { (document.kind) ", " (document.generator) }
+                    @if let Some(started) = started() {
+                        p class="quiet" { code { (started.command) } ", " (started.time) }
+                    }
+                }
                 main { "\n" (content) }
                 (PreEscaped(page.scripts))
             }

@@ -26,6 +26,7 @@ mod document;
 mod errors;
 mod facts;
 mod geometric_stiffness;
+mod held;
 mod html;
 mod lumped;
 mod mass_properties;

@@ -1,6 +1,7 @@
 //! Commands that make exactly the body of a recommendation.
 
 use crate::selection::Selection;
+use flexbody_base::provenance::shell_word;
 use flexbody_body::flex_body::{Storage, Subset, TermGroups};
 use flexbody_eigen::Accuracy;
 
@@ -156,15 +157,6 @@ fn text<const N: usize>(words: [&str; N]) -> Vec<String> {
     words.map(str::to_owned).to_vec()
 }
 
-/// Returns a word as a POSIX shell reads it: in single quotes if it has characters with a meaning there.
-fn shell_word(word: &str) -> String {
-    let is_plain = |c: char| c.is_alphanumeric() || "_./,=:@%+-".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', "'\\''"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,14 +169,5 @@ mod tests {
         let command = Recipe::File.command(&origin, &all, 2, Storage::F64);
         assert_eq!(command, "flexbody reduce 'a b.h5' --terms all -o body.flex.h5");
         assert_eq!(advised("a.h5", TermGroups::NONE), "flexbody reduce a.h5 --terms none -o body.flex.h5");
-    }
-
-    #[test]
-    fn words_are_quoted_for_the_shell() {
-        assert_eq!(shell_word("a/b-1.toml"), "a/b-1.toml");
-        assert_eq!(shell_word("my body.h5"), "'my body.h5'");
-        assert_eq!(shell_word("it's"), "'it'\\''s'");
-        assert_eq!(shell_word("$(x)"), "'$(x)'");
-        assert_eq!(shell_word(""), "''");
     }
 }

@@ -251,6 +251,15 @@ impl FlexBody {
         })
     }
 
+    /// Returns the reference point of `carrier` and its translations and rotations in the modes (6 x nf), body axes.
+    ///
+    /// # Errors
+    /// The errors FB212 and FB214 of [`FlexBody::carried`].
+    pub(super) fn motion_of(&self, carrier: &Carrier) -> Result<(Vector3<f64>, Mat<f64>)> {
+        let CarriedPoint { reference, motion } = self.place_of(carrier)?;
+        Ok((reference, motion))
+    }
+
     fn place_of(&self, carrier: &Carrier) -> Result<CarriedPoint> {
         let unknown = |message: String| Err(Diagnostic::new(Code::SceneBody, message).into());
         match carrier {

@@ -2,6 +2,7 @@
 
 mod body;
 mod carried;
+mod held_modes;
 mod identities;
 mod in_units;
 mod interface;
@@ -22,6 +23,7 @@ pub use carried::Carrier;
 pub use flexbody_model::{
     Coupling, GeometricStiffness, LoadKind, Quantity, RecoveryRow, SurfaceMesh, UnitLoad,
 };
+pub use held_modes::HeldMode;
 pub use interface::{Interface, InterfaceRows};
 pub use modal_change::{ModalChange, RigidMotions, diagonal_eigenvalues, reduced_residuals, rigid_motions};
 pub use model_axes::stiffness_about;

@@ -15,6 +15,7 @@ mod empty_rows;
 mod errata;
 mod extremes;
 mod first_shift;
+mod held_modes;
 mod invariants;
 mod lumped_modes;
 mod mesh;
