@@ -127,7 +127,8 @@ class Case:
         with h5py.File(self.folder / "body.flex.h5") as body:
             first = float(np.sqrt(body["modes/eigenvalue"][0]) / (2 * np.pi))
         point = list(self.sets)[-1]
-        scene = f"""[run]
+        scene = f"""variation = []
+[run]
 duration = {2 / first!r}
 [initial]
 deformation = "static"
@@ -136,9 +137,6 @@ angular_velocity = [0, {2 * np.pi * spin * first!r}, {np.pi * spin * first!r}]
 interface = "{point}"
 force = [1.0, 2.0, 3.0]
 history = {{ amplitude = 1e-3, frequency = {swing * first!r} }}
-[[variation]]
-name = "the same"
-speed = 1.0
 [tolerance]
 attitude = 10.0
 deflection = 10.0

@@ -29,7 +29,7 @@ pub(super) fn run(arguments: &AdviseArguments) -> Result<Outcome> {
         slot.fill(facts.render(format).as_bytes())?;
     }
     OutputSlot::commit_all(reports)?;
-    let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
+    let (text, json) = (facts.render(Format::Terminal), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
 }
 

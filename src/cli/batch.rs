@@ -100,7 +100,7 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
         slot.fill(facts.render(format).as_bytes())?;
     }
     OutputSlot::commit_all(slots)?;
-    let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
+    let (text, json) = (facts.render(Format::Terminal), facts.render(Format::Json));
     let failed = failed(&facts, &arguments.list);
     Ok(Outcome { text, json, passed: failed.is_none(), diagnostics: failed.into_iter().collect() })
 }

@@ -217,7 +217,7 @@ impl Job<'_> {
         let text = body_text(&facts, arguments.verbose, arguments.printing)
             + &decided.map_or_else(String::new, |decided| {
                 if arguments.verbose {
-                    format!("\n{}", decided.render(Format::Text))
+                    format!("\n{}", decided.render(Format::Terminal))
                 } else {
                     format!("\n{}", decided.summary())
                 }

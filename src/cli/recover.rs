@@ -80,6 +80,6 @@ pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
         slot.fill(facts.render(format).as_bytes())?;
     }
     OutputSlot::commit_all(std::iter::once(slot).chain(envelope_slot).chain(reports))?;
-    let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
+    let (text, json) = (facts.render(Format::Terminal), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
 }

@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     // No file appears before everything is done.
     OutputSlot::commit_all(table.into_iter().chain(reports))?;
     Ok(Outcome {
-        text: facts.render(Format::Text),
+        text: facts.render(Format::Terminal),
         json: facts.render(Format::Json),
         diagnostics: run.diagnostics.clone(),
         passed: response.holds(settings.tolerance),

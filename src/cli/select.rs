@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     }
     OutputSlot::commit_all(reports)?;
     Ok(Outcome {
-        text: facts.render(Format::Text),
+        text: facts.render(Format::Terminal),
         json: facts.render(Format::Json),
         diagnostics: run.diagnostics.clone(),
         passed: selection.holds(),

@@ -143,7 +143,7 @@ impl Job<'_> {
         for (slot, format) in slots.reports.iter().zip(self.formats) {
             slot.fill(facts.render(*format).as_bytes())?;
         }
-        let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
+        let (text, json) = (facts.render(Format::Terminal), facts.render(Format::Json));
         Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
     }
 }

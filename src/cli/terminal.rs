@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 /// Returns the summary of a body, or with `verbose` all facts about it.
 pub(super) fn body_text(facts: &Facts, verbose: bool, printing: Printing) -> String {
-    if verbose { render(facts, Format::Text) } else { summary(facts, stdout_screen(printing)) }
+    if verbose { render(facts, Format::Terminal) } else { summary(facts, stdout_screen(printing)) }
 }
 
 /// Returns the properties of the screen of stdout.

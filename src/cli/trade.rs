@@ -92,7 +92,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let holds = |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
     let is_reference = nodal.is_some() || reference_errors.iter().all(holds);
     let passed = study.recommended.row().is_some() && is_reference && study.holds_in_stated_variations();
-    let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
+    let (text, json) = (facts.render(Format::Terminal), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })
 }
 

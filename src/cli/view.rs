@@ -22,7 +22,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<Outcome> {
     slot.fill(view.html().as_bytes())?;
     slot.commit()?;
     Ok(Outcome {
-        text: view.render(Format::Text),
+        text: view.render(Format::Terminal),
         json: view.render(Format::Json),
         diagnostics,
         passed: true,

@@ -27,6 +27,7 @@ impl<'a> Document<'a> {
         match format {
             Format::Json => json(facts),
             Format::Text => text::render(&document().blocks, text::Screen::default()),
+            Format::Terminal => text::render_results(&document().blocks, text::Screen::default()),
             Format::Html => html::render(&document()),
         }
     }

@@ -12,8 +12,10 @@ use std::path::Path;
 pub enum Format {
     /// JSON for programs, following `schemas/report.schema.json`; floats round-trip.
     Json,
-    /// Text for a terminal of at most 80 columns.
+    /// Text of at most 80 columns, for files.
     Text,
+    /// Text for a terminal, on which warnings and notes are printed apart.
+    Terminal,
     /// One HTML file for people and archives, without external resources, readable without scripts.
     Html,
 }

@@ -1,5 +1,5 @@
-//! Summary of a body on one screen: properties, completeness of the modes, errors of lumped masses, and all
-//! limitations.
+//! Summary of a body on one screen: properties, completeness of the modes, errors of lumped masses. Warnings and notes
+//! are printed apart.
 
 use super::body_modes::first_and_last;
 use super::craig_bampton::CraigBamptonFacts;
@@ -10,7 +10,6 @@ use super::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
 use super::numbers::{bytes, coordinates, counted, duration, frequency, frequency_range, triple};
 use super::text::{self, Screen};
 use super::{Facts, html};
-use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::MassStructure;
 
 /// Number of list entries that are shown.
@@ -18,7 +17,7 @@ const MAX_LISTED: usize = 4;
 
 /// Renders the summary for a screen.
 pub fn summary(facts: &Facts<'_>, screen: Screen) -> String {
-    let groups = [body, mass_properties, modes, lumped, diagnostics, output];
+    let groups = [body, mass_properties, modes, lumped, output];
     let blocks: Vec<Block<'_>> =
         groups.iter().flat_map(|group| [Block::Terms(group(facts)), Block::Gap]).collect();
     text::render(&blocks, screen)
@@ -142,18 +141,6 @@ fn lumped(facts: &Facts<'_>) -> Vec<Term> {
         entry(Tone::Plain, "own modes", words, 3)
     }));
     items
-}
-
-/// Returns errors and warnings. Notes are shown on stderr and in the report.
-fn diagnostics(facts: &Facts<'_>) -> Vec<Term> {
-    let kinds = [(Severity::Error, "errors", Tone::Bad), (Severity::Warning, "warnings", Tone::Warning)];
-    let of_kind = |(severity, label, tone): (Severity, &'static str, Tone)| {
-        let found: Vec<_> = facts.diagnostics.iter().filter(|d| d.severity() == severity).collect();
-        listed_to(MAX_LISTED, label, &found, |d| {
-            entry(tone, label, format!("{} {}", d.code().id(), d.message()), 3)
-        })
-    };
-    kinds.into_iter().flat_map(of_kind).collect()
 }
 
 fn output(facts: &Facts<'_>) -> Vec<Term> {

@@ -43,18 +43,23 @@ impl Default for Screen {
     }
 }
 
-/// Writes the blocks of a document that belong to a text, ending with a line break.
+/// Writes the blocks of a document that belong to a text, with its diagnostics at the end, ending with a line break.
 pub(super) fn render(blocks: &[Block<'_>], screen: Screen) -> String {
     let mut text = Text { text: String::new(), label: String::new(), screen };
     text.blocks(blocks);
-    // Diagnostics come last because a terminal shows the end of a text.
     for block in blocks {
         if let Block::Diagnostics(found) = block {
             text.diagnostics(found);
         }
     }
-    text.text.truncate(text.text.trim_end().len());
-    text.text + "\n"
+    text.finish()
+}
+
+/// Writes the blocks of a document that belong to a text, without its diagnostics, ending with a line break.
+pub(super) fn render_results(blocks: &[Block<'_>], screen: Screen) -> String {
+    let mut text = Text { text: String::new(), label: String::new(), screen };
+    text.blocks(blocks);
+    text.finish()
 }
 
 struct Text {
@@ -65,6 +70,11 @@ struct Text {
 }
 
 impl Text {
+    fn finish(mut self) -> String {
+        self.text.truncate(self.text.trim_end().len());
+        self.text + "\n"
+    }
+
     fn blocks(&mut self, blocks: &[Block<'_>]) {
         for block in blocks {
             match block {

@@ -90,7 +90,7 @@ impl View {
         match format {
             Format::Json => json(&self.facts),
             Format::Html => self.page.clone(),
-            Format::Text => self.facts.text(),
+            Format::Text | Format::Terminal => self.facts.text(),
         }
     }
 }

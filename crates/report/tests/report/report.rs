@@ -192,8 +192,14 @@ fn the_summary_keeps_what_the_body_cannot_do() {
     has(&|p| p.storage = Storage::F32, "rounded to 32-bit floats");
     has(&|p| p.source.number = Some(BodyNumber { number: 1, of: 2 }), "body 1 of 2");
     has(&|p| p.interfaces[0].coupling = Some(Coupling::Rigid), "rigid but DEFORMS");
-    let warned = summary(&Facts::new(&engine_mount(), &run_data()), Screen::default());
+    // A text has the warnings; with the summary and on a terminal they are printed apart.
+    let mount = engine_mount();
+    let facts = Facts::new(&mount, &run_data());
+    let warned = render(&facts, Format::Text);
     assert!(line(&warned, "warnings").contains("FB510 rigid modes reach"), "{warned}");
+    for printed in [summary(&facts, Screen::default()), render(&facts, Format::Terminal)] {
+        assert!(!printed.contains("FB510"), "{printed}");
+    }
 }
 
 #[test]
