@@ -426,8 +426,8 @@ impl Body {
     /// Computes the frequency response between places, like `flexbody response` without a model: its errors are unknown.
     /// `Model.response` computes them, and describes the arguments.
     #[pyo3(
-        signature = (source=None, target=None, *, band=None, scene=None, damping=None, points=None),
-        text_signature = "($self, source=None, target=None, *, band=None, scene=None, damping=None, points=400)"
+        signature = (source=None, target=None, *, base=None, rows=None, psd=None, band=None, scene=None, damping=None, points=None),
+        text_signature = "($self, source=None, target=None, *, base=None, rows=None, psd=None, band=None, scene=None, damping=None, points=400)"
     )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn response(
@@ -435,13 +435,16 @@ impl Body {
         py: Python<'_>,
         source: Argument<'_, '_>,
         target: Argument<'_, '_>,
+        base: Argument<'_, '_>,
+        rows: Argument<'_, '_>,
+        psd: Argument<'_, '_>,
         band: Argument<'_, '_>,
         scene: Argument<'_, '_>,
         damping: Argument<'_, '_>,
         points: Argument<'_, '_>,
     ) -> PyResult<Response> {
         let (tolerance, solves) = (None, None);
-        let stated = ResponseArguments { source, target, band, scene, damping, tolerance, points, solves };
+        let stated = ResponseArguments { source, target, base, rows, psd, band, scene, damping, tolerance, points, solves };
         let (options, body) = (stated.options(py)?, Arc::clone(&self.inner));
         Response::with_warnings(py, run(py, move |listener| body.response(&options, listener))?, 0)
     }

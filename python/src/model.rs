@@ -343,10 +343,12 @@ impl Model {
     /// optionally with a colon and directions ("big_end:z", "17:x,rz"), or a list of these. `band` is (low, high) in Hz. A
     /// `scene` supplies what is not stated: the places of its loads, its watched points, band and damping. `damping` is a
     /// ratio, for a body without damping. `points` and `solves` are the approximate numbers of frequencies of the curves,
-    /// and of those at which the equations of all nodes are solved. `modes` and `basis` are those of a body that is made.
+    /// and of those at which the equations of all nodes are solved. `base` is an interface whose acceleration excites the
+    /// body in place of forces, `rows` are recoveries whose rows are read ("gauges", or "gauges:ROW" for one), `psd` is the
+    /// file of the spectral densities of a random excitation. `modes` and `basis` are those of a body that is made.
     #[pyo3(
-        signature = (source=None, target=None, *, body=None, band=None, scene=None, damping=None, tolerance=None, points=None, solves=None, modes=None, basis=None),
-        text_signature = "($self, source=None, target=None, *, body=None, band=None, scene=None, damping=None, tolerance=0.05, points=400, solves=80, modes=20, basis=\"free\")"
+        signature = (source=None, target=None, *, base=None, rows=None, psd=None, body=None, band=None, scene=None, damping=None, tolerance=None, points=None, solves=None, modes=None, basis=None),
+        text_signature = "($self, source=None, target=None, *, base=None, rows=None, psd=None, body=None, band=None, scene=None, damping=None, tolerance=0.05, points=400, solves=80, modes=20, basis=\"free\")"
     )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn response(
@@ -354,6 +356,9 @@ impl Model {
         py: Python<'_>,
         source: Argument<'_, '_>,
         target: Argument<'_, '_>,
+        base: Argument<'_, '_>,
+        rows: Argument<'_, '_>,
+        psd: Argument<'_, '_>,
         body: Argument<'_, '_>,
         band: Argument<'_, '_>,
         scene: Argument<'_, '_>,
@@ -364,7 +369,7 @@ impl Model {
         modes: Argument<'_, '_>,
         basis: Argument<'_, '_>,
     ) -> PyResult<Response> {
-        let stated = ResponseArguments { source, target, band, scene, damping, tolerance, points, solves };
+        let stated = ResponseArguments { source, target, base, rows, psd, band, scene, damping, tolerance, points, solves };
         let mut options = stated.options(py)?.basis(self::basis(basis)?);
         if let Some(modes) = modes {
             options = options.modes(positive(modes, "modes")?);

@@ -1,6 +1,6 @@
 //! Frequency responses.
 
-use crate::arguments::{Argument, count, mistyped, real};
+use crate::arguments::{Argument, count, mistyped, path, real};
 use crate::arrays::{Given, sequence, vector};
 use crate::errors::{diagnostics, value_error, warn};
 use crate::report::report;
@@ -9,7 +9,7 @@ use flexbody::ResponseOptions;
 use nalgebra::Complex;
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyInt, PyString, PyTuple};
+use pyo3::types::{PyDict, PyInt, PyString, PyTuple};
 
 /// A frequency response between places of a body.
 #[pyclass(frozen, module = "flexbody")]
@@ -21,6 +21,9 @@ pub struct Response {
 pub struct ResponseArguments<'a, 'py> {
     pub source: Argument<'a, 'py>,
     pub target: Argument<'a, 'py>,
+    pub base: Argument<'a, 'py>,
+    pub rows: Argument<'a, 'py>,
+    pub psd: Argument<'a, 'py>,
     pub band: Argument<'a, 'py>,
     pub scene: Argument<'a, 'py>,
     pub damping: Argument<'a, 'py>,
@@ -38,6 +41,15 @@ impl ResponseArguments<'_, '_> {
         }
         for place in places(self.target, "target")? {
             options = options.to(&place);
+        }
+        for place in places(self.base, "base")? {
+            options = options.base(&place);
+        }
+        for rows in places(self.rows, "rows")? {
+            options = options.rows(&rows);
+        }
+        if let Some(psd) = self.psd {
+            options = options.densities(path(psd, "psd")?);
         }
         if let Some(band) = self.band {
             let ends = sequence(band, "band")?;
@@ -117,6 +129,23 @@ impl Response {
             ))
         };
         self.inner.functions().into_iter().map(function).collect()
+    }
+
+    /// Root mean squares under random excitation: a dict with, for each recovery, a dict of `rows` and `points` (names), and
+    /// of `rms` and `von_mises` (arrays, in the units of the rows); None without spectral densities.
+    #[getter]
+    fn random<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(random) = self.inner.random() else { return Ok(None) };
+        let all = PyDict::new(py);
+        for one in &random.recoveries {
+            let values = PyDict::new(py);
+            values.set_item("rows", one.rows.iter().map(|row| row.name.as_str()).collect::<Vec<_>>())?;
+            values.set_item("rms", vector(py, &one.rms))?;
+            values.set_item("points", one.points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>())?;
+            values.set_item("von_mises", vector(py, &one.von_mises))?;
+            all.set_item(&one.name, values)?;
+        }
+        Ok(Some(all))
     }
 
     /// True if no error exceeds the tolerance, or if no error is known.

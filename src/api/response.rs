@@ -6,9 +6,10 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_report::{ResponseFacts, response_csv};
 use flexbody_study::response::{
-    self, Band, Place, ResponseRequest, ResponseSettings, converted_for_response,
+    self, Band, Place, RandomResponse, ResponseRequest, ResponseSettings, converted_for_response,
 };
 use nalgebra::Complex;
+use std::path::PathBuf;
 
 /// Settings of a frequency response: places of unit forces and of measured displacements, and a band. A scene supplies
 /// what is not stated: the places of its loads, its watched points, its band and its damping.
@@ -32,6 +33,25 @@ impl ResponseOptions {
     /// Adds a place of measured displacements, in the form of [`ResponseOptions::from`].
     pub fn to(mut self, place: &str) -> Self {
         self.request.to.push(Place::parse(place));
+        self
+    }
+
+    /// Sets the interface whose acceleration excites the body in place of forces, in the form of
+    /// [`ResponseOptions::from`]; its other directions are at rest.
+    pub fn base(mut self, place: &str) -> Self {
+        self.request.base = Some(Place::parse(place));
+        self
+    }
+
+    /// Adds rows of recoveries: `gauges` for all rows of a recovery, `gauges:ROW` for one.
+    pub fn rows(mut self, rows: &str) -> Self {
+        self.request.rows.push(rows.to_owned());
+        self
+    }
+
+    /// Sets the table of the spectral densities of a random excitation, one-sided and per hertz.
+    pub fn densities(mut self, path: impl Into<PathBuf>) -> Self {
+        self.request.densities = Some(path.into());
         self
     }
 
@@ -105,10 +125,10 @@ pub struct TransferFunction {
     pub from: String,
     /// Direction of the force or torque: `x`, `y`, `z`, `rx`, `ry` or `rz`.
     pub from_direction: &'static str,
-    /// Place of the displacement: `interface tip`, `node 17`.
+    /// Place of the displacement: `interface tip`, `node 17`, or the recovery of the row: `recovery gauges`.
     pub to: String,
-    /// Direction of the displacement or rotation.
-    pub to_direction: &'static str,
+    /// Direction of the displacement or rotation, or the name of the row.
+    pub to_direction: String,
     /// Response of the body at every frequency.
     pub reduced: Vec<Complex<f64>>,
     /// Response of all nodes at every frequency; `None` where their equations were not solved.
@@ -189,11 +209,16 @@ impl Response {
                 from: pair.from.to_string(),
                 from_direction: function.from.name(),
                 to: pair.to.to_string(),
-                to_direction: function.to.name(),
+                to_direction: function.to.name().to_owned(),
                 reduced: function.reduced.clone(),
                 full: function.full.clone(),
             })
             .collect()
+    }
+
+    /// Returns the root mean squares under random excitation; `None` without spectral densities.
+    pub fn random(&self) -> Option<&RandomResponse> {
+        self.inner.random.as_ref()
     }
 
     /// Returns true if no error exceeds the tolerance, or if no error is known.

@@ -110,7 +110,7 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  flexbody response model.toml --modes 20 --band 0..2000 --from big_end --to small_end --damping 0.01 --report response.html\n  flexbody response model.toml rod.flex.h5 --scene crank.toml --csv response.csv\n  flexbody response rod.flex.h5 --band 10..2000 --from big_end:z --to 17:x,z"
     )]
-    Response(ResponseArguments),
+    Response(Box<ResponseArguments>),
     /// Write a page that shows the modes of a body, or a simulation, in motion: one file for any browser
     #[command(
         after_help = "Examples:\n  flexbody view rod.flex.h5 -o rod.html\n  flexbody view rod.flex.h5 --simulation tumble.h5 -o tumble.html"

@@ -15,17 +15,21 @@ use flexbody_input::LoadSource;
 use flexbody_linalg::context::{Event, Watch};
 use flexbody_model::FeModel;
 use flexbody_motion::scene::LoadCases;
-use flexbody_report::{Format, ResponseFacts, RunData, response_csv};
+use flexbody_report::{EnvelopeKind, Format, ResponseFacts, RunData, response_csv};
 use flexbody_study::response::{Place, ResponseRequest, converted_for_response};
 use std::path::PathBuf;
 
 pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
-    let inputs = || std::iter::once(&arguments.model).chain(&arguments.body).chain(&arguments.scene);
+    let inputs = || {
+        std::iter::once(&arguments.model).chain(&arguments.body).chain(&arguments.scene).chain(&arguments.psd)
+    };
     refuse_replacing(inputs(), outputs(arguments))?;
     let is_model = is_model(&arguments.model, &arguments.job)?;
     refuse_contradictions(arguments, is_model)?;
     let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
+    let kind = arguments.rms.as_deref().map(EnvelopeKind::of).transpose()?;
+    let rms = arguments.rms.as_ref().map(OutputSlot::prepare).transpose()?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
     let threads = use_threads(arguments.threads);
 
@@ -50,11 +54,14 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     if let Some(slot) = &table {
         slot.fill(response_csv(&response).as_bytes())?;
     }
+    if let (Some(kind), Some(slot), Some(random)) = (kind, &rms, &response.random) {
+        slot.fill(&kind.random_bytes(&body, random)?)?;
+    }
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(facts.render(format).as_bytes())?;
     }
     // No file appears before everything is done.
-    OutputSlot::commit_all(table.into_iter().chain(reports))?;
+    OutputSlot::commit_all(table.into_iter().chain(rms).chain(reports))?;
     Ok(Outcome {
         text: facts.render(Format::Terminal),
         json: facts.render(Format::Json),
@@ -68,6 +75,9 @@ fn request(arguments: &ResponseArguments) -> ResponseRequest {
     let places = |named: &[String]| named.iter().map(|text| Place::parse(text)).collect();
     ResponseRequest {
         from: places(&arguments.from),
+        base: arguments.base.as_deref().map(Place::parse),
+        rows: arguments.rows.clone(),
+        densities: arguments.psd.clone(),
         to: places(&arguments.to),
         band: arguments.band,
         damping: arguments.damping,
@@ -78,7 +88,7 @@ fn request(arguments: &ResponseArguments) -> ResponseRequest {
 }
 
 fn outputs(arguments: &ResponseArguments) -> impl Iterator<Item = &PathBuf> + Clone {
-    arguments.csv.iter().chain(&arguments.report)
+    arguments.csv.iter().chain(&arguments.rms).chain(&arguments.report)
 }
 
 /// Refuses contradictory options.

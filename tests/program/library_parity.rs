@@ -317,7 +317,7 @@ fn response(place: &Place) {
     assert_same_results(&alone.report(ReportFormat::Json), &results);
     assert_eq!(alone.csv(), fs::read_to_string(place.path("command.csv")).expect("a table"));
     let functions = alone.functions();
-    assert_eq!((functions.len(), functions[0].to_direction), (3, "z"));
+    assert_eq!((functions.len(), functions[0].to_direction.as_str()), (3, "z"));
     assert_eq!(functions[0].reduced.len(), alone.frequencies_hz().len());
     let whole = options.clone().tolerance(1000.0).modes(4);
     let whole = place.model().response(None, &whole, &go_on).expect("a response");

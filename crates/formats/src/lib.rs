@@ -36,4 +36,4 @@ pub use registry::{
     FORMATS, IMPORT_FORMATS, audit_file, export, export_in_units, find_format, find_import_format,
     import_file, recognise,
 };
-pub use vtk::envelope_vtu;
+pub use vtk::{PointValues, envelope_vtu, stresses_vtu};

@@ -9,7 +9,7 @@ use crate::picture::{Drawn, Played, mode_names, named, printable};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_file::RecordedMotion;
-use flexbody_motion::scene::RecoveredMotion;
+use flexbody_motion::scene::{PointEnvelope, RecoveredMotion};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
@@ -104,39 +104,67 @@ impl ExportFormat for Vtk {
     }
 }
 
-/// Returns the undeformed body with the largest stresses of a motion at every node: for each recovery with points at nodes
-/// the arrays `NAME von Mises`, `NAME largest principal` and `NAME smallest principal`, NaN at nodes without stresses.
-/// Returns `None` without such a recovery, or if the motion has no envelopes.
-pub fn envelope_vtu(body: &FlexBody, motion: &RecoveredMotion) -> Option<Vec<u8>> {
+/// Values at points of a recovery.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointValues {
+    /// Name of the array.
+    pub name: String,
+    /// Node of each point; `None` for a point that is no node.
+    pub nodes: Vec<Option<i64>>,
+    /// Value at each point.
+    pub values: Vec<f64>,
+    /// True if the smallest of several values at a node counts; otherwise the largest.
+    pub is_smallest: bool,
+}
+
+/// Returns the undeformed body with an array of values at its nodes for each of `all`, NaN at nodes without a point.
+/// Returns `None` if no point is a node.
+pub fn stresses_vtu(body: &FlexBody, all: &[PointValues]) -> Option<Vec<u8>> {
     let drawn = Drawn::places(body, &Points::Nodes);
     let place: HashMap<i64, usize> = drawn.numbers().iter().enumerate().map(|(at, id)| (*id, at)).collect();
     let mut grid = Grid::new(&drawn);
     let mut is_empty = true;
-    for (map, envelope) in motion.recoveries.iter().zip(motion.envelopes.as_ref()?) {
-        let mut values = [0; 3].map(|_| vec![f64::NAN; drawn.len()]);
+    for one in all {
+        let mut values = vec![f64::NAN; drawn.len()];
         let mut found = false;
-        for (point, own) in map.points.iter().zip(envelope) {
-            let Some(&at) = map.rows[point.rows[0]].node.and_then(|node| place.get(&node)) else { continue };
+        for (node, own) in one.nodes.iter().zip(&one.values) {
+            let Some(&at) = node.and_then(|node| place.get(&node)) else { continue };
             found = true;
-            let own = [own.von_mises.value, own.tension.value, -own.compression.value];
-            for (c, (values, own)) in values.iter_mut().zip(own).enumerate() {
-                // Several elements have a point at this node: the largest, of compression the smallest.
-                let is_further = if c == 2 { own < values[at] } else { own > values[at] };
-                if values[at].is_nan() || is_further {
-                    values[at] = own;
-                }
+            // Several elements may have a point at this node.
+            let is_further = if one.is_smallest { *own < values[at] } else { *own > values[at] };
+            if values[at].is_nan() || is_further {
+                values[at] = *own;
             }
         }
         if found {
             is_empty = false;
-            let names = ["von Mises", "largest principal", "smallest principal"];
-            names
-                .iter()
-                .zip(&values)
-                .for_each(|(name, own)| grid.put_scalars(&format!("{} {name}", map.name), own));
+            grid.put_scalars(&one.name, &values);
         }
     }
     (!is_empty).then(|| grid.file(&drawn.positions()))
+}
+
+/// Returns the undeformed body with the largest stresses of a motion at every node: for each recovery with points at nodes
+/// the arrays `NAME von Mises`, `NAME largest principal` and `NAME smallest principal`, NaN at nodes without stresses.
+/// Returns `None` without such a recovery, or if the motion has no envelopes.
+pub fn envelope_vtu(body: &FlexBody, motion: &RecoveredMotion) -> Option<Vec<u8>> {
+    let mut all = Vec::new();
+    for (map, envelope) in motion.recoveries.iter().zip(motion.envelopes.as_ref()?) {
+        let nodes: Vec<Option<i64>> = map.points.iter().map(|point| map.rows[point.rows[0]].node).collect();
+        let mut put = |name: &str, is_smallest: bool, value: fn(&PointEnvelope) -> f64| {
+            let values = envelope.iter().map(value).collect();
+            all.push(PointValues {
+                name: format!("{} {name}", map.name),
+                nodes: nodes.clone(),
+                values,
+                is_smallest,
+            });
+        };
+        put("von Mises", false, |own| own.von_mises.value);
+        put("largest principal", false, |own| own.tension.value);
+        put("smallest principal", true, |own| -own.compression.value);
+    }
+    stresses_vtu(body, &all)
 }
 
 /// Returns the undeformed body with a vector at every point for each mode.

@@ -55,7 +55,11 @@ impl StressPoint {
     /// Returns the equivalent stress of von Mises for the values of all rows of the recovery:
     /// sqrt(((s_xx - s_yy)^2 + (s_yy - s_zz)^2 + (s_zz - s_xx)^2) / 2 + 3 (s_xy^2 + s_yz^2 + s_xz^2)).
     pub fn von_mises(&self, values: &[f64]) -> f64 {
-        let [xx, yy, zz, xy, yz, xz] = self.rows.map(|row| values[row]);
+        Self::von_mises_of(&self.rows.map(|row| values[row]))
+    }
+
+    /// Returns the equivalent stress of von Mises of the stress xx, yy, zz, xy, yz, xz.
+    pub fn von_mises_of([xx, yy, zz, xy, yz, xz]: &[f64; 6]) -> f64 {
         let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
         (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
     }

@@ -33,6 +33,7 @@ mod mass_properties;
 mod measured_run;
 mod numbers;
 mod picture;
+mod random;
 mod recovered;
 mod render;
 mod response;

@@ -6,12 +6,13 @@ use super::csv;
 use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
 use super::facts::UnitFacts;
 use super::numbers::{counted, frequency, frequency_range, percent, significant, times};
+use super::random::RandomFacts;
 use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;
 use flexbody_study::response::{
-    At, Complex, Effectivity, Function, Pair, Response, ResponseSettings, Spacing,
+    At, Complex, Effectivity, Function, Output, Pair, Response, ResponseSettings, Spacing,
 };
 use serde::Serialize;
 
@@ -47,6 +48,9 @@ pub struct ResponseFacts<'a> {
     coupling: Option<CouplingFacts<'a>>,
     frequencies_hz: &'a [f64],
     pairs: Vec<PairFacts>,
+    /// Root mean squares under random excitation; `None` without spectral densities.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    random: Option<RandomFacts>,
     diagnostics: &'a [Diagnostic],
     threads: usize,
     wall_seconds: f64,
@@ -107,7 +111,7 @@ struct PairFacts {
 #[derive(Debug, Clone, Serialize)]
 struct FunctionFacts {
     from: &'static str,
-    to: &'static str,
+    to: String,
     reduced: Vec<[f64; 2]>,
     full: Vec<Option<[f64; 2]>>,
 }
@@ -125,18 +129,18 @@ struct ErrorFacts {
 }
 
 impl PairFacts {
-    fn new(pair: &Pair, units: &UnitSystem) -> Self {
+    fn new(pair: &Pair, by_base: bool, units: &UnitSystem) -> Self {
         let parts = |z: Complex<f64>| [z.re, z.im];
         let function = |function: &Function| FunctionFacts {
             from: function.from.name(),
-            to: function.to.name(),
+            to: function.to.name().to_owned(),
             reduced: function.reduced.iter().copied().map(parts).collect(),
             full: function.full.iter().map(|z| z.map(parts)).collect(),
         };
         Self {
             from: pair.from.to_string(),
             to: pair.to.to_string(),
-            unit: pair.functions.first().map_or_else(String::new, |function| unit(function, units)),
+            unit: pair.functions.first().map_or_else(String::new, |function| unit(function, by_base, units)),
             functions: pair.functions.iter().map(function).collect(),
             errors: pair.errors.as_ref().map(|errors| ErrorFacts {
                 measured: errors.measured.clone(),
@@ -168,25 +172,38 @@ impl PairFacts {
     }
 }
 
-/// Returns the unit of a function: `mm/N`, `rad/N`, `mm/(N mm)`. A consistent force unit of one newton is
+/// Returns the unit of a function: `mm/N`, `rad/N`, `mm/(N mm)`, `MPa/(mm s^-2)`. A consistent force unit of one newton is
 /// written `N`.
-fn unit(function: &Function, units: &UnitSystem) -> String {
+fn unit(function: &Function, by_base: bool, units: &UnitSystem) -> String {
     let [length, mass, time] = [&units.length, &units.mass, &units.time];
     let newton = mass.to_si() * length.to_si() / (time.to_si() * time.to_si());
     let force = match newton {
         n if (n - 1.0).abs() < 1e-9 => "N".to_owned(),
         _ => format!("({} {} {}^-2)", mass.name(), length.name(), time.name()),
     };
-    let motion = if function.to.turns() { "rad" } else { length.name() };
-    let load = if function.from.turns() { format!("({force} {})", length.name()) } else { force };
+    let motion = match &function.to {
+        Output::Direction(direction) if direction.turns() => "rad",
+        Output::Direction(_) => length.name(),
+        Output::Row(row) if row.unit.is_empty() => "1",
+        Output::Row(row) => &row.unit,
+    };
+    let load = match (by_base, function.from.turns()) {
+        (false, false) => force,
+        (false, true) => format!("({force} {})", length.name()),
+        (true, false) => format!("({} {}^-2)", length.name(), time.name()),
+        (true, true) => format!("(rad {}^-2)", time.name()),
+    };
     format!("{motion}/{load}")
 }
 
 impl<'a> ResponseFacts<'a> {
     /// Collects the facts of `response`, which was computed with `settings` in `run`.
     pub fn new(response: &'a Response, settings: &ResponseSettings, run: &'a RunData) -> Self {
-        let pairs: Vec<PairFacts> =
-            response.pairs.iter().map(|pair| PairFacts::new(pair, &response.units)).collect();
+        let pairs: Vec<PairFacts> = response
+            .pairs
+            .iter()
+            .map(|pair| PairFacts::new(pair, response.by_base, &response.units))
+            .collect();
         let passed = response.solved.map(|_| response.holds(settings.tolerance));
         Self {
             format: "flexbody-response",
@@ -214,6 +231,7 @@ impl<'a> ResponseFacts<'a> {
             }),
             frequencies_hz: &response.frequencies,
             pairs,
+            random: response.random.as_ref().map(RandomFacts::new),
             diagnostics: &run.diagnostics,
             threads: run.threads,
             wall_seconds: run.wall_seconds(),
@@ -282,10 +300,13 @@ impl<'a> ResponseFacts<'a> {
             heading("Comparison"),
             Block::Terms(head.into_iter().chain(entries).collect()),
         ];
-        if self.solved.is_some() {
+        if self.solved.is_some() && !self.pairs.is_empty() {
             blocks.extend([Block::Gap, heading("Errors"), Block::Table(self.errors()), Block::Gap]);
         }
-        blocks.push(heading("Transfer functions"));
+        blocks.extend(self.random.iter().flat_map(RandomFacts::blocks));
+        if !self.pairs.is_empty() {
+            blocks.push(heading("Transfer functions"));
+        }
         if self.pairs.len() > PLOTTED_PAIRS {
             let all = self.pairs.len();
             let some = format!(
@@ -462,7 +483,8 @@ pub fn response_csv(response: &Response) -> String {
             );
         }
         if pair.errors.is_some() {
-            let turns = pair.functions.first().map_or("", |function| function.kind());
+            let turns =
+                pair.functions.first().map_or_else(String::new, |function| function.kind(response.by_base));
             head.extend(
                 ["error", "estimate"].map(|what| format!("{} to {} {turns} {what}", pair.from, pair.to)),
             );

@@ -84,6 +84,9 @@ class Model:
         source: _types.Places | None = None,
         target: _types.Places | None = None,
         *,
+        base: str | None = None,
+        rows: str | Sequence[str] | None = None,
+        psd: _Path | None = None,
         body: Body | _Path | None = None,
         band: tuple[float, float] | None = None,
         scene: _Scene | None = None,
@@ -212,6 +215,9 @@ class Body:
         source: _types.Places | None = None,
         target: _types.Places | None = None,
         *,
+        base: str | None = None,
+        rows: str | Sequence[str] | None = None,
+        psd: _Path | None = None,
         band: tuple[float, float] | None = None,
         scene: _Scene | None = None,
         damping: float | None = None,
@@ -387,6 +393,8 @@ class Response:
     def frequencies_hz(self) -> _Floats: ...
     @property
     def functions(self) -> list[TransferFunction]: ...
+    @property
+    def random(self) -> dict[str, dict[str, Any]] | None: ...
     @property
     def holds(self) -> bool: ...
     @property

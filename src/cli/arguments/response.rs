@@ -23,6 +23,12 @@ pub struct ResponseArguments {
     /// with commas [default: the displacements; with --scene the places of its loads] (repeatable)
     #[arg(long, value_name = "PLACE[:DIRECTIONS]")]
     pub from: Vec<String>,
+    /// Interface whose acceleration excites the body, in place of forces: its other directions are at rest
+    #[arg(long, value_name = "INTERFACE[:DIRECTIONS]", conflicts_with = "from")]
+    pub base: Option<String>,
+    /// Rows of a recovery of the body, all of them or one (repeatable)
+    #[arg(long, value_name = "RECOVERY[:ROW]")]
+    pub rows: Vec<String>,
     /// Place of measured displacements, in the same form [default: with --scene its watched points] (repeatable)
     #[arg(long, value_name = "PLACE[:DIRECTIONS]")]
     pub to: Vec<String>,
@@ -62,6 +68,13 @@ pub struct ResponseArguments {
     /// Table of the functions to write
     #[arg(long, value_name = "RESPONSE.csv")]
     pub csv: Option<PathBuf>,
+    /// Table of spectral densities of a random excitation: one-sided, per hertz, with the column hertz and a column
+    /// PLACE:DIRECTION for each input of --from or --base; adds root mean squares
+    #[arg(long, value_name = "PSD.csv")]
+    pub psd: Option<PathBuf>,
+    /// Root mean squares of all rows and points to write: .csv, or .vtu with the von Mises stress at the nodes
+    #[arg(long, value_name = "RMS.csv|.vtu", requires = "psd")]
+    pub rms: Option<PathBuf>,
     /// Report to write, with plots as .html; format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,

@@ -6,7 +6,9 @@ use crate::subject::Subject;
 use flexbody_base::error::Result;
 use flexbody_linalg::context::Context;
 use flexbody_motion::scene::Point;
-use flexbody_study::response::{Band, Complex, Function, Place, ResponseSettings, respond};
+use flexbody_study::response::{
+    Band, Complex, Excitation, Function, Place, ResponseEnds, ResponseSettings, respond,
+};
 
 /// Damping ratio for a body without damping, which keeps responses at resonances finite.
 const RATIO: f64 = 0.02;
@@ -30,7 +32,9 @@ pub fn response(subject: &Subject) -> Result<Outputs> {
     };
     let place = |point: &Point| vec![Place { point: point.clone(), directions: Vec::new() }];
     let [from, to] = [&subject.scene.watched[0], &Point::Interface("tip".to_owned())];
-    let response = respond(Some(&model), &body, &place(from), &place(to), &settings, &Context::QUIET)?;
+    let (from, to) = (Excitation::Forces(place(from)), place(to));
+    let ends = ResponseEnds { from: &from, to: &to, rows: &[], densities: None };
+    let response = respond(Some(&model), &body, &ends, &settings, &Context::QUIET)?;
     let mut outputs = Outputs { times: Vec::new(), all: findings(&[]) };
     for pair in &response.pairs {
         let norm = |of: &dyn Fn(&Function, usize) -> Option<Complex<f64>>| -> Vec<f64> {

@@ -356,3 +356,57 @@ fn limits_of_recoveries_decide_selections_and_trades() {
         refused(place, "select body.h5 --scene scene.toml", code);
     }
 }
+
+/// `response` reads rows, moves an interface, and computes root mean squares of all rows and points; what it cannot do is
+/// refused with a code and leaves no file.
+#[test]
+fn random_vibration_of_an_interface_is_written() {
+    let (folder, _) = folder();
+    let place = folder.path();
+    runs(place, "convert model.toml --modes 12 --residual-vectors interfaces -o body.h5 --quiet");
+    fs::write(place.join("psd.csv"), "hertz,left:y\n100,4\n8000,16\n").expect("written");
+    let line =
+        "response model.toml body.h5 --base left:y --damping 0.02 --band 100..8000 --solves 4 --points 30";
+    let told: Value = serde_json::from_str(&runs(
+        place,
+        &format!("{line} --psd psd.csv --to right:y --rows root --rms rms.csv --csv response.csv --json"),
+    ))
+    .expect("JSON");
+    let results = &told["results"];
+    let random = &results["random"];
+    let [low, high] = [100.0f64, 8000.0];
+    // The density is a power of the frequency: 4 (f / 100)^p with p = ln 4 / ln 80.
+    let power = 4.0f64.ln() / 80.0f64.ln();
+    let expected = 4.0 * low / (power + 1.0) * ((high / low).powf(power + 1.0) - 1.0);
+    let of_input = random["inputs"][0]["rms"].as_f64().expect("a number");
+    assert!((of_input / expected.sqrt() - 1.0).abs() < 1e-6, "{of_input} {}", expected.sqrt());
+    assert_eq!(random["displacements"][0]["name"], "interface right y");
+    let table = fs::read_to_string(place.join("rms.csv")).expect("a table");
+    let kinds = |kind: &str| table.lines().filter(|line| line.split(',').nth(1) == Some(kind)).count();
+    assert_eq!((kinds("displacement"), kinds("row"), kinds("von Mises")), (1, 198, 32), "{table}");
+    for recovery in random["recoveries"].as_array().expect("recoveries") {
+        let error = recovery["errors"]["rows"].as_f64().expect("an error");
+        assert!(error < 0.02, "{recovery}");
+    }
+    let names: Vec<&str> =
+        results["pairs"].as_array().expect("pairs").iter().filter_map(|pair| pair["to"].as_str()).collect();
+    assert_eq!(names, ["interface right", "recovery root"]);
+    assert!(
+        fs::read_to_string(place.join("response.csv"))
+            .expect("a table")
+            .contains("recovery root Mz reduced re")
+    );
+    for (words, code) in [
+        ("--psd psd.csv --rms rms.vtu", "FB221"),
+        ("--rows nothing", "FB218"),
+        ("--rows root:Mw", "FB218"),
+        ("--to right:y --psd none.csv", "FB101"),
+        ("--to right:y --from right", "cannot be used with"),
+    ] {
+        refused(place, &format!("{line} {words}"), code);
+    }
+    refused(place, "response body.h5 --base left:y --band 100..8000 --psd psd.csv", "FB801");
+    refused(place, "response body.h5 --base 3:y --band 100..8000 --rows root --damping 0.02", "FB218");
+    refused(place, "response body.h5 --from right:y --band 100..8000 --psd psd.csv --damping 0.02", "FB215");
+    assert!(!place.join("rms.vtu").exists());
+}

@@ -22,6 +22,6 @@ pub use conversion::{Conversion, convert, interface_compliance, poor_fits};
 pub use lumped::LumpedPipeline;
 pub use modal_matrices::{modal_damping, modal_geometric_stiffness};
 pub use modal_model::{Condensation, ModalModel};
-pub use recovery::recovered_rows;
+pub use recovery::{recovered_rows, recovery_loads};
 pub use settings::{ConvertSettings, Lumping, MeshChoice};
 pub use shapes::{RecoveryShapes, ShapeColumn, recovery_shapes};

@@ -332,6 +332,27 @@ pub fn recovered_rows(model: &FeModel, recovery: &ModelRecovery, x: &Mat<f64>) -
     }
 }
 
+/// Returns the nodal forces R' of some rows of a recovery (N x rows), whose products with displacements are the values of
+/// the rows; `None` for a recovery that is known for some shapes only.
+pub fn recovery_loads(model: &FeModel, recovery: &ModelRecovery, rows: &[usize]) -> Option<Mat<f64>> {
+    match &recovery.operator {
+        RecoveryOperator::Rows { transposed, .. } => {
+            let mut loads = Mat::zeros(transposed.n_rows(), rows.len());
+            for (at, &row) in rows.iter().enumerate() {
+                let (places, values) = transposed.column(row);
+                places.iter().zip(values).for_each(|(&place, value)| loads[(place as usize, at)] += value);
+            }
+            Some(loads)
+        }
+        RecoveryOperator::Shapes { .. } => None,
+        RecoveryOperator::Cut { nodes, about } => {
+            let side = one_side(model, nodes, *about);
+            let chosen = Mat::from_fn(side.nrows(), rows.len(), |i, at| side[(i, rows[at])]);
+            Some(model.pencil().apply_stiffness(chosen.as_ref()))
+        }
+    }
+}
+
 /// Returns T_S (N x 6, in the plane N x 3): rigid motions about a point, of the rows of some nodes alone.
 fn one_side(model: &FeModel, side: &[i64], about: [f64; 3]) -> Mat<f64> {
     let members: HashSet<i64> = side.iter().copied().collect();

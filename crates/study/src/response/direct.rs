@@ -1,5 +1,6 @@
 //! Equations of all nodes at one frequency, solved with a factor of the dynamic stiffness.
 
+use super::modal_sum::clear_rows;
 use faer::{Mat, Scale};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -55,6 +56,7 @@ impl<'m> DirectSolver<'m> {
     /// Prepares the solution at `solves` frequencies.
     ///
     /// * `loads`, `measured`: B and L in all rows of the model.
+    /// * `moving`: true for outputs that move with the body, false for those relative to its frame.
     /// * `damping`: the products M Psi and the modal matrix C of D = M Psi C (M Psi)'.
     ///
     /// # Errors
@@ -62,6 +64,7 @@ impl<'m> DirectSolver<'m> {
     pub(super) fn new(
         model: &'m CoupledModel<'_>,
         [loads, measured]: [&Mat<f64>; 2],
+        moving: &[bool],
         damping: Option<(&Mat<f64>, &Mat<f64>)>,
         solves: usize,
         context: &Context<'_>,
@@ -75,7 +78,8 @@ impl<'m> DirectSolver<'m> {
         // Split the rigid acceleration off the loads: B <- (1 - M Phi Phi') B.
         let rigid_products = pencil.apply_mass(rigid.as_ref());
         let rigid_loads = gram(rigid.as_ref(), loads.as_ref());
-        let rigid_gain = gram(gram(rigid.as_ref(), measured.as_ref()).as_ref(), rigid_loads.as_ref());
+        let mut rigid_gain = gram(gram(rigid.as_ref(), measured.as_ref()).as_ref(), rigid_loads.as_ref());
+        clear_rows(&mut rigid_gain, moving);
         subtract_combination(loads.as_mut(), rigid_products.as_ref(), rigid_loads.as_ref());
         let damping = damping.and_then(|(u, c)| damped_columns(&model.restrict(u.clone()), c));
         let solver = Self { pencil, analysis, rigid, rigid_products, loads, measured, rigid_gain, damping };

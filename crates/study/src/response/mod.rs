@@ -2,17 +2,23 @@
 //! of its model, and the difference of the two. No files.
 
 mod band;
+mod densities;
 mod direct;
+mod ends;
 mod errors;
+mod framed_body;
 mod modal_sum;
 mod place;
+mod random;
 mod request;
 mod study;
 
 pub use band::{Band, Resonance, Spacing};
+pub use ends::{Excitation, Output, Target};
 pub use errors::{At, Effectivity, PairErrors};
 /// Complex number of a response; the real part is in phase with the force.
 pub use nalgebra::Complex;
 pub use place::{Direction, Place};
+pub use random::{RandomErrors, RandomRecovery, RandomResponse, RandomValue};
 pub use request::{ResponseRequest, converted_for_response};
-pub use study::{CouplingEffect, Function, Pair, Response, ResponseSettings, Solved, respond};
+pub use study::{CouplingEffect, Function, Pair, Response, ResponseEnds, ResponseSettings, Solved, respond};

@@ -12,7 +12,7 @@ use flexbody_linalg::{
 use nalgebra::{Complex, DMatrix};
 
 /// Receptances of a free body in coordinates of diagonal stiffness and mass: H(w) = -G / w^2 + C' (diag(k) - w^2
-/// diag(m) + i w D)^-1 B.
+/// diag(m) + i w D)^-1 B + S.
 pub(super) struct ModalSum {
     /// Stiffness k of the coordinates (n).
     pub stiffness: Vec<f64>,
@@ -26,6 +26,8 @@ pub(super) struct ModalSum {
     pub outputs: Mat<f64>,
     /// Rigid accelerations G for unit loads (outputs x inputs).
     pub rigid: Mat<f64>,
+    /// Static response S outside the coordinates (outputs x inputs); `None` for zero.
+    pub direct: Option<Mat<f64>>,
 }
 
 impl ModalSum {
@@ -37,12 +39,13 @@ impl ModalSum {
         DMatrix::from_fn(outputs, inputs, |o, i| {
             let flexible: Complex<f64> =
                 (0..self.mass.len()).map(|j| amplitudes[(j, i)] * self.outputs[(j, o)]).sum();
-            flexible - self.rigid[(o, i)] / (omega * omega)
+            let direct = self.direct.as_ref().map_or(0.0, |direct| direct[(o, i)]);
+            flexible - self.rigid[(o, i)] / (omega * omega) + direct
         })
     }
 
     /// Returns (diag(k) - w^2 diag(m) + i w D)^-1 B.
-    fn amplitudes(&self, omega: f64) -> DMatrix<Complex<f64>> {
+    pub(super) fn amplitudes(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let (n, inputs) = (self.mass.len(), self.inputs.ncols());
         let input = |j: usize, i: usize| Complex::new(self.inputs[(j, i)], 0.0);
         let dynamic = |j: usize| self.stiffness[j] - omega * omega * self.mass[j];
@@ -99,17 +102,25 @@ pub(super) struct NodalModes<'m> {
     /// Loads B (N x inputs) and outputs L (N x outputs).
     pub loads: Mat<f64>,
     pub measured: Mat<f64>,
+    /// Outputs that move with the body; the others are rows of recoveries, which are relative to its frame.
+    pub moving: Vec<bool>,
+    /// Number of outputs, the first ones, whose static responses improve the estimate.
+    pub improved: usize,
 }
 
 impl NodalModes<'_> {
     /// Returns the transfer function in the span of the modes and of the static responses E = K^+ \[(1 - M Phi Phi' - M
     /// Psi Psi') \[B, L\], K Psi - M Psi Psi'K Psi\], with the modal damping C: D = M Psi C (M Psi)'. Returns `None` if
-    /// the modes leave no unbalanced force.
+    /// the modes leave no unbalanced force; otherwise also the displacements of its coordinates (N x n).
     ///
     /// # Errors
     /// The errors of [`free_static_responses`]; [`FactorizationFailed`](Code::FactorizationFailed) if the modes and
     /// responses are linearly dependent.
-    pub(super) fn enriched(&self, body: &FlexBody, damping: Option<&Mat<f64>>) -> Result<Option<ModalSum>> {
+    pub(super) fn enriched(
+        &self,
+        body: &FlexBody,
+        damping: Option<&Mat<f64>>,
+    ) -> Result<Option<(ModalSum, Mat<f64>)>> {
         let Some(static_responses) = self.static_responses(body)? else { return Ok(None) };
         let stiff = normalised(&self.vectors, &self.elastic);
         let all = side_by_side(&[stiff.as_ref(), static_responses.as_ref()]);
@@ -139,7 +150,7 @@ impl NodalModes<'_> {
 
     /// Returns the part of the loads B and L outside rigid motions and modes.
     fn unbalanced_loads(&self) -> Mat<f64> {
-        let loads = side_by_side(&[self.loads.as_ref(), self.measured.as_ref()]);
+        let loads = side_by_side(&[self.loads.as_ref(), self.measured.as_ref().subcols(0, self.improved)]);
         let mut left = loads.clone();
         let rigid = self.model.model().pencil().apply_mass(self.rigid.as_ref());
         for (vectors, products) in [(&self.rigid, &rigid), (&self.vectors, &self.inertial)] {
@@ -163,8 +174,9 @@ impl NodalModes<'_> {
         left
     }
 
-    /// Returns the transfer function of motion in the span of rigid motions and the columns of `span`.
-    fn in_span(&self, span: &Mat<f64>, damping: Option<&Mat<f64>>) -> Option<ModalSum> {
+    /// Returns the transfer function of motion in the span of rigid motions and the columns of `span`, and the displacements
+    /// of its coordinates (N x n).
+    fn in_span(&self, span: &Mat<f64>, damping: Option<&Mat<f64>>) -> Option<(ModalSum, Mat<f64>)> {
         let pencil = self.model.model().pencil();
         let stiffness = gram(span.as_ref(), pencil.apply_stiffness(span.as_ref()).as_ref());
         let mass = gram(span.as_ref(), pencil.apply_mass(span.as_ref()).as_ref());
@@ -180,22 +192,32 @@ impl NodalModes<'_> {
         let seen = |columns: MatRef<'_, f64>| {
             combine(coordinates.transpose().to_owned().as_ref(), gram(span.as_ref(), columns).as_ref())
         };
-        let rigid = gram(
+        let mut rigid = gram(
             gram(self.rigid.as_ref(), self.measured.as_ref()).as_ref(),
             gram(self.rigid.as_ref(), self.loads.as_ref()).as_ref(),
         );
+        clear_rows(&mut rigid, &self.moving);
         let damping = damping.map(|c| {
             let modal = seen(self.inertial.as_ref());
             combine(combine(modal.as_ref(), c.as_ref()).as_ref(), modal.transpose().to_owned().as_ref())
         });
-        Some(ModalSum {
+        let sum = ModalSum {
             stiffness: vec![1.0; eigen.values.len()],
             mass: eigen.values,
             damping,
             inputs: seen(self.loads.as_ref()),
             outputs: seen(self.measured.as_ref()),
             rigid,
-        })
+            direct: None,
+        };
+        Some((sum, combine(span.as_ref(), coordinates.as_ref())))
+    }
+}
+
+/// Sets the rows to zero that are not `kept`.
+pub(super) fn clear_rows(a: &mut Mat<f64>, kept: &[bool]) {
+    for (row, _) in kept.iter().enumerate().filter(|(_, kept)| !**kept) {
+        (0..a.ncols()).for_each(|c| a[(row, c)] = 0.0);
     }
 }
 
@@ -256,6 +278,7 @@ mod tests {
                 if spread { 0.5 * sign * share } else { sign * share }
             }),
             rigid: Mat::from_fn(2, 2, |_, _| 0.5 / m),
+            direct: None,
         };
         for omega in [0.1, 5.0, 7.0710678, 30.0] {
             let h = sum(false).at(omega);

@@ -107,6 +107,14 @@ impl Place {
         }
     }
 
+    /// Returns the name of an interface or the number of a node, as it is stated.
+    pub(super) fn stated_name(&self) -> String {
+        match &self.point {
+            Point::Node(number) => number.to_string(),
+            Point::Interface(name) => name.clone(),
+        }
+    }
+
     /// Returns the directions of the place in a body of the given dimension.
     pub(super) fn directions_of(&self, dimension: usize) -> Vec<Direction> {
         match self.directions.as_slice() {

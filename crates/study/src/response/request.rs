@@ -1,8 +1,9 @@
 //! Request for a frequency response: what a user states, completed by a scene.
 
 use super::band::Band;
+use super::ends::Excitation;
 use super::place::Place;
-use super::study::{Response, ResponseSettings, respond};
+use super::study::{Response, ResponseEnds, ResponseSettings, respond};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisKind, ModeSettings};
@@ -14,12 +15,19 @@ use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{Point, Scene};
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 /// Request for a frequency response. A scene supplies what is not stated: its loads, watched points, band and damping.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseRequest {
     /// Places of unit forces; empty for the places of the loads of the scene.
     pub from: Vec<Place>,
+    /// Interface whose acceleration excites the body, in place of forces.
+    pub base: Option<Place>,
+    /// Rows of recoveries to compute: `NAME` for all rows of a recovery, `NAME:ROW` for one.
+    pub rows: Vec<String>,
+    /// Table of the spectral densities of a random excitation; `None` without.
+    pub densities: Option<PathBuf>,
     /// Places of measured displacements; empty for the watched points of the scene.
     pub to: Vec<Place>,
     /// Frequency band; `None` for the band of the scene.
@@ -38,6 +46,9 @@ impl Default for ResponseRequest {
     fn default() -> Self {
         Self {
             from: Vec::new(),
+            base: None,
+            rows: Vec::new(),
+            densities: None,
             to: Vec::new(),
             band: None,
             damping: None,
@@ -68,8 +79,10 @@ impl ResponseRequest {
     ) -> Result<(Response, ResponseSettings)> {
         self.refuse_impossible()?;
         let settings = self.settings(scene, body)?;
-        let [from, to] = self.places(scene)?;
-        let response = respond(model, body, &from, &to, &settings, context)?;
+        let (from, to) = self.ends(scene)?;
+        let ends =
+            ResponseEnds { from: &from, to: &to, rows: &self.rows, densities: self.densities.as_deref() };
+        let response = respond(model, body, &ends, &settings, context)?;
         Ok((response, settings))
     }
 
@@ -112,19 +125,31 @@ impl ResponseRequest {
         })
     }
 
-    /// Returns the places of forces and of measured displacements.
-    fn places(&self, scene: Option<&Scene>) -> Result<[Vec<Place>; 2]> {
-        let loaded = scene.map_or_else(Vec::new, |scene| scene.loads.iter().map(|load| &load.at).collect());
+    /// Returns the excitation, and the places of measured displacements.
+    fn ends(&self, scene: Option<&Scene>) -> Result<(Excitation, Vec<Place>)> {
         let watched = scene.map_or_else(Vec::new, |scene| scene.watched.iter().collect());
-        let from = chosen(&self.from, &loaded).ok_or_else(|| missing("forces", "from", "load"))?;
-        let to = chosen(&self.to, &watched).ok_or_else(|| missing("displacements", "to", "watch"))?;
-        Ok([from, to])
+        let to = chosen(&self.to, &watched);
+        if to.is_empty() && self.rows.is_empty() && self.densities.is_none() {
+            return Err(missing("displacements", "to", "watch").into());
+        }
+        if let Some(base) = &self.base {
+            if !self.from.is_empty() {
+                let message = "--base and --from are both given: a body is excited by one of the two";
+                return Err(Diagnostic::new(Code::Usage, message).into());
+            }
+            return Ok((Excitation::Base(base.clone()), to));
+        }
+        let loaded = scene.map_or_else(Vec::new, |scene| scene.loads.iter().map(|load| &load.at).collect());
+        let from = chosen(&self.from, &loaded);
+        if from.is_empty() {
+            return Err(missing("forces", "from", "load").into());
+        }
+        Ok((Excitation::Forces(from), to))
     }
 }
 
-/// Returns the stated places, or else those of a scene, each once; `None` if there are none. A scene may load a point
-/// twice.
-fn chosen(stated: &[Place], of_scene: &[&Point]) -> Option<Vec<Place>> {
+/// Returns the stated places, or else those of a scene, each once. A scene may load a point twice.
+fn chosen(stated: &[Place], of_scene: &[&Point]) -> Vec<Place> {
     let mut places = stated.to_vec();
     if places.is_empty() {
         places.extend(of_scene.iter().map(|point| Place::of((*point).clone())));
@@ -135,7 +160,7 @@ fn chosen(stated: &[Place], of_scene: &[&Point]) -> Option<Vec<Place>> {
             once.push(place)
         }
     });
-    Some(once).filter(|once| !once.is_empty())
+    once
 }
 
 fn missing(what: &str, option: &str, key: &str) -> Diagnostic {

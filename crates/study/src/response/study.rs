@@ -1,11 +1,15 @@
 //! Frequency response of a body over a band, compared with that of its model.
 
 use super::Complex;
-use super::band::{Band, Frequency, Resonance};
+use super::band::{Band, Frequency};
+use super::densities::SpectralDensities;
 use super::direct::{DirectSolution, DirectSolver};
+use super::ends::{BaseMotion, Excitation, Output, Target};
 use super::errors::{At, Compared, PairErrors};
+use super::framed_body::{FramedBody, Read, numbered, reduced_sum};
 use super::modal_sum::{ModalSum, NodalModes};
-use super::place::{Direction, Place, PlaceRows};
+use super::place::{Direction, Place};
+use super::random::{RandomResponse, RandomStudy, input_names};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -15,13 +19,15 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{gram, largest, parallel, side_by_side};
 use flexbody_model::{DampingRatios, FeModel};
-use flexbody_motion::scene::Requirements;
-use nalgebra::{DMatrix, Matrix6, Vector3};
-use std::borrow::Cow;
+use nalgebra::DMatrix;
+use std::path::Path;
 
 /// Largest deviation from one of the modal masses (and relative modal stiffnesses) of a body in its own model. It
 /// allows for arrays of 32 bits; a larger deviation means another model.
 const MODAL_MASS: f64 = 1e-4;
+
+/// Largest number of outputs whose static responses improve the estimate of the error. More cost more.
+const MOST_IMPROVED: usize = 36;
 
 /// Settings of a frequency response.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,6 +66,8 @@ pub struct Response {
     pub modes: usize,
     /// True if the modes are damped.
     pub damped: bool,
+    /// True if the excitation is the acceleration of an interface.
+    pub by_base: bool,
     /// Frequencies in hertz, ascending.
     pub frequencies: Vec<f64>,
     /// Pairs of a loaded and a measured place.
@@ -71,6 +79,8 @@ pub struct Response {
     /// Effect of the rigid interfaces of the body; the compared model has these interfaces too. `None` without rigid
     /// interfaces.
     pub coupling: Option<CouplingEffect>,
+    /// Root mean squares under random excitation; `None` without spectral densities.
+    pub random: Option<RandomResponse>,
 }
 
 /// Effect of rigid interfaces on a frequency response.
@@ -99,23 +109,24 @@ pub struct Solved {
 /// Transfer functions from one place to another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
-    /// Place of the forces.
+    /// Place of the forces or accelerations.
     pub from: Place,
-    /// Place of the displacements.
-    pub to: Place,
-    /// Transfer functions from every direction at the one place to every direction at the other.
+    /// Place of the displacements, or a recovery.
+    pub to: Target,
+    /// Transfer functions from every direction at the one place to every direction or row at the other.
     pub functions: Vec<Function>,
     /// Errors of the reduced response; `None` without a model.
     pub errors: Option<PairErrors>,
 }
 
-/// Transfer function: displacement per force, rotation per force, and so on, in the units of the body and radians.
+/// Transfer function: displacement per force, rotation per force, and so on, in the units of the body and radians; rows of
+/// recoveries in their units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Function {
-    /// Direction of the force or torque.
+    /// Direction of the force or torque, or of the acceleration.
     pub from: Direction,
-    /// Direction of the displacement or rotation.
-    pub to: Direction,
+    /// Direction of the displacement or rotation, or the row of a recovery.
+    pub to: Output,
     /// Response of the reduced body at every frequency.
     pub reduced: Vec<Complex<f64>>,
     /// Response of all nodes at every frequency; `None` where their equations were not solved.
@@ -123,14 +134,22 @@ pub struct Function {
 }
 
 impl Function {
-    /// Returns the kind of function: `displacement per force`, `rotation per torque`, and so on.
-    pub fn kind(&self) -> &'static str {
-        match (self.to.turns(), self.from.turns()) {
-            (false, false) => "displacement per force",
-            (false, true) => "displacement per torque",
-            (true, false) => "rotation per force",
-            (true, true) => "rotation per torque",
-        }
+    /// Returns the kind of function: `displacement per force`, `row per angular acceleration`, and so on.
+    ///
+    /// * `by_base`: true if the excitation is an acceleration.
+    pub fn kind(&self, by_base: bool) -> String {
+        let read = match &self.to {
+            Output::Direction(direction) if direction.turns() => "rotation",
+            Output::Direction(_) => "displacement",
+            Output::Row(_) => "row",
+        };
+        let excited = match (by_base, self.from.turns()) {
+            (false, false) => "force",
+            (false, true) => "torque",
+            (true, false) => "acceleration",
+            (true, true) => "angular acceleration",
+        };
+        format!("{read} per {excited}")
     }
 }
 
@@ -138,58 +157,83 @@ impl Response {
     /// Returns true if no error exceeds the tolerance, or if no error is known.
     pub fn holds(&self, tolerance: f64) -> bool {
         let errors = self.pairs.iter().filter_map(|pair| pair.errors.as_ref());
-        errors.filter_map(|errors| errors.worst).all(|worst| worst.value <= tolerance)
+        let of_pairs = errors.filter_map(|errors| errors.worst).all(|worst| worst.value <= tolerance);
+        of_pairs && self.random.as_ref().is_none_or(|random| random.worst_error() <= tolerance)
     }
 }
 
-/// Computes the receptances of `body` between places over a band: displacements and rotations for unit forces and
-/// torques, along the axes of the model, H(w) = L'(K + i w D - w^2 M)^-1 B. With the `model` that the body was made of,
+/// Ends of the transfer functions of a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResponseEnds<'e> {
+    /// Excitation.
+    pub from: &'e Excitation,
+    /// Places of displacements.
+    pub to: &'e [Place],
+    /// Rows of recoveries: `NAME` for all rows of a recovery, `NAME:ROW` for one.
+    pub rows: &'e [String],
+    /// Table of the spectral densities of a random excitation.
+    pub densities: Option<&'e Path>,
+}
+
+/// Computes the transfer functions of `body` over a band: displacements, rotations and rows of recoveries for unit forces
+/// and torques, along the axes of the model, H(w) = L'(K + i w D - w^2 M)^-1 B. With the `model` that the body was made of,
 /// the equations of all its nodes are also solved at some of the frequencies, with the damping of the body: D = M Psi C
-/// Psi'M.
+/// Psi'M. For a base, the forces are those that move the interface as prescribed: H (-w^2 H_a)^-1 with the response H_a of
+/// the interface.
 ///
 /// # Errors
-/// [`PlaceUnknown`](Code::PlaceUnknown) for a place that the body does not have;
+/// [`PlaceUnknown`](Code::PlaceUnknown) for a place or row that the body does not have;
 /// [`BodyIncomparable`](Code::BodyIncomparable) for a body of another model; failures of the solutions.
 pub fn respond(
     model: Option<&FeModel>,
     body: &FlexBody,
-    from: &[Place],
-    to: &[Place],
+    ends: &ResponseEnds<'_>,
     settings: &ResponseSettings,
     context: &Context<'_>,
 ) -> Result<Response> {
-    // Frames: mean axes uncouple rigid motion from the modes; places refer to the centre of mass.
-    let mean = body.in_mean_axes()?;
-    let body = &*damped(&mean, settings)?;
-    let at_centre = body.in_model_axes(body.invariants().first_moment() / body.invariants().mass())?;
-    let rows =
-        |places: &[Place]| places.iter().map(|place| place.rows(&at_centre)).collect::<Result<Vec<_>>>();
-    let damping = Some(body.damping()).filter(|c| c.norm_max() > 0.0);
-    let reduced = reduced_sum(&at_centre, &rows(from)?, &rows(to)?, damping.clone());
+    let framed = FramedBody::new(body, settings)?;
+    let (body, dimension) = (&framed.damped, body.dimension());
+    let read = Read::new(&framed.at_centre, ends)?;
+    let damping = framed.damping();
+    let reduced = reduced_sum(&framed.at_centre, &read, damping.clone())?;
     let known = match model {
-        Some(model) => Some(ModelResponse::new(model, body, [from, to], damping.as_ref(), context)?),
+        Some(model) => Some(ModelResponse::new(model, body, &read, damping.as_ref(), context)?),
         None => None,
     };
     // Frequencies cluster at the resonances of the best sum at hand.
-    let resonances =
-        known.as_ref().and_then(|known| known.enriched.as_ref()).unwrap_or(&reduced).resonances();
-    let resonances: Vec<Resonance> = resonances.map(|found| in_hertz(body.units(), found)).collect();
+    let best = known.as_ref().and_then(|known| known.enriched.as_ref()).unwrap_or(&reduced);
+    let resonances = framed.resonances(best, ends.from)?;
     let solves = if known.is_some() { settings.solves } else { 0 };
     let frequencies = settings.band.frequencies(settings.points, solves, &resonances);
-    let blocks = blocks(from, to, body.dimension());
+    let blocks = blocks(ends, &read, dimension);
     // Evaluate the curves, then solve the equations of all nodes, also where the estimate is critical.
-    let mut curves = Curves::new(&reduced, known.as_ref(), frequencies, body.units());
+    let mut curves = Curves::new(&reduced, known.as_ref(), frequencies, read.base.clone(), body.units());
     if let Some(known) = &known {
         curves.solve_more(&blocks, settings.tolerance, solves.div_ceil(4));
         curves.solve(known, body.units(), context)?;
     }
+    let random = match ends.densities {
+        None => None,
+        Some(path) => {
+            context.phase("random vibration");
+            let inputs = input_names(ends.from.places(), dimension);
+            let densities = &SpectralDensities::read(path, &inputs)?;
+            let band = settings.band;
+            let (known, resonances) = (known.as_ref(), &resonances[..]);
+            let (framed, read, reduced) = (&framed, &read, &reduced);
+            let study = RandomStudy { framed, read, reduced, known, densities, inputs, band, resonances };
+            Some(study.run()?)
+        }
+    };
     let [low, high] = settings.band.ends();
     let in_band = |f: &f64| *f >= low && *f <= high;
     Ok(Response {
+        random,
         name: body.source().name.clone(),
         units: body.units().clone(),
         modes: body.n_modes(),
         damped: damping.is_some(),
+        by_base: read.base.is_some(),
         pairs: blocks.iter().map(|block| curves.pair(block, settings.tolerance)).collect(),
         body_modes_in_band: body.frequencies_hz().iter().filter(|f| in_band(f)).count(),
         solved: known.as_ref().map(|known| curves.solved(known, low)),
@@ -198,66 +242,14 @@ pub fn respond(
     })
 }
 
-/// Returns the body with the damping ratios of the settings, if they state any.
-fn damped<'b>(body: &'b FlexBody, settings: &ResponseSettings) -> Result<Cow<'b, FlexBody>> {
-    let ResponseSettings { damping, replaces_damping, .. } = settings;
-    let stated = Requirements {
-        damping: damping.clone(),
-        replaces_damping: *replaces_damping,
-        ..Requirements::default()
-    };
-    stated.damped(body, "--damping or the scene")
-}
-
-fn in_hertz(units: &UnitSystem, (square, ratio): (f64, f64)) -> Resonance {
-    Resonance { hertz: units.frequency_of(square), ratio }
-}
-
-/// Returns the response of a body in a frame along the axes of the model about its centre of mass: rigid motion of the
-/// undeformed body plus the modes, to which rigid motion does not couple at rest.
-fn reduced_sum(body: &FlexBody, from: &[PlaceRows], to: &[PlaceRows], damping: Option<Mat<f64>>) -> ModalSum {
-    let joined = |rows: &[PlaceRows], part: fn(&PlaceRows) -> &Mat<f64>| {
-        side_by_side(&rows.iter().map(|place| part(place).as_ref()).collect::<Vec<_>>())
-    };
-    let (forces, motions) = (joined(from, |place| &place.rigid), joined(to, |place| &place.rigid));
-    let compliance = rigid_compliance(body);
-    let rigid = Mat::from_fn(motions.ncols(), forces.ncols(), |o, i| {
-        let row = |k: usize| (0..6).map(|l| compliance[(k, l)] * forces[(l, i)]).sum::<f64>();
-        (0..6).map(|k| motions[(k, o)] * row(k)).sum()
-    });
-    ModalSum {
-        stiffness: body.modes().eigenvalue.clone(),
-        mass: vec![1.0; body.n_modes()],
-        damping,
-        inputs: joined(from, |place| &place.modal),
-        outputs: joined(to, |place| &place.modal),
-        rigid,
-    }
-}
-
-/// Returns the accelerations of the undeformed body for unit forces and torques about its centre of mass; for a plane
-/// body, those in the plane.
-fn rigid_compliance(body: &FlexBody) -> Matrix6<f64> {
-    let (mass, inertia) = (body.invariants().mass(), body.invariants().inertia());
-    let mut compliance = Matrix6::zeros();
-    if body.dimension() == 2 {
-        compliance.set_diagonal(&nalgebra::Vector6::new(1.0, 1.0, 0.0, 0.0, 0.0, 0.0).unscale(mass));
-        compliance[(5, 5)] = 1.0 / inertia[(2, 2)];
-        return compliance;
-    }
-    compliance.fixed_view_mut::<3, 3>(0, 0).set_diagonal(&Vector3::repeat(1.0 / mass));
-    if let Some(inverse) = inertia.try_inverse() {
-        compliance.fixed_view_mut::<3, 3>(3, 3).copy_from(&inverse);
-    }
-    compliance
-}
-
 /// Model of the body, with the enriched response that estimates the error.
-struct ModelResponse<'m> {
+pub(super) struct ModelResponse<'m> {
     nodal: NodalModes<'m>,
     /// Response with static responses added to the modes, which estimates the error; `None` if the modes leave no
     /// unbalanced force.
-    enriched: Option<ModalSum>,
+    pub enriched: Option<ModalSum>,
+    /// Displacements of the coordinates of this response (N x n).
+    pub shapes: Option<Mat<f64>>,
     damping: Option<Mat<f64>>,
     context: Context<'m>,
 }
@@ -266,22 +258,27 @@ impl<'m> ModelResponse<'m> {
     fn new(
         model: &'m FeModel,
         body: &FlexBody,
-        [from, to]: [&[Place]; 2],
+        read: &Read<'_>,
         damping: Option<&Mat<f64>>,
         context: &Context<'m>,
     ) -> Result<Self> {
         context.phase("estimate of the error");
-        let nodal = nodal_modes(model, body, from, to)?;
-        let enriched = nodal.enriched(body, damping)?;
-        Ok(Self { nodal, enriched, damping: damping.cloned(), context: *context })
+        let nodal = nodal_modes(model, body, read)?;
+        let (enriched, shapes) = nodal.enriched(body, damping)?.unzip();
+        Ok(Self { nodal, enriched, shapes, damping: damping.cloned(), context: *context })
+    }
+
+    /// Returns the model.
+    pub(super) fn model(&self) -> &FeModel {
+        self.nodal.model.model()
     }
 
     /// Prepares the equations of all nodes of `model`, with the couplings of the body or without, for `solves`
     /// frequencies.
     fn direct_solver<'s>(&'s self, model: &'s CoupledModel<'_>, solves: usize) -> Result<DirectSolver<'s>> {
-        let NodalModes { inertial, loads, measured, .. } = &self.nodal;
+        let NodalModes { inertial, loads, measured, moving, .. } = &self.nodal;
         let damping = self.damping.as_ref().map(|c| (inertial, c));
-        DirectSolver::new(model, [loads, measured], damping, solves, &self.context)
+        DirectSolver::new(model, [loads, measured], moving, damping, solves, &self.context)
     }
 
     /// Returns the model with deformable interfaces; `None` if no interface of the body is rigid.
@@ -292,12 +289,7 @@ impl<'m> ModelResponse<'m> {
 }
 
 /// Expresses the body in the rows of the model that it was made of, and refuses a body of another model.
-fn nodal_modes<'m>(
-    model: &'m FeModel,
-    body: &FlexBody,
-    from: &[Place],
-    to: &[Place],
-) -> Result<NodalModes<'m>> {
+fn nodal_modes<'m>(model: &'m FeModel, body: &FlexBody, read: &Read<'_>) -> Result<NodalModes<'m>> {
     let foreign = |why: &str| {
         let message = format!("the body was not made from this model: {why}");
         let help = "give the model that the body was converted from";
@@ -319,23 +311,34 @@ fn nodal_modes<'m>(
         return Err(foreign(&why).into());
     }
     let unit_loads = |places: &[Place]| -> Result<Mat<f64>> {
+        if places.is_empty() {
+            return Ok(Mat::zeros(model.rows().len(), 0));
+        }
         let loads = places.iter().map(|place| place.loads(model)).collect::<Result<Vec<_>>>()?;
         Ok(side_by_side(&loads.iter().map(|load| load.as_ref()).collect::<Vec<_>>()))
     };
+    let of_recoveries = read.rows.iter().map(|one| one.loads(model)).collect::<Result<Vec<_>>>()?;
+    let places = unit_loads(&read.to)?;
+    let outputs: Vec<_> = std::iter::once(&places).chain(&of_recoveries).map(Mat::as_ref).collect();
+    let measured = side_by_side(&outputs);
+    let improved = if measured.ncols() > MOST_IMPROVED { places.ncols() } else { measured.ncols() };
     Ok(NodalModes {
         model: body.coupled_model(model, vectors.as_ref()),
         rigid: rigid_modes(model, &pencil)?,
         vectors,
         inertial,
         elastic,
-        loads: unit_loads(from)?,
-        measured: unit_loads(to)?,
+        loads: unit_loads(&read.from)?,
+        measured,
+        moving: read.moving(model.dimension()),
+        improved,
     })
 }
 
 /// Responses between all places at every frequency.
 struct Curves {
     frequencies: Vec<Frequency>,
+    base: Option<BaseMotion>,
     reduced: Vec<DMatrix<Complex<f64>>>,
     /// Enriched responses; empty without a model.
     enriched: Vec<DMatrix<Complex<f64>>>,
@@ -351,22 +354,26 @@ impl Curves {
         reduced: &ModalSum,
         known: Option<&ModelResponse<'_>>,
         frequencies: Vec<Frequency>,
+        base: Option<BaseMotion>,
         units: &UnitSystem,
     ) -> Self {
-        let omega = |f: &Frequency| units.eigenvalue_of(f.hertz).sqrt();
-        let responses = |sum: &ModalSum| parallel::map(&frequencies, |f| sum.at(omega(f)));
+        let response = |sum: &ModalSum, f: &Frequency| {
+            let omega = units.eigenvalue_of(f.hertz).sqrt();
+            applied(base.as_ref(), omega, sum.at(omega))
+        };
+        let responses = |sum: &ModalSum| parallel::map(&frequencies, |f| response(sum, f));
         let own = responses(reduced);
         let enriched = match known {
             Some(known) => known.enriched.as_ref().map_or_else(|| own.clone(), responses),
             None => Vec::new(),
         };
         let [full, deforming] = [0; 2].map(|_| frequencies.iter().map(|_| None).collect());
-        Self { frequencies, reduced: own, enriched, full, deforming, flops: 0.0 }
+        Self { frequencies, base, reduced: own, enriched, full, deforming, flops: 0.0 }
     }
 
     /// Marks for solution the frequencies where the estimated error of a block is largest and where it first exceeds
     /// the tolerance, at most `most` of them, so that reported errors are measured there.
-    fn solve_more(&mut self, blocks: &[(&Place, &Place, Block)], tolerance: f64, most: usize) {
+    fn solve_more(&mut self, blocks: &[(&Place, Target, Block)], tolerance: f64, most: usize) {
         let mut found = Vec::new();
         for errors in blocks.iter().filter_map(|(_, _, block)| self.errors(block, tolerance)) {
             let estimated = &errors.estimated;
@@ -415,8 +422,12 @@ impl Curves {
         let mut solutions: Vec<Option<DirectSolution>> = self.frequencies.iter().map(|_| None).collect();
         let (count, mut failed) = (self.frequencies.len() as f64, None);
         for (i, frequency) in self.frequencies.iter().enumerate().filter(|(_, f)| f.solved) {
-            match solver.at(units.eigenvalue_of(frequency.hertz).sqrt()) {
-                Ok(solution) => solutions[i] = Some(solution),
+            let omega = units.eigenvalue_of(frequency.hertz).sqrt();
+            match solver.at(omega) {
+                Ok(DirectSolution { response, modes_below }) => {
+                    let response = applied(self.base.as_ref(), omega, response);
+                    solutions[i] = Some(DirectSolution { response, modes_below });
+                }
                 Err(error) if error.has(Code::FactorizationFailed) => failed = Some(error),
                 Err(error) => return Err(error),
             }
@@ -433,14 +444,14 @@ impl Curves {
     fn coupling_effect(
         &self,
         known: &ModelResponse<'_>,
-        blocks: &[(&Place, &Place, Block)],
+        blocks: &[(&Place, Target, Block)],
         tolerance: f64,
     ) -> Option<CouplingEffect> {
         let interfaces = known.nodal.model.rigid_interfaces();
         if interfaces.is_empty() {
             return None;
         }
-        let of_block = |(_, _, block): &(&Place, &Place, Block)| {
+        let of_block = |(_, _, block): &(&Place, Target, Block)| {
             // Frequencies that were solved for both models.
             let both = self.full.iter().zip(&self.deforming).enumerate();
             let both: Vec<_> = both
@@ -481,10 +492,10 @@ impl Curves {
         }
     }
 
-    fn pair(&self, (from, to, block): &(&Place, &Place, Block), tolerance: f64) -> Pair {
+    fn pair(&self, (from, to, block): &(&Place, Target, Block), tolerance: f64) -> Pair {
         Pair {
             from: (*from).clone(),
-            to: (*to).clone(),
+            to: to.clone(),
             functions: self.functions(block),
             errors: self.errors(block, tolerance),
         }
@@ -493,11 +504,12 @@ impl Curves {
     fn functions(&self, block: &Block) -> Vec<Function> {
         let mut functions = Vec::new();
         for &(column, from) in &block.columns {
-            for &(row, to) in &block.rows {
+            for (row, to) in &block.rows {
+                let row = *row;
                 let entry = |s: &Option<DirectSolution>| s.as_ref().map(|s| s.response[(row, column)]);
                 functions.push(Function {
                     from,
-                    to,
+                    to: to.clone(),
                     reduced: self.reduced.iter().map(|h| h[(row, column)]).collect(),
                     full: self.full.iter().map(entry).collect(),
                 });
@@ -525,43 +537,49 @@ impl Curves {
     }
 }
 
-/// Returns every place with its directions, which are numbered over all places.
-fn numbered(places: &[Place], dimension: usize) -> impl Iterator<Item = (&Place, Vec<(usize, Direction)>)> {
-    let mut next = 0;
-    places.iter().map(move |place| {
-        let directions = place.directions_of(dimension).into_iter();
-        let numbered = directions.map(|direction| {
-            next += 1;
-            (next - 1, direction)
-        });
-        (place, numbered.collect())
-    })
-}
-
-/// Returns the blocks from each place to each other. Forces and torques, displacements and rotations are in separate
-/// blocks.
-fn blocks<'p>(from: &'p [Place], to: &'p [Place], dimension: usize) -> Vec<(&'p Place, &'p Place, Block)> {
+/// Returns the blocks from each place to each other and to each recovery. Forces and torques, displacements and rotations
+/// are in separate blocks.
+fn blocks<'p>(ends: &ResponseEnds<'p>, read: &Read<'_>, dimension: usize) -> Vec<(&'p Place, Target, Block)> {
+    // Outputs of every target, numbered over all: places, the moving interface, recoveries.
+    let mut targets: Vec<(Target, Vec<(usize, Output)>)> = Vec::new();
+    for (place, directions) in numbered(&read.to, dimension).take(ends.to.len()) {
+        for turns in [false, true] {
+            let of_kind = directions.iter().filter(|(_, direction)| direction.turns() == turns);
+            let outputs = of_kind.map(|(at, direction)| (*at, Output::Direction(*direction))).collect();
+            targets.push((Target::Place(place.clone()), outputs));
+        }
+    }
+    let mut next: usize = read.to.iter().map(|place| place.directions_of(dimension).len()).sum();
+    for one in &read.rows {
+        let outputs =
+            one.labels().enumerate().map(|(at, row)| (next + at, Output::Row(row.clone()))).collect();
+        next += one.rows.len();
+        targets.push((Target::Recovery(one.recovery.name.clone()), outputs));
+    }
     let mut blocks = Vec::new();
-    for (source, columns) in numbered(from, dimension) {
-        for (target, rows) in numbered(to, dimension) {
-            for turns in [(false, false), (false, true), (true, false), (true, true)] {
-                let kind_alone = |all: &[(usize, Direction)], turns: bool| {
-                    all.iter().copied().filter(|(_, d)| d.turns() == turns).collect::<Vec<_>>()
-                };
-                let block =
-                    Block { columns: kind_alone(&columns, turns.0), rows: kind_alone(&rows, turns.1) };
-                if !block.columns.is_empty() && !block.rows.is_empty() {
-                    blocks.push((source, target, block));
-                }
+    for (source, columns) in numbered(ends.from.places(), dimension) {
+        for turns in [false, true] {
+            let columns: Vec<_> = columns.iter().copied().filter(|(_, d)| d.turns() == turns).collect();
+            for (target, rows) in targets.iter().filter(|(_, rows)| !columns.is_empty() && !rows.is_empty()) {
+                let block = Block { columns: columns.clone(), rows: rows.clone() };
+                blocks.push((source, target.clone(), block));
             }
         }
     }
     blocks
 }
 
+/// Returns the response to accelerations of a moving interface, or the response to forces as it is.
+fn applied(base: Option<&BaseMotion>, omega: f64, response: DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
+    match base {
+        Some(base) => base.applied(omega, &response),
+        None => response,
+    }
+}
+
 /// Rows and columns of a pair of places, with their directions.
 struct Block {
-    rows: Vec<(usize, Direction)>,
+    rows: Vec<(usize, Output)>,
     columns: Vec<(usize, Direction)>,
 }
 

@@ -5,6 +5,7 @@
 mod advice;
 mod continuous_motion;
 mod nodal_reference;
+mod random_response;
 mod random_verdicts;
 mod recovery_limits;
 mod reference;
