@@ -29,7 +29,7 @@ MODELS = [("bracket_hex20", 10, 15), ("bracket_hex20", 10, 7), ("bracket_hex20",
 SPIN = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 # Model, modes of its body, and the scenes that are tried: with the frequency of the load and the rate of the spin over the first frequency.
 SELECTED = [("bracket_hex20", 40), ("robot_link", 40)]
-SCENES = [("load at 0.1 f1", 0.1, 0.0), ("load at 0.4 f1", 0.4, 0.0), ("load at 0.8 f1, spin at 0.02 f1", 0.8, 0.02)]
+SCENES = [("load at 0.1 f1", 0.1, 0.0), ("load at 0.4 f1", 0.4, 0.0), ("load at 0.8 f1", 0.8, 0.0), ("load at 0.4 f1, spin at 0.002 f1", 0.4, 0.002)]
 LIMITS = [
     ("elastic energy", "stress = 0.01"),
     ("stresses of modes and static columns", "recovery = { all = 0.01 }"),
@@ -140,6 +140,7 @@ history = {{ amplitude = 1e-3, frequency = {swing * first!r} }}
 [tolerance]
 attitude = 10.0
 deflection = 10.0
+least_deflection = 1e-12
 {tolerance}
 """
         (self.folder / "scene.toml").write_text(scene)

@@ -105,7 +105,7 @@ impl RandomFacts {
             }
         }
         let caption = "Largest root mean squares of each recovery, about the values at rest. Error: estimated difference from the model, relative to the largest value";
-        Table::new(caption, heads, &[0, 1, 4], rows)
+        Table::new(caption, heads, &[0, 1, 4], rows).in_text(|_| true)
     }
 }
 
