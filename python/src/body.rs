@@ -1,6 +1,6 @@
 //! Methods of flexible bodies, and functions that read and list them.
 
-use crate::arguments::{Argument, counts, path, positive, real, text, units};
+use crate::arguments::{Argument, counts, path, positive, real, text, texts, units};
 use crate::arrays::{by_node, matrix, matrix3, triples, vector};
 use crate::body_arguments::{attached_mass, motion_history, points_of, recorded};
 use crate::body_class::Body;
@@ -18,7 +18,7 @@ use crate::work::{brief, run};
 use flexbody::{ExportOptions, FlexBody, Matrix, Ranges};
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyTuple};
+use pyo3::types::{PyBool, PyBytes, PyDict, PyTuple};
 use std::sync::Arc;
 
 #[pymethods]
@@ -336,11 +336,12 @@ impl Body {
     /// "interfaces,17,23". `dialect` is one of the format, `to_units` the units of the file. A picture ("vtk", "gltf")
     /// shows the first `modes`, or a `motion` (a Motion, or the path of its file). `scene` is one for which the share of
     /// the stiffness of inertia is reported, if the format cannot hold it. With `allow_loss` the file is written even if
-    /// the format cannot hold all of the body; every loss is then a warning.
+    /// the format cannot hold all of the body; with names of properties ("damping", or a list), only these may be lost. Losses
+    /// are then warnings.
     ///
     /// Raises InputError for properties that the format cannot hold (FB720), options that it does not have, and the motion
     /// of another body.
-    #[pyo3(signature = (format, path, *, points=None, dialect=None, to_units=None, modes=None, motion=None, scene=None, allow_loss=false))]
+    #[pyo3(signature = (format, path, *, points=None, dialect=None, to_units=None, modes=None, motion=None, scene=None, allow_loss=None), text_signature = "($self, format, path, *, points=None, dialect=None, to_units=None, modes=None, motion=None, scene=None, allow_loss=False)")]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn export<'py>(
         &self,
@@ -353,7 +354,7 @@ impl Body {
         modes: Argument<'_, 'py>,
         motion: Argument<'_, 'py>,
         scene: Argument<'_, 'py>,
-        allow_loss: bool,
+        allow_loss: Argument<'_, 'py>,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let (format, path) = (text(format, "format")?, self::path(path, "path")?);
         let mut options = ExportOptions::default();
@@ -375,7 +376,9 @@ impl Body {
         if let Some(scene) = scene {
             options = options.scene(&Scene::whole(scene)?);
         }
-        if allow_loss {
+        if let Some(allowed) = allow_loss.filter(|allowed| !allowed.is_instance_of::<PyBool>()) {
+            options = value(options.allow_losses_of(texts(allowed, "allow_loss")?))?;
+        } else if allow_loss.map(|any| any.extract()).transpose()?.unwrap_or(false) {
             options = options.allow_loss();
         }
         let body = Arc::clone(&self.inner);

@@ -6,7 +6,7 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_file::RecordedMotion;
-use flexbody_formats::export::{self, InertiaInScene, Points};
+use flexbody_formats::export::{self, AllowedLosses, InertiaInScene, Points};
 use flexbody_formats::{FORMATS, export_in_units, find_format};
 use flexbody_input::parse_units;
 use std::path::Path;
@@ -21,7 +21,7 @@ pub struct ExportOptions {
     modes: Option<usize>,
     motion: Option<RecordedMotion>,
     scene: Option<Scene>,
-    allow_loss: bool,
+    allowed: AllowedLosses,
 }
 
 impl ExportOptions {
@@ -72,8 +72,18 @@ impl ExportOptions {
 
     /// Writes the file even if the format cannot hold all of the body; every loss is then a warning.
     pub fn allow_loss(mut self) -> Self {
-        self.allow_loss = true;
+        self.allowed = AllowedLosses::All;
         self
+    }
+
+    /// Writes the file even if the format cannot hold the properties with these names, which the error of a loss states
+    /// in brackets (`damping`, `rotations`, ...); these losses are then warnings.
+    ///
+    /// # Errors
+    /// FB801 for an unknown name.
+    pub fn allow_losses_of(mut self, names: Vec<String>) -> Result<Self> {
+        self.allowed = AllowedLosses::named(names)?;
+        Ok(self)
     }
 }
 
@@ -108,7 +118,7 @@ impl FlexBody {
         };
         let slot = OutputSlot::prepare(path)?;
         let (exported, diagnostics) =
-            export_in_units(&self.0, format, &asked, units.as_ref(), options.allow_loss)?;
+            export_in_units(&self.0, format, &asked, units.as_ref(), options.allowed.clone())?;
         OutputSlot::commit_all(exported.fill(slot)?)?;
         Ok(diagnostics)
     }

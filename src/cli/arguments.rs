@@ -251,9 +251,10 @@ pub struct ExportArguments {
     /// Units to write in [default: those of the body]
     #[arg(long, value_name = "L,M,T")]
     pub to_units: Option<String>,
-    /// Write the file even if the format cannot hold all of the body
-    #[arg(long)]
-    pub allow_loss: bool,
+    /// Write the file even if the format cannot hold all of the body; with names, such as damping,rotations, only these
+    /// may be lost
+    #[arg(long, value_name = "NAMES", num_args = 0..=1, require_equals = true, value_delimiter = ',')]
+    pub allow_loss: Option<Vec<String>>,
     /// File to write; further files have its name and another extension
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,

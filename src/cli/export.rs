@@ -6,7 +6,7 @@ use super::resources::context;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_file::read_simulation;
-use flexbody_formats::export::{ExportOptions, Exported, InertiaInScene, Points};
+use flexbody_formats::export::{AllowedLosses, ExportOptions, Exported, InertiaInScene, Points};
 use flexbody_formats::{export_in_units, find_format};
 use flexbody_input::parse_units;
 use flexbody_linalg::context::Context;
@@ -26,6 +26,11 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
         name: Some(arguments.output.clone()),
         in_scene: None,
     };
+    let allowed = match &arguments.allow_loss {
+        None => AllowedLosses::None,
+        Some(names) if names.is_empty() => AllowedLosses::All,
+        Some(names) => AllowedLosses::named(names.clone())?,
+    };
     let units = arguments.to_units.as_deref().map(parse_units).transpose()?;
     let inputs = || std::iter::once(&arguments.body).chain(&arguments.simulation).chain(&arguments.scene);
     refuse_replacing(inputs(), std::iter::once(&arguments.output))?;
@@ -36,7 +41,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
         let limits = context(None, true, Context::QUIET.watch);
         options.in_scene = InertiaInScene::largest(&body, &LoadCases::read(scene, None)?, &limits)?;
     }
-    let (exported, findings) = export_in_units(&body, format, &options, units.as_ref(), arguments.allow_loss)
+    let (exported, findings) = export_in_units(&body, format, &options, units.as_ref(), allowed)
         .map_err(|error| error.in_file(arguments.simulation.as_ref().unwrap_or(&arguments.body)))?;
     diagnostics.extend(findings);
     refuse_warnings(arguments.printing, &diagnostics)?;

@@ -1,6 +1,6 @@
 //! Registry of the formats of other programs, for export and import.
 
-use super::export::{ExportFormat, ExportOptions, Exported, Points};
+use super::export::{AllowedLosses, ExportFormat, ExportOptions, Exported, Loss, Points};
 use super::gltf::Gltf;
 use super::import::{Audit, ImportFormat, Imported, accept_imported, audit, import_body};
 use super::vtk::Vtk;
@@ -55,13 +55,13 @@ pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
 ///
 /// # Errors
 /// [`Usage`](Code::Usage) for options that the format does not have, or nodes that the body does not have;
-/// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss` is true; the errors of
+/// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless all of them are `allowed`; the errors of
 /// [`RecordedMotion::body_in_frame`](flexbody_file::RecordedMotion::body_in_frame) and of [`ExportFormat::write`].
 pub fn export(
     body: &FlexBody,
     format: &dyn ExportFormat,
     options: &ExportOptions,
-    allow_loss: bool,
+    allowed: impl Into<AllowedLosses>,
 ) -> Result<(Exported, Vec<Diagnostic>)> {
     check_options(body, format, options)?;
     // A picture of a motion shows the body in the frame of the motion.
@@ -70,8 +70,6 @@ pub fn export(
         None => Cow::Borrowed(body),
     };
     let body = body.as_ref();
-    // Losses are warnings if they are allowed, otherwise errors.
-    let code = if allow_loss { Code::ExportLost } else { Code::ExportLoses };
     let checklist = format.checklist(body, options);
     let numbers = format.interface_numbers(body, options);
     let numbered = (!numbers.is_empty()).then(|| {
@@ -83,14 +81,19 @@ pub fn export(
         let message = format!("the file {what}");
         Diagnostic::new(Code::ExportRecoveries, message)
     });
-    let losses: Vec<Diagnostic> = checklist
-        .losses()
-        .into_iter()
-        .map(|loss| Diagnostic::new(code, format!("{} cannot hold {loss}", format.name())))
-        .collect();
-    if !(allow_loss || losses.is_empty()) {
-        return Err(Error::new(losses));
+    // Losses are warnings if they are allowed, otherwise errors.
+    let allowed = allowed.into();
+    let told = |code: Code, loss: &Loss| {
+        let message = format!("{} cannot hold {} ({})", format.name(), loss.text, loss.property);
+        Diagnostic::new(code, message)
+    };
+    let losses = checklist.losses();
+    let refused: Vec<Diagnostic> =
+        losses.iter().filter(|loss| !allowed.allow(loss)).map(|loss| told(Code::ExportLoses, loss)).collect();
+    if !refused.is_empty() {
+        return Err(Error::new(refused));
     }
+    let losses: Vec<Diagnostic> = losses.iter().map(|loss| told(Code::ExportLost, loss)).collect();
     let needs = format.needs(body, options).into_iter().map(|need| Diagnostic::new(Code::ExportNeeds, need));
     let left =
         format.leaves_out(body, options).into_iter().map(|what| Diagnostic::new(Code::ExportPicture, what));
@@ -108,13 +111,13 @@ pub fn export_in_units(
     format: &dyn ExportFormat,
     options: &ExportOptions,
     units: Option<&UnitSystem>,
-    allow_loss: bool,
+    allowed: impl Into<AllowedLosses>,
 ) -> Result<(Exported, Vec<Diagnostic>)> {
     let body = match units {
         Some(units) => Cow::Owned(body.in_units(units)?),
         None => Cow::Borrowed(body),
     };
-    let (exported, mut findings) = export(&body, format, options, allow_loss)?;
+    let (exported, mut findings) = export(&body, format, options, allowed)?;
     findings.extend(interface_compliance(&body).filter(|_| !format.is_picture()));
     Ok((exported, findings))
 }

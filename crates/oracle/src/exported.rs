@@ -135,5 +135,11 @@ pub fn file(body: &FlexBody, format: &str, dialect: Option<&str>) -> Vec<u8> {
 
 /// Returns the properties of a body that a format cannot hold.
 pub fn losses(body: &FlexBody, format: &str) -> Vec<String> {
-    find_format(format).expect("a format").checklist(body, &ExportOptions::default()).losses()
+    find_format(format)
+        .expect("a format")
+        .checklist(body, &ExportOptions::default())
+        .losses()
+        .into_iter()
+        .map(|loss| loss.text)
+        .collect()
 }

@@ -196,7 +196,7 @@ class Body:
         modes: int | None = None,
         motion: Motion | _Path | None = None,
         scene: _Cases | None = None,
-        allow_loss: bool = False,
+        allow_loss: bool | str | Sequence[str] = False,
     ) -> tuple[Diagnostic, ...]: ...
     def check(self, against: Model | _Path | None = None) -> Check: ...
     def compare(

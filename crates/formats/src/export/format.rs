@@ -291,53 +291,110 @@ impl ExportChecklist {
         }
     }
 
-    /// Returns the losses as completions of "FORMAT cannot hold ...", the most important first.
-    pub fn losses(self) -> Vec<String> {
-        let Self {
-            rigid_coupling,
-            plane,
-            deformed_inertia,
-            general_w0,
-            coriolis_force,
-            general_w3,
-            separate_w2,
-            geometric_stiffness,
-            inertia_stiffness,
-            damping,
-            shapes,
-            rotations,
-            internal_rows,
-            gravity,
-            interfaces,
-            surface,
-            origins_of_modes,
-            units,
-            storage,
-            recoveries: _,
-        } = self;
-        let motion = [
-            rigid_coupling,
-            plane,
-            deformed_inertia,
-            general_w0,
-            coriolis_force,
-            general_w3,
-            separate_w2,
-            geometric_stiffness,
-            inertia_stiffness,
-            damping,
+    /// Returns the losses, the most important first.
+    pub fn losses(self) -> Vec<Loss> {
+        let all = [
+            ("rigid-coupling", self.rigid_coupling),
+            ("plane", self.plane),
+            ("deformed-inertia", self.deformed_inertia),
+            ("general-w0", self.general_w0),
+            ("coriolis-force", self.coriolis_force),
+            ("general-w3", self.general_w3),
+            ("separate-w2", self.separate_w2),
+            ("geometric-stiffness", self.geometric_stiffness),
+            ("inertia-stiffness", self.inertia_stiffness),
+            ("damping", self.damping),
+            ("shapes", self.shapes),
+            ("rotations", self.rotations),
+            ("internal-rows", self.internal_rows),
+            ("gravity", self.gravity),
+            ("interfaces", self.interfaces),
+            ("surface", self.surface),
+            ("origins-of-modes", self.origins_of_modes),
+            ("units", self.units),
+            ("storage", self.storage),
         ];
-        let contents = [
-            shapes,
-            rotations,
-            internal_rows,
-            gravity,
-            interfaces,
-            surface,
-            origins_of_modes,
-            units,
-            storage,
-        ];
-        motion.into_iter().chain(contents).filter_map(Holding::lost).collect()
+        let loss = |(name, holding): (&'static str, Holding)| {
+            holding.lost().map(|text| Loss { property: name, text })
+        };
+        all.into_iter().filter_map(loss).collect()
+    }
+}
+
+/// Property of a body that a format cannot hold.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Loss {
+    /// Name of the property, one of [`Loss::PROPERTIES`].
+    pub property: &'static str,
+    /// Completion of "FORMAT cannot hold ...".
+    pub text: String,
+}
+
+impl Loss {
+    /// Names of all properties that may be lost.
+    pub const PROPERTIES: [&'static str; 19] = [
+        "rigid-coupling",
+        "plane",
+        "deformed-inertia",
+        "general-w0",
+        "coriolis-force",
+        "general-w3",
+        "separate-w2",
+        "geometric-stiffness",
+        "inertia-stiffness",
+        "damping",
+        "shapes",
+        "rotations",
+        "internal-rows",
+        "gravity",
+        "interfaces",
+        "surface",
+        "origins-of-modes",
+        "units",
+        "storage",
+    ];
+}
+
+/// Losses with which a body may be exported.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum AllowedLosses {
+    /// No loss.
+    #[default]
+    None,
+    /// Losses of the properties with these names.
+    Named(Vec<String>),
+    /// Any loss.
+    All,
+}
+
+impl From<bool> for AllowedLosses {
+    /// Returns any loss for true, none for false.
+    fn from(any: bool) -> Self {
+        if any { Self::All } else { Self::None }
+    }
+}
+
+impl AllowedLosses {
+    /// Creates the losses from names.
+    ///
+    /// # Errors
+    /// [`Usage`](Code::Usage) for a name that is none of [`Loss::PROPERTIES`].
+    pub fn named(names: Vec<String>) -> Result<Self> {
+        match names.iter().find(|name| !Loss::PROPERTIES.contains(&name.as_str())) {
+            Some(unknown) => {
+                let message = format!("`{unknown}` is no property that a format may lose");
+                Err(Diagnostic::new(Code::Usage, message).with_help(Loss::PROPERTIES.join(", ")).into())
+            }
+            None => Ok(Self::Named(names)),
+        }
+    }
+
+    /// Returns true if the loss is allowed.
+    pub(crate) fn allow(&self, loss: &Loss) -> bool {
+        match self {
+            Self::None => false,
+            Self::Named(names) => names.iter().any(|name| name == loss.property),
+            Self::All => true,
+        }
     }
 }

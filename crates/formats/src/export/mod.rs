@@ -9,5 +9,8 @@ pub(crate) mod losses;
 pub(crate) mod matrices;
 pub(crate) mod stresses;
 
-pub use format::{ExportChecklist, ExportFormat, ExportOptions, Exported, Holding, InertiaInScene, Points};
+pub use format::{
+    AllowedLosses, ExportChecklist, ExportFormat, ExportOptions, Exported, Holding, InertiaInScene, Loss,
+    Points,
+};
 pub use frames::{ExportFrame, frames};

@@ -477,7 +477,7 @@ fn what_cannot_be_held_is_told() {
         sid().checklist(&fixture(model, MODES, BodyFrame::Model), &ExportOptions::default()).losses()
     };
     assert!(said("bracket_hex20").is_empty() && said("turbine_blade").is_empty());
-    assert!(said("plane_frame").iter().any(|loss| loss.contains("plane")));
+    assert!(said("plane_frame").iter().any(|loss| loss.text.contains("plane")));
     // The stiffness of inertia is written like geometric stiffness.
     assert!(said("frame_beams").is_empty(), "{:?}", said("frame_beams"));
     let body = fixture("bracket_hex20", MODES, BodyFrame::Model);
@@ -580,11 +580,11 @@ fn what_embslib_leaves_out_is_told() {
     let body = stressed(body, &[LoadKind::Force("tip".to_owned())], 1e-3, &mut Random(1));
     assert!(sid().checklist(&body, &ExportOptions::default()).losses().is_empty());
     let told = sid().checklist(&body, &dialect("embs")).losses();
-    assert!(matches!(&told[..], [loss] if loss.starts_with("the geometric stiffness for ")), "{told:?}");
+    assert!(matches!(&told[..], [loss] if loss.text.starts_with("the geometric stiffness for ")), "{told:?}");
     // The modes move the centre of mass.
     let body = oracle::file_bodies::body(2, 4, 3, 1, 0);
     let coriolis = |name: &str| {
-        sid().checklist(&body, &dialect(name)).losses().iter().any(|loss| loss.contains("Coriolis"))
+        sid().checklist(&body, &dialect(name)).losses().iter().any(|loss| loss.text.contains("Coriolis"))
     };
     assert!(coriolis("embs") && !coriolis("fembeam"));
 }

@@ -2,7 +2,7 @@
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_formats::export::ExportOptions;
+use flexbody_formats::export::{AllowedLosses, ExportOptions};
 use flexbody_formats::{FORMATS, export, find_format};
 use oracle::exported::{bodies, exported, losses};
 use oracle::file_bodies::wild_body;
@@ -65,6 +65,17 @@ fn a_loss_needs_a_word_and_is_told_either_way() {
     assert!(error.diagnostics()[1].message().starts_with("openradioss cannot hold the geometric stiffness"));
     let (_, told) = export(body, format, &ExportOptions::default(), true).expect("allowed");
     assert_eq!(told.iter().map(|diagnostic| diagnostic.code()).collect::<Vec<Code>>(), [Code::ExportLost; 2]);
+    // With names only these properties may be lost; each message ends with its name.
+    let losses = format.checklist(body, &ExportOptions::default()).losses();
+    let names: Vec<String> = losses.iter().map(|loss| loss.property.to_owned()).collect();
+    let allowed = |names: &[String]| AllowedLosses::named(names.to_vec()).expect("known names");
+    let error = export(body, format, &ExportOptions::default(), allowed(&names[..1])).expect_err("another");
+    let [only] = error.diagnostics() else { panic!("{error}") };
+    assert!(only.message().ends_with(&format!("({})", names[1])), "{only}");
+    let (_, told) = export(body, format, &ExportOptions::default(), allowed(&names)).expect("both");
+    assert_eq!(told.len(), 2);
+    let unknown = AllowedLosses::named(vec!["mass".to_owned()]).expect_err("no such property");
+    assert!(unknown.has(Code::Usage) && unknown.to_string().contains("damping"), "{unknown}");
 }
 
 /// Valid but unphysical bodies are written or refused in every dialect, and never cause a panic.
