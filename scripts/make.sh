@@ -8,7 +8,7 @@
 #   ./scripts/make.sh fixtures NAME    fixtures: models, general, frames, broken, foreign, jobs, modes, open, ... (fixtures/make/make_NAME.py; its head says what it needs)
 #   ./scripts/make.sh site             the documentation as a site
 #   ./scripts/make.sh wheel            the Python package
-#   ./scripts/make.sh release          the program of a release, tested
+#   ./scripts/make.sh release          the files of a release, tested
 #
 # Read the difference (`git diff`) before it is committed. What a page or a fixture needs beside this repository stands in the head of its
 # script; a missing program is named there.

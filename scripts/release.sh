@@ -3,13 +3,18 @@
 #
 #     scripts/release.sh [--no-wheel] [FOLDER]          # target/release-files without one
 #
-#   flexbody-VERSION-x86_64-linux.tar.gz    the program, static: it runs on every Linux of this processor, whatever its C library
+#   flexbody-VERSION-x86_64-linux.tar.gz    the program, static: it runs on every Linux of this processor, whatever its C library; with a
+#                                           Dockerfile for an image of it
+#   flexbody_VERSION_amd64.deb              the same program as a package of Debian (packaging/debian.sh)
+#   flexbody-VERSION-*.conda                the same program as a package of conda (packaging/conda)
 #   flexbody-VERSION-*.whl                  the Python package (scripts/wheel.sh --zig)
 #   flexbody-VERSION.cdx.json               bill of materials (CycloneDX); -python: that of the wheel
 #   SHA256SUMS
 #
 # Needed: what the build needs (README.md), the Rust target x86_64-unknown-linux-musl (rustup adds it) and a C compiler for musl
-# (musl-tools of Debian and Ubuntu, musl-gcc of Fedora, or MUSL_CC=compiler). FLEXBODY=program is an ordinary build of the same
+# (musl-tools of Debian and Ubuntu, musl-gcc of Fedora, or MUSL_CC=compiler), dpkg, python3 with venv and pip, and docker, podman or
+# buildah. Every file is tested where nothing else is: in an empty folder as the file system (root, or user namespaces), in an image, in an
+# empty virtual environment. FLEXBODY=program is an ordinary build of the same
 # sources to compare with, which is then not built. docs/reference/versions.md says what else belongs to a release: that ./.ci/run passes.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -39,12 +44,41 @@ fail() {
 
 step() { echo "== $1"; }
 
+# Copies a model of the fixtures into the folder $1.
+copy_model() {
+    mkdir -p "$1"
+    cp fixtures/models/connecting_rod/{model.toml,K.mtx.gz,M.mtx.gz,nodes.csv,dofs.csv,mesh.inp} "$1"
+}
+
+# Runs a program with the folder $1 as its whole file system and without an environment: `in_root ROOT PROGRAM ARGUMENTS`. Users other than
+# root need user namespaces.
+in_root() {
+    local change=("$(command -v chroot || echo /usr/sbin/chroot)")
+    [ "$(id -u)" = 0 ] || change=("$(command -v unshare)" --map-root-user "${change[@]}")
+    env -i "${change[@]}" "$@"
+}
+
+# Converts, checks and exports a model with the program $2 of the file system $1.
+converts_in_root() {
+    copy_model "$1/work"
+    in_root "$1" "$2" convert /work/model.toml --modes 6 --quiet -o /work/body.flex.h5 --report /work/body.html
+    in_root "$1" "$2" check /work/body.flex.h5 --quiet
+    in_root "$1" "$2" export /work/body.flex.h5 --to sid --quiet -o /work/body.SID_FEM
+    rm -r "$1/work"
+}
+
 step "what is needed"
 compiler="${MUSL_CC:-$(command -v x86_64-linux-musl-gcc || command -v musl-gcc || true)}"
 [ -n "$compiler" ] || fail "no C compiler for musl: HDF5, METIS and mimalloc are C" "apt-get install musl-tools, or MUSL_CC=compiler"
-for tool in readelf sha256sum python3; do
-    command -v "$tool" >/dev/null || fail "$tool is not there" "install it (binutils, coreutils, python3)"
+for tool in readelf sha256sum python3 dpkg dpkg-deb; do
+    command -v "$tool" >/dev/null || fail "$tool is not there" "install it (binutils, coreutils, python3, dpkg)"
 done
+builder=""
+for tool in docker podman buildah; do
+    # A client of docker without its server builds nothing.
+    if [ -z "$builder" ] && "$tool" info >/dev/null 2>&1; then builder="$tool"; fi
+done
+[ -n "$builder" ] || fail "there is no builder of container images" "install buildah, podman, or docker with its server"
 if [ ! -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
     command -v rustup >/dev/null || fail "the Rust target $target is not installed" "install it as the rest of Rust was installed"
     rustup target add "$target"
@@ -75,8 +109,11 @@ fi
 size="$(stat -c %s "$static")"
 echo "   $size bytes"
 [ "$size" -lt "$MOST" ] || fail "$static has more than $MOST bytes" "look for what has grown (cargo bloat), or take a lower INLINED"
-# Without anything from outside: no environment, and no file but its own.
-env -i "$static" doctor | sed 's/^/   /'
+# Without anything from outside: no environment, and no file but its own and those of a model.
+mkdir "$work/empty"
+cp "$static" "$work/empty/flexbody"
+in_root "$work/empty" /flexbody doctor | sed 's/^/   /'
+converts_in_root "$work/empty" /flexbody
 
 step "it ends as it should: signals, a panic, results that cannot be printed"
 FLEXBODY="$static" cargo test --locked --package flexbody --test program -- --include-ignored ends::
@@ -100,32 +137,77 @@ done
 
 step "licences and bill of materials"
 mkdir -p "$out"
-rm -f "$out"/flexbody-* "$out/SHA256SUMS"
+rm -f "$out"/flexbody[-_]* "$out/SHA256SUMS"
 name="flexbody-$version-x86_64-linux"
 mkdir "$work/$name"
 python3 scripts/sbom.py --target "$target" --sbom "$out/flexbody-$version.cdx.json" --licences "$work/$name/LICENCES-OF-DEPENDENCIES.txt"
 
 step "archive"
-cp "$static" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE CITATION.cff "$work/$name"
+cp "$static" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE CITATION.cff packaging/Dockerfile "$work/$name"
 mkdir -p "$work/$name/completions" "$work/$name/man"
 for shell in bash zsh fish; do
     "$static" completions "$shell" >"$work/$name/completions/flexbody.$shell"
 done
+"$static" man >"$work/$name/man/flexbody.1"
 for command in convert inspect check compare select simulate trade response view export audit recipe doctor; do
     "$static" man "$command" >"$work/$name/man/flexbody-$command.1"
 done
 # Equal files give an equal archive.
-stamp="${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || echo 0)}"
-tar --create --directory "$work" --sort=name --mtime="@$stamp" --owner=0 --group=0 --numeric-owner "$name" | gzip -n9 >"$out/$name.tar.gz"
+export SOURCE_DATE_EPOCH="${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || echo 0)}"
+tar --create --directory "$work" --sort=name --mtime="@$SOURCE_DATE_EPOCH" --owner=0 --group=0 --numeric-owner "$name" | gzip -n9 >"$out/$name.tar.gz"
+mkdir "$work/unpacked"
+tar --extract --file "$out/$name.tar.gz" --directory "$work/unpacked" --strip-components=1
+converts_in_root "$work/unpacked" /flexbody
+
+step "container image"
+copy_model "$work/model"
+command=(convert model.toml --modes 6 --quiet -o body.flex.h5)
+if [ "$builder" = buildah ]; then
+    images=(buildah --storage-driver vfs --root "$work/images" --runroot "$work/images-state")
+    "${images[@]}" bud --isolation chroot --quiet --tag flexbody "$work/$name" >/dev/null
+    container="$("${images[@]}" from flexbody)"
+    "${images[@]}" run --isolation chroot --volume "$work/model:/work" "$container" /usr/bin/flexbody "${command[@]}"
+    "${images[@]}" rm --all >/dev/null
+else
+    image="$("$builder" build --quiet "$work/$name")"
+    "$builder" run --rm --user "$(id -u):$(id -g)" --volume "$work/model:/work" "$image" "${command[@]}"
+    "$builder" image rm "$image" >/dev/null
+fi
+"$ordinary" check "$work/model/body.flex.h5" --quiet
+echo "   built and run by $builder"
+
+step "Debian package"
+packaging/debian.sh "$version" "$work/$name" "$out"
+debian="$work/debian"
+mkdir -p "$debian"/var/lib/dpkg/{info,updates,triggers}
+touch "$debian"/var/lib/dpkg/{status,available}
+packages=(dpkg --root="$debian" --log=/dev/null --force-not-root --force-bad-path)
+[ "$(id -u)" = 0 ] || packages=(fakeroot "${packages[@]}")
+"${packages[@]}" --install "$out/flexbody_${version}_amd64.deb" >/dev/null
+converts_in_root "$debian" /usr/bin/flexbody
+"${packages[@]}" --purge flexbody >/dev/null 2>&1
+left="$(find "$debian" -path "$debian/var" -prune -o -type f -print)"
+[ -z "$left" ] || fail "the removed package leaves $left" "look into packaging/debian.sh"
+if command -v lintian >/dev/null; then
+    # Who publishes it is the maintainer: DEBFULLNAME, DEBEMAIL.
+    lintian --fail-on error --suppress-tags bogus-mail-host,root-in-contact "$out/flexbody_${version}_amd64.deb" 2>/dev/null
+fi
+echo "   installed into an empty root, run there, and removed"
+
+step "conda package"
+python3 -m venv "$work/tools"
+"$work/tools/bin/pip" install --quiet --disable-pip-version-check 'py-rattler-build>=0.73,<0.74' 'auditwheel>=6,<7'
+"$work/tools/bin/python" packaging/conda/build.py "$version" "$work/$name" "$out"
 
 if [ "$wheel" = yes ]; then
     step "wheel"
     FLEXBODY_WHEELS="$(realpath "$out")" ./scripts/wheel.sh --zig
+    "$work/tools/bin/auditwheel" show "$out"/flexbody-*-cp310-abi3-manylinux*.whl | sed -n 's/^.*\(manylinux[^"]*_x86_64\)".*$/   \1/p' | tail -1
     python3 scripts/sbom.py --manifest python/Cargo.toml --target x86_64-unknown-linux-gnu --sbom "$out/flexbody-$version-python.cdx.json"
 fi
 
 step "sums"
-(cd "$out" && sha256sum flexbody-* | tee SHA256SUMS)
+(cd "$out" && sha256sum flexbody[-_]* | tee SHA256SUMS)
 if [ -n "$(git status --porcelain 2>/dev/null)" ]; then
     echo "warning: the sources are not those of a commit" >&2
 fi
