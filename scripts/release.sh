@@ -202,7 +202,9 @@ python3 -m venv "$work/tools"
 if [ "$wheel" = yes ]; then
     step "wheel"
     FLEXBODY_WHEELS="$(realpath "$out")" ./scripts/wheel.sh --zig
-    "$work/tools/bin/auditwheel" show "$out"/flexbody-*-cp310-abi3-manylinux*.whl | sed -n 's/^.*\(manylinux[^"]*_x86_64\)".*$/   \1/p' | tail -1
+    glibc="$("$work/tools/bin/auditwheel" show "$out"/flexbody-*-cp310-abi3-*.whl | tr '\n' ' ' | sed -n 's/.*following platform tag: *"manylinux_2_\([0-9]*\)_x86_64".*/\1/p')"
+    [ "${glibc:-99}" -le 17 ] || fail "auditwheel finds that the wheel needs glibc 2.${glibc:-?}" "look for what scripts/wheel.sh --zig has not built by zig"
+    echo "   for glibc 2.$glibc and newer"
     python3 scripts/sbom.py --manifest python/Cargo.toml --target x86_64-unknown-linux-gnu --sbom "$out/flexbody-$version-python.cdx.json"
 fi
 
