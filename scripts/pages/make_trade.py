@@ -5,14 +5,15 @@
     cargo build --release --locked
     python3 scripts/pages/make_trade.py
 
-Runs in Exudyn and in a C program are those of scripts/pages/trade_seconds.py; all of it takes about an hour. What it finds of a scene is kept in
-target/trade: `--only SCENE ...` measures some of them again.
+Runs in Exudyn and in a C program are those of scripts/pages/trade_seconds.py; all of it takes some two hours. `--only PART ...` measures some parts again (a scene by
+the name of its file, or guidelines, block, conversions) and keeps the rest of the page, which is written after each part.
 """
 
 import argparse
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -44,6 +45,8 @@ SCENES = [
     ("gear_disc", "gear_disc", 30),
     ("conveyor_plate", "conveyor_plate", 20),
 ]
+# Parts of the page that are not of one scene.
+OTHERS = ("guidelines", "block", "conversions")
 COUNTER = ("block_79_periods", "cube_hex8", 12)
 # Candidates of the front whose error is more than this many times what is allowed are not timed.
 HOPELESS = 10
@@ -57,7 +60,7 @@ HEAD = """<!-- Written by scripts/pages/make_trade.py -->
 # Cost of accuracy in each scene
 
 For each scene of `fixtures/scenes`: the body that it needs, its error against the finite element model, and the seconds that it takes in two other
-programs. `flexbody {version}`, Exudyn {exudyn}; {processor}. Written by `./scripts/make.sh pages trade`; how `trade` works: [reference](../reference/trade.md).
+programs. Each part names the versions and the processor that it was measured with. Written by `./scripts/make.sh pages trade`; how `trade` works: [reference](../reference/trade.md).
 
 * **Error**: `flexbody trade MODEL --modes N` simulates candidate bodies and measures each against a reference: 2N modes with residual vectors, enriched with the static
   responses to the forces that the equations of all nodes leave unbalanced along the motion ([theory](../theory.md), (8.16)). The error of the reference
@@ -339,7 +342,7 @@ def scene_part(program, name, model, modes):
         times = timed(program, folder, told, (path, read_scene(path)), manifest)
     picture = drawn(told, times, name)
     verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:]).replace(f"{ROOT}/", "")
-    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s."
+    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s. {versions(program)}."
     parts = [f"## {told['scene']}", said, verdict, measured(told, times), *picture]
     return "\n\n".join(parts) + "\n\n", summary(told, times), bases(told)
 
@@ -486,53 +489,71 @@ def processor():
     return f"{len(names)} cores, {names[0]}" if names else "processor not known"
 
 
+def versions(program):
+    """The programs and the processor of a measurement."""
+    version = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
+    return f"`flexbody {version}`, Exudyn {metadata.version('exudyn')}; {processor()}"
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
     parser.add_argument("--output", type=Path, default=ROOT / "docs/validation/trade.md")
-    parser.add_argument("--only", nargs="*", help="measure these parts only, by the names of their scenes")
+    names = [*(name for name, *_ in SCENES), *OTHERS]
+    parser.add_argument("--only", nargs="+", choices=names, metavar="PART", help=f"measure these parts and keep the rest of the page: {', '.join(names)}")
     args = parser.parse_args()
     program = str(Path(args.program).resolve())  # it runs in another folder
-    version = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
-    kept = ROOT / "target/trade"
-    kept.mkdir(parents=True, exist_ok=True)
+    parts = read_page(args.output.read_text(encoding="utf-8")) if args.only else {}
     for name, make in jobs(program).items():
         # One after the other: the times are measured.
         if not args.only or name in args.only:
-            (kept / f"{name}.json").write_text(json.dumps(make()))
+            parts[name] = make()
+            args.output.write_text(assembled(parts), encoding="utf-8")
             print(name, flush=True)
-    found = {path.stem: json.loads(path.read_text()) for path in kept.glob("*.json")}
-    args.output.write_text(assembled(version, found), encoding="utf-8")
     print(args.output)
 
 
 def jobs(program):
-    """What is measured, each part by its name."""
+    """Functions that measure a part, by the name of the part."""
     scenes = {one[0]: partial(scene_part, program, *one) for one in SCENES}
     return {**scenes, "guidelines": partial(all_guidelines, program), "block": partial(counter_part, program), "conversions": partial(conversion_part, program)}
 
 
 def all_guidelines(program):
     with ProcessPoolExecutor() as pool:
-        return list(pool.map(guidelines, [(program, name, model) for name, model, *_ in SCENES]))
+        return guide_part(list(pool.map(guidelines, [(program, name, model) for name, model, *_ in SCENES])))
 
 
-def assembled(version, found):
+def read_page(text):
+    """The parts of a page: of a scene its section and its rows of the two tables, of other parts their text."""
+    _, *marked = re.split(r"^<!-- part (\w+) -->\n", text, flags=re.MULTILINE)
+    parts = {}
+    for name, section in zip(marked[::2], marked[1::2]):
+        section = section.rstrip() + "\n\n"
+        if name in OTHERS:
+            parts[name] = section
+            continue
+        title = section.splitlines()[0].removeprefix("## ")
+        # The first two rows are those of the tables on top; the table of the guidelines may have a third.
+        summary_row, bases_row, *_ = (line for line in text.splitlines() if line.startswith(f"| {title} |"))
+        parts[name] = [section, summary_row, bases_row]
+    return parts
+
+
+def assembled(parts):
     """The page, of the parts that are there."""
-    parts = [found[name] for name, *_ in SCENES if name in found]
+    scenes = [name for name, *_ in SCENES if name in parts]
     head = ["| scene | body | its error | error of the whole body | the reference lacks (estimated) | Exudyn | C |", "|---|---|---|---|---|---|---|"]
-    top = "\n".join(head + [part[1] for part in parts])
+    top = "\n".join(head + [parts[name][1] for name in scenes])
     head = ["| scene | free modes | and residual vectors | those of the reference that do most | shapes of the motion |", "|---|---|---|---|---|"]
-    ways = "\n".join(head + [part[2] for part in parts])
-    text = HEAD.format(version=version, exudyn=metadata.version("exudyn"), processor=processor(), turns=TURNS, table=top, bases=ways)
-    missing = [name for name, *_ in SCENES if name not in found]
+    ways = "\n".join(head + [parts[name][2] for name in scenes])
+    text = HEAD.format(turns=TURNS, table=top, bases=ways)
+    missing = [name for name, *_ in SCENES if name not in parts]
     if missing:
         text += f"Not measured yet in this form: {', '.join(missing)} (`python3 scripts/pages/make_trade.py --only ...`).\n\n"
-    text += "".join(part[0] for part in parts)
-    if "guidelines" in found:
-        text += guide_part(found["guidelines"])
-    return (text + found.get("block", "") + found.get("conversions", "")).rstrip() + "\n"
+    sections = {**{name: parts[name][0] for name in scenes}, **{name: parts[name] for name in OTHERS if name in parts}}
+    return (text + "".join(f"<!-- part {name} -->\n{section}" for name, section in sections.items())).rstrip() + "\n"
 
 
 if __name__ == "__main__":
