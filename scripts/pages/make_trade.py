@@ -55,6 +55,11 @@ OUTPUTS = ("attitude", "deflection", "stress", "reaction")
 # Lowest modes that the guidelines are tried with.
 FEW = 6
 INSTANTS = 300
+# Reasons for which no reference of a scene is within the tolerances.
+REASONS = {
+    "tumbling": "The bracket is thrown undeformed with its full spin, which is a shock: it vibrates at all its frequencies, and those above the modes of the reference are missing in its stress. "
+    'With `[initial] deformation = "static"` there is no shock.',
+}
 HEAD = """<!-- Written by scripts/pages/make_trade.py -->
 
 # Cost of accuracy in each scene
@@ -65,12 +70,10 @@ programs. Each part names the versions and the processor that it was measured wi
 * **Error**: `flexbody trade MODEL --modes N` simulates candidate bodies and measures each against a reference: 2N modes with residual vectors, enriched with the static
   responses to the forces that the equations of all nodes leave unbalanced along the motion ([theory](../theory.md), (8.16)). The error of the reference
   itself against the FE model is estimated by the same forces and listed. If it exceeds the tolerances (**bold**), `trade` warns (FB548) and exits with 1: errors of such a scene are
-  relative to its reference only. The tumbling bracket is
-  thrown undeformed with its full spin, which is a shock: it vibrates at all its frequencies, and those of a body differ from those of the nodes. With `[initial] deformation = "static"`
-  there is no shock, and far fewer modes are needed.
+  relative to its reference only, and the part of the scene says why.
 * **Runs**: time, error and number of steps are those of one run. The number of steps belongs to a candidate as its modes do: for each candidate and program it is the smallest found for which the error of the run
-  against the reference is within what the error of the reference leaves of the tolerances; a candidate beyond the tolerances may get a tenth worse. `flexbody measure` finds the error of a run from its modal coordinates and attitude.
-  Times are those of the processor, medians of {turns} runs in turns. *simulate*: explicit steps of order 8 with error control, or the method that the scene states. *Exudyn*: generalised alpha, implicit, order 2. *C*: the header of
+  against the reference is within what the error of the reference leaves of the tolerances; a candidate beyond the tolerances may get a tenth worse. An error in **bold** is the smallest where no number of steps is enough. `flexbody measure` finds the error of a run from its modal coordinates and attitude.
+  Times are those of the processor, medians of {turns} runs in turns; those of *simulate* are of one run, by the clock. *simulate*: explicit steps of order 8 with error control, or the method that the scene states. *Exudyn*: generalised alpha, implicit, order 2. *C*: the header of
   `export --to embedded` in a Runge-Kutta program of order 4, explicit: its step is limited by the highest mode of the body, so that a high mode that is not needed costs steps.
 * **Candidates that are run**: those near the tolerances that no other candidate beats in both cost and accuracy, the recommended one and the whole body.
 * **Out of sample**: *variations* are motions that the body was not made for; a recommended body holds in them, or the verdict says where it does not.
@@ -204,7 +207,7 @@ class Timed:
         own.mkdir()
         path = folder / f"candidate_{row['number']:03}.flex.h5"
         task = Task(path, scene, start)
-        self.task, self.programs, self.runs, self.errors, self.seconds, self.why = task, {}, {}, {}, {}, {}
+        self.task, self.programs, self.runs, self.errors, self.meets, self.seconds, self.why = task, {}, {}, {}, {}, {}, {}
         for name, kind in (("exudyn", InExudyn), ("c", InC)):
             try:
                 made = kind(program, task, own)
@@ -213,9 +216,9 @@ class Timed:
                 self.why[name] = str(error).splitlines()[0]
                 continue
             if best is None:
-                self.why[name] = f"no number of steps up to {made.most:,} is enough"
+                self.why[name] = f"no run of up to {made.most:,} steps comes to its end"
                 continue
-            self.programs[name], (self.runs[name], self.errors[name]) = made, best
+            self.programs[name], (self.runs[name], self.errors[name], self.meets[name]) = made, best
             self.seconds[name] = [self.runs[name].seconds]
 
     def run(self):
@@ -277,9 +280,24 @@ def other_runs(one):
     """The runs in Exudyn and in C: seconds, error of the same run, number of steps; empty for candidates that were not run."""
     if one is None:
         return ["", ""]
+    return [run_in_words(one, name) if name in one.runs else one.why[name] for name in ("exudyn", "c")]
+
+
+def run_in_words(one, name):
+    """A run: seconds, error, number of steps; the error in bold if no number of steps is enough."""
+    error = f"{number(100 * one.errors[name])} %"
+    return f"{time_in_words(one.median(name))}, {error if one.meets[name] else f'**{error}**'}, {one.runs[name].steps:,} steps"
+
+
+def too_long(told, times):
+    """A paragraph on the runs in Exudyn for which no number of steps is enough; empty if there is none."""
+    one = times[told["recommended"] or usual(told)]
+    if one.meets.get("exudyn", True):
+        return []
+    steps, periods = one.runs["exudyn"].steps, np.sqrt([one.task.eigenvalue.min(), one.task.eigenvalue.max()]) / (2 * np.pi) * one.task.duration
     return [
-        f"{time_in_words(one.median(name))}, {number(100 * one.errors[name])} %, {one.runs[name].steps:,} steps" if name in one.runs else one.why.get(name, "")
-        for name in ("exudyn", "c")
+        f"Errors in **bold**: no number of steps that was tried is enough (in Exudyn up to {InExudyn.most:,}, in C up to {InC.most:,}). The recommended body has {periods[0]:.0f} periods of its lowest and {periods[1]:.0f} of its highest mode in this scene; with {steps:,} steps "
+        f"Exudyn takes {steps / periods[1]:.0f} steps per period of the highest one, and the error in phase of a method of order 2 adds up over the periods."
     ]
 
 
@@ -323,6 +341,8 @@ def summary(told, times):
         if not before or not after:
             return whole.why.get(kind) or own.why.get(kind) or ""
         errors = f"errors {number(100 * whole.errors[kind])} % and {number(100 * own.errors[kind])} % of the tolerance"
+        if not own.meets[kind]:
+            return f"no number of steps is enough: {time_in_words(before)} and {time_in_words(after)} ({errors})"
         return f"{time_in_words(before)} to {time_in_words(after)}: **{number(before / after)} times** ({errors})"
 
     return f"| {told['scene']} | {described(row)} | {own_error(name, error, allowed)} | {beside} | {reference} | {saved('exudyn')} | {saved('c')} |"
@@ -343,8 +363,20 @@ def scene_part(program, name, model, modes):
     picture = drawn(told, times, name)
     verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:]).replace(f"{ROOT}/", "")
     said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s. {versions(program)}."
-    parts = [f"## {told['scene']}", said, verdict, measured(told, times), *picture]
+    parts = [f"## {told['scene']}", said, *unmet(told, name), verdict, measured(told, times), *too_long(told, times), *picture]
     return "\n\n".join(parts) + "\n\n", summary(told, times), bases(told)
+
+
+def unmet(told, name):
+    """A paragraph on a reference that does not meet the tolerances, or on a scene without a recommended body."""
+    lacks, lines = told["reference_lacks"], []
+    beyond = [key for key in OUTPUTS if lacks and lacks[-1][key] and lacks[-1][key] > told["tolerance"][key]]
+    if beyond:
+        errors = ", ".join(own_error(key, lacks[-1][key], told["tolerance"][key]) for key in beyond)
+        lines.append(f"The reference of {lacks[-1]['modes']} modes is not within the tolerances of the FE model: {errors}, estimated. Errors and runs of this part are relative to the reference; relative to the FE model this error comes on top. {REASONS.get(name, '')}")
+    if not told["recommended"]:
+        lines.append("No candidate is within the tolerances.")
+    return lines
 
 
 def bases(told):

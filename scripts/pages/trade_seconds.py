@@ -506,17 +506,20 @@ def cheapest(program, measure, task, worst, most, folder):
     """The run with the fewest steps found whose error is within `most` times the tolerance, and that error, for a body with the error `worst`.
 
     Steps are increased until the error of the integration, which is proportional to a power of the step, is small enough, and then reduced as long as it
-    leaves room.
+    leaves room. If no number of steps is enough, the run with the smallest error; the third value then is False. `None` if no run comes to its end.
     """
     allowed = most if worst <= most else (1 + SHARE) * worst
     room = max(allowed - worst, SHARE * allowed)
     steps, best, too_few, last = max(task.first_steps, program.fewest), None, program.fewest - 1, np.inf
+    closest = None
     for _ in range(TRIALS):
         try:
             run = program.run(steps)
             error = run.error(measure, task, folder / "run.csv")
         except RuntimeError:
             run, error = None, np.inf
+        if np.isfinite(error) and (closest is None or error < closest[1]):
+            closest = run, error
         if error <= allowed:
             best = run, error
         else:
@@ -535,7 +538,7 @@ def cheapest(program, measure, task, worst, most, folder):
         if steps == wanted:
             break
         steps = wanted
-    return best
+    return (*best, True) if best else closest and (*closest, False)
 
 
 def axes_of(parameters):
