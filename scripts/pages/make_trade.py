@@ -17,7 +17,6 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from importlib import metadata
@@ -355,14 +354,12 @@ def scene_part(program, name, model, modes):
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         words = ["trade", manifest, "--modes", modes, "--scene", path, "--repeat", 1, "--bodies", folder, "--report", "trade.json", "--quiet"]
-        begin = time.perf_counter()
         run(program, *words, folder=folder, passes=(0, 1))
-        took = time.perf_counter() - begin
         told = json.loads((folder / "trade.json").read_text())
         times = timed(program, folder, told, (path, read_scene(path)), manifest)
     picture = drawn(told, times, name)
     verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:]).replace(f"{ROOT}/", "")
-    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s. {versions(program)}."
+    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {told['cpu_seconds']:.0f} s of the processor. {versions(program)}."
     parts = [f"## {told['scene']}", said, *unmet(told, name), verdict, measured(told, times), *too_long(told, times), *picture]
     return "\n\n".join(parts) + "\n\n", summary(told, times), bases(told)
 

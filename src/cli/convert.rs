@@ -24,6 +24,7 @@ use flexbody_input::{
 };
 use flexbody_linalg::context::{Context, Event};
 use flexbody_model::{CheckedModel, FeModel};
+use flexbody_motion::dynamics::indefinite_inertia;
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SearchAttempt, SelectionFacts, render};
 use flexbody_study::selection::Selection;
@@ -238,13 +239,14 @@ impl Job<'_> {
             let mut conversion = convert(model, &settings, context)?;
             if let Some(stated) = self.stated {
                 conversion.body = conversion.body.subset(&stated.subset)?;
+                conversion = noted(conversion);
             }
             return Ok((conversion, None));
         };
         let tailoring = self.of_band(settings);
         let made = match self.stated {
             Some(stated) => {
-                convert_stated(model, &tailoring, cases, stated, context).map(|made| (made, None))
+                convert_stated(model, &tailoring, cases, stated, context).map(|made| (noted(made), None))
             }
             None => convert_for(model, &tailoring, cases, context).map(|(made, chosen)| (made, Some(chosen))),
         };
@@ -280,6 +282,12 @@ impl Job<'_> {
             },
         }
     }
+}
+
+/// Returns the conversion with a warning if the stated terms let deflections make the inertia indefinite.
+fn noted(mut conversion: Conversion) -> Conversion {
+    conversion.diagnostics.extend(indefinite_inertia(&conversion.body));
+    conversion
 }
 
 /// Returns the parts of the body that the command line states; `None` if it states none, so that a scene selects them.

@@ -8,6 +8,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Storage};
 use flexbody_body::verification::accept;
+use flexbody_motion::dynamics::indefinite_inertia;
 use flexbody_report::{Facts, Format, RunData, render};
 
 pub(super) fn run(arguments: &ReduceArguments) -> Result<Outcome> {
@@ -19,9 +20,10 @@ pub(super) fn run(arguments: &ReduceArguments) -> Result<Outcome> {
     }
     refuse_replacing(std::iter::once(&arguments.body), std::iter::once(&arguments.output))?;
     let slot = flexbody_file::prepare_output(&arguments.output)?;
-    let (body, diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
+    let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     let body = stored(body.subset(&subset)?, arguments.storage)?;
     accept(&body)?;
+    diagnostics.extend(indefinite_inertia(&body));
     refuse_warnings(arguments.printing, &diagnostics)?;
     flexbody_file::fill_slot(&body, &slot)?;
     let size = std::fs::metadata(slot.temporary()).map(|meta| meta.len()).unwrap_or(0);

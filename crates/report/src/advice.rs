@@ -21,6 +21,7 @@ pub struct AdviceFacts<'a> {
     generator: String,
     body: &'a str,
     units: UnitFacts,
+    /// First frequency, with the attached mass.
     first_frequency_hz: f64,
     spin_hz: f64,
     /// Ratio of the rotation rate to the first frequency.
@@ -103,7 +104,7 @@ impl<'a> AdviceFacts<'a> {
             generator: generator(),
             body: &body.source().name,
             units: UnitFacts::new(body.units()),
-            first_frequency_hz: body.frequencies_hz().first().copied().unwrap_or(0.0),
+            first_frequency_hz: advice.first_frequency_hz,
             spin_hz: advice.ranges.spin_hz,
             speed_ratio: advice.speed_ratio,
             deflection: advice.deflection,
@@ -163,9 +164,10 @@ impl<'a> AdviceFacts<'a> {
 
     fn asked(&self) -> Vec<Term> {
         let spin = format!(
-            "{} ({} of the first frequency, {})",
+            "{} ({} of the first frequency{}, {})",
             frequency(self.spin_hz, 4),
             percent(self.speed_ratio),
+            if self.attached_mass.is_some() { " with the attached mass" } else { "" },
             frequency(self.first_frequency_hz, 4)
         );
         let deflection = format!(

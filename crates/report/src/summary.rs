@@ -148,7 +148,11 @@ fn output(facts: &Facts<'_>) -> Vec<Term> {
         let took = format!("in {}", duration(run.wall_seconds));
         match &run.output {
             Some(output) => {
-                let file = format!("{}, {}, {took}", output.name, bytes(output.bytes));
+                let mut file = format!("{}, {}", output.name, bytes(output.bytes));
+                // Commands without phases measure no time.
+                if run.wall_seconds > 0.0 {
+                    file = format!("{file}, {took}");
+                }
                 entry(Tone::Plain, "file", file, 4)
             }
             None => entry(Tone::Plain, "done", took, 1),

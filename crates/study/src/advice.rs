@@ -1,6 +1,8 @@
 //! Advice on the terms of the equations of motion for ranges of spin, deflection and attached mass, without a scene: the
 //! guidelines of \[WP19\] section 8.
 
+pub use crate::attached_mass::AttachedMass;
+use crate::attached_mass::Carried;
 use crate::selection::{Significance, Situation, significances};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -9,7 +11,8 @@ use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
     Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Run, Scene, Scheme,
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
+use std::f64::consts::TAU;
 
 /// Largest deflection, relative to the extent of the body, that is assumed if none is stated. It is the value of the
 /// tables of \[WP19\].
@@ -28,15 +31,6 @@ pub struct Ranges {
     pub is_rotation_given: bool,
     /// Largest size of a term, relative to the term that it is compared with, that may be left out.
     pub limit: f64,
-}
-
-/// Point mass attached to a body.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AttachedMass {
-    /// Mass, in the unit of mass of the body.
-    pub mass: f64,
-    /// Name of the interface that carries it; `None` for the node farthest from the centre of mass.
-    pub interface: Option<String>,
 }
 
 /// Size of one term beside the term that it is compared with.
@@ -77,6 +71,8 @@ pub struct Advice {
     pub ranges: Ranges,
     /// Largest deflection, in the unit of length of the body.
     pub deflection: f64,
+    /// First frequency, with the attached mass. Unit: Hz.
+    pub first_frequency_hz: f64,
     /// Ratio of the rotation rate to the first frequency.
     pub speed_ratio: f64,
     /// All terms.
@@ -113,8 +109,8 @@ const CORIOLIS_TORQUE: &str = "Coriolis torque";
 /// Returns the advice for a body in mean axes.
 ///
 /// The sizes of the terms are those of [`significances`] at the largest spin w, the angular acceleration w^2, and modal
-/// amplitudes that move a node by the largest deflection. An attached mass m_a at the distance r adds the inertia
-/// mu (|r|^2 I - r r') with mu = m m_a / (m + m_a), that of both about their common centre of mass.
+/// amplitudes that move a node by the largest deflection. An attached mass adds its inertia about the common centre of
+/// mass and lowers the first frequency.
 ///
 /// # Errors
 /// FB801 for ranges that are negative or not finite, and for an unknown interface; FB225 and others if the body has no
@@ -124,7 +120,9 @@ pub fn advise(body: &FlexBody, ranges: Ranges) -> Result<Advice> {
     refuse_ranges(&ranges)?;
     let deflection = ranges.deflection.unwrap_or(ASSUMED_DEFLECTION * body.extent());
     let spin = body.units().eigenvalue_of(ranges.spin_hz).sqrt();
-    let scene = scene_of(spin, deflection, attached_inertia(body, ranges.attached.as_ref())?);
+    let carried = ranges.attached.as_ref().map(|attached| Carried::new(body, attached)).transpose()?;
+    let inertia = carried.as_ref().map_or_else(Matrix3::zeros, Carried::inertia);
+    let scene = scene_of(spin, deflection, inertia, carried.as_ref().and_then(Carried::first_rate));
     let situation = Situation::new(body, &scene, &[]);
     // A term counts unless the rotation is given and the term is inertia of the rotation.
     let advised = |significance: Significance| AdvisedTerm {
@@ -140,6 +138,7 @@ pub fn advise(body: &FlexBody, ranges: Ranges) -> Result<Advice> {
     };
     Ok(Advice {
         deflection,
+        first_frequency_hz: situation.first_rate.value / TAU * body.units().hertz(),
         speed_ratio: spin / situation.first_rate.value,
         groups: TermGroup::ALL
             .iter()
@@ -193,51 +192,8 @@ fn refuse_ranges(ranges: &Ranges) -> Result<()> {
     }
 }
 
-/// Returns the inertia that an attached mass adds about the common centre of mass, body axes.
-fn attached_inertia(body: &FlexBody, attached: Option<&AttachedMass>) -> Result<Matrix3<f64>> {
-    let Some(AttachedMass { mass, interface }) = attached else { return Ok(Matrix3::zeros()) };
-    let centre = body.invariants().first_moment() / body.invariants().mass();
-    let place = match interface {
-        Some(name) => interface_place(body, name)?,
-        None => farthest_node(body, &centre),
-    };
-    let arm = place - centre;
-    let own = body.invariants().mass();
-    let reduced = own * mass / (own + mass);
-    Ok((Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * reduced)
-}
-
-fn interface_place(body: &FlexBody, name: &str) -> Result<Vector3<f64>> {
-    let Some(interface) = body.interfaces().iter().find(|one| one.name == name) else {
-        let names: Vec<&str> = body.interfaces().iter().map(|one| one.name.as_str()).collect();
-        let message = format!("the body has no interface `{name}`");
-        let help = match names.is_empty() {
-            true => {
-                "leave the interface out: the mass is then at the node farthest from the centre".to_owned()
-            }
-            false => format!("its interfaces are {}", names.join(", ")),
-        };
-        return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
-    };
-    let centre = || {
-        let sum: Vector3<f64> = interface.nodes.iter().map(|&node| node_place(body, node)).sum();
-        sum / interface.nodes.len() as f64
-    };
-    Ok(interface.reference.map_or_else(centre, Vector3::from))
-}
-
-fn node_place(body: &FlexBody, node: usize) -> Vector3<f64> {
-    Vector3::from(body.nodes().positions[node])
-}
-
-fn farthest_node(body: &FlexBody, centre: &Vector3<f64>) -> Vector3<f64> {
-    let places = (0..body.n_nodes()).map(|node| node_place(body, node));
-    let distance = |place: &Vector3<f64>| (place - centre).norm_squared();
-    places.max_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(*centre)
-}
-
 /// Returns a scene of ranges alone.
-fn scene_of(spin: f64, deflection: f64, inertia: Matrix3<f64>) -> Scene {
+fn scene_of(spin: f64, deflection: f64, inertia: Matrix3<f64>, first_rate: Option<f64>) -> Scene {
     let run = Run {
         duration: None,
         outputs: 1,
@@ -247,7 +203,12 @@ fn scene_of(spin: f64, deflection: f64, inertia: Matrix3<f64>) -> Scene {
     };
     let requirements = Requirements {
         motion: MotionRange { angular_velocity: Some(Range::Any(spin)), ..MotionRange::default() },
-        attachment: Attachment { kind: AttachmentKind::Free, inertia, ..Attachment::default() },
+        attachment: Attachment {
+            kind: AttachmentKind::Free,
+            inertia,
+            first_frequency: first_rate.map(|rate| rate / TAU),
+            ..Attachment::default()
+        },
         limits: Limits { deflection: Some(deflection), ..Limits::default() },
         ..Requirements::default()
     };

@@ -9,6 +9,7 @@
 )]
 
 pub mod advice;
+mod attached_mass;
 pub mod measured_run;
 pub mod recipe;
 pub mod reference;

@@ -2,6 +2,7 @@
 //! and of all its nodes. Forces, momenta, energies, accelerations and Jacobians, without an allocation per
 //! evaluation; and its motion as a system to integrate.
 
+mod definiteness;
 mod equations;
 mod evaluation;
 mod jacobian;
@@ -12,6 +13,7 @@ mod orientation;
 mod points;
 mod snapshot;
 
+pub use definiteness::{deflection_of_indefinite_inertia, indefinite_inertia};
 pub use equations::{Constants, EquationsOfMotion, Stiffening, Terms, stiffness_under};
 pub use evaluation::Evaluation;
 pub use jacobian::{LoadAxes, LoadJacobian};

@@ -3,6 +3,7 @@
 #![allow(unreachable_pub)] // tests export nothing
 
 mod body_units;
+mod definiteness;
 mod dynamics;
 mod dynamics_conservation;
 mod dynamics_forms;

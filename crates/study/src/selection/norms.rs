@@ -255,11 +255,12 @@ const TERMS: [Term; 8] = [
 /// perpendicular to the axis.
 const WITHOUT_NORM: usize = TERMS.len() - 1;
 
-/// Returns the relative sizes of the terms for rotation about `axis`, in the order of [`TERMS`].
-fn sizes(situation: &Situation, norms: &Norms, axis: &Vector3<f64>) -> [f64; 8] {
+/// Returns the relative sizes of the terms for rotation about `axis`, in the order of [`TERMS`]. `own` is the inertia of
+/// the body without attached parts, which bounds the terms of its deformation.
+fn sizes(situation: &Situation, own: &Matrix3<f64>, norms: &Norms, axis: &Vector3<f64>) -> [f64; 8] {
     let inertia = &situation.inertia;
     let (q, w, alpha) = (situation.amplitude.value, situation.spin.value, situation.acceleration.value);
-    let trace = (0.5 * inertia.trace()).sqrt();
+    let trace = (0.5 * own.trace()).sqrt();
     let about = axis.dot(&(inertia * axis));
     [
         2.0 * norms.centrifugal * q / about,
@@ -294,6 +295,7 @@ pub(super) fn largest_significances(cases: impl Iterator<Item = Vec<Significance
 pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance> {
     let (invariants, eigenvalues) = (body.invariants(), &body.modes().eigenvalue);
     let driven = situation.driven.as_ref().ok().and_then(|driven| driven.rotation.axis);
+    let rigid = invariants.inertia();
     // Axis of rotation, or the principal axes.
     let axes = match driven {
         Some(axis) => vec![axis],
@@ -305,16 +307,15 @@ pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance
     };
     let largest = |norms: &dyn Fn(&Vector3<f64>) -> Option<Norms>| -> Option<[f64; 8]> {
         axes.iter().try_fold([0.0; 8], |most: [f64; 8], axis| {
-            let own = sizes(situation, &norms(axis)?, axis);
+            let own = sizes(situation, &rigid, &norms(axis)?, axis);
             Some(std::array::from_fn(|i| most[i].max(own[i])))
         })
     };
     // Largest value over the axes, at tier 0 and tier 1.
-    let bound = largest(&|axis| Some(Norms::of_rigid(&invariants.inertia(), eigenvalues, Some(axis))));
+    let bound = largest(&|axis| Some(Norms::of_rigid(&rigid, eigenvalues, Some(axis))));
     let mut bound = bound.unwrap_or([f64::INFINITY; 8]);
     let mut of_body = largest(&|axis| Norms::of_invariants(invariants, eigenvalues, Some(axis)));
     // Modes may change products of inertia and no moment of inertia.
-    let rigid = invariants.inertia();
     let about = |inertia: &Matrix3<f64>, axis: &Vector3<f64>| axis.dot(&(inertia * axis));
     for (at, e) in axes.iter().enumerate() {
         for f in &axes[at + 1..] {

@@ -5,7 +5,8 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_study::advice::{Advice, AttachedMass, Ranges, advise};
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::{body_of, soft_block};
-use oracle::mesh::Mesh;
+use oracle::mesh::{Mesh, grid};
+use oracle::plane::rectangle;
 
 fn ranges(spin_hz: f64) -> Ranges {
     Ranges { spin_hz, deflection: None, attached: None, is_rotation_given: true, limit: 0.05 }
@@ -64,6 +65,68 @@ fn an_attached_mass_reduces_the_terms_beside_the_inertia() {
     for wrong in [f64::NAN, f64::INFINITY, -1.0] {
         assert!(advise(&body, ranges(wrong)).is_err());
         assert!(advise(&body, Ranges { limit: wrong, ..ranges(1.0) }).is_err());
+    }
+}
+
+/// A mass as large as that of a rectangle, in its corner at r^2 = 3 I0 / m, adds m/2 r^2 = 1.5 I0; an endless mass adds
+/// m r^2 = 3 I0. The terms beside I0 shrink by this, those beside elastic forces do not change, and the Coriolis force
+/// grows with the period of the first mode.
+#[test]
+fn a_mass_in_a_corner_of_a_rectangle_multiplies_the_inertia_by_known_factors() {
+    let body = body_of(rectangle(5, 2, 0.7, [1.0, 2.0]), 6, BodyFrame::Com);
+    let own = |masses: f64| {
+        let attached = AttachedMass { mass: masses * body.invariants().mass(), interface: None };
+        let ranges = Ranges { attached: Some(attached), is_rotation_given: false, ..ranges(1.0) };
+        advise(&body, ranges).expect("advice")
+    };
+    let without = own(0.0);
+    assert!((without.first_frequency_hz / body.frequencies_hz()[0] - 1.0).abs() < 1e-12);
+    for (masses, inertia) in [(1.0, 2.5), (1e12, 4.0)] {
+        let with = own(masses);
+        let ratio = |at: usize| with.terms[at].size / without.terms[at].size;
+        for beside_inertia in [0, 1, 2, 7] {
+            assert!((ratio(beside_inertia) * inertia - 1.0).abs() < 1e-9, "{masses} {beside_inertia}");
+        }
+        for elastic in [3, 4, 6] {
+            assert!((ratio(elastic) - 1.0).abs() < 1e-12, "{masses} {elastic}");
+        }
+        let slower = without.first_frequency_hz / with.first_frequency_hz;
+        assert!(slower > 1.1 && (ratio(5) / slower - 1.0).abs() < 1e-12, "{masses} {slower}");
+    }
+}
+
+/// Root of 1 - cos x cosh x + a x (sin x cosh x - cos x sinh x): the first x^2 of bending of a free beam with a times its
+/// mass at one end.
+fn beam_with_mass(a: f64) -> f64 {
+    let residual = |x: f64| 1.0 - x.cos() * x.cosh() + a * x * (x.sin() * x.cosh() - x.cos() * x.sinh());
+    let (mut low, mut high) = (3.9, 4.8);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if residual(middle) > 0.0 { low = middle } else { high = middle }
+    }
+    low * low
+}
+
+#[test]
+fn the_first_frequency_of_a_beam_with_a_mass_at_its_end_is_the_closed_form() {
+    let rubber = Material { youngs: 4.0, poisson: 0.0, density: 1.0 };
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([60, 1, 1]), |place| place);
+    let body = body_of(mesh.assemble(&rubber, MassRule::Consistent).raw_model(), 16, BodyFrame::Principal);
+    let own = |masses: f64| {
+        let attached = AttachedMass { mass: masses * body.invariants().mass(), interface: None };
+        let first = body.frequencies_hz()[0];
+        let ranges = Ranges { attached: Some(attached), is_rotation_given: true, ..ranges(0.1 * first) };
+        advise(&body, ranges).expect("advice")
+    };
+    // Without a mass 4.7300^2, with an endless one, about which the beam swings, 3.9266^2.
+    assert!((beam_with_mass(0.0) - 22.3733).abs() < 1e-4 && (beam_with_mass(1e9) - 15.4182).abs() < 1e-4);
+    for masses in [0.1, 1.0, 1e9] {
+        let ratio = own(masses).first_frequency_hz / own(0.0).first_frequency_hz;
+        let expected = beam_with_mass(masses) / beam_with_mass(0.0);
+        assert!((ratio / expected - 1.0).abs() < 0.01, "{masses}: {ratio} {expected}");
+        // Both bending modes couple with the norm 1 about the axis of the beam: the Coriolis force has the size 2 w / Omega_1.
+        let size = own(masses).terms[5].size;
+        assert!((size * ratio / 0.2 - 1.0).abs() < 0.01, "{masses}: {size}");
     }
 }
 
