@@ -32,6 +32,7 @@ mod shapes;
 #[cfg(unix)]
 mod signals;
 mod simulate;
+mod stiffening;
 mod terminal;
 mod trade;
 mod view;

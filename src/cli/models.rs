@@ -72,7 +72,7 @@ pub(super) fn origin(path: &Path, job: &JobArguments, scene: &Path, case: &Optio
 
 impl JobArguments {
     /// Returns the given options as words of a command line.
-    fn words(&self) -> Vec<String> {
+    pub(super) fn words(&self) -> Vec<String> {
         let dimension = self.dimension.map(|dimension| dimension.to_string());
         let single = [
             ("--format", &self.format),

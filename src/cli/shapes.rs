@@ -4,6 +4,7 @@ use super::arguments::{PlacesName, ShapeFormat, ShapesArguments};
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_replacing, refuse_replacing_read, refuse_warnings};
 use super::resources::context;
+use super::stiffening;
 use super::terminal::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -24,6 +25,9 @@ const MAX_DISTANCE: f64 = 1e-5;
 
 pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
     refuse_options_of_decks(arguments)?;
+    if arguments.geometric_stiffness {
+        return stiffening::run(arguments);
+    }
     let archive = arguments.output.with_extension("npz");
     let is_npz = arguments.to == ShapeFormat::Npz;
     let outputs: Vec<PathBuf> = match is_npz {
@@ -66,6 +70,7 @@ pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
 /// Refuses options that only a deck has.
 fn refuse_options_of_decks(arguments: &ShapesArguments) -> Result<()> {
     let given = [
+        ("--geometric-stiffness", arguments.geometric_stiffness),
         ("--deck", arguments.deck.is_some()),
         ("--nodes", arguments.nodes != "surface"),
         ("--at", arguments.at != PlacesName::Nodes),
@@ -92,20 +97,7 @@ struct Asked {
 
 impl Asked {
     fn of(arguments: &ShapesArguments, files: &ModelFiles, model: &FeModel) -> Result<Self> {
-        if !model.rows().rotations().is_empty() {
-            let message = "nodes of the model have rotations, which CalculiX cannot be given";
-            let help = "write the shapes with --to csv or --to npz for the FE program of the model";
-            return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
-        }
-        let path = arguments.deck.clone().or_else(|| deck_of(files)).ok_or_else(|| {
-            let message = "--to calculix needs the deck of the model, which its manifest does not name";
-            Diagnostic::new(Code::Usage, message)
-                .with_help("name the deck with its elements: --deck DECK.inp")
-        })?;
-        let deck = ElementDeck::read(&path)?;
-        if let Some(message) = stranger(&deck, model) {
-            return Err(Diagnostic::new(Code::MeshForeign, message).in_file(path).into());
-        }
+        let deck = deck_for(arguments, files, model)?;
         let watched = watched(arguments, &deck, model)?;
         let places = match arguments.at {
             PlacesName::Nodes => StressPlaces::Nodes,
@@ -126,6 +118,32 @@ impl Asked {
         };
         write().map_err(|error| slot.failure(&error))
     }
+}
+
+/// Returns the elements and materials of the model.
+///
+/// # Errors
+/// FB001 if the nodes have rotations or no deck is known, the errors of [`ElementDeck::read`], FB125 for the deck of
+/// another model.
+pub(super) fn deck_for(
+    arguments: &ShapesArguments,
+    files: &ModelFiles,
+    model: &FeModel,
+) -> Result<ElementDeck> {
+    if !model.rows().rotations().is_empty() {
+        let message = "nodes of the model have rotations, which CalculiX cannot be given";
+        let help = "write the shapes with --to csv or --to npz for the FE program of the model";
+        return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+    }
+    let path = arguments.deck.clone().or_else(|| deck_of(files)).ok_or_else(|| {
+        let message = "--to calculix needs the deck of the model, which its manifest does not name";
+        Diagnostic::new(Code::Usage, message).with_help("name the deck with its elements: --deck DECK.inp")
+    })?;
+    let deck = ElementDeck::read(&path)?;
+    if let Some(message) = stranger(&deck, model) {
+        return Err(Diagnostic::new(Code::MeshForeign, message).in_file(path).into());
+    }
+    Ok(deck)
 }
 
 /// Returns the deck that a model was read from.

@@ -190,6 +190,8 @@ codes! {
     RecoveryAveraged = "FB448", Warning, Done, "stresses at nodes between materials are means over the materials", "ask for stresses at integration points: flexbody shapes --at integration-points";
     RecoveryMapped = "FB449", Note, Done, "recovery was computed from the answers of an FE program to shapes", "nothing to do: the misfit bounds the share of each mode that the shapes do not contain";
     InterfaceCentre = "FB450", Warning, Done, "reference point of an interface is not the mean of its nodes", "nothing to do if the joint belongs there; else state the point: --interface NAME=SET,COUPLING,X/Y/Z, or `reference` in [[interface]]";
+    GeometricStiffnessDifference = "FB451", Note, Done, "geometric stiffness is the difference of two stiffness matrices", "nothing to do; with less than four digits give the stress of a larger load";
+    GeometricStiffnessUnstressed = "FB452", Error, BadInput, "matrix with stress is the stiffness without it", "assemble the stiffness after the stress, with the stress of a larger load";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";
@@ -222,7 +224,7 @@ codes! {
     ResonanceDropped = "FB544", Warning, Done, "dropped mode is near the frequency of a load", "keep the mode, or lengthen the run until the resonance would show";
     LoadIdle = "FB545", Warning, Done, "load has no effect", "let an interface carry the body to see gravity and inertia bend it: [carried] in docs/reference/scenes.md";
     CarrierUnresolved = "FB546", Warning, Done, "modes resolve the carried interface poorly", "convert with --basis craig-bampton, or with --residual-vectors interfaces, and with the interface in the manifest";
-    CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness does not act while the body is carried", "trust spin rates far below the first frequency only: the geometric stiffness is that of the free body";
+    CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness does not act while the body is carried", "convert the model with the frame on the carrier: --frame interface=NAME; without it trust spin rates far below the first frequency only";
     ReferenceIncomplete = "FB548", Warning, Done, "error of the reference body relative to the model uses more of the tolerances than intended", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where the difference comes from";
     LumpedWithoutBody = "FB549", Note, Done, "no body can be computed with a lumped mass, so it is missing in the comparison", "nothing to do: a program that lumps the mass in this way cannot compute the body either";
     RunTooLong = "FB550", Error, BadInput, "run takes more steps than allowed", "simulate a shorter `duration`, leave out modes beyond the frequencies of the loads, or raise `most_steps` in [run]";

@@ -29,6 +29,7 @@ pub mod shapes;
 mod sid;
 #[cfg(feature = "hdf5")]
 mod simscape;
+pub mod stiffening;
 mod vtk;
 
 pub use embedded::embedded_markdown;

@@ -4,6 +4,7 @@
 use super::npz::{archive, npy, text};
 use flexbody_body::convert::{RecoveryShapes, ShapeColumn};
 use flexbody_model::FeModel;
+use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -22,6 +23,8 @@ pub struct NodalShapes {
     columns: Vec<ShapeColumn>,
     /// Factor of each shape.
     factors: Vec<f64>,
+    /// Positions of the nodes.
+    positions: Vec<[f64; 3]>,
     /// Displacements of each shape and node along the axes of the model.
     displacements: Vec<Vec<[f64; 3]>>,
     /// Rotations of each shape and node, if nodes have rotations.
@@ -54,6 +57,7 @@ impl NodalShapes {
         Self {
             body: body.to_owned(),
             nodes: model.nodes().ids.clone(),
+            positions: model.nodes().positions.clone(),
             columns: shapes.columns.clone(),
             factors: shapes.factors.clone(),
             displacements,
@@ -74,6 +78,36 @@ impl NodalShapes {
     /// Returns the mode or column of each shape with its factor.
     pub fn columns(&self) -> impl Iterator<Item = (&ShapeColumn, f64)> {
         self.columns.iter().zip(self.factors.iter().copied())
+    }
+
+    /// Returns the largest difference of displacements of nodes from those of shape `step`, relative to the largest of
+    /// the shape; infinite for an unknown node.
+    pub fn difference(&self, step: usize, nodes: &[i64], displacements: &[[f64; 3]]) -> f64 {
+        let own: HashMap<i64, &[f64; 3]> =
+            self.nodes.iter().copied().zip(&self.displacements[step]).collect();
+        let size = own.values().flat_map(|u| u.iter()).fold(0.0f64, |most, value| most.max(value.abs()));
+        let of_node = |(node, u): (&i64, &[f64; 3])| match own.get(node) {
+            Some(shape) => (0..3).map(|k| (u[k] - shape[k]).abs()).fold(0.0, f64::max),
+            None => f64::INFINITY,
+        };
+        nodes.iter().zip(displacements).map(of_node).fold(0.0, f64::max) / size
+    }
+
+    /// Returns about the largest strain of shape `step` in `elements`: the largest change of the distance vector of two
+    /// nodes of an element, relative to their distance.
+    pub(super) fn strain(&self, step: usize, elements: &[(i64, Vec<i64>)]) -> f64 {
+        let place: HashMap<i64, usize> = self.nodes.iter().copied().zip(0..).collect();
+        let distance = |at: &[[f64; 3]], a: usize, b: usize| {
+            (0..3).map(|k| (at[a][k] - at[b][k]).powi(2)).sum::<f64>().sqrt()
+        };
+        let of_element = |(_, nodes): &(i64, Vec<i64>)| {
+            let known: Vec<usize> = nodes.iter().filter_map(|node| place.get(node).copied()).collect();
+            let pairs =
+                known.iter().enumerate().flat_map(|(at, a)| known[..at].iter().map(move |b| (*a, *b)));
+            let strain = |(a, b)| distance(&self.displacements[step], a, b) / distance(&self.positions, a, b);
+            pairs.map(strain).filter(|strain| strain.is_finite()).fold(0.0, f64::max)
+        };
+        elements.iter().map(of_element).fold(0.0, f64::max)
     }
 
     /// Returns the archive from which the answers of the FE program are read: the arrays `nodes`, `displacements`
@@ -212,6 +246,13 @@ impl StressDeck<'_> {
             writeln!(out, "*EL PRINT, ELSET={SOLIDS}, TOTALS=ONLY\nELSE\n*END STEP")?;
         }
         Ok(())
+    }
+}
+
+impl NodalShapes {
+    /// Writes the set of all nodes for the steps of [`super::stiffening`].
+    pub(super) fn write_all_nodes(&self, out: &mut impl Write) -> io::Result<()> {
+        set(out, "NSET", "FLEXBODY_ALL", self.nodes.iter().copied())
     }
 }
 

@@ -13,10 +13,12 @@ use crate::npy::{self, Blocks};
 use crate::scipy_npz::{Archive, ScipyNpz};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Error;
 use flexbody_base::text::InputFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_model::{AnsweredShapes, DofLabel, Quantity, RecoveryOperator, RecoveryRow};
 use std::collections::{HashMap, HashSet};
+use std::path::Path;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
@@ -83,6 +85,41 @@ pub(super) fn read_answers(
     let (answers, answer_digits) = (values.stresses(), values.digits);
     let shapes = AnsweredShapes { dofs, displacements, digits, answers, answer_digits, energies };
     Ok((RecoveryOperator::Shapes { shapes, labels }, averaged.into_iter().collect()))
+}
+
+/// Stresses at integration points and displacements of nodes, as CalculiX prints them for all steps of a deck.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointStresses {
+    /// Element and integration point of every stress, equal in all steps.
+    pub points: Vec<(i64, i64)>,
+    /// Stresses xx, yy, zz, xy, yz, xz of each step and point.
+    pub stresses: Vec<Vec<[f64; 6]>>,
+    /// Nodes of the displacements, equal in all steps.
+    pub nodes: Vec<i64>,
+    /// Displacements of each step and node.
+    pub displacements: Vec<Vec<[f64; 3]>>,
+    /// Significant decimal digits of the values.
+    pub digits: u8,
+}
+
+/// Reads the printed results of CalculiX (.dat).
+///
+/// # Errors
+/// FB101 and FB106 for a file that cannot be read, FB327 for another file, or without stresses at integration points.
+pub fn read_point_stresses(path: &Path) -> Result<PointStresses, Error> {
+    let file = InputFile::open(path)?;
+    if !dat::recognises(&file.first_bytes(HEAD)) {
+        let found = unreadable(&file, "the file does not begin like printed results of CalculiX (.dat)");
+        return Err(Error::new(found));
+    }
+    let values = dat::read(&file).and_then(|values| values.with_stresses(&file)).map_err(Error::new)?;
+    let point = |place: &Place| match *place {
+        Place::Point { element, point } => Some((element, point)),
+        Place::Node(_) => None,
+    };
+    let StepValues { places, stresses, moved, displacements, digits, .. } = values;
+    let points = places.iter().filter_map(point).collect();
+    Ok(PointStresses { points, stresses, nodes: moved, displacements, digits })
 }
 
 /// Reads results in any of the formats.

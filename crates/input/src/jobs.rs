@@ -15,6 +15,7 @@ mod nastran;
 use super::node_files::{NodeFile, NodeSets, Unresolved};
 use abaqus::Abaqus;
 use calculix::Calculix;
+pub(super) use calculix::read_stiffness as read_calculix_stiffness;
 use deck::Deck;
 use deck_mesh::DeckMesh;
 use flexbody_base::diagnostic::{Code, Diagnostic};

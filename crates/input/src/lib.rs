@@ -41,16 +41,19 @@ mod read_model;
 mod reader;
 mod recipes;
 mod recovery_files;
+mod rows_of_model;
 mod scipy_npz;
 mod shapes;
 mod tables;
+mod with_stress;
 
 pub use assemble::check_size;
+pub use fe_results::{PointStresses, read_point_stresses};
 pub use jobs::{ElementDeck, JobFile, is_job, job_programs};
 pub use manifest::read_manifest;
 pub use model_files::{
     InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource,
-    RecoverySource, Region, TableFiles, parse_units,
+    RecoverySource, Region, StressStiffnessSource, TableFiles, WithStress, parse_units,
 };
 pub use read_model::{read_matrix, read_model, read_nodal_masses, read_nodes_of_table};
 pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};

@@ -4,7 +4,9 @@ mod interface;
 mod recovery;
 
 use super::jobs::JobFile;
-use super::model_files::{MatrixLocation, ModelFiles, ModelSource, TableFiles, stem};
+use super::model_files::{
+    MatrixLocation, ModelFiles, ModelSource, StressStiffnessSource, TableFiles, WithStress, stem,
+};
 use crate::LoadSource;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -332,9 +334,11 @@ impl ManifestWalk<'_, '_> {
     }
 }
 
-/// Keys `file`, `interface`, and the kinds of loads.
+/// Keys of the matrix, `interface`, and the kinds of loads.
 const GEOMETRIC_STIFFNESS: &[&str] = &[
     "file",
+    "with_stress",
+    "load_size",
     "interface",
     LoadKind::NAMES[0],
     LoadKind::NAMES[1],
@@ -346,7 +350,7 @@ const GEOMETRIC_STIFFNESS: &[&str] = &[
 
 impl ManifestWalk<'_, '_> {
     /// Reads the geometric stiffness of unit loads. Entries with errors are left out; the errors are in `found`.
-    fn geometric_stiffness(&mut self, top: &TomlTable) -> Vec<GeometricStiffness<MatrixLocation>> {
+    fn geometric_stiffness(&mut self, top: &TomlTable) -> Vec<GeometricStiffness<StressStiffnessSource>> {
         let tables = self.tables(top, "geometric_stiffness").unwrap_or_default();
         tables.into_iter().filter_map(|(table, span)| self.one_geometric_stiffness(table, span)).collect()
     }
@@ -355,16 +359,46 @@ impl ManifestWalk<'_, '_> {
         &mut self,
         table: &TomlTable,
         span: Range<usize>,
-    ) -> Option<GeometricStiffness<MatrixLocation>> {
+    ) -> Option<GeometricStiffness<StressStiffnessSource>> {
         self.known_keys(table, "[[geometric_stiffness]]", GEOMETRIC_STIFFNESS);
-        if !table.contains_key("file") {
-            let message = "key `file` is missing in [[geometric_stiffness]]".to_owned();
-            self.complain(Code::ManifestSyntax, span.clone(), message);
-        }
-        let file = self.string(table, "file");
+        let matrix = self.stress_stiffness(table, &span);
         let load = self.unit_load(table, span)?;
+        Some(GeometricStiffness { load, matrix: matrix? })
+    }
+
+    /// Reads the file of the matrix: K_geo in `file`, or K with the stress in `with_stress`.
+    fn stress_stiffness(&mut self, table: &TomlTable, span: &Range<usize>) -> Option<StressStiffnessSource> {
+        let message = match (table.contains_key("file"), table.contains_key("with_stress")) {
+            (false, false) => "key `file` is missing in [[geometric_stiffness]]",
+            (true, true) => {
+                "[[geometric_stiffness]] has `file` and `with_stress`: give the geometric stiffness, or the stiffness with the stress"
+            }
+            (true, false) if table.contains_key("load_size") => {
+                "`load_size` belongs to `with_stress`: the matrix in `file` is that of a unit load"
+            }
+            _ => "",
+        };
+        if !message.is_empty() {
+            self.complain(Code::ManifestSyntax, span.clone(), message.to_owned());
+            return None;
+        }
         let folder = self.path.parent().unwrap_or(Path::new(""));
-        Some(GeometricStiffness { load, matrix: MatrixLocation::parse(file?).relative_to(folder) })
+        let located = |file: String| MatrixLocation::parse(file).relative_to(folder);
+        if let Some(file) = self.string(table, "file") {
+            return Some(StressStiffnessSource { location: located(file), with_stress: None });
+        }
+        let location = located(self.string(table, "with_stress")?);
+        let load_size = match table.contains_key("load_size") {
+            true => self.number(table, "load_size", span)?,
+            false => 1.0,
+        };
+        if !(load_size > 0.0 && load_size.is_finite()) {
+            let message = format!("`load_size` is {load_size}, expected a positive number");
+            self.complain(Code::ManifestSyntax, span.clone(), message);
+            return None;
+        }
+        let with_stress = Some(WithStress::new(&location.path, load_size));
+        Some(StressStiffnessSource { location, with_stress })
     }
 
     /// Reads the load that causes the stress: one key with the axis (or the name of the load) as its value.

@@ -30,7 +30,7 @@ pub struct ModelFiles {
     /// Damping, if it is given.
     pub damping: Option<Damping<MatrixLocation>>,
     /// Geometric stiffness of unit loads.
-    pub geometric_stiffness: Vec<GeometricStiffness<MatrixLocation>>,
+    pub geometric_stiffness: Vec<GeometricStiffness<StressStiffnessSource>>,
     /// Rows to read off the body.
     pub recoveries: Vec<RecoverySource>,
     /// Loads whose static responses join the modes.
@@ -129,6 +129,40 @@ pub enum OperatorSource {
         /// Point that the moments are about.
         about: [f64; 3],
     },
+}
+
+/// Matrix of a stress: K_geo, or K with the stress.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StressStiffnessSource {
+    /// File of the matrix.
+    pub location: MatrixLocation,
+    /// Properties of a matrix that holds K and the stiffness of the stress; `None` for K_geo.
+    pub with_stress: Option<WithStress>,
+}
+
+/// Stress of a matrix that holds K as well.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WithStress {
+    /// Number of units of the load whose stress the matrix has, positive.
+    pub load_size: f64,
+    /// Labels of the rows as CalculiX writes them (.dof); `None` for a matrix with the rows of K.
+    pub dofs: Option<PathBuf>,
+}
+
+impl WithStress {
+    /// Creates the properties of the matrix in `file`: a `.sti` of CalculiX has a `.dof` with its labels beside it.
+    pub fn new(file: &Path, load_size: f64) -> Self {
+        let is_of_calculix = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("sti"));
+        Self { load_size, dofs: is_of_calculix.then(|| file.with_extension("dof")) }
+    }
+}
+
+impl StressStiffnessSource {
+    /// Returns the files of the matrix.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let dofs = self.with_stress.as_ref().and_then(|with| with.dofs.as_deref());
+        std::iter::once(self.location.path.as_path()).chain(dofs)
+    }
 }
 
 /// Loads of residual vectors and their source.
@@ -255,7 +289,8 @@ impl ModelFiles {
             _ => None,
         });
         let damping = self.damping.as_ref().and_then(Damping::matrix).map(|place| place.path.clone());
-        let geometric = self.geometric_stiffness.iter().map(|one| one.matrix.path.clone());
+        let geometric = self.geometric_stiffness.iter().flat_map(|one| one.matrix.files());
+        let geometric = geometric.map(Path::to_path_buf);
         let paths = match &self.source {
             ModelSource::Tables(TableFiles { stiffness, mass, nodes, dofs }) => {
                 [&stiffness.path, &mass.path, nodes].into_iter().chain(dofs).cloned().collect()

@@ -2,7 +2,7 @@
 
 use super::fe_results::{AnswerFiles, read_answers};
 use super::jobs::{JobModel, comparable, read_job};
-use super::mapping::{Mapping, Turn};
+use super::mapping::Mapping;
 use super::mesh::MeshReading;
 use super::model_files::{
     InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource, RecoverySource,
@@ -10,7 +10,9 @@ use super::model_files::{
 use super::node_files::{NodeFile, NodeSets, Unresolved, read_node_file};
 use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::recovery_files::{read_offset, read_operator};
+use super::rows_of_model::{by_rows_of_model, in_order_of_nodes, refuse_followers, turned};
 use super::tables::{read_masses, read_node_list, read_recovery_rows};
+use super::with_stress::{PlainStiffness, StressMatrix, difference_note, read_stress_matrix};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::{SourceFile, Sources};
@@ -19,10 +21,11 @@ use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::quotes::without_foreign_quotes;
 use flexbody_linalg::parallel;
 use flexbody_model::{
-    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, LostRow, ModelRecovery, NodeAxes, NodeSet,
-    Nodes, RawMatrix, RawModel, RecoveryOperator, Reference, RowMap, filled_rows,
+    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, ModelRecovery, NodeSet, Nodes, RawMatrix,
+    RawModel, RecoveryOperator, Reference, filled_rows,
 };
-use std::collections::{HashMap, HashSet};
+use std::borrow::Cow;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Number of significant digits below which a matrix gets a warning.
@@ -85,12 +88,15 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         let damping = take(&mut diagnostics, damping)?;
         take(&mut diagnostics, damping.try_map(|raw| by_rows_of_model(raw, rows)))
     });
-    let geometric = parsed.geometric_stiffness.into_iter().filter_map(|one| {
-        let GeometricStiffness { load, matrix } = take(&mut diagnostics, one)?;
-        let matrix = take(&mut diagnostics, by_rows_of_model(matrix, rows))?;
-        Some(GeometricStiffness { load, matrix })
-    });
-    let geometric_stiffness = geometric.collect();
+    let mut geometric_stiffness = Vec::new();
+    let mut differences = Vec::new();
+    for one in parsed.geometric_stiffness {
+        let Some(GeometricStiffness { load, matrix }) = take(&mut diagnostics, one) else { continue };
+        let found = matrices.as_ref().map(|matrices| matrix.of_stress(matrices.plain(files.dimension), rows));
+        let Some(found) = found.and_then(|found| take(&mut diagnostics, found)) else { continue };
+        differences.extend(found.digits_left.map(|digits| (digits, load.clone())));
+        geometric_stiffness.push(GeometricStiffness { load, matrix: found.matrix });
+    }
     // Interfaces and surface refer to the nodes.
     let places = NodeLookup::of(matrices.as_ref(), files.dimension);
     let interfaces: Vec<NodeSet> = files
@@ -113,6 +119,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         return Err(Error::new(diagnostics));
     };
     diagnostics.extend(matrices.diagnostics);
+    diagnostics.extend(difference_note(&differences));
     let (mesh, partly) = mesh.unwrap_or_default();
     diagnostics.extend(partly);
     let model = RawModel {
@@ -161,7 +168,7 @@ struct Parsed {
     matrices: Matrices,
     mesh: Option<Found<NodeFile>>,
     damping: Option<Found<Damping<RawMatrix>>>,
-    geometric_stiffness: Vec<Found<GeometricStiffness<RawMatrix>>>,
+    geometric_stiffness: Vec<Found<GeometricStiffness<StressMatrix>>>,
 }
 
 enum Matrices {
@@ -190,6 +197,13 @@ struct ModelMatrices {
 }
 
 impl ModelMatrices {
+    /// Returns K with the labels of its rows, for matrices that hold it with a stress.
+    fn plain(&self, dimension: u8) -> PlainStiffness<'_> {
+        let labels = || in_order_of_nodes(&self.nodes, dimension);
+        let labels = self.dofs.as_deref().map_or_else(|| Cow::Owned(labels()), Cow::Borrowed);
+        PlainStiffness { stiffness: &self.stiffness, labels }
+    }
+
     /// Returns the nodes with stiffness or mass; `None` if the rows have no labels and do not follow the nodes.
     fn moving(&self, dimension: u8) -> Option<HashSet<i64>> {
         let n = self.stiffness.matrix.n_cols();
@@ -306,7 +320,8 @@ impl Parsed {
         let damping = files.damping.as_ref();
         let damping = damping.map(|d| d.borrowed().try_map(|place| matrix(place, MatrixRole::Damping)));
         let geometric_stiffness = files.geometric_stiffness.iter().map(|one| {
-            let matrix = matrix(&one.matrix, MatrixRole::GeometricStiffness)?;
+            let other = |location: &MatrixLocation| matrix(location, MatrixRole::GeometricStiffness);
+            let matrix = read_stress_matrix(&one.matrix, |path| opened.get(path), other)?;
             Ok(GeometricStiffness { load: one.load.clone(), matrix })
         });
         let geometric_stiffness = geometric_stiffness.collect();
@@ -505,71 +520,6 @@ fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
     })
 }
 
-/// Returns the labels of rows that follow the nodes of a table, each with its displacements.
-fn in_order_of_nodes(nodes: &Nodes, dimension: u8) -> Vec<DofLabel> {
-    let of_node = |&node: &i64| (1..=dimension).map(move |direction| DofLabel { node, direction });
-    nodes.ids.iter().flat_map(of_node).collect()
-}
-
-/// Returns FB111 for matrices with rows that follow others by constraints of the deck of their nodes: the matrices do
-/// not contain these constraints.
-fn refuse_followers(followers: &[(String, Vec<DofLabel>)], labels: &[DofLabel], deck: &Path) -> Found<()> {
-    let labels: HashSet<DofLabel> = labels.iter().copied().collect();
-    let open = followers.iter().filter(|(_, rows)| rows.iter().any(|row| labels.contains(row)));
-    let names: Vec<&str> = open.map(|(name, _)| name.as_str()).collect();
-    if names.is_empty() {
-        return Ok(());
-    }
-    let message =
-        format!("rows of the matrices depend on others by constraints of the deck: {}", names.join(", "));
-    let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(deck);
-    Err(vec![diagnostic.with_help("give the deck as the model, with its matrices beside it")])
-}
-
-/// Returns K and M along the axes of the model, with rows originally along the `axes` of nodes, and the map that
-/// transforms other data by these rows.
-///
-/// # Errors
-/// FB404 for a rotated node without all directions that are rotated together.
-fn turned(
-    matrices: [RawMatrix; 2],
-    labels: &[DofLabel],
-    axes: HashMap<i64, NodeAxes>,
-) -> Found<([RawMatrix; 2], GivenRows)> {
-    let [stiffness, mass] = matrices;
-    let has_rows = |raw: &RawMatrix| raw.matrix.n_cols() == labels.len();
-    // Different numbers of rows are reported later.
-    if !labels.iter().any(|label| axes.contains_key(&label.node)) || !has_rows(&stiffness) || !has_rows(&mass)
-    {
-        return Ok(([stiffness, mass], GivenRows::default()));
-    }
-    let turn = Turn::new(labels, &axes).map_err(|node| {
-        let message =
-            format!("rows of node {node} are along local axes, but not each of its directions occurs once");
-        vec![Diagnostic::new(Code::DofIncomplete, message).in_file(&stiffness.path)]
-    })?;
-    let transformed = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
-    let matrices = [transformed(stiffness)?, transformed(mass)?];
-    let rows = (0..labels.len() as u32).collect();
-    let map = RowMap::new(turn.axes(), turn.axes(), rows);
-    Ok((matrices, GivenRows::new(vec![map], axes)))
-}
-
-/// Returns an additional matrix, such as damping, by the rows of the model.
-fn by_rows_of_model(raw: RawMatrix, rows: &GivenRows) -> Found<RawMatrix> {
-    let RawMatrix { matrix, digits, path } = raw;
-    match rows.matrix(matrix) {
-        Ok(matrix) => Ok(RawMatrix { matrix, digits, path }),
-        Err(LostRow) => {
-            let message = "the matrix has entries in rows that K and M leave empty";
-            let diagnostic = Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(path);
-            Err(vec![
-                diagnostic.with_help("remove these rows from the matrix, or give them stiffness and mass"),
-            ])
-        }
-    }
-}
-
 fn take<T>(diagnostics: &mut Vec<Diagnostic>, found: Found<T>) -> Option<T> {
     found.map_err(|list| collect(diagnostics, list)).ok()
 }
@@ -644,7 +594,7 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
     roles.extend(files.mesh.as_deref().map(|path| ("mesh", path)));
     let damping = files.damping.as_ref().and_then(Damping::matrix);
     roles.extend(damping.map(|place| (MatrixRole::Damping.name(), place.path.as_path())));
-    let geometric = files.geometric_stiffness.iter().map(|one| one.matrix.path.as_path());
+    let geometric = files.geometric_stiffness.iter().flat_map(|one| one.matrix.files());
     roles.extend(geometric.map(|path| (MatrixRole::GeometricStiffness.name(), path)));
     roles.extend(files.interfaces.iter().filter_map(|interface| match &interface.nodes {
         InterfaceNodes::File(path) => Some(("interface", path.as_path())),

@@ -5,8 +5,9 @@ use crate::assemble::rounding;
 use crate::rows::{centre_and_length, rigid_axes};
 use crate::wording::name_some;
 use crate::{FeModel, GeometricStiffness, RawMatrix, UnitLoad};
+use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_linalg::{SymmetricMatrix, larger, parallel};
+use flexbody_linalg::{SymmetricMatrix, gram, larger, parallel, subtract_combination};
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
@@ -40,7 +41,7 @@ pub(super) fn check_stress(
         let digits = file.map_or(17, |file| file.digits);
         let relations = Relations::new(model, matrix, solid, digits);
         let judged = Judged { model, load, relations };
-        let diagnostic = judged.motion().or_else(|| judged.load(&loads));
+        let diagnostic = judged.softening(matrix).or_else(|| judged.motion()).or_else(|| judged.load(&loads));
         let path = file.map_or(Path::new(""), |file| &file.path);
         found.extend(diagnostic.map(|one| one.in_file(path)));
     }
@@ -54,6 +55,20 @@ struct Judged<'m> {
 }
 
 impl Judged<'_> {
+    /// Returns an error if translations cause forces in proportion to mass: the matrix was assembled while a
+    /// centrifugal load acted, and holds its change with displacement.
+    fn softening(&self, matrix: &SymmetricMatrix) -> Option<Diagnostic> {
+        let is_resisted = self.relations.translation.share > MIN_REPORTED_ERROR.max(self.relations.rounding);
+        let rate = is_resisted.then(|| like_mass(self.model, matrix)).flatten()?;
+        let message = format!(
+            "geometric stiffness for {} resists translation by {rate:.3e} times the mass: it holds the softening of a centrifugal load, which belongs to W2",
+            self.load
+        );
+        let help =
+            "assemble the stiffness with the stress alone, in a step in which no centrifugal load is active";
+        Some(Diagnostic::new(Code::GeometricStiffnessMotion, message).with_help(help))
+    }
+
     /// Returns an error about the worst relation with rigid motion that holds for every load.
     fn motion(&self) -> Option<Diagnostic> {
         let Relations { translation, rotation, blocks, .. } = &self.relations;
@@ -110,6 +125,27 @@ impl Judged<'_> {
             Diagnostic::new(Code::GeometricStiffnessRough, message)
         })
     }
+}
+
+/// Largest part of the forces of translations that is not in proportion to mass, for a matrix that holds the
+/// softening of a centrifugal load. Stress adds no such forces, and rounding is not in proportion to mass.
+const MAX_MASSLESS_SHARE: f64 = 0.1;
+
+/// Returns the largest factor of the mass in the forces of translations; `None` if other forces remain.
+fn like_mass(model: &FeModel, matrix: &SymmetricMatrix) -> Option<f64> {
+    let d = model.dimension();
+    let translations = model.rigid_fields([0.0; 3], 1.0).as_ref().subcols(0, d).to_owned();
+    let momenta = model.pencil().apply_mass(translations.as_ref());
+    let forces = Mat::from_fn(translations.nrows(), d, |i, k| {
+        let (columns, values) = matrix.row(i);
+        columns.iter().zip(values).map(|(&j, value)| value * translations[(j as usize, k)]).sum()
+    });
+    let of_mass = gram(momenta.as_ref(), momenta.as_ref());
+    let shared = gram(momenta.as_ref(), forces.as_ref());
+    let factors = Mat::from_fn(d, d, |i, j| shared[(i, j)] / of_mass[(i, i)]);
+    let mut rest = forces.clone();
+    subtract_combination(rest.as_mut(), momenta.as_ref(), factors.as_ref());
+    (rest.norm_l2() <= MAX_MASSLESS_SHARE * forces.norm_l2()).then(|| factors.norm_max())
 }
 
 // Relations between a geometric stiffness and rigid motion of the body.

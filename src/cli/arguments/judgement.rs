@@ -116,6 +116,14 @@ pub struct ShapesArguments {
     /// With --to calculix: places of the stresses
     #[arg(long, value_enum, value_name = "PLACES", default_value_t = PlacesName::Nodes)]
     pub at: PlacesName,
+    /// Whole static responses to unit spin and unit loads at the interfaces instead of the shapes of a body, with a
+    /// script that assembles the stiffness with the stress of each: geometric stiffness by CalculiX
+    #[arg(long)]
+    pub geometric_stiffness: bool,
+    /// Stresses that CalculiX printed for these responses: writes the deck of each load with its stress, and the tables
+    /// of the manifest that read the results (the script calls this)
+    #[arg(long, value_name = "STRESSES.dat", requires = "geometric_stiffness")]
+    pub stresses: Option<PathBuf>,
     /// File to write; the archive from which the answers are read has its name with the extension .npz
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,

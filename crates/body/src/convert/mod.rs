@@ -24,4 +24,4 @@ pub use modal_matrices::{modal_damping, modal_geometric_stiffness};
 pub use modal_model::{Condensation, ModalModel};
 pub use recovery::{recovered_rows, recovery_loads};
 pub use settings::{ConvertSettings, Lumping, MeshChoice};
-pub use shapes::{RecoveryShapes, ShapeColumn, recovery_shapes};
+pub use shapes::{RecoveryShapes, ShapeColumn, load_shapes, recovery_shapes};

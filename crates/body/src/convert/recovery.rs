@@ -6,7 +6,7 @@ use super::answered::{Targets, mapped_answers};
 use crate::basis::{
     CoupledModel, accurate_static_responses, centrifugal_loads, interface_loads, rigid_modes,
 };
-use crate::flex_body::{LOAD_COMPONENTS, LoadColumns, LoadKind, Recovery};
+use crate::flex_body::{LOAD_COMPONENTS, LoadColumns, LoadKind, Recovery, UnitLoad};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -163,11 +163,30 @@ impl<'m> FreeBasis<'m> {
         responds_to_spin: bool,
         context: &Context<'_>,
     ) -> Result<Mat<f64>> {
-        let mut responses = accurate_static_responses(&self.coupled, loads.forces.clone(), first, context)?;
+        let mut responses = self.whole_responses(loads, first, context)?;
         // Less the part that the modes contain.
         let amplitudes = self.static_amplitudes(loads, responds_to_spin);
         subtract_combination(responses.as_mut(), self.modes.as_ref(), amplitudes.as_ref());
         Ok(responses)
+    }
+
+    /// Returns the whole static responses G F to all loads (N x m), in mean axes.
+    ///
+    /// * `first`: about the first flexible eigenvalue.
+    pub(super) fn whole_responses(
+        &self,
+        loads: &StaticLoads,
+        first: f64,
+        context: &Context<'_>,
+    ) -> Result<Mat<f64>> {
+        accurate_static_responses(&self.coupled, loads.forces.clone(), first, context)
+    }
+
+    /// Removes rigid motion from fields (N x m): the part that rounding leaves.
+    pub(super) fn remove_rigid_motion(&self, fields: &mut Mat<f64>) {
+        let moved = self.coupled.model().pencil().apply_mass(fields.as_ref());
+        let along = gram(self.rigid.as_ref(), moved.as_ref());
+        subtract_combination(fields.as_mut(), self.rigid.as_ref(), along.as_ref());
     }
 
     /// Returns the M-norms of the whole static responses, about |G_r F| + |Psi_m K_ff^-1 Psi_m'F|.
@@ -269,6 +288,19 @@ impl StaticLoads {
         });
         let at = |interface: &String| {
             self.components.iter().map(|&c| format!("{interface} {}", COMPONENTS[c])).collect::<Vec<_>>()
+        };
+        spin.chain(self.interfaces.iter().flat_map(at)).collect()
+    }
+
+    /// Returns the unit loads of geometric stiffness that the loads are, in their order.
+    pub(super) fn unit_loads(&self) -> Vec<UnitLoad> {
+        let spin = self.spins.iter().map(|&component| UnitLoad { kind: LoadKind::Spin, component });
+        let at = |interface: &String| {
+            let one = |&component: &usize| match component {
+                0..3 => UnitLoad { kind: LoadKind::Force(interface.clone()), component },
+                _ => UnitLoad { kind: LoadKind::Moment(interface.clone()), component: component - 3 },
+            };
+            self.components.iter().map(one).collect::<Vec<_>>()
         };
         spin.chain(self.interfaces.iter().flat_map(at)).collect()
     }

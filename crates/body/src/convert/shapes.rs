@@ -7,8 +7,8 @@ use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::{gram, largest_entry, side_by_side, subtract_combination};
-use flexbody_model::{FeModel, extents};
+use flexbody_linalg::{gram, largest_entry, side_by_side};
+use flexbody_model::{FeModel, UnitLoad, extents};
 
 /// Difference of Psi'K Psi from the stored K_ff, relative to its largest entry, above which the model is another one.
 const MAX_STIFFNESS_DIFFERENCE: f64 = 1e-5;
@@ -25,8 +25,10 @@ const SHAPE_SIZE: f64 = 1e-3;
 pub enum ShapeColumn {
     /// Mode, counted from 1.
     Mode(usize),
-    /// Static response to the load of this name.
+    /// Static response, outside the modes, to the load of this name.
     Static(String),
+    /// Whole static response to a unit load.
+    Load(UnitLoad),
 }
 
 impl std::fmt::Display for ShapeColumn {
@@ -34,6 +36,7 @@ impl std::fmt::Display for ShapeColumn {
         match self {
             Self::Mode(number) => write!(f, "mode {number}"),
             Self::Static(name) => f.write_str(name),
+            Self::Load(load) => write!(f, "{load}"),
         }
     }
 }
@@ -55,6 +58,55 @@ pub struct RecoveryShapes {
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) if the body is not of `model`; failures of the factor.
 pub fn recovery_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) -> Result<RecoveryShapes> {
+    let basis = basis_of(body, model)?;
+    context.phase("static responses");
+    let loads = StaticLoads::new(model)?;
+    let responds_to_spin = body.groups().w1;
+    let mut responses = basis.responses(&loads, body.modes().eigenvalue[0], responds_to_spin, context)?;
+    let sizes = basis.sizes_of_responses(&responses, &loads, responds_to_spin);
+    basis.remove_rigid_motion(&mut responses);
+    let norms = basis.norms(&responses);
+    let modes = basis.modes.ncols();
+    let names = loads.names();
+    let columns = (0..modes).map(|j| ShapeColumn::Mode(j + 1));
+    let columns: Vec<ShapeColumn> = columns.chain(names.into_iter().map(ShapeColumn::Static)).collect();
+    let fields = side_by_side(&[basis.modes.as_ref(), responses.as_ref()]);
+    let is_kept = |j: &usize| {
+        j.checked_sub(modes).is_none_or(|at| norms[at] > MIN_RESPONSE * sizes[at] && norms[at] > 0.0)
+    };
+    let kept: Vec<usize> = (0..columns.len()).filter(is_kept).collect();
+    Ok(scaled(model, &columns, &fields, &kept))
+}
+
+/// Returns the whole static responses G F of `model` to unit spin and to unit loads at its interfaces, balanced by
+/// inertia relief: the displacements of the stress of each load. Interfaces that `body` keeps rigid are rigid. Loads
+/// without a response are left out.
+///
+/// # Errors
+/// [`BodyIncomparable`](Code::BodyIncomparable) if the body is not of `model`; failures of the factor.
+pub fn load_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) -> Result<RecoveryShapes> {
+    let basis = basis_of(body, model)?;
+    context.phase("static responses");
+    let loads = StaticLoads::new(model)?;
+    let mut responses = basis.whole_responses(&loads, body.modes().eigenvalue[0], context)?;
+    basis.remove_rigid_motion(&mut responses);
+    let norms = basis.norms(&responses);
+    let unit_loads = loads.unit_loads();
+    let of_kind = |load: &UnitLoad| {
+        let same = unit_loads.iter().zip(&norms).filter(|(other, _)| other.kind.name() == load.kind.name());
+        same.map(|(_, norm)| *norm).fold(0.0, f64::max)
+    };
+    let is_kept = |j: &usize| norms[*j] > MIN_RESPONSE * of_kind(&unit_loads[*j]);
+    let kept: Vec<usize> = (0..unit_loads.len()).filter(is_kept).collect();
+    let columns: Vec<ShapeColumn> = unit_loads.iter().cloned().map(ShapeColumn::Load).collect();
+    Ok(scaled(model, &columns, &responses, &kept))
+}
+
+/// Returns the modes of `body` as fields of `model`.
+///
+/// # Errors
+/// [`BodyIncomparable`](Code::BodyIncomparable) if the body is not of `model`.
+fn basis_of<'m>(body: &FlexBody, model: &'m FeModel) -> Result<FreeBasis<'m>> {
     let incomparable = |message: &str| Diagnostic::new(Code::BodyIncomparable, message);
     let vectors = (body.nodes().ids == model.nodes().ids).then(|| body.vectors_of(model)).flatten();
     let Some(vectors) = vectors else {
@@ -67,24 +119,11 @@ pub fn recovery_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) 
     if apart.is_nan() || apart > allowed {
         return Err(incomparable("the stiffness of the body's modes is not that of the model").into());
     }
-    context.phase("static responses");
-    let basis = FreeBasis::new(model, &vectors, stored.clone())?;
-    let loads = StaticLoads::new(model)?;
-    let responds_to_spin = body.groups().w1;
-    let mut responses = basis.responses(&loads, body.modes().eigenvalue[0], responds_to_spin, context)?;
-    let sizes = basis.sizes_of_responses(&responses, &loads, responds_to_spin);
-    let along = gram(basis.rigid.as_ref(), model.pencil().apply_mass(responses.as_ref()).as_ref());
-    subtract_combination(responses.as_mut(), basis.rigid.as_ref(), along.as_ref());
-    let norms = basis.norms(&responses);
-    let modes = basis.modes.ncols();
-    let names = loads.names();
-    let columns = (0..modes).map(|j| ShapeColumn::Mode(j + 1));
-    let columns: Vec<ShapeColumn> = columns.chain(names.into_iter().map(ShapeColumn::Static)).collect();
-    let fields = side_by_side(&[basis.modes.as_ref(), responses.as_ref()]);
-    let is_kept = |j: &usize| {
-        j.checked_sub(modes).is_none_or(|at| norms[at] > MIN_RESPONSE * sizes[at] && norms[at] > 0.0)
-    };
-    let kept: Vec<usize> = (0..columns.len()).filter(is_kept).collect();
+    FreeBasis::new(model, &vectors, stored.clone())
+}
+
+/// Returns the columns `kept` of the fields (N x m), each with its largest displacement set to the size of a shape.
+fn scaled(model: &FeModel, columns: &[ShapeColumn], fields: &Mat<f64>, kept: &[usize]) -> RecoveryShapes {
     let size =
         extents(&model.nodes().positions).into_iter().map(|extent| extent * extent).sum::<f64>().sqrt();
     let displaced = model.dimension() * model.nodes().len();
@@ -92,9 +131,9 @@ pub fn recovery_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) 
         .iter()
         .map(|&j| SHAPE_SIZE * size / fields.as_ref().subrows(0, displaced).col(j).norm_max())
         .collect();
-    Ok(RecoveryShapes {
+    RecoveryShapes {
         columns: kept.iter().map(|&j| columns[j].clone()).collect(),
         fields: Mat::from_fn(fields.nrows(), kept.len(), |i, j| fields[(i, kept[j])] * factors[j]),
         factors,
-    })
+    }
 }

@@ -12,7 +12,7 @@
 //! interface has the eigenpairs of (K_ff, m_ff), with m_ff of the new modes.
 
 use super::modal_change::{rotations_without, shapes_without, stacked};
-use super::{FlexBody, LoadKind, ReferenceConditions, TermGroups};
+use super::{FlexBody, GeometricStiffness, LoadKind, ReferenceConditions, TermGroups};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -73,9 +73,10 @@ impl FlexBody {
     /// axes are those of the model, and the carrier is at rest in every mode (see the module
     /// documentation). A body already carried there keeps its modes.
     ///
-    /// Geometric stiffness is dropped for every frame of the original body, since the loads together with
-    /// the reaction at the interface stress the carried body. The stiffness of inertia follows from the
-    /// moments of the nodes and their rotations relative to the carrier.
+    /// Geometric stiffness includes that of the reaction at the carrier, where it is given (see
+    /// [`super::carried_stiffness`]). It is dropped if the carrier moves in the modes of this body: the
+    /// geometric stiffness of the rigid motion that is removed from them is not known. The stiffness of
+    /// inertia follows from the moments of the nodes and their rotations relative to the carrier.
     ///
     /// # Errors
     /// FB212 if the body has no interface or node of this name; FB214 if `carrier` has no reference point
@@ -91,12 +92,16 @@ impl FlexBody {
         let along_model = self.frame().axes == nalgebra::Matrix3::identity();
         if along_model && self.has_carrier_at_rest(carrier)? {
             let mut parts = self.clone().into_parts();
-            parts.geometric_stiffness.retain(|one| matches!(one.load.kind, LoadKind::Named(_)));
+            parts.geometric_stiffness = self.stiffness_with_reaction(carrier);
             return Self::new(parts);
         }
         let at = self.place_of(carrier)?;
         let body = self.in_model_axes(at.reference)?;
         let CarriedPoint { motion, .. } = body.place_of(carrier)?;
+        let geometric_stiffness = match body.is_at_rest(&motion) {
+            true => body.stiffness_with_reaction(carrier),
+            false => body.stiffness_without_place(),
+        };
         let mut parts = body.into_parts();
         parts.conditions = match carrier {
             Carrier::Interface(name) => ReferenceConditions::Interface(name.clone()),
@@ -108,7 +113,7 @@ impl FlexBody {
         for lumped in &mut parts.lumped {
             lumped.invariants = lumped.invariants.without_rigid_motion(motion.as_ref());
         }
-        parts.geometric_stiffness.retain(|one| matches!(one.load.kind, LoadKind::Named(_)));
+        parts.geometric_stiffness = geometric_stiffness;
         // The nodes turn relative to the carrier, which turns the frame.
         parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
             (Some(inertia), Some(rotation)) => {
@@ -119,9 +124,15 @@ impl FlexBody {
         Self::new(parts)
     }
 
-    /// Returns true if this body has geometric stiffness that is dropped when the body is carried.
-    pub fn loses_geometric_stiffness(&self) -> bool {
+    /// Returns true if this body has geometric stiffness of a load that is known by more than its name.
+    pub fn has_geometric_stiffness(&self) -> bool {
         self.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_)))
+    }
+
+    /// Returns the geometric stiffness of loads that are known by their name only.
+    fn stiffness_without_place(&self) -> Vec<GeometricStiffness<Mat<f64>>> {
+        let is_named = |one: &&GeometricStiffness<_>| matches!(one.load.kind, LoadKind::Named(_));
+        self.geometric_stiffness().iter().filter(is_named).cloned().collect()
     }
 
     /// Returns the eigenvalues lambda of (K_ff, m_ff), ascending: for free modes their eigenvalues, for a

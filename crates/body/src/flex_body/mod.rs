@@ -2,6 +2,7 @@
 
 mod body;
 mod carried;
+mod carried_stiffness;
 mod held_modes;
 mod identities;
 mod in_units;

@@ -11,7 +11,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::numbers::significant;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{Line, Lines, excerpt, expected, integer, real};
-use flexbody_model::{DofLabel, GivenRows, Nodes};
+use flexbody_model::{DofLabel, GivenRows, Nodes, RawMatrix};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
@@ -86,9 +86,26 @@ impl JobReader for Calculix {
     }
 }
 
+/// Reads a stiffness matrix (`.sti`) and the labels of its rows (`.dof`).
+///
+/// # Errors
+/// FB204 for lines of labels, FB301 to FB312 for the matrix.
+pub(in super::super) fn read_stiffness(
+    matrix: &InputFile,
+    labels: &InputFile,
+) -> Found<(RawMatrix, Vec<DofLabel>)> {
+    let labels = labels_of(labels)?;
+    let (matrix, _) = CoordinateFile::read_opened(matrix, labels.len() as u32)?.into_matrix(labels.len())?;
+    Ok((matrix, labels))
+}
+
 /// Reads the labels of the rows from lines `node.direction`.
 fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
     let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
+    Ok((labels_of(&file)?, file.seen().map_err(|diagnostic| vec![diagnostic])?))
+}
+
+fn labels_of(file: &InputFile) -> Found<Vec<DofLabel>> {
     let mut labels = Vec::with_capacity(file.bytes().len() / 6);
     for Line { number, text: line } in Lines::of(file.bytes()).filter_map(Line::content) {
         let label = line.iter().position(|&b| b == b'.').and_then(|dot| {
@@ -98,11 +115,11 @@ fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
         let Some(label) = label else {
             let diagnostic = expected(Code::TableRow, "a node and a direction as in `17.3`", line);
             let help = "write the file again: structures have the directions 1 to 3";
-            return Err(vec![diagnostic.in_file(path).at_line(number).with_help(help)]);
+            return Err(vec![diagnostic.in_file(file.path()).at_line(number).with_help(help)]);
         };
         labels.push(label);
     }
-    Ok((labels, file.seen().map_err(|diagnostic| vec![diagnostic])?))
+    Ok(labels)
 }
 
 // Nodes of CalculiX whose directions 1 to 3 are rotations of a reference node.

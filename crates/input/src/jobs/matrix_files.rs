@@ -189,7 +189,11 @@ impl CoordinateFile {
         read
     }
 
-    fn read_opened(file: &InputFile, n: u32) -> Found<Self> {
+    /// Reads an opened file whose indices are at most `n`.
+    ///
+    /// # Errors
+    /// The errors of [`Self::read`] but FB101 and FB132.
+    pub(super) fn read_opened(file: &InputFile, n: u32) -> Found<Self> {
         let path = file.path();
         let compression = Compression::of(file.bytes());
         let in_file = |found: Vec<Diagnostic>| found.into_iter().map(|d| d.in_file(path)).collect::<Vec<_>>();

@@ -200,6 +200,22 @@ const MANIFESTS: &[(&str, bool)] = &[
         true,
     ),
     (
+        "geometric_stiffness=[{with_stress='g.sti',spin='xz'},{with_stress='g',load_size=2e5,load='bolts'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        true,
+    ),
+    (
+        "geometric_stiffness=[{with_stress='g',file='g',spin='xx'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        false,
+    ),
+    (
+        "geometric_stiffness=[{file='g',load_size=2,spin='xx'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        false,
+    ),
+    (
+        "geometric_stiffness=[{with_stress='g',load_size=0,spin='xx'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        false,
+    ),
+    (
         "basis={residual_vectors=['centrifugal','interfaces'],loads='f.npy'}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
         true,
     ),

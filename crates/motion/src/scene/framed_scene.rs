@@ -4,7 +4,7 @@
 //! of a scene does not depend on this choice: everything is computed in the frame defined here, and vectors
 //! of the results are along its axes, which are those of the model.
 
-use super::{Axes, Load, Point, Range, Scene, VectorHistory};
+use super::{Axes, Carried, Load, Point, Range, Scene, VectorHistory};
 use crate::dynamics::{Orientation, RotationVector};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -47,13 +47,13 @@ impl<'a> FramedScene<'a> {
         refuse_beyond_range(scene, &body.frame().axes)?;
         let (framed_body, mut found) = match &scene.carried {
             Some(carried) => {
-                let carrier = carrier(&carried.by);
+                let carrier = carried.carrier();
                 let carried_body = body.carried(&carrier)?;
                 let mut found = Vec::from_iter(carried_body.unresolved(&carrier, body));
                 found.extend(body.softened(&carrier));
-                if body.loses_geometric_stiffness() {
+                if body.has_geometric_stiffness() && !carried_body.has_geometric_stiffness() {
                     let message = format!(
-                        "the geometric stiffness of the body is not used while {carrier} carries it, because the stress comes from the reaction at the carrier"
+                        "the geometric stiffness of the body is not used while {carrier} carries it, because {carrier} moves in the modes of the body"
                     );
                     found.push(Diagnostic::new(Code::CarriedGeometricStiffness, message));
                 }
@@ -84,11 +84,13 @@ fn refuse_numbered_modes(body: &FlexBody, scene: &Scene) -> Result<()> {
     Err(Diagnostic::new(Code::SceneContradicts, message).with_help(help).into())
 }
 
-/// Returns the carrier at `point`.
-fn carrier(point: &Point) -> Carrier {
-    match point {
-        Point::Node(number) => Carrier::Node(*number),
-        Point::Interface(name) => Carrier::Interface(name.clone()),
+impl Carried {
+    /// Returns the place that the frame of the body is fixed to.
+    pub fn carrier(&self) -> Carrier {
+        match &self.by {
+            Point::Node(number) => Carrier::Node(*number),
+            Point::Interface(name) => Carrier::Interface(name.clone()),
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
 use flexbody_body::convert::recovered_rows;
-use flexbody_body::flex_body::{FlexBody, LoadKind};
+use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::Analysis;
 use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, ModelRecovery, RecoveryOperator};
@@ -124,9 +124,11 @@ impl<'m> NodalReference<'m> {
     /// # Errors
     /// FB801 for geometric stiffness; FB212 for points that the model does not have; FB604 for too much work.
     pub fn refuse(model: &FeModel, body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<()> {
-        let stiffened =
-            body.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_)));
-        if stiffened && scene.run.terms.geometric_stiffness && scene.carried.is_none() {
+        let is_stiffened = match &scene.carried {
+            Some(carried) => body.carried(&carried.carrier())?.has_geometric_stiffness(),
+            None => body.has_geometric_stiffness(),
+        };
+        if is_stiffened && scene.run.terms.geometric_stiffness {
             let what = "the model has geometric stiffness, which the equations of all nodes do not support";
             return Err(refused(what));
         }

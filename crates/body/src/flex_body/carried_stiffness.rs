@@ -1,0 +1,109 @@
+//! Geometric stiffness of a carried body: the reaction at the carrier is one of its loads.
+//!
+//! A carried body is a free body under its inertia forces, its loads and the reaction. With its origin at
+//! the carrier, the reaction follows from the motion of the frame and from the other loads (theory 7.6),
+//!
+//! ```text
+//! f  = m (a - g) + al x c + w x (w x c) - sum F_p
+//! mu = c x (a - g) + I0 al + w x I0 w - sum (x_p x F_p + M_p)
+//! ```
+//!
+//! so that the geometric stiffness of the reaction becomes a part of that of the motion and of the loads.
+//! Where none is given for loads at the carrier, that of the motion includes the reaction: it was computed
+//! with the carrier held.
+
+use super::{Carrier, FlexBody, GeometricStiffness, LoadKind, UnitLoad};
+use faer::{Mat, Scale};
+use nalgebra::Vector3;
+
+/// Work of a unit load: its force, and its moment about the origin.
+struct Resultant {
+    force: Vector3<f64>,
+    moment: Vector3<f64>,
+}
+
+impl FlexBody {
+    /// Returns the geometric stiffness of this body when `carrier`, which lies at the origin and moves in no
+    /// mode, carries it: that of the reaction is added to that of the loads that cause it.
+    pub(super) fn stiffness_with_reaction(&self, carrier: &Carrier) -> Vec<GeometricStiffness<Mat<f64>>> {
+        let Carrier::Interface(name) = carrier else { return self.geometric_stiffness().to_vec() };
+        let is_reaction = |load: &UnitLoad| load.kind.interface() == Some(name);
+        let (reaction, mut all): (Vec<_>, Vec<_>) =
+            self.geometric_stiffness().iter().cloned().partition(|one| is_reaction(&one.load));
+        if reaction.is_empty() {
+            return all;
+        }
+        for load in self.loads_with_reaction(name) {
+            let Resultant { force, moment } = self.reaction_to(&load);
+            for one in &reaction {
+                let resultant = if matches!(one.load.kind, LoadKind::Force(_)) { force } else { moment };
+                let amount = resultant[one.load.component];
+                if amount != 0.0 {
+                    let part = &one.matrix * Scale(amount);
+                    match all.iter_mut().find(|known| known.load == load) {
+                        Some(sum) => sum.matrix += part,
+                        None => all.push(GeometricStiffness { load: load.clone(), matrix: part }),
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    /// Returns the unit loads that the carrier reacts to: motions of the frame, and loads at other interfaces.
+    fn loads_with_reaction(&self, carrier: &str) -> Vec<UnitLoad> {
+        let mut kinds = vec![LoadKind::Acceleration, LoadKind::AngularAcceleration, LoadKind::Spin];
+        for interface in self.interfaces() {
+            if interface.name != carrier && interface.reference.is_some() {
+                kinds.extend([
+                    LoadKind::Force(interface.name.clone()),
+                    LoadKind::Moment(interface.name.clone()),
+                ]);
+            }
+        }
+        let of_kind = |kind: LoadKind| {
+            let components = kind.of_dimension(self.dimension());
+            components.iter().map(move |&component| UnitLoad { kind: kind.clone(), component })
+        };
+        kinds.into_iter().flat_map(of_kind).collect()
+    }
+
+    /// Returns the reaction at the origin to a unit load on the undeformed body.
+    fn reaction_to(&self, load: &UnitLoad) -> Resultant {
+        let (mass, c) = (self.invariants().mass(), self.invariants().first_moment());
+        let inertia = self.invariants().inertia();
+        let unit = |axis: usize| Vector3::ith(axis, 1.0);
+        match &load.kind {
+            LoadKind::Acceleration => {
+                let a = unit(load.component);
+                Resultant { force: a * mass, moment: c.cross(&a) }
+            }
+            LoadKind::AngularAcceleration => {
+                let alpha = unit(load.component);
+                Resultant { force: alpha.cross(&c), moment: inertia * alpha }
+            }
+            LoadKind::Spin => {
+                let (k, l) = LoadKind::SPIN[load.component];
+                let of = |k: usize, l: usize| Resultant {
+                    force: unit(k).cross(&unit(l).cross(&c)),
+                    moment: unit(k).cross(&(inertia * unit(l))),
+                };
+                let (one, other) = (of(k, l), of(l, k));
+                match k == l {
+                    true => one,
+                    false => Resultant { force: one.force + other.force, moment: one.moment + other.moment },
+                }
+            }
+            LoadKind::Force(at) => {
+                let force = -unit(load.component);
+                let point = self.interfaces().iter().find(|interface| interface.name == *at);
+                let point = point
+                    .and_then(|interface| interface.reference)
+                    .map_or_else(Vector3::zeros, Vector3::from);
+                Resultant { force, moment: point.cross(&force) }
+            }
+            LoadKind::Moment(_) => Resultant { force: Vector3::zeros(), moment: -unit(load.component) },
+            LoadKind::Named(_) => Resultant { force: Vector3::zeros(), moment: Vector3::zeros() },
+        }
+    }
+}
