@@ -22,7 +22,7 @@ html_css_files = ["site.css"]
 CONTENTS = {
     "Start": ["docs/start/tour", "docs/start/tutorial", "docs/start/accuracy", "docs/start/basis"],
     "Parts": ["docs/how_to/rotor", "docs/how_to/robot_link", "docs/how_to/frame", "docs/how_to/satellite"],
-    "From FE programs": ["docs/how_to/from_fe_programs", "docs/how_to/from_calculix", "docs/how_to/from_abaqus", "docs/how_to/from_ansys", "docs/how_to/from_nastran", "docs/how_to/from_open_codes", "docs/how_to/import_modes", "docs/how_to/stresses_from_calculix"],
+    "From FE programs": ["docs/how_to/from_fe_programs", "docs/how_to/from_calculix", "docs/how_to/from_abaqus", "docs/how_to/from_ansys", "docs/how_to/from_nastran", "docs/how_to/from_open_codes", "docs/how_to/import_modes", "docs/how_to/stresses_from_calculix", "docs/how_to/geometric_stiffness"],
     "To other programs": ["docs/how_to/known_error", "docs/how_to/to_exudyn", "docs/how_to/to_mbdyn", "docs/how_to/to_simpack_modelica", "docs/how_to/to_mbsim", "docs/how_to/to_simscape", "docs/how_to/to_chrono", "docs/how_to/to_openradioss", "docs/how_to/to_real_time", "docs/how_to/to_viewers", "docs/how_to/read_the_file"],
     "Many bodies": ["docs/how_to/batch", "docs/how_to/cluster", "docs/how_to/ci"],
     "Reference": ["docs/reference/commands", "docs/reference/runs", "docs/reference/codes", "docs/reference/input", "docs/reference/scenes", "docs/reference/simulate", "docs/reference/select", "docs/reference/trade", "docs/reference/measure", "docs/reference/advise", "docs/reference/response", "docs/reference/recovery", "docs/reference/report", "docs/reference/view", "docs/reference/audit", "docs/reference/exports", "docs/reference/python", "docs/reference/rust", "docs/reference/versions"],

@@ -111,6 +111,7 @@ PEERS = [
     ("validator of glTF", "pictures.validator", True),
     ("CalculiX", "calculix.rows", True),
     ("stresses of CalculiX", "calculix_stresses.rows", True),
+    ("geometric stiffness of CalculiX", "geometric_stiffness.rows", True),
     ("public decks of CalculiX", "public_decks.rows", False),
     ("public decks of CalculiX, a part", "public_decks.some", True),
     ("open FE codes", "open_codes.rows", True),

@@ -148,6 +148,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB447", "crates/body/tests/body/answered_shapes.rs"),
     ("FB448", "crates/input/src/fe_results/tests.rs"),
     ("FB449", "crates/body/tests/body/answered_shapes.rs"),
+    ("FB451", "tests/program/motion/stiffening.rs"),
     ("FB501", "crates/body/tests/body/single_precision.rs"),
     ("FB505", "crates/body/tests/body/single_precision.rs"),
     ("FB506", "tests/program/cluster.rs"),

@@ -150,10 +150,16 @@ pub struct WithStress {
 }
 
 impl WithStress {
-    /// Creates the properties of the matrix in `file`: a `.sti` of CalculiX has a `.dof` with its labels beside it.
+    /// Creates the properties of the matrix in `file`: a `.sti` of CalculiX, packed or not, has a `.dof` with its labels
+    /// beside it.
     pub fn new(file: &Path, load_size: f64) -> Self {
-        let is_of_calculix = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("sti"));
-        Self { load_size, dofs: is_of_calculix.then(|| file.with_extension("dof")) }
+        let has = |path: &Path, wanted: &str| {
+            path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted))
+        };
+        let is_packed = has(file, "gz") || has(file, "zst");
+        let unpacked = if is_packed { file.with_extension("") } else { file.to_path_buf() };
+        let dofs = has(&unpacked, "sti").then(|| unpacked.with_extension("dof"));
+        Self { load_size, dofs }
     }
 }
 

@@ -6,3 +6,4 @@ mod mechanisms;
 mod recovery;
 mod shapes;
 mod simulate;
+mod stiffening;

@@ -4,6 +4,7 @@
 
 mod body_units;
 mod definiteness;
+mod carried_stiffness;
 mod dynamics;
 mod dynamics_conservation;
 mod dynamics_forms;

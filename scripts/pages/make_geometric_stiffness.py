@@ -1,0 +1,254 @@
+#!/usr/bin/env python3
+"""Geometric stiffness from the stresses of CalculiX beside element code, and a blade under spin beside CalculiX: writes docs/validation/geometric_stiffness.md.
+
+    apt install calculix-ccx; pip install numpy scipy h5py
+    cargo build --release --locked
+    python3 scripts/pages/make_geometric_stiffness.py
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import h5py
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from geometric_elements import SPIN, Part, by_element_code, full, given, run, with_stresses
+
+ROOT = Path(__file__).resolve().parents[2]
+KINDS = ["C3D4", "C3D8", "C3D10", "C3D20"]
+# Radius of the root, and spin of the rotor over the first frequency of the blade at rest.
+HUB, SPIN_RATIO = 0.2, 0.83
+MODES = 5
+HEAD = """<!-- Written by scripts/pages/make_geometric_stiffness.py -->
+
+# Geometric stiffness beside element code and CalculiX
+
+Written by `./scripts/make.sh pages geometric_stiffness` with CalculiX {calculix}, by the steps of [geometric stiffness from CalculiX](../how_to/geometric_stiffness.md).
+
+## Rows of K_geo
+
+A twisted block with two interfaces, 18 loads: six products of spin rates, forces and moments at both ends, balanced by inertia. The difference is that of any entry from element code in numpy, relative to the largest entry of its load.
+
+| elements | attitude and units | nodes | loads | largest difference |
+|---|---|---|---|---|
+"""
+
+
+def turned():
+    """A rotation about no axis of the model."""
+    a, b = np.cos(0.7), np.sin(0.7)
+    c, d = np.cos(-0.4), np.sin(-0.4)
+    return np.array([[a, -b, 0], [b, a, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, c, -d], [0, d, c]])
+
+
+def block(x, y, z):
+    angle = 0.3 * x
+    y, z = 0.1 * (y - 0.5) * (1 - 0.2 * x), 0.08 * (z - 0.4)
+    return np.array([0.3 * x + 0.05 * y, y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)])
+
+
+def blade(x, y, z):
+    """A twisted and tapered blade along x from the hub; the rotor axis is z through the origin."""
+    angle, width, thickness = 0.3 + 0.5 * x, 0.04 - 0.01 * x, 0.012 - 0.004 * x
+    y, z = width * (y - 0.5), thickness * (z - 0.5)
+    return np.array([HUB + 0.3 * x, y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)])
+
+
+def rows_of_kinds(flexbody, ccx, folder):
+    for kind in KINDS:
+        for name, units, turn in (("as built, m", "m", np.eye(3)), ("turned, mm", "mm", turned())):
+            part = Part(kind, (3, 2, 2), block, units, turn)
+            place = folder / f"{kind}_{units}"
+            part.write(place, "averaging")
+            with_stresses(flexbody, ccx, part, place)
+            worst, count = by_element_code(part, place)
+            # The program accepts every load, and the geometric stiffness is that of its files.
+            told = run(flexbody, "convert", "stressed.toml", "--modes", 6, "--lumped", "none", "-o", "body.flex.h5", cwd=place)
+            assert "FB451" in told and "FB442" not in told, told
+            yield kind, name, len(part.ids), count, worst
+
+
+class Blade:
+    """The blade of C3D20 on its rotor: frequencies of CalculiX, of all nodes with our K_geo, and of the body."""
+
+    def __init__(self, flexbody, ccx, folder, units="m", turn=np.eye(3), cells=(12, 2, 1)):
+        self.part, self.folder, self.ccx, self.flexbody = Part("C3D20", cells, blade, units, turn), folder, ccx, flexbody
+        self.axis = turn @ np.array([0.0, 0.0, 1.0])
+        self.part.write(folder, "rigid")
+        options = ("--basis", "craig-bampton", "--frame", "interface=root")
+        with_stresses(flexbody, ccx, self.part, folder, options)
+        run(flexbody, "convert", "stressed.toml", *options, "--modes", 24, "--lumped", "none", "-o", "body.flex.h5", cwd=folder)
+        rest = self.calculix("rest", "")
+        self.rate = SPIN_RATIO * 2 * np.pi * rest[0]
+        self.rest = rest
+
+    def calculix(self, job, load):
+        """Frequencies of the blade held at its root, after a static step with large displacements."""
+        static = f"*STEP, NLGEOM\n*STATIC\n*DLOAD\nEALL, CENTRIF, {load}\n*END STEP\n*STEP, PERTURBATION\n" if load else "*STEP\n"
+        text = self.part.mesh() + f"*BOUNDARY\nROOT, 1, 3\n{static}*FREQUENCY\n{MODES}\n*END STEP\n"
+        (self.folder / f"{job}.inp").write_text(text)
+        run(self.ccx, "-i", job, cwd=self.folder)
+        lines = (self.folder / f"{job}.dat").read_text().split("E I G E N V A L U E   O U T P U T")[-1].splitlines()
+        table = [line.split() for line in lines if len(line.split()) == 5 and line.split()[0].isdigit()]
+        return np.array([float(row[3]) for row in table[:MODES]])
+
+    def spinning(self):
+        axis = ", ".join(f"{value:.15g}" for value in self.axis)
+        return self.calculix("spin", f"{self.rate**2:.15g}, 0., 0., 0., {axis}")
+
+    def squared(self):
+        """w (w x): the matrix of w x (w x x)."""
+        x, y, z = self.rate * self.axis
+        skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        return skew @ skew
+
+    def all_nodes(self, stiffened=True):
+        """Frequencies of the held nodal equations with K_geo of all loads and the softening of the mass."""
+        part = self.part
+        k = part.matrices(self.folder)
+        m = full(self.folder / "job.mas", *part.rows(self.folder / "job.dof"))
+        turn = self.squared()
+        # The reaction at the root, about its reference point.
+        force = m @ (part.points @ turn.T).ravel()
+        reaction = part.rigid(part.reference("root")).T @ force
+        stiffness = k + m @ sp.kron(sp.identity(len(part.ids)), turn)
+        if stiffened:
+            w = self.rate * self.axis
+            for kind, axis, interface, matrix in given(part, self.folder):
+                if kind == "spin":
+                    a, b = ("xyz".index(letter) for letter in axis)
+                    stiffness = stiffness + w[a] * w[b] * matrix
+                elif interface == "root":
+                    stiffness = stiffness + reaction["xyz".index(axis) + (3 if kind == "moment" else 0)] * matrix
+        held = np.zeros(3 * len(part.ids), bool)
+        held[(3 * part.ends["root"][:, None] + np.arange(3)).ravel()] = True
+        return frequencies(stiffness.tocsr()[~held][:, ~held].toarray(), m[~held][:, ~held].toarray())
+
+    def body(self, stiffened=True):
+        """Frequencies of the body on its rotor: K_ff with the geometric stiffness of spin and reaction, less W2 (theory 7.1 and 7.6)."""
+        with h5py.File(self.folder / "body.flex.h5") as file:
+            stiffness, w2, modal_mass, inertia, c, mass = (
+                file["invariants"][name][()] for name in ("modal_stiffness", "W2", "modal_mass", "I0", "first_moment", "mass")
+            )
+            origin, axes = file["frame/origin"][()], file["frame/axes"][()]
+            matrices = {name: group["stiffness"][()] for name, group in file["geometric_stiffness"].items()}
+        nf, w = len(stiffness), axes.T @ (self.rate * self.axis)
+        a = np.cross(w, np.cross(w, axes.T @ origin))
+        force = mass * a + np.cross(w, np.cross(w, c))
+        moment = np.cross(c, a) + np.cross(w, inertia @ w)
+        stiffness = stiffness - sum(w[k] * w[l] * w2[k * nf : (k + 1) * nf, l * nf : (l + 1) * nf] for k in range(3) for l in range(3))
+        if stiffened:
+            for k, l in SPIN:
+                stiffness = stiffness + w[k] * w[l] * matrices[f"spin_{'xyz'[k]}{'xyz'[l]}"]
+            for k in range(3):
+                stiffness = stiffness + force[k] * matrices[f"force_{'xyz'[k]}_root"] + moment[k] * matrices[f"moment_{'xyz'[k]}_root"]
+        return frequencies(stiffness, modal_mass)
+
+    def compliance(self, body):
+        """Deflection of the tip along the rotor axis under a unit force there, on the spinning blade: by simulate, from static equilibrium."""
+        deflections = []
+        for force in (0.0, 1.0):
+            vector = ", ".join(f"{value:.15g}" for value in force * self.axis)
+            axis = ", ".join(f"{value:.15g}" for value in self.axis)
+            scene = f"""[run]
+duration = 1e-9
+outputs = 1
+[initial]
+deformation = "static"
+[carried]
+interface = "root"
+[carried.spin]
+axis = [{axis}]
+through = [0, 0, 0]
+rate = {self.rate:.15g}
+[[load]]
+interface = "tip"
+force = [{vector}]
+axes = "model"
+[[watch]]
+interface = "tip"
+"""
+            (self.folder / "scene.toml").write_text(scene)
+            told = run(self.flexbody, "simulate", body, "--scene", "scene.toml", "-o", "run.h5", cwd=self.folder)
+            assert "FB547" not in told and ("FB542" in told) == (body != "body.flex.h5"), told
+            with h5py.File(self.folder / "run.h5") as file:
+                deflections.append(file["points/interface tip/deflection"][0] @ self.axis)
+        return deflections[1] - deflections[0]
+
+    def compliance_of_calculix(self):
+        """The same by CalculiX with large displacements."""
+        deflections = []
+        axis = ", ".join(f"{value:.15g}" for value in self.axis)
+        distribution = self.part.at("tip")[:, :3] @ self.axis
+        for force in (0.0, 1.0):
+            load = "".join(f"{self.part.ids[row // 3]}, {row % 3 + 1}, {force * value:.13e}\n" for row, value in enumerate(distribution) if abs(value) > 1e-12)
+            text = self.part.mesh() + f"*BOUNDARY\nROOT, 1, 3\n*STEP, NLGEOM\n*STATIC\n*DLOAD\nEALL, CENTRIF, {self.rate**2:.15g}, 0., 0., 0., {axis}\n"
+            text += f"*CLOAD\n{load}*NODE PRINT, NSET=TIP\nU\n*END STEP\n"
+            (self.folder / "pushed.inp").write_text(text)
+            run(self.ccx, "-i", "pushed", cwd=self.folder)
+            table = (self.folder / "pushed.dat").read_text().split("displacements")[-1].splitlines()[1:]
+            moved = {int(words[0]): np.array([float(word) for word in words[1:4]]) for words in map(str.split, table) if len(words) == 4}
+            mean = np.mean([moved[self.part.ids[node]] for node in self.part.ends["tip"]], axis=0)
+            deflections.append(mean @ self.axis)
+        return deflections[1] - deflections[0]
+
+
+def frequencies(stiffness, mass):
+    values = la.eigh((stiffness + stiffness.T) / 2, (mass + mass.T) / 2, eigvals_only=True, subset_by_index=[0, MODES - 1])
+    return np.sqrt(np.maximum(values, 0)) / (2 * np.pi)
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--program", default=os.environ.get("FLEXBODY", ROOT / "target/release/flexbody"), type=Path)
+    options.add_argument("--output", default=ROOT / "docs/validation/geometric_stiffness.md", type=Path)
+    chosen = options.parse_args()
+    ccx = shutil.which(os.environ.get("CCX", "ccx")) or sys.exit("CalculiX (ccx) is not found: apt install calculix-ccx")
+    version = subprocess.run([ccx, "-v"], capture_output=True, text=True).stdout.split()[-1]
+    with tempfile.TemporaryDirectory() as folder:
+        text = page(chosen.program.resolve(), ccx, Path(folder)).replace("{calculix}", version)
+    chosen.output.write_text(text)
+
+
+def page(flexbody, ccx, folder):
+    out = HEAD
+    for kind, name, nodes, count, worst in rows_of_kinds(flexbody, ccx, folder):
+        out += f"| {kind} | {name} | {nodes} | {count} | {worst:.1e} |\n"
+    built = Blade(flexbody, ccx, folder / "blade")
+    theirs, nodal = built.spinning(), built.all_nodes()
+    body, without = built.body(), built.body(stiffened=False)
+    moved = Blade(flexbody, ccx, folder / "moved", "mm", turned())
+    assert abs(moved.body() / body - 1).max() < 1e-5, (moved.body(), body)
+    out += f"""
+## A blade under spin
+
+A twisted and tapered blade of C3D20, {len(built.part.ids)} nodes, 0.3 m long on a hub of 0.2 m radius, held at its root, at {built.rate / 2 / np.pi:.1f} Hz, {SPIN_RATIO} of its first frequency at rest. CalculiX: `*STEP, NLGEOM` with `*DLOAD`, CENTRIF, then
+`*STEP, PERTURBATION` with `*FREQUENCY`. All nodes: K, the geometric stiffness of the script for spin and reaction, less the softening of M, held at the root. Body: 24 modes of Craig-Bampton, with the frame on the root. Neither has gyroscopic terms.
+
+| mode | at rest, Hz | CalculiX, Hz | body, Hz | body less CalculiX | body less all nodes | without geometric stiffness |
+|---|---|---|---|---|---|---|
+"""
+    for mode in range(MODES):
+        apart = [f"{100 * (value / theirs[mode] - 1):+.2f} %" for value in (body[mode], without[mode])]
+        out += f"| {mode + 1} | {built.rest[mode]:.2f} | {theirs[mode]:.2f} | {body[mode]:.2f} | {apart[0]} | {body[mode] / nodal[mode] - 1:.1e} | {apart[1]} |\n"
+    run(flexbody, "convert", "model.toml", "--basis", "craig-bampton", "--frame", "interface=root", "--modes", 24, "--lumped", "none", "-o", "soft.flex.h5", cwd=built.folder)
+    stiff, soft, wanted = built.compliance("body.flex.h5"), built.compliance("soft.flex.h5"), built.compliance_of_calculix()
+    out += f"""
+Turned in space and in mm, tonne, s the body has the same frequencies within {abs(moved.body() / body - 1).max():.0e}.
+
+Deflection of the tip along the rotor axis per force there, on the spinning blade, by `flexbody simulate` from static equilibrium: {100 * (stiff / wanted - 1):+.2f} % from CalculiX with large displacements, {100 * (soft / wanted - 1):+.1f} % without geometric
+stiffness.
+"""
+    return out
+
+
+if __name__ == "__main__":
+    main()
