@@ -79,7 +79,7 @@ def rows_of_kinds(flexbody, ccx, folder):
 class Blade:
     """The blade of C3D20 on its rotor: frequencies of CalculiX, of all nodes with our K_geo, and of the body."""
 
-    def __init__(self, flexbody, ccx, folder, units="m", turn=np.eye(3), cells=(12, 2, 1)):
+    def __init__(self, flexbody, ccx, folder, units="m", turn=np.eye(3), cells=(8, 2, 1)):
         self.part, self.folder, self.ccx, self.flexbody = Part("C3D20", cells, blade, units, turn), folder, ccx, flexbody
         self.axis = turn @ np.array([0.0, 0.0, 1.0])
         self.part.write(folder, "rigid")
@@ -96,9 +96,7 @@ class Blade:
         text = self.part.mesh() + f"*BOUNDARY\nROOT, 1, 3\n{static}*FREQUENCY\n{MODES}\n*END STEP\n"
         (self.folder / f"{job}.inp").write_text(text)
         run(self.ccx, "-i", job, cwd=self.folder)
-        lines = (self.folder / f"{job}.dat").read_text().split("E I G E N V A L U E   O U T P U T")[-1].splitlines()
-        table = [line.split() for line in lines if len(line.split()) == 5 and line.split()[0].isdigit()]
-        return np.array([float(row[3]) for row in table[:MODES]])
+        return printed_frequencies(self.folder / f"{job}.dat")
 
     def spinning(self):
         axis = ", ".join(f"{value:.15g}" for value in self.axis)
@@ -201,6 +199,52 @@ interface = "tip"
         return deflections[1] - deflections[0]
 
 
+class Plate:
+    """A free plate with a stress that its middle was welded with: frequencies by the steps of the page on preload, and of CalculiX with large displacements."""
+
+    SIZE = (0.2, 0.15, 0.004)
+
+    def __init__(self, flexbody, ccx, folder):
+        self.flexbody, self.ccx, self.folder = flexbody, ccx, folder
+        self.part = Part("C3D20", (6, 4, 1), lambda x, y, z: np.array([x, y, z - 0.5]) * self.SIZE)
+        self.part.write(folder, "averaging")
+        middle = [e for e, nodes in enumerate(self.part.elements, 1) if (abs(self.part.lattice[nodes].mean(axis=0)[:2] - 0.5) < (0.34, 0.26)).all()]
+        self.stress = "*INITIAL CONDITIONS, TYPE=STRESS\n" + "".join(f"{e}, {point}, 60e6, 60e6, 0., 0., 0., 0.\n" for e in middle for point in range(1, 28))
+        a, b, c = (self.part.ids[np.argmin(((self.part.points - np.multiply(at, self.SIZE)) ** 2).sum(axis=1))] for at in ((0, 0, -0.5), (1, 0, -0.5), (0, 1, -0.5)))
+        self.supports = f"*BOUNDARY\n{a}, 1, 3\n{b}, 2, 3\n{c}, 3, 3\n"
+
+    def run(self, job, text):
+        (self.folder / f"{job}.inp").write_text(self.part.mesh() + text)
+        run(self.ccx, "-i", job, cwd=self.folder)
+
+    def body(self):
+        """Frequencies of the body whose stiffness has the stress in equilibrium, and of the body without."""
+        self.run("equilibrium", f"{self.stress}{self.supports}*STEP\n*STATIC\n*EL PRINT, ELSET=EALL, GLOBAL=YES\nS\n*END STEP\n")
+        printed = [line.split() for line in (self.folder / "equilibrium.dat").read_text().splitlines()]
+        points = "".join(", ".join(words) + "\n" for words in printed if len(words) == 8 and words[0].isdigit())
+        held = "*STEP\n*STATIC\n*BOUNDARY\nNALL, 1, 3\n*END STEP\n*STEP, PERTURBATION\n*FREQUENCY, SOLVER=MATRIXSTORAGE\n4\n*BOUNDARY, OP=NEW\n*END STEP\n"
+        self.run("preloaded", f"*INITIAL CONDITIONS, TYPE=STRESS\n{points}{held}")
+        self.run("job", "*STEP\n*FREQUENCY, SOLVER=MATRIXSTORAGE\n4\n*END STEP\n")
+        found = []
+        for job in ("preloaded", "job"):
+            run(self.flexbody, "convert", f"{job}.inp", "--units", "m,kg,s", "--modes", MODES, "--lumped", "none", "-o", f"{job}.flex.h5", cwd=self.folder)
+            with h5py.File(self.folder / f"{job}.flex.h5") as file:
+                found.append(np.sqrt(file["modes/eigenvalue"][()]) / 2 / np.pi)
+        return found
+
+    def calculix(self):
+        self.run("large", f"{self.stress}{self.supports}*STEP, NLGEOM\n*STATIC\n*END STEP\n*STEP, PERTURBATION\n*FREQUENCY\n{MODES + 6}\n*BOUNDARY, OP=NEW\n*END STEP\n")
+        return printed_frequencies(self.folder / "large.dat")[6:]
+
+
+def printed_frequencies(path):
+    """Frequencies of the last table of CalculiX."""
+    lines = path.read_text().split("E I G E N V A L U E   O U T P U T")[-1].splitlines()
+    table = [line.split() for line in lines if len(line.split()) == 5 and line.split()[0].isdigit()]
+    count = next((at for at, row in enumerate(table) if int(row[0]) != at + 1), len(table))
+    return np.array([float(row[3]) for row in table[:count]])
+
+
 def frequencies(stiffness, mass):
     values = la.eigh((stiffness + stiffness.T) / 2, (mass + mass.T) / 2, eigvals_only=True, subset_by_index=[0, MODES - 1])
     return np.sqrt(np.maximum(values, 0)) / (2 * np.pi)
@@ -246,7 +290,19 @@ Turned in space and in mm, tonne, s the body has the same frequencies within {ab
 
 Deflection of the tip along the rotor axis per force there, on the spinning blade, by `flexbody simulate` from static equilibrium: {100 * (stiff / wanted - 1):+.2f} % from CalculiX with large displacements, {100 * (soft / wanted - 1):+.1f} % without geometric
 stiffness.
+
+## A plate with preload
+
+A free plate of C3D20, {1000 * Plate.SIZE[0]:.0f} x {1000 * Plate.SIZE[1]:.0f} x {1000 * Plate.SIZE[2]:.0f} mm, whose middle has an initial stress of 60 MPa along both sides, by the steps of [parts with a preload](../how_to/geometric_stiffness.md#parts-with-a-preload). CalculiX:
+`*STEP, NLGEOM` with `*STATIC`, then `*STEP, PERTURBATION` with `*FREQUENCY`.
+
+| mode | without preload, Hz | CalculiX, Hz | body, Hz | body less CalculiX |
+|---|---|---|---|---|
 """
+    plate = Plate(flexbody, ccx, folder / "plate")
+    (loaded, plain), theirs = plate.body(), plate.calculix()
+    for mode in range(MODES):
+        out += f"| {mode + 1} | {plain[mode]:.2f} | {theirs[mode]:.2f} | {loaded[mode]:.2f} | {100 * (loaded[mode] / theirs[mode] - 1):+.3f} % |\n"
     return out
 
 
