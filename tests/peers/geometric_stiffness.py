@@ -19,7 +19,7 @@ def rows(flexbody, folder):
     blade = page.Blade(flexbody, ccx, folder / "blade")
     body, theirs = blade.body(), blade.spinning()
     found.append(Row(version, "C3D20", "frequencies of a spinning blade beside CalculiX with large displacements", float(abs(body / theirs - 1).max()), 7e-3))
-    found.append(Row(version, "C3D20", "frequencies of a spinning blade beside all nodes", float(abs(body / blade.all_nodes() - 1).max()), 1e-4))
+    found.append(Row(version, "C3D20", "frequencies of a spinning blade beside all nodes", float(abs(body / blade.all_nodes() - 1).max()), 3e-4))
     found.append(Row(version, "C3D20", "compliance of a spinning blade beside CalculiX with large displacements", float(abs(blade.compliance("body.flex.h5") / blade.compliance_of_calculix() - 1)), 1e-2))
     plate = page.Plate(flexbody, ccx, folder / "plate")
     preloaded, _ = plate.body()
