@@ -62,7 +62,7 @@ impl Judged<'_> {
     /// Returns an error if translations cause forces in proportion to mass: the matrix was assembled while a
     /// centrifugal load acted, and holds its change with displacement.
     fn softening(&self, matrix: &SymmetricMatrix) -> Option<Diagnostic> {
-        let is_resisted = self.relations.translation.share > MIN_REPORTED_ERROR.max(self.relations.rounding);
+        let is_resisted = self.relations.translation.share > MIN_REPORTED_ERROR;
         let rate = is_resisted.then(|| like_mass(self.model, matrix)).flatten()?;
         let message = format!(
             "geometric stiffness for {} resists translation by {rate:.3e} times the mass: it holds the softening of a centrifugal load, which belongs to W2",

@@ -282,6 +282,30 @@ fn the_difference_of_tangents_is_refused_for_every_load() {
     }
 }
 
+/// A centrifugal load that is active when the tangent is assembled adds minus its change with displacement.
+#[test]
+fn the_softening_of_a_centrifugal_load_is_refused_by_its_name() {
+    for is_held in [false, true] {
+        let (mesh, body) = solid(is_held);
+        let all = loads(&body);
+        let spins = all.iter().filter(|one| one.0 == LoadKind::Spin);
+        for (kind, component, load) in spins {
+            let (k, l) = LoadKind::SPIN[*component];
+            let skew = |k: usize| Vector3::ith(k, 1.0).cross_matrix();
+            let twice: Matrix3<f64> =
+                if k == l { skew(k) * skew(k) } else { skew(k) * skew(l) + skew(l) * skew(k) };
+            let softening = &body.m
+                * DMatrix::from_fn(body.m.nrows(), body.m.nrows(), |i, j| {
+                    if i / 3 == j / 3 { twice[(i % 3, j % 3)] } else { 0.0 }
+                });
+            let matrix = stress_stiffness(&mesh, &body.response(load)) + softening;
+            let (codes, text) = body.told(kind.clone(), *component, &matrix);
+            assert_eq!(codes, [Code::GeometricStiffnessMotion], "held {is_held}, {component}: {text}");
+            assert!(text.contains("softening of a centrifugal load"), "held {is_held}, {component}: {text}");
+        }
+    }
+}
+
 #[test]
 fn free_expansion_has_no_stress_and_only_the_blocks_tell() {
     let (mesh, body) = solid(false);
