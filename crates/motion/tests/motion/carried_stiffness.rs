@@ -33,7 +33,6 @@ struct Bar {
     tip: DMatrix<f64>,
     /// Reference point of the root.
     origin: Vector3<f64>,
-    tip_at: Vector3<f64>,
 }
 
 fn dense(matrix: &CscMatrix) -> DMatrix<f64> {
@@ -77,9 +76,9 @@ impl Bar {
                 set.nodes.iter().map(|&id| Vector3::from(mesh.nodes[id as usize - 1])).sum();
             sum / set.nodes.len() as f64
         };
-        let (root, tip, origin, tip_at) = (loads("root"), loads("tip"), place("root"), place("tip"));
+        let (root, tip, origin) = (loads("root"), loads("tip"), place("root"));
         let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
-        Self { mesh, raw, k, m, root, tip, origin, tip_at }
+        Self { mesh, raw, k, m, root, tip, origin }
     }
 
     /// Returns rigid motions about the root (3n x 6).

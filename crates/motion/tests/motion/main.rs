@@ -3,8 +3,8 @@
 #![allow(unreachable_pub)] // tests export nothing
 
 mod body_units;
-mod definiteness;
 mod carried_stiffness;
+mod definiteness;
 mod dynamics;
 mod dynamics_conservation;
 mod dynamics_forms;
