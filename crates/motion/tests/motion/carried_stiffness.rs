@@ -70,13 +70,10 @@ impl Bar {
         let loads = |name: &str| {
             converted_matrix(&interface_loads(&model, name).expect("loads").expect("a reference point"))
         };
-        let place = |name: &str| {
-            let set = raw.interfaces.iter().find(|set| set.name == name).expect("an interface");
-            let sum: Vector3<f64> =
-                set.nodes.iter().map(|&id| Vector3::from(mesh.nodes[id as usize - 1])).sum();
-            sum / set.nodes.len() as f64
-        };
-        let (root, tip, origin) = (loads("root"), loads("tip"), place("root"));
+        let set = raw.interfaces.iter().find(|set| set.name == "root").expect("an interface");
+        let sum: Vector3<f64> = set.nodes.iter().map(|&id| Vector3::from(mesh.nodes[id as usize - 1])).sum();
+        let origin = sum / set.nodes.len() as f64;
+        let (root, tip) = (loads("root"), loads("tip"));
         let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
         Self { mesh, raw, k, m, root, tip, origin }
     }
