@@ -6,6 +6,7 @@ version="$1" archive="$2" out="$3"
 work="$(mktemp -d)"
 trap 'rm -rf "$work"' EXIT
 root="$work/root"
+maintainer="${DEBFULLNAME:-flexbody developers} <${DEBEMAIL:-root@localhost}>"
 share="$root/usr/share"
 
 install -D -m 755 "$archive/flexbody" "$root/usr/bin/flexbody"
@@ -15,14 +16,20 @@ gzip -n9 "$share"/man/man1/*.1
 install -D -m 644 "$archive/completions/flexbody.bash" "$share/bash-completion/completions/flexbody"
 install -D -m 644 "$archive/completions/flexbody.zsh" "$share/zsh/vendor-completions/_flexbody"
 install -D -m 644 "$archive/completions/flexbody.fish" "$share/fish/vendor_completions.d/flexbody.fish"
-install -m 644 "$archive/README.md" "$archive/CITATION.cff" "$share/doc/flexbody"
-gzip -n9 <"$archive/CHANGELOG.md" >"$share/doc/flexbody/changelog.gz"
+install -m 644 "$archive"/{README.md,CHANGELOG.md,CITATION.cff} "$share/doc/flexbody"
+gzip -n9 <"$archive/LICENCES-OF-DEPENDENCIES.txt" >"$share/doc/flexbody/LICENCES-OF-DEPENDENCIES.txt.gz"
+gzip -n9 >"$share/doc/flexbody/changelog.gz" <<EOF
+flexbody ($version) unstable; urgency=medium
+
+  * Changes are in CHANGELOG.md.
+
+ -- $maintainer  $(LC_ALL=C date --utc --rfc-email --date "@${SOURCE_DATE_EPOCH:-0}")
+EOF
 {
     printf 'flexbody is licensed by MIT or Apache-2.0, at the choice of the user. On Debian systems the Apache-2.0 licence is\n'
     printf 'in /usr/share/common-licenses/Apache-2.0. The MIT licence:\n\n'
     cat "$archive/LICENSE-MIT"
-    printf '\nThe program contains the libraries below.\n\n'
-    cat "$archive/LICENCES-OF-DEPENDENCIES.txt"
+    printf '\nThe licences of the libraries that the program contains are in LICENCES-OF-DEPENDENCIES.txt.gz, beside this file.\n'
 } >"$share/doc/flexbody/copyright"
 install -D -m 644 /dev/stdin "$share/lintian/overrides/flexbody" <<'EOF'
 # The program is built against no library of the distribution: it runs on all of them.
@@ -33,7 +40,7 @@ cat >"$root/DEBIAN/control" <<EOF
 Package: flexbody
 Version: $version
 Architecture: amd64
-Maintainer: ${DEBFULLNAME:-flexbody developers} <${DEBEMAIL:-root@localhost}>
+Maintainer: $maintainer
 Section: science
 Priority: optional
 Installed-Size: $(du -sk --apparent-size "$root/usr" | cut -f1)
