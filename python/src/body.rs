@@ -377,7 +377,7 @@ impl Body {
             options = options.scene(&Scene::whole(scene)?);
         }
         if let Some(allowed) = allow_loss.filter(|allowed| !allowed.is_instance_of::<PyBool>()) {
-            options = value(options.allow_losses_of(texts(allowed, "allow_loss")?))?;
+            options = value(py, options.allow_losses_of(texts(allowed, "allow_loss")?))?;
         } else if allow_loss.map(|any| any.extract()).transpose()?.unwrap_or(false) {
             options = options.allow_loss();
         }

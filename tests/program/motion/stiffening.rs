@@ -178,7 +178,12 @@ fn stress_stiffness_of_calculix_is_that_of_element_code() {
             let expected = reference.stress_stiffness(&load);
             let error = (reference.by_nodes(&one.matrix.matrix) - &expected).amax() / expected.amax();
             println!("{kind} {}: {error:.1e}, {} digits", one.load, one.matrix.digits);
-            assert!(error < 1e-6 && one.matrix.digits >= 12, "{kind} {}: {error:e}", one.load);
+            assert!(
+                error < 1e-6 && one.matrix.digits >= 10,
+                "{kind} {}: {error:e}, {} digits",
+                one.load,
+                one.matrix.digits
+            );
         }
     }
 }
