@@ -4,7 +4,7 @@
 #   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/reference/codes.md, docs/reference/file_format.md, schemas
 #   ./scripts/make.sh pages [NAME]     pages of docs/validation, docs/reference/python.md and pictures; without NAME all of them (some hours). NAME:
 #                                      accuracy, craig_bampton, cutoff, dynamics, embedded, geometric_stiffness, peers, performance, plausibility, python, recovery, seeds, stability,
-#                                      trade, verdicts [COUNT], image_response, image_simulation, image_terminal, image_tutorial, image_view, image_vtk
+#                                      trade, verdicts [SEEDS], image_response, image_simulation, image_terminal, image_tutorial, image_view, image_vtk
 #   ./scripts/make.sh fixtures NAME    fixtures: models, general, frames, broken, foreign, jobs, modes, open, ... (fixtures/make/make_NAME.py; its head says what it needs)
 #   ./scripts/make.sh site             the documentation as a site
 #   ./scripts/make.sh wheel            the Python package
@@ -46,7 +46,7 @@ pages)
     peers) "${PYTHON:-python3}" tests/peers/suite.py --install --write ;;
     performance) ./benches/page.sh ;;
     plausibility) cargo run --release --locked --example plausibility ;;
-    verdicts) FLEXBODY_BLESS=1 FLEXBODY_VERDICTS="${3:-600}" cargo test --release --locked --package flexbody-study random_verdicts -- --include-ignored ;;
+    verdicts) FLEXBODY_BLESS=1 FLEXBODY_VERDICTS="${3:-100}" cargo test --release --locked --package flexbody-study random_verdicts -- --include-ignored ;;
     "")
         for script in scripts/pages/make_*.py scripts/pages/image_*.py; do "${PYTHON:-python3}" "$script"; done
         for page in craig_bampton dynamics embedded peers performance plausibility verdicts; do ./scripts/make.sh pages "$page"; done

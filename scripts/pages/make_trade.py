@@ -296,7 +296,7 @@ def too_long(told, times):
     steps, periods = one.runs["exudyn"].steps, np.sqrt([one.task.eigenvalue.min(), one.task.eigenvalue.max()]) / (2 * np.pi) * one.task.duration
     return [
         f"Errors in **bold**: no number of steps that was tried is enough (in Exudyn up to {InExudyn.most:,}, in C up to {InC.most:,}). The recommended body has {periods[0]:.0f} periods of its lowest and {periods[1]:.0f} of its highest mode in this scene; with {steps:,} steps "
-        f"Exudyn takes {steps / periods[1]:.0f} steps per period of the highest one, and the error in phase of a method of order 2 adds up over the periods."
+        f"Exudyn takes {steps / periods[1]:.0f} steps per period of the highest one, and the errors of a method of order 2 in phase, and its numerical damping, add up over the periods."
     ]
 
 
@@ -533,11 +533,15 @@ def main():
     parser.add_argument("--only", nargs="+", choices=names, metavar="PART", help=f"measure these parts and keep the rest of the page: {', '.join(names)}")
     args = parser.parse_args()
     program = str(Path(args.program).resolve())  # it runs in another folder
-    parts = read_page(args.output.read_text(encoding="utf-8")) if args.only else {}
+    parts = {}
     for name, make in jobs(program).items():
         # One after the other: the times are measured.
         if not args.only or name in args.only:
-            parts[name] = make()
+            made = make()
+            if args.only:
+                # Another run may have written the page meanwhile.
+                parts = read_page(args.output.read_text(encoding="utf-8"))
+            parts[name] = made
             args.output.write_text(assembled(parts), encoding="utf-8")
             print(name, flush=True)
     print(args.output)
