@@ -293,6 +293,8 @@ def too_long(told, times):
     one = times[told["recommended"] or usual(told)]
     if one.meets.get("exudyn", True):
         return []
+    if one.task.is_stiffened:
+        return ["Errors in **bold**: no number of steps is enough. The body has geometric stiffness, which Exudyn does not have: the error of its runs does not depend on the step."]
     steps, periods = one.runs["exudyn"].steps, np.sqrt([one.task.eigenvalue.min(), one.task.eigenvalue.max()]) / (2 * np.pi) * one.task.duration
     return [
         f"Errors in **bold**: no number of steps that was tried is enough (in Exudyn up to {InExudyn.most:,}, in C up to {InC.most:,}). The recommended body has {periods[0]:.0f} periods of its lowest and {periods[1]:.0f} of its highest mode in this scene; with {steps:,} steps "

@@ -51,6 +51,8 @@ class Task:
             self.axes = file["frame/axes"][()]
             self.eigenvalue = file["modes/eigenvalue"][()]
             self.interfaces = list(file.get("interfaces", {}))
+            self.mass = float(np.ravel(file["invariants/mass"][()])[0])
+            self.is_stiffened = len(file.get("geometric_stiffness", ())) > 0
         self.path, self.scene, self.nf = path, scene, len(self.eigenvalue)
         self.duration = scene["run"]["duration"]
         self.ratio = scene.get("damping", {}).get("ratio", 0.0)
@@ -451,8 +453,10 @@ class InC:
             return "    return flexbody_body_accelerations(&e, applied, d + 4) != FLEXBODY_BODY_OK;"
         # The modal mass is the identity, and free modes do not move the centre of mass: what is driven takes no part in the solution.
         slope = in_c(self.task.scene["spin"]["rate"], rate=True)
+        # The centre of mass accelerates by the loads unless it is held: geometric stiffness depends on it.
+        pushed = "" if self.task.spin[2] else f"    for (int k = 0; k < 3; k++) prescribed[k] = applied[k] / {self.task.mass!r};\n"
         return f"""    double prescribed[NV] = {{0}}, force[NV];
-    for (int k = 0; k < 3; k++) prescribed[3 + k] = axis[k] * ({slope});
+{pushed}    for (int k = 0; k < 3; k++) prescribed[3 + k] = axis[k] * ({slope});
     flexbody_body_balance(&e, prescribed, force);
     memset(d + 4, 0, RIGID * sizeof(double));
     for (int j = 0; j < NF; j++) d[4 + RIGID + j] = applied[RIGID + j] - force[RIGID + j];
