@@ -73,8 +73,7 @@ impl FlexBody {
     /// axes are those of the model, and the carrier is at rest in every mode (see the module
     /// documentation). A body already carried there keeps its modes.
     ///
-    /// Geometric stiffness includes that of the reaction at the carrier, where it is given (see
-    /// [`super::carried_stiffness`]). It is dropped if the carrier moves in the modes of this body: the
+    /// Geometric stiffness includes that of the reaction at the carrier, where it is given (theory 7.6). It is dropped if the carrier moves in the modes of this body: the
     /// geometric stiffness of the rigid motion that is removed from them is not known. The stiffness of
     /// inertia follows from the moments of the nodes and their rotations relative to the carrier.
     ///

@@ -28,7 +28,7 @@ pub fn indefinite_inertia(body: &FlexBody) -> Option<Diagnostic> {
 /// Returns a deflection of a node at which the mass matrix of a body with W3 and without W2 stops being positive
 /// definite: the smallest over the principal axes e of the deformations with the largest |Q'W3 e|. Returns `None` if
 /// the body holds W2 or no W3, or if its mass matrix is positive definite for all of them up to
-/// [`LARGEST_DEFLECTION`].
+/// 0.1 of the extent of the body.
 pub fn deflection_of_indefinite_inertia(body: &FlexBody) -> Option<f64> {
     let groups = body.groups();
     if groups.w2 || !groups.w3 {
