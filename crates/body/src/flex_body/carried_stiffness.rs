@@ -9,8 +9,8 @@
 //! ```
 //!
 //! so that the geometric stiffness of the reaction becomes a part of that of the motion and of the loads.
-//! Where none is given for loads at the carrier, that of the motion includes the reaction: it was computed
-//! with the carrier held.
+//! If no geometric stiffness is given for loads at the carrier, the one of the motion includes the reaction,
+//! because it was computed with the carrier held.
 
 use super::{Carrier, FlexBody, GeometricStiffness, LoadKind, UnitLoad};
 use faer::{Mat, Scale};

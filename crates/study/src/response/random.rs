@@ -97,7 +97,8 @@ pub struct RandomRecovery {
 pub struct RandomErrors {
     /// Largest root mean square of the difference of a row, relative to the largest of the rows of its unit.
     pub rows: f64,
-    /// Largest root mean square of the difference of the equivalent stress of von Mises, relative to the largest; `None` without points.
+    /// Largest root mean square of the difference of the equivalent stress of von Mises, relative to the largest;
+    /// `None` without points.
     pub von_mises: Option<f64>,
 }
 

@@ -12,3 +12,4 @@ mod reference;
 mod scene_frames;
 mod selection_bounds;
 mod selection_verdicts;
+mod skewed_beam;

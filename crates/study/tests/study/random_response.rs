@@ -1,19 +1,18 @@
 //! Rows of recoveries in frequency responses, accelerated interfaces, and random vibration, beside dense solutions of the
 //! equations of all nodes and closed forms.
 
+use crate::skewed_beam::skewed_beam;
 use faer::Mat;
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
-use flexbody_model::{Coupling, FeModel, NodeSet, RawModel, RecoveryOperator};
+use flexbody_model::{FeModel, RecoveryOperator};
 use flexbody_motion::dynamics::NodalPoint;
 use flexbody_motion::scene::StressPoint;
 use flexbody_study::response::{Band, Direction, Place, RandomResponse, Response, ResponseRequest};
 use nalgebra::{Complex, DMatrix};
-use oracle::elements::{ElementKind, MassRule, Material};
-use oracle::mesh::{Mesh, grid};
 use std::f64::consts::TAU;
 
 /// Ratio of the damping of every mode.
@@ -21,19 +20,7 @@ const RATIO: f64 = 0.02;
 
 /// Returns a skewed rubber beam with its stresses and an interface at each end.
 fn model() -> FeModel {
-    let rubber = Material { youngs: 4.0e4, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([4, 1, 1]), |[x, y, z]| {
-        [0.4 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
-    });
-    let raw = mesh.assemble(&rubber, MassRule::Consistent).raw_model();
-    let set = |name: &str, inside: &dyn Fn(f64) -> bool| {
-        let nodes = raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| inside(at[0]));
-        let nodes = nodes.map(|(id, _)| *id).collect();
-        NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new(name, nodes) }
-    };
-    let interfaces = vec![set("root", &|x| x < 0.1), set("tip", &|x| x > 1.55)];
-    let recoveries = vec![mesh.stresses(&rubber)];
-    FeModel::from_raw(RawModel { interfaces, recoveries, ..raw }).expect("a sound model").model
+    FeModel::from_raw(skewed_beam(4.0e4, 4)).expect("a sound model").model
 }
 
 fn body(model: &FeModel, modes: usize) -> FlexBody {

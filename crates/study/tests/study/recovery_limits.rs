@@ -1,6 +1,7 @@
 //! Limits of the errors of recoveries: the measured, bounded and estimated errors beside those of all rows at all
 //! instants and of the equations of all nodes, and selections that hold.
 
+use crate::skewed_beam::skewed_beam;
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::ModeSettings;
@@ -9,9 +10,7 @@ use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
-use flexbody_model::{
-    AnsweredShapes, Coupling, DofLabel, FeModel, ModelRecovery, NodeSet, RawModel, RecoveryOperator,
-};
+use flexbody_model::{AnsweredShapes, DofLabel, FeModel, ModelRecovery, RawModel, RecoveryOperator};
 use flexbody_motion::scene::{
     Axes, Carried, FramedScene, History, Initial, Load, Measure, Point, RecoveryLimit, RecoveryMeasure,
     RecoveryTolerance, Scene, Spin, Trace, VectorHistory, trace, trace_at,
@@ -20,8 +19,6 @@ use flexbody_study::reference::{Enrichment, ReferenceError, enrich};
 use flexbody_study::selection::{Selection, select};
 use flexbody_study::trade::NodalReference;
 use nalgebra::Vector3;
-use oracle::elements::{ElementKind, MassRule, Material};
-use oracle::mesh::{Mesh, grid};
 use oracle::scenes::nothing_happens;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -32,23 +29,12 @@ fn model() -> FeModel {
 }
 
 fn raw_model() -> RawModel {
-    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([5, 1, 1]), |[x, y, z]| {
-        [0.4 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
-    });
-    let raw = mesh.assemble(&rubber, MassRule::Consistent).raw_model();
-    let set = |name: &str, inside: &dyn Fn(f64) -> bool| {
-        let nodes = raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| inside(at[0]));
-        let nodes = nodes.map(|(id, _)| *id).collect();
-        NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new(name, nodes) }
-    };
-    let interfaces = vec![set("root", &|x| x < 0.1), set("tip", &|x| x > 1.95)];
+    let mut raw = skewed_beam(4.0, 5);
     let side =
         raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| at[0] < 0.7).map(|(id, _)| *id);
     let operator = RecoveryOperator::Cut { nodes: side.collect(), about: [0.7, 0.2, 0.1] };
-    let cut = ModelRecovery { name: "cut".to_owned(), operator, path: PathBuf::new() };
-    let recoveries = vec![mesh.stresses(&rubber), cut];
-    RawModel { interfaces, recoveries, ..raw }
+    raw.recoveries.push(ModelRecovery { name: "cut".to_owned(), operator, path: PathBuf::new() });
+    raw
 }
 
 fn body(model: &FeModel, modes: usize) -> FlexBody {
