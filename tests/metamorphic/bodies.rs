@@ -1,6 +1,7 @@
 //! Random bodies: solids, plane bodies, nodes with rotations, singular mass matrices.
 
 use crate::draws::{between, one_in, pick};
+use crate::recoveries;
 use crate::stress::of_spin;
 use flexbody_model::{Coupling, Damping, NodeSet, RawModel, Reference};
 use nalgebra::Vector3;
@@ -37,7 +38,8 @@ pub fn body(kind: usize, random: &mut Random) -> RawModel {
         _ => raw_fixture("plane_frame"),
     };
     let raw = with_ends(raw, kind == 2);
-    RawModel { damping: damping(random), ..raw }
+    let recoveries = recoveries::of(&raw);
+    RawModel { damping: damping(random), recoveries, ..raw }
 }
 
 /// Returns damping of the model in a third of the draws.

@@ -11,6 +11,7 @@ mod features;
 mod matrix;
 mod nodes_in_world;
 mod outputs;
+mod recoveries;
 mod scenes;
 mod shrink;
 mod stress;

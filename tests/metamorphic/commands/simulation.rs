@@ -2,6 +2,7 @@
 
 use super::{LOOKED_AT, STEP_ENDS, findings, number};
 use crate::outputs::{Along, Output, Outputs, Values};
+use crate::recoveries::SECTION;
 use crate::subject::Subject;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -60,6 +61,7 @@ pub fn simulation(subject: &Subject) -> Result<Outputs> {
     places(&recording, &sizes, &mut outputs);
     states(&recording, &sizes, &mut outputs);
     largest(&recording, &sizes, &mut outputs);
+    recovered(&recording, &sizes, &mut outputs);
     outputs.all.extend(findings(&found));
     Ok(outputs)
 }
@@ -157,4 +159,43 @@ fn largest(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
             sizes.deflection,
         ));
     }
+}
+
+/// Adds the rows of the recoveries, and the largest gauge.
+fn recovered(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
+    let Some(recovered) = &recording.recovered else { return };
+    for (map, extremes) in recovered.recoveries.iter().zip(&recovered.extremes) {
+        let rows: Vec<Vec<f64>> = recovered.states.iter().map(|z| map.values(z)).collect();
+        match map.name.as_str() {
+            SECTION => section(&rows, sizes, outputs),
+            name => {
+                let strain = sizes.deflection / sizes.extent;
+                for gauge in 0..map.rows.len() {
+                    let values = Values::Numbers(rows.iter().map(|y| y[gauge]).collect());
+                    let named = format!("{name}, {}", map.rows[gauge].name);
+                    let output = vectors(named, Along::Model, [0; 3], Vec::new(), strain);
+                    outputs.all.push(Output { values, ..output });
+                }
+                let largest = extremes.row.map_or(0.0, |row| row.value.abs());
+                outputs.all.push(peak(&format!("largest of {name}"), [0; 3], largest, strain));
+            }
+        }
+    }
+}
+
+/// Adds force and moment in a section; in the plane they are two forces and the moment about z.
+fn section(rows: &[Vec<f64>], sizes: &Sizes, outputs: &mut Outputs) {
+    let vector = |of: &dyn Fn(&[f64]) -> Vector3<f64>| rows.iter().map(|y| of(y)).collect();
+    let force = vector(&|y| match y.len() {
+        6 => Vector3::new(y[0], y[1], y[2]),
+        _ => Vector3::new(y[0], y[1], 0.0),
+    });
+    let moment = vector(&|y| match y.len() {
+        6 => Vector3::new(y[3], y[4], y[5]),
+        _ => Vector3::new(0.0, 0.0, y[2]),
+    });
+    let least = sizes.force();
+    outputs.all.push(vectors("section force".to_owned(), Along::Model, FORCE, force, least));
+    let moment = vectors("section moment".to_owned(), Along::Model, ENERGY, moment, least * sizes.extent);
+    outputs.all.push(axial(moment));
 }

@@ -5,6 +5,7 @@ use super::moved::Motion;
 use super::world::{extent, turning};
 use crate::correspondence::Correspondence;
 use crate::draws::direction;
+use crate::recoveries;
 use crate::subject::Subject;
 use flexbody_base::error::Result;
 use flexbody_linalg::CscMatrix;
@@ -42,6 +43,7 @@ pub fn renumber(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> 
     changed.raw.nodes.ids.iter_mut().for_each(number);
     changed.raw.dofs.iter_mut().flatten().for_each(|label| number(&mut label.node));
     changed.raw.interfaces.iter_mut().flat_map(|set| &mut set.nodes).for_each(number);
+    recoveries::renumber(&mut changed.raw.recoveries, number);
     let point = |point: &mut Point| {
         if let Point::Node(id) = point {
             number(id);
@@ -74,6 +76,7 @@ pub fn permute(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     for stiffness in &mut changed.raw.geometric_stiffness {
         stiffness.matrix = permuted(&stiffness.matrix);
     }
+    changed.raw.recoveries = recoveries::permuted(raw, &place);
     changed.raw.dofs = Some(order.iter().map(|&old| labels[old]).collect());
     let nodes = random.permutation(raw.nodes.len());
     changed.raw.nodes.ids = nodes.iter().map(|&i| raw.nodes.ids[i]).collect();
@@ -95,7 +98,7 @@ pub fn rows(raw: &RawModel) -> Vec<DofLabel> {
 }
 
 /// Returns for every row of a model the rows of the same vector, and the coefficients of the rotation.
-fn turned_rows(raw: &RawModel, turn: &Matrix3<f64>) -> Vec<Vec<(u32, f64)>> {
+pub fn turned_rows(raw: &RawModel, turn: &Matrix3<f64>) -> Vec<Vec<(u32, f64)>> {
     let labels = rows(raw);
     let place: HashMap<DofLabel, u32> =
         labels.iter().enumerate().map(|(i, &label)| (label, i as u32)).collect();

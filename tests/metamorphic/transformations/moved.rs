@@ -2,6 +2,7 @@
 
 use super::model::{conjugated, geometric};
 use super::scene::start_axes;
+use crate::recoveries;
 use crate::subject::Subject;
 use flexbody_model::{Damping, RawMatrix, RawModel, Reference};
 use flexbody_motion::dynamics::{Orientation, RotationVector};
@@ -58,6 +59,7 @@ impl Motion {
                 set.reference = Reference::Point(self.place(x));
             }
         }
+        moved.recoveries = recoveries::moved(raw, &self.model, |x| self.place(x));
         if self.model != Matrix3::identity() {
             let turned = |matrix: &RawMatrix| RawMatrix {
                 matrix: conjugated(raw, &matrix.matrix, &self.model),

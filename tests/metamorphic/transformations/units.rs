@@ -5,6 +5,7 @@ use super::histories::{Clock, Driven, for_driving};
 use super::model::rows;
 use crate::correspondence::Correspondence;
 use crate::draws::pick;
+use crate::recoveries;
 use crate::subject::Subject;
 use flexbody_base::error::Result;
 use flexbody_base::units::UnitSystem;
@@ -82,6 +83,7 @@ impl Units {
             };
             own.matrix = self.matrix(raw, &own.matrix, self.stiffness() / load);
         }
+        changed.recoveries = recoveries::scaled(raw, self.length);
         changed.units = self.named(&raw.units);
         changed
     }
