@@ -48,6 +48,7 @@ pub fn features(subject: &Subject) -> Vec<&'static str> {
         ("damping of the scene", scene.requirements.damping.is_some()),
         ("damping of the model", subject.raw.damping.is_some()),
         ("geometric stiffness", !subject.raw.geometric_stiffness.is_empty()),
+        ("limit of a recovery", !scene.requirements.recoveries.is_empty()),
         ("reaction", scene.prescribes()),
         ("several cases", subject.cases > 1 || subject.second.is_some()),
         ("attachment", scene.requirements.attachment != Attachment::default()),

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 
 /// Name of the recovery of relative elongations between nodes.
-const GAUGES: &str = "gauges";
+pub const GAUGES: &str = "gauges";
 
 /// Name of the recovery of the forces and moments in a section.
 pub const SECTION: &str = "section";

@@ -2,6 +2,7 @@
 
 use crate::bodies::{self, KINDS, turns};
 use crate::draws::{axis, between, direction, one_in, pick, stream};
+use crate::recoveries;
 use crate::subject::{Basis, Subject};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -11,7 +12,7 @@ use flexbody_model::RawModel;
 use flexbody_motion::dynamics::RotationVector;
 use flexbody_motion::scene::{
     AttachmentKind, Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, PerQuantity,
-    Point, Range, Samples, Scene, Scheme, Spin, VectorHistory, trace,
+    Point, Range, RecoveryLimit, RecoveryTolerance, Samples, Scene, Scheme, Spin, VectorHistory, trace,
 };
 use nalgebra::{Matrix3, Vector3};
 use oracle::random::Random;
@@ -283,7 +284,16 @@ impl Scales<'_> {
             attachment.first_frequency = one_in(self.random, 2).then_some(0.8 * self.rate / TAU);
         }
         let tolerance = 10f64.powf(between(self.random, -2.3, -0.8));
-        scene.requirements.tolerance.errors = PerQuantity::all(tolerance);
+        scene.requirements.tolerance.errors =
+            PerQuantity { recovery: f64::INFINITY, ..PerQuantity::all(tolerance) };
+        if one_in(self.random, 4) {
+            scene.requirements.tolerance.errors.recovery = 1.0;
+            scene.requirements.recoveries = vec![RecoveryTolerance {
+                recovery: recoveries::GAUGES.to_owned(),
+                limit: RecoveryLimit::Relative(10f64.powf(between(self.random, -2.3, -0.8))),
+                static_columns: one_in(self.random, 2),
+            }];
+        }
     }
 }
 

@@ -58,6 +58,7 @@ fn simpler_scenes(scene: &Scene) -> Vec<Scene> {
     }
     with(&|simpler| simpler.gravity = None);
     with(&|simpler| simpler.requirements.damping = None);
+    with(&|simpler| simpler.requirements.recoveries.clear());
     with(&|simpler| simpler.requirements.motion = MotionRange::default());
     with(&|simpler| simpler.requirements.attachment = Attachment::default());
     with(&|simpler| simpler.initial.settled = false);

@@ -1,7 +1,8 @@
 //! Scenes written as files like those of a user.
 
 use flexbody_motion::scene::{
-    Attachment, Axes, Drive, History, Load, Point, Range, Samples, Scene, Scheme, VectorHistory,
+    Attachment, Axes, Drive, History, Load, Point, Range, RecoveryLimit, Samples, Scene, Scheme,
+    VectorHistory,
 };
 use nalgebra::Vector3;
 use std::fmt::Write;
@@ -122,6 +123,14 @@ impl Text {
             "[tolerance]\nattitude = {:?}\ndeflection = {:?}\nstress = {:?}\nreaction = {:?}",
             allowed.attitude, allowed.deflection, allowed.stress, allowed.reaction
         ));
+        for one in &demands.recoveries {
+            // Random limits are relative.
+            let RecoveryLimit::Relative(part) = &one.limit else { continue };
+            self.line(&format!(
+                "recovery.{} = {{ limit = {part:?}, static_columns = {} }}",
+                one.recovery, one.static_columns
+            ));
+        }
     }
 
     fn start(&mut self, scene: &Scene) {
