@@ -9,7 +9,9 @@ use super::trade::accuracy_key;
 use flexbody_body::flex_body::Storage;
 use flexbody_motion::scene::{OutputErrors, Scheme, Tolerance};
 use flexbody_study::reference::ReferenceError;
-use flexbody_study::trade::{InCase, Measured, NodalIntegration, Recommendation, Trade, TradeRow};
+use flexbody_study::trade::{
+    InCase, InVariations, Measured, NodalIntegration, Recommendation, Trade, TradeRow,
+};
 use serde::Serialize;
 
 /// Returns the lines with their labels. `names` are the names of the rows, `tolerances` the tolerances
@@ -102,6 +104,11 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
         Recommendation::MostAccurate(_) => {
             format!("the smallest error of the candidates with so few multiplications ({count} compared)")
         }
+        _ if trade.in_scene != trade.recommended => {
+            format!(
+                "the cheapest of {count} candidates with every error within the tolerances, in the scene and in its variations"
+            )
+        }
         _ => format!("the cheapest of {count} candidates with every error within the tolerances"),
     };
     let cheaper = trade.front.iter().rev().find_map(|&at| {
@@ -109,23 +116,38 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
         (own.multiplications < measured.multiplications).then_some((at, own))
     });
     let Some((at, own)) = cheaper else { return first };
+    format!("{first}; the next cheaper one, {}, {}", names[at], against(trade, own))
+}
+
+/// Returns what speaks against a candidate that is cheaper than the recommended one.
+fn against(trade: &Trade, own: &Measured) -> String {
     let case = &trade.cases[own.case];
     let (output, error, allowed) = own.decisive_case().errors.decisive(&case.tolerance);
     let part = error / allowed;
-    let times = significant(part, 2);
-    let reference = if part <= 1.0 && case.reserved > 0.0 {
-        format!(
+    let fails = own.varied.as_ref().filter(|varied| varied.beyond > 0);
+    if let Some(varied) = fails.filter(|_| part + case.reserved <= 1.0) {
+        return format!("holds in the scene and {}", in_variation(trade, varied));
+    }
+    let reference = match part <= 1.0 && case.reserved > 0.0 {
+        true => format!(
             ", and the error of the reference is another {} times the tolerance",
             significant(case.reserved, 2)
-        )
-    } else {
-        String::new()
+        ),
+        false => String::new(),
     };
-    format!(
-        "{first}; the next cheaper one, {}, has an error in {output} of {times} times the tolerance{}{reference}",
-        names[at],
-        in_case(trade, own)
-    )
+    let times = significant(part, 2);
+    format!("has an error in {output} of {times} times the tolerance{}{reference}", in_case(trade, own))
+}
+
+/// Returns the largest error of a candidate in a variation.
+fn in_variation(trade: &Trade, varied: &InVariations) -> String {
+    let name = &trade.variations[varied.variation].name;
+    if varied.worst <= 1.0 {
+        return format!(
+            "cannot be judged where {name}: the reference differs too much from the FE model there"
+        );
+    }
+    format!("takes {} times the tolerances where {name}", significant(varied.worst, 2))
 }
 
 /// Returns the errors of the recommended row in variations, and a cheaper row that fails there; `None` if no row was
@@ -142,11 +164,7 @@ pub(super) fn varied_line(
     else {
         return Some(words);
     };
-    let (name, times) = (&trade.variations[varied.variation].name, significant(varied.worst, 2));
-    Some(format!(
-        "{words}; cheaper, {} holds in the scene and takes {times} times the tolerances where {name}",
-        names[row]
-    ))
+    Some(format!("{words}; cheaper, {} holds in the scene and {}", names[row], in_variation(trade, varied)))
 }
 
 /// Returns ` in case braking` if there are several load cases; empty otherwise.

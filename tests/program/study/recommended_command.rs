@@ -160,3 +160,33 @@ fn a_missing_folder_of_bodies_is_refused_before_the_study() {
     let told = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(!run.status.success() && told.contains("missing") && !told.contains("--modes"), "{told}");
 }
+
+/// In the scene one mode is enough; a load near the fourth natural frequency needs another one.
+const STATIC_AND_FAST: &str = "[run]\nduration = 2e-3\noutputs = 20\n[initial]\ndeformation = \"static\"\n\
+    [[load]]\nnode = 99\nforce = [300, 0, 0]\naxes = \"body\"\nhistory = { amplitude = 1, frequency = 500 }\n\
+    [[variation]]\nname = \"fast load\"\n\
+    [[variation.load]]\nnode = 99\nforce = [300, 0, 0]\naxes = \"body\"\nhistory = { amplitude = 1, frequency = 20000 }\n\
+    [tolerance]\ndeflection = 0.3\nstress = 0.3\n";
+
+#[test]
+fn reason_of_a_trade_names_the_cheaper_candidate_that_fails_in_a_variation() {
+    let folder = folder(STATIC_AND_FAST);
+    let place = folder.path();
+    let model = fixtures().join(MODEL);
+    let made = flexbody(place, &["convert", model.to_str().unwrap(), "--modes", "5", "-o", "five.flex.h5"]);
+    assert!(made.status.success());
+    let study = results(place, &["trade", "five.flex.h5", "--scene", "my scene.toml"]);
+    let lines = study["verdict"].as_array().expect("lines");
+    let why = lines.iter().find(|line| line["label"] == "Why").expect("a reason");
+    let why = why["text"].as_str().expect("a text");
+    assert!(
+        why.contains(
+            "within the tolerances, in the scene and in its variations; the next cheaper one, 1 mode"
+        ),
+        "{why}"
+    );
+    assert!(
+        why.contains("holds in the scene and takes") && why.ends_with("times the tolerances where fast load"),
+        "{why}"
+    );
+}
