@@ -6,7 +6,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_model::RecoveryRow;
-use flexbody_motion::scene::{self, LoadHistory, RecoveredMotion, RowMap, StressPoint};
+use flexbody_motion::scene::{self, Envelope, LoadHistory, RecoveredMotion, RowMap, StressPoint};
 use flexbody_report::{EnvelopeKind, RecoveredFacts, RunData, recovered_csv};
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -244,8 +244,11 @@ impl Recovered {
                 return refused("the body was simulated without the largest stresses of points".to_owned());
             }
         };
+        let Some(envelope) = Envelope::of(&motion, None) else {
+            return refused("the motion has no largest stresses of points".to_owned());
+        };
         let slot = OutputSlot::prepare(path)?;
-        slot.fill(&kind.bytes(&body.0, &motion)?)?;
+        slot.fill(&kind.bytes(&body.0, &envelope)?)?;
         slot.commit()
     }
 }

@@ -6,7 +6,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_motion::scene::{LoadedHistory, RecoveredMotion};
+use flexbody_motion::scene::{Envelope, LoadedHistory, RecoveredMotion};
 use flexbody_report::{EnvelopeKind, Format, RecoveredFacts, RunData, recovered_csv};
 use std::path::Path;
 
@@ -72,8 +72,10 @@ pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
     let run = RunData { diagnostics, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
     kind.fill(&body, &recovered, ("history", &history.path.display().to_string()), &slot)?;
-    if let (Some(kind), Some(slot)) = (envelope, &envelope_slot) {
-        slot.fill(&kind.bytes(&body, &recovered)?)?;
+    if let (Some(kind), Some(slot), Some(found)) =
+        (envelope, &envelope_slot, Envelope::of(&recovered, None))
+    {
+        slot.fill(&kind.bytes(&body, &found)?)?;
     }
     let facts = RecoveredFacts::new(&body, &history, &recovered, &run);
     for (slot, format) in reports.iter().zip(formats) {

@@ -26,6 +26,7 @@ mod odd_files;
 mod pages;
 mod program;
 mod replaced_inputs;
+mod stress_colours;
 mod structure;
 mod study;
 mod view;

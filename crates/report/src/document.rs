@@ -2,6 +2,7 @@
 
 use super::chart::{Bars, Cells, Chart};
 use super::render::{Format, json};
+use super::picture::Fields;
 use super::{html, text};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_body::flex_body::FlexBody;
@@ -71,6 +72,8 @@ pub(crate) enum Block<'a> {
     Preformatted(String),
     /// The picture of a body on a page, if the body has one, with other blocks beside it.
     Picture(&'a FlexBody, Vec<Block<'a>>),
+    /// The picture of a body at rest in the colours of stresses, on a page, with the largest of them beside it.
+    Coloured(&'a FlexBody, &'a Fields),
 }
 
 /// Outcome of the verdict.

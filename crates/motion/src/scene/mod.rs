@@ -1,6 +1,7 @@
 //! Scenes: the scene file, and its simulation.
 
 mod description;
+mod envelope;
 mod errors;
 mod extremes;
 mod framed_scene;
@@ -27,6 +28,7 @@ pub use description::{
     Carried, CarriedSpin, CaseName, Change, Drive, Initial, Load, ModeStart, Point, Run, Scene,
     SceneVariation, Scheme, SeriesFile, Spin, Variations,
 };
+pub use envelope::{CasePeak, Envelope, PointPeaks, RecoveryEnvelope};
 pub use errors::{
     DeformationDifference, ErrorHistory, LEAST_REACTION, Measure, OtherModes, OutputErrors, reaction_errors,
 };
