@@ -92,7 +92,8 @@ fn together(mut done: Vec<Outcome>, envelope: Option<&EnvelopeFacts<'_>>) -> Out
             diagnostics.push(said.clone());
         }
     }
-    let of_all = envelope.map_or_else(String::new, |facts| format!(",\n\"envelope\": {}", facts.json().trim_end()));
+    let of_all =
+        envelope.map_or_else(String::new, |facts| format!(",\n\"envelope\": {}", facts.json().trim_end()));
     let json = format!("{{\n\"cases\": [\n{}\n]{of_all}\n}}", reports.join(",\n"));
     Outcome { text: texts.join("\n"), json, diagnostics, passed: true }
 }

@@ -7,6 +7,8 @@ mod gmsh;
 mod vtk_legacy;
 mod vtk_xml;
 
+pub(super) use vtk_xml::{PointArray, point_arrays};
+
 use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};
 use super::tables::read_nodes;
@@ -146,4 +148,9 @@ mod tests {
         }
         assert!(found.iter().all(|count| *count > 0), "fixtures of each format: {found:?}");
     }
+}
+
+/// Returns true when a file begins like VTK in XML.
+pub(super) fn is_vtk_xml(head: &[u8]) -> bool {
+    vtk_xml::recognises(&String::from_utf8_lossy(head))
 }

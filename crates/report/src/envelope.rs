@@ -128,8 +128,9 @@ pub fn read_envelope(path: &Path) -> Result<Envelope> {
         };
         let real = |at: usize| match fields[at] {
             b"" => Ok(0.0),
-            field => scanner::number(field)
-                .ok_or_else(|| scanner::expected(Code::TableRow, "a number", field)),
+            field => {
+                scanner::number(field).ok_or_else(|| scanner::expected(Code::TableRow, "a number", field))
+            }
         };
         let mut peak = |value: usize, case: usize| {
             let name = text(fields[COLUMNS.len() + case]);

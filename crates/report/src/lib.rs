@@ -62,7 +62,7 @@ pub use completeness::dropped_text;
 pub use envelope::{EnvelopeFacts, EnvelopeKind, read_envelope};
 pub use facts::Facts;
 pub use measured_run::MeasuredRunFacts;
-pub use recovered::{RecoveredFacts, recovered_csv};
+pub use recovered::{RecoveredFacts, channels_csv, recovered_csv};
 pub use render::{Format, output_json, render};
 pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData, SearchAttempt};

@@ -2,8 +2,8 @@
 
 use super::csv;
 use super::document::{Block, Inline, Table, Term, heading};
-use super::numbers::{counted, frequency_range, percent, significant};
 use super::envelope::EnvelopeKind;
+use super::numbers::{counted, frequency_range, percent, significant};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, RecoveryRow};

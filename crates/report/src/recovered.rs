@@ -8,7 +8,9 @@ use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_motion::scene::{LoadedHistory, RecoveredMotion, RowExtreme, RowExtremes, RowMap, StressPoint};
+use flexbody_motion::scene::{
+    Channels, LoadedHistory, RecoveredMotion, RowExtreme, RowExtremes, RowMap, StressPoint,
+};
 use serde::Serialize;
 
 /// Facts of recoveries over time.
@@ -202,6 +204,17 @@ pub fn recovered_csv(motion: &RecoveredMotion) -> String {
         };
         let values = motion.recoveries.iter().flat_map(values);
         csv::push_row(&mut table, std::iter::once(*time).chain(values).map(csv::number));
+    }
+    table
+}
+
+/// Returns channels over time as comma-separated values: the time and one column for each step; numbers round-trip.
+pub fn channels_csv(channels: &Channels) -> String {
+    let mut table = String::new();
+    let names = channels.names.iter().map(|name| csv::text(name));
+    csv::push_row(&mut table, std::iter::once("time".to_owned()).chain(names));
+    for (time, values) in channels.times.iter().zip(&channels.values) {
+        csv::push_row(&mut table, std::iter::once(time).chain(values).map(|value| csv::number(*value)));
     }
     table
 }

@@ -57,7 +57,12 @@ impl Envelope {
         let all = motion.envelopes.as_ref()?;
         let of_recovery = |(map, peaks): (&RowMap, &Vec<PointEnvelope>)| RecoveryEnvelope {
             name: map.name.clone(),
-            points: map.points.iter().zip(peaks).map(|(point, own)| PointPeaks::new(map, point, own)).collect(),
+            points: map
+                .points
+                .iter()
+                .zip(peaks)
+                .map(|(point, own)| PointPeaks::new(map, point, own))
+                .collect(),
         };
         Some(Self {
             cases: case.map(str::to_owned).into_iter().collect(),
@@ -71,7 +76,9 @@ impl Envelope {
         self.cases.extend(other.cases);
         for mut recovery in other.recoveries {
             for point in &mut recovery.points {
-                for peak in [&mut point.von_mises, &mut point.largest_principal, &mut point.smallest_principal] {
+                for peak in
+                    [&mut point.von_mises, &mut point.largest_principal, &mut point.smallest_principal]
+                {
                     peak.case += first;
                 }
             }

@@ -1,5 +1,6 @@
 //! Scenes: the scene file, and its simulation.
 
+mod channels;
 mod description;
 mod envelope;
 mod errors;
@@ -24,6 +25,7 @@ mod simulate;
 mod surroundings;
 mod trace;
 
+pub use channels::{Channels, ShapeSteps};
 pub use description::{
     Carried, CarriedSpin, CaseName, Change, Drive, Initial, Load, ModeStart, Point, Run, Scene,
     SceneVariation, Scheme, SeriesFile, Spin, Variations,

@@ -5,8 +5,8 @@ use crate::html::Plain;
 use crate::numbers::{counted, significant};
 use faer::MatRef;
 use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
-use nalgebra::{Matrix3, Rotation3, Vector3};
 use maud::Render;
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -449,8 +449,7 @@ fn points(svg: &mut String, drawing: &Drawing<'_>, view: &Projection, tones: Opt
     let size = if drawing.vertices() > 400 { 2.2 } else { 4.0 };
     for ((layer, tone), path) in layers {
         let colour = tone.map_or_else(String::new, |tone| format!(" style=\"stroke:{}\"", hex(tone)));
-        let _ =
-            writeln!(svg, "<path class=\"node n{layer}\" stroke-width=\"{size}\"{colour} d=\"{path}\"/>");
+        let _ = writeln!(svg, "<path class=\"node n{layer}\" stroke-width=\"{size}\"{colour} d=\"{path}\"/>");
     }
 }
 
@@ -501,11 +500,19 @@ impl Tones {
         let width = SCALE_LENGTH / (TONES + 1.0);
         for k in 0..=(TONES as u8) {
             let (left, colour) = (from + width * f64::from(k), hex(k));
-            let _ = write!(svg, "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"8\" fill=\"{colour}\"/>", width + 0.3);
+            let _ = write!(
+                svg,
+                "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"8\" fill=\"{colour}\"/>",
+                width + 0.3
+            );
         }
         let text = |svg: &mut String, x: f64, anchor: &str, text: &str| {
             let text = Plain(text).render().into_string();
-            let _ = writeln!(svg, "<text class=\"model\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{text}</text>", top - 5.0);
+            let _ = writeln!(
+                svg,
+                "<text class=\"model\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{text}</text>",
+                top - 5.0
+            );
         };
         text(svg, from, "start", "0");
         text(svg, from + SCALE_LENGTH, "end", &self.largest);

@@ -199,11 +199,7 @@ impl Places {
     }
 
     /// Returns the largest value at each of `n` nodes, NaN without a value, and the point that has it.
-    fn largest(
-        &self,
-        n: usize,
-        points: impl Iterator<Item = (Option<i64>, f64)>,
-    ) -> (Vec<f64>, Vec<usize>) {
+    fn largest(&self, n: usize, points: impl Iterator<Item = (Option<i64>, f64)>) -> (Vec<f64>, Vec<usize>) {
         let (mut values, mut of) = (vec![f64::NAN; n], vec![0; n]);
         for (point, (node, value)) in points.enumerate() {
             let Some(&at) = node.and_then(|node| self.0.get(&node)) else { continue };

@@ -17,9 +17,9 @@ use maud::Render;
 use serde::Serialize;
 
 pub(super) use drawing::Drawing;
-pub(super) use field::{Field, Fields};
 #[cfg(feature = "hdf5")]
 pub(super) use drawing::HALF_STEP;
+pub(super) use field::{Field, Fields};
 
 // Picture of a body in a report: an interactive drawing of its modes if scripts run, otherwise (and on
 // paper) a still picture.
@@ -55,7 +55,8 @@ impl Embedded {
 
     fn of(body: &FlexBody, drawing: &Drawing<'_>, fields: &Fields) -> Option<Self> {
         let still = still(body, fields.drawn.first())?;
-        let shown = ShownBody::<()>::new(body, drawing, &fields.drawn, Vec::new(), None, drawing.modes() == 0);
+        let shown =
+            ShownBody::<()>::new(body, drawing, &fields.drawn, Vec::new(), None, drawing.modes() == 0);
         let arrays: String = drawing.arrays(&fields.drawn).iter().map(script).collect();
         let words = Plain(&drawn(body, drawing, fields)).render().into_string();
         let panel = PANEL.replace("{{STILL}}", &still).replace("{{DRAWN}}", &words);
