@@ -146,7 +146,7 @@ fn the_envelope_is_that_of_all_load_cases() {
     let case = |name: &str, spin: &str| {
         format!("[[case]]\nname = \"{name}\"\n[case.initial]\nangular_velocity = [{spin}]\n")
     };
-    let (slow, fast) = (case("slow-x", "5, 0, 1"), case("fast", "1, 2, 9"));
+    let (slow, fast) = (case("slow-x", "9, 0.5, 0"), case("fast", "0.5, 0, 9"));
     let scene = |cases: &str| format!("[run]\nduration = 0.002\noutputs = 10\n{cases}");
     fs::write(folder.path().join("spin.toml"), scene(&(slow.clone() + &fast))).expect("written");
     fs::write(folder.path().join("other.toml"), scene(&(fast + &slow))).expect("written");
