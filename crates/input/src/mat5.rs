@@ -278,22 +278,21 @@ impl<'a> Variable<'a> {
     /// The errors of [`Self::arrays`]; FB301, FB304 for lists that do not fit each other, FB313 for a matrix beyond
     /// memory.
     fn rectangular(&self) -> Found<Rectangular> {
-        let (starts, count, entry): (Vec<u64>, usize, Box<dyn Fn(usize) -> (i64, f64)>) =
-            match self.arrays()? {
-                Arrays::Sparse([indices, pointers, values]) => {
-                    let count = indices.len().min(values.len());
-                    let starts = starts_of(&pointers);
-                    let entry = move |k| (indices.whole(k).unwrap_or(-1), values.real(k).unwrap_or(f64::NAN));
-                    (starts, count, Box::new(entry))
-                }
-                Arrays::Full(values) => {
-                    let (rows, count) = (self.rows, values.len());
-                    let starts = (0..=self.columns).map_while(|column| column.checked_mul(rows)).collect();
-                    let entry =
-                        move |k: usize| ((k as u64 % rows.max(1)) as i64, values.real(k).unwrap_or(f64::NAN));
-                    (starts, count, Box::new(entry))
-                }
-            };
+        let (starts, count, entry): (Vec<u64>, usize, EntryAt) = match self.arrays()? {
+            Arrays::Sparse([indices, pointers, values]) => {
+                let count = indices.len().min(values.len());
+                let starts = starts_of(&pointers);
+                let entry = move |k| (indices.whole(k).unwrap_or(-1), values.real(k).unwrap_or(f64::NAN));
+                (starts, count, Box::new(entry))
+            }
+            Arrays::Full(values) => {
+                let (rows, count) = (self.rows, values.len());
+                let starts = (0..=self.columns).map_while(|column| column.checked_mul(rows)).collect();
+                let entry =
+                    move |k: usize| ((k as u64 % rows.max(1)) as i64, values.real(k).unwrap_or(f64::NAN));
+                (starts, count, Box::new(entry))
+            }
+        };
         let fits = starts.len() as u64 == self.columns.saturating_add(1)
             && starts.is_sorted()
             && starts[0] == 0
@@ -362,6 +361,9 @@ impl<'a> Variable<'a> {
         compressed.assemble(path)
     }
 }
+
+/// Function that returns row and value of the k-th entry.
+type EntryAt = Box<dyn Fn(usize) -> (i64, f64)>;
 
 /// Arrays of a matrix.
 enum Arrays {

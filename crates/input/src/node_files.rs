@@ -127,6 +127,11 @@ pub(super) struct NodeFile {
     pub axes: HashMap<i64, NodeAxes>,
 }
 
+/// Returns true when a file begins like VTK in XML.
+pub(super) fn is_vtk_xml(head: &[u8]) -> bool {
+    vtk_xml::recognises(&String::from_utf8_lossy(head))
+}
+
 #[cfg(test)]
 mod tests {
     use super::{FORMATS, HEAD};
@@ -148,9 +153,4 @@ mod tests {
         }
         assert!(found.iter().all(|count| *count > 0), "fixtures of each format: {found:?}");
     }
-}
-
-/// Returns true when a file begins like VTK in XML.
-pub(super) fn is_vtk_xml(head: &[u8]) -> bool {
-    vtk_xml::recognises(&String::from_utf8_lossy(head))
 }

@@ -146,7 +146,7 @@ pub fn read_envelope(path: &Path) -> Result<Envelope> {
             element: id(3)?,
             unit: text(fields[4]),
         };
-        if !(point.von_mises.value >= 0.0) {
+        if point.von_mises.value.is_nan() || point.von_mises.value < 0.0 {
             return Err(scanner::expected(Code::TableRow, "an equivalent stress from 0", fields[5]));
         }
         Ok((text(fields[0]), point))
