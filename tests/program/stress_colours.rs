@@ -53,7 +53,11 @@ fn recovery(
         name: name.to_owned(),
         offset: vec![0.0; n],
         modes: Mat::from_fn(n, body.n_modes(), |row, j| stress(row / 6, row % 6, j)),
-        spin: Mat::from_fn(n, 6, |row, k| 1e-4 * stress(row / 6, row % 6, 11 + k)),
+        // Spin about x strains every second node, spin about z the others.
+        spin: Mat::from_fn(n, 6, |row, k| match (row / 6 % 2, k) {
+            (0, 0) | (1, 2) => 1e-2 * stress(row / 6, row % 6, 11 + k),
+            _ => 0.0,
+        }),
         loads: Vec::new(),
         rows,
     }
@@ -175,7 +179,7 @@ fn the_envelope_is_that_of_all_load_cases() {
     let [slow, fast] = ["slow.csv", "fast.csv"].map(|file| parsed(file, "von_mises"));
     let text = fs::read_to_string(folder.path().join("all.csv")).expect("a table");
     let of_fast = |at: usize| fast[at] > slow[at];
-    assert!((0..fast.len()).any(of_fast) && !(0..fast.len()).all(of_fast), "both cases have extremes");
+    assert!((0..fast.len()).any(of_fast) && !(0..fast.len()).all(of_fast), "{slow:?} {fast:?}");
     for (at, line) in text.lines().skip(1).enumerate() {
         // The first of the three columns of cases is that of the equivalent stress.
         let cases = line.splitn(12, ',').last().expect("cases");
