@@ -115,7 +115,7 @@ mod api;
 mod cli;
 
 pub use api::{
-    Accuracy, Advice, AttachedMass, Audit, Basis, BodyFrame, Check, Comparison, ComparisonFormat,
+    Accuracy, Advice, AttachedMass, Audit, Basis, BodyFrame, Channels, Check, Comparison, ComparisonFormat,
     ComparisonRow, Conversion, ConvertOptions, Coupling, ExportOptions, FlexBody, FrameChoice,
     GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, LoadedHistory, Matrix,
     MeasuredRun, Model, ModelBuilder, Motion, MotionHistory, PointPath, Progress, Quantity, Ranges, Recipe,

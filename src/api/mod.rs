@@ -50,7 +50,7 @@ pub use measured_run::{MeasuredRun, MotionHistory};
 pub use model::{Model, ModelBuilder, SparseMatrix};
 pub use motion::{Motion, PointPath};
 pub use progress::{Listener, Progress};
-pub use recovery::{LoadedHistory, Recovered, RecoveredRows};
+pub use recovery::{Channels, LoadedHistory, Recovered, RecoveredRows};
 pub use report::ReportFormat;
 pub use response::{Response, ResponseOptions, TransferFunction};
 pub use scene::{Scene, Selection};

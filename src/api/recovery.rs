@@ -5,9 +5,10 @@ use super::{FlexBody, Matrix, ReportFormat};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
+use flexbody_input::{WrittenSteps, read_steps};
 use flexbody_model::RecoveryRow;
-use flexbody_motion::scene::{self, LoadHistory, RecoveredMotion, RowMap, StressPoint};
-use flexbody_report::{EnvelopeKind, RecoveredFacts, RunData, recovered_csv};
+use flexbody_motion::scene::{self, Envelope, LoadHistory, RecoveredMotion, RowMap, StressPoint};
+use flexbody_report::{EnvelopeKind, RecoveredFacts, RunData, channels_csv, recovered_csv};
 use nalgebra::Vector3;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -162,9 +163,67 @@ impl FlexBody {
         Ok(Recovered { motion, source: RowSource::History(history.clone()) })
     }
 
+    /// Returns the factor of each FE step over a history, like `flexbody recover --channels`, for a program that
+    /// superposes the results of the steps.
+    ///
+    /// * `steps`: archive (`.npz`) that `flexbody shapes` wrote with the steps.
+    ///
+    /// # Errors
+    /// FB101 and FB106 if the archive cannot be read; FB326 for steps of another body; FB215 if the history has no angular
+    /// velocity and there are steps of spin; FB212 for loads without steps; FB804 for another number of modal coordinates.
+    pub fn channels(&self, history: &LoadedHistory, steps: impl AsRef<Path>) -> Result<Channels> {
+        history.refuse_foreign(self)?;
+        let WrittenSteps { columns, factors, nodes, displacements, modes_follow_spin } =
+            read_steps(steps.as_ref())?;
+        let steps = scene::ShapeSteps { columns, factors, nodes, displacements, modes_follow_spin };
+        let channels = history.0.channels(&self.0, &steps)?;
+        Ok(Channels { channels, history: history.0.path.display().to_string() })
+    }
+
     /// Returns the names of the recoveries of the body.
     pub fn recoveries(&self) -> Vec<&str> {
         self.0.recoveries().iter().map(|recovery| recovery.name.as_str()).collect()
+    }
+}
+
+/// Factors of the steps of an FE program over time; the last channel is `constant`, for the values at rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channels {
+    channels: scene::Channels,
+    history: String,
+}
+
+impl Channels {
+    /// Returns the names of the channels: those of the steps, and `constant`.
+    pub fn names(&self) -> &[String] {
+        &self.channels.names
+    }
+
+    /// Returns the times.
+    pub fn times(&self) -> &[f64] {
+        &self.channels.times
+    }
+
+    /// Returns the factors (times x channels).
+    pub fn values(&self) -> Matrix {
+        by_rows(self.channels.names.len(), &self.channels.values)
+    }
+
+    /// Returns the table of `flexbody recover --channels FILE.csv`.
+    pub fn csv(&self) -> String {
+        channels_csv(&self.channels)
+    }
+
+    /// Writes the HDF5 file of `flexbody recover --channels FILE.h5`, which appears whole or not at all. `body` is the
+    /// body of the channels.
+    ///
+    /// # Errors
+    /// FB104, FB105, FB107 and FB602 if the file cannot be written.
+    #[cfg(feature = "hdf5")]
+    pub fn write(&self, body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
+        let slot = flexbody_file::prepare_output(path)?;
+        flexbody_file::fill_channels(&body.0, &self.channels, &self.history, &slot)?;
+        slot.commit()
     }
 }
 
@@ -236,7 +295,34 @@ impl Recovered {
     /// FB801 for another extension; FB804 for a simulation without envelope; FB221 if no recovery has all six stresses of
     /// a point, or for a mesh if none of its points is a node; FB104 and FB602 if the file cannot be written.
     pub fn write_envelope(&self, body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
-        let kind = EnvelopeKind::of(path.as_ref())?;
+        write_envelope(self.envelope(None)?, body, path.as_ref())
+    }
+
+    /// Writes the largest stresses of every point over several load cases of `body`, each with its name, like `--envelope`
+    /// for a scene with several: the file names the load case of each extreme.
+    ///
+    /// # Errors
+    /// The errors of [`Recovered::write_envelope`]; FB804 without load cases.
+    pub fn write_envelope_of_cases(
+        cases: &[(&str, &Self)],
+        body: &FlexBody,
+        path: impl AsRef<Path>,
+    ) -> Result<()> {
+        let mut of_all: Option<Envelope> = None;
+        for (name, own) in cases {
+            let own = own.envelope(Some(name))?;
+            match &mut of_all {
+                Some(known) => known.join(own),
+                None => of_all = Some(own),
+            }
+        }
+        match of_all {
+            Some(of_all) => write_envelope(of_all, body, path.as_ref()),
+            None => refused("no load cases are given".to_owned()),
+        }
+    }
+
+    fn envelope(&self, case: Option<&str>) -> Result<Envelope> {
         let motion = match (&self.motion.envelopes, &self.source) {
             (Some(_), _) => Cow::Borrowed(&self.motion),
             (None, RowSource::History(_)) => Cow::Owned(self.motion.clone().with_envelope()),
@@ -244,8 +330,16 @@ impl Recovered {
                 return refused("the body was simulated without the largest stresses of points".to_owned());
             }
         };
-        let slot = OutputSlot::prepare(path)?;
-        slot.fill(&kind.bytes(&body.0, &motion)?)?;
-        slot.commit()
+        match Envelope::of(&motion, case) {
+            Some(envelope) => Ok(envelope),
+            None => refused("the motion has no largest stresses of points".to_owned()),
+        }
     }
+}
+
+fn write_envelope(envelope: Envelope, body: &FlexBody, path: &Path) -> Result<()> {
+    let kind = EnvelopeKind::of(path)?;
+    let slot = OutputSlot::prepare(path)?;
+    slot.fill(&kind.bytes(&body.0, &envelope)?)?;
+    slot.commit()
 }

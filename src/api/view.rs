@@ -3,6 +3,7 @@
 use super::{FlexBody, Motion, ReportFormat};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
+use flexbody_report::{Colouring, read_envelope};
 use std::path::Path;
 
 /// Motion of a body as pictures need it: of a simulation, or read from its file.
@@ -38,7 +39,37 @@ impl FlexBody {
     /// # Errors
     /// FB735 for the motion of another body.
     pub fn view(&self, motion: Option<&RecordedMotion>, triangles: Option<usize>) -> Result<View> {
-        flexbody_report::View::new(&self.0, triangles, motion.map(|motion| &motion.0)).map(View)
+        flexbody_report::View::new(&self.0, triangles, motion.map(|motion| &motion.0), None).map(View)
+    }
+
+    /// Returns the page of `flexbody view --recovery`: the modes in the colours of the equivalent stress of a recovery.
+    ///
+    /// * `triangles`: as for [`FlexBody::view`].
+    ///
+    /// # Errors
+    /// FB221 for a recovery that the body does not have or that cannot be drawn.
+    pub fn view_recovery(&self, name: &str, triangles: Option<usize>) -> Result<View> {
+        flexbody_report::View::new(&self.0, triangles, None, Some(Colouring::Recovery(name))).map(View)
+    }
+
+    /// Returns the page of `flexbody view --envelope`: the body, at rest or in a motion, in the colours of the largest
+    /// equivalent stresses of a run.
+    ///
+    /// * `envelope`: table of [`Recovered::write_envelope`](super::Recovered::write_envelope) or of `--envelope FILE.csv`.
+    /// * `triangles`: as for [`FlexBody::view`].
+    ///
+    /// # Errors
+    /// FB101, FB106, FB203 and FB204 for a table that cannot be read, FB221 for stresses that cannot be drawn, FB735 for
+    /// the motion of another body.
+    pub fn view_envelope(
+        &self,
+        envelope: impl AsRef<Path>,
+        motion: Option<&RecordedMotion>,
+        triangles: Option<usize>,
+    ) -> Result<View> {
+        let envelope = read_envelope(envelope.as_ref())?;
+        let colouring = Some(Colouring::Envelope(&envelope));
+        flexbody_report::View::new(&self.0, triangles, motion.map(|motion| &motion.0), colouring).map(View)
     }
 }
 

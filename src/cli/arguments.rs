@@ -211,6 +211,12 @@ pub struct ViewArguments {
     /// Motion of the body to play instead of its modes: a file written by `simulate -o`
     #[arg(long, value_name = "MOTION.h5")]
     pub simulation: Option<PathBuf>,
+    /// Colour the modes by the equivalent stress of this recovery
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["simulation", "envelope"])]
+    pub recovery: Option<String>,
+    /// Colour the body by the largest equivalent stresses of a run: a table written by `simulate` or `recover --envelope`
+    #[arg(long, value_name = "ENVELOPE.csv")]
+    pub envelope: Option<PathBuf>,
     /// Largest number of triangles of the surface [default: as many as keep the page below 10 MB]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub triangles: Option<u32>,
@@ -427,8 +433,8 @@ pub struct SimulateArguments {
     /// File to write the rows of all recoveries of the body to, .csv or .h5
     #[arg(long, value_name = "ROWS.csv|ROWS.h5")]
     pub rows: Option<PathBuf>,
-    /// File to write the largest stresses of every point of the recoveries over the motion to: a table (.csv), or the
-    /// body with them at its nodes (.vtu)
+    /// File to write the largest stresses of every point of the recoveries over the motion to, over all load cases: a table
+    /// (.csv), or the body with them at its nodes (.vtu); reports draw them as well
     #[arg(long, value_name = "FILE.csv|FILE.vtu")]
     pub envelope: Option<PathBuf>,
     /// Report to write, with plots as .html; format by extension: .html, .json or .txt (repeatable)

@@ -6,9 +6,10 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_motion::scene::{LoadedHistory, RecoveredMotion};
-use flexbody_report::{EnvelopeKind, Format, RecoveredFacts, RunData, recovered_csv};
-use std::path::Path;
+use flexbody_input::{WrittenSteps, read_steps};
+use flexbody_motion::scene::{Channels, Envelope, LoadedHistory, RecoveredMotion, ShapeSteps};
+use flexbody_report::{EnvelopeKind, Format, RecoveredFacts, RunData, channels_csv, recovered_csv};
+use std::path::{Path, PathBuf};
 
 /// Kind of a file of recoveries over time.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +38,22 @@ impl Kind {
 }
 
 impl Kind {
+    /// Writes channels of the steps of an FE program to the temporary file of `slot`.
+    fn fill_channels(
+        self,
+        body: &FlexBody,
+        channels: &Channels,
+        history: &LoadedHistory,
+        slot: &OutputSlot,
+    ) -> Result<()> {
+        match self {
+            Self::Csv => slot.fill(channels_csv(channels).as_bytes()),
+            Self::Hdf5 => {
+                flexbody_file::fill_channels(body, channels, &history.path.display().to_string(), slot)
+            }
+        }
+    }
+
     /// Writes recoveries of `body` over a motion to the temporary file of `slot`.
     ///
     /// * `origin`: name and value of the attribute that says where the motion is from.
@@ -56,30 +73,70 @@ impl Kind {
 
 pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
-    let kind = Kind::of(&arguments.output)?;
+    let kind = arguments.output.as_deref().map(Kind::of).transpose()?;
+    let of_channels = arguments.channels.as_deref().map(Kind::of).transpose()?;
     let envelope = arguments.envelope.as_deref().map(EnvelopeKind::of).transpose()?;
-    let outputs = || std::iter::once(&arguments.output).chain(&arguments.envelope).chain(&arguments.report);
-    refuse_replacing([&arguments.body, &arguments.history].into_iter(), outputs())?;
-    let slot = OutputSlot::prepare(&arguments.output)?;
-    let envelope_slot = arguments.envelope.as_ref().map(OutputSlot::prepare).transpose()?;
+    let RecoverArguments { output, channels, .. } = arguments;
+    let outputs = || output.iter().chain(channels).chain(&arguments.envelope).chain(&arguments.report);
+    let inputs = [&arguments.body, &arguments.history].into_iter().chain(&arguments.shapes);
+    refuse_replacing(inputs, outputs())?;
+    let prepare = |path: &Option<PathBuf>| path.as_ref().map(OutputSlot::prepare).transpose();
+    let (slot, channel_slot) = (prepare(output)?, prepare(channels)?);
+    let envelope_slot = prepare(&arguments.envelope)?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
     let (body, diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     let history = LoadedHistory::read(&arguments.history, &body)?;
+    let run = RunData { diagnostics, ..RunData::default() };
+    refuse_warnings(arguments.printing, &run.diagnostics)?;
+    let mut found = None;
+    if let (Some(steps), Some(kind), Some(slot)) = (&arguments.shapes, of_channels, &channel_slot) {
+        let channels = channels_of(&body, &history, steps)?;
+        kind.fill_channels(&body, &channels, &history, slot)?;
+        found = Some(channels);
+    }
+    let needs_rows = kind.is_some() || envelope.is_some() || !formats.is_empty();
+    if !needs_rows && body.recoveries().is_empty() {
+        OutputSlot::commit_all(channel_slot)?;
+        let (text, json) = (channels_in_words(found.as_ref()), channels_json(found.as_ref()));
+        return Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true });
+    }
     let mut recovered = history.recover(&body, &arguments.only)?;
     if envelope.is_some() {
         recovered = recovered.with_envelope();
     }
-    let run = RunData { diagnostics, ..RunData::default() };
-    refuse_warnings(arguments.printing, &run.diagnostics)?;
-    kind.fill(&body, &recovered, ("history", &history.path.display().to_string()), &slot)?;
-    if let (Some(kind), Some(slot)) = (envelope, &envelope_slot) {
-        slot.fill(&kind.bytes(&body, &recovered)?)?;
+    if let (Some(kind), Some(slot)) = (kind, &slot) {
+        kind.fill(&body, &recovered, ("history", &history.path.display().to_string()), slot)?;
+    }
+    if let (Some(kind), Some(slot), Some(found)) = (envelope, &envelope_slot, Envelope::of(&recovered, None))
+    {
+        slot.fill(&kind.bytes(&body, &found)?)?;
     }
     let facts = RecoveredFacts::new(&body, &history, &recovered, &run);
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(facts.render(format).as_bytes())?;
     }
-    OutputSlot::commit_all(std::iter::once(slot).chain(envelope_slot).chain(reports))?;
-    let (text, json) = (facts.render(Format::Terminal), facts.render(Format::Json));
-    Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
+    OutputSlot::commit_all(slot.into_iter().chain(channel_slot).chain(envelope_slot).chain(reports))?;
+    let text = facts.render(Format::Terminal) + &channels_in_words(found.as_ref());
+    Ok(Outcome { text, json: facts.render(Format::Json), diagnostics: run.diagnostics.clone(), passed: true })
+}
+
+/// Returns the channels of the steps in an archive of `flexbody shapes`.
+fn channels_of(body: &FlexBody, history: &LoadedHistory, steps: &Path) -> Result<Channels> {
+    let WrittenSteps { columns, factors, nodes, displacements, modes_follow_spin } = read_steps(steps)?;
+    let known = ShapeSteps { columns, factors, nodes, displacements, modes_follow_spin };
+    history.channels(body, &known).map_err(|error| error.in_file(steps))
+}
+
+/// Returns the numbers of channels and instants in words; empty without channels.
+fn channels_in_words(channels: Option<&Channels>) -> String {
+    channels.map_or_else(String::new, |own| {
+        let (steps, instants) = (own.names.len() - 1, own.times.len());
+        format!("Channels    {steps} steps and a constant, {instants} instants\n")
+    })
+}
+
+fn channels_json(channels: Option<&Channels>) -> String {
+    let names = channels.map(|own| &own.names);
+    let instants = channels.map(|own| own.times.len());
+    format!("{:#}", serde_json::json!({ "channels": names, "instants": instants }))
 }

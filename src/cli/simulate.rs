@@ -10,8 +10,10 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Event;
-use flexbody_motion::scene::{LoadCases, Scene, simulate, simulate_with_envelope, unsettled_rate};
-use flexbody_report::{EnvelopeKind, Format, RunData, SimulationFacts, simulation_csv};
+use flexbody_motion::scene::{
+    Envelope, LoadCases, Recording, Scene, simulate, simulate_with_envelope, unsettled_rate,
+};
+use flexbody_report::{EnvelopeFacts, EnvelopeKind, Format, RunData, SimulationFacts, simulation_csv};
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
@@ -19,9 +21,11 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let rows = arguments.rows.as_deref().map(Kind::of).transpose()?;
     let envelope = arguments.envelope.as_deref().map(EnvelopeKind::of).transpose()?;
     let places = SimulationOutputs::of(arguments, None);
-    refuse_replacing([&arguments.body, &arguments.scene].into_iter(), places.all())?;
+    let of_all_cases = || arguments.envelope.iter();
+    refuse_replacing([&arguments.body, &arguments.scene].into_iter(), places.all().chain(of_all_cases()))?;
     // Outputs are checked before reading, although the load cases are known only afterwards.
     let reserved = places.reserve()?;
+    let envelope_slot = arguments.envelope.as_ref().map(OutputSlot::prepare).transpose()?;
     let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
@@ -31,8 +35,9 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
         if cases.len() == 1 { vec![places] } else { cases.iter().map(of_case).collect() };
     let series = cases.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
     let inputs = [&arguments.body, &arguments.scene].into_iter().chain(series);
-    refuse_replacing(inputs, all.iter().flat_map(SimulationOutputs::all))?;
-    refuse_replacing_read(all.iter().flat_map(SimulationOutputs::all))?;
+    let outputs = || all.iter().flat_map(SimulationOutputs::all).chain(of_all_cases());
+    refuse_replacing(inputs, outputs())?;
+    refuse_replacing_read(outputs())?;
     let slots = match &all[..] {
         [_] => vec![reserved],
         all => all.iter().map(SimulationOutputs::reserve).collect::<Result<Vec<_>>>()?,
@@ -46,20 +51,40 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let job =
         Job { path: &arguments.scene, printing, body: &body, formats: &formats, rows, envelope, threads };
     let several = cases.len() > 1;
-    let done =
-        cases.iter().zip(&slots).map(|(scene, slots)| job.simulate(scene, several, &notes, slots, &watcher));
-    let done = done.collect::<Result<Vec<_>>>()?;
+    // Reports of load cases that draw the largest stresses of all are written after the last of them.
+    let waits = several && envelope.is_some() && formats.contains(&Format::Html);
+    let (mut done, mut waiting) = (Vec::new(), Vec::new());
+    let mut of_all: Option<Envelope> = None;
+    for (scene, slots) in cases.iter().zip(&slots) {
+        let simulated = job.simulate(scene, several, &notes, &watcher)?;
+        match (&mut of_all, simulated.envelope.clone()) {
+            (Some(known), Some(own)) => known.join(own),
+            (of_all, own) => *of_all = own,
+        }
+        match waits {
+            true => waiting.push((simulated, slots)),
+            false => done.push(job.write(&simulated, slots, None)?),
+        }
+    }
+    for (simulated, slots) in waiting {
+        done.push(job.write(&simulated, slots, of_all.as_ref())?);
+    }
+    if let (Some(slot), Some(kind), Some(of_all)) = (&envelope_slot, envelope, &of_all) {
+        slot.fill(&kind.bytes(&body, of_all)?)?;
+    }
     // No file appears before everything is done.
-    OutputSlot::commit_all(slots.into_iter().flat_map(Slots::into_all))?;
-    Ok(together(done))
+    OutputSlot::commit_all(slots.into_iter().flat_map(Slots::into_all).chain(envelope_slot))?;
+    let of_all = of_all.as_ref().filter(|_| several).map(|of_all| EnvelopeFacts::new(of_all, body.units()));
+    Ok(together(done, of_all.as_ref()))
 }
 
-/// Joins the outcomes of all load cases; a single one is returned unchanged.
-fn together(mut done: Vec<Outcome>) -> Outcome {
+/// Joins the outcomes of all load cases, with their largest stresses; a single one is returned unchanged.
+fn together(mut done: Vec<Outcome>, envelope: Option<&EnvelopeFacts<'_>>) -> Outcome {
     if done.len() == 1 {
         return done.remove(0);
     }
-    let texts: Vec<&str> = done.iter().map(|one| one.text.as_str()).collect();
+    let of_all = envelope.map(EnvelopeFacts::text).filter(|text| !text.is_empty());
+    let texts: Vec<&str> = done.iter().map(|one| one.text.as_str()).chain(of_all.as_deref()).collect();
     let reports: Vec<&str> = done.iter().map(|one| one.json.trim_end()).collect();
     let mut diagnostics: Vec<Diagnostic> = Vec::new();
     for said in done.iter().flat_map(|one| &one.diagnostics) {
@@ -67,7 +92,9 @@ fn together(mut done: Vec<Outcome>) -> Outcome {
             diagnostics.push(said.clone());
         }
     }
-    let json = format!("{{\n\"cases\": [\n{}\n]\n}}", reports.join(",\n"));
+    let of_all =
+        envelope.map_or_else(String::new, |facts| format!(",\n\"envelope\": {}", facts.json().trim_end()));
+    let json = format!("{{\n\"cases\": [\n{}\n]{of_all}\n}}", reports.join(",\n"));
     Outcome { text: texts.join("\n"), json, diagnostics, passed: true }
 }
 
@@ -82,16 +109,23 @@ struct Job<'a> {
     threads: usize,
 }
 
+/// Motion of one load case.
+struct Simulated {
+    recording: Recording,
+    run: RunData,
+    /// Largest stresses of every point, if they were asked for.
+    envelope: Option<Envelope>,
+}
+
 impl Job<'_> {
-    /// Simulates a scene, and writes the motion and its reports. `notes` are the diagnostics of the body.
+    /// Simulates a scene. `notes` are the diagnostics of the body.
     fn simulate(
         &self,
         scene: &Scene,
         several: bool,
         notes: &[Diagnostic],
-        slots: &Slots,
         watcher: &Watcher,
-    ) -> Result<Outcome> {
+    ) -> Result<Simulated> {
         watcher.hear(Event::Phase("simulation"));
         let name = scene.case_name().filter(|_| several).map(|name| format!("case `{name}`"));
         let watch = |event: Event<'_>| watcher.hear(event);
@@ -124,21 +158,36 @@ impl Job<'_> {
             let message = "no recovery of the body is left in this scene, so there are no rows to write";
             return Err(Diagnostic::new(Code::RecoveryUnknown, message).in_file(self.path).into());
         }
-        // Files are filled here and put in place by the caller, after all load cases.
-        let facts = SimulationFacts::new(&recording, self.body.units(), &run);
+        let case = scene.case_name().filter(|_| several);
+        let envelope = recording.recovered.as_ref().and_then(|rows| Envelope::of(rows, case));
+        Ok(Simulated { recording, run, envelope })
+    }
+
+    /// Writes a motion and its reports to their temporary files, which the caller puts in place after all load cases.
+    /// `of_all` are the largest stresses of all load cases if there are several.
+    fn write(&self, done: &Simulated, slots: &Slots, of_all: Option<&Envelope>) -> Result<Outcome> {
+        let Simulated { recording, run, envelope } = done;
+        let mut facts = SimulationFacts::new(recording, self.body.units(), run);
+        let mut drawn = Vec::new();
+        match (envelope, of_all) {
+            (Some(own), Some(all)) => {
+                drawn.push(("this load case".to_owned(), own));
+                drawn.push((format!("all {} load cases", all.cases.len()), all));
+            }
+            (Some(own), None) => drawn.push(("the run".to_owned(), own)),
+            (None, _) => {}
+        }
+        if !drawn.is_empty() && self.formats.contains(&Format::Html) {
+            facts = facts.with_picture(self.body, &drawn);
+        }
         if let Some(slot) = &slots.motion {
-            flexbody_file::fill_simulation(&recording, self.body.units(), slot)?;
+            flexbody_file::fill_simulation(recording, self.body.units(), slot)?;
         }
         if let Some(slot) = &slots.table {
-            slot.fill(simulation_csv(&recording).as_bytes())?;
+            slot.fill(simulation_csv(recording).as_bytes())?;
         }
         if let (Some(slot), Some(kind), Some(recovered)) = (&slots.rows, self.rows, &recording.recovered) {
             kind.fill(self.body, recovered, ("scene", &recording.scene), slot)?;
-        }
-        if let (Some(slot), Some(kind), Some(recovered)) =
-            (&slots.envelope, self.envelope, &recording.recovered)
-        {
-            slot.fill(&kind.bytes(self.body, recovered)?)?;
         }
         for (slot, format) in slots.reports.iter().zip(self.formats) {
             slot.fill(facts.render(*format).as_bytes())?;
@@ -153,7 +202,6 @@ struct SimulationOutputs {
     motion: Option<PathBuf>,
     table: Option<PathBuf>,
     rows: Option<PathBuf>,
-    envelope: Option<PathBuf>,
     reports: Vec<PathBuf>,
 }
 
@@ -162,7 +210,6 @@ struct Slots {
     motion: Option<OutputSlot>,
     table: Option<OutputSlot>,
     rows: Option<OutputSlot>,
-    envelope: Option<OutputSlot>,
     reports: Vec<OutputSlot>,
 }
 
@@ -175,13 +222,12 @@ impl SimulationOutputs {
             motion: arguments.output.as_ref().map(place),
             table: arguments.csv.as_ref().map(place),
             rows: arguments.rows.as_ref().map(place),
-            envelope: arguments.envelope.as_ref().map(place),
             reports: arguments.report.iter().map(place).collect(),
         }
     }
 
     fn all(&self) -> impl Iterator<Item = &PathBuf> {
-        self.motion.iter().chain(&self.table).chain(&self.rows).chain(&self.envelope).chain(&self.reports)
+        self.motion.iter().chain(&self.table).chain(&self.rows).chain(&self.reports)
     }
 
     fn reserve(&self) -> Result<Slots> {
@@ -189,7 +235,6 @@ impl SimulationOutputs {
             motion: self.motion.as_ref().map(flexbody_file::prepare_output).transpose()?,
             table: self.table.as_ref().map(OutputSlot::prepare).transpose()?,
             rows: self.rows.as_ref().map(OutputSlot::prepare).transpose()?,
-            envelope: self.envelope.as_ref().map(OutputSlot::prepare).transpose()?,
             reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
         })
     }
@@ -197,6 +242,6 @@ impl SimulationOutputs {
 
 impl Slots {
     fn into_all(self) -> impl Iterator<Item = OutputSlot> {
-        self.motion.into_iter().chain(self.table).chain(self.rows).chain(self.envelope).chain(self.reports)
+        self.motion.into_iter().chain(self.table).chain(self.rows).chain(self.reports)
     }
 }

@@ -37,7 +37,7 @@ pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
     let watch = |event: Event<'_>| watcher.hear(event);
     let shapes = load_shapes(&body, &model, &context(None, false, &watch))
         .map_err(|error| error.in_file(&arguments.body))?;
-    let shapes = NodalShapes::new(&shapes, &model, &body.source().name);
+    let shapes = NodalShapes::new(&shapes, &model, &body);
     watcher.finish();
     refuse_warnings(arguments.printing, &diagnostics)?;
     let written = match &arguments.stresses {

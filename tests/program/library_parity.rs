@@ -5,8 +5,8 @@ use crate::program::{flexbody, program};
 use flexbody::program::Arguments;
 use flexbody::{
     Audit, Batch, BatchOptions, ComparisonFormat, ConvertOptions, ExportOptions, FlexBody, LoadedHistory,
-    Model, MotionHistory, Progress, Ranges, Recipe, RecordedMotion, ReportFormat, ResponseOptions, Scene,
-    Tolerances, TradeOptions,
+    Model, MotionHistory, Progress, Ranges, Recipe, RecordedMotion, Recovered, ReportFormat, ResponseOptions,
+    Scene, Tolerances, TradeOptions,
 };
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -281,6 +281,20 @@ fn recover(place: &Place) {
         assert!(rows.write_envelope(&body, place.path("envelope.csv")).is_err());
     }
     assert!(recovered.write_envelope(&body, place.path("envelope.pdf")).is_err());
+    assert!(Recovered::write_envelope_of_cases(&[], &body, place.path("envelope.csv")).is_err());
+    // Factors of FE steps.
+    place.results("shapes cut.h5 --model cut.toml --to npz -o ask.npz");
+    let channels = body.channels(&history, place.path("ask.npz")).expect("channels");
+    for file in ["command_channels.csv", "command_channels.h5"] {
+        place.results(&format!("recover cut.h5 --history {run} --channels {file} --shapes ask.npz"));
+    }
+    let table = fs::read_to_string(place.path("command_channels.csv")).expect("a table");
+    let own = LoadedHistory::read(&run, &body).expect("a history");
+    let channels_of_run = body.channels(&own, place.path("ask.npz")).expect("channels");
+    assert_eq!((channels.csv(), channels_of_run.csv()), (table.clone(), table));
+    channels_of_run.write(&body, place.path("library_channels.h5")).expect("written");
+    place.assert_same("command_channels.h5", "library_channels.h5");
+    assert_eq!(channels.values().columns(), channels.names().len());
     let q = (0..motion.times().len()).map(|at| motion.modal_coordinates(at).to_vec()).collect();
     let omega: Vec<[f64; 3]> =
         (0..motion.times().len()).map(|at| motion.angular_velocity(at).into()).collect();

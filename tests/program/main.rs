@@ -2,6 +2,7 @@
 
 #![allow(unreachable_pub)] // tests export nothing
 
+mod answers;
 mod bad_input;
 mod bodies;
 mod ci_example;
@@ -23,9 +24,11 @@ mod limits;
 mod models;
 mod motion;
 mod odd_files;
+mod operators;
 mod pages;
 mod program;
 mod replaced_inputs;
+mod stress_colours;
 mod structure;
 mod study;
 mod view;

@@ -189,14 +189,14 @@ fn plate() -> FlexBody {
 #[test]
 fn a_hundred_thousand_nodes_fit_into_a_page() {
     let body = plate();
-    let view = View::new(&body, None, None).expect("a page");
+    let view = View::new(&body, None, None, None).expect("a page");
     assert!((5_000_000..10_000_000).contains(&view.html().len()), "{}", view.html().len());
     let report = render(&Facts::new(&body, &RunData::default()), Format::Html).len();
     assert!((1_500_000..4_000_000).contains(&report), "{report}");
 }
 
 /// Returns a browser of this machine, if there is one.
-fn browser() -> Option<PathBuf> {
+pub fn browser() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     let names = ["chromium", "chromium-browser", "google-chrome", "chrome"];
     std::env::split_paths(&path)
@@ -206,7 +206,7 @@ fn browser() -> Option<PathBuf> {
 
 /// Returns the document and the messages of the browser for a page; with an option for a screenshot it writes
 /// that instead.
-fn browse(browser: &Path, page: &Path, asked: &str, options: &[&str]) -> (String, String) {
+pub fn browse(browser: &Path, page: &Path, asked: &str, options: &[&str]) -> (String, String) {
     let own = tempfile::tempdir().expect("a folder");
     let usual = "--headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic \
         --no-first-run --disable-background-networking --disable-component-update --disable-sync --enable-logging=stderr";
@@ -258,7 +258,7 @@ fn a_browser_turns_a_hundred_thousand_nodes() {
     };
     let folder = tempfile::tempdir().expect("a folder");
     let page = folder.path().join("plate.html");
-    fs::write(&page, View::new(&plate(), None, None).expect("a page").html()).expect("written");
+    fs::write(&page, View::new(&plate(), None, None, None).expect("a page").html()).expect("written");
     let (document, said) = browse(&browser, &page, "#mode=3&frames=20", &["--dump-dom"]);
     assert!(!said.contains("CONSOLE"), "{said}");
     let (_, rest) = document.split_once("data-frame-time=\"").expect("the time of a frame");

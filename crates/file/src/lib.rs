@@ -38,7 +38,7 @@ pub use flexbody_base::output::OutputSlot;
 pub use read::{read, read_with_notes, validate};
 pub use recorded_motion::RecordedMotion;
 #[cfg(feature = "hdf5")]
-pub use recovered::fill_recovered;
+pub use recovered::{fill_channels, fill_recovered};
 #[cfg(feature = "hdf5")]
 pub use simulation::{fill_simulation, read_simulation};
 #[cfg(feature = "hdf5")]

@@ -9,7 +9,7 @@ use flexbody_base::hdf5_file::{create, make, put_text};
 use flexbody_base::output::OutputSlot;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_motion::scene::{RecoveredMotion, RowMap, StressPoint};
+use flexbody_motion::scene::{Channels, RecoveredMotion, RowMap, StressPoint};
 use hdf5_metno as hdf5;
 use std::path::Path;
 
@@ -51,6 +51,38 @@ fn fill(body: &FlexBody, motion: &RecoveredMotion, origin: (&str, &str), path: &
     }
     file.flush()?;
     file.close()
+}
+
+/// Writes channels of the steps of an FE program to the temporary file of `slot`, which appears under its name when the
+/// slot is committed.
+///
+/// * `history`: file of the motion.
+///
+/// # Errors
+/// FB104 if the file cannot be written, FB602 if the disk is full.
+pub fn fill_channels(body: &FlexBody, channels: &Channels, history: &str, slot: &OutputSlot) -> Result<()> {
+    let fill = || -> hdf5::Result<()> {
+        let file = create(slot.temporary())?;
+        put_text(&file, "format", "flexbody-channels")?;
+        file.new_attr::<i64>().create("format_version")?.write_scalar(&VERSION)?;
+        put_text(&file, "generator", &generator())?;
+        put_text(&file, "body", &body.source().name)?;
+        put_text(&file, "history", history)?;
+        let root = file.as_group()?;
+        let time = put(&root, "time", &[channels.times.len()], &channels.times)?;
+        put_text(&time, "units", body.units().time.name())?;
+        let values =
+            put(&root, "channels", &[channels.times.len(), channels.names.len()], &channels.values.concat())?;
+        put_text(&values, "names", &serde_json::to_string(&channels.names).expect("strings are valid JSON"))?;
+        put_text(
+            &values,
+            "description",
+            "factors of the steps, one row per instant; the last is that of the values at rest",
+        )?;
+        file.flush()?;
+        file.close()
+    };
+    fill().map_err(|e| slot.failure(&system_error(&e.to_string())))
 }
 
 /// Writes the rows of one recovery, and the stress measures of its points.

@@ -3,6 +3,7 @@
 
 use super::npz::{archive, npy, text};
 use flexbody_body::convert::{RecoveryShapes, ShapeColumn};
+use flexbody_body::flex_body::FlexBody;
 use flexbody_model::FeModel;
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -17,6 +18,8 @@ const DECIMALS: usize = 13;
 pub struct NodalShapes {
     /// Name of the body.
     pub body: String,
+    /// True if the modes respond to spin, so that the static columns of spin are what the modes leave out.
+    modes_follow_spin: bool,
     /// Numbers of the nodes.
     nodes: Vec<i64>,
     /// Mode or column of each shape.
@@ -32,8 +35,8 @@ pub struct NodalShapes {
 }
 
 impl NodalShapes {
-    /// Creates the shapes of a body named `body` by the nodes of its model.
-    pub fn new(shapes: &RecoveryShapes, model: &FeModel, body: &str) -> Self {
+    /// Creates the shapes of `body` by the nodes of its model.
+    pub fn new(shapes: &RecoveryShapes, model: &FeModel, body: &FlexBody) -> Self {
         let (n, d) = (model.nodes().len(), model.dimension());
         let count = shapes.columns.len();
         let displacements = (0..count)
@@ -55,7 +58,8 @@ impl NodalShapes {
             (0..count).map(of_shape).collect()
         });
         Self {
-            body: body.to_owned(),
+            body: body.source().name.clone(),
+            modes_follow_spin: body.groups().w1,
             nodes: model.nodes().ids.clone(),
             positions: model.nodes().positions.clone(),
             columns: shapes.columns.clone(),
@@ -120,6 +124,7 @@ impl NodalShapes {
             "program": format!("flexbody {}", env!("CARGO_PKG_VERSION")),
             "body": self.body,
             "columns": columns,
+            "modes_follow_spin": self.modes_follow_spin,
         });
         let (count, n) = (self.count(), self.nodes.len());
         let field = |values: &[Vec<[f64; 3]>]| {

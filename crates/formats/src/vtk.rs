@@ -9,7 +9,7 @@ use crate::picture::{Drawn, Played, mode_names, named, printable};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_file::RecordedMotion;
-use flexbody_motion::scene::{PointEnvelope, RecoveredMotion};
+use flexbody_motion::scene::{CasePeak, Envelope, PointPeaks};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
@@ -115,10 +115,12 @@ pub struct PointValues {
     pub values: Vec<f64>,
     /// True if the smallest of several values at a node counts; otherwise the largest.
     pub is_smallest: bool,
+    /// Number of the load case of each value, counted from 1; empty without load cases.
+    pub cases: Vec<f64>,
 }
 
-/// Returns the undeformed body with an array of values at its nodes for each of `all`, NaN at nodes without a point.
-/// Returns `None` if no point is a node.
+/// Returns the undeformed body with an array of values at its nodes for each of `all`, NaN at nodes without a point; with
+/// load cases also the array `NAME case`. Returns `None` if no point is a node.
 pub fn stresses_vtu(body: &FlexBody, all: &[PointValues]) -> Option<Vec<u8>> {
     let drawn = Drawn::places(body, &Points::Nodes);
     let place: HashMap<i64, usize> = drawn.numbers().iter().enumerate().map(|(at, id)| (*id, at)).collect();
@@ -126,43 +128,51 @@ pub fn stresses_vtu(body: &FlexBody, all: &[PointValues]) -> Option<Vec<u8>> {
     let mut is_empty = true;
     for one in all {
         let mut values = vec![f64::NAN; drawn.len()];
+        let mut cases = vec![f64::NAN; drawn.len()];
         let mut found = false;
-        for (node, own) in one.nodes.iter().zip(&one.values) {
+        for (point, (node, own)) in one.nodes.iter().zip(&one.values).enumerate() {
             let Some(&at) = node.and_then(|node| place.get(&node)) else { continue };
             found = true;
             // Several elements may have a point at this node.
             let is_further = if one.is_smallest { *own < values[at] } else { *own > values[at] };
             if values[at].is_nan() || is_further {
                 values[at] = *own;
+                cases[at] = one.cases.get(point).copied().unwrap_or(f64::NAN);
             }
         }
         if found {
             is_empty = false;
             grid.put_scalars(&one.name, &values);
+            if !one.cases.is_empty() {
+                grid.put_scalars(&format!("{} case", one.name), &cases);
+            }
         }
     }
     (!is_empty).then(|| grid.file(&drawn.positions()))
 }
 
-/// Returns the undeformed body with the largest stresses of a motion at every node: for each recovery with points at nodes
-/// the arrays `NAME von Mises`, `NAME largest principal` and `NAME smallest principal`, NaN at nodes without stresses.
-/// Returns `None` without such a recovery, or if the motion has no envelopes.
-pub fn envelope_vtu(body: &FlexBody, motion: &RecoveredMotion) -> Option<Vec<u8>> {
+/// Returns the undeformed body with the largest stresses at every node: for each recovery with points at nodes the arrays
+/// `NAME von Mises`, `NAME largest principal` and `NAME smallest principal`, NaN at nodes without stresses; of several load
+/// cases each also with `case` behind its name, the number of the load case of each value. Returns `None` without such a
+/// recovery.
+pub fn envelope_vtu(body: &FlexBody, envelope: &Envelope) -> Option<Vec<u8>> {
     let mut all = Vec::new();
-    for (map, envelope) in motion.recoveries.iter().zip(motion.envelopes.as_ref()?) {
-        let nodes: Vec<Option<i64>> = map.points.iter().map(|point| map.rows[point.rows[0]].node).collect();
-        let mut put = |name: &str, is_smallest: bool, value: fn(&PointEnvelope) -> f64| {
-            let values = envelope.iter().map(value).collect();
+    for recovery in &envelope.recoveries {
+        let nodes: Vec<Option<i64>> = recovery.points.iter().map(|point| point.node).collect();
+        let mut put = |name: &str, is_smallest: bool, peak: fn(&PointPeaks) -> CasePeak| {
+            let peaks: Vec<CasePeak> = recovery.points.iter().map(peak).collect();
+            let is_named = !envelope.cases.is_empty();
             all.push(PointValues {
-                name: format!("{} {name}", map.name),
+                name: format!("{} {name}", recovery.name),
                 nodes: nodes.clone(),
-                values,
+                values: peaks.iter().map(|peak| peak.value).collect(),
                 is_smallest,
+                cases: peaks.iter().filter(|_| is_named).map(|peak| peak.case as f64 + 1.0).collect(),
             });
         };
-        put("von Mises", false, |own| own.von_mises.value);
-        put("largest principal", false, |own| own.tension.value);
-        put("smallest principal", true, |own| -own.compression.value);
+        put("von Mises", false, |own| own.von_mises);
+        put("largest principal", false, |own| own.largest_principal);
+        put("smallest principal", true, |own| own.smallest_principal);
     }
     stresses_vtu(body, &all)
 }

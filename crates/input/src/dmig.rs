@@ -4,7 +4,7 @@ use super::assemble::{
     Entry, Sides, StoredEntries, assemble_distinct, check_size, push, undeclared_triangle,
 };
 use super::bulk_cards::{Card, Item, MatrixLines, is_bulk_data, read_cards, read_deck};
-use super::named_matrices::choose;
+use super::named_matrices::{choose, named_or_only};
 use super::reader::{MatrixSource, Reader};
 use crate::digits::written_digits;
 use crate::mapping::Recent;
@@ -37,6 +37,8 @@ struct Dmig {
     form: i64,
     /// Kind of the numbers: 1 and 2 are real; complex ones are skipped.
     kind: i64,
+    /// Number of columns of a rectangular matrix, if the header states it.
+    columns: Option<i64>,
     path: PathBuf,
     line: usize,
     /// Entries in the order of the deck; row and column are indices of points.
@@ -240,6 +242,41 @@ impl Dmigs {
         })
     }
 
+    /// Returns a matrix whose rows are points and whose columns are numbers: the transpose of an operator. Its entries
+    /// are moved out.
+    ///
+    /// # Errors
+    /// FB302 for complex matrices and for other forms, FB303 for columns beyond those of the header.
+    fn take_numbered(&mut self, k: usize) -> Result<NumberedColumns, Diagnostic> {
+        let pieces = std::mem::take(&mut self.matrices[k].pieces);
+        let dmig = &self.matrices[k];
+        let refuse = |code, message: String, help: &str| {
+            let diagnostic = Diagnostic::new(code, message).about(format!("DMIG {}", dmig.name));
+            Err(diagnostic.in_file(&dmig.path).at_line(dmig.line).with_help(help))
+        };
+        if !dmig.is_real() {
+            return refuse(Code::MatrixKind, format!("type {} is complex", dmig.kind), "write real matrices");
+        }
+        if !matches!(dmig.form, 2 | RECTANGULAR) {
+            let message = format!("form {} is not that of a rectangular matrix", dmig.form);
+            let help = "write the transposed operator with form 9: its rows are grids and components, its columns 1, 2, ... are the rows of the operator";
+            return refuse(Code::MatrixKind, message, help);
+        }
+        let mut entries = Vec::new();
+        for entry in pieces.into_iter().flatten() {
+            let (column, component) = self.points[entry.col as usize];
+            if component != 0 || column > dmig.columns.unwrap_or(i64::from(u32::MAX)) {
+                let message = format!("column {column}, component {component} is not a number of a column");
+                let help = "number the columns 1, 2, ... as far as the header says, with component 0";
+                return refuse(Code::MatrixIndex, message, help);
+            }
+            entries.push((label(self.points[entry.row as usize]), column as u32 - 1, entry.value));
+        }
+        let last = entries.iter().map(|(_, column, _)| column + 1).max().unwrap_or(0);
+        let columns = dmig.columns.and_then(|columns| u32::try_from(columns).ok()).unwrap_or(last);
+        Ok(NumberedColumns { name: dmig.name.clone(), columns, entries })
+    }
+
     /// Returns the nonzero entries with rows and columns as indices in `points`, and their sides of the diagonal.
     fn in_rows(&self, mut pieces: Vec<Vec<Entry>>, points: &[Point]) -> (Vec<Vec<Entry>>, Sides) {
         let row_of = |point| points.binary_search(point).map_or(u32::MAX, |row| row as u32);
@@ -279,6 +316,7 @@ impl Dmigs {
             name,
             form,
             kind,
+            columns: card.integer(7).filter(|columns| *columns > 0),
             path: path.to_path_buf(),
             line,
             pieces: Vec::new(),
@@ -286,6 +324,24 @@ impl Dmigs {
         });
         Ok(())
     }
+}
+
+/// Matrix with labelled rows and numbered columns.
+pub(super) struct NumberedColumns {
+    pub name: String,
+    pub columns: u32,
+    /// Row, column from 0, and value of every entry.
+    pub entries: Vec<(DofLabel, u32, f64)>,
+}
+
+/// Reads the matrix `name`, or the only one of the file, with numbered columns.
+///
+/// # Errors
+/// FB310 if there is no such matrix, the errors of [`Dmigs::of`] and of the matrix.
+pub(super) fn read_numbered(path: &Path, name: Option<&str>) -> Result<NumberedColumns, Vec<Diagnostic>> {
+    let mut all = Dmigs::of(&[path.to_path_buf()])?;
+    let wanted = named_or_only(&all.names(), name).map_err(|diagnostic| vec![diagnostic.in_file(path)])?;
+    all.take_numbered(wanted).map_err(|diagnostic| vec![diagnostic])
 }
 
 /// Returns the label of a row. Scalar points have direction 1.

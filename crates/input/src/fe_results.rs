@@ -4,10 +4,12 @@
 mod any_program;
 mod dat;
 mod frd;
+mod mesh_files;
 #[cfg(test)]
 mod tests;
 
-use super::hdf5::Hdf5;
+use super::hdf5::{Hdf5, has_nodal_variables};
+use super::node_files;
 use super::reader::{HEAD, Reader};
 use crate::npy::{self, Blocks};
 use crate::scipy_npz::{Archive, ScipyNpz};
@@ -126,7 +128,15 @@ pub fn read_point_stresses(path: &Path) -> Result<PointStresses, Error> {
 fn read_values(file: &InputFile) -> Found<StepValues> {
     let head = file.first_bytes(HEAD);
     if Hdf5.recognises(&head) {
-        return any_program::read_hdf5(file);
+        return match has_nodal_variables(file) {
+            true => mesh_files::read_exodus(file),
+            false => any_program::read_hdf5(file),
+        };
+    }
+    if head.starts_with(b"CDF") {
+        let message = "file is netCDF in its classic form, which is not read";
+        let found = Diagnostic::new(Code::FeResultsSyntax, message).in_file(file.path());
+        return Err(vec![found.with_help("write it as netCDF-4: nccopy -k netCDF-4 OLD.e NEW.e")]);
     }
     file.load().map_err(|diagnostic| vec![diagnostic])?;
     if frd::recognises(&head) {
@@ -134,6 +144,9 @@ fn read_values(file: &InputFile) -> Found<StepValues> {
     }
     if dat::recognises(&head) {
         return dat::read(file);
+    }
+    if node_files::is_vtk_xml(&head) {
+        return mesh_files::read_vtu(file);
     }
     any_program::read_table(file)
 }
@@ -417,6 +430,67 @@ impl ShapeArchive {
     fn count(&self) -> usize {
         self.displacements.ncols()
     }
+}
+
+/// Steps of an FE program in the archive that `flexbody shapes` writes with them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WrittenSteps {
+    /// Mode or static column of each step.
+    pub columns: Vec<String>,
+    /// Factor of each step.
+    pub factors: Vec<f64>,
+    /// Numbers of the nodes.
+    pub nodes: Vec<i64>,
+    /// Displacements of each step and node, axes of the model.
+    pub displacements: Vec<Vec<[f64; 3]>>,
+    /// True if the modes respond to spin.
+    pub modes_follow_spin: bool,
+}
+
+/// Reads the steps in an archive of `flexbody shapes`.
+///
+/// # Errors
+/// FB101 and FB106 for a file that cannot be read, FB326 for a file that is no such archive, FB103, FB301 to FB306 for
+/// damaged arrays.
+pub fn read_steps(path: &Path) -> Result<WrittenSteps, Error> {
+    let file = InputFile::open(path)?;
+    let about = |diagnostic: Diagnostic| Error::new(vec![diagnostic.in_file(path)]);
+    let foreign = |message: &str| {
+        about(
+            Diagnostic::new(Code::RecoveryShapes, message)
+                .with_help("give the archive (.npz) that flexbody shapes wrote"),
+        )
+    };
+    if !ShapeArchive::recognises(&file) {
+        return Err(foreign("file is no archive of shapes"));
+    }
+    let mut archive = Archive::open(file.bytes()).map_err(about)?;
+    if let Some(missing) =
+        ["nodes", "displacements", "factors", "description"].iter().find(|name| !archive.has(name))
+    {
+        return Err(foreign(&format!("the archive has no array `{missing}`")));
+    }
+    let text = npy::read_text(&archive.member("description").map_err(about)?);
+    let description: Option<serde_json::Value> = text.and_then(|text| serde_json::from_str(&text).ok());
+    let columns = description.as_ref().and_then(|description| {
+        let names = description["columns"].as_array()?;
+        names.iter().map(|name| name.as_str().map(str::to_owned)).collect::<Option<Vec<String>>>()
+    });
+    let Some(columns) = columns else {
+        return Err(foreign("the description of the archive does not name its steps"));
+    };
+    let follows = description.and_then(|description| description["modes_follow_spin"].as_bool());
+    let factors = npy::read(&archive.member("factors").map_err(about)?).map_err(about)?.values;
+    let nodes = npy::read_integers(&archive.member("nodes").map_err(about)?).map_err(about)?;
+    let blocks = blocks(&mut archive, "displacements").map_err(about)?;
+    if (blocks.count, blocks.rows, blocks.columns) != (columns.len(), nodes.len(), 3)
+        || factors.len() != columns.len()
+    {
+        return Err(foreign("names, factors and displacements of the archive do not fit each other"));
+    }
+    let step = |step: &[f64]| step.as_chunks::<3>().0.to_vec();
+    let displacements = blocks.values.chunks((3 * nodes.len()).max(1)).map(step).collect();
+    Ok(WrittenSteps { columns, factors, nodes, displacements, modes_follow_spin: follows.unwrap_or(true) })
 }
 
 /// Returns the labels of three displacements for each node.

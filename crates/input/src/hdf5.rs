@@ -6,6 +6,7 @@ mod values;
 
 use super::named_matrices::NamedMatrices;
 use super::reader::{MatrixRole, MatrixSource, Reader};
+use super::recovery_files::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::hdf5_file::{by_utf8_name, without_plugins};
@@ -16,7 +17,7 @@ use hdf5_metno::{File, Group, LinkType};
 use std::collections::BTreeMap;
 use values::Found;
 
-pub(super) use exodus::read_exodus;
+pub(super) use exodus::{NodalVariables, has_nodal_variables, read_exodus, read_nodal_variables};
 pub(super) use values::read_array;
 
 /// Reader of HDF5 files.
@@ -61,6 +62,30 @@ impl Reader for Hdf5 {
             group::read(&group, &name, source)
         };
         read().map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))
+    }
+}
+
+/// Reads a matrix that need not be square: the sparse matrix or the dense array `name`, or the only one of the file.
+///
+/// # Errors
+/// FB310 if there is no such matrix or several, FB302 to FB313 for an invalid one.
+pub(super) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+    let opened = opened(file)?;
+    let found = matrices(&opened);
+    let wanted = name.map(|name| format!("/{}", name.trim_matches('/')));
+    let sparse = match &wanted {
+        Some(wanted) => found.iter().find(|(name, _)| name == wanted),
+        None => {
+            found.first().filter(|_| found.len() == 1 && !values::has_arrays_beside(&opened, &found[0].0))
+        }
+    };
+    match sparse {
+        Some((name, group)) => group::read_rectangular(group, name, file),
+        None if wanted.is_none() && found.len() > 1 => {
+            let message = format!("file holds {} sparse matrices; which is the operator?", found.len());
+            Err(vec![layout(message).with_help(listing(&found))])
+        }
+        None => values::read_rectangular(file, name),
     }
 }
 

@@ -1,13 +1,15 @@
 //! Matrices in MAT-files of MATLAB, versions 5 to 7, as MATLAB, Octave and SciPy write them: "MAT-File Format", The
 //! MathWorks. Files of version 7.3 are HDF5.
 
-use super::named_matrices::NamedMatrices;
+use super::named_matrices::{NamedMatrices, named_or_only};
 use super::reader::{MatrixRole, MatrixSource, Reader};
+use super::recovery_files::Rectangular;
 use crate::array::Compressed;
-use crate::assemble::{check_size, most_entries_of};
+use crate::assemble::{Entry, check_extents, check_size, most_entries_of};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::memory::{left, refuse_beyond};
+use flexbody_base::text::InputFile;
 use flexbody_model::RawMatrix;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
@@ -55,6 +57,34 @@ impl Reader for Mat5 {
         };
         read().map_err(|diagnostic: Diagnostic| Error::from(diagnostic.in_file(source.file.path())))
     }
+}
+
+/// Reads the variable `name`, or the only matrix of the file, which need not be square.
+///
+/// # Errors
+/// FB102 and FB103 for a file that cannot be read, FB310 if there is no such variable, FB301 to FB306 for an invalid
+/// matrix.
+pub(super) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+    let bytes = file.bytes();
+    let Some(order) = Order::of(bytes) else {
+        return Err(Diagnostic::new(
+            Code::FileFormatUnknown,
+            "file is not of a MATLAB version from 5 to 7.3",
+        ));
+    };
+    let variables = variables(bytes, order)?;
+    let chosen = match name {
+        Some(name) => named(&variables, name)?,
+        None => {
+            let is_matrix = |v: &&Variable<'_>| {
+                v.kind == VariableKind::Sparse || v.kind == VariableKind::Full && v.rows * v.columns > 1
+            };
+            let candidates: Vec<&Variable<'_>> = variables.iter().filter(is_matrix).collect();
+            let names: Vec<String> = candidates.iter().map(|variable| variable.name.clone()).collect();
+            candidates[named_or_only(&names, None)?]
+        }
+    };
+    chosen.rectangular()?.checked()
 }
 
 /// Reads the heads of all variables of the file.
@@ -204,14 +234,14 @@ impl<'a> Variable<'a> {
         Ok(head)
     }
 
-    /// Returns the matrix of the variable.
+    /// Reads the arrays of the variable.
     ///
     /// # Errors
-    /// FB302 for a variable that is no matrix of real numbers, FB103, and the errors of matrices.
-    fn matrix(&self, path: &Path) -> Found<RawMatrix> {
+    /// FB302 for a variable that is no matrix of real numbers, FB103.
+    fn arrays(&self) -> Found<Arrays> {
         let mut elements = Elements::of(self.body, self.compressed, self.order)?;
         Self::head(&mut elements)?;
-        let raw = match (self.kind, self.not_real) {
+        let arrays = match (self.kind, self.not_real) {
             (VariableKind::Other(what), _) | (_, Some(what)) => {
                 let message = format!("variable `{}` holds {what}, not a matrix of real numbers", self.name);
                 return Err(Diagnostic::new(Code::MatrixKind, message).with_help(REAL));
@@ -219,16 +249,71 @@ impl<'a> Variable<'a> {
             (VariableKind::Sparse, None) => {
                 let (indices, values) = (self.most_entries() * 4, self.most_entries() * 8);
                 let pointers = self.columns.saturating_add(1).saturating_mul(8);
-                let arrays = [elements.next(indices)?, elements.next(pointers)?, elements.next(values)?];
-                self.sparse(arrays, path)?
+                Arrays::Sparse([elements.next(indices)?, elements.next(pointers)?, elements.next(values)?])
             }
             (VariableKind::Full, None) => {
                 let places = self.rows.saturating_mul(self.columns);
-                self.full(&elements.next(places.saturating_mul(8))?, path)?
+                Arrays::Full(elements.next(places.saturating_mul(8))?)
             }
         };
         elements.finish()?;
+        Ok(arrays)
+    }
+
+    /// Returns the square matrix of the variable.
+    ///
+    /// # Errors
+    /// The errors of [`Self::arrays`] and of matrices.
+    fn matrix(&self, path: &Path) -> Found<RawMatrix> {
+        let raw = match self.arrays()? {
+            Arrays::Sparse(arrays) => self.sparse(arrays, path)?,
+            Arrays::Full(values) => self.full(&values, path)?,
+        };
         Ok(RawMatrix { digits: if self.single { raw.digits.min(7) } else { raw.digits }, ..raw })
+    }
+
+    /// Returns the matrix of the variable, which need not be square.
+    ///
+    /// # Errors
+    /// The errors of [`Self::arrays`]; FB301, FB304 for lists that do not fit each other, FB313 for a matrix beyond
+    /// memory.
+    fn rectangular(&self) -> Found<Rectangular> {
+        let (starts, count, entry): (Vec<u64>, usize, EntryAt) = match self.arrays()? {
+            Arrays::Sparse([indices, pointers, values]) => {
+                let count = indices.len().min(values.len());
+                let starts = starts_of(&pointers);
+                let entry = move |k| (indices.whole(k).unwrap_or(-1), values.real(k).unwrap_or(f64::NAN));
+                (starts, count, Box::new(entry))
+            }
+            Arrays::Full(values) => {
+                let (rows, count) = (self.rows, values.len());
+                let starts = (0..=self.columns).map_while(|column| column.checked_mul(rows)).collect();
+                let entry =
+                    move |k: usize| ((k as u64 % rows.max(1)) as i64, values.real(k).unwrap_or(f64::NAN));
+                (starts, count, Box::new(entry))
+            }
+        };
+        let fits = starts.len() as u64 == self.columns.saturating_add(1)
+            && starts.is_sorted()
+            && starts[0] == 0
+            && starts.last().is_some_and(|last| *last <= count as u64);
+        if !fits {
+            let message = format!("variable `{}` has lists that do not fit each other", self.name);
+            return Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP));
+        }
+        let used = starts.last().copied().unwrap_or(0);
+        let [rows, columns] = check_extents(self.rows, self.columns, used)?;
+        let mut entries = Vec::new();
+        for (column, pair) in starts.windows(2).enumerate() {
+            for k in pair[0]..pair[1] {
+                let (row, value) = entry(k as usize);
+                let row = u32::try_from(row).unwrap_or(u32::MAX);
+                if value != 0.0 {
+                    entries.push(Entry { row, col: column as u32, value });
+                }
+            }
+        }
+        Ok(Rectangular { rows, columns, entries })
     }
 
     /// Returns the largest number of entries of a matrix of this size.
@@ -238,9 +323,7 @@ impl<'a> Variable<'a> {
 
     fn sparse(&self, [indices, pointers, values]: [Numbers; 3], path: &Path) -> Found<RawMatrix> {
         let n = check_size(self.rows, self.columns, values.len() as u64)?;
-        let pointers: Vec<u64> = (0..pointers.len())
-            .map(|k| pointers.whole(k).and_then(|at| u64::try_from(at).ok()).unwrap_or(u64::MAX))
-            .collect();
+        let pointers = starts_of(&pointers);
         // The arrays may have capacity for more entries than are used.
         let count = indices.len().min(values.len());
         let entries = pointers.last().map_or(0, |last| (*last).min(count as u64) as usize);
@@ -277,6 +360,23 @@ impl<'a> Variable<'a> {
         };
         compressed.assemble(path)
     }
+}
+
+/// Function that returns row and value of the k-th entry.
+type EntryAt = Box<dyn Fn(usize) -> (i64, f64)>;
+
+/// Arrays of a matrix.
+enum Arrays {
+    /// Rows, starts of the columns, values.
+    Sparse([Numbers; 3]),
+    /// Values, column by column.
+    Full(Numbers),
+}
+
+/// Returns the starts of the columns of a sparse matrix.
+fn starts_of(pointers: &Numbers) -> Vec<u64> {
+    let start = |k| pointers.whole(k).and_then(|at| u64::try_from(at).ok()).unwrap_or(u64::MAX);
+    (0..pointers.len()).map(start).collect()
 }
 
 // Data elements of a MAT-file: a tag with type and number of bytes, and the bytes.

@@ -244,7 +244,8 @@ pub struct MatrixLocation {
 }
 
 impl MatrixLocation {
-    /// Parses `FILE` or `FILE:/group`. A single letter before the `:/` is a Windows drive, not a file.
+    /// Parses `FILE` or `FILE:/group`. A single letter before the `:/` is a Windows drive, not a file. After the extensions
+    /// `.op4`, `.pch` and `.mat`, whose matrices have names and no folders, the `/` may be missing.
     ///
     /// ```
     /// use flexbody_input::MatrixLocation;
@@ -259,6 +260,12 @@ impl MatrixLocation {
             let drive = file.len() == 1 && file.starts_with(|c: char| c.is_ascii_alphabetic());
             if !file.is_empty() && !drive {
                 return Self { path: file.into(), group: Some(format!("/{group}")) };
+            }
+        }
+        if let Some((file, name)) = text.to_str().and_then(|t| t.rsplit_once(':')) {
+            let lower = file.to_lowercase();
+            if [".op4", ".pch", ".mat"].iter().any(|ending| lower.ends_with(ending)) && !name.is_empty() {
+                return Self { path: file.into(), group: Some(format!("/{name}")) };
             }
         }
         Self { path: text.into(), group: None }

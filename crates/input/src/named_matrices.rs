@@ -113,6 +113,21 @@ pub(super) fn choose(names: &[String], role: MatrixRole, group: Option<&str>) ->
     }
 }
 
+/// Returns the index of the matrix that a user has named, or of the only one of a file.
+///
+/// # Errors
+/// FB310 if there is none, or more than one.
+pub(super) fn named_or_only(names: &[String], name: Option<&str>) -> Result<usize, Diagnostic> {
+    match (name, names.len()) {
+        (Some(_), _) => choose(names, MatrixRole::Stiffness, name),
+        (None, 1) => Ok(0),
+        (None, count) => {
+            let message = format!("the file has {count} matrices; which is the operator?");
+            Err(Diagnostic::new(Code::Hdf5Layout, message).with_help(listing(names)))
+        }
+    }
+}
+
 fn listing(names: &[String]) -> String {
     const MAX_SHOWN: usize = 12;
     if names.is_empty() {

@@ -7,6 +7,8 @@ mod gmsh;
 mod vtk_legacy;
 mod vtk_xml;
 
+pub(super) use vtk_xml::{PointArray, point_arrays};
+
 use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};
 use super::tables::read_nodes;
@@ -123,6 +125,11 @@ pub(super) struct NodeFile {
     pub followers: Vec<(String, Vec<DofLabel>)>,
     /// Unit vectors along the rows of nodes, where these are not the axes of the model.
     pub axes: HashMap<i64, NodeAxes>,
+}
+
+/// Returns true when a file begins like VTK in XML.
+pub(super) fn is_vtk_xml(head: &[u8]) -> bool {
+    vtk_xml::recognises(&String::from_utf8_lossy(head))
 }
 
 #[cfg(test)]

@@ -130,6 +130,21 @@ pub(super) fn announced_bytes(bytes: &[u8]) -> Option<u64> {
     Some(((bytes.len() - data.len()) as u64).saturating_add(values))
 }
 
+/// Returns the text of an array that is one text of any length (`<U120`).
+pub(super) fn read_text(bytes: &[u8]) -> Option<String> {
+    let (header, data) = split(bytes).ok()?;
+    let Header { descr, .. } = parse(header)?;
+    if !descr.starts_with("<U") {
+        return None;
+    }
+    data.as_chunks::<4>()
+        .0
+        .iter()
+        .map(|four| char::from_u32(u32::from_le_bytes(*four)))
+        .filter(|c| *c != Some('\0'))
+        .collect()
+}
+
 /// Returns the text of an array that is one word (`|S3`, `<U3`).
 pub(super) fn read_word(bytes: &[u8]) -> Option<String> {
     let (header, data) = split(bytes).ok()?;

@@ -4,9 +4,10 @@
 mod binary;
 mod text;
 
-use super::assemble::{check_size, undeclared_triangle};
-use super::named_matrices::choose;
+use super::assemble::{check_extents, check_size, undeclared_triangle};
+use super::named_matrices::{choose, named_or_only};
 use super::reader::{MatrixSource, Reader};
+use super::recovery_files::Rectangular;
 use crate::assemble::{ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, push};
 use binary::Binary;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -98,6 +99,31 @@ impl Contents {
         usize::try_from(stored.header.rows).ok().filter(|_| is_square)
     }
 
+    /// Returns a matrix that need not be square; `file` must be the file that was scanned.
+    ///
+    /// # Errors
+    /// FB301 for text that cannot be parsed, FB302 for complex matrices and other forms, FB303 for rows outside the
+    /// matrix, FB306 for values that are not finite, FB313 for more entries than memory holds.
+    fn rectangular(&self, file: &InputFile, wanted: usize) -> Found<Rectangular> {
+        let (stored, encoding) = &self.matrices[wanted];
+        let header = &stored.header;
+        let about = |diagnostic: Diagnostic| diagnostic.about(&header.name);
+        let refuse = |message: String, help: &str| {
+            Err(about(Diagnostic::new(Code::MatrixKind, message).with_help(help)))
+        };
+        if !header.is_real() {
+            let message = format!("type {} is complex", header.kind);
+            return refuse(message, "write real matrices, without structural damping");
+        }
+        if !matches!(header.form, 1 | 2 | 6) {
+            let message = format!("form {} is not that of a matrix with all its entries", header.form);
+            return refuse(message, "write a matrix of form 2: forms are 1, 2 and 6");
+        }
+        let columns = columns(file, stored, *encoding)?;
+        let extents = check_extents(header.rows, header.columns, columns.count() as u64).map_err(about)?;
+        Ok(Rectangular { rows: extents[0], columns: extents[1], entries: columns.into_entries() })
+    }
+
     /// Returns the matrix with this index; `file` must be the file that was scanned.
     ///
     /// # Errors
@@ -135,6 +161,16 @@ impl Contents {
         let digits = if is_single { raw.digits.min(SINGLE_DIGITS) } else { raw.digits };
         Ok(RawMatrix { digits, ..raw })
     }
+}
+
+/// Reads the matrix `name`, or the only one of the file, which need not be square.
+///
+/// # Errors
+/// FB310 if there is no such matrix, the errors of [`Contents::of`] and of the matrix.
+pub(super) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+    let contents = Contents::of(file)?;
+    let wanted = named_or_only(&contents.names(), name)?;
+    contents.rectangular(file, wanted)
 }
 
 /// Reads all columns of a matrix. Groups of stretches are read in parallel and joined in the order of the file before
@@ -393,6 +429,13 @@ impl Columns {
 
     fn sides(&self) -> Sides {
         self.sides
+    }
+
+    /// Returns all entries in file order.
+    fn into_entries(self) -> Vec<Entry> {
+        let columns = self.lengths.iter().flat_map(|&(col, length)| std::iter::repeat_n(col, length));
+        let places = columns.zip(self.rows).zip(self.values);
+        places.map(|((col, row), value)| Entry { row, col, value }).collect()
     }
 
     /// Returns the matrix of `n` rows and columns.

@@ -4,8 +4,9 @@
 //! its first number and its length.
 
 use super::array::Compressed;
-use super::assemble::check_size;
+use super::assemble::{Entry, check_extents, check_size};
 use super::reader::{MatrixSource, Reader};
+use super::recovery_files::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_model::RawMatrix;
@@ -85,48 +86,100 @@ impl Whole {
     }
 }
 
-fn read(bytes: &[u8], source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic> {
-    let cut_off = || {
-        let message = "file ends before the matrix does: it may be cut off";
-        Diagnostic::new(Code::MatrixCount, message).with_help(HELP)
-    };
-    let Some(whole) = Whole::of(bytes) else {
-        let message = "file does not begin with the number of a matrix of PETSc, 1211216";
-        return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP));
-    };
-    // A matrix has a head of four numbers, the lengths of its rows, the column indices and the values.
-    let (head, rest) = whole.list(bytes, 4).ok_or_else(cut_off)?;
-    let [kind, rows, columns, entries] = std::array::from_fn(|k| whole.get(head, k).unwrap_or(-1));
-    let entries = entry_count(kind, entries)?;
-    let size = |extent: i64| extent.max(0) as u64;
-    let n = check_size(size(rows), size(columns), entries)?;
-    let (lengths, rest) = whole.list(rest, n as u64).ok_or_else(cut_off)?;
-    let (indices, values) = whole.list(rest, entries).ok_or_else(cut_off)?;
-    let single = value_bytes(values.len(), entries).ok_or_else(|| wrong_size(values, entries, whole))? == 4;
-    let mut pointers = vec![0u64];
-    for k in 0..n {
-        let length = whole.get(lengths, k).and_then(|length| u64::try_from(length).ok()).unwrap_or(u64::MAX);
-        pointers.push(pointers[k].saturating_add(length));
+/// Arrays of a matrix in its file.
+struct Stored<'a> {
+    whole: Whole,
+    rows: u64,
+    columns: u64,
+    entries: u64,
+    lengths: &'a [u8],
+    indices: &'a [u8],
+    values: &'a [u8],
+    is_single: bool,
+}
+
+impl<'a> Stored<'a> {
+    /// Splits the file into its arrays. A matrix has a head of four numbers, the lengths of its rows, the column indices
+    /// and the values. `check` refuses extents and numbers of entries.
+    fn of(
+        bytes: &'a [u8],
+        check: impl FnOnce(u64, u64, u64) -> std::result::Result<(), Diagnostic>,
+    ) -> std::result::Result<Self, Diagnostic> {
+        let cut_off = || {
+            let message = "file ends before the matrix does: it may be cut off";
+            Diagnostic::new(Code::MatrixCount, message).with_help(HELP)
+        };
+        let Some(whole) = Whole::of(bytes) else {
+            let message = "file does not begin with the number of a matrix of PETSc, 1211216";
+            return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP));
+        };
+        let (head, rest) = whole.list(bytes, 4).ok_or_else(cut_off)?;
+        let [kind, rows, columns, entries] = std::array::from_fn(|k| whole.get(head, k).unwrap_or(-1));
+        let entries = entry_count(kind, entries)?;
+        let [rows, columns] = [rows, columns].map(|extent| extent.max(0) as u64);
+        check(rows, columns, entries)?;
+        let (lengths, rest) = whole.list(rest, rows).ok_or_else(cut_off)?;
+        let (indices, values) = whole.list(rest, entries).ok_or_else(cut_off)?;
+        let size = value_bytes(values.len(), entries).ok_or_else(|| wrong_size(values, entries, whole))?;
+        Ok(Self { whole, rows, columns, entries, lengths, indices, values, is_single: size == 4 })
     }
-    let value = |k: usize| {
-        if single {
-            values[4 * k..].first_chunk().map_or(f64::NAN, |b| f64::from(f32::from_be_bytes(*b)))
-        } else {
-            values[8 * k..].first_chunk().map_or(f64::NAN, |b| f64::from_be_bytes(*b))
+
+    /// Returns the start of each row among the entries, and the end of the last.
+    fn pointers(&self) -> Vec<u64> {
+        let mut pointers = vec![0u64];
+        for k in 0..self.rows as usize {
+            let length = self.whole.get(self.lengths, k).and_then(|length| u64::try_from(length).ok());
+            pointers.push(pointers[k].saturating_add(length.unwrap_or(u64::MAX)));
         }
-    };
+        pointers
+    }
+
+    /// Returns column and value of an entry.
+    fn entry(&self, k: usize) -> (i64, f64) {
+        let value = match self.is_single {
+            true => self.values[4 * k..].first_chunk().map(|b| f64::from(f32::from_be_bytes(*b))),
+            false => self.values[8 * k..].first_chunk().map(|b| f64::from_be_bytes(*b)),
+        };
+        (self.whole.get(self.indices, k).unwrap_or(-1), value.unwrap_or(f64::NAN))
+    }
+}
+
+fn read(bytes: &[u8], source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic> {
+    let stored = Stored::of(bytes, |rows, columns, entries| check_size(rows, columns, entries).map(|_| ()))?;
     let compressed = Compressed {
-        n,
+        n: stored.rows as usize,
         by_rows: true,
-        pointers,
+        pointers: stored.pointers(),
         pointers_name: "the sum of the lengths of the rows",
-        entries: entries as usize,
-        entry: &|k| (whole.get(indices, k).unwrap_or(-1), value(k)),
+        entries: stored.entries as usize,
+        entry: &|k| stored.entry(k),
         help: HELP,
         both_triangles: BOTH_TRIANGLES,
     };
     let raw = compressed.assemble(source.file.path())?;
-    Ok(RawMatrix { digits: if single { raw.digits.min(7) } else { raw.digits }, ..raw })
+    Ok(RawMatrix { digits: if stored.is_single { raw.digits.min(7) } else { raw.digits }, ..raw })
+}
+
+/// Reads a matrix that need not be square.
+///
+/// # Errors
+/// FB301 to FB306 for an invalid matrix, FB313 for one beyond memory.
+pub(super) fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
+    let check = |rows, columns, entries| check_extents(rows, columns, entries).map(|_| ());
+    let stored = Stored::of(bytes, check)?;
+    let pointers = stored.pointers();
+    if pointers.last() != Some(&stored.entries) {
+        let message = format!("the lengths of the rows do not add up to {} entries", stored.entries);
+        return Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP));
+    }
+    let mut entries = Vec::with_capacity(stored.entries as usize);
+    for (row, pair) in pointers.windows(2).enumerate() {
+        for k in pair[0]..pair[1] {
+            let (col, value) = stored.entry(k as usize);
+            entries.push(Entry { row: row as u32, col: u32::try_from(col).unwrap_or(u32::MAX), value });
+        }
+    }
+    Rectangular { rows: stored.rows as usize, columns: stored.columns as usize, entries }.checked()
 }
 
 /// Returns the number of stored entries of a sparse matrix; refuses other objects.

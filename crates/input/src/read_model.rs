@@ -9,7 +9,7 @@ use super::model_files::{
 };
 use super::node_files::{NodeFile, NodeSets, Unresolved, read_node_file};
 use super::reader::{MatrixRole, MatrixSource, reader_for};
-use super::recovery_files::{read_offset, read_operator};
+use super::recovery_files::{OperatorColumns, read_offset, read_operator};
 use super::rows_of_model::{by_rows_of_model, in_order_of_nodes, refuse_followers, turned};
 use super::tables::{read_masses, read_node_list, read_recovery_rows};
 use super::with_stress::{PlainStiffness, StressMatrix, difference_note, read_stress_matrix};
@@ -19,7 +19,7 @@ use flexbody_base::provenance::{SourceFile, Sources};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::quotes::without_foreign_quotes;
-use flexbody_linalg::parallel;
+use flexbody_linalg::{CscMatrix, parallel};
 use flexbody_model::{
     Damping, DofLabel, Elements, GeometricStiffness, GivenRows, ModelRecovery, NodeSet, Nodes, RawMatrix,
     RawModel, RecoveryOperator, Reference, filled_rows,
@@ -387,6 +387,34 @@ impl<'m> NodeLookup<'m> {
         read
     }
 
+    /// Returns the transposed operator by the rows of the files.
+    ///
+    /// # Errors
+    /// FB322 for labels that are no rows of the matrices, and for labelled rows of a model whose rows are combinations of
+    /// those of its files.
+    fn by_matrix_rows(
+        &self,
+        given: OperatorColumns,
+        location: &MatrixLocation,
+        dimension: u8,
+    ) -> Found<CscMatrix> {
+        let refuse = |diagnostic: Diagnostic| vec![diagnostic.in_file(&location.path)];
+        let labels = match (&given, self.matrices) {
+            (OperatorColumns::Matrix(_), _) => Cow::Borrowed(&[][..]),
+            (OperatorColumns::Labelled(..), Some(known)) if known.given_rows == GivenRows::default() => {
+                known.plain(dimension).labels
+            }
+            (OperatorColumns::Labelled(..), Some(_)) => {
+                let message = "DMIG operator names grids, but the rows of the model are combinations of those of its files";
+                let help = "give the operator as a matrix with one column for each matrix row";
+                return Err(refuse(Diagnostic::new(Code::RecoverySize, message).with_help(help)));
+            }
+            // The files of the model report why there are no rows.
+            (OperatorColumns::Labelled(..), None) => return Err(Vec::new()),
+        };
+        given.by_rows(&labels).map_err(refuse)
+    }
+
     /// Returns a recovery with an operator by the rows of the files, with shapes, or with the nodes of its cut; and
     /// warnings about it.
     fn recovery(
@@ -398,7 +426,8 @@ impl<'m> NodeLookup<'m> {
         let name = source.name.clone();
         match &source.operator {
             OperatorSource::Rows { operator, rows, offset } => {
-                let transposed = read_operator(opened.get(&operator.path)?, operator.group.as_deref())?;
+                let given = read_operator(opened.get(&operator.path)?, operator.group.as_deref())?;
+                let transposed = self.by_matrix_rows(given, operator, files.dimension)?;
                 let labels = read_recovery_rows(opened.get(rows)?)?;
                 let offset = offset.as_ref();
                 let offset =

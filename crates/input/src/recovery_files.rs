@@ -3,13 +3,20 @@
 
 use super::array::Array;
 use super::assemble::Entry;
+use super::dmig::{self, DmigPunch, NumberedColumns};
+use super::hdf5::{self, Hdf5};
+use super::mat5::{self, Mat5};
 use super::matrix_market;
+use super::output4::{self, Output4};
+use super::petsc::{self, Petsc};
 use super::reader::{HEAD, Reader};
 use super::scipy_npz::{self, ScipyNpz};
 use super::shapes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::{Compression, InputFile};
 use flexbody_linalg::CscMatrix;
+use flexbody_model::DofLabel;
+use std::collections::HashMap;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
@@ -51,26 +58,75 @@ impl Rectangular {
     }
 }
 
-/// Reads an operator R (rows x matrix rows of the model) and returns R': sparse in a Matrix Market file or an archive of
-/// SciPy, dense in a NumPy, HDF5 or Matrix Market array.
+/// Operator as its file gives it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum OperatorColumns {
+    /// R' with one row for each matrix row.
+    Matrix(CscMatrix),
+    /// R' with labelled rows (name, number of columns, entries), as Nastran writes DMIG matrices.
+    Labelled(String, usize, Vec<(DofLabel, u32, f64)>),
+}
+
+impl OperatorColumns {
+    /// Returns R' with one row for each of the `labels` of the matrix rows.
+    ///
+    /// # Errors
+    /// FB322 for a label that is none of the matrix rows.
+    pub(super) fn by_rows(self, labels: &[DofLabel]) -> Result<CscMatrix, Diagnostic> {
+        let (name, columns, given) = match self {
+            Self::Matrix(matrix) => return Ok(matrix),
+            Self::Labelled(name, columns, given) => (name, columns, given),
+        };
+        let places: HashMap<DofLabel, u32> = labels.iter().copied().zip(0..).collect();
+        let mut entries = Vec::with_capacity(given.len());
+        for (label, column, value) in given {
+            let Some(&row) = places.get(&label) else {
+                let message = format!(
+                    "DMIG {name} has an entry at node {}, component {}, which is no row of the matrices",
+                    label.node, label.direction
+                );
+                return Err(Diagnostic::new(Code::RecoverySize, message));
+            };
+            entries.push((row, column, value));
+        }
+        Ok(CscMatrix::from_triplets(labels.len(), columns, &entries))
+    }
+}
+
+/// Reads an operator R (rows x matrix rows of the model) in any of the formats of K, or as a dense array. `name` is the
+/// matrix of a file with several.
 ///
 /// # Errors
 /// FB102 for other formats; FB103, FB301 to FB313 for files that cannot be read.
-pub(super) fn read_operator(file: &InputFile, dataset: Option<&str>) -> Found<CscMatrix> {
+pub(super) fn read_operator(file: &InputFile, name: Option<&str>) -> Found<OperatorColumns> {
     let about = |found: Vec<Diagnostic>| -> Vec<Diagnostic> {
         found.into_iter().map(|diagnostic| diagnostic.in_file(file.path())).collect()
     };
+    let one = |diagnostic: Diagnostic| about(vec![diagnostic]);
     let compression = Compression::of(file.bytes());
     let head = compression.head(file, HEAD);
-    if ScipyNpz.recognises(&head) && compression == Compression::None && dataset.is_none() {
-        let read = scipy_npz::read_rectangular(file.bytes()).map_err(|diagnostic| about(vec![diagnostic]));
-        return Ok(read?.transposed());
+    let is_plain = compression == Compression::None;
+    if is_plain && DmigPunch.recognises(&head) {
+        let NumberedColumns { name, columns, entries } = dmig::read_numbered(file.path(), name)?;
+        return Ok(OperatorColumns::Labelled(name, columns as usize, entries));
     }
-    if matrix_market::is_coordinate(&head) && dataset.is_none() {
-        return Ok(matrix_market::read_rectangular(file, compression).map_err(about)?.transposed());
-    }
-    let array = shapes::read(file, dataset).map_err(|found| about(with_formats(found)))?;
-    transposed_array(&array).map_err(|diagnostic| about(vec![diagnostic]))
+    let read = if is_plain && Hdf5.recognises(&head) {
+        hdf5::read_rectangular(file, name).map_err(about)
+    } else if is_plain && Mat5.recognises(&head) {
+        mat5::read_rectangular(file, name).map_err(one)
+    } else if is_plain && Output4.recognises(&head) {
+        output4::read_rectangular(file, name).map_err(one)
+    } else if is_plain && name.is_none() && Petsc.recognises(&head) {
+        petsc::read_rectangular(file.bytes()).map_err(one)
+    } else if is_plain && name.is_none() && ScipyNpz.recognises(&head) {
+        scipy_npz::read_rectangular(file.bytes()).map_err(one)
+    } else if name.is_none() && matrix_market::is_coordinate(&head) {
+        matrix_market::read_rectangular(file, compression).map_err(about)
+    } else {
+        let array = shapes::read(file, name).map_err(|found| about(with_formats(found)))?;
+        return transposed_array(&array).map(OperatorColumns::Matrix).map_err(one);
+    };
+    Ok(OperatorColumns::Matrix(read?.transposed()))
 }
 
 /// Reads one value per row.
@@ -91,7 +147,7 @@ pub(super) fn read_offset(file: &InputFile, dataset: Option<&str>) -> Found<Vec<
 
 /// Names the formats of operators in the help about a file of unknown format.
 fn with_formats(found: Vec<Diagnostic>) -> Vec<Diagnostic> {
-    let help = "give the operator as Matrix Market file (.mtx), archive of scipy.sparse.save_npz (.npz), NumPy array (.npy) or HDF5 dataset (FILE.h5:/dataset)";
+    let help = "give the operator in a format of stiffness matrices (Matrix Market, scipy.sparse.save_npz, HDF5, MATLAB, PETSc, OUTPUT4, DMIG) or as a NumPy array (.npy)";
     let named = |diagnostic: Diagnostic| match diagnostic.code() {
         Code::FileFormatUnknown => diagnostic.with_help(help),
         _ => diagnostic,
@@ -160,7 +216,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).expect("written");
-        read_operator(&InputFile::open(&path).expect("a file"), None)
+        let operator = read_operator(&InputFile::open(&path).expect("a file"), None)?;
+        Ok(operator.by_rows(&[]).expect("a matrix"))
     }
 
     #[test]

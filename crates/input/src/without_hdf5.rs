@@ -2,6 +2,7 @@
 
 use super::array::Array;
 use super::reader::{MatrixSource, Reader};
+use super::recovery_files::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::input_file::{InputFile, is_hdf5};
@@ -33,6 +34,14 @@ pub(super) fn read_array(_: &InputFile, _: Option<&str>) -> std::result::Result<
     Err(vec![left_out()])
 }
 
+/// Refuses an operator.
+pub(super) fn read_rectangular(
+    _: &InputFile,
+    _: Option<&str>,
+) -> std::result::Result<Rectangular, Vec<Diagnostic>> {
+    Err(vec![left_out()])
+}
+
 /// Node numbers of sets by name.
 type NamedSets = Vec<(String, Vec<i64>)>;
 
@@ -40,6 +49,25 @@ type NamedSets = Vec<(String, Vec<i64>)>;
 pub(super) fn read_exodus(
     _: &InputFile,
 ) -> std::result::Result<(Nodes, NamedSets, Elements), Vec<Diagnostic>> {
+    Err(vec![left_out()])
+}
+
+/// Variables of the nodes of an Exodus file at every time.
+pub(super) struct NodalVariables {
+    pub ids: Vec<i64>,
+    pub names: Vec<String>,
+    pub values: Vec<Vec<f64>>,
+    pub times: usize,
+    pub is_single: bool,
+}
+
+/// Returns false: Exodus files are not told apart.
+pub(super) fn has_nodal_variables(_: &InputFile) -> bool {
+    false
+}
+
+/// Refuses an Exodus file.
+pub(super) fn read_nodal_variables(_: &InputFile) -> std::result::Result<NodalVariables, Vec<Diagnostic>> {
     Err(vec![left_out()])
 }
 

@@ -215,8 +215,9 @@ fn in_internal_rows(
     let (n, count) = (transposed.n_rows(), transposed.n_cols());
     let known: Vec<usize> = std::iter::once(of_files.matrix_rows).chain(of_files.given.counts()).collect();
     if !known.contains(&n) {
+        let transposed = if known.contains(&count) { "; it may be the transposed operator" } else { "" };
         let message = format!(
-            "`{name}`: its operator is {count} x {n}, the matrices have {} rows",
+            "`{name}`: its operator is {count} x {n}, the matrices have {} rows{transposed}",
             of_files.matrix_rows
         );
         return Err((Code::RecoverySize, message));

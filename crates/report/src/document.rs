@@ -1,6 +1,7 @@
 //! Tree of a report, built once from the facts and rendered as a text or as a page.
 
 use super::chart::{Bars, Cells, Chart};
+use super::picture::Fields;
 use super::render::{Format, json};
 use super::{html, text};
 use flexbody_base::diagnostic::Diagnostic;
@@ -71,6 +72,8 @@ pub(crate) enum Block<'a> {
     Preformatted(String),
     /// The picture of a body on a page, if the body has one, with other blocks beside it.
     Picture(&'a FlexBody, Vec<Block<'a>>),
+    /// The picture of a body at rest in the colours of stresses, on a page, with the largest of them beside it.
+    Coloured(&'a FlexBody, &'a Fields),
 }
 
 /// Outcome of the verdict.

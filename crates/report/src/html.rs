@@ -4,7 +4,7 @@
 use super::chart::{Cells, colour_scale};
 use super::document::{Block, Document, Inline, Span, State, Table, Term};
 use super::numbers::plain;
-use super::picture::Embedded;
+use super::picture::{Embedded, Field, Fields};
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 use flexbody_base::provenance::started;
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
@@ -117,7 +117,8 @@ impl Page {
                 Block::Maps(own) => (maps(own)),
                 Block::Fold(summary, blocks) => (self.fold(summary, blocks)),
                 Block::Preformatted(text) => (preformatted(text)),
-                Block::Picture(body, blocks) => (self.picture(Embedded::of(body), blocks)),
+                Block::Picture(body, blocks) => (self.picture(Embedded::of_modes(body), blocks)),
+                Block::Coloured(body, fields) => (self.picture(Embedded::of_fields(body, fields), &colours(fields))),
             }
         }
     }
@@ -135,6 +136,12 @@ impl Page {
         self.scripts.push_str(&scripts);
         html! { div class="top" { (PreEscaped(panel)) div class="properties" { (self.blocks(blocks)) } } }
     }
+}
+
+/// Returns the largest value of every field of a picture.
+fn colours<'b>(fields: &Fields) -> Vec<Block<'b>> {
+    let words: Vec<Inline> = fields.drawn.iter().filter_map(Field::in_words).map(Inline::from).collect();
+    vec![Block::List(words)]
 }
 
 fn verdict(state: State, head: &str, rest: &str) -> Markup {

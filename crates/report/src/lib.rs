@@ -23,6 +23,7 @@ mod completeness;
 mod craig_bampton;
 mod csv;
 mod document;
+mod envelope;
 mod errors;
 mod facts;
 mod geometric_stiffness;
@@ -58,9 +59,10 @@ pub use checks::{
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};
 pub use comparison_report::{ComparisonFormat, ComparisonReport};
 pub use completeness::dropped_text;
+pub use envelope::{EnvelopeFacts, EnvelopeKind, read_envelope};
 pub use facts::Facts;
 pub use measured_run::MeasuredRunFacts;
-pub use recovered::{EnvelopeKind, RecoveredFacts, recovered_csv};
+pub use recovered::{RecoveredFacts, channels_csv, recovered_csv};
 pub use render::{Format, output_json, render};
 pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData, SearchAttempt};
@@ -71,4 +73,4 @@ pub use text::Screen;
 #[cfg(feature = "hdf5")]
 pub use trade::{TradeFacts, trade_csv};
 #[cfg(feature = "hdf5")]
-pub use view::View;
+pub use view::{Colouring, View};

@@ -2,8 +2,8 @@
 
 use super::csv;
 use super::document::{Block, Inline, Table, Term, heading};
+use super::envelope::EnvelopeKind;
 use super::numbers::{counted, frequency_range, percent, significant};
-use super::recovered::EnvelopeKind;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, RecoveryRow};
@@ -149,6 +149,7 @@ impl EnvelopeKind {
                     nodes: one.points.iter().map(|point| one.rows[point.rows[0]].node).collect(),
                     values: one.von_mises.clone(),
                     is_smallest: false,
+                    cases: Vec::new(),
                 };
                 let all: Vec<PointValues> = random.recoveries.iter().map(values).collect();
                 stresses_vtu(body, &all).ok_or_else(|| {

@@ -5,14 +5,13 @@ use super::csv;
 use super::document::{Block, Document, Term};
 use super::numbers::{counted, significant};
 use super::run_data::RunData;
-use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::Result;
+use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_formats::envelope_vtu;
-use flexbody_motion::scene::{LoadedHistory, RecoveredMotion, RowExtreme, RowExtremes, RowMap, StressPoint};
+use flexbody_motion::scene::{
+    Channels, LoadedHistory, RecoveredMotion, RowExtreme, RowExtremes, RowMap, StressPoint,
+};
 use serde::Serialize;
-use std::path::Path;
 
 /// Facts of recoveries over time.
 #[derive(Debug, Clone, Serialize)]
@@ -176,94 +175,6 @@ impl<'a> RecoveredFacts<'a> {
     }
 }
 
-/// Kind of a file of the largest stresses of every point.
-#[derive(Debug, Clone, Copy)]
-pub enum EnvelopeKind {
-    /// Table, one row for each point.
-    Csv,
-    /// Mesh of the body with the stresses at its nodes, for ParaView.
-    Vtu,
-}
-
-impl EnvelopeKind {
-    /// Returns the kind of a file by its extension.
-    ///
-    /// # Errors
-    /// [`Usage`](Code::Usage) for other extensions.
-    pub fn of(path: &Path) -> Result<Self> {
-        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-        match extension.as_deref() {
-            Some("csv") => Ok(Self::Csv),
-            Some("vtu") => Ok(Self::Vtu),
-            _ => {
-                let message = format!("envelope {} has no known extension", path.display());
-                let help = "give it the extension .csv or .vtu";
-                Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
-            }
-        }
-    }
-
-    /// Returns the file of the envelopes of a motion of `body`.
-    ///
-    /// # Errors
-    /// [`RecoveryUnknown`](Code::RecoveryUnknown) if no recovery has all six stresses of a point, or for a mesh if none
-    /// of its points is a node.
-    pub fn bytes(self, body: &FlexBody, motion: &RecoveredMotion) -> Result<Vec<u8>> {
-        let none = |what: &str| Diagnostic::new(Code::RecoveryUnknown, what.to_owned());
-        if motion.recoveries.iter().all(|one| one.points.is_empty()) {
-            let help =
-                "give the rows of six stresses of a point one name that ends with xx, yy, zz, xy, yz, xz";
-            return Err(none("no recovery has all six stresses of a point").with_help(help).into());
-        }
-        match self {
-            Self::Csv => Ok(envelope_csv(motion).into_bytes()),
-            Self::Vtu => envelope_vtu(body, motion).ok_or_else(|| {
-                none("no point of the recoveries is a node of the body, so there is nothing to draw")
-                    .with_help("write a table instead: --envelope FILE.csv")
-                    .into()
-            }),
-        }
-    }
-}
-
-/// Returns the envelopes of a motion as comma-separated values, one row for each point of each recovery: its name, node
-/// and element, and the largest equivalent stress of von Mises, the largest and the smallest principal stress, each with
-/// its time; empty without envelopes.
-fn envelope_csv(motion: &RecoveredMotion) -> String {
-    let mut table = String::new();
-    let head = [
-        "recovery",
-        "point",
-        "node",
-        "element",
-        "unit",
-        "von_mises",
-        "von_mises_time",
-        "largest_principal",
-        "largest_principal_time",
-        "smallest_principal",
-        "smallest_principal_time",
-    ];
-    csv::push_row(&mut table, head.map(str::to_owned));
-    for (map, envelope) in motion.recoveries.iter().zip(motion.envelopes.iter().flatten()) {
-        for (point, own) in map.points.iter().zip(envelope) {
-            let row = &map.rows[point.rows[0]];
-            let number = |id: Option<i64>| id.map_or_else(String::new, |id| id.to_string());
-            let texts = [csv::text(&map.name), csv::text(&point.name), number(row.node), number(row.element)];
-            let (most, least) = (own.tension, own.compression);
-            let values = [
-                (own.von_mises.value, own.von_mises.time),
-                (most.value, most.time),
-                (-least.value, least.time),
-            ];
-            let numbers =
-                values.into_iter().flat_map(|(value, time)| [csv::number(value), csv::number(time)]);
-            csv::push_row(&mut table, texts.into_iter().chain([csv::text(&point.unit)]).chain(numbers));
-        }
-    }
-    table
-}
-
 /// Returns recoveries over time as comma-separated values: the time, then for every recovery a column `RECOVERY ROW` for
 /// every row and, for every point with all six stresses, `RECOVERY POINT von Mises`, `RECOVERY POINT signed von Mises` and
 /// `RECOVERY POINT principal 1` to `3`; numbers round-trip.
@@ -293,6 +204,17 @@ pub fn recovered_csv(motion: &RecoveredMotion) -> String {
         };
         let values = motion.recoveries.iter().flat_map(values);
         csv::push_row(&mut table, std::iter::once(*time).chain(values).map(csv::number));
+    }
+    table
+}
+
+/// Returns channels over time as comma-separated values: the time and one column for each step; numbers round-trip.
+pub fn channels_csv(channels: &Channels) -> String {
+    let mut table = String::new();
+    let names = channels.names.iter().map(|name| csv::text(name));
+    csv::push_row(&mut table, std::iter::once("time".to_owned()).chain(names));
+    for (time, values) in channels.times.iter().zip(&channels.values) {
+        csv::push_row(&mut table, std::iter::once(time).chain(values).map(|value| csv::number(*value)));
     }
     table
 }

@@ -6,15 +6,17 @@ use super::csv;
 use super::document::{Block, Document, State, Term, heading, quantity};
 use super::facts::UnitFacts;
 use super::numbers::{counted, frequencies, significant, times};
+use super::picture::Fields;
 use super::recovered::RecoveryFacts;
 use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;
+use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::larger;
 use flexbody_motion::dynamics::Balance;
 use flexbody_motion::integration::Work;
-use flexbody_motion::scene::{Drift, Path, Recording, Scheme};
+use flexbody_motion::scene::{Drift, Envelope, Path, Recording, Scheme};
 use nalgebra::Vector3;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -62,6 +64,16 @@ pub struct SimulationFacts<'a> {
     cpu_seconds: f64,
     #[serde(skip)]
     recording: &'a Recording,
+    /// Body in the colours of its largest stresses.
+    #[serde(skip)]
+    picture: Option<Coloured<'a>>,
+}
+
+/// Body in the colours of stresses.
+#[derive(Debug, Clone)]
+struct Coloured<'a> {
+    body: &'a FlexBody,
+    fields: Fields,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -184,7 +196,17 @@ impl<'a> SimulationFacts<'a> {
             wall_seconds: run.wall_seconds(),
             cpu_seconds: run.cpu_seconds(),
             recording,
+            picture: None,
         }
+    }
+
+    /// Adds the picture of `body` in the colours of its largest stresses.
+    ///
+    /// * `envelopes`: largest stresses, each with the name of what they are the largest of, as in "the run".
+    pub fn with_picture(mut self, body: &'a FlexBody, envelopes: &[(String, &Envelope)]) -> Self {
+        let fields = Fields::of_envelopes(body, envelopes);
+        self.picture = Some(Coloured { body, fields });
+        self
     }
 
     /// Renders the facts in a format, ending with a line break.
@@ -281,12 +303,25 @@ impl<'a> SimulationFacts<'a> {
             Block::Verdict { state: State::Good, head, rest: method + "." },
             heading("Motion"),
             Block::Terms(terms),
-            heading("Plots"),
         ];
+        blocks.extend(self.largest_stresses());
+        blocks.push(heading("Plots"));
         blocks.extend(self.plots().into_iter().map(Block::Chart));
         blocks.push(Block::Diagnostics(self.diagnostics));
         let (name, generator) = (self.scene, self.generator.as_str());
         Document { name, kind: "Simulation of a flexible body", generator, blocks }
+    }
+
+    /// Returns the picture of the largest stresses, or the reasons why there is none.
+    fn largest_stresses(&self) -> Vec<Block<'_>> {
+        let Some(Coloured { body, fields }) = &self.picture else { return Vec::new() };
+        let mut blocks = vec![heading("Largest stresses")];
+        if fields.drawn.is_empty() {
+            blocks.push(Block::Quiet(fields.left_out.join("; ")));
+        } else {
+            blocks.push(Block::Coloured(body, fields));
+        }
+        blocks
     }
 
     fn body_in_words(&self) -> Term {

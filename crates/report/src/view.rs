@@ -5,11 +5,13 @@ use super::Format;
 use super::facts::UnitFacts;
 use super::html::Plain;
 use super::numbers::{bytes, counted, plain, significant};
-use super::picture::{Drawing, HALF_STEP, Packed, SCRIPT, ShownBody, script};
+use super::picture::{Drawing, Field, Fields, HALF_STEP, Packed, SCRIPT, ShownBody, script};
 use super::render::json;
+use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_file::RecordedMotion;
+use flexbody_motion::scene::Envelope;
 use maud::Render;
 use serde::Serialize;
 
@@ -44,27 +46,104 @@ struct ViewFacts {
     shape_error: f64,
     /// Number of simulated times in the page; `None` without a simulation.
     instants: Option<usize>,
+    /// Stresses that colour the body.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    colours: Vec<String>,
+    /// Recoveries that cannot be drawn, with reasons.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    not_drawn: Vec<String>,
     bytes: usize,
+}
+
+/// Stresses that colour the body in a page.
+#[derive(Debug, Clone, Copy)]
+pub enum Colouring<'a> {
+    /// Equivalent stresses of the modes in the recovery of this name.
+    Recovery(&'a str),
+    /// Largest equivalent stresses of a motion.
+    Envelope(&'a Envelope),
+}
+
+impl Colouring<'_> {
+    /// Returns the values of the page.
+    ///
+    /// # Errors
+    /// [`RecoveryUnknown`](Code::RecoveryUnknown) for a recovery that the body does not have, and for recoveries of which
+    /// none can be drawn.
+    fn fields(self, body: &FlexBody) -> Result<Fields> {
+        let refuse = |message: String, help: String| {
+            Err(Diagnostic::new(Code::RecoveryUnknown, message).with_help(help).into())
+        };
+        match self {
+            Self::Recovery(name) => {
+                let Some(recovery) = body.recoveries().iter().find(|one| one.name == name) else {
+                    let known: Vec<&str> = body.recoveries().iter().map(|one| one.name.as_str()).collect();
+                    let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+                    return refuse(
+                        format!("the body has no recovery `{name}`"),
+                        format!("name one of its recoveries: {known}"),
+                    );
+                };
+                match Field::of_modes(body, recovery, body.n_modes()) {
+                    Ok(field) => Ok(Fields { drawn: vec![field], ..Fields::default() }),
+                    Err(reason) => refuse(
+                        format!("recovery `{name}` cannot be drawn: {reason}"),
+                        "name a recovery with the six stresses of nodes".to_owned(),
+                    ),
+                }
+            }
+            Self::Envelope(envelope) => {
+                let scope = match envelope.cases.len() {
+                    0 => "the run".to_owned(),
+                    count => counted(count, "load case"),
+                };
+                let fields = Fields::of_envelopes(body, &[(scope, envelope)]);
+                if fields.drawn.is_empty() {
+                    return refuse(
+                        format!("no stresses can be drawn: {}", fields.left_out.join("; ")),
+                        "give the largest stresses of nodes of this body".to_owned(),
+                    );
+                }
+                Ok(fields)
+            }
+        }
+    }
 }
 
 impl View {
     /// Builds the page of `body` with at most `triangles` triangles or, without a number, as many as keep the
-    /// page below 10 MB. With a `motion` the page plays the simulation instead of the modes.
+    /// page below 10 MB. With a `motion` the page plays the simulation instead of the modes. The largest stresses of a
+    /// motion without this motion colour the body at rest.
     ///
     /// # Errors
-    /// FB735 if the motion belongs to another body; the errors of [`FlexBody::carried`].
-    pub fn new(body: &FlexBody, triangles: Option<usize>, motion: Option<&RecordedMotion>) -> Result<Self> {
+    /// FB735 if the motion belongs to another body; FB221 for stresses that cannot be drawn, and for stresses of the modes
+    /// in a simulation; the errors of [`FlexBody::carried`].
+    pub fn new(
+        body: &FlexBody,
+        triangles: Option<usize>,
+        motion: Option<&RecordedMotion>,
+        colouring: Option<Colouring<'_>>,
+    ) -> Result<Self> {
+        if let (Some(_), Some(Colouring::Recovery(name))) = (motion, colouring) {
+            let message = format!("recovery `{name}` colours modes, and a simulation has none");
+            let help = "draw the largest stresses of the simulation: simulate --envelope FILE.csv, then view --envelope FILE.csv";
+            return Err(Diagnostic::new(Code::RecoveryUnknown, message).with_help(help).into());
+        }
+        let fields = colouring.map(|colouring| colouring.fields(body)).transpose()?.unwrap_or_default();
         let body_in_frame = motion.map(|motion| motion.body_in_frame(body)).transpose()?;
         let body = body_in_frame.as_ref().unwrap_or(body);
-        let drawing = Drawing::new(body, triangles, MAX_DRAWING_BYTES, usize::MAX);
+        let is_still = motion.is_none() && matches!(colouring, Some(Colouring::Envelope(_)));
+        let modes = if is_still { 0 } else { usize::MAX };
+        let drawing = Drawing::new(body, triangles, MAX_DRAWING_BYTES, modes, fields.sets());
         let shown = motion.map(|motion| ShownMotion::new(motion, body));
-        let mut arrays = drawing.arrays();
+        let mut arrays = drawing.arrays(&fields.drawn);
         arrays.extend(shown.iter().flat_map(ShownMotion::arrays));
-        let entries = terms(body, &drawing, shown.as_ref());
-        let data = ShownBody::new(body, &drawing, entries, shown.as_ref());
+        let entries = terms(body, &drawing, &fields, shown.as_ref());
+        let data =
+            ShownBody::new(body, &drawing, &fields.drawn, entries, shown.as_ref(), colouring.is_some());
         let mut facts = ViewFacts {
             model: body.source().name.clone(),
-            modes: body.n_modes(),
+            modes: if is_still { 0 } else { body.n_modes() },
             drawn: drawing.kind(),
             nodes: body.n_nodes(),
             drawn_nodes: drawing.vertices(),
@@ -73,6 +152,8 @@ impl View {
             position_error: drawing.position_error(),
             shape_error: HALF_STEP,
             instants: shown.as_ref().map(ShownMotion::instants),
+            colours: fields.drawn.iter().map(|field| field.label().to_owned()).collect(),
+            not_drawn: fields.left_out.clone(),
             bytes: 0,
         };
         let page = page(&facts.model, &data, &arrays);
@@ -104,10 +185,14 @@ impl ViewFacts {
         };
         let moving = match self.instants {
             Some(instants) => format!("a simulation of {}", counted(instants, "instant")),
+            None if self.modes == 0 && !self.colours.is_empty() => "at rest".to_owned(),
             None => counted(self.modes, "mode"),
         };
+        let colours = self.colours.iter().map(|label| format!("colours: {}\n", plain(label)));
+        let left_out = self.not_drawn.iter().map(|reason| plain(reason) + "\n");
+        let more: String = colours.chain(left_out).collect();
         format!(
-            "{}: {what} on {} of {}, {moving}, {}\n",
+            "{}: {what} on {} of {}, {moving}, {}\n{more}",
             plain(&self.model),
             self.drawn_nodes,
             counted(self.nodes, "node"),
@@ -120,6 +205,7 @@ impl ViewFacts {
 fn terms(
     body: &FlexBody,
     drawing: &Drawing<'_>,
+    fields: &Fields,
     motion: Option<&ShownMotion>,
 ) -> Vec<(&'static str, String)> {
     let units = UnitFacts::new(body.units());
@@ -140,6 +226,8 @@ fn terms(
             ),
         ),
     ];
+    let words = fields.drawn.iter().filter_map(Field::in_words).chain(fields.left_out.iter().cloned());
+    terms.extend(words.map(|words| ("Stresses", plain(&words))));
     if let Some(motion) = motion {
         terms.push(("Scene", plain(motion.scene())));
         terms.push(("Instants", motion.in_words()));

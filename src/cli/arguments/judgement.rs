@@ -74,11 +74,18 @@ pub struct RecoverArguments {
     #[arg(long, value_name = "RUN.csv")]
     pub history: PathBuf,
     /// Rows over time, format by extension: .csv or .h5
-    #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    #[arg(short, long, value_name = "FILE", required_unless_present = "channels")]
+    pub output: Option<PathBuf>,
     /// Recovery to compute (repeatable) [default: all]
     #[arg(long, value_name = "NAME")]
     pub only: Vec<String>,
+    /// File to write the factor of each FE step over time to, .csv or .h5, for a fatigue program that superposes the
+    /// results of these steps
+    #[arg(long, value_name = "FILE.csv|FILE.h5", requires = "shapes")]
+    pub channels: Option<PathBuf>,
+    /// With --channels: archive that `flexbody shapes` wrote with the steps
+    #[arg(long, value_name = "ASK.npz", requires = "channels")]
+    pub shapes: Option<PathBuf>,
     /// File to write the largest stresses of every point of the recoveries over the run to: a table (.csv), or the body
     /// with them at its nodes (.vtu)
     #[arg(long, value_name = "FILE.csv|FILE.vtu")]

@@ -26,6 +26,56 @@ pub(crate) fn read_exodus(file: &InputFile) -> Found<(Nodes, NamedSets, Elements
     mesh.read().map_err(|found| found.iter().flat_map(|one| wrong(one.message().to_owned())).collect())
 }
 
+/// Variables of the nodes at every time.
+pub(crate) struct NodalVariables {
+    pub ids: Vec<i64>,
+    pub names: Vec<String>,
+    /// Values of each variable, time by time.
+    pub values: Vec<Vec<f64>>,
+    pub times: usize,
+    /// True if any variable has single precision.
+    pub is_single: bool,
+}
+
+/// Returns true if a file is an Exodus file with variables of the nodes.
+pub(crate) fn has_nodal_variables(file: &InputFile) -> bool {
+    let root = opened(file).ok().and_then(|file| file.group("/").ok());
+    root.is_some_and(|root| Members::of(&root).is_here("name_nod_var"))
+}
+
+/// Reads the variables of the nodes: `name_nod_var` and `vals_nod_var1`, `vals_nod_var2`, ... (times x nodes).
+///
+/// # Errors
+/// FB101 for a file that cannot be opened, FB115 for variables that do not fit the nodes.
+pub(crate) fn read_nodal_variables(file: &InputFile) -> Found<NodalVariables> {
+    let opened = opened(file)?;
+    let root = opened.group("/").map_err(|e| wrong(format!("file cannot be read: {e}")))?;
+    let mesh = Mesh { members: Members::of(&root), root, heaps: Heaps::of(file) };
+    let count = mesh.positions()?.len();
+    let ids = match mesh.has("node_num_map") {
+        true => mesh.whole_numbers("node_num_map")?,
+        false => (1..=count as i64).collect(),
+    };
+    let names = names_of(&mesh.root, &mesh.members, "name_nod_var")?;
+    let (mut values, mut times, mut is_single) = (Vec::new(), None, false);
+    for variable in 1..=names.len() {
+        let dataset = format!("vals_nod_var{variable}");
+        let numbers = Numbers::open(&mesh.root, &mesh.members, "", &dataset)?;
+        let &[steps, nodes] = numbers.dataset.shape().as_slice() else {
+            return Err(wrong(format!("dataset {} is not times x nodes", numbers.name)));
+        };
+        if nodes != ids.len() || *times.get_or_insert(steps) != steps {
+            let message = format!("dataset {} has {steps} times of {nodes} nodes", numbers.name);
+            return Err(wrong(format!("{message}, expected {} of {}", times.unwrap_or(0), ids.len())));
+        }
+        refuse_beyond_memory(numbers.dataset.size(), &numbers.name)?;
+        is_single |= numbers.is_single_precision();
+        let read = numbers.dataset.read_raw::<f64>();
+        values.push(read.map_err(|e| wrong(format!("dataset {} cannot be read: {e}", numbers.name)))?);
+    }
+    Ok(NodalVariables { ids, names, values, times: times.unwrap_or(0), is_single })
+}
+
 fn wrong(message: String) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).with_help(HELP)]
 }

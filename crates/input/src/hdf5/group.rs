@@ -2,13 +2,14 @@
 //! MATLAB and PETSc (`docs/reference/input.md`).
 
 use super::super::assemble::{
-    ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, assembled, check_size, push,
-    refuse_beyond_memory, undeclared_triangle,
+    ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, assembled, check_extents,
+    check_size, push, refuse_beyond_memory, undeclared_triangle,
 };
 use super::values::{Found, Heaps, Vector, integers_of, text_of, truth_of};
 use super::{Members, POINTERS};
 use crate::lent::StoredColumns;
 use crate::reader::MatrixSource;
+use crate::recovery_files::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_linalg::CscMatrix;
@@ -65,6 +66,58 @@ pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Foun
         raw.digits = raw.digits.min(7);
     }
     Ok(raw)
+}
+
+/// Reads the matrix in `group`, which need not be square: compressed rows or columns, or coordinates.
+///
+/// # Errors
+/// FB310 for a group that does not say which of rows and columns are compressed, FB301 to FB306 for an invalid matrix.
+pub(super) fn read_rectangular(group: &Group, name: &str, file: &InputFile) -> Found<Rectangular> {
+    let reader = GroupReader { file, group, name, members: Members::of(group), keep_in: None };
+    if reader.declared_symmetry().map_err(|d| vec![d])? == Declared::Triangle {
+        let message = format!("group `{name}` declares one triangle, and an operator has none");
+        return Err(vec![Diagnostic::new(Code::MatrixKind, message).with_help("store all entries")]);
+    }
+    let (rows, columns) = reader
+        .shape()?
+        .ok_or_else(|| vec![reader.layout("has no `shape`").with_help("store shape = [rows, columns]")])?;
+    let read = |vector: &Vector| vector.integers(0..vector.len);
+    let (values, places) = match (reader.members.compressed(), reader.members.coordinates()) {
+        (Some((values, indices, pointers)), _) => {
+            let [values, indices, pointers] =
+                [reader.vector(values)?, reader.vector(indices)?, reader.vector(pointers)?];
+            let entries = reader.same_length(&values, &indices)?;
+            check_extents(rows, columns, entries as u64).map_err(|d| vec![d])?;
+            let by_rows = reader.compresses_rows(pointers.len as u64, rows, columns)?;
+            let (indices, starts) = (read(&indices)?, read(&pointers)?);
+            if !starts.is_sorted() || starts[0] != 0 || starts.last() != Some(&(entries as i64)) {
+                let message =
+                    format!("{} does not rise from 0 to {entries}, the number of values", pointers.name);
+                return Err(vec![Diagnostic::new(Code::MatrixSyntax, message)]);
+            }
+            let mut major = by_major(&starts);
+            let place = |(k, index)| {
+                let (minor, major) = major(k, [index]);
+                if by_rows { (major, minor) } else { (minor, major) }
+            };
+            (values, indices.into_iter().enumerate().map(place).collect::<Vec<(i64, i64)>>())
+        }
+        (None, Some((values, rows_name, columns_name))) => {
+            let [values, row, col] =
+                [reader.vector(values)?, reader.vector(rows_name)?, reader.vector(columns_name)?];
+            let entries = reader.same_length(&values, &row)?;
+            reader.same_length(&values, &col)?;
+            check_extents(rows, columns, entries as u64).map_err(|d| vec![d])?;
+            (values, read(&row)?.into_iter().zip(read(&col)?).collect())
+        }
+        (None, None) => return Err(vec![reader.layout("holds no sparse matrix")]),
+    };
+    let index = |index: i64| u32::try_from(index).unwrap_or(u32::MAX);
+    let numbers = values.floats(0..values.len)?;
+    let entry = |((row, col), value): (&(i64, i64), f64)| Entry { row: index(*row), col: index(*col), value };
+    let entries = places.iter().zip(numbers).map(entry).collect();
+    let matrix = Rectangular { rows: rows as usize, columns: columns as usize, entries };
+    matrix.checked().map_err(|d| vec![d])
 }
 
 /// Symmetry declared by the attribute `symmetric` of the group.
@@ -204,6 +257,34 @@ impl GroupReader<'_> {
             self.visit(&values, &both, n, |_, [row, col]| (row, col), |entry| push(&mut pieces, entry))?;
         let single_precision = values.is_single_precision();
         Ok(Parsed { n, entries: Entries::Listed(pieces), sides, single_precision })
+    }
+
+    /// Returns true if rows are compressed, false if columns are: by the declared encoding, by the names of MATLAB, or by
+    /// the number of pointers.
+    fn compresses_rows(&self, pointers: u64, rows: u64, columns: u64) -> Found<bool> {
+        let words = ["encoding-type", "h5sparse_format", "format"].iter().find_map(|name| {
+            text_of(&self.group.attr(name).ok()?, &Heaps::of(self.file)).map(|text| text.to_lowercase())
+        });
+        let stated = words.as_deref().and_then(|text| match text {
+            "csr" | "csr_matrix" => Some(true),
+            "csc" | "csc_matrix" => Some(false),
+            _ => None,
+        });
+        let of_matlab = self.group.attr("MATLAB_sparse").is_ok().then_some(false);
+        let fits = |by_rows: bool| pointers == if by_rows { rows + 1 } else { columns + 1 };
+        match (stated.or(of_matlab), fits(true), fits(false)) {
+            (Some(by_rows), ..) if fits(by_rows) => Ok(by_rows),
+            (None, true, false) => Ok(true),
+            (None, false, true) => Ok(false),
+            (None, true, true) => Err(vec![
+                self.layout("does not say if its rows or its columns are compressed")
+                    .with_help("set the attribute format = \"csr\" or \"csc\" of the group"),
+            ]),
+            _ => {
+                let message = format!("{pointers} pointers do not fit {rows} rows and {columns} columns");
+                Err(vec![Diagnostic::new(Code::MatrixCount, message)])
+            }
+        }
     }
 
     /// Reads values and indices piece by piece. `place` returns row and column of entry k from its indices; `keep`

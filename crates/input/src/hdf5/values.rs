@@ -2,6 +2,8 @@
 
 use super::{MAX_DEPTH, MAX_GROUPS, Members, layout, opened};
 use crate::array::Array;
+use crate::assemble::Entry;
+use crate::recovery_files::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::hdf5_file::first_broken_heap;
 use flexbody_base::memory::{left, refuse_beyond};
@@ -313,6 +315,33 @@ pub(crate) fn read_array(file: &InputFile, name: Option<&str>) -> Found<Array> {
         vec![Diagnostic::new(Code::FileUnreadable, message).with_help("write the file again")]
     })?;
     Ok(Array { rows, cols, row_major: true, values, digits: if single { 7 } else { 17 } })
+}
+
+/// Reads the dataset `name`, or the only array of the file, as a matrix. MATLAB stores the transposed array.
+pub(super) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+    let opened_file = opened(file)?;
+    let numbers = match name {
+        Some(name) => named(&opened_file, name)?,
+        None => search(&opened_file)?,
+    };
+    let is_transposed = numbers.dataset.attr("MATLAB_class").is_ok();
+    let Array { rows, cols, values, .. } = read_array(file, name)?;
+    let mut entries = Vec::new();
+    for (at, &value) in values.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+        let (row, col) = ((at / cols.max(1)) as u32, (at % cols.max(1)) as u32);
+        entries.push(if is_transposed {
+            Entry { row: col, col: row, value }
+        } else {
+            Entry { row, col, value }
+        });
+    }
+    let (rows, columns) = if is_transposed { (cols, rows) } else { (rows, cols) };
+    Rectangular { rows, columns, entries }.checked().map_err(|diagnostic| vec![diagnostic])
+}
+
+/// Returns true if the file has arrays with two extents outside the group `name`.
+pub(super) fn has_arrays_beside(file: &File, name: &str) -> bool {
+    arrays(file).iter().any(|(_, path, _)| path != name && !(path.is_empty() && name == "/"))
 }
 
 fn named(file: &File, name: &str) -> Found<Numbers> {

@@ -34,6 +34,50 @@ fn points_and_sets(bytes: &[u8]) -> Unpacked<NodeFile> {
     Ok(NodeFile { nodes: Nodes { ids, positions }, sets, elements, ..NodeFile::default() })
 }
 
+/// Array of numbers at the points of a mesh.
+pub(crate) struct PointArray {
+    pub name: String,
+    /// Number of values for each point.
+    pub components: usize,
+    /// Values, point by point.
+    pub values: Vec<f64>,
+    /// Significant decimal digits.
+    pub digits: u8,
+}
+
+/// Significant decimal digits that an array in text is assumed to have.
+const DIGITS_OF_TEXT: u8 = 6;
+
+/// Returns the numbers of the points (the global ids, or the array `node`; `None` without either) and the arrays of real
+/// numbers at the points of a mesh.
+///
+/// # Errors
+/// A description of the problem.
+pub(crate) fn point_arrays(bytes: &[u8]) -> Unpacked<(Option<Vec<i64>>, Vec<PointArray>)> {
+    let mesh = Mesh::of(elements(bytes, "AppendedData")?)?;
+    let named_node = || mesh.lists().find_map(|array| array.attribute("Name").filter(|name| *name == "node"));
+    let ids = mesh.global_ids().or_else(named_node).map(|name| mesh.numbered_by(name)).transpose()?;
+    let mut arrays = Vec::new();
+    for array in mesh.arrays("PointData").filter(|array| !is_list_of_whole_numbers(array)) {
+        let name = array.attribute("Name").unwrap_or_default().to_owned();
+        let components = array.number("NumberOfComponents").unwrap_or(1);
+        let values = mesh.numbers(array, mesh.points.saturating_mul(components))?;
+        if mesh.points.checked_mul(components) != Some(values.len() as u64) {
+            let (found, points) = (values.len(), mesh.points);
+            return Err(format!("array `{name}` has {found} values for {points} points of {components}"));
+        }
+        let is_single =
+            array.attribute("type").and_then(NumberType::named).is_some_and(|kind| kind.bytes() < 8);
+        let digits = match array.attribute("format") {
+            Some("ascii") => DIGITS_OF_TEXT,
+            _ if is_single => 7,
+            _ => 15,
+        };
+        arrays.push(PointArray { name, components: components as usize, values, digits });
+    }
+    Ok((ids, arrays))
+}
+
 fn is_list_of_whole_numbers(array: &Element<'_>) -> bool {
     let kind = array.attribute("type").and_then(NumberType::named);
     kind.is_some_and(NumberType::is_whole)

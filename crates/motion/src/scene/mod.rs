@@ -1,6 +1,8 @@
 //! Scenes: the scene file, and its simulation.
 
+mod channels;
 mod description;
+mod envelope;
 mod errors;
 mod extremes;
 mod framed_scene;
@@ -23,10 +25,12 @@ mod simulate;
 mod surroundings;
 mod trace;
 
+pub use channels::{Channels, ShapeSteps};
 pub use description::{
     Carried, CarriedSpin, CaseName, Change, Drive, Initial, Load, ModeStart, Point, Run, Scene,
     SceneVariation, Scheme, SeriesFile, Spin, Variations,
 };
+pub use envelope::{CasePeak, Envelope, PointPeaks, RecoveryEnvelope};
 pub use errors::{
     DeformationDifference, ErrorHistory, LEAST_REACTION, Measure, OtherModes, OutputErrors, reaction_errors,
 };

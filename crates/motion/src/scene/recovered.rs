@@ -191,7 +191,7 @@ impl LoadedHistory {
     }
 
     /// Refuses torques at interfaces whose nodes do not determine a rotation.
-    fn refuse_torque_without_rotation(&self, body: &FlexBody) -> Result<()> {
+    pub(super) fn refuse_torque_without_rotation(&self, body: &FlexBody) -> Result<()> {
         let modes = body.modes();
         let rotation = modes.rotation.as_ref().map(faer::Mat::as_ref);
         for load in &self.loads {

@@ -4,6 +4,7 @@
 
 mod body_units;
 mod carried_stiffness;
+mod channels;
 mod definiteness;
 mod dynamics;
 mod dynamics_conservation;

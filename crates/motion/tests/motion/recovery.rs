@@ -18,7 +18,7 @@ use oracle::flexible::body_of;
 use oracle::mesh::{Mesh, grid};
 
 /// Returns a rubber-like arm without symmetry, with its stresses.
-fn arm_model() -> RawModel {
+pub fn arm_model() -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([6, 2, 1]), |[x, y, z]| {
         [0.3 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.25 * z * (1.0 + 0.1 * y)]

@@ -1,10 +1,13 @@
 //! Drawn parts of a body: its surface, with fewer triangles if it is large, or its nodes as points.
 
-use super::{Packed, Placed};
-use crate::numbers::counted;
+use super::{Field, Packed, Placed};
+use crate::html::Plain;
+use crate::numbers::{counted, significant};
 use faer::MatRef;
 use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
+use maud::Render;
 use nalgebra::{Matrix3, Rotation3, Vector3};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Half a step of a 16-bit number, relative to the largest.
@@ -34,12 +37,18 @@ pub(crate) struct Drawing<'b> {
 
 impl<'b> Drawing<'b> {
     /// Builds the drawing of a body with at most `triangles` triangles or, without a number, as many as
-    /// `max_bytes` bytes of text hold together with at most the first `modes` modes.
-    pub(crate) fn new(body: &'b FlexBody, triangles: Option<usize>, max_bytes: usize, modes: usize) -> Self {
+    /// `max_bytes` bytes of text hold together with at most the first `modes` modes and `sets` sets of values.
+    pub(crate) fn new(
+        body: &'b FlexBody,
+        triangles: Option<usize>,
+        max_bytes: usize,
+        modes: usize,
+        sets: usize,
+    ) -> Self {
         let modes = modes.min(body.n_modes());
-        // A node needs six bytes for its position and six for each shape, plus two triangles; base64 writes
-        // three bytes as four letters.
-        let most = (max_bytes / (8 + 8 * modes + 32)).max(MIN_NODES);
+        // A node needs six bytes for its position and six for each shape, two for each value, plus two
+        // triangles; base64 writes three bytes as four letters.
+        let most = (max_bytes / (8 + 8 * modes + 3 * sets + 32)).max(MIN_NODES);
         let positions = &body.nodes().positions;
         let mesh = body.mesh().and_then(|mesh| mesh.decimated(positions, triangles.unwrap_or(2 * most)));
         let nodes = match &mesh {
@@ -82,8 +91,8 @@ impl<'b> Drawing<'b> {
         self.nodes.iter().fold([0.0; 2], larger)
     }
 
-    /// Returns positions, shapes, triangles and edges in the form that the page reads.
-    pub(crate) fn arrays(&self) -> Vec<Packed> {
+    /// Returns positions, shapes, values, triangles and edges in the form that the page reads.
+    pub(crate) fn arrays(&self, fields: &[Field]) -> Vec<Packed> {
         let axes = self.body.frame().axes;
         let half = if self.half > 0.0 { self.half } else { 1.0 };
         let places = self.places.iter().map(|x| (Vector3::from(*x) - self.centre) / half);
@@ -95,6 +104,9 @@ impl<'b> Drawing<'b> {
             Packed::i16("positions", places.flat_map(in_steps)),
             Packed::i16("shapes", shapes.flat_map(in_steps)),
         ];
+        if !fields.is_empty() {
+            arrays.push(Packed::i16("values", fields.iter().flat_map(|field| field.packed(self))));
+        }
         if let Some(mesh) = &self.mesh {
             let own =
                 |nodes: &[u32]| nodes.iter().filter_map(|&i| self.vertex(i as usize)).collect::<Vec<_>>();
@@ -103,6 +115,11 @@ impl<'b> Drawing<'b> {
             arrays.extend(parts.map(|(name, nodes)| Packed::indices(name, self.nodes.len(), &own(nodes))));
         }
         arrays
+    }
+
+    /// Returns the drawn nodes, ascending.
+    pub(crate) fn nodes(&self) -> &[u32] {
+        &self.nodes
     }
 
     /// Returns the number of modes in the drawing.
@@ -247,24 +264,33 @@ const SHADE_COUNT: f64 = 14.0;
 /// Colour of the part in full light (red, green, blue).
 const PART_COLOUR: [f64; 3] = [185.0, 198.0, 214.0];
 
-/// Returns the picture; `None` if there is nothing to draw.
-pub(crate) fn still(body: &FlexBody) -> Option<String> {
-    let drawing = Drawing::new(body, Some(TRIANGLES), MAX_DRAWING_BYTES, 0);
+/// Returns the picture, coloured by a field with one set of values; `None` if there is nothing to draw.
+pub(crate) fn still(body: &FlexBody, field: Option<&Field>) -> Option<String> {
+    let drawing = Drawing::new(body, Some(TRIANGLES), MAX_DRAWING_BYTES, 0, 0);
+    let tones = field.and_then(|field| Tones::of(body, &drawing, field));
     if drawing.vertices() == 0 {
         return None;
     }
     let placed = Placed::of(body);
     let view = Projection::onto_page(&drawing, &placed, body.dimension() == 2)?;
+    let content = match &tones {
+        Some(_) => "coloured by stress, with its scale, the place of the largest value",
+        None => "with its principal axes of inertia 1, 2 and 3 at the centre of mass",
+    };
     let mut svg = format!(
-        "<svg class=\"still\" viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"The part, undeformed, with its principal axes of inertia 1, 2 and 3 at the centre of mass and the axes of the model in the corner.\">\n",
+        "<svg class=\"still\" viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"The part, undeformed, {content} and the axes of the model in the corner.\">\n",
         view.height
     );
     if drawing.triangle_corners().is_empty() && drawing.edge_ends().is_empty() {
-        points(&mut svg, &drawing, &view)
+        points(&mut svg, &drawing, &view, tones.as_ref())
     } else {
-        surface(&mut svg, &drawing, &view)
+        surface(&mut svg, &drawing, &view, tones.as_ref())
     }
-    principal_axes(&mut svg, &placed, &view);
+    if let Some(tones) = &tones {
+        tones.legend(&mut svg, &view);
+    } else {
+        principal_axes(&mut svg, &placed, &view);
+    }
     corner(&mut svg, &view);
     svg.push_str("</svg>\n");
     Some(svg)
@@ -338,20 +364,22 @@ struct PaintedPath {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Paint {
-    Face(u8),
+    /// Brightness, and the colour of the value.
+    Face(u8, Option<u8>),
     Edge,
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // colours are from 0 to 255
 /// Draws triangles and edges from back to front; consecutive pieces with the same paint form one path.
-fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
+fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection, tones: Option<&Tones>) {
     let seen: Vec<Vector3<f64>> = drawing.places().iter().map(|x| view.turned(x)).collect();
     let mut pieces: Vec<PaintedPath> = Vec::new();
     for corners in drawing.triangle_corners() {
+        let tone = tones.and_then(|tones| tones.of_triangle(&corners));
         let corners = corners.map(|i| seen[i as usize]);
         let path = path(view, &corners) + "Z";
         let depth = corners.iter().map(|p| p.z).sum::<f64>() / 3.0;
-        pieces.push(PaintedPath { depth, paint: Paint::Face(shade(&corners)), path });
+        pieces.push(PaintedPath { depth, paint: Paint::Face(shade(&corners), tone), path });
     }
     for ends in drawing.edge_ends() {
         let ends = ends.map(|i| seen[i as usize]);
@@ -367,9 +395,10 @@ fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
         let (run, behind) = rest.split_at(count);
         let paths: String = run.iter().map(|piece| piece.path.as_str()).collect();
         let _ = match first.paint {
-            Paint::Face(shade) => {
+            Paint::Face(shade, tone) => {
                 let light = f64::from(shade) / SHADE_COUNT;
-                let [r, g, b] = PART_COLOUR.map(|part| (part * light).round() as u8);
+                let colour = tone.map_or(PART_COLOUR, tone_colour);
+                let [r, g, b] = colour.map(|part| (part * light).round() as u8);
                 writeln!(svg, "<path color=\"#{r:02x}{g:02x}{b:02x}\" d=\"{paths}\"/>")
             }
             Paint::Edge => writeln!(svg, "<path class=\"edge\" d=\"{paths}\"/>"),
@@ -403,10 +432,10 @@ fn shade([a, b, c]: &[Vector3<f64>; 3]) -> u8 {
     ((0.45 + 0.55 * normal.dot(&light).abs()) * SHADE_COUNT).round() as u8
 }
 
-/// Draws nodes as points in three layers by depth; points at the back are fainter.
-fn points(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
-    let mut layers = [const { String::new() }; 3];
-    for place in drawing.places() {
+/// Draws nodes as points in three layers by depth; points at the back are fainter. Points with values have their colours.
+fn points(svg: &mut String, drawing: &Drawing<'_>, view: &Projection, tones: Option<&Tones>) {
+    let mut layers: BTreeMap<(usize, Option<u8>), String> = BTreeMap::new();
+    for (vertex, place) in drawing.places().iter().enumerate() {
         let seen = view.turned(place);
         let layer = match seen.z / view.radius {
             depth if depth < -0.25 => 0,
@@ -414,12 +443,106 @@ fn points(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
             _ => 2,
         };
         let [x, y] = view.at(&seen);
-        let _ = write!(layers[layer], "M{x:.1} {y:.1}h0");
+        let tone = tones.and_then(|tones| tones.of_vertex(vertex));
+        let _ = write!(layers.entry((layer, tone)).or_default(), "M{x:.1} {y:.1}h0");
     }
     let size = if drawing.vertices() > 400 { 2.2 } else { 4.0 };
-    for (layer, path) in layers.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
-        let _ = writeln!(svg, "<path class=\"node n{layer}\" stroke-width=\"{size}\" d=\"{path}\"/>");
+    for ((layer, tone), path) in layers {
+        let colour = tone.map_or_else(String::new, |tone| format!(" style=\"stroke:{}\"", hex(tone)));
+        let _ = writeln!(svg, "<path class=\"node n{layer}\" stroke-width=\"{size}\"{colour} d=\"{path}\"/>");
     }
+}
+
+// Colours of values.
+
+/// Number of colours of a still picture.
+const TONES: f64 = 20.0;
+/// Length of the scale of colours on the page.
+const SCALE_LENGTH: f64 = 130.0;
+
+/// Colours of the vertices of a still picture.
+struct Tones {
+    /// Value of each vertex relative to the largest; `None` without a value.
+    levels: Vec<Option<f64>>,
+    /// Largest value with its unit, and its undeformed place in model coordinates.
+    largest: String,
+    place: [f64; 3],
+}
+
+impl Tones {
+    fn of(body: &FlexBody, drawing: &Drawing<'_>, field: &Field) -> Option<Self> {
+        let (values, unit, node) = field.single()?;
+        let largest = values[node];
+        let level = |value: f64| if largest > 0.0 { value / largest } else { 0.0 };
+        let of_node = |&node: &u32| Some(values[node as usize]).filter(|value| !value.is_nan()).map(level);
+        Some(Self {
+            levels: drawing.nodes().iter().map(of_node).collect(),
+            largest: format!("{} {unit}", significant(largest, 4)),
+            place: body.frame().to_model(body.nodes().positions[node]),
+        })
+    }
+
+    fn of_vertex(&self, vertex: usize) -> Option<u8> {
+        self.levels[vertex].map(tone)
+    }
+
+    /// Returns the colour of the mean of three values; `None` unless all are known.
+    fn of_triangle(&self, corners: &[u32; 3]) -> Option<u8> {
+        let [a, b, c] = corners.map(|vertex| self.levels[vertex as usize]);
+        Some(tone((a? + b? + c?) / 3.0))
+    }
+
+    /// Draws the scale of the colours, and marks the largest value.
+    fn legend(&self, svg: &mut String, view: &Projection) {
+        let [x, y] = view.at(&view.turned(&self.place));
+        let _ = writeln!(svg, "<circle class=\"largest\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"6\"/>");
+        let (from, top) = (WIDTH - SCALE_LENGTH - MARGIN, view.height - MARGIN);
+        let width = SCALE_LENGTH / (TONES + 1.0);
+        for k in 0..=(TONES as u8) {
+            let (left, colour) = (from + width * f64::from(k), hex(k));
+            let _ = write!(
+                svg,
+                "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"8\" fill=\"{colour}\"/>",
+                width + 0.3
+            );
+        }
+        let text = |svg: &mut String, x: f64, anchor: &str, text: &str| {
+            let text = Plain(text).render().into_string();
+            let _ = writeln!(
+                svg,
+                "<text class=\"model\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{text}</text>",
+                top - 5.0
+            );
+        };
+        text(svg, from, "start", "0");
+        text(svg, from + SCALE_LENGTH, "end", &self.largest);
+    }
+}
+
+/// Returns the number of the colour of a value from 0 to 1.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to the range
+fn tone(level: f64) -> u8 {
+    (level * TONES).round().clamp(0.0, TONES) as u8
+}
+
+/// Polynomials of the colours of the page, which are close to those of `viridis` (van der Walt and Smith, CC0): red,
+/// green, blue, by ascending powers.
+const COLOURS: [[f64; 7]; 3] = [
+    [0.278, 0.105, -0.331, -4.634, 6.228, 4.776, -5.435],
+    [0.005, 1.404, 0.215, -5.799, 14.18, -13.745, 4.646],
+    [0.334, 1.385, 0.095, -19.332, 56.691, -65.353, 26.312],
+];
+
+/// Returns a colour by its number (red, green, blue, to 255).
+fn tone_colour(tone: u8) -> [f64; 3] {
+    let t = f64::from(tone) / TONES;
+    COLOURS.map(|p| 255.0 * p.iter().rev().fold(0.0, |sum, a| sum * t + a).clamp(0.0, 1.0))
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // colours are from 0 to 255
+fn hex(tone: u8) -> String {
+    let [r, g, b] = tone_colour(tone).map(|part| part.round() as u8);
+    format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 fn principal_axes(svg: &mut String, placed: &Placed, view: &Projection) {

@@ -2,19 +2,24 @@
 //! picture.
 
 mod drawing;
+mod field;
 
 use crate::facts::UnitFacts;
+use crate::html::Plain;
 use crate::mass_properties::{centre_of_mass, inertia_about_com};
 use crate::numbers::{counted, frequency, plain};
 use drawing::{still, turned};
+use field::ShownField;
 use flexbody_base::provenance;
 use flexbody_body::flex_body::{FlexBody, Interface, is_static};
 use flexbody_body::invariants::principal_axes;
+use maud::Render;
 use serde::Serialize;
 
 pub(super) use drawing::Drawing;
 #[cfg(feature = "hdf5")]
 pub(super) use drawing::HALF_STEP;
+pub(super) use field::{Field, Fields};
 
 // Picture of a body in a report: an interactive drawing of its modes if scripts run, otherwise (and on
 // paper) a still picture.
@@ -35,14 +40,27 @@ pub(super) struct Embedded {
 }
 
 impl Embedded {
-    /// Builds the picture; `None` for a body without anything to draw.
-    pub(crate) fn of(body: &FlexBody) -> Option<Self> {
-        let still = still(body)?;
-        let drawing = Drawing::new(body, None, MAX_DRAWING_BYTES, MODES);
-        let shown = ShownBody::<()>::new(body, &drawing, Vec::new(), None);
-        let arrays: String = drawing.arrays().iter().map(script).collect();
-        let panel = PANEL.replace("{{STILL}}", &still).replace("{{DRAWN}}", &drawn(body, &drawing));
-        if drawing.modes() == 0 {
+    /// Builds the picture of the modes of a body, which stresses may colour; `None` for a body without anything to draw.
+    pub(crate) fn of_modes(body: &FlexBody) -> Option<Self> {
+        let fields = Fields::of_modes(body, MODES);
+        let drawing = Drawing::new(body, None, MAX_DRAWING_BYTES, MODES, fields.sets());
+        Self::of(body, &drawing, &fields)
+    }
+
+    /// Builds the picture of a body at rest in the colours of `fields`; `None` for a body without anything to draw.
+    pub(crate) fn of_fields(body: &FlexBody, fields: &Fields) -> Option<Self> {
+        let drawing = Drawing::new(body, None, MAX_DRAWING_BYTES, 0, fields.sets());
+        Self::of(body, &drawing, fields)
+    }
+
+    fn of(body: &FlexBody, drawing: &Drawing<'_>, fields: &Fields) -> Option<Self> {
+        let still = still(body, fields.drawn.first())?;
+        let shown =
+            ShownBody::<()>::new(body, drawing, &fields.drawn, Vec::new(), None, drawing.modes() == 0);
+        let arrays: String = drawing.arrays(&fields.drawn).iter().map(script).collect();
+        let words = Plain(&drawn(body, drawing, fields)).render().into_string();
+        let panel = PANEL.replace("{{STILL}}", &still).replace("{{DRAWN}}", &words);
+        if drawing.modes() == 0 && fields.drawn.is_empty() {
             return Some(Self { panel, scripts: String::new() });
         }
         let scripts = format!(
@@ -54,7 +72,7 @@ impl Embedded {
 }
 
 /// Returns the drawn and the omitted parts in words.
-fn drawn(body: &FlexBody, drawing: &Drawing<'_>) -> String {
+fn drawn(body: &FlexBody, drawing: &Drawing<'_>, fields: &Fields) -> String {
     let mut words = vec![match drawing.kind() {
         "points" => "nodes as points, since the file has no surface".to_owned(),
         _ => drawing.in_words(),
@@ -62,8 +80,12 @@ fn drawn(body: &FlexBody, drawing: &Drawing<'_>) -> String {
     if drawing.vertices() < body.n_nodes() {
         words.push(format!("{} of {}", drawing.vertices(), counted(body.n_nodes(), "node")));
     }
-    if drawing.modes() < body.n_modes() {
+    if (1..body.n_modes()).contains(&drawing.modes()) {
         words.push(format!("the first {} of {}", drawing.modes(), counted(body.n_modes(), "mode")));
+    }
+    words.extend(fields.left_out.iter().cloned());
+    if drawing.modes() > 0 || fields.drawn.is_empty() {
+        words.push("the axes 1, 2, 3 are principal axes of inertia, moments ascending".to_owned());
     }
     words.join("; ")
 }
@@ -116,6 +138,9 @@ pub(super) struct ShownBody<'a, M> {
     /// Principal axes, by ascending moments.
     principal: [[f64; 3]; 3],
     motion: Option<&'a M>,
+    /// Values that colour the picture. The page begins with the first of them if it was made for them.
+    fields: Vec<ShownField<'a>>,
+    starts_with_field: bool,
 }
 
 #[derive(Serialize)]
@@ -139,13 +164,15 @@ struct ShownInterface {
 }
 
 impl<'a, M: Serialize> ShownBody<'a, M> {
-    /// Collects the data of `body` with the modes of `drawing`, the `terms` beside the picture, and the
-    /// `motion`.
+    /// Collects the data of `body` with the modes of `drawing`, the values of `fields`, the `terms` beside the picture,
+    /// and the `motion`.
     pub(crate) fn new(
         body: &FlexBody,
         drawing: &Drawing<'_>,
+        fields: &'a [Field],
         terms: Vec<(&'static str, String)>,
         motion: Option<&'a M>,
+        starts_with_field: bool,
     ) -> Self {
         let placed = Placed::of(body);
         Self {
@@ -163,6 +190,8 @@ impl<'a, M: Serialize> ShownBody<'a, M> {
             centre_of_mass: placed.centre_of_mass,
             principal: placed.principal,
             motion,
+            fields: fields.iter().map(|field| field.shown(body, drawing)).collect(),
+            starts_with_field,
         }
     }
 

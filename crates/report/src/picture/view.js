@@ -31,6 +31,14 @@ const motion = facts.motion && {
   ...facts.motion, times: array("times", Float32Array), q: array("q", Float32Array),
   origins: array("origins", Float32Array), attitudes: array("attitudes", Float32Array),
 };
+// Values at the vertices, field by field and set by set; -1 where there is none.
+const values = array("values", Int16Array);
+let firstSet = 0;
+const fields = (facts.fields || []).map((field) => {
+  const own = { ...field, first: firstSet };
+  firstSet += field.sets.length;
+  return own;
+});
 const vertices = facts.vertices, modes = facts.modes, half = facts.half, STEP = 1 / 32767;
 
 // Vectors and 3 x 3 matrices, these by columns as WebGL takes them.
@@ -60,16 +68,19 @@ document.documentElement.dataset.live = "";
 const VERTEX = `#version 300 es
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 displacement;
+layout(location = 2) in float tone;
 uniform mat3 model, view;
 uniform vec3 shift, scale;
 uniform vec2 pan;
 uniform float size, amplitude, share, dot;
 uniform int component;
+uniform bool toned;
 out vec3 place;
-out float level;
+out float level, known;
 void main() {
   place = view * (model * (position * size + amplitude * displacement) + shift);
-  level = share * (component == 0 ? length(displacement) : abs(displacement[component - 1]));
+  level = toned ? tone : share * (component == 0 ? length(displacement) : abs(displacement[component - 1]));
+  known = toned && tone < 0.0 ? 0.0 : 1.0;
   gl_Position = vec4(place * scale + vec3(pan, 0.0), 1.0);
   gl_PointSize = dot;
 }`;
@@ -77,7 +88,7 @@ void main() {
 const FRAGMENT = `#version 300 es
 precision highp float;
 in vec3 place;
-in float level;
+in float level, known;
 uniform vec4 plain;
 uniform bool coloured, lit;
 out vec4 colour;
@@ -86,7 +97,7 @@ vec3 scaled(float t) {
     + t * (vec3(6.228, 14.180, 56.691) + t * (vec3(4.776, -13.745, -65.353) + t * vec3(-5.435, 4.646, 26.312))))));
 }
 void main() {
-  vec4 own = coloured ? vec4(scaled(clamp(level, 0.0, 1.0)), 1.0) : plain;
+  vec4 own = coloured && known > 0.999 ? vec4(scaled(clamp(level, 0.0, 1.0)), 1.0) : plain;
   float light = 1.0;
   if (lit) {
     vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
@@ -108,7 +119,7 @@ gl.linkProgram(program);
 if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
 gl.useProgram(program);
 const uniform = Object.fromEntries(["model", "view", "shift", "scale", "pan", "size", "amplitude", "share", "dot", "component",
-  "plain", "coloured", "lit"].map((name) => [name, gl.getUniformLocation(program, name)]));
+  "plain", "coloured", "lit", "toned"].map((name) => [name, gl.getUniformLocation(program, name)]));
 
 function buffer(target, data, usage = gl.STATIC_DRAW) {
   const made = gl.createBuffer();
@@ -126,6 +137,10 @@ const displacement = new Float32Array(3 * vertices);
 const displaced = buffer(gl.ARRAY_BUFFER, displacement, gl.DYNAMIC_DRAW);
 gl.enableVertexAttribArray(1);
 gl.vertexAttribPointer(1, 3, gl.FLOAT, false, 0, 0);
+const tones = new Float32Array(vertices);
+const toneBuffer = buffer(gl.ARRAY_BUFFER, tones, gl.DYNAMIC_DRAW);
+gl.enableVertexAttribArray(2);
+gl.vertexAttribPointer(2, 1, gl.FLOAT, false, 0, 0);
 // Lines of axes and marks, anew in every frame.
 const marks = gl.createVertexArray();
 gl.bindVertexArray(marks);
@@ -153,6 +168,21 @@ function showMode() {
 function upload() {
   gl.bindBuffer(gl.ARRAY_BUFFER, displaced);
   gl.bufferSubData(gl.ARRAY_BUFFER, 0, displacement);
+}
+/// Field that colours the body, and its values in the mode that is shown.
+const field = () => fields[Number(byId("colours") ? byId("colours").value : 0) - FIRST_FIELD];
+const setOf = (own) => own.sets[own.isPerMode ? state.mode : 0];
+function showTones() {
+  const own = field();
+  say("extreme", own ? `Largest: ${short(setOf(own).largest)} ${own.unit}, ${setOf(own).words}; marked.` : "");
+  if (own) {
+    const first = vertices * (own.first + (own.isPerMode ? state.mode : 0));
+    for (let i = 0; i < vertices; i++) tones[i] = values[first + i] < 0 ? -1 : values[first + i] * STEP;
+    gl.bindBuffer(gl.ARRAY_BUFFER, toneBuffer);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, tones);
+  }
+  byId("most").textContent = own ? `${short(setOf(own).largest)} ${own.unit}` : motion ? `${short(motion.largest)} ${facts.units.length}` : "largest of the mode";
+  ask();
 }
 /// State of the motion at a time: coordinates, place and attitude between two instants.
 function instant(time) {
@@ -230,6 +260,8 @@ function draw() {
     if (!isChecked("follow")) reach += motion.reach;
     amplitude = state.factor;
     share = motion.largest > 0 ? 1 / motion.largest : 0;
+  } else if (!modes.length) {
+    amplitude = share = 0;
   } else {
     const largest = modes[state.mode].largest;
     share = largest > 0 ? 1 / largest : 0;
@@ -247,12 +279,13 @@ function draw() {
     gl.uniform1f(uniform.amplitude, program.amplitude ?? amplitude);
     gl.uniform1f(uniform.share, share);
     gl.uniform1f(uniform.dot, (program.dot || 3) * ratio);
-    gl.uniform1i(uniform.component, Math.max(0, component));
+    gl.uniform1i(uniform.component, component > 3 ? 0 : Math.max(0, component));
     gl.uniform4fv(uniform.plain, program.plain || [0, 0, 0, 1]);
     gl.uniform1i(uniform.coloured, program.coloured ? 1 : 0);
     gl.uniform1i(uniform.lit, program.lit ? 1 : 0);
+    gl.uniform1i(uniform.toned, program.coloured && toned ? 1 : 0);
   };
-  const component = byId("colours") ? Number(byId("colours").value) : 0, coloured = component >= 0;
+  const component = byId("colours") ? Number(byId("colours").value) : 0, coloured = component >= 0, toned = field();
   const elements = (kind, own) => {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, own.buffer);
     gl.drawElements(kind, own.count, own.type, 0);
@@ -300,11 +333,19 @@ function draw() {
   gl.disable(gl.DEPTH_TEST);
   if (isChecked("interfaces")) {
     for (const one of facts.interfaces.filter((one) => one.reference)) {
-      const moved = [0, 1, 2].map((k) => motion ? now.q.reduce((s, q, j) => s + q * one.motion[3 * j + k], 0) : one.motion[3 * state.mode + k]);
+      const moved = [0, 1, 2].map((k) => motion ? now.q.reduce((s, q, j) => s + q * one.motion[3 * j + k], 0) : one.motion[3 * state.mode + k] || 0);
       const place = sum(sum(one.reference, facts.centre, -1), moved, amplitude);
       segments([place], { points: true, dot: 10, plain: [...colour.mark, 1] });
       label(one.name, seen(place), colour.mark);
     }
+  }
+  if (toned && setOf(toned).words) {
+    const { place, vertex, largest } = setOf(toned), at = vertex === null ? 0 : 3 * vertex;
+    const moved = vertex === null ? [0, 0, 0] : Array.from(displacement.subarray(at, at + 3));
+    const marked = sum(sum(place, facts.centre, -1), moved, amplitude);
+    segments([marked], { points: true, dot: 13, plain: [0.85, 0.25, 0.22, 1] });
+    segments([marked], { points: true, dot: 7, plain: [1, 1, 1, 1] });
+    label(toned.isPerMode ? short(largest) : `${short(largest)} ${toned.unit}`, seen(marked), AXES[0]);
   }
   if (isChecked("axes")) {
     const centre = sum(facts.centreOfMass, facts.centre, -1);
@@ -325,7 +366,7 @@ function draw() {
   labels.filter((known) => !known.used).forEach((known) => (known.element.hidden = true));
   byId("legend").hidden = !coloured;
   Object.assign(document.documentElement.dataset, { drawn: drawn.triangles.count ? "surface" : "points", mode: state.mode + 1,
-    phase: state.phase.toFixed(4), time: state.time.toPrecision(6) });
+    phase: state.phase.toFixed(4), time: state.time.toPrecision(6), field: toned ? toned.label : "" });
 }
 
 // Time goes on, or a frame is wanted.
@@ -358,11 +399,12 @@ function play(playing) {
   ask();
 }
 function choose(mode) {
+  if (!modes.length) return showTones();
   state.mode = (mode + modes.length) % modes.length;
   byId("mode").value = state.mode;
   byId("kind").textContent = modes[state.mode].kind;
   if (!motion) showMode();
-  ask();
+  showTones();
 }
 function step(direction) {
   if (!motion) return choose(state.mode + direction);
@@ -455,7 +497,22 @@ function setSpeed(value) {
   state.speed = 2 ** value;
   say("pace", `${short(state.speed)} \u00d7`);
 }
-for (const id of ["colours", "outline", "lines", "interfaces", "axes", "follow"]) on(id, "change", ask);
+const FIRST_FIELD = 4;
+if (byId("colours")) {
+  if (!modes.length && !motion) for (const known of [...byId("colours").options]) known.value >= 0 && known.remove();
+  fields.forEach((own, k) => byId("colours").add(new Option(own.label, FIRST_FIELD + k), k));
+  const asked = Number(new URLSearchParams(location.hash.slice(1)).get("colours") ?? (facts.startsWithField ? 1 : 0));
+  byId("colours").value = fields[asked - 1] ? FIRST_FIELD + asked - 1 : byId("colours").options[modes.length || motion ? fields.length : 0].value;
+}
+if (byId("tones")) byId("tones").hidden = !fields.length;
+if (!modes.length && !motion) {
+  state.playing = false;
+  document.querySelectorAll(".moving").forEach((own) => (own.hidden = true));
+  if (byId("outline")) byId("outline").checked = false, byId("outline").closest("label").hidden = true;
+  if (byId("axes")) byId("axes").checked = false;
+}
+on("colours", "change", showTones);
+for (const id of ["outline", "lines", "interfaces", "axes", "follow"]) on(id, "change", ask);
 byId("lines").closest("label").hidden = !triangles.length;
 byId("interfaces").closest("label").hidden = !facts.interfaces.length;
 const bar = Array.from({ length: 11 }, (_, k) => {
@@ -463,10 +520,10 @@ const bar = Array.from({ length: 11 }, (_, k) => {
   return `rgb(${c.map((p) => Math.round(255 * Math.max(0, Math.min(1, p.reduceRight((s, a) => s * t + a, 0)))))})`;
 });
 byId("legend").querySelector("i").style.background = `linear-gradient(90deg, ${bar})`;
-byId("most").textContent = motion ? `${short(motion.largest)} ${facts.units.length}` : "largest of the mode";
 if (motion) {
   for (const id of ["instant", "following"]) byId(id).hidden = false;
   byId("choice").hidden = byId("kind").hidden = true;
+  showTones();
   Object.assign(byId("time"), { min: motion.times[0], max: motion.times[motion.times.length - 1] });
   byId("time").addEventListener("input", (event) => {
     play(false);
@@ -494,7 +551,7 @@ new IntersectionObserver((entries) => {
 }).observe(canvas);
 setSpeed(0);
 setAmplitude(number("amplitude") ?? (motion ? 0 : 1));
-choose(Math.max(0, (number("mode") ?? 1) - 1) % modes.length);
+choose(Math.max(0, (number("mode") ?? 1) - 1) % (modes.length || 1));
 if (motion) showTime();
 play(state.playing);
 draw();
