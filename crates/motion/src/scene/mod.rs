@@ -3,6 +3,7 @@
 mod description;
 mod errors;
 mod extremes;
+mod frame_motion;
 mod framed_scene;
 mod history;
 mod instants;
@@ -32,9 +33,10 @@ pub use errors::{
 };
 pub use extremes::{Drift, Extremes, Peak};
 pub use flexbody_model::StressPoint;
+pub use frame_motion::FrameMotion;
 pub use framed_scene::FramedScene;
 pub use history::{Axes, History, VectorHistory};
-pub use instants::{Instant, highest_excited_rate, inertia_share, instants, unsettled_rate};
+pub use instants::{Instant, highest_excited_rate, instants, unsettled_rate};
 pub use load_cases::LoadCases;
 pub use prepared::{damped, damped_once, ends_a_run, fastest_history, find_nodal_point, nodal_point};
 pub use recovered::{LoadHistory, LoadedHistory, RecoveredMotion};
