@@ -424,6 +424,10 @@ pub struct SimulateArguments {
     /// Load case of the scene, by name [default: all, one after the other; file names contain the case names]
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
+    /// Number of threads, at most four for each processor or 64; results are independent of it [default: all
+    /// processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
     /// HDF5 file to write the motion to
     #[arg(short, long, value_name = "MOTION.h5")]
     pub output: Option<PathBuf>,
@@ -440,10 +444,6 @@ pub struct SimulateArguments {
     /// Report to write, with plots as .html; format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Number of threads, at most four for each processor or 64; results are independent of it [default: all
-    /// processors]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    pub threads: Option<u16>,
     /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,

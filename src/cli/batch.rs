@@ -240,7 +240,9 @@ fn parse(list: &BatchList, body: &BatchBody) -> Result<(Vec<String>, Box<Convert
     let more = own.into_iter().chain(threads).chain(list.options.clone()).chain(body.options.clone());
     let words: Vec<String> = more.collect();
     let program = std::iter::once("flexbody".to_owned());
-    match Arguments::parse_words(program.chain(words.clone()).map(OsString::from)).map(|parsed| parsed.command) {
+    match Arguments::parse_words(program.chain(words.clone()).map(OsString::from))
+        .map(|parsed| parsed.command)
+    {
         Ok(Command::Convert(converted)) => Ok((words, converted)),
         Ok(_) => Err(refused(body, "its options belong to another command")),
         Err(error) => {

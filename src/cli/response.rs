@@ -48,7 +48,8 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
         (None, body, notes)
     };
     let context = context(None, arguments.allow_long, &watch);
-    let (response, settings) = request(arguments, damping.ratio).respond(model.as_ref(), &body, scene.as_ref(), &context)?;
+    let (response, settings) =
+        request(arguments, damping.ratio).respond(model.as_ref(), &body, scene.as_ref(), &context)?;
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
     let facts = ResponseFacts::new(&response, &settings, &run);

@@ -5,8 +5,7 @@ nothing else.
 `rows` is called by suite.py. Each body tumbles as in exudyn_bodies.py, at three speeds. Its motion in Exudyn is compared with that by `flexbody simulate` of
 
 * the body that `flexbody convert --from exudyn` reads back from the file: the same equations, so that only the error of the integration is left;
-* the whole body: the difference must stay below the change of deflections that `flexbody export --scene` states for this scene, times the number of
-  oscillations, since a frequency that is wrong by a part d lets the phase drift by 2 pi d in each.
+* the whole body: the difference must be of the size of the change of deflections that `flexbody export --scene` states for this scene.
 """
 
 import re
@@ -27,6 +26,8 @@ from exudyn_bodies import Scene  # noqa: E402
 BODIES = ["frame_beams", "shell_folded"]
 MODES = 8
 STEPS, LIMIT = 8000, 1e-8
+# In three oscillations the phase adds up to twice the error; measured are 0.9 to 2.2 times.
+PHASE = 3.0
 # Parts of the spin of exudyn_bodies.py, a quarter of the first frequency.
 SPEEDS = [0.25, 0.5, 1.0]
 
@@ -83,12 +84,9 @@ def rows(flexbody, folder):
             error = stated(flexbody, path, folder / "scene.toml", folder / "again.hdf5")
             apart = max(scene.difference(own, theirs).values())
             same = max(scene.difference(Tumbling(back, part).ours(folder), theirs).values())
-            # Three periods of the lowest mode; higher ones drift in proportion to their frequency.
-            cycles = scene.duration * np.sqrt(body.lam[-1]) / (2 * np.pi)
-            allowed = error * (1 + np.pi * cycles)
             hertz = float(np.linalg.norm(scene.omega) / (2 * np.pi))
             print(f"  {name} at {hertz:.3g} turns per unit of time: stated {error:.1e}, to the whole body {apart:.1e}, to the body of the file {same:.1e}")
             row = lambda what, value, limit: found.append(Row(program, "exudyn", f"{name}, spin {hertz:.3g} 1/time: {what}", value, limit))
             row("motion of the body in the file", same, LIMIT)
-            row(f"motion of the whole body, stated change of deflections {error:.1e}", apart, allowed)
+            row(f"motion of the whole body, stated change of deflections {error:.1e}", apart, PHASE * error)
     return found

@@ -250,7 +250,8 @@ pub fn interface_in_memory(interface: &InterfaceSource, raw: &RawModel) -> Resul
             nodes
         }
         InterfaceNodes::File(_) | InterfaceNodes::Set(_) => {
-            let what = "matrices in memory have neither node sets nor tables: list the nodes, or give a region";
+            let what =
+                "matrices in memory have neither node sets nor tables: list the nodes, or give a region";
             return Err(about(Code::Usage, what));
         }
     };

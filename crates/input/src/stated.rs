@@ -196,8 +196,9 @@ pub fn parse_damping(text: &str) -> Result<Damping<MatrixLocation>> {
             "give the ratio of every mode as in 0.02, rayleigh=ALPHA,BETA, bands=100:0.01,1000:0.1,1 or matrix=FILE",
         ))
     };
-    let numbers =
-        |values: &str| values.split(',').map(|number| number.trim().parse().ok()).collect::<Option<Vec<f64>>>();
+    let numbers = |values: &str| {
+        values.split(',').map(|number| number.trim().parse().ok()).collect::<Option<Vec<f64>>>()
+    };
     let damping = match text.split_once('=') {
         None => text.trim().parse().ok().map(Damping::Ratio),
         Some(("rayleigh", values)) => match numbers(values).as_deref() {
@@ -234,7 +235,10 @@ mod tests {
         let bore = parsed("bore=cylinder:0/0/-1:0/0/1:4/5,rigid,0/1/2");
         let wanted = Region::Cylinder { from: [0.0, 0.0, -1.0], to: [0.0, 0.0, 1.0], radius: [4.0, 5.0] };
         assert_eq!(bore.nodes, InterfaceNodes::Region(wanted));
-        assert_eq!((bore.coupling, bore.reference), (Some(Coupling::Rigid), Reference::Point([0.0, 1.0, 2.0])));
+        assert_eq!(
+            (bore.coupling, bore.reference),
+            (Some(Coupling::Rigid), Reference::Point([0.0, 1.0, 2.0]))
+        );
         let axis = Reference::Axis { point: [0.0, 0.0, -1.0], direction: [0.0, 0.0, 2.0] };
         assert_eq!(parsed("bore=cylinder:0/0/-1:0/0/1:5").reference, axis, "as a manifest has it");
         assert_eq!(parsed("EDGE").nodes, InterfaceNodes::Set("EDGE".to_owned()));
@@ -250,10 +254,24 @@ mod tests {
     #[test]
     fn texts_that_are_no_interface_are_refused() {
         for text in [
-            "=SET", "a=", "a=SET,stiff", "a=SET,1/2", "a=SET,node:x", "a=nodes:1/1", "a=nodes:1,2", "a=nodes:",
-            "a=box:0/0/0", "a=box:1/0/0:0/1/1", "a=box:0/0/0:1/1/1:2", "a=cylinder:0/0/0:0/0/0:1",
-            "a=cylinder:0/0/0:0/0/1:5/4", "a=plane:0/0/0:0/0/0:1", "a=plane:0/0/0:0/0/1:-1", "a=nearest:0/0/nan",
-            "a=nearest:0/0/0:0", "a\u{7}=SET",
+            "=SET",
+            "a=",
+            "a=SET,stiff",
+            "a=SET,1/2",
+            "a=SET,node:x",
+            "a=nodes:1/1",
+            "a=nodes:1,2",
+            "a=nodes:",
+            "a=box:0/0/0",
+            "a=box:1/0/0:0/1/1",
+            "a=box:0/0/0:1/1/1:2",
+            "a=cylinder:0/0/0:0/0/0:1",
+            "a=cylinder:0/0/0:0/0/1:5/4",
+            "a=plane:0/0/0:0/0/0:1",
+            "a=plane:0/0/0:0/0/1:-1",
+            "a=nearest:0/0/nan",
+            "a=nearest:0/0/0:0",
+            "a\u{7}=SET",
         ] {
             let error = InterfaceSource::parse(text, 3).expect_err(text);
             assert!(error.has(Code::Usage), "{text}");

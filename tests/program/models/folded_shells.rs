@@ -1,13 +1,14 @@
 //! Folded shells of CalculiX: knots, linear shells, edges of shells as interfaces.
 
 use flexbody_base::diagnostic::Code;
-use flexbody_body::basis::{BasisChoice, ModeSettings};
+use flexbody_body::basis::{BasisKind, ModeSettings};
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
 use flexbody_input::{ModelFiles, read_model};
 use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawModel};
+use flexbody_study::tailoring::computed_basis;
 use nalgebra::Vector3;
 use oracle::fixtures;
 use oracle::jobs::{body, job, set};
@@ -83,7 +84,7 @@ fn edges_and_folds_are_interfaces() {
         let near = (0..3).all(|k| (middle[k] - exact[k]).abs() < 1e-9);
         assert!(near, "{name}: the edge is between the faces, {middle:?}");
         let settings = ConvertSettings {
-            basis: BasisChoice::CraigBampton,
+            basis: computed_basis(BasisKind::CraigBampton, &[], &model).expect("a basis"),
             modes: ModeSettings { wanted: Wanted::Lowest(4), ..ModeSettings::default() },
             ..ConvertSettings::default()
         };
@@ -103,7 +104,8 @@ fn edges_and_folds_are_interfaces() {
 fn rows_of_other_knots_are_refused() {
     let place = tempfile::tempdir().expect("a folder");
     for file in ["s4.inp", "s4.sti", "s4.mas", "s4.dof"] {
-        fs::copy(fixtures().join("small/calculix_folded").join(file), place.path().join(file)).expect("a copy");
+        fs::copy(fixtures().join("small/calculix_folded").join(file), place.path().join(file))
+            .expect("a copy");
     }
     let read = |from: &str, to: &str| {
         let text = fs::read_to_string(deck("s4")).expect("a deck").replace(from, to);
@@ -120,6 +122,12 @@ fn rows_of_other_knots_are_refused() {
     // An element less: its nodes are no longer those of shells.
     let text = refused("2, 11, 13, 23, 21\n4, 13, 15, 25, 23\n", "");
     assert!(text.contains("CalculiX expands S4"), "{text}");
-    let text = refused("*ELEMENT, TYPE=S4, ELSET=E\n1, 1, 3, 13, 11\n2, 11, 13, 23, 21\n3, 3, 5, 15, 13\n4, 13, 15, 25, 23", "*ELEMENT, TYPE=S4, ELSET=E\n1, 1, 3, 13, 11\n2, 11, 13, 23, 21");
-    assert!(text.contains("3 nodes outside the deck are stretches of knots of shells, but 2 nodes"), "{text}");
+    let text = refused(
+        "*ELEMENT, TYPE=S4, ELSET=E\n1, 1, 3, 13, 11\n2, 11, 13, 23, 21\n3, 3, 5, 15, 13\n4, 13, 15, 25, 23",
+        "*ELEMENT, TYPE=S4, ELSET=E\n1, 1, 3, 13, 11\n2, 11, 13, 23, 21",
+    );
+    assert!(
+        text.contains("3 nodes outside the deck are stretches of knots of shells, but 2 nodes"),
+        "{text}"
+    );
 }

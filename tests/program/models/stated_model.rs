@@ -1,7 +1,9 @@
 //! Models whose interfaces and damping are stated on the command line instead of in a manifest.
 
 use crate::program::flexbody;
-use oracle::{Assembly, ElementKind, MassRule, Material, Mesh, Triangle, write_model};
+use oracle::elements::{ElementKind, MassRule, Material};
+use oracle::files::{Triangle, write_model};
+use oracle::mesh::{Assembly, Mesh};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -46,7 +48,11 @@ fn content(folder: &Path, body: &str) -> String {
 
 /// One interface or damping in both forms: tables of the manifest, words of the command line.
 const SAME: [(&str, &str, &[&str]); 9] = [
-    ("free", "[[interface]]\nname = \"end\"\nnodes_file = \"some.csv\"", &["--interface", "end=file:some.csv"]),
+    (
+        "free",
+        "[[interface]]\nname = \"end\"\nnodes_file = \"some.csv\"",
+        &["--interface", "end=file:some.csv"],
+    ),
     (
         "craig-bampton",
         "[[interface]]\nname = \"end\"\nbox = { min = [0.0, 0.0, 0.0], max = [0.0, 1.0, 1.0] }\ncoupling = \"rigid\"\nreference = [-0.1, 0.0, 0.0]",
@@ -85,7 +91,8 @@ const SAME: [(&str, &str, &[&str]); 9] = [
 fn the_command_line_states_what_a_manifest_does() {
     let folder = folder();
     let folder = folder.path();
-    let files = "[files]\nstiffness = \"K.mtx\"\nmass = \"M.mtx\"\nnodes = \"nodes.csv\"\n[model]\nname = \"K\"\n";
+    let files =
+        "[files]\nstiffness = \"K.mtx\"\nmass = \"M.mtx\"\nnodes = \"nodes.csv\"\n[model]\nname = \"K\"\n";
     let units = "[model.units]\nlength = \"m\"\nmass = \"kg\"\ntime = \"s\"\n";
     let mut bodies = Vec::new();
     for (basis, tables, words) in SAME {

@@ -167,10 +167,7 @@ impl InertiaStiffness {
 impl InertiaShares {
     /// Returns upper bounds, over all directions of a unit load, of the ratio of the stiffnesses `stiffness` of unit
     /// motions to the stiffness K_ff of any deformation. Returns `None` if K_ff is not positive definite.
-    pub fn of(
-        stiffness: &[GeometricStiffness<Mat<f64>>],
-        modal_stiffness: MatRef<'_, f64>,
-    ) -> Option<Self> {
+    pub fn of(stiffness: &[GeometricStiffness<Mat<f64>>], modal_stiffness: MatRef<'_, f64>) -> Option<Self> {
         let of_kind = |kind: LoadKind| {
             let of_kind = stiffness.iter().filter(|one| one.load.kind == kind);
             // w'K w contains both orders of a pair of axes, and the stored matrix is their sum.

@@ -3,8 +3,8 @@
 use crate::export::ExportOptions;
 use crate::export::Holding::{self, Held, Lost, NotApplicable, Slight};
 use faer::Mat;
-use flexbody_body::flex_body::FlexBody;
 use flexbody_base::numbers::significant;
+use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{CauchySchwarz, InertiaShares};
 use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
 

@@ -317,7 +317,8 @@ fn rotations(body: &FlexBody) -> Holding {
     let modes = body.modes();
     let Some(rotation) = &modes.rotation else { return NotApplicable };
     let needs = |interface: &&Interface| {
-        let rows = interface.rows(body.nodes(), modes.shape.as_ref(), Some(rotation.as_ref()), body.dimension());
+        let rows =
+            interface.rows(body.nodes(), modes.shape.as_ref(), Some(rotation.as_ref()), body.dimension());
         rows.is_some_and(|rows| rows.rotation.is_some()) && !turns(body, interface)
     };
     let names: Vec<String> =

@@ -105,7 +105,8 @@ fn other_w2(body: &FlexBody, options: &ExportOptions) -> Holding {
     let differences = differences_of_w2(body);
     let bound = CauchySchwarz::of(body.invariants());
     let nf = body.n_modes();
-    let places = differences.iter().flat_map(|own| (0..nf).flat_map(move |j| (0..nf).map(move |k| (own, j, k))));
+    let places =
+        differences.iter().flat_map(|own| (0..nf).flat_map(move |j| (0..nf).map(move |k| (own, j, k))));
     let lost = places.map(|(own, j, k)| own[(j, k)].abs() / bound.s(j, k)).fold(0.0, f64::max);
     if body.invariants().w2().is_none() {
         return Lost(format!(
@@ -120,7 +121,8 @@ fn other_w2(body: &FlexBody, options: &ExportOptions) -> Holding {
         let differences = differences_of_w2(body).into_iter().enumerate();
         Some(differences.map(|(k, matrix)| GeometricStiffness { load: spin(k), matrix }).collect())
     };
-    let what = "W2 that differs from the one implied by the modal mass, which is the sum of the same integrals";
+    let what =
+        "W2 that differs from the one implied by the modal mass, which is the sum of the same integrals";
     losses::in_motion(body, options, what, of_spin)
 }
 

@@ -127,7 +127,8 @@ fn stated_errors_are_those_of_the_body_in_the_file() {
                     FrameMotion { scene: "turn".into(), body: body.clone(), motion: motions.motion.clone() };
                 let options = ExportOptions { in_scene: vec![case], ..plain.clone() };
                 let checklist = find_format(format).expect("a format").checklist(&body, &options);
-                let losses = checklist.losses().into_iter().filter(|loss| loss.text.contains("deflections change"));
+                let losses =
+                    checklist.losses().into_iter().filter(|loss| loss.text.contains("deflections change"));
                 let stated: Vec<[f64; 2]> = losses.map(|loss| stated(&loss)).collect();
                 let sum = [0, 1].map(|k| stated.iter().map(|own| own[k]).sum::<f64>());
                 let measured = motions.measured(&body, &back);
@@ -160,7 +161,8 @@ fn files_of_frames_are_written_unless_a_scene_makes_their_losses_large() {
     };
     for format in ["exudyn", "mbsim", "mbdyn"] {
         let format = find_format(format).expect("a format");
-        let written = |options: &ExportOptions, allowed: AllowedLosses| export(&body, format, options, allowed);
+        let written =
+            |options: &ExportOptions, allowed: AllowedLosses| export(&body, format, options, allowed);
         let (plain, found) = written(&ExportOptions::default(), AllowedLosses::None).expect("written");
         let texts: Vec<&str> = found.iter().map(|diagnostic| diagnostic.message()).collect();
         assert!(texts.iter().any(|text| text.contains("changes deflections by 1 %")), "{texts:?}");
@@ -168,7 +170,10 @@ fn files_of_frames_are_written_unless_a_scene_makes_their_losses_large() {
         assert!(plain == slow && found.iter().any(|one| one.message().contains("in the scene `spin`")));
         if format.name() != "mbdyn" {
             let error = written(&case(0.2), AllowedLosses::None).expect_err("a large error");
-            assert!(error.to_string().contains("in the scene `spin` deflections change by at most"), "{error}");
+            assert!(
+                error.to_string().contains("in the scene `spin` deflections change by at most"),
+                "{error}"
+            );
             let (fast, _) = written(&case(0.2), AllowedLosses::All).expect("allowed");
             assert!(plain == fast);
         }

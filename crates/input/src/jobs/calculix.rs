@@ -73,7 +73,7 @@ impl JobReader for Calculix {
         let place = |(id, x): (&i64, &[f64; 3])| (*id, *means.get(id).unwrap_or(x));
         let mut nodes: BTreeMap<i64, [f64; 3]> = placed.map(place).collect();
         nodes.extend(places);
-        let elements = mesh.drawn();
+        let elements = mesh.drawn_by_corners();
         let sets = sets_of_copies(mesh.sets, &copies, &nodes, &dofs);
         let (ids, positions) = nodes.into_iter().unzip();
         let mut diagnostics = mesh.notes.clone();

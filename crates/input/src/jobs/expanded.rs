@@ -7,9 +7,9 @@
 //! the rigid rotations R. If none of the three is at x, the middle one keeps the number of the node; others get numbers
 //! that the deck does not have. Of the two nodes of a linear shell the upper one keeps the number.
 
-use super::{Found, NodeSets};
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
+use super::{Found, NodeSets};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::scanner::real;
@@ -277,7 +277,8 @@ pub(super) fn sets_of_copies(
         let moving = nodes.iter().filter(|node| with_rows.contains(node));
         let points: Vec<[f64; 3]> = moving.filter_map(|node| places.get(node).copied()).collect();
         // One new node: the other copy has the number of the deck.
-        let on_face = |node: &i64| with_rows.contains(node) && copies.get(node).is_some_and(|own| own.len() == 1);
+        let on_face =
+            |node: &i64| with_rows.contains(node) && copies.get(node).is_some_and(|own| own.len() == 1);
         if nodes.iter().any(on_face) || are_on_one_line(&points) {
             let more: Vec<i64> = nodes.iter().flat_map(of_copies).collect();
             return (name, [nodes, more].concat());

@@ -23,6 +23,10 @@ use std::path::Path;
 /// response decays along a fold by a constant factor for each node; a larger value leaves rigid motion with strain.
 const NEGLIGIBLE: f64 = 1e-16;
 
+/// Mass over stiffness of a stretch, relative to the largest of any row, that counts as rounding. Stretches of solids with
+/// mass have 1e-2 or so.
+const ROUNDING_MASS: f64 = 1e-12;
+
 /// Number of columns that are solved together.
 const COLUMNS: usize = 256;
 
@@ -72,7 +76,12 @@ impl Knots {
             .filter(|(node, own)| of_shells.contains(node) && is_point(own))
             .map(|(node, _)| *node)
             .collect();
-        let turns = |node: &i64| made(node) && directions.get(node).is_some_and(is_point);
+        // Between shells with one normal the rotation about it is held.
+        let turns = |node: &i64| {
+            let own = directions.get(node);
+            made(node)
+                && own.is_some_and(|own| own.len() >= 2 && own.windows(2).all(|pair| pair[0] < pair[1]))
+        };
         if candidates.len() != turning.len() || !turning.iter().all(turns) {
             let message = format!(
                 "rows of {} nodes outside the deck are stretches of knots of shells, but {} nodes of the deck may be knots: the rows cannot be identified",
@@ -119,6 +128,7 @@ impl Knots {
             vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(path).with_help(help)]
         };
         let map = self.map(&stiffness.matrix).ok_or_else(refuse)?;
+        let mass = self.without_rounding(mass, &stiffness.matrix);
         let rows = GivenRows::new(vec![map], HashMap::new());
         let without = |raw: RawMatrix| {
             let RawMatrix { matrix, digits, path } = raw;
@@ -126,6 +136,30 @@ impl Knots {
         };
         let matrices = [without(stiffness)?, without(mass)?];
         Ok((matrices, rows))
+    }
+
+    /// Returns M without the rows of stretches whose mass is rounding: solids with one integration point across have none.
+    /// The mass that condensation would add to rotations without mass may be negative.
+    fn without_rounding(&self, mass: RawMatrix, stiffness: &CscMatrix) -> RawMatrix {
+        let n = mass.matrix.n_cols();
+        let ratio = |row: usize| {
+            let stiffness = stiffness.get(row, row);
+            if stiffness > 0.0 { mass.matrix.get(row, row).abs() / stiffness } else { 0.0 }
+        };
+        let largest = (0..n).map(ratio).fold(0.0, f64::max);
+        let is_rounding = |row: &&u32| ratio(**row as usize) <= ROUNDING_MASS * largest;
+        let empty: HashSet<u32> = self.stretches.iter().filter(is_rounding).copied().collect();
+        if empty.is_empty() {
+            return mass;
+        }
+        let mut entries = Vec::with_capacity(mass.matrix.nnz());
+        for column in 0..n as u32 {
+            let (rows, values) = mass.matrix.column(column as usize);
+            let kept =
+                rows.iter().zip(values).filter(|(row, _)| !empty.contains(row) && !empty.contains(&column));
+            entries.extend(kept.map(|(&row, &value)| (row, column, value)));
+        }
+        RawMatrix { matrix: CscMatrix::from_triplets(n, n, &entries), ..mass }
     }
 
     /// Returns the map x_file = T x, in which the stretches respond statically to the other rows.
