@@ -109,7 +109,8 @@ fn stated(loss: &Loss) -> [f64; 2] {
     <[f64; 2]>::try_from(parts).unwrap_or_else(|_| panic!("{}", loss.text)).map(|percent| 0.01 * percent)
 }
 
-/// The stated errors of all losses of a motion bound those of the file, and are at most twice as large.
+/// The stated errors of all losses of a motion together bound those of the file, and the largest change of a deflection is
+/// at most twice as large.
 #[test]
 fn stated_errors_are_those_of_the_body_in_the_file() {
     let mut compared = 0;
@@ -134,10 +135,13 @@ fn stated_errors_are_those_of_the_body_in_the_file() {
                 let measured = motions.measured(&body, &back);
                 println!("{name} {format} motion {kind}: stated {stated:?}, measured {measured:?}");
                 assert!(sum[0] > 0.01, "{name} {format} {kind}: {stated:?}");
-                for (stated, measured) in sum.into_iter().zip(measured) {
+                // Losses may cancel in part, and half the change of a deflection bounds that of a frequency, whichever
+                // the shape of its mode.
+                for (k, least) in [0.5, 0.4].into_iter().enumerate() {
+                    let largest = stated.iter().map(|own| own[k]).fold(0.0, f64::max);
                     // Texts have two digits.
-                    assert!(measured < 1.06 * stated, "{name} {format} {kind}: {measured} {stated}");
-                    assert!(measured > 0.5 * stated, "{name} {format} {kind}: {measured} {stated}");
+                    assert!(measured[k] < 1.06 * sum[k], "{name} {format} {kind}: {measured:?} {stated:?}");
+                    assert!(measured[k] > least * largest, "{name} {format} {kind}: {measured:?} {stated:?}");
                 }
                 compared += 1;
             }
