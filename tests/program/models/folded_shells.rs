@@ -45,7 +45,8 @@ fn assert_is_the_sheet(body: &FlexBody) {
         masses[k] * (own + (middles[k] - centre).norm_squared())
     };
     let invariants = body.invariants();
-    assert!((invariants.mass() / mass - 1.0).abs() < 1e-11, "{}", invariants.mass());
+    // The deck has nine digits.
+    assert!((invariants.mass() / mass - 1.0).abs() < 1e-9, "{}", invariants.mass());
     let away = (Vector3::from(body.frame().origin) - centre).norm();
     assert!(away < 1e-9 * LENGTH, "{away}");
     let polar = 0.5 * invariants.inertia().trace();
@@ -119,9 +120,7 @@ fn rows_of_other_knots_are_refused() {
         assert!(error.has(Code::DeckUnsupported), "{error}");
         error.to_string()
     };
-    // An element less: its nodes are no longer those of shells.
-    let text = refused("2, 11, 13, 23, 21\n4, 13, 15, 25, 23\n", "");
-    assert!(text.contains("CalculiX expands S4"), "{text}");
+    // Without the elements on one side of a line the node of a knot is not one of shells.
     let text = refused(
         "*ELEMENT, TYPE=S4, ELSET=E\n1, 1, 3, 13, 11\n2, 11, 13, 23, 21\n3, 3, 5, 15, 13\n4, 13, 15, 25, 23",
         "*ELEMENT, TYPE=S4, ELSET=E\n1, 1, 3, 13, 11\n2, 11, 13, 23, 21",
