@@ -334,10 +334,10 @@ impl Body {
     ///
     /// `points` are the places of the body in the file: "nodes", "interfaces", numbers of nodes, or both as in
     /// "interfaces,17,23". `dialect` is one of the format, `to_units` the units of the file. A picture ("vtk", "gltf")
-    /// shows the first `modes`, or a `motion` (a Motion, or the path of its file). `scene` is one for which the share of
-    /// the stiffness of inertia is reported, if the format cannot hold it. With `allow_loss` the file is written even if
-    /// the format cannot hold all of the body; with names of properties ("damping", or a list), only these may be lost. Losses
-    /// are then warnings.
+    /// shows the first `modes`, or a `motion` (a Motion, or the path of its file). `scene` is one for which the errors
+    /// of losses are stated that grow with the motion. With `allow_loss` the file is written even if the format cannot hold
+    /// all of the body; with names of properties ("damping", or a list), only these may be lost. Losses are then warnings,
+    /// as losses are without it that change deflections of the scene by less than 5 %, or that only a motion causes.
     ///
     /// Raises InputError for properties that the format cannot hold (FB720), options that it does not have, and the motion
     /// of another body.

@@ -48,8 +48,17 @@ impl Compressed<'_> {
     }
 }
 
+/// Nodes of an interface: numbers, or the text of a region.
+#[derive(FromPyObject)]
+pub enum GivenNodes {
+    /// Node numbers.
+    Listed(Vec<i64>),
+    /// Region, as `--interface` of the command line has it.
+    Region(String),
+}
+
 /// Interface from `flexbody.model`: name, nodes, coupling, reference point.
-type GivenInterface<'py> = (String, Vec<i64>, Option<Bound<'py, PyAny>>, Option<[f64; 3]>);
+type GivenInterface<'py> = (String, GivenNodes, Option<Bound<'py, PyAny>>, Option<[f64; 3]>);
 
 /// Returns the coupling of this name.
 fn coupling(name: Argument<'_, '_>) -> PyResult<Option<Coupling>> {
@@ -194,9 +203,13 @@ impl Model {
             builder = builder.dofs(labels.as_array().rows().into_iter().map(label).collect::<Vec<_>>());
         }
         for (name, nodes, how, reference) in interfaces {
-            builder = match (coupling(how.as_ref())?, reference) {
-                (None, None) => builder.interface(name, nodes),
-                (how, reference) => {
+            builder = match (nodes, coupling(how.as_ref())?, reference) {
+                (GivenNodes::Region(region), how, reference) => {
+                    let how = how.or(reference.and(Some(Coupling::Averaging)));
+                    builder.interface_in(name, region, how, reference)
+                }
+                (GivenNodes::Listed(nodes), None, None) => builder.interface(name, nodes),
+                (GivenNodes::Listed(nodes), how, reference) => {
                     builder.coupled_interface(name, nodes, how.unwrap_or(Coupling::Averaging), reference)
                 }
             };

@@ -142,6 +142,15 @@ def test_nodes_are_positions_without_numbers_and_numbers_with_them(bracket: Give
         np.testing.assert_array_equal(body.node_ids, np.arange(len(mask)))
     by_mask = bracket.model(interfaces={"end": (mask, "rigid")}).convert(modes=2, basis="craig-bampton")
     assert by_mask == expected
+    # A box around the same nodes.
+    low, high = bracket.nodes[mask].min(axis=0), bracket.nodes[mask].max(axis=0)
+    inside = np.all((bracket.nodes >= low) & (bracket.nodes <= high), axis=1)
+    box = "box:" + ":".join("/".join(repr(float(x)) for x in corner) for corner in (low, high))
+    by_box = bracket.model(interfaces={"end": (box, "rigid")}).convert(modes=2, basis="craig-bampton")
+    assert by_box == bracket.model(interfaces={"end": (inside, "rigid")}).convert(modes=2, basis="craig-bampton")
+    with pytest.raises(flexbody.InputError) as refused:
+        bracket.model(interfaces={"end": "END"})
+    assert refused.value.codes == ("FB801",)
     q = np.zeros(expected.n_modes)
     for at in positions[:3]:
         point = body.equations_of_motion().node(int(at))

@@ -115,6 +115,25 @@ def test_losses_are_warned_of(bracket_body: flexbody.Body, tmp_path: Path) -> No
     assert first.filename == __file__
 
 
+def test_frames_are_exported_with_warnings(tmp_path: Path) -> None:
+    body = flexbody.read_model(MODELS / "frame_beams" / "model.toml").convert(modes=6)
+    body.write(tmp_path / "body.flex.h5")
+    scene = tmp_path / "fast.toml"
+    spin = "[spin]\naxis = [0, 0, 1]\nrate = { to = 200.0, duration = 0.05 }\nhold = true\n"
+    scene.write_text("[run]\nduration = 0.1\n" + spin)
+    command = [sys.executable, "-m", "flexbody", "export", tmp_path / "body.flex.h5", "--to", "exudyn", "-o"]
+    with pytest.warns(flexbody.FlexbodyWarning) as caught:
+        body.export("exudyn", tmp_path / "python.hdf5")
+    assert any("changes deflections by 1 %" in str(one.message) for one in caught)
+    subprocess.run([*command, tmp_path / "command.hdf5", "--quiet"], check=True)
+    assert digest(tmp_path / "python.hdf5") == digest(tmp_path / "command.hdf5")
+    with pytest.raises(flexbody.InputError) as refused:
+        body.export("exudyn", tmp_path / "fast.hdf5", scene=scene)
+    assert set(refused.value.codes) == {"FB720"} and "deflections change by at most" in str(refused.value)
+    done = subprocess.run([*command, tmp_path / "fast.hdf5", "--scene", scene], capture_output=True, text=True)
+    assert done.returncode == 2 and "deflections change by at most" in done.stderr
+
+
 def test_files_that_cannot_be(cube: Given, tmp_path: Path) -> None:
     body = cube.model().convert(modes=8)
     with pytest.raises(flexbody.InputError) as caught:

@@ -6,13 +6,15 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_file::RecordedMotion;
-use flexbody_formats::export::{self, AllowedLosses, InertiaInScene, Points};
+use flexbody_formats::export::{self, AllowedLosses, Points};
 use flexbody_formats::{FORMATS, export_in_units, find_format};
 use flexbody_input::parse_units;
+use flexbody_motion::scene::FrameMotion;
 use std::path::Path;
 
 /// Settings of an export. By default it has the first dialect of the format, its usual points, all modes and the units
-/// of the body, and is refused if the format cannot hold all of the body.
+/// of the body, and is refused if the format cannot hold
+/// all of the body, apart from losses that are small or that only fast motions make large.
 #[derive(Debug, Clone, Default)]
 pub struct ExportOptions {
     points: Option<String>,
@@ -63,8 +65,8 @@ impl ExportOptions {
         self
     }
 
-    /// Sets the scene for which the share of the stiffness of inertia of turning nodes is reported, if the format
-    /// cannot hold it.
+    /// Sets the scene for which the errors of losses are stated that grow with the motion. Errors of deflections above
+    /// 5 % need the permission to lose them.
     pub fn scene(mut self, scene: &Scene) -> Self {
         self.scene = Some(scene.clone());
         self
@@ -105,8 +107,8 @@ impl FlexBody {
         let units = options.units.as_deref().map(parse_units).transpose()?;
         let points = options.points.as_deref().map(str::parse::<Points>).transpose()?;
         let in_scene = match &options.scene {
-            Some(scene) => heard(NO_LISTENER, |context| InertiaInScene::largest(&self.0, &scene.0, context))?,
-            None => None,
+            Some(scene) => heard(NO_LISTENER, |context| FrameMotion::in_cases(&self.0, &scene.0, context))?,
+            None => Vec::new(),
         };
         let asked = export::ExportOptions {
             dialect: options.dialect.clone(),

@@ -6,7 +6,7 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::verification::model_of;
 use flexbody_input::{
-    InterfaceNodes, InterfaceSource, LoadSource, ModelFiles, check_size, read_manifest, read_model,
+    InterfaceSource, LoadSource, ModelFiles, check_size, interface_in_memory, read_manifest, read_model,
 };
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{
@@ -109,7 +109,8 @@ impl Model {
     ///
     /// * `program`: name of the program as on the command line; `None` to detect it from the files.
     /// * `units`: units of length, mass and time, as in a manifest; `None` if not stated.
-    /// * `interfaces`: names of interfaces, each with a node set of the deck and a coupling.
+    /// * `interfaces`: names of interfaces, each with a node set of the deck (or a region, as `--interface` has it) and a
+    ///   coupling.
     ///
     /// # Errors
     /// The errors of [`Model::read`]; FB108 to FB112 for errors of the job, FB220 for a set that the job does not have.
@@ -119,13 +120,10 @@ impl Model {
         units: Option<[&str; 3]>,
         interfaces: &[(&str, &str, Option<Coupling>)],
     ) -> Result<Self> {
-        let source = |&(name, set, coupling): &(&str, &str, Option<Coupling>)| InterfaceSource {
-            name: name.to_owned(),
-            nodes: InterfaceNodes::Set(set.to_owned()),
-            coupling,
-            reference: Reference::Centre,
+        let source = |&(name, nodes, coupling): &(&str, &str, Option<Coupling>)| {
+            InterfaceSource::named(name, nodes, coupling, 3)
         };
-        let interfaces = interfaces.iter().map(source).collect();
+        let interfaces = interfaces.iter().map(source).collect::<Result<Vec<_>>>()?;
         let units = units.map(|units| units.join(","));
         let path = path.as_ref();
         let files = ModelFiles::from_job(path, program.map(str::to_owned), interfaces, units.as_deref())?;
@@ -157,7 +155,7 @@ impl Model {
     pub fn builder(name: impl Into<String>, stiffness: SparseMatrix, mass: SparseMatrix) -> ModelBuilder {
         let nodes = Nodes { ids: Vec::new(), positions: Vec::new() };
         let raw = RawModel::in_memory(name, stiffness.0, mass.0, nodes);
-        ModelBuilder { raw, residual_vectors: Vec::new() }
+        ModelBuilder { raw, regions: Vec::new(), residual_vectors: Vec::new() }
     }
 
     fn checked(raw: RawModel, residual_vectors: Vec<LoadSource>) -> Result<Self> {
@@ -195,7 +193,17 @@ impl Model {
 #[derive(Debug, Clone)]
 pub struct ModelBuilder {
     raw: RawModel,
+    regions: Vec<GivenRegion>,
     residual_vectors: Vec<LoadSource>,
+}
+
+/// Interface of a region, as [`ModelBuilder::interface_in`] is given it.
+#[derive(Debug, Clone)]
+struct GivenRegion {
+    name: String,
+    region: String,
+    coupling: Option<Coupling>,
+    reference: Option<Reference>,
 }
 
 impl ModelBuilder {
@@ -264,6 +272,25 @@ impl ModelBuilder {
         self
     }
 
+    /// Adds an interface with the nodes of a region, in the words of `--interface` of the command line
+    /// (docs/reference/input.md): `cylinder:0/0/0:0/0/10:5`. Nodes without stiffness and mass do not count.
+    /// [`ModelBuilder::build`] finds the nodes.
+    ///
+    /// * `coupling`: `None` for a named node set.
+    /// * `reference`: reference point in model axes; `None` for a point on the axis of a cylinder, and the centre of the
+    ///   interface of other regions.
+    pub fn interface_in(
+        mut self,
+        name: impl Into<String>,
+        region: impl Into<String>,
+        coupling: Option<Coupling>,
+        reference: Option<[f64; 3]>,
+    ) -> Self {
+        let reference = reference.map(Reference::Point);
+        self.regions.push(GivenRegion { name: name.into(), region: region.into(), coupling, reference });
+        self
+    }
+
     /// Declares a plane model: nodes lie in z = 0 and have rows x and y (directions 1, 2 and the rotation 6).
     pub fn plane(mut self) -> Self {
         self.raw.dimension = 2;
@@ -316,8 +343,16 @@ impl ModelBuilder {
     /// Checks the model.
     ///
     /// # Errors
-    /// FB305 to FB439 for errors of matrices, nodes and interfaces, all errors of a stage together.
-    pub fn build(self) -> Result<Model> {
+    /// FB220 and FB801 for an invalid region; FB305 to FB439 for errors of matrices, nodes and interfaces,
+    /// all errors of a stage together.
+    pub fn build(mut self) -> Result<Model> {
+        for given in std::mem::take(&mut self.regions) {
+            let GivenRegion { name, region, coupling, reference } = given;
+            let mut interface = InterfaceSource::named(&name, &region, coupling, self.raw.dimension)?;
+            interface.reference = reference.unwrap_or(interface.reference);
+            let set = interface_in_memory(&interface, &self.raw)?;
+            self.raw.interfaces.push(set);
+        }
         Model::checked(self.raw, self.residual_vectors)
     }
 }

@@ -34,6 +34,7 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
             format: prepared.model.format.clone(),
             units: prepared.model.units.clone(),
             interface: prepared.model.interfaces.clone(),
+            damping: prepared.model.damping.clone(),
         },
         stiffness: None,
         mass: None,

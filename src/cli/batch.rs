@@ -6,7 +6,6 @@ use super::convert::{model_files, wanted};
 use super::outcome::{Outcome, format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{for_threads, memory_left};
 use super::terminal::Watcher;
-use clap::Parser;
 use flexbody_base::children;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, ExitCode, Result};
@@ -241,7 +240,9 @@ fn parse(list: &BatchList, body: &BatchBody) -> Result<(Vec<String>, Box<Convert
     let more = own.into_iter().chain(threads).chain(list.options.clone()).chain(body.options.clone());
     let words: Vec<String> = more.collect();
     let program = std::iter::once("flexbody".to_owned());
-    match Arguments::try_parse_from(program.chain(words.clone())).map(|parsed| parsed.command) {
+    match Arguments::parse_words(program.chain(words.clone()).map(OsString::from))
+        .map(|parsed| parsed.command)
+    {
         Ok(Command::Convert(converted)) => Ok((words, converted)),
         Ok(_) => Err(refused(body, "its options belong to another command")),
         Err(error) => {

@@ -3,7 +3,6 @@
 
 use super::arguments::{Arguments, CompletionsArguments, ManArguments};
 use super::outcome::Outcome;
-use clap::CommandFactory;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 
@@ -11,13 +10,13 @@ const PROGRAM: &str = "flexbody";
 
 pub(super) fn completions(arguments: &CompletionsArguments) -> Result<Outcome> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Arguments::command(), PROGRAM, &mut script);
+    clap_complete::generate(arguments.shell, &mut Arguments::grouped(), PROGRAM, &mut script);
     printed(script)
 }
 
 pub(super) fn man(arguments: &ManArguments) -> Result<Outcome> {
     // Adds the common options to the commands.
-    let mut program = Arguments::command();
+    let mut program = Arguments::grouped();
     program.build();
     let page = match &arguments.command {
         None => clap_mangen::Man::new(program),

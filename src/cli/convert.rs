@@ -499,7 +499,7 @@ fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
             arguments.dofs.clone(),
             arguments.job.units.as_deref(),
         )
-        .map(|files| ModelFiles { dimension: arguments.job.dimension.unwrap_or(files.dimension), ..files }),
+        .and_then(|files| arguments.job.state_in(files)),
         _ => {
             Err(Diagnostic::new(Code::Usage, "give a manifest, a job, or --stiffness, --mass and --nodes")
                 .into())

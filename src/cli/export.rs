@@ -6,11 +6,11 @@ use super::resources::context;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_file::read_simulation;
-use flexbody_formats::export::{AllowedLosses, ExportOptions, Exported, InertiaInScene, Points};
+use flexbody_formats::export::{AllowedLosses, ExportOptions, Exported, Points};
 use flexbody_formats::{export_in_units, find_format};
 use flexbody_input::parse_units;
 use flexbody_linalg::context::Context;
-use flexbody_motion::scene::LoadCases;
+use flexbody_motion::scene::{FrameMotion, LoadCases};
 use std::borrow::Cow;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -24,7 +24,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
         modes: arguments.modes.map(|modes| modes as usize),
         motion: arguments.simulation.as_ref().map(read_simulation).transpose()?,
         name: Some(arguments.output.clone()),
-        in_scene: None,
+        in_scene: Vec::new(),
     };
     let allowed = match &arguments.allow_loss {
         None => AllowedLosses::None,
@@ -39,7 +39,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     if let Some(scene) = &arguments.scene {
         let limits = context(None, true, Context::QUIET.watch);
-        options.in_scene = InertiaInScene::largest(&body, &LoadCases::read(scene, None)?, &limits)?;
+        options.in_scene = FrameMotion::in_cases(&body, &LoadCases::read(scene, None)?, &limits)?;
     }
     let (exported, findings) = export_in_units(&body, format, &options, units.as_ref(), allowed)
         .map_err(|error| error.in_file(arguments.simulation.as_ref().unwrap_or(&arguments.body)))?;

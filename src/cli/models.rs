@@ -3,12 +3,13 @@
 use super::arguments::JobArguments;
 use super::outcome::{refuse_replacing, refuse_replacing_read};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::{Error, Result};
+use flexbody_base::error::Result;
 use flexbody_input::{
-    InterfaceNodes, InterfaceSource, ModelFiles, ModelSource, is_job, read_manifest, read_model,
+    InterfaceSource, ModelFiles, ModelSource, is_job, parse_damping, read_manifest, read_model,
 };
-use flexbody_model::{CheckedModel, Coupling, FeModel, Reference};
+use flexbody_model::{CheckedModel, FeModel};
 use flexbody_study::recipe::Origin;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Returns true if `path`, of a model or of a flex-body file, is that of a model.
@@ -42,13 +43,11 @@ pub(super) fn of_manifest_or_job(path: &Path, job: &JobArguments) -> Result<Mode
         refuse_for_manifest(job)?;
         return read_manifest(path);
     }
-    let interfaces = job.interface.iter().map(|text| interface_source(text)).collect::<Result<Vec<_>>>()?;
-    let mut files = ModelFiles::from_job(path, job.format.clone(), interfaces, job.units.as_deref())?;
+    let mut files = ModelFiles::from_job(path, job.format.clone(), Vec::new(), job.units.as_deref())?;
     if let ModelSource::Job(own) = &mut files.source {
         own.matrices = job.matrices.as_deref().map(matrix_names).transpose()?;
     }
-    files.dimension = job.dimension.unwrap_or(files.dimension);
-    Ok(files)
+    job.state_in(files)
 }
 
 /// Reads and checks a model. Refuses `outputs` that would replace one of its files.
@@ -71,6 +70,25 @@ pub(super) fn origin(path: &Path, job: &JobArguments, scene: &Path, case: &Optio
 }
 
 impl JobArguments {
+    /// Returns the files of a model without a manifest with the dimension, interfaces and damping that the command line
+    /// states.
+    ///
+    /// # Errors
+    /// FB801 for an invalid interface or damping, and for two interfaces of one name.
+    pub(super) fn state_in(&self, mut files: ModelFiles) -> Result<ModelFiles> {
+        files.dimension = self.dimension.unwrap_or(files.dimension);
+        let parsed = self.interface.iter().map(|text| InterfaceSource::parse(text, files.dimension));
+        files.interfaces = parsed.collect::<Result<Vec<_>>>()?;
+        let mut names = HashSet::new();
+        if let Some(twice) = files.interfaces.iter().find(|interface| !names.insert(&interface.name)) {
+            let message = format!("interface `{}` is given twice", twice.name);
+            let help = "give each --interface a name of its own, as in bore=SET_BORE";
+            return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+        }
+        files.damping = self.damping.as_deref().map(parse_damping).transpose()?;
+        Ok(files)
+    }
+
     /// Returns the given options as words of a command line.
     pub(super) fn words(&self) -> Vec<String> {
         let dimension = self.dimension.map(|dimension| dimension.to_string());
@@ -79,6 +97,7 @@ impl JobArguments {
             ("--matrices", &self.matrices),
             ("--units", &self.units),
             ("--dimension", &dimension),
+            ("--damping", &self.damping),
         ];
         let single = single.into_iter().filter_map(|(option, value)| Some((option, value.as_ref()?)));
         let interfaces = self.interface.iter().map(|interface| ("--interface", interface));
@@ -93,6 +112,7 @@ impl JobArguments {
             (self.units.is_some(), "--units"),
             (self.dimension.is_some(), "--dimension"),
             (!self.interface.is_empty(), "--interface"),
+            (self.damping.is_some(), "--damping"),
         ];
         given.iter().find(|(given, _)| *given).map(|(_, option)| *option)
     }
@@ -119,7 +139,10 @@ fn refuse_for_manifest(job: &JobArguments) -> Result<()> {
             "--dimension applies to --stiffness and jobs; set `dimension` in [model] of the manifest instead"
         }
         JobArguments { interface, .. } if !interface.is_empty() => {
-            "--interface applies to jobs; add [[interface]] to the manifest instead"
+            "--interface applies to --stiffness and jobs; add [[interface]] to the manifest instead"
+        }
+        JobArguments { damping: Some(_), .. } => {
+            "--damping applies to --stiffness and jobs; add [damping] to the manifest instead"
         }
         _ => return Ok(()),
     };
@@ -136,47 +159,4 @@ fn matrix_names(text: &str) -> Result<[String; 2]> {
             Err(Diagnostic::new(Code::Usage, message).into())
         }
     }
-}
-
-/// Parses the interface of `--interface`: `NAME=SET` or `SET`, then a coupling, a reference point or both, each after a
-/// comma.
-///
-/// # Errors
-/// FB801 for an unknown coupling, a point that does not have three coordinates, or an empty name.
-fn interface_source(text: &str) -> Result<InterfaceSource> {
-    let refused = |why: String, help: String| {
-        Error::from(Diagnostic::new(Code::Usage, format!("--interface {text}: {why}")).with_help(help))
-    };
-    let mut names = text;
-    let mut reference = Reference::Centre;
-    if let Some((before, last)) = names.rsplit_once(',').filter(|(_, last)| last.contains('/')) {
-        let point = point(last).ok_or_else(|| {
-            let help =
-                "write the point as X/Y/Z in model axes and the unit of length of the nodes".to_owned();
-            refused(format!("`{last}` is not a point"), help)
-        })?;
-        (names, reference) = (before, Reference::Point(point));
-    }
-    let mut coupling = None;
-    if let Some((before, last)) = names.rsplit_once(',') {
-        let known = Coupling::from_name(last.trim());
-        let help = || format!("use one of the couplings {}", Coupling::ALL.map(Coupling::name).join(", "));
-        coupling =
-            Some(known.ok_or_else(|| refused(format!("`{}` is not a coupling", last.trim()), help()))?);
-        names = before;
-    }
-    let (name, set) = names.split_once('=').unwrap_or((names, names));
-    if name.is_empty() || set.is_empty() || name.chars().any(char::is_control) {
-        let message = "expected NAME=SET, NAME=SET,COUPLING or NAME=SET,COUPLING,X/Y/Z".to_owned();
-        let help = "name a node set of the job, as in --interface bore=SET_BORE,rigid,0/0/12.5".to_owned();
-        return Err(refused(message, help));
-    }
-    let nodes = InterfaceNodes::Set(set.to_owned());
-    Ok(InterfaceSource { name: name.to_owned(), nodes, coupling, reference })
-}
-
-/// Parses the point `X/Y/Z`.
-fn point(text: &str) -> Option<[f64; 3]> {
-    let numbers: Option<Vec<f64>> = text.split('/').map(|number| number.trim().parse().ok()).collect();
-    numbers?.try_into().ok()
 }

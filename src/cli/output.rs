@@ -8,7 +8,7 @@ use super::{
     advise, assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, measure,
     prepare, recipe, recover, reduce, response, select, shapes, simulate, trade, view,
 };
-use clap::{CommandFactory, Parser};
+use clap::CommandFactory;
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{ExitCode, Result};
 use flexbody_base::memory::set_left;
@@ -24,7 +24,7 @@ use std::io::Write;
 /// # Errors
 /// [`ExitCode::Done`] after help or the version, [`ExitCode::BadInput`] for an invalid command line.
 pub fn parse(words: &[OsString]) -> std::result::Result<Arguments, ExitCode> {
-    Arguments::try_parse_from(words).map_err(|error| {
+    Arguments::parse_words(words.iter().cloned()).map_err(|error| {
         let words = || words.iter().skip(1).take_while(|word| *word != "--");
         if words().any(|word| word == "--json") && error.use_stderr() {
             let printing = Printing { json: true, quiet: false, deny_warnings: false };

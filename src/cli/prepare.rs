@@ -42,6 +42,7 @@ pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
             matrices: arguments.job.matrices.clone(),
             dimension: arguments.job.dimension,
             interfaces: arguments.job.interface.clone(),
+            damping: arguments.job.damping.clone(),
             allow_implausible: arguments.allow_implausible,
         },
     };

@@ -1,6 +1,6 @@
 //! Command `flexbody response`.
 
-use super::arguments::ResponseArguments;
+use super::arguments::{JobArguments, ResponseArguments};
 use super::convert::load_sources;
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, format_of, refuse_replacing, refuse_replacing_read, refuse_warnings};
@@ -11,9 +11,9 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_input::LoadSource;
+use flexbody_input::{LoadSource, parse_damping};
 use flexbody_linalg::context::{Event, Watch};
-use flexbody_model::FeModel;
+use flexbody_model::{Damping, FeModel};
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{EnvelopeKind, Format, ResponseFacts, RunData, response_csv};
 use flexbody_study::response::{Place, ResponseRequest, converted_for_response};
@@ -25,7 +25,8 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
         std::iter::once(&arguments.model).chain(&arguments.body).chain(&arguments.scene).chain(&arguments.psd)
     };
     refuse_replacing(inputs(), outputs(arguments))?;
-    let is_model = is_model(&arguments.model, &arguments.job)?;
+    let damping = Stated::of(arguments)?;
+    let is_model = is_model(&arguments.model, &damping.job)?;
     refuse_contradictions(arguments, is_model)?;
     let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
     let kind = arguments.rms.as_deref().map(EnvelopeKind::of).transpose()?;
@@ -40,14 +41,15 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     refuse_replacing_read(outputs(arguments))?;
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let (model, body, diagnostics) = if is_model {
-        let (model, body, diagnostics) = model_and_body(arguments, asked, &watch)?;
+        let (model, body, diagnostics) = model_and_body(arguments, &damping.job, asked, &watch)?;
         (Some(model), body, diagnostics)
     } else {
         let (body, notes) = flexbody_file::read_with_notes(&arguments.model)?;
         (None, body, notes)
     };
     let context = context(None, arguments.allow_long, &watch);
-    let (response, settings) = request(arguments).respond(model.as_ref(), &body, scene.as_ref(), &context)?;
+    let (response, settings) =
+        request(arguments, damping.ratio).respond(model.as_ref(), &body, scene.as_ref(), &context)?;
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
     let facts = ResponseFacts::new(&response, &settings, &run);
@@ -70,8 +72,31 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     })
 }
 
-/// Returns what the command line states.
-fn request(arguments: &ResponseArguments) -> ResponseRequest {
+/// Damping that the command line states: a ratio of the modes, which any body may have, or a part of the job.
+struct Stated {
+    ratio: Option<f64>,
+    job: JobArguments,
+}
+
+impl Stated {
+    /// Reads `--damping`. A ratio is taken out of the job.
+    ///
+    /// # Errors
+    /// FB801 for invalid damping.
+    fn of(arguments: &ResponseArguments) -> Result<Self> {
+        let job = arguments.job.clone();
+        let damping = job.damping.as_deref().map(parse_damping).transpose()?;
+        Ok(match damping {
+            Some(Damping::Ratio(ratio)) => {
+                Self { ratio: Some(ratio), job: JobArguments { damping: None, ..job } }
+            }
+            _ => Self { ratio: None, job },
+        })
+    }
+}
+
+/// Returns the request of the command line. `damping` is the ratio of the modes.
+fn request(arguments: &ResponseArguments, damping: Option<f64>) -> ResponseRequest {
     let places = |named: &[String]| named.iter().map(|text| Place::parse(text)).collect();
     ResponseRequest {
         from: places(&arguments.from),
@@ -80,7 +105,7 @@ fn request(arguments: &ResponseArguments) -> ResponseRequest {
         densities: arguments.psd.clone(),
         to: places(&arguments.to),
         band: arguments.band,
-        damping: arguments.damping,
+        damping,
         tolerance: arguments.tolerance,
         points: arguments.points as usize,
         solves: arguments.solves as usize,
@@ -119,10 +144,11 @@ fn refuse_contradictions(arguments: &ResponseArguments, is_model: bool) -> Resul
 /// Returns the model with the given body, or with a body that is converted now.
 fn model_and_body(
     arguments: &ResponseArguments,
+    job: &JobArguments,
     asked: Option<Vec<LoadSource>>,
     watch: Watch<'_>,
 ) -> Result<(FeModel, FlexBody, Vec<Diagnostic>)> {
-    let (files, checked) = read_checked(&arguments.model, &arguments.job, outputs(arguments))?;
+    let (files, checked) = read_checked(&arguments.model, job, outputs(arguments))?;
     let (model, mut diagnostics) = (checked.model, checked.diagnostics);
     if let Some(path) = &arguments.body {
         let (body, notes) = flexbody_file::read_with_notes(path)?;

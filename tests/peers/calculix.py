@@ -2,6 +2,7 @@
 a body of the modes that it wrote itself (.frd) has to be the one of the modes that are computed here. The last row goes from a geometry to a body."""
 
 import itertools
+import math
 import os
 import re
 import subprocess
@@ -93,41 +94,60 @@ def rows(flexbody, folder):
             imported = file["modes/eigenvalue"][()][:MODES]
         error = max(abs(a / b - 1) for a, b in zip(imported, ours, strict=True))
         found.append(Row(f"CalculiX {version}", kind, f"{MODES} modes of its own (.frd) imported, beside ours", error, MODES_LIMIT))
-    found += [shell_row(flexbody, folder, version, kind) for kind in ("S8", "S8R")]
+    found += [shell_row(flexbody, folder, version, kind, form) for form in SHEETS for kind in ("S3", "S4", "S8", "S8R")]
     return [*found, *from_cad(flexbody, folder, version)]
 
 
-def shell_row(flexbody, folder, version, kind):
-    """A plate of shells beside the table of CalculiX."""
+def shell_row(flexbody, folder, version, kind, form):
+    """Sheets of shells beside the table of CalculiX, with their mass."""
     import h5py
 
+    stem = f"{kind}_{form}"
     for name, solver in (("job", ", SOLVER=MATRIXSTORAGE"), ("table", "")):
-        (folder / f"{kind}_{name}.inp").write_text(plate(kind, solver))
-        subprocess.run([program("ccx", "CCX", ""), "-i", f"{kind}_{name}"], cwd=folder, check=True, capture_output=True)
-    theirs = eigenvalues((folder / f"{kind}_table.dat").read_text())
-    path = body_of(flexbody, folder / f"{kind}_job.inp", folder / f"{kind}.flex.h5", "--modes", MODES)
+        (folder / f"{stem}_{name}.inp").write_text(sheet(kind, form, solver))
+        subprocess.run([program("ccx", "CCX", ""), "-i", f"{stem}_{name}"], cwd=folder, check=True, capture_output=True)
+    theirs = eigenvalues((folder / f"{stem}_table.dat").read_text())
+    path = body_of(flexbody, folder / f"{stem}_job.inp", folder / f"{stem}.flex.h5", "--modes", MODES)
     with h5py.File(path) as file:
-        ours = file["modes/eigenvalue"][()]
+        ours, mass = file["modes/eigenvalue"][()], file["invariants/mass"][0]
     error = max(abs(a / b - 1) for a, b in zip(ours, theirs, strict=True))
-    return Row(f"CalculiX {version}", kind, f"eigenvalues of {MODES} modes beside its own table", error, LIMIT)
+    exact = sum(7850 * 0.2 * 0.04 * cells * thickness for _, cells, thickness in SHEETS[form])
+    assert abs(mass / exact - 1) < 1e-9, f"{stem}: mass {mass}, not {exact}"
+    return Row(f"CalculiX {version}", kind, f"{form} sheet: eigenvalues of {MODES} modes beside its own table", error, LIMIT)
 
 
-def plate(kind, solver):
-    """A deck of a plate of 5 x 3 quadratic shells."""
-    numbers, elements = {}, []
-    for i, j in itertools.product(range(0, 10, 2), range(0, 6, 2)):
-        places = [(i, j), (i + 2, j), (i + 2, j + 2), (i, j + 2), (i + 1, j), (i + 2, j + 1), (i + 1, j + 2), (i, j + 1)]
-        elements.append([numbers.setdefault(place, 10 * len(numbers) + 7) for place in places])
-    lines = ["*NODE"] + [f"{at}, {0.02 * i:.15g}, {0.02 * j:.15g}, 0." for (i, j), at in numbers.items()]
-    lines += [f"*ELEMENT, TYPE={kind}, ELSET=EALL"] + [", ".join(map(str, [at, *element])) for at, element in enumerate(elements, 1)]
-    lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", "2.1e11, 0.3", "*DENSITY", "7850.", "*SHELL SECTION, ELSET=EALL, MATERIAL=STEEL", "0.004"]
-    return "\n".join([*lines, "*STEP", f"*FREQUENCY{solver}", str(MODES + 6), "*END STEP", ""])
+# Strips of shells that meet in one line: angles in degrees, cells across and thickness of each. Where they meet CalculiX makes knots.
+SHEETS = {
+    "plate": [(0, 3, 0.004)],
+    "folded": [(0, 3, 0.004), (100, 2, 0.004)],
+    "tee": [(0, 2, 0.004), (180, 2, 0.004), (90, 2, 0.004)],
+    "stepped": [(0, 2, 0.004), (180, 2, 0.007)],
+}
+
+
+def sheet(kind, form, solver):
+    """A deck of strips of shells, five cells long."""
+    numbers, lines, sections = {}, [], []
+    for strip, (angle, cells, thickness) in enumerate(SHEETS[form]):
+        y, z = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        elements = []
+        for i, j in itertools.product(range(0, 10, 2), range(0, 2 * cells, 2)):
+            ends = [(i, j), (i + 2, j), (i + 2, j + 2), (i, j + 2)]
+            middles = [(i + 1, j), (i + 2, j + 1), (i + 1, j + 2), (i, j + 1)]
+            parts = [ends + middles] if kind.startswith("S8") else [ends] if kind.startswith("S4") else [ends[:3], [ends[0], *ends[2:]]]
+            for part in parts:
+                places = [(0.02 * i, round(0.02 * j * y, 12), round(0.02 * j * z, 12)) for i, j in part]
+                elements.append([numbers.setdefault(place, 10 * len(numbers) + 7) for place in places])
+        first = 1000 * strip + 1
+        lines += [f"*ELEMENT, TYPE={kind}, ELSET=E{strip}"] + [", ".join(map(str, [at, *element])) for at, element in enumerate(elements, first)]
+        sections += [f"*SHELL SECTION, ELSET=E{strip}, MATERIAL=STEEL", repr(thickness)]
+    nodes = ["*NODE"] + [f"{at}, {x:.12g}, {y:.12g}, {z:.12g}" for (x, y, z), at in numbers.items()]
+    material = ["*MATERIAL, NAME=STEEL", "*ELASTIC", "2.1e11, 0.3", "*DENSITY", "7850."]
+    return "\n".join([*nodes, *lines, *material, *sections, "*STEP", f"*FREQUENCY{solver}", str(MODES + 6), "*END STEP", ""])
 
 
 def from_cad(flexbody, folder, version):
     """examples/from_cad: the mass of the bracket of Gmsh is that of its geometry, but for the chords of the round holes."""
-    import math
-
     import h5py
 
     try:

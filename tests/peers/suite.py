@@ -93,6 +93,7 @@ PLACES = {
 # Name, module and function, whether it needs seconds only.
 PEERS = [
     ("Exudyn", "exudyn_bodies.rows", False),
+    ("Exudyn, frames of beams and shells", "exudyn_frames.rows", False),
     ("MBDyn", "mbdyn.rows", False),
     ("Octave", "octave.simscape", True),
     ("FEMBeam in Octave", "octave.fembeam", True),

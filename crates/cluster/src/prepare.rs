@@ -207,6 +207,9 @@ pub struct ModelReference {
     pub dimension: Option<u8>,
     /// Interfaces of the job.
     pub interfaces: Vec<String>,
+    /// Damping of the job.
+    #[serde(default)]
+    pub damping: Option<String>,
     /// True if implausible findings were treated as warnings.
     pub allow_implausible: bool,
 }

@@ -9,6 +9,7 @@ mod deck_of_elements;
 mod deck_sets;
 mod element_kinds;
 mod expanded;
+mod knots;
 mod matrix_files;
 mod nastran;
 

@@ -44,6 +44,7 @@ mod recovery_files;
 mod rows_of_model;
 mod scipy_npz;
 mod shapes;
+mod stated;
 mod tables;
 mod with_stress;
 
@@ -55,7 +56,8 @@ pub use model_files::{
     InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource,
     RecoverySource, Region, StressStiffnessSource, TableFiles, WithStress, parse_units,
 };
-pub use read_model::{read_matrix, read_model, read_nodal_masses, read_nodes_of_table};
+pub use read_model::{interface_in_memory, read_matrix, read_model, read_nodal_masses, read_nodes_of_table};
 pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use recipes::{RECIPES, Recipe, Step};
 pub use shapes::{ImportedColumns, read_imported, read_shapes};
+pub use stated::parse_damping;

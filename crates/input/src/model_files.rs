@@ -466,6 +466,18 @@ impl Region {
         }
     }
 
+    /// Returns the reason why the region is empty by definition, in words; `None` if it is not.
+    pub(super) fn problem(&self) -> Option<&'static str> {
+        match self {
+            Self::Box { min, max } if (0..3).any(|k| min[k] > max[k]) => Some("`min` lies beyond `max`"),
+            Self::Cylinder { from, to, .. } if from == to => {
+                Some("`from` and `to` are one point: there is no axis")
+            }
+            Self::Plane { normal, .. } if normal.iter().all(|x| *x == 0.0) => Some("`normal` is zero"),
+            _ => None,
+        }
+    }
+
     fn holds(&self, x: [f64; 3]) -> bool {
         match *self {
             Self::Box { min, max } => (0..3).all(|k| (min[k]..=max[k]).contains(&x[k])),

@@ -206,16 +206,57 @@ impl ModelMatrices {
 
     /// Returns the nodes with stiffness or mass; `None` if the rows have no labels and do not follow the nodes.
     fn moving(&self, dimension: u8) -> Option<HashSet<i64>> {
-        let n = self.stiffness.matrix.n_cols();
-        let filled = filled_rows([&self.stiffness.matrix, &self.mass.matrix], n);
-        let (d, nodes) = (usize::from(dimension), &self.nodes.ids);
-        let node_of = |row: usize| match &self.dofs {
-            Some(labels) => labels.get(row).map(|label| label.node),
-            None => Some(nodes[row / d]),
-        };
-        let known = self.dofs.is_some() || d * nodes.len() == n;
-        known.then(|| (0..n).filter(|&row| filled[row]).filter_map(node_of).collect())
+        moving([&self.stiffness, &self.mass], &self.nodes.ids, self.dofs.as_deref(), dimension)
     }
+}
+
+/// Returns the nodes with entries in any of the matrices; `None` if the rows have no labels and do not follow the nodes.
+fn moving(
+    matrices: [&RawMatrix; 2],
+    nodes: &[i64],
+    labels: Option<&[DofLabel]>,
+    dimension: u8,
+) -> Option<HashSet<i64>> {
+    let n = matrices[0].matrix.n_cols();
+    let filled = filled_rows(matrices.map(|one| &one.matrix), n);
+    let d = usize::from(dimension);
+    let node_of = |row: usize| match labels {
+        Some(labels) => labels.get(row).map(|label| label.node),
+        None => Some(nodes[row / d]),
+    };
+    let known = labels.is_some() || d * nodes.len() == n;
+    known.then(|| (0..n).filter(|&row| filled[row]).filter_map(node_of).collect())
+}
+
+/// Returns an interface of a model in memory: its nodes are listed, or lie in a region.
+///
+/// # Errors
+/// FB220 for a region without nodes; FB801 for a set or a table, which a model in memory does not have.
+pub fn interface_in_memory(interface: &InterfaceSource, raw: &RawModel) -> Result<NodeSet> {
+    let about = |code: Code, what: &str| {
+        Error::from(Diagnostic::new(code, format!("interface `{}`: {what}", interface.name)))
+    };
+    let nodes = match &interface.nodes {
+        InterfaceNodes::Listed(nodes) => nodes.clone(),
+        InterfaceNodes::Region(region) => {
+            let matrices = [&raw.stiffness, &raw.mass];
+            let moving = moving(matrices, &raw.nodes.ids, raw.dofs.as_deref(), raw.dimension);
+            let moves = |id: i64| moving.as_ref().is_none_or(|moving| moving.contains(&id));
+            let all = raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied());
+            let nodes = region.nodes(all.filter(|(id, _)| moves(*id)));
+            if nodes.is_empty() {
+                return Err(about(Code::NodeSetUnknown, "no node of the model lies in the region"));
+            }
+            nodes
+        }
+        InterfaceNodes::File(_) | InterfaceNodes::Set(_) => {
+            let what =
+                "matrices in memory have neither node sets nor tables: list the nodes, or give a region";
+            return Err(about(Code::Usage, what));
+        }
+    };
+    let (name, coupling, reference) = (interface.name.clone(), interface.coupling, interface.reference);
+    Ok(NodeSet { name, nodes, coupling, reference, outline: Vec::new() })
 }
 
 impl From<JobModel> for ModelMatrices {

@@ -143,7 +143,8 @@ def model(
         Sets of nodes that joints and loads act on: name to nodes, or to a tuple of these with a coupling
         ("rigid", "averaging", "free") and perhaps a reference point (3) in model axes; without one it is the
         mean of the nodes. With `node_ids` nodes are given by their numbers, without by positions from 0 (as
-        `numpy.flatnonzero` has them); in both cases also by a boolean mask (n).
+        `numpy.flatnonzero` has them); in both cases also by a boolean mask (n), or as a region in the words of
+        `--interface`: "box:X/Y/Z:X/Y/Z", "cylinder:X/Y/Z:X/Y/Z:R", "plane:X/Y/Z:X/Y/Z:WITHIN", "nearest:X/Y/Z:COUNT".
     units
         Units of length, mass and time, as in ("mm", "t", "s"); a number is a factor to SI. Without, they are
         m, kg, s; an implausible density in these units is a warning.
@@ -199,7 +200,7 @@ def read_model(
     units
         Units of length, mass and time of a job, as in ("mm", "t", "s").
     interfaces
-        Name to the node set of the deck that it is, or to a tuple of the set and a coupling.
+        Name to the node set of the deck that it is (or a region, as for `model`), or to a tuple of it and a coupling.
 
     Raises
     ------

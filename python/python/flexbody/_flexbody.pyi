@@ -42,7 +42,7 @@ class Model:
         *,
         plane: bool,
         dofs: NDArray[np.int64] | None,
-        interfaces: Sequence[tuple[str, list[int], str | None, tuple[float, float, float] | None]],
+        interfaces: Sequence[tuple[str, list[int] | str, str | None, tuple[float, float, float] | None]],
         units: tuple[str, str, str] | None,
         damping: float | tuple[float, float] | list[tuple[float, float]] | _Compressed | None,
         residual_vectors: tuple[bool, bool],

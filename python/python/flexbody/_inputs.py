@@ -149,9 +149,9 @@ def _members(nodes: ArrayLike, name: str, node_ids: NDArray[np.int64], numbered:
 
 def interface_list(
     interfaces: Mapping[str, Any] | None, node_ids: NDArray[np.int64], numbered: bool
-) -> list[tuple[str, list[int], str | None, tuple[float, float, float] | None]]:
-    """Returns name, nodes, coupling and reference point of every interface."""
-    found = []
+) -> list[tuple[str, list[int] | str, str | None, tuple[float, float, float] | None]]:
+    """Returns name, nodes (numbers, or the text of a region), coupling and reference point of every interface."""
+    found: list[tuple[str, list[int] | str, str | None, tuple[float, float, float] | None]] = []
     if interfaces is not None and not isinstance(interfaces, Mapping):
         raise type_error(f"interfaces are of type {type(interfaces).__name__}, expected a mapping of name to nodes")
     for name, given in (interfaces or {}).items():
@@ -161,7 +161,7 @@ def interface_list(
         if isinstance(given, tuple) and len(given) in (2, 3) and isinstance(given[1], (str, type(None))):
             nodes, coupling = given[0], given[1]
             reference = given[2] if len(given) == 3 else None
-        ids = _members(nodes, name, node_ids, numbered)
+        ids = nodes if isinstance(nodes, str) else _members(nodes, name, node_ids, numbered)
         if reference is not None:
             place = f"the reference point of interface {name!r}"
             point = _read(lambda: np.asarray(reference, dtype=np.float64), place, "numbers")

@@ -85,8 +85,8 @@ class SupportsTocsc(Protocol):
 
 Matrix: TypeAlias = Union[SupportsTocsc, ArrayLike]
 """A sparse matrix or array of scipy, or a dense array."""
-Nodes: TypeAlias = Union[Sequence[int], "NDArray[Any]"]
-"""Nodes by number or position, or a boolean mask."""
+Nodes: TypeAlias = Union[Sequence[int], "NDArray[Any]", str]
+"""Nodes by number or position, a boolean mask, or the text of a region as in "cylinder:0/0/0:0/0/10:5"."""
 InterfaceNodes: TypeAlias = Union[
     Nodes, tuple[Nodes, Union[Coupling, None]], tuple[Nodes, Union[Coupling, None], Union[ArrayLike, None]]
 ]

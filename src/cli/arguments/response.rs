@@ -41,9 +41,6 @@ pub struct ResponseArguments {
     /// Load case of the scene, by name (required for a scene with load cases)
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
-    /// Damping ratio of the modes, for a body without damping
-    #[arg(long, value_name = "RATIO", value_parser = damping_ratio)]
-    pub damping: Option<f64>,
     /// Largest relative error; if it is exceeded the exit code is 1
     #[arg(long, value_name = "REL", default_value_t = ResponseSettings::TOLERANCE, value_parser = positive)]
     pub tolerance: f64,
@@ -92,12 +89,4 @@ fn band(text: &str) -> Result<Band, String> {
     let ends = text.split_once("..").and_then(|(low, high)| Some((number(low)?, number(high)?)));
     let band = ends.and_then(|(low, high)| Band::new(low, high));
     band.ok_or_else(|| "expected two frequencies in hertz, the lower one first, as in 0..2000".to_owned())
-}
-
-/// Parses a finite number from 0.
-fn damping_ratio(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(ratio) if ratio.is_finite() && ratio >= 0.0 => Ok(ratio),
-        _ => Err("expected a finite number, 0 or larger (2 % is 0.02, critical damping is 1)".to_owned()),
-    }
 }

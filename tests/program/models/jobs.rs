@@ -177,7 +177,11 @@ fn couplings_that_do_not_explain_the_rows_are_refused() {
 #[test]
 fn quadratic_shells_of_calculix_are_told_apart() {
     let raw = job(&small("calculix_shells"), vec![set("left", "LEFT")]);
-    assert_eq!(raw.interfaces[0].nodes.len(), 2, "the corners have a node between the faces");
+    assert_eq!(
+        raw.interfaces[0].nodes.len(),
+        8,
+        "an edge has the nodes on both faces and those between them"
+    );
     let faces = raw.nodes.positions.iter().filter(|x| ((x[2] / 0.005).abs() - 1.0).abs() < 1e-9).count();
     assert_eq!(faces, 26, "two for each node of the deck");
     let body = body(raw, 4);

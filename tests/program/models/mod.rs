@@ -1,5 +1,6 @@
 //! Models and their files, as read by the program.
 
+mod folded_shells;
 mod interface_names;
 mod interface_points;
 mod jobs;
@@ -9,4 +10,5 @@ mod nastran_files;
 mod plane;
 mod shared_doors;
 mod split;
+mod stated_model;
 mod substructures;

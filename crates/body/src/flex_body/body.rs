@@ -7,7 +7,8 @@ use super::{
 };
 use crate::basis::BasisKind;
 use crate::invariants::{
-    BodyFrame, Expected, Frame, IdentityCheck, InertiaStiffness, Invariants, Turning, identities,
+    BodyFrame, Expected, Frame, IdentityCheck, InertiaShares, InertiaStiffness, Invariants, Turning,
+    identities,
 };
 use faer::Mat;
 use flexbody_base::error::{Error, Result};
@@ -215,12 +216,18 @@ impl FlexBody {
     /// definite.
     pub fn inertia_rates(&self, part: f64) -> Option<InertiaRates> {
         let shares = self.inertia_stiffness()?.shares(self.invariants().modal_stiffness().as_ref())?;
+        Some(self.rates_of(&shares, part))
+    }
+
+    /// Returns the motions at which a stiffness with these `shares` reaches `part` of the stiffness against some
+    /// deformation.
+    pub fn rates_of(&self, shares: &InertiaShares, part: f64) -> InertiaRates {
         let at = |share: f64| (share > 0.0).then_some(part / share);
-        Some(InertiaRates {
+        InertiaRates {
             spin_hz: at(shares.spin_squared).map(|square| self.units().frequency_of(square)),
             acceleration: at(shares.acceleration),
             angular_acceleration: at(shares.angular_acceleration),
-        })
+        }
     }
 
     /// Returns the loads that the body has a [stiffness](FlexBody::stiffness_under) for, each once.

@@ -144,8 +144,8 @@ impl InertiaStiffness {
     }
 }
 
-/// Largest ratios of the stiffness of inertia to the stiffness K_ff, over all deformations and load
-/// directions.
+/// Largest ratios of a stiffness that motion causes (of inertia, of other terms of the kinetic energy) to the
+/// stiffness K_ff, over all deformations and load directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InertiaShares {
     /// Ratio for a unit acceleration of the origin. Unit: time^2/length.
@@ -160,8 +160,16 @@ impl InertiaStiffness {
     /// Returns upper bounds, over all directions of a unit load, of the ratio of the stiffness of inertia
     /// to the stiffness K_ff of any deformation. Returns `None` if K_ff is not positive definite.
     pub fn shares(&self, modal_stiffness: MatRef<'_, f64>) -> Option<InertiaShares> {
+        InertiaShares::of(&self.stiffness, modal_stiffness)
+    }
+}
+
+impl InertiaShares {
+    /// Returns upper bounds, over all directions of a unit load, of the ratio of the stiffnesses `stiffness` of unit
+    /// motions to the stiffness K_ff of any deformation. Returns `None` if K_ff is not positive definite.
+    pub fn of(stiffness: &[GeometricStiffness<Mat<f64>>], modal_stiffness: MatRef<'_, f64>) -> Option<Self> {
         let of_kind = |kind: LoadKind| {
-            let of_kind = self.stiffness.iter().filter(|one| one.load.kind == kind);
+            let of_kind = stiffness.iter().filter(|one| one.load.kind == kind);
             // w'K w contains both orders of a pair of axes, and the stored matrix is their sum.
             let matrices: Vec<Mat<f64>> = of_kind
                 .map(|one| match (&kind, one.load.component) {
@@ -172,7 +180,7 @@ impl InertiaStiffness {
             let matrices: Vec<_> = matrices.iter().map(Mat::as_ref).collect();
             largest_relative_norm(&matrices, modal_stiffness)
         };
-        Some(InertiaShares {
+        Some(Self {
             acceleration: of_kind(LoadKind::Acceleration)?,
             angular_acceleration: of_kind(LoadKind::AngularAcceleration)?,
             spin_squared: of_kind(LoadKind::Spin)?,

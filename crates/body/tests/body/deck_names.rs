@@ -39,7 +39,10 @@ fn sets_of_a_deck_without_instances_may_have_dots() {
     let (_folder, path) = changed("calculix_shells", |text| text.replace("*MATERIAL", sets));
     let raw = read(&path, vec![set("tip", "tip.1"), set("all", "A.1"), set("blank", "AB")]).expect("read");
     let of = |at: usize| raw.interfaces[at].nodes.clone();
-    assert_eq!((of(0), of(1), of(2)), (vec![5, 35], vec![5, 35], vec![5, 35]), "75 has no row of its own");
+    // A set on a line takes the nodes on both faces: two of each, and of 75, which has no row of its own.
+    assert_eq!((&of(0)[..2], of(0).len()), (&[5, 35][..], 6));
+    assert_eq!((&of(1)[..6], of(1).len()), (&of(0)[..], 8));
+    assert_eq!(of(1), of(2));
 }
 
 /// An unresolved set, or a set that contains one, is an error only if it is requested.
@@ -47,7 +50,7 @@ fn sets_of_a_deck_without_instances_may_have_dots() {
 fn sets_that_cannot_be_resolved_are_told_when_they_are_asked_for() {
     let sets = "*NSET, NSET=BROKEN\n5, NOWHERE\n*NSET, NSET=MADE\nBROKEN\n*NSET, NSET=BY, ELSET=NONE\n*ELSET, ELSET=ODD\n1, NONE\n*MATERIAL";
     let (_folder, path) = changed("calculix_shells", |text| text.replace("*MATERIAL", sets));
-    assert_eq!(nodes(&path, "LEFT").len(), 2);
+    assert_eq!(nodes(&path, "LEFT").len(), 8);
     for (name, part) in [("BROKEN", "`NOWHERE`"), ("made", "`BROKEN`"), ("BY", "`NONE`")] {
         let error = read(&path, vec![set("a", name)]).expect_err(name);
         assert!(error.has(Code::DeckSyntax) && error.to_string().contains(part), "{name}: {error}");
@@ -136,10 +139,12 @@ fn blanks_in_keywords_do_not_count() {
     ] {
         let (centre, interface) = centre(to);
         near(centre, middle);
-        // Interfaces take the points at the nodes or, without such points, those between the faces.
+        // The two nodes of the deck lie at its places or, without points there, between the faces. Those of the edge on
+        // both faces lie around the middle.
         let own = if middle.abs() == 0.002 { middle } else { 0.0 };
-        assert!(interface.len() >= 2);
-        interface.iter().for_each(|z| near(*z, own));
+        assert_eq!(interface.len(), 8);
+        interface[..2].iter().for_each(|z| near(*z, own));
+        near(interface.iter().sum::<f64>() / 8.0, middle);
     }
     let (_folder, path) =
         changed("calculix_shells", |text| text.replace(section, "*SHELLSECTION, ELSET=PLATE, OFFSET=x\n"));

@@ -6,8 +6,7 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_file::RecordedMotion;
-use flexbody_linalg::context::Context;
-use flexbody_motion::scene::{LoadCases, inertia_share};
+use flexbody_motion::scene::FrameMotion;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -78,34 +77,8 @@ pub struct ExportOptions {
     pub motion: Option<RecordedMotion>,
     /// Name of the main file, for formats whose main file refers to further files.
     pub name: Option<PathBuf>,
-    /// Effect of the stiffness of inertia in a scene, reported if the format cannot hold it.
-    pub in_scene: Option<InertiaInScene>,
-}
-
-/// Largest part of the stiffness of a motion that the stiffness of inertia has in a scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InertiaInScene {
-    /// Name of the scene.
-    pub scene: String,
-    /// Part of the stiffness, 0.01 for 1 %.
-    pub share: f64,
-}
-
-impl InertiaInScene {
-    /// Returns the largest share over the load cases of a scene; `None` for a body without stiffness of inertia.
-    ///
-    /// # Errors
-    /// The errors of [`inertia_share`].
-    pub fn largest(body: &FlexBody, cases: &LoadCases, context: &Context<'_>) -> Result<Option<Self>> {
-        let mut largest: Option<Self> = None;
-        for scene in cases.iter() {
-            let Some(share) = inertia_share(body, scene, context)? else { continue };
-            if largest.as_ref().is_none_or(|known| known.share < share) {
-                largest = Some(Self { scene: scene.name.clone(), share });
-            }
-        }
-        Ok(largest)
-    }
+    /// Motion in the load cases of a scene, for which the error of a loss is stated; empty without a scene.
+    pub in_scene: Vec<FrameMotion>,
 }
 
 /// Selection of the places of the body in a file.
@@ -215,6 +188,9 @@ pub enum Holding {
     /// The file does not hold a property of the body. The text completes the sentence "FORMAT cannot hold
     /// ...".
     Lost(String),
+    /// The file does not hold a property whose effect is small, or grows with a motion that no scene states: a
+    /// warning, unless the user names the losses that are allowed. The text is that of [`Holding::Lost`].
+    Slight(String),
     /// The body does not have the property, or the readers of the format do not use it; nothing is reported.
     NotApplicable,
 }
@@ -225,9 +201,11 @@ impl Holding {
         lost.map_or(Self::Held, Self::Lost)
     }
 
-    fn lost(self) -> Option<String> {
+    /// Returns the loss of the property with this name, if there is one.
+    fn lost(self, property: &'static str) -> Option<Loss> {
         match self {
-            Self::Lost(text) => Some(text),
+            Self::Lost(text) => Some(Loss { property, text, is_slight: false }),
+            Self::Slight(text) => Some(Loss { property, text, is_slight: true }),
             Self::Held | Self::NotApplicable => None,
         }
     }
@@ -286,7 +264,7 @@ impl ExportChecklist {
     /// Returns what the file lacks of the recoveries, as completion of "the file ..."; `None` if it lacks nothing.
     pub fn left_out_recoveries(&self) -> Option<&str> {
         match &self.recoveries {
-            Holding::Lost(text) => Some(text),
+            Holding::Lost(text) | Holding::Slight(text) => Some(text),
             Holding::Held | Holding::NotApplicable => None,
         }
     }
@@ -314,10 +292,7 @@ impl ExportChecklist {
             ("units", self.units),
             ("storage", self.storage),
         ];
-        let loss = |(name, holding): (&'static str, Holding)| {
-            holding.lost().map(|text| Loss { property: name, text })
-        };
-        all.into_iter().filter_map(loss).collect()
+        all.into_iter().filter_map(|(name, holding)| holding.lost(name)).collect()
     }
 }
 
@@ -328,6 +303,8 @@ pub struct Loss {
     pub property: &'static str,
     /// Completion of "FORMAT cannot hold ...".
     pub text: String,
+    /// True if the loss is allowed unless the user names others ([`Holding::Slight`]).
+    pub is_slight: bool,
 }
 
 impl Loss {
@@ -358,7 +335,7 @@ impl Loss {
 /// Losses with which a body may be exported.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum AllowedLosses {
-    /// No loss.
+    /// Slight losses only.
     #[default]
     None,
     /// Losses of the properties with these names.
@@ -368,7 +345,7 @@ pub enum AllowedLosses {
 }
 
 impl From<bool> for AllowedLosses {
-    /// Returns any loss for true, none for false.
+    /// Returns any loss for true, slight losses for false.
     fn from(any: bool) -> Self {
         if any { Self::All } else { Self::None }
     }
@@ -392,7 +369,7 @@ impl AllowedLosses {
     /// Returns true if the loss is allowed.
     pub(crate) fn allow(&self, loss: &Loss) -> bool {
         match self {
-            Self::None => false,
+            Self::None => loss.is_slight,
             Self::Named(names) => names.iter().any(|name| name == loss.property),
             Self::All => true,
         }

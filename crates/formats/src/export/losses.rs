@@ -1,19 +1,23 @@
 //! Sentences about properties that formats cannot hold, shared by several formats, with the size of the loss.
 
-use crate::export::Holding::{self, Held, Lost, NotApplicable};
-use crate::export::{ExportOptions, InertiaInScene};
+use crate::export::ExportOptions;
+use crate::export::Holding::{self, Held, Lost, NotApplicable, Slight};
 use faer::Mat;
+use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_body::invariants::CauchySchwarz;
-use flexbody_model::UnitLoad;
+use flexbody_body::invariants::{CauchySchwarz, InertiaShares};
+use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
 
 /// Largest difference, relative to a Cauchy-Schwarz bound, that counts as rounding and not as a loss. A
 /// larger value hides small losses; a smaller one reports rounding.
-const ROUNDING: f64 = 1e-12;
+pub(crate) const ROUNDING: f64 = 1e-12;
 
-/// Part of the stiffness of a motion from which the stiffness of inertia is reported. A larger value reports
-/// it for faster motions only.
-const MIN_REPORTED_STIFFNESS: f64 = 0.01;
+/// Part of a stiffness for which the motion is stated that reaches it.
+const REPORTED_STIFFNESS: f64 = 0.01;
+
+/// Largest part of a stiffness in a scene that may be lost without permission. A larger value lets files with
+/// larger errors pass with a warning.
+const MAX_SLIGHT_STIFFNESS: f64 = 0.05;
 
 /// Returns the holding of the restriction to a plane, for a format in space.
 pub(crate) fn plane(body: &FlexBody) -> Holding {
@@ -36,13 +40,28 @@ pub(crate) fn general_w0(body: &FlexBody) -> Holding {
 }
 
 /// Returns the holding of the symmetric part of the blocks of W3, for a format that takes them as skew.
-pub(crate) fn general_w3(body: &FlexBody) -> Holding {
+///
+/// The force on the modes of a symmetric block S_a is d/dt(w_a S_a q) - w_a S_a q' = w_a' S_a q: a stiffness of the
+/// angular acceleration.
+pub(crate) fn general_w3(body: &FlexBody, options: &ExportOptions) -> Holding {
     let bound = CauchySchwarz::of(body.invariants());
     let nf = body.n_modes();
     let Some(w3) = body.invariants().w3() else { return NotApplicable };
     let mirrored = Mat::from_fn(3 * nf, nf, |row, j| -w3[(row / nf * nf + j, row % nf)]);
     let lost = 0.5 * largest(&w3, &mirrored, |row, j| bound.s(row % nf, j));
-    lost_beyond_rounding(lost, "the symmetric part of W3")
+    if lost <= ROUNDING {
+        return Held;
+    }
+    let symmetric = |body: &FlexBody| {
+        let w3 = body.invariants().w3()?;
+        let block = |component: usize| {
+            let entry = |i: usize, j: usize| w3[(component * nf + i, j)];
+            let matrix = Mat::from_fn(nf, nf, |i, j| 0.5 * (entry(i, j) + entry(j, i)));
+            GeometricStiffness { load: UnitLoad { kind: LoadKind::AngularAcceleration, component }, matrix }
+        };
+        Some((0..3).map(block).collect())
+    };
+    in_motion(body, options, "the symmetric part of W3", symmetric)
 }
 
 fn largest(a: &Mat<f64>, b: &Mat<f64>, bound: impl Fn(usize, usize) -> f64) -> f64 {
@@ -94,31 +113,53 @@ pub(crate) fn inertia_stiffness(
     options: &ExportOptions,
     holds: impl Fn(&UnitLoad) -> bool,
 ) -> Holding {
-    const WHAT: &str = "the stiffness of inertia of turning nodes";
-    let Some(inertia) = body.inertia_stiffness() else { return NotApplicable };
-    let all = inertia.stiffness.iter().filter(|one| one.matrix.norm_max() > 0.0);
-    let lost: Vec<&UnitLoad> = all.map(|one| &one.load).filter(|load| !holds(load)).collect();
-    if lost.is_empty() {
-        return Held;
+    let lost = |body: &FlexBody| {
+        let all = body.inertia_stiffness()?.stiffness.iter().filter(|one| one.matrix.norm_max() > 0.0);
+        Some(all.filter(|one| !holds(&one.load)).cloned().collect::<Vec<_>>())
+    };
+    match lost(body) {
+        None => NotApplicable,
+        Some(none) if none.is_empty() => Held,
+        Some(_) => in_motion(body, options, "the stiffness of inertia of turning nodes", lost),
     }
-    if let Some(InertiaInScene { scene, share }) = &options.in_scene {
-        let percent = 100.0 * share;
-        return Lost(format!(
-            "{WHAT}: at most {percent:.2} % of the stiffness of a motion in the scene `{scene}`"
-        ));
-    }
-    let Some(rates) = body.inertia_rates(MIN_REPORTED_STIFFNESS) else { return NotApplicable };
-    let rates = rates.in_words(body.units(), |kind| lost.iter().any(|load| load.kind == *kind));
-    Lost(format!("{WHAT}, which reaches 1 % of the stiffness of a motion at {rates}"))
 }
 
-/// Returns the holding of rotations of nodes, for a format without rotations.
-#[cfg(feature = "hdf5")]
-pub(crate) fn rotations(body: &FlexBody) -> Holding {
-    if body.modes().rotation.is_none() {
-        return NotApplicable;
+/// Returns the loss of a stiffness that the motion of the frame causes. The text states the largest errors in the
+/// scene, or otherwise the motion at which they reach 1 %. If a part s of the stiffness is lost, every deflection under a
+/// given load changes by at most s / (1 - s), and every frequency by at most half of that.
+///
+/// * `lost`: returns the stiffnesses of unit motions that the file does not hold, in the frame of the body that it is
+///   given; `None` if that body does not have the property.
+pub(crate) fn in_motion(
+    body: &FlexBody,
+    options: &ExportOptions,
+    what: &str,
+    lost: impl Fn(&FlexBody) -> Option<Vec<GeometricStiffness<Mat<f64>>>>,
+) -> Holding {
+    let shares = options.in_scene.iter().map(|case| {
+        let share = lost(&case.body).map_or(Some(0.0), |lost| case.largest_share(&lost));
+        (share.unwrap_or(f64::INFINITY), &case.scene)
+    });
+    if let Some((share, scene)) = shares.max_by(|a, b| a.0.total_cmp(&b.0)) {
+        let error = if share < 1.0 { share / (1.0 - share) } else { f64::INFINITY };
+        let percent = |error: f64| format!("{} %", significant(100.0 * error, 2));
+        let size = match error.is_finite() {
+            true => format!(
+                "in the scene `{scene}` deflections change by at most {}, frequencies by at most {}",
+                percent(error),
+                percent(0.5 * error)
+            ),
+            false => format!("in the scene `{scene}` it exceeds the stiffness of the body"),
+        };
+        let text = format!("{what}: {size}");
+        return if error <= MAX_SLIGHT_STIFFNESS { Slight(text) } else { Lost(text) };
     }
-    Lost("the rotations of the nodes in the modes".to_owned())
+    let own = body.invariants().modal_stiffness();
+    let Some(shares) = lost(body).and_then(|lost| InertiaShares::of(&lost, own.as_ref())) else {
+        return Lost(format!("{what}, whose effect is not known"));
+    };
+    let rates = body.rates_of(&shares, REPORTED_STIFFNESS).in_words(body.units(), |_| true);
+    Slight(format!("{what}, which changes deflections by 1 % and frequencies by 0.5 % at {rates}"))
 }
 
 /// Returns the holding of rows of the modes that belong to no node.

@@ -10,7 +10,6 @@ pub(crate) mod matrices;
 pub(crate) mod stresses;
 
 pub use format::{
-    AllowedLosses, ExportChecklist, ExportFormat, ExportOptions, Exported, Holding, InertiaInScene, Loss,
-    Points,
+    AllowedLosses, ExportChecklist, ExportFormat, ExportOptions, Exported, Holding, Loss, Points,
 };
 pub use frames::{ExportFrame, frames};

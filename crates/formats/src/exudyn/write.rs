@@ -6,7 +6,7 @@
 //! -I9, mPhitTPsi = int S_j = I3, mPhitTPsiTilde = int S_j~, mXRefTildePsi = int x~' S_j = -I4,
 //! mXRefTildePsiTilde = int x~' S_j~ = I8.
 
-use crate::export::Holding::{Held, NotApplicable};
+use crate::export::Holding::{self, Held, Lost, NotApplicable, Slight};
 use crate::export::frames::{ExportFrame, interface_frames, named_nodes};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
 use crate::export::matrices::inertia;
@@ -41,14 +41,14 @@ impl ExportFormat for Exudyn {
             deformed_inertia: Held,
             general_w0: losses::general_w0(body),
             coriolis_force: Held,
-            general_w3: losses::general_w3(body),
+            general_w3: losses::general_w3(body, options),
             separate_w2: Held,
             geometric_stiffness: losses::geometric_stiffness(body, |_| false),
             inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
             damping: losses::damping(body),
             shapes: Held,
             // An interface written as a cross of nodes rotates exactly as in the body.
-            rotations: if options.points.of_interfaces() { Held } else { losses::rotations(body) },
+            rotations: if options.points.of_interfaces() { Held } else { rotations(body) },
             internal_rows: losses::internal_rows(body),
             gravity: Held,
             interfaces: Held,
@@ -309,6 +309,29 @@ fn arm_of(body: &FlexBody, interface: &Interface) -> f64 {
     let arm = (own / interface.nodes.len() as f64).sqrt();
     let farthest = body.nodes().positions.iter().map(square).fold(0.0, f64::max).sqrt();
     arm.max(ARM * farthest)
+}
+
+/// Returns the holding of the rotations of the nodes, which bodies of Exudyn do not have. No frequency and no
+/// deflection depends on them, but a joint at an interface whose rotation only they determine cannot turn with it.
+fn rotations(body: &FlexBody) -> Holding {
+    let modes = body.modes();
+    let Some(rotation) = &modes.rotation else { return NotApplicable };
+    let needs = |interface: &&Interface| {
+        let rows =
+            interface.rows(body.nodes(), modes.shape.as_ref(), Some(rotation.as_ref()), body.dimension());
+        rows.is_some_and(|rows| rows.rotation.is_some()) && !turns(body, interface)
+    };
+    let names: Vec<String> =
+        body.interfaces().iter().filter(needs).map(|interface| format!("`{}`", interface.name)).collect();
+    match names.is_empty() {
+        true => Slight(
+            "the rotations of the nodes in the modes: deflections and frequencies do not depend on them, but markers at single nodes do not turn with them".to_owned(),
+        ),
+        false => Lost(format!(
+            "the rotations of the nodes in the modes, without which joints do not turn with {}; --points interfaces writes them",
+            names.join(", ")
+        )),
+    }
 }
 
 /// Returns true if the positions of the nodes determine a rotation; bodies of Exudyn have no rotations of

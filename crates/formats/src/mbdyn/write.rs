@@ -56,7 +56,7 @@ impl ExportFormat for Mbdyn {
             deformed_inertia: if exact { Held } else { NotApplicable },
             general_w0: if exact { losses::general_w0(body) } else { NotApplicable },
             coriolis_force: if exact { Held } else { NotApplicable },
-            general_w3: if exact { losses::general_w3(body) } else { NotApplicable },
+            general_w3: if exact { losses::general_w3(body, options) } else { NotApplicable },
             separate_w2: if exact { Held } else { NotApplicable },
             geometric_stiffness: losses::geometric_stiffness(body, |load| {
                 exact && tag(load, &places).is_some()

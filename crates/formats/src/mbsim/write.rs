@@ -15,6 +15,7 @@ use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{CauchySchwarz, MassKind};
+use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
 
 /// Export format of MBSim.
 pub(crate) struct Mbsim;
@@ -42,8 +43,8 @@ impl ExportFormat for Mbsim {
             deformed_inertia: Held,
             general_w0: losses::general_w0(body),
             coriolis_force: Held,
-            general_w3: losses::general_w3(body),
-            separate_w2: other_w2(body),
+            general_w3: losses::general_w3(body, options),
+            separate_w2: other_w2(body, options),
             geometric_stiffness: losses::geometric_stiffness(body, |_| false),
             inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
             damping: Held,
@@ -99,30 +100,41 @@ fn diagonal(body: &FlexBody) -> [Mat<f64>; 3] {
 }
 
 /// Returns the holding of a W2 that differs from the one implied by the modal mass: for a mass that does not
-/// commute with rotations, or a body without W2.
-fn other_w2(body: &FlexBody) -> Holding {
-    let invariants = body.invariants();
+/// commute with rotations, or a body without W2. The centrifugal term of W2 is a stiffness of the spin.
+fn other_w2(body: &FlexBody, options: &ExportOptions) -> Holding {
+    let differences = differences_of_w2(body);
+    let bound = CauchySchwarz::of(body.invariants());
     let nf = body.n_modes();
-    let bound = CauchySchwarz::of(invariants);
-    let written = diagonal(body);
-    let own = invariants.w2();
-    let places = (0..3).flat_map(|a| (0..nf).flat_map(move |j| (0..nf).map(move |k| (a, j, k))));
-    let lost = places
-        .map(|(a, j, k)| {
-            let numbered: f64 = (0..3).filter(|b| *b != a).map(|b| written[b][(j, k)]).sum();
-            let held = own.as_ref().map_or(0.0, |w2| w2[(a * nf + j, a * nf + k)]);
-            (numbered - held).abs() / bound.s(j, k)
-        })
-        .fold(0.0, f64::max);
-    match own {
-        Some(_) => losses::lost_beyond_rounding(
-            lost,
-            "W2 that differs from the one implied by the modal mass, which is the sum of the same integrals",
-        ),
-        None => Lost(format!(
+    let places =
+        differences.iter().flat_map(|own| (0..nf).flat_map(move |j| (0..nf).map(move |k| (own, j, k))));
+    let lost = places.map(|(own, j, k)| own[(j, k)].abs() / bound.s(j, k)).fold(0.0, f64::max);
+    if body.invariants().w2().is_none() {
+        return Lost(format!(
             "the absence of W2: MBSim computes W2 from the integrals whose sum is the modal mass, here up to {lost:.1e} of its Cauchy-Schwarz bound"
-        )),
+        ));
     }
+    if lost <= losses::ROUNDING {
+        return Held;
+    }
+    let of_spin = |body: &FlexBody| {
+        let spin = |component: usize| UnitLoad { kind: LoadKind::Spin, component };
+        let differences = differences_of_w2(body).into_iter().enumerate();
+        Some(differences.map(|(k, matrix)| GeometricStiffness { load: spin(k), matrix }).collect())
+    };
+    let what =
+        "W2 that differs from the one implied by the modal mass, which is the sum of the same integrals";
+    losses::in_motion(body, options, what, of_spin)
+}
+
+/// Returns the blocks aa of W2 as MBSim computes them less those of the body.
+fn differences_of_w2(body: &FlexBody) -> [Mat<f64>; 3] {
+    let (nf, written, own) = (body.n_modes(), diagonal(body), body.invariants().w2());
+    [0, 1, 2].map(|a| {
+        Mat::from_fn(nf, nf, |j, k| {
+            let numbered: f64 = (0..3).filter(|b| *b != a).map(|b| written[b][(j, k)]).sum();
+            numbered - own.as_ref().map_or(0.0, |w2| w2[(a * nf + j, a * nf + k)])
+        })
+    })
 }
 
 fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {

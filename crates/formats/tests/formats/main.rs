@@ -9,5 +9,6 @@ mod export_mbs;
 mod export_sid;
 mod import_mbs;
 mod import_sid;
+mod loss_errors;
 mod round_trips;
 mod stresses;

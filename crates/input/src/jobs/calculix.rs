@@ -4,7 +4,8 @@
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::deck_sets::nodes_of_surface;
-use super::expanded::{Once, label_once};
+use super::expanded::{Once, label_once, sets_of_copies};
+use super::knots::Knots;
 use super::matrix_files::CoordinateFile;
 use super::{Found, JobFile, JobModel, JobReader, both, is_deck, missing};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -55,7 +56,13 @@ impl JobReader for Calculix {
         // The files are read one after the other: each uses all threads, and the entries of only one are in memory.
         let stiffness = read(&sti);
         let ((stiffness, stiffness_file), (mass, mass_file)) = both(stiffness, read(&mas))?;
-        let Once { labels, places } = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
+        let knots = Knots::of(&mesh, &labels, &rotations, &dof)?;
+        let ([stiffness, mass], given_rows) = match knots.are_absent() {
+            true => ([stiffness, mass], GivenRows::default()),
+            false => knots.condensed([stiffness, mass], &dof)?,
+        };
+        let labels = knots.labels(labels);
+        let Once { labels, places, copies } = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
         let label = |label: &DofLabel| match rotations.get(&label.node) {
             Some(reference) => DofLabel { node: *reference, direction: label.direction + 3 },
             None => *label,
@@ -66,6 +73,8 @@ impl JobReader for Calculix {
         let place = |(id, x): (&i64, &[f64; 3])| (*id, *means.get(id).unwrap_or(x));
         let mut nodes: BTreeMap<i64, [f64; 3]> = placed.map(place).collect();
         nodes.extend(places);
+        let elements = mesh.drawn_by_corners();
+        let sets = sets_of_copies(mesh.sets, &copies, &nodes, &dofs);
         let (ids, positions) = nodes.into_iter().unzip();
         let mut diagnostics = mesh.notes.clone();
         diagnostics.extend(placed_note(&means, &dofs, path));
@@ -76,9 +85,9 @@ impl JobReader for Calculix {
             mass,
             nodes: Nodes { ids, positions },
             dofs,
-            given_rows: GivenRows::default(),
-            elements: mesh.drawn(),
-            sets: mesh.sets,
+            given_rows,
+            elements,
+            sets,
             unresolved: mesh.unresolved,
             files,
             diagnostics,

@@ -48,10 +48,22 @@ impl DeckMesh {
 
     /// Returns the elements for drawing.
     pub(super) fn drawn(&self) -> flexbody_model::Elements {
+        self.drawn_with(|_, nodes| nodes)
+    }
+
+    /// Returns the elements for drawing, quadratic shells by their corners: CalculiX has no rows for the nodes between.
+    pub(super) fn drawn_by_corners(&self) -> flexbody_model::Elements {
+        self.drawn_with(|kind, nodes| match kind {
+            "S6" | "S8" | "S8R" => nodes.get(..nodes.len() / 2).unwrap_or(nodes),
+            _ => nodes,
+        })
+    }
+
+    fn drawn_with(&self, part: impl for<'n> Fn(&str, &'n [i64]) -> &'n [i64]) -> flexbody_model::Elements {
         let mut drawn = flexbody_model::Elements::default();
         for Elements { kind, members } in &self.elements {
             for (_, nodes) in members {
-                match drawing(kind, nodes) {
+                match drawing(kind, part(kind, nodes)) {
                     Drawing::Shape(shape, nodes) => drawn.add(kind, shape, &nodes),
                     Drawing::Nothing => {}
                     Drawing::Unknown => drawn.leave_out(kind, 1),

@@ -1,26 +1,29 @@
 //! Elements that CalculiX expands into solids: several rows have the label of one node of the deck.
 //!
 //! A node at the corner of a quadratic shell (S6, S8, S8R) becomes three nodes, on both faces and between them; one at
-//! the middle of an edge becomes two. The middle node of three has more mass than the others, since it is in the middle
+//! the middle of an edge, and one of a linear shell (S3, S4, S4R), becomes two. The middle node of three has more mass than the others, since it is in the middle
 //! of an edge of the solid. With the node of the deck at x, the vector d through the thickness and the OFFSET o of the
 //! section, the nodes are at x - (1/2 + o) d, x - o d and x + (1/2 - o) d. K determines d: it follows from K R = 0 for
 //! the rigid rotations R. If none of the three is at x, the middle one keeps the number of the node; others get numbers
-//! that the deck does not have.
+//! that the deck does not have. Of the two nodes of a linear shell the upper one keeps the number.
 
-use super::Found;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
+use super::{Found, NodeSets};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::scanner::real;
 use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix};
 use flexbody_model::{DofLabel, RawMatrix};
-use std::collections::{BTreeMap, HashMap};
+use nalgebra::Vector3;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
 /// Prefixes of the types of expanded elements; `SHELLS` are the types among them whose rows can be identified.
 const EXPANDED: &[&str] = &["S", "B", "CPS", "CPE", "CAX", "M3D", "T3D", "T2D"];
-const SHELLS: &[&str] = &["S6", "S8", "S8R"];
+const SHELLS: &[&str] = &["S3", "S4", "S4R", "S6", "S8", "S8R"];
+/// Types among them with nodes at the corners only.
+const LINEAR_SHELLS: &[&str] = &["S3", "S4", "S4R"];
 
 /// Part of the size of the body by which the rows of a node may differ from those of a point.
 const POINT: f64 = 1e-6;
@@ -30,6 +33,8 @@ const POINT: f64 = 1e-6;
 pub(super) struct Once {
     pub labels: Vec<DofLabel>,
     pub places: BTreeMap<i64, [f64; 3]>,
+    /// New numbers of the copies of each expanded node.
+    pub copies: HashMap<i64, Vec<i64>>,
 }
 
 /// Node of the deck that was expanded into several nodes.
@@ -60,7 +65,7 @@ pub(super) fn label_once(
     };
     rows.retain(|_, rows_of_node| is_repeated(rows_of_node));
     let Some(first) = rows.values().map(|rows_of_node| rows_of_node[0]).min().map(|row| labels[row]) else {
-        return Ok(Once { labels, places: BTreeMap::new() });
+        return Ok(Once { labels, places: BTreeMap::new(), copies: HashMap::new() });
     };
     let kinds = expanded_kinds(mesh);
     let refuse = |why: &str| vec![refused(first, &kinds, why).in_file(path)];
@@ -144,11 +149,14 @@ fn numbered(
     through: &[[f64; 3]],
 ) -> Option<Once> {
     let mut next = labels.iter().map(|label| label.node).chain(mesh.nodes.keys().copied()).max().unwrap_or(0);
-    let mut places = BTreeMap::new();
+    let linear = corners_of_linear_shells(mesh);
+    let (mut places, mut all_copies) = (BTreeMap::new(), HashMap::new());
     for (Expanded { node, copies }, d) in all.iter().zip(through) {
         let x = mesh.nodes[node];
         let at_node = copies.iter().position(|(_, part)| *part == 0.0);
-        let middle = at_node.or((copies.len() == 3).then_some(1));
+        let keeps = copies.len() == 3 || linear.contains(node);
+        let middle = at_node.or(keeps.then_some(1));
+        let mut numbers: Vec<i64> = Vec::new();
         for (copy, &(row, part)) in copies.iter().enumerate() {
             let place = [0, 1, 2].map(|k| x[k] + part * d[k]);
             if middle == Some(copy) {
@@ -160,9 +168,18 @@ fn numbered(
             next = next.checked_add(1)?;
             (row..row + 3).for_each(|row| labels[row].node = next);
             places.insert(next, place);
+            numbers.push(next);
         }
+        all_copies.insert(*node, numbers);
     }
-    Some(Once { labels, places })
+    Some(Once { labels, places, copies: all_copies })
+}
+
+/// Returns the nodes of linear shells.
+fn corners_of_linear_shells(mesh: &DeckMesh) -> HashSet<i64> {
+    let linear = mesh.elements.iter().filter(|elements| LINEAR_SHELLS.contains(&elements.kind.as_str()));
+    let members = linear.flat_map(|elements| &elements.members);
+    members.flat_map(|(_, nodes)| nodes.iter().copied()).collect()
 }
 
 /// Returns the vectors d of the nodes. With R_b of the known rows, rotated about each axis, the copies of a node at x
@@ -188,6 +205,10 @@ fn thickness(
         let DofLabel { node, direction } = labels[row];
         let Some(x) = nodes.get(&node) else { return 0.0 };
         let k = usize::from(direction) - 1;
+        // Knots have rotations.
+        if k >= 3 {
+            return if k - 3 == axis { 1.0 } else { 0.0 };
+        }
         // Component k of e_a x x.
         match (k + 3 - axis) % 3 {
             1 => -x[(axis + 2) % 3],
@@ -223,7 +244,7 @@ fn thickness(
 }
 
 /// Solves A X = B for a positive definite matrix, with one step of refinement; returns `None` for another matrix.
-fn solved(matrix: &SymmetricMatrix, load: &Mat<f64>) -> Option<Mat<f64>> {
+pub(super) fn solved(matrix: &SymmetricMatrix, load: &Mat<f64>) -> Option<Mat<f64>> {
     let n = matrix.n();
     let unit: Vec<_> = (0..n as u32).map(|i| (i, i, 1.0)).collect();
     let unit = SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &unit))?;
@@ -236,6 +257,45 @@ fn solved(matrix: &SymmetricMatrix, load: &Mat<f64>) -> Option<Mat<f64>> {
     factor.solve_in_place(rest.as_mut());
     solution += &rest;
     Some(solution)
+}
+
+/// Returns the node sets of a deck with the new nodes that stand for their nodes: a set whose nodes with rows do not
+/// lie on one line stays as it is, unless nodes of linear shells, which lie on one face, belong to it. The others get all
+/// copies of their nodes, on both faces, so that the edge of a shell determines a rotation.
+pub(super) fn sets_of_copies(
+    sets: NodeSets,
+    copies: &HashMap<i64, Vec<i64>>,
+    places: &BTreeMap<i64, [f64; 3]>,
+    labels: &[DofLabel],
+) -> NodeSets {
+    if copies.is_empty() {
+        return sets;
+    }
+    let with_rows: HashSet<i64> = labels.iter().map(|label| label.node).collect();
+    let whole = |(name, nodes): (String, Vec<i64>)| {
+        let of_copies = |node: &i64| copies.get(node).into_iter().flatten().copied();
+        let moving = nodes.iter().filter(|node| with_rows.contains(node));
+        let points: Vec<[f64; 3]> = moving.filter_map(|node| places.get(node).copied()).collect();
+        // One new node: the other copy has the number of the deck.
+        let on_face =
+            |node: &i64| with_rows.contains(node) && copies.get(node).is_some_and(|own| own.len() == 1);
+        if nodes.iter().any(on_face) || are_on_one_line(&points) {
+            let more: Vec<i64> = nodes.iter().flat_map(of_copies).collect();
+            return (name, [nodes, more].concat());
+        }
+        (name, nodes)
+    };
+    sets.into_iter().map(whole).collect()
+}
+
+/// Returns true if two or more points lie on one line, to the accuracy of their coordinates.
+fn are_on_one_line(points: &[[f64; 3]]) -> bool {
+    let [first, _, ..] = points else { return false };
+    let first = Vector3::from(*first);
+    let away = points.iter().map(|point| Vector3::from(*point) - first);
+    let farthest = away.clone().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or_default();
+    let length = farthest.norm();
+    away.map(|vector| vector.cross(&farthest).norm()).all(|area| area <= POINT * length * length)
 }
 
 /// Returns the types of the expanded elements of a deck.
@@ -252,6 +312,6 @@ fn refused(label: DofLabel, kinds: &[&str], why: &str) -> Diagnostic {
     let kinds = if kinds.is_empty() { "elements".to_owned() } else { kinds.join(", ") };
     let message = format!("{label} labels several rows: CalculiX expands {kinds} into solids, and {why}");
     Diagnostic::new(Code::DeckUnsupported, message).with_help(
-        "use solid elements only (C3D4, C3D8, C3D10, C3D20 and their variants), or shells S6, S8, S8R only",
+        "use solid elements only (C3D4, C3D8, C3D10, C3D20 and their variants), or shells S3, S4, S4R, S6, S8, S8R without layers only",
     )
 }

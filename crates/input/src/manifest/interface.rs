@@ -80,10 +80,7 @@ impl ManifestWalk<'_, '_> {
             None => None,
         };
         let reference = match (table.get("reference"), table.get("reference_node")) {
-            (None, None) => match &nodes {
-                InterfaceNodes::Region(region) => region.reference(),
-                _ => Reference::Centre,
-            },
+            (None, None) => nodes.usual_reference(),
             (Some(point), None) => Reference::Point(self.point("reference", point, dimension)?),
             (None, Some(node)) => match integer(node) {
                 Some(node) => Reference::Node(node),
@@ -290,14 +287,7 @@ impl ManifestWalk<'_, '_> {
 
     /// Returns the region unless it is empty by definition.
     fn sensible(&mut self, key: &str, region: &Region, span: Range<usize>) -> Option<Region> {
-        let message = match region {
-            Region::Box { min, max } if (0..3).any(|k| min[k] > max[k]) => "`min` lies beyond `max`",
-            Region::Cylinder { from, to, .. } if from == to => {
-                "`from` and `to` are one point: there is no axis"
-            }
-            Region::Plane { normal, .. } if normal.iter().all(|x| *x == 0.0) => "`normal` is zero",
-            _ => return Some(*region),
-        };
+        let Some(message) = region.problem() else { return Some(*region) };
         self.complain(Code::ManifestSyntax, span, format!("{message} in `{key}`"));
         None
     }

@@ -24,8 +24,7 @@ fn losses_are_those_of_the_format_and_the_body() {
     const SPRUNG: &str = "the geometric stiffness for ";
     const INERTIA: &str = "the change of the inertia with the deformation (W1 except its centrifugal load, W2, W3): OpenRadioss";
     const SMALL: &str = "the change of the inertia with the deformation (W1, W2, W3): K and M";
-    const TURNS: &str =
-        "the stiffness of inertia of turning nodes, which reaches 1 % of the stiffness of a motion at a spin";
+    const TURNS: &str = "the stiffness of inertia of turning nodes, which changes deflections by 1 % and frequencies by 0.5 % at a spin";
     const WEIGHT: &str = "the point of action of gravity on the deformed body: Chrono distributes";
     const PLANE: &str = "the restriction to the plane z = 0";
     for (name, _) in bodies() {
