@@ -6,7 +6,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_model::RecoveryRow;
-use flexbody_motion::scene::{self, LoadHistory, RecoveredMotion, RowMap, StressPoint};
+use flexbody_motion::scene::{self, AmplitudeHistory, LoadHistory, RecoveredMotion, RowMap, StressPoint};
 use flexbody_report::{EnvelopeKind, RecoveredFacts, RunData, recovered_csv};
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -43,7 +43,7 @@ impl LoadedHistory {
             return refused("a time or a modal coordinate is not a finite number".to_owned());
         }
         let path = PathBuf::from("history");
-        Ok(Self(scene::LoadedHistory { path, time, q, angular_velocity: None, loads: Vec::new() }))
+        Ok(Self(scene::LoadedHistory { path, time, q, angular_velocity: None, loads: Vec::new(), named: Vec::new() }))
     }
 
     /// Sets the angular velocity of the body frame at each time.
@@ -78,6 +78,28 @@ impl LoadedHistory {
         Ok(self)
     }
 
+    /// Adds the amplitude of a named load at each time. Named loads without amplitudes count as zero; preloads act always
+    /// and take none.
+    ///
+    /// # Errors
+    /// FB804 if the number of values is not that of the times, for numbers that are not finite, and for a load that has
+    /// amplitudes already.
+    pub fn amplitude(mut self, load: impl Into<String>, values: &[f64]) -> Result<Self> {
+        let load = load.into();
+        if self.0.named.iter().any(|known| known.load == load) {
+            return refused(format!("named load `{load}` has amplitudes already"));
+        }
+        let count = self.0.time.len();
+        if values.len() != count {
+            return refused(format!("{} amplitudes of the named load `{load}` for {count} times", values.len()));
+        }
+        if !values.iter().all(|value| value.is_finite()) {
+            return refused(format!("an amplitude of the named load `{load}` is not finite"));
+        }
+        self.0.named.push(AmplitudeHistory { load, values: values.to_vec() });
+        Ok(self)
+    }
+
     /// Returns rows of three as vectors, one for each time.
     fn vectors(&self, what: &str, rows: &[[f64; 3]]) -> Result<Vec<Vector3<f64>>> {
         let count = self.0.time.len();
@@ -95,6 +117,17 @@ impl LoadedHistory {
         let n_modes = body.n_modes();
         if let Some(row) = self.0.q.iter().find(|row| row.len() != n_modes) {
             return refused(format!("{} modal coordinates, but the body has {n_modes} modes", row.len()));
+        }
+        for own in &self.0.named {
+            let known = body.0.named_loads().iter().find(|load| load.name == own.load);
+            let problem = match known {
+                None => format!("the body has no named load `{}`", own.load),
+                Some(load) if load.preload => {
+                    format!("`{}` is a preload, which acts always with amplitude 1", own.load)
+                }
+                Some(_) => continue,
+            };
+            return Err(Diagnostic::new(Code::SceneBody, problem).into());
         }
         for load in &self.0.loads {
             let mut known = body.0.interfaces().iter().filter(|interface| interface.reference.is_some());

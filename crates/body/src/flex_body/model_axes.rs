@@ -66,6 +66,7 @@ impl FlexBody {
             .collect();
         parts.geometric_stiffness = self.geometric_stiffness_in(&origin, &to_body);
         parts.inertia_stiffness = self.inertia_stiffness_in(&origin, &to_body);
+        parts.named_loads = parts.named_loads.iter().map(|one| one.in_frame(&origin, &to_body)).collect();
         parts.recoveries = parts.recoveries.iter().map(|one| one.in_axes(&to_body)).collect();
         parts.coordinates = None;
         Self::new(parts)

@@ -189,8 +189,7 @@ fn turning_of_run(
 fn largest_torque(body: &FlexBody, scene: &Scene, duration: f64, points: &[BodyPoint]) -> f64 {
     let torque = |(load, point): (&Load, &BodyPoint)| {
         let largest = |history: &VectorHistory| Variation::of_vector(history, duration).largest;
-        let lever = point.place(&Evaluation::new(&EquationsOfMotion::new(body, Terms::NONE))).norm();
-        largest(&load.force) * lever + largest(&load.torque)
+        largest(&load.force) * point.lever() + largest(&load.torque)
     };
     scene.loads.iter().zip(points).map(torque).sum()
 }
@@ -407,6 +406,12 @@ impl<'b> PointRows<'b> {
     /// Returns Psi of a point (3 x nf), body axes.
     pub(super) fn of(&self, point: &BodyPoint) -> DMatrix<f64> {
         self.works(|rest, axis, forces| point.add_force(rest, axis, forces))
+    }
+
+    /// Returns the rows (3 x nf), body axes, whose product with a force is the torque that the force gains by deformation.
+    pub(super) fn of_lever(point: &BodyPoint) -> DMatrix<f64> {
+        let rows = point.lever_rows();
+        DMatrix::from_fn(3, rows.ncols(), |k, j| rows[(k, j)])
     }
 
     /// Returns the rotations of a point by the modes (3 x nf), body axes. The point must have an orientation.
