@@ -2,9 +2,9 @@
 
 use super::recovery::{Problem, RowsOfFiles};
 use super::rows::{centre_and_length, rigid_count};
-use super::{NodeSet, Nodes, Rows};
+use super::{GeometricStiffness, LoadKind, NodeSet, Nodes, Rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_linalg::CscMatrix;
+use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use std::collections::HashSet;
 use std::path::PathBuf;
 
@@ -137,6 +137,24 @@ fn refuse_rows_without_place(name: &str, forces: &[f64], rows: &Rows) -> Result<
     }
     let message = format!("`{name}`: it has forces in {loaded} rows that belong to no position in space");
     Err((Code::NamedLoadMisfit, message))
+}
+
+/// Returns an error for each preload with geometric stiffness, which would act always: the stiffness with preload is that of
+/// the modes only if it is in K.
+pub(super) fn refuse_stiff_preloads(
+    all: &[ModelLoad],
+    stiffness: &[GeometricStiffness<SymmetricMatrix>],
+) -> Vec<Diagnostic> {
+    let is_stiff = |load: &&ModelLoad| {
+        let named = |kind: &LoadKind| matches!(kind, LoadKind::Named(name) if *name == load.name);
+        load.preload && stiffness.iter().any(|one| named(&one.load.kind))
+    };
+    let refused = |load: &ModelLoad| {
+        let message = format!("preload `{}` has geometric stiffness, which no mode of the body would have", load.name);
+        let help = "give K with the stress of the preload as stiffness (docs/how_to/geometric_stiffness.md) and leave its [[geometric_stiffness]] out";
+        Diagnostic::new(Code::NamedLoadMisfit, message).in_file(&load.path).with_help(help)
+    };
+    all.iter().filter(is_stiff).map(refused).collect()
 }
 
 /// Returns an error for each preload with a resultant.

@@ -1,5 +1,6 @@
 //! Facts of a body and of the run that made it, computed once and rendered in every format.
 
+use super::named_loads::NamedLoadFacts;
 use super::completeness::{Completeness, GuaranteeFacts, TermFacts};
 use super::craig_bampton::CraigBamptonFacts;
 use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz};
@@ -66,6 +67,9 @@ pub(super) struct ModelFacts {
     pub interfaces: Vec<InterfaceFacts>,
     /// Rows to read off the deformed body.
     pub recoveries: Vec<RecoveryFacts>,
+    /// Nodal forces with a name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub named_loads: Vec<NamedLoadFacts>,
     /// Size of the surface; `None` if no surface is known.
     pub mesh: Option<MeshFacts>,
     pub settings: serde_json::Value,
@@ -389,6 +393,7 @@ impl ModelFacts {
                 .map(|interface| InterfaceFacts::of(interface, body))
                 .collect(),
             recoveries: body.recoveries().iter().map(RecoveryFacts::of).collect(),
+            named_loads: NamedLoadFacts::of(body),
             mesh: MeshFacts::of(body),
             settings: source.settings.clone(),
         }

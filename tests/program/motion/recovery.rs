@@ -131,7 +131,7 @@ fn rows_of_a_run_are_those_of_the_body() {
         let (force, torque) = (along(0), along(3));
         let right = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
         let found: Vec<f64> = line.split(',').skip(1).map(|cell| cell.parse().expect("a number")).collect();
-        let state = RecoveryState { q, angular_velocity: axes * omega, loads: &[[0.0; 6], right] };
+        let state = RecoveryState { q, angular_velocity: axes * omega, loads: &[[0.0; 6], right], named: &[] };
         let mut expected = body.recoveries()[0].values(&state);
         let measures = |s: &[f64]| {
             let stress = nalgebra::Matrix3::new(s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2]);

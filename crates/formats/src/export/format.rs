@@ -277,6 +277,8 @@ pub struct ExportChecklist {
     pub units: Holding,
     /// Storage of large arrays in 32-bit floats.
     pub storage: Holding,
+    /// Named loads, and preloads among them.
+    pub named_loads: Holding,
     /// Recoveries. A loss is a note, whatever is allowed, since `recover` computes them from a run of any program; its
     /// text completes "the file ...".
     pub recoveries: Holding,
@@ -313,6 +315,7 @@ impl ExportChecklist {
             ("origins-of-modes", self.origins_of_modes),
             ("units", self.units),
             ("storage", self.storage),
+            ("named-loads", self.named_loads),
         ];
         let loss = |(name, holding): (&'static str, Holding)| {
             holding.lost().map(|text| Loss { property: name, text })
@@ -332,7 +335,7 @@ pub struct Loss {
 
 impl Loss {
     /// Names of all properties that may be lost.
-    pub const PROPERTIES: [&'static str; 19] = [
+    pub const PROPERTIES: [&'static str; 20] = [
         "rigid-coupling",
         "plane",
         "deformed-inertia",
@@ -352,6 +355,7 @@ impl Loss {
         "origins-of-modes",
         "units",
         "storage",
+        "named-loads",
     ];
 }
 

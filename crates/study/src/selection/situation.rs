@@ -72,7 +72,7 @@ impl Situation {
             None => (softest, "first mode of the free body"),
         };
         // Largest spin, angular acceleration and modal amplitudes.
-        let (spin, acceleration) = turning(body, scene, &inertia, duration.value, points);
+        let (spin, acceleration) = turning(scene, &inertia, duration.value, points);
         let mode_amplitudes = amplitudes(body, scene);
         let limits = &demands.limits;
         let named = [
@@ -118,14 +118,13 @@ type Sourced = (f64, String);
 
 /// Returns the largest angular velocity and acceleration of the frame.
 fn turning(
-    body: &FlexBody,
     scene: &Scene,
     inertia: &Matrix3<f64>,
     duration: f64,
     points: &[BodyPoint],
 ) -> (Input, Input) {
     let motion = &scene.requirements.motion;
-    let [spin, acceleration] = turning_of_run(body, scene, inertia, duration, points);
+    let [spin, acceleration] = turning_of_run(scene, inertia, duration, points);
     // A range stated for a free body replaces the worst case of its loads; a prescribed spin is only increased by the
     // range.
     let larger = |range: &Option<Range>, (value, source): Sourced, key: &str| match range {
@@ -150,7 +149,6 @@ fn turning(
 
 /// Returns the largest angular velocity and acceleration in the run of the scene.
 fn turning_of_run(
-    body: &FlexBody,
     scene: &Scene,
     inertia: &Matrix3<f64>,
     duration: f64,
@@ -169,7 +167,7 @@ fn turning_of_run(
         (None, None) => {
             // Angular momentum of a free body: the initial one plus the impulse of the torques.
             let start = inertia * scene.initial.angular_velocity;
-            let torque = largest_torque(body, scene, duration, points);
+            let torque = largest_torque(scene, duration, points);
             let principal = inertia.symmetric_eigenvalues();
             let (least, most) = (principal.min(), principal.max());
             let spin = (start.norm() + torque * duration) / least;
@@ -186,7 +184,7 @@ fn turning_of_run(
 }
 
 /// Returns the largest torque of the loads on the undeformed body.
-fn largest_torque(body: &FlexBody, scene: &Scene, duration: f64, points: &[BodyPoint]) -> f64 {
+fn largest_torque(scene: &Scene, duration: f64, points: &[BodyPoint]) -> f64 {
     let torque = |(load, point): (&Load, &BodyPoint)| {
         let largest = |history: &VectorHistory| Variation::of_vector(history, duration).largest;
         largest(&load.force) * point.lever() + largest(&load.torque)
