@@ -43,7 +43,14 @@ impl LoadedHistory {
             return refused("a time or a modal coordinate is not a finite number".to_owned());
         }
         let path = PathBuf::from("history");
-        Ok(Self(scene::LoadedHistory { path, time, q, angular_velocity: None, loads: Vec::new(), named: Vec::new() }))
+        Ok(Self(scene::LoadedHistory {
+            path,
+            time,
+            q,
+            angular_velocity: None,
+            loads: Vec::new(),
+            named: Vec::new(),
+        }))
     }
 
     /// Sets the angular velocity of the body frame at each time.
@@ -91,7 +98,10 @@ impl LoadedHistory {
         }
         let count = self.0.time.len();
         if values.len() != count {
-            return refused(format!("{} amplitudes of the named load `{load}` for {count} times", values.len()));
+            return refused(format!(
+                "{} amplitudes of the named load `{load}` for {count} times",
+                values.len()
+            ));
         }
         if !values.iter().all(|value| value.is_finite()) {
             return refused(format!("an amplitude of the named load `{load}` is not finite"));
@@ -193,6 +203,11 @@ impl FlexBody {
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
         let motion = history.0.recover(&self.0, &names)?;
         Ok(Recovered { motion, source: RowSource::History(history.clone()) })
+    }
+
+    /// Returns the names of the named loads of the body, preloads included.
+    pub fn named_loads(&self) -> Vec<&str> {
+        self.0.named_loads().iter().map(|load| load.name.as_str()).collect()
     }
 
     /// Returns the names of the recoveries of the body.

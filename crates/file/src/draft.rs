@@ -229,7 +229,8 @@ impl Draft {
                 ));
                 continue;
             }
-            recovery.named = Mat::from_fn(recovery.rows.len(), places.len(), |i, c| recovery.named[(i, places[c])]);
+            recovery.named =
+                Mat::from_fn(recovery.rows.len(), places.len(), |i, c| recovery.named[(i, places[c])]);
         }
     }
 

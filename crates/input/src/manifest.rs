@@ -18,7 +18,8 @@ use std::ops::{Deref, DerefMut, Range};
 use std::path::Path;
 use toml::de::DeValue;
 
-const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "recovery", "named_load", "basis"];
+const TOP: &[&str] =
+    &["model", "files", "interface", "damping", "geometric_stiffness", "recovery", "named_load", "basis"];
 const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible"];
 const UNITS: &[&str] = &["length", "mass", "time"];
 const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program", "matrices", "mesh"];

@@ -5,8 +5,8 @@ use super::jobs::{JobModel, comparable, read_job};
 use super::mapping::Mapping;
 use super::mesh::MeshReading;
 use super::model_files::{
-    InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource, OperatorSource,
-    RecoverySource,
+    InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
+    OperatorSource, RecoverySource,
 };
 use super::node_files::{NodeFile, NodeSets, Unresolved, read_node_file};
 use super::reader::{MatrixRole, MatrixSource, reader_for};
@@ -22,8 +22,8 @@ use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::quotes::without_foreign_quotes;
 use flexbody_linalg::parallel;
 use flexbody_model::{
-    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes, RawMatrix,
-    RawModel, RecoveryOperator, Reference, filled_rows,
+    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes,
+    RawMatrix, RawModel, RecoveryOperator, Reference, filled_rows,
 };
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -514,11 +514,7 @@ fn read_opened(
 }
 
 /// Returns the named loads of the model, by the rows of their files; adds errors.
-fn read_loads(
-    opened: &OpenFiles,
-    files: &ModelFiles,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Vec<ModelLoad> {
+fn read_loads(opened: &OpenFiles, files: &ModelFiles, diagnostics: &mut Vec<Diagnostic>) -> Vec<ModelLoad> {
     let read = |load: &NamedLoadSource| {
         let forces = read_forces(opened.get(&load.vector.path)?, load.vector.group.as_deref())?;
         let path = load.vector.path.clone();

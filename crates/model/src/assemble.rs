@@ -10,7 +10,8 @@ use super::references::resolve_references;
 use super::rows::{extents, rigid_count};
 use super::wording::name_some;
 use super::{
-    Damping, DofLabel, GeometricStiffness, ModelLoad, ModelRecovery, Nodes, RawMatrix, RawModel, Rows, SurfaceMesh,
+    Damping, DofLabel, GeometricStiffness, ModelLoad, ModelRecovery, Nodes, RawMatrix, RawModel, Rows,
+    SurfaceMesh,
 };
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};

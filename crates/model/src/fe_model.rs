@@ -4,8 +4,8 @@
 use super::assemble::Assembled;
 use super::mass_structure::MassForm;
 use super::{
-    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet,
-    Nodes, Rows, SurfaceMesh,
+    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery,
+    NodeSet, Nodes, Rows, SurfaceMesh,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;

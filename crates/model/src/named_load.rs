@@ -107,7 +107,10 @@ fn in_internal_rows(name: &str, forces: &[f64], of_files: &RowsOfFiles<'_>) -> R
         )));
     }
     if let Some(at) = forces.iter().position(|value| !value.is_finite()) {
-        return Err((Code::MatrixNotFinite, format!("`{name}`: value {} of its vector is not finite", at + 1)));
+        return Err((
+            Code::MatrixNotFinite,
+            format!("`{name}`: value {} of its vector is not finite", at + 1),
+        ));
     }
     let nonzero = forces.iter().enumerate().filter(|(_, value)| **value != 0.0);
     let entries: Vec<(u32, u32, f64)> = nonzero.map(|(row, value)| (row as u32, 0, *value)).collect();
@@ -150,7 +153,8 @@ pub(super) fn refuse_stiff_preloads(
         load.preload && stiffness.iter().any(|one| named(&one.load.kind))
     };
     let refused = |load: &ModelLoad| {
-        let message = format!("preload `{}` has geometric stiffness, which no mode of the body would have", load.name);
+        let message =
+            format!("preload `{}` has geometric stiffness, which no mode of the body would have", load.name);
         let help = "give K with the stress of the preload as stiffness (docs/how_to/geometric_stiffness.md) and leave its [[geometric_stiffness]] out";
         Diagnostic::new(Code::NamedLoadMisfit, message).in_file(&load.path).with_help(help)
     };

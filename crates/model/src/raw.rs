@@ -1,6 +1,8 @@
 //! A model as delivered by the readers: parsed, but not yet checked as a mechanical body.
 
-use super::{Damping, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes, SurfaceMesh};
+use super::{
+    Damping, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes, SurfaceMesh,
+};
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::{SourceFile, Sources};

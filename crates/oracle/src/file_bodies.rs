@@ -7,7 +7,8 @@ use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
     InterfaceCoordinates, InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, NamedLoad,
-    Parts,    Quantity, Recovery, RecoveryRow, ReferenceConditions, Source, Storage, SurfaceMesh, Truncation, UnitLoad,
+    Parts, Quantity, Recovery, RecoveryRow, ReferenceConditions, Source, Storage, SurfaceMesh, Truncation,
+    UnitLoad,
 };
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, TermGroups,

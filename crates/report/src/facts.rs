@@ -1,12 +1,12 @@
 //! Facts of a body and of the run that made it, computed once and rendered in every format.
 
-use super::named_loads::NamedLoadFacts;
 use super::completeness::{Completeness, GuaranteeFacts, TermFacts};
 use super::craig_bampton::CraigBamptonFacts;
 use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz};
 use super::held::HeldFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
+use super::named_loads::NamedLoadFacts;
 use super::numbers::{coordinates, counted, percent, significant};
 use super::run_data::{Phase, RunData, SearchAttempt};
 use flexbody_base::diagnostic::Diagnostic;

@@ -35,9 +35,9 @@ impl NamedLoadFacts {
     /// Returns `bolts: preload, 12 % of its static response outside the modes`.
     pub(crate) fn in_words(&self) -> String {
         let kind = if self.preload { "preload" } else { "load" };
-        let missing = self.missing_compliance.map_or(String::new(), |part| {
-            format!(", {} of its compliance outside the modes", percent(part))
-        });
+        let missing = self
+            .missing_compliance
+            .map_or(String::new(), |part| format!(", {} of its compliance outside the modes", percent(part)));
         format!("{}: {kind}{missing}", self.name)
     }
 }

@@ -11,8 +11,8 @@ use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;
-use flexbody_study::response::{Direction, 
-    At, Complex, Effectivity, Function, Output, Pair, Response, ResponseSettings, Spacing,
+use flexbody_study::response::{
+    At, Complex, Direction, Effectivity, Function, Output, Pair, Response, ResponseSettings, Spacing,
 };
 use serde::Serialize;
 

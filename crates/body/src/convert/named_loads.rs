@@ -21,7 +21,10 @@ impl ModalModel<'_> {
         let fields = model.rigid_fields(self.place.frame.origin.into(), 1.0);
         let resultants = gram(fields.as_ref(), forces.as_ref());
         let mut along_model = [0.0; 6];
-        rigid_axes(model.dimension()).iter().enumerate().for_each(|(c, &k)| along_model[k] = resultants[(c, 0)]);
+        rigid_axes(model.dimension())
+            .iter()
+            .enumerate()
+            .for_each(|(c, &k)| along_model[k] = resultants[(c, 0)]);
         let [force, torque] =
             [0, 3].map(|first| axes.tr_mul(&Vector3::from_fn(|k, _| along_model[first + k])));
         // First moments and their change with the modes.

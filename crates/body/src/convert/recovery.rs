@@ -50,11 +50,7 @@ impl ModalModel<'_> {
     /// # Errors
     /// [`RecoveryCut`](Code::RecoveryCut) for a cut through a rigid interface; failures of the factor, and responses
     /// that are not accurate.
-    pub(super) fn recoveries(
-        &self,
-        responds_to_spin: bool,
-        context: &Context<'_>,
-    ) -> Result<Recovered> {
+    pub(super) fn recoveries(&self, responds_to_spin: bool, context: &Context<'_>) -> Result<Recovered> {
         let (asked, mut named_loads) = (self.model.recoveries(), self.named_loads());
         if asked.is_empty() && named_loads.is_empty() {
             return Ok(Recovered::default());
@@ -340,7 +336,8 @@ impl StaticLoads {
             };
             self.components.iter().map(one).collect::<Vec<_>>()
         };
-        let named = self.named.iter().map(|name| UnitLoad { kind: LoadKind::Named(name.clone()), component: 0 });
+        let named =
+            self.named.iter().map(|name| UnitLoad { kind: LoadKind::Named(name.clone()), component: 0 });
         spin.chain(self.interfaces.iter().flat_map(at)).chain(named).collect()
     }
 

@@ -2,8 +2,8 @@
 
 use super::validate::problems;
 use super::{
-    Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, NamedLoad, Parts, Recovery, ReferenceConditions,
-    Source, Storage, TermDecision, TermGroups,
+    Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, NamedLoad, Parts, Recovery,
+    ReferenceConditions, Source, Storage, TermDecision, TermGroups,
 };
 use crate::basis::BasisKind;
 use crate::invariants::{

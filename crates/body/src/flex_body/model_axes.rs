@@ -1,7 +1,8 @@
 //! Transformation of a body to a frame along the axes of its model, and its modes in the rows of the model.
 
 use super::{
-    FlexBody, GeometricStiffness, Interface, InternalRows, LumpedBody, NamedLoad, ReferenceConditions, UnitLoad,
+    FlexBody, GeometricStiffness, Interface, InternalRows, LumpedBody, NamedLoad, ReferenceConditions,
+    UnitLoad,
 };
 use crate::basis::CoupledModel;
 use crate::invariants::InertiaStiffness;

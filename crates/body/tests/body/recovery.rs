@@ -448,7 +448,12 @@ fn stresses_under_a_slow_sine_load_follow_those_of_all_nodes() {
             }
             let q: Vec<f64> = (0..count).map(|j| response(lambda[j], modal[j], t)).collect();
             let now = |loads: [[f64; 6]; 2]| {
-                recovery.values(&RecoveryState { q: &q, angular_velocity: Vector3::zeros(), loads: &loads, named: &[] })
+                recovery.values(&RecoveryState {
+                    q: &q,
+                    angular_velocity: Vector3::zeros(),
+                    loads: &loads,
+                    named: &[],
+                })
             };
             let loaded = at_interfaces.map(|load| load.map(|f| f * (w * t).sin()));
             let difference = |found: Vec<f64>| {

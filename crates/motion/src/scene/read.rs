@@ -6,8 +6,8 @@ use super::read_values::{
     EVERY, axes, direction, history, list, loaded_place, mode_number, place, transposed, turning, vector,
 };
 use super::{
-    Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, ModeStart, Point, Run, Scene, Scheme,
-    Spin, VectorHistory,
+    Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, ModeStart, Point, Run, Scene,
+    Scheme, Spin, VectorHistory,
 };
 use crate::dynamics::Terms;
 use flexbody_base::diagnostic::Code;

@@ -313,7 +313,8 @@ fn varied(
         _ => false,
     };
     if all.iter().any(misplaced) {
-        let message = "a named load has neither a point nor a direction that a variation can change: give `scale`";
+        let message =
+            "a named load has neither a point nor a direction that a variation can change: give `scale`";
         walk.wrong(span.clone(), message.to_owned());
         return None;
     }

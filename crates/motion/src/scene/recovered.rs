@@ -147,7 +147,11 @@ impl LoadedHistory {
         let interfaces = body.interfaces().iter().filter(|interface| interface.reference.is_some());
         let acting = body.named_loads().iter().filter(|load| !load.preload).map(|load| load.name.as_str());
         let absent = acting.filter(|name| self.named.iter().all(|one| one.load != *name));
-        interfaces.map(|interface| interface.name.as_str()).filter(|name| !known(name)).chain(absent).collect()
+        interfaces
+            .map(|interface| interface.name.as_str())
+            .filter(|name| !known(name))
+            .chain(absent)
+            .collect()
     }
 
     /// Returns recoveries of `body` over this motion: all of them, or those with the given names. Their largest values

@@ -62,7 +62,9 @@ fn stresses(body: &FlexBody, omega: Vector3<f64>, instants: &[f64]) -> [Vec<Vec<
         let now = other.evaluate(time, state)?;
         let q = now.evaluation().modal_coordinates();
         let omega = now.evaluation().rigid_velocity().1;
-        let at = |angular_velocity| recovery.values(&RecoveryState { q, angular_velocity, loads: &[], named: &[] });
+        let at = |angular_velocity| {
+            recovery.values(&RecoveryState { q, angular_velocity, loads: &[], named: &[] })
+        };
         with.push(at(omega));
         alone.push(at(Vector3::zeros()));
         Ok::<(), Failure>(())

@@ -312,7 +312,11 @@ impl BodyComparison {
 impl Pair<'_> {
     /// Returns true if both bodies have the same named loads in the same order.
     fn named_loads_alike(&self) -> bool {
-        self.a.named_loads().iter().map(|load| &load.name).eq(self.b.named_loads().iter().map(|load| &load.name))
+        self.a.named_loads().iter().map(|load| &load.name).eq(self
+            .b
+            .named_loads()
+            .iter()
+            .map(|load| &load.name))
     }
 }
 

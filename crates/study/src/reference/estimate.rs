@@ -13,7 +13,7 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::not_negative;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{
-    FramedScene, Load, Instant, OutputErrors, Point, Scene, Trace, damped_once, fastest_history,
+    FramedScene, Instant, Load, OutputErrors, Point, Scene, Trace, damped_once, fastest_history,
     highest_excited_rate, instants, nodal_point, trace,
 };
 use std::f64::consts::TAU;

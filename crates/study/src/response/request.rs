@@ -154,7 +154,10 @@ impl ResponseRequest {
 fn refuse_read_loads<'p>(places: impl Iterator<Item = &'p Place>, body: &FlexBody) -> Result<()> {
     for place in places {
         if matches!(place.resolved(body)?.point, Point::NamedLoad(_)) {
-            let message = format!("`{}` is a named load: it excites the body and has no displacement", place.stated_name());
+            let message = format!(
+                "`{}` is a named load: it excites the body and has no displacement",
+                place.stated_name()
+            );
             let help = "give it to --from; give a node or an interface to --to and --base";
             return Err(Diagnostic::new(Code::PlaceUnknown, message).with_help(help).into());
         }

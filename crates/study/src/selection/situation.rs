@@ -117,12 +117,7 @@ impl Situation {
 type Sourced = (f64, String);
 
 /// Returns the largest angular velocity and acceleration of the frame.
-fn turning(
-    scene: &Scene,
-    inertia: &Matrix3<f64>,
-    duration: f64,
-    points: &[BodyPoint],
-) -> (Input, Input) {
+fn turning(scene: &Scene, inertia: &Matrix3<f64>, duration: f64, points: &[BodyPoint]) -> (Input, Input) {
     let motion = &scene.requirements.motion;
     let [spin, acceleration] = turning_of_run(scene, inertia, duration, points);
     // A range stated for a free body replaces the worst case of its loads; a prescribed spin is only increased by the
