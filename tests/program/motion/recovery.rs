@@ -451,6 +451,7 @@ fn named_loads_of_the_manifest_act_and_are_recovered() {
     };
     assert_eq!((minor("plain.h5"), minor("body.h5")), (8.into(), 9.into()));
     let text = runs(place, "inspect body.h5");
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(text.contains("push: load, ") && text.contains("bolts: preload, "), "{text}");
     let scene = "[run]\nduration = 0.002\noutputs = 20\n[initial]\nangular_velocity = [10, 20, 30]\n\
                  deformation = \"static\"\n[[load]]\nnamed_load = \"push\"\n\

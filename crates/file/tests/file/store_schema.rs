@@ -38,7 +38,7 @@ fn every_required_entry_is_missed_when_it_is_not_there() {
         let (parent, key) = pointer.rsplit_once('/').unwrap();
         let key = key.replace("~1", "/").replace("~0", "~");
         broken.pointer_mut(parent).unwrap().as_object_mut().unwrap().remove(&key);
-        let optional = ["comparison", "lumped", "interfaces", "geometric_stiffness", "inertia_stiffness", "recovery"]
+        let optional = ["comparison", "lumped", "interfaces", "geometric_stiffness", "inertia_stiffness", "recovery", "named_loads"]
             .iter()
             .any(|g| parent == format!("/groups/{g}/groups"))
             || ["geometric_stiffness", "inertia_stiffness", "interface", "recovery"].contains(&key.as_str())

@@ -96,7 +96,7 @@ pub struct BodyPoint {
     translation: PointMotion,
     rotation: Option<PointMotion>,
     /// Resultants of a named load, whose amplitude is the component x of its force.
-    named: Option<Resultants>,
+    named: Option<Box<Resultants>>,
 }
 
 /// Force, and torque T + L q about the origin of the frame, of a load with the amplitude 1.
@@ -170,11 +170,11 @@ impl BodyPoint {
             position: Vector3::zeros(),
             translation: PointMotion::new(nf, |k, j| if k == 0 { load.modal[j] } else { 0.0 }),
             rotation: None,
-            named: Some(Resultants {
+            named: Some(Box::new(Resultants {
                 force: load.resultant_force(),
                 torque,
                 turning: PointMotion::new(nf, turning),
-            }),
+            })),
         }
     }
 

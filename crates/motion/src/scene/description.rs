@@ -538,8 +538,8 @@ impl Scene {
     /// Returns the scene with its loads turned or, without loads, with its prescribed translation turned. Returns `None`
     /// if it has neither.
     fn turned_excitation(&self, rotation: &Matrix3<f64>) -> Option<(&'static str, Scene)> {
-        let turns = |load: &Load| !load.is_named() && !(load.force.is_nothing() && load.torque.is_nothing());
-        if self.loads.iter().any(turns) {
+        let stays = |load: &Load| load.is_named() || load.force.is_nothing() && load.torque.is_nothing();
+        if !self.loads.iter().all(stays) {
             return Some(("loads", self.with_turned_loads(None, rotation)));
         }
         let mut scene = self.clone();

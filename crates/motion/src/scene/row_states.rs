@@ -229,9 +229,9 @@ pub(super) struct RowSampler {
 /// Static columns of a load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Columns {
-    /// Those of an interface, by its place in the layout.
+    /// The columns of an interface, by its place in the layout.
     Interface(usize),
-    /// That of a named load, by its place in the layout.
+    /// The column of a named load, by its place in the layout.
     Named(usize),
 }
 
