@@ -7,7 +7,9 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_input::{WrittenSteps, read_steps};
 use flexbody_model::RecoveryRow;
-use flexbody_motion::scene::{self, Envelope, LoadHistory, RecoveredMotion, RowMap, StressPoint};
+use flexbody_motion::scene::{
+    self, AmplitudeHistory, Envelope, LoadHistory, RecoveredMotion, RowMap, StressPoint,
+};
 use flexbody_report::{EnvelopeKind, RecoveredFacts, RunData, channels_csv, recovered_csv};
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -44,7 +46,14 @@ impl LoadedHistory {
             return refused("a time or a modal coordinate is not a finite number".to_owned());
         }
         let path = PathBuf::from("history");
-        Ok(Self(scene::LoadedHistory { path, time, q, angular_velocity: None, loads: Vec::new() }))
+        Ok(Self(scene::LoadedHistory {
+            path,
+            time,
+            q,
+            angular_velocity: None,
+            loads: Vec::new(),
+            named: Vec::new(),
+        }))
     }
 
     /// Sets the angular velocity of the body frame at each time.
@@ -79,6 +88,31 @@ impl LoadedHistory {
         Ok(self)
     }
 
+    /// Adds the amplitude of a named load at each time. Named loads without amplitudes count as zero; preloads act always
+    /// and take none.
+    ///
+    /// # Errors
+    /// FB804 if the number of values is not that of the times, for numbers that are not finite, and for a load that has
+    /// amplitudes already.
+    pub fn amplitude(mut self, load: impl Into<String>, values: &[f64]) -> Result<Self> {
+        let load = load.into();
+        if self.0.named.iter().any(|known| known.load == load) {
+            return refused(format!("named load `{load}` has amplitudes already"));
+        }
+        let count = self.0.time.len();
+        if values.len() != count {
+            return refused(format!(
+                "{} amplitudes of the named load `{load}` for {count} times",
+                values.len()
+            ));
+        }
+        if !values.iter().all(|value| value.is_finite()) {
+            return refused(format!("an amplitude of the named load `{load}` is not finite"));
+        }
+        self.0.named.push(AmplitudeHistory { load, values: values.to_vec() });
+        Ok(self)
+    }
+
     /// Returns rows of three as vectors, one for each time.
     fn vectors(&self, what: &str, rows: &[[f64; 3]]) -> Result<Vec<Vector3<f64>>> {
         let count = self.0.time.len();
@@ -96,6 +130,17 @@ impl LoadedHistory {
         let n_modes = body.n_modes();
         if let Some(row) = self.0.q.iter().find(|row| row.len() != n_modes) {
             return refused(format!("{} modal coordinates, but the body has {n_modes} modes", row.len()));
+        }
+        for own in &self.0.named {
+            let known = body.0.named_loads().iter().find(|load| load.name == own.load);
+            let problem = match known {
+                None => format!("the body has no named load `{}`", own.load),
+                Some(load) if load.preload => {
+                    format!("`{}` is a preload, which acts always with amplitude 1", own.load)
+                }
+                Some(_) => continue,
+            };
+            return Err(Diagnostic::new(Code::SceneBody, problem).into());
         }
         for load in &self.0.loads {
             let mut known = body.0.interfaces().iter().filter(|interface| interface.reference.is_some());
@@ -178,6 +223,11 @@ impl FlexBody {
         let steps = scene::ShapeSteps { columns, factors, nodes, displacements, modes_follow_spin };
         let channels = history.0.channels(&self.0, &steps)?;
         Ok(Channels { channels, history: history.0.path.display().to_string() })
+    }
+
+    /// Returns the names of the named loads of the body, preloads included.
+    pub fn named_loads(&self) -> Vec<&str> {
+        self.0.named_loads().iter().map(|load| load.name.as_str()).collect()
     }
 
     /// Returns the names of the recoveries of the body.

@@ -33,6 +33,7 @@ fn point(point: &Point) -> String {
     match point {
         Point::Node(id) => format!("node = {id}"),
         Point::Interface(name) => format!("interface = \"{name}\""),
+        Point::NamedLoad(name) => format!("named_load = \"{name}\""),
     }
 }
 
@@ -214,6 +215,10 @@ impl Text {
 
     /// Writes force and torque as separate loads.
     fn load(&mut self, load: &Load) {
+        if let (true, VectorHistory::Along { factor, .. }) = (load.is_named(), &load.force) {
+            self.line(&format!("[[load]]\n{}\nhistory = {}", point(&load.at), history(factor, 1.0)));
+            return;
+        }
         for (name, vector_history) in [("force", &load.force), ("torque", &load.torque)] {
             if vector_history.is_nothing() {
                 continue;

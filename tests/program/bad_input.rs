@@ -161,6 +161,8 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB556", "crates/motion/tests/motion/recovery.rs"),
     ("FB560", "crates/motion/tests/motion/definiteness.rs"),
     ("FB561", "crates/study/tests/study/recovery_limits.rs"),
+    ("FB562", "crates/study/tests/study/named_loads.rs"),
+    ("FB563", "crates/study/tests/study/named_loads.rs"),
     ("FB602", "tests/program/limits.rs"),
     ("FB605", "tests/program/front_door.rs"),
     ("FB606", "python/tests/test_running.py"),

@@ -144,6 +144,8 @@ codes! {
     RecoveryCut = "FB324", Error, BadInput, "cut of a recovery does not divide the body", "give the nodes of one side, with all nodes of a rigid interface or none";
     RecoveryShapes = "FB326", Error, BadInput, "answers of an FE program do not belong to the shapes of their recovery", "run the FE program on all shapes that flexbody shapes wrote, and keep the .npz that was written with them beside the results";
     FeResultsSyntax = "FB327", Error, BadInput, "results of an FE program cannot be read", "write them as docs/how_to/stresses_from_calculix.md says";
+    NamedLoadMisfit = "FB328", Error, BadInput, "named load does not fit the model", "give one force for each matrix row, in the order of the matrices";
+    PreloadUnbalanced = "FB329", Error, BadInput, "preload is not in equilibrium by itself", "give all forces of the preload, those on both sides of each bolt, so that their resultant is zero; a load with a resultant is no preload (`preload = false`) and has a history in a scene";
     // FB4xx: model
     NodesMissing = "FB401", Error, BadInput, "degrees of freedom refer to nodes without coordinates", "add the nodes to the node table";
     DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "give one row of dofs.csv for each matrix row; without dofs.csv there are three rows for each node";
@@ -237,6 +239,8 @@ codes! {
     SelectionUnjudged = "FB557", Error, CheckFailed, "body does not meet the tolerances of the scene, or this cannot be judged", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body nevertheless";
     RecoveryUnjudged = "FB561", Note, Done, "truncation error of a recovery is not known", "give the recovery by an operator (`operator` in [[recovery]]); or make a body of more shapes and compare";
     VariationFails = "FB559", Warning, Done, "recommended body does not hold in a variation of the scene", "make the variation a [[case]] of the scene, so that the body is made for it as well; or leave out a [[variation]] that cannot occur";
+    PreloadReleased = "FB562", Warning, Done, "body starts undeformed under a preload and vibrates", "start in the equilibrium of the preload: deformation = \"static\" in [initial]";
+    NamedStiffnessUnused = "FB563", Warning, Done, "geometric stiffness of a named load is not used in a simulation", "give K with the mean stress of the load as stiffness (docs/how_to/geometric_stiffness.md), or leave out the [[geometric_stiffness]] of the load";
     InertiaIndefinite = "FB560", Warning, Done, "W3 is kept without W2, and deflections make the inertia indefinite", "keep W2 as well (--terms W2,W3 or all), unless joints prescribe the rotation or the deflections stay far below the value in the message";
     CouplingEffect = "FB558", Note, Done, "effect of rigid interfaces that the body and its reference model share", "nothing to do where a stiff part is mounted at the interface; otherwise set coupling = \"averaging\", which lets the interface deform";
     // FB6xx: resources; FB603 stays unused (checkpoints of earlier versions)

@@ -179,6 +179,7 @@ fn symbol(extent: Extent) -> String {
         Extent::Edges => "ne".to_owned(),
         Extent::RecoveryRows => "r".to_owned(),
         Extent::LoadedInterfaces => "ni".to_owned(),
+        Extent::NamedLoads => "nl".to_owned(),
     }
 }
 

@@ -8,7 +8,7 @@ use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     Certificate, FixedInterface, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
-    InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, Parts, Recovery,
+    InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, NamedLoad, Parts, Recovery,
     ReferenceConditions, Source, Storage, SurfaceMesh, TermDecision, TermGroup, TermGroups, UnitLoad,
 };
 use flexbody_body::invariants::{
@@ -28,6 +28,8 @@ pub(super) struct Draft {
     pub edges: Option<Vec<u32>>,
     /// Indices of the nodes by node number.
     pub index: HashMap<i64, usize>,
+    /// Names of the columns of named loads, for each recovery.
+    named_columns: Vec<Vec<String>>,
     invariants: InvariantEntries,
     of_lumped: Vec<InvariantEntries>,
     /// Group whose entries are put, and the index of its instance.
@@ -44,6 +46,7 @@ impl Draft {
             triangles: None,
             edges: None,
             index: HashMap::new(),
+            named_columns: Vec::new(),
             invariants: InvariantEntries::new(),
             of_lumped: Vec::new(),
             per: Per::Body,
@@ -77,13 +80,27 @@ impl Draft {
                 let (nodes, coupling, reference) = (Vec::new(), None, None);
                 self.body.interfaces.push(Interface { name: name.to_owned(), nodes, coupling, reference });
             }
-            Per::Recovery => self.body.recoveries.push(Recovery {
+            Per::Recovery => {
+                self.named_columns.push(Vec::new());
+                self.body.recoveries.push(Recovery {
+                    name: name.to_owned(),
+                    rows: Vec::new(),
+                    offset: Vec::new(),
+                    modes: Mat::new(),
+                    spin: Mat::new(),
+                    loads: Vec::new(),
+                    named: Mat::new(),
+                });
+            }
+            Per::NamedLoad => self.body.named_loads.push(NamedLoad {
                 name: name.to_owned(),
-                rows: Vec::new(),
-                offset: Vec::new(),
-                modes: Mat::new(),
-                spin: Mat::new(),
-                loads: Vec::new(),
+                preload: false,
+                modal: Vec::new(),
+                force: Vector3::zeros(),
+                torque: Vector3::zeros(),
+                moments: Matrix3::zeros(),
+                turning: Mat::new(),
+                compliance: None,
             }),
             Per::UnitLoad => self.body.geometric_stiffness.push(load()),
             Per::InertiaLoad => self.inertia().stiffness.push(load()),
@@ -185,6 +202,38 @@ impl Draft {
         Ok(())
     }
 
+    /// Sets the named loads that the current recovery has columns of.
+    pub(super) fn recovery_named(&mut self, names: Vec<String>) -> Result<(), String> {
+        self.named_columns[self.at] = names;
+        Ok(())
+    }
+
+    /// Returns the named load of the current instance.
+    pub(super) fn named_load(&mut self) -> &mut NamedLoad {
+        &mut self.body.named_loads[self.at]
+    }
+
+    /// Puts the columns of named loads of every recovery into the order of the named loads.
+    fn order_named_columns(&mut self, problems: &mut Vec<String>) {
+        let loads = &self.body.named_loads;
+        for (recovery, names) in self.body.recoveries.iter_mut().zip(&self.named_columns) {
+            let place = |load: &NamedLoad| names.iter().position(|name| *name == load.name);
+            let places: Vec<usize> = loads.iter().filter_map(place).collect();
+            let is_whole = places.len() == loads.len() && names.len() == loads.len();
+            if !is_whole || (recovery.named.ncols() != names.len()) {
+                let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                problems.push(format!(
+                    "/recovery/{}: expected a column for each of the {} named loads, found {found}",
+                    recovery.name,
+                    loads.len()
+                ));
+                continue;
+            }
+            recovery.named =
+                Mat::from_fn(recovery.rows.len(), places.len(), |i, c| recovery.named[(i, places[c])]);
+        }
+    }
+
     /// Returns the lumped body of the current instance.
     pub(super) fn lumped(&mut self) -> &mut LumpedBody {
         &mut self.body.lumped[self.at]
@@ -209,6 +258,7 @@ impl Draft {
 
     /// Completes the body after all entries are put. Adds contradictions to `problems`.
     pub(super) fn finish(mut self, problems: &mut Vec<String>) -> Parts {
+        self.order_named_columns(problems);
         let (nf, plane, groups) = (self.nf(), self.body.dimension == 2, self.body.invariants.groups());
         self.body.invariants = self.invariants.finish(nf, plane, groups);
         for (lumped, entries) in self.body.lumped.iter_mut().zip(self.of_lumped) {
@@ -360,6 +410,7 @@ fn empty_body(units: UnitSystem, storage: Storage, invariants: Invariants) -> Pa
         interfaces: Vec::new(),
         coordinates: None,
         recoveries: Vec::new(),
+        named_loads: Vec::new(),
         terms: Vec::new(),
         storage,
     }

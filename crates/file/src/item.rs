@@ -4,7 +4,7 @@ use super::draft::Draft;
 use super::value::{ReadValue, Units, Value, View, text};
 #[cfg(feature = "hdf5")]
 use flexbody_body::flex_body::Storage;
-use flexbody_body::flex_body::{Interface, LumpedBody, Parts, Recovery, TermGroup};
+use flexbody_body::flex_body::{Interface, LumpedBody, NamedLoad, Parts, Recovery, TermGroup};
 
 /// One extent of a dataset's shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,10 +30,12 @@ pub(super) enum Extent {
     RecoveryRows,
     /// Number ni of interfaces with loads in the group's recovery.
     LoadedInterfaces,
+    /// Number nl of named loads in the group's recovery.
+    NamedLoads,
 }
 use Extent::{
-    Coordinates, Edges, Fixed, InterfaceNodes, InternalRows, LoadedInterfaces, Modes, Nodes, RecoveryRows,
-    ThreeModes, Triangles,
+    Coordinates, Edges, Fixed, InterfaceNodes, InternalRows, LoadedInterfaces, Modes, NamedLoads, Nodes,
+    RecoveryRows, ThreeModes, Triangles,
 };
 
 /// Storage of an entry in the file.
@@ -164,6 +166,7 @@ pub(super) enum Per {
     UnitLoad,
     InertiaLoad,
     Recovery,
+    NamedLoad,
 }
 
 /// A row of the table: a dataset or attribute.
@@ -286,6 +289,7 @@ impl Item {
             Edges => view.body.mesh.as_ref().map_or(0, |mesh| mesh.edges().len()),
             RecoveryRows => view.recovery.map_or(0, |one| one.rows.len()),
             LoadedInterfaces => view.recovery.map_or(0, |one| one.loads.len()),
+            NamedLoads => view.recovery.map_or(0, |one| one.named.ncols()),
             InternalRows => view.body.modes.internal.as_ref().map_or(0, |internal| internal.dofs.len()),
         };
         self.shape().unwrap_or(&[]).iter().map(size).collect()
@@ -310,7 +314,14 @@ impl SchemaGroup {
 
     /// Returns the instances of this group in a body, with their names if these are data.
     pub(crate) fn instances<'a>(&self, body: &'a Parts) -> Vec<(Option<String>, View<'a>)> {
-        let view = View { body, lumped: None, interface: None, geometric_stiffness: None, recovery: None };
+        let view = View {
+            body,
+            lumped: None,
+            interface: None,
+            geometric_stiffness: None,
+            recovery: None,
+            named_load: None,
+        };
         match self.per {
             Per::Body => vec![(None, view)],
             Per::LumpingScheme => {
@@ -328,6 +339,10 @@ impl SchemaGroup {
             Per::Recovery => {
                 let one = |r: &'a Recovery| (Some(r.name.clone()), View { recovery: Some(r), ..view });
                 body.recoveries.iter().map(one).collect()
+            }
+            Per::NamedLoad => {
+                let one = |l: &'a NamedLoad| (Some(l.name.clone()), View { named_load: Some(l), ..view });
+                body.named_loads.iter().map(one).collect()
             }
             Per::InertiaLoad => {
                 let view = |g| View { geometric_stiffness: Some(g), ..view };

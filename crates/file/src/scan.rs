@@ -144,7 +144,8 @@ impl Scan {
             Err(found) => return self.add(format!("{path}: expected a group, found {found}")),
         };
         let mut sizes = self.sizes;
-        (sizes.interface_nodes, sizes.recovery_rows, sizes.loaded_interfaces) = (None, None, None);
+        (sizes.interface_nodes, sizes.recovery_rows) = (None, None);
+        (sizes.loaded_interfaces, sizes.named_loads) = (None, None);
         for item in group.entries() {
             let name = key(&path, item);
             self.texts(&opened, &name, item);
@@ -395,6 +396,7 @@ pub(super) struct Sizes {
     triangles: Option<usize>,
     edges: Option<usize>,
     pub recovery_rows: Option<usize>,
+    pub named_loads: Option<usize>,
     pub loaded_interfaces: Option<usize>,
 }
 
@@ -437,6 +439,7 @@ impl Sizes {
             Extent::Edges => size == *self.edges.get_or_insert(size),
             Extent::RecoveryRows => size == *self.recovery_rows.get_or_insert(size),
             Extent::LoadedInterfaces => size == *self.loaded_interfaces.get_or_insert(size),
+            Extent::NamedLoads => size == *self.named_loads.get_or_insert(size),
         }
     }
 
@@ -454,6 +457,7 @@ impl Sizes {
             Extent::Edges => self.edges,
             Extent::RecoveryRows => self.recovery_rows,
             Extent::LoadedInterfaces => self.loaded_interfaces,
+            Extent::NamedLoads => self.named_loads,
         };
         known.unwrap_or(0)
     }
@@ -475,6 +479,7 @@ impl Sizes {
             Extent::Edges => known("ne", self.edges),
             Extent::RecoveryRows => known("r", self.recovery_rows),
             Extent::LoadedInterfaces => known("ni", self.loaded_interfaces),
+            Extent::NamedLoads => known("nl", self.named_loads),
         }
     }
 }

@@ -4,6 +4,7 @@
 pub(super) mod certificate;
 mod interfaces;
 mod invariants;
+mod named_load;
 mod recovery;
 
 use super::draft::node_indices;
@@ -19,6 +20,7 @@ use flexbody_model::NodeMoments;
 use interfaces::{COORDINATES, INTERFACES};
 use invariants::{COMPARISON, DAMPING, GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS, INVARIANTS, LUMPED};
 use nalgebra::{Matrix3, Vector3};
+use named_load::NAMED_LOAD;
 use recovery::RECOVERY;
 
 #[cfg(feature = "hdf5")]
@@ -32,7 +34,9 @@ pub(super) const WHOLE: &str = "sha256";
 /// Major version of the format. Readers refuse a newer major version; a newer minor version only adds entries.
 pub(super) const MAJOR: i64 = 1;
 /// Minor version with all entries, see [`MAJOR`]. A file states the lowest version that has all entries which it holds.
-pub(super) const MINOR: i64 = 8;
+pub(super) const MINOR: i64 = 9;
+/// Minor version of files of bodies without named loads.
+const WITHOUT_NAMED_LOADS: i64 = 8;
 /// Minor version of files of bodies without recoveries.
 const WITHOUT_RECOVERIES: i64 = 7;
 /// Minor version of files of bodies in mean axes.
@@ -56,6 +60,8 @@ const ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: 1, length: 1, time: 0 }
 const PER_ROOT_MASS: Units = Units::Of { mass_halves: -1, length: 0, time: 0 };
 const PER_ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: -1, length: -1, time: 0 };
 const PER_TIME: Units = Units::Of { mass_halves: 0, length: 0, time: -1 };
+const FORCE: Units = Units::Of { mass_halves: 2, length: 1, time: -2 };
+const TORQUE: Units = Units::Of { mass_halves: 2, length: 2, time: -2 };
 const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
 
 /// Returns a required dataset of version 1.0.
@@ -121,9 +127,10 @@ const ROOT: &[Item] = &[
         ONE,
         "additions within the major version; a reader ignores what it does not know",
         written(|v| {
-            let Parts { conditions, inertia_stiffness, mesh, recoveries, .. } = v.body;
+            let Parts { conditions, inertia_stiffness, mesh, recoveries, named_loads, .. } = v.body;
             Some(Value::Int(match (conditions.is_mean(), inertia_stiffness, mesh) {
-                _ if !recoveries.is_empty() => MINOR,
+                _ if !named_loads.is_empty() => MINOR,
+                _ if !recoveries.is_empty() => WITHOUT_NAMED_LOADS,
                 (false, _, _) => WITHOUT_RECOVERIES,
                 (true, Some(_), _) => MEAN_AXES_ONLY,
                 (true, None, Some(_)) => WITHOUT_INERTIA_STIFFNESS,
@@ -644,8 +651,14 @@ pub(super) const TABLE: &[SchemaGroup] = &[
     SchemaGroup {
         path: "/recovery/<name>",
         per: Per::Recovery,
-        description: "Rows that read stresses, strains, forces or displacements off the deformed body: y = offset + modes q + loads f + spin (w w), with the modal coordinates q, the loads f at the interfaces and the angular velocity w (theory section 12). Accelerations and gravity have no columns. The rows are along the axes of the operator that they were made of. Absent: none. Since 1.8; a file without it is one of 1.7.",
+        description: "Rows that read stresses, strains, forces or displacements off the deformed body: y = offset + modes q + loads f + spin (w w), with the modal coordinates q, the loads f at the interfaces (and, since 1.9, the amplitudes of named loads), and the angular velocity w (theory section 12). Accelerations and gravity have no columns. The rows are along the axes of the operator that they were made of. Absent: none. Since 1.8; a file without it is one of 1.7.",
         items: &[RECOVERY],
+    },
+    SchemaGroup {
+        path: "/named_loads/<name>",
+        per: Per::NamedLoad,
+        description: "Nodal forces f that act as one load with an amplitude a: generalised forces a (F, T + L q, Psi'f) on the frame and the modes, the forces along body axes at the deformed places of their nodes. Of a preload, whose resultant is zero on the deformed body too, Psi'f alone, always with a = 1. Absent: none. Since 1.9; a file without it is one of 1.8.",
+        items: &[NAMED_LOAD],
     },
     SchemaGroup {
         path: "/interface_coordinates",

@@ -4,7 +4,7 @@ use faer::{Mat, MatRef};
 use flexbody_base::units::{Unit, UnitSystem};
 use flexbody_body::flex_body::{
     FixedInterface, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InterfaceRows,
-    InternalRows, LumpedBody, Parts, Recovery,
+    InternalRows, LumpedBody, NamedLoad, Parts, Recovery,
 };
 use flexbody_body::invariants::Invariants;
 use flexbody_model::BodyNumber;
@@ -32,6 +32,7 @@ pub(super) struct View<'a> {
     /// Geometric stiffness or stiffness of inertia of a unit load.
     pub geometric_stiffness: Option<&'a GeometricStiffness<Mat<f64>>>,
     pub recovery: Option<&'a Recovery>,
+    pub named_load: Option<&'a NamedLoad>,
 }
 
 impl<'a> View<'a> {
@@ -81,6 +82,10 @@ impl<'a> View<'a> {
 
     pub(crate) fn recovery(&self) -> Option<&'a Recovery> {
         self.recovery
+    }
+
+    pub(crate) fn named_load(&self) -> Option<&'a NamedLoad> {
+        self.named_load
     }
 
     /// Returns the node indices of the group's interface; none for other groups.

@@ -5,7 +5,7 @@ use super::export::Holding::{Held, NotApplicable};
 use super::export::arrays::Nested;
 use super::export::frames::{ExportFrame, frames};
 use super::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, losses};
-use crate::export::stresses::without_recoveries;
+use crate::export::stresses::{without_named_loads, without_recoveries};
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -55,6 +55,7 @@ impl ExportFormat for AdamsInvariants {
             origins_of_modes: NotApplicable,
             units: Held,
             storage: NotApplicable,
+            named_loads: without_named_loads(body),
             recoveries: without_recoveries(body),
         }
     }

@@ -15,7 +15,7 @@
 use super::export::Holding::{self, Held, NotApplicable};
 use super::export::frames::{ExportFrame, frames};
 use super::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, losses};
-use crate::export::stresses::without_recoveries;
+use crate::export::stresses::{without_named_loads, without_recoveries};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -67,6 +67,7 @@ impl ExportFormat for OpenRadioss {
             origins_of_modes: NotApplicable,
             units: NotApplicable,
             storage: NotApplicable,
+            named_loads: without_named_loads(body),
             recoveries: without_recoveries(body),
         }
     }

@@ -7,7 +7,7 @@
 
 use super::shapes::NodalShapes;
 use flexbody_body::convert::ShapeColumn;
-use flexbody_model::UnitLoad;
+use flexbody_model::{LoadKind, UnitLoad};
 use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -104,7 +104,11 @@ impl StiffeningDecks<'_> {
             let _ = writeln!(out, "[[geometric_stiffness]]");
             let _ = writeln!(out, "with_stress = {}", quoted(&file(step)));
             let _ = writeln!(out, "load_size = {size:e}");
-            let _ = writeln!(out, "{} = {}", load.kind.name(), quoted(load.axis()));
+            let value = match &load.kind {
+                LoadKind::Named(name) => name.as_str(),
+                _ => load.axis(),
+            };
+            let _ = writeln!(out, "{} = {}", load.kind.name(), quoted(value));
             if let Some(interface) = load.kind.interface() {
                 let _ = writeln!(out, "interface = {}", quoted(interface));
             }

@@ -60,6 +60,7 @@ impl ExportFormat for Vtk {
             origins_of_modes: Held,
             units: Held,
             storage: NotApplicable,
+            named_loads: NotApplicable,
             recoveries: NotApplicable,
         }
     }

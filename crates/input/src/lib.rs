@@ -53,8 +53,8 @@ pub use fe_results::{PointStresses, WrittenSteps, read_point_stresses, read_step
 pub use jobs::{ElementDeck, JobFile, is_job, job_programs};
 pub use manifest::read_manifest;
 pub use model_files::{
-    InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource,
-    RecoverySource, Region, StressStiffnessSource, TableFiles, WithStress, parse_units,
+    InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
+    OperatorSource, RecoverySource, Region, StressStiffnessSource, TableFiles, WithStress, parse_units,
 };
 pub use read_model::{interface_in_memory, read_matrix, read_model, read_nodal_masses, read_nodes_of_table};
 pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};

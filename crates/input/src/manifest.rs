@@ -1,6 +1,7 @@
 //! The manifest `model.toml`. Its machine-readable contract is `schemas/manifest.schema.json`.
 
 mod interface;
+mod named_load;
 mod recovery;
 
 use super::jobs::JobFile;
@@ -17,7 +18,8 @@ use std::ops::{Deref, DerefMut, Range};
 use std::path::Path;
 use toml::de::DeValue;
 
-const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "recovery", "basis"];
+const TOP: &[&str] =
+    &["model", "files", "interface", "damping", "geometric_stiffness", "recovery", "named_load", "basis"];
 const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible"];
 const UNITS: &[&str] = &["length", "mass", "time"];
 const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program", "matrices", "mesh"];
@@ -91,6 +93,7 @@ impl ManifestWalk<'_, '_> {
         let damping = self.damping(top);
         let geometric_stiffness = self.geometric_stiffness(top);
         let recoveries = self.recoveries(top, usize::from(dimension));
+        let named_loads = self.named_loads(top);
         let residual_vectors = self.residual_vectors(top);
         let Some((files, span)) = self.table(top, "files") else {
             if !top.contains_key("files") {
@@ -114,6 +117,7 @@ impl ManifestWalk<'_, '_> {
             damping,
             geometric_stiffness,
             recoveries,
+            named_loads,
             residual_vectors,
             manifest: Some(self.path.to_path_buf()),
             manifest_sha256: Some(self.fingerprint()),
@@ -445,6 +449,7 @@ impl ManifestWalk<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::interface::{BOX, CYLINDER, INTERFACE, NEAREST, PLANE};
+    use super::named_load::NAMED_LOAD;
     use super::recovery::RECOVERY;
     use super::*;
     use flexbody_model::DAMPING_BAND_KEYS;
@@ -473,6 +478,7 @@ mod tests {
             ("/properties/damping/properties/rayleigh/properties", RAYLEIGH),
             ("/properties/geometric_stiffness/items/properties", GEOMETRIC_STIFFNESS),
             ("/properties/recovery/items/properties", RECOVERY),
+            ("/properties/named_load/items/properties", NAMED_LOAD),
             ("/properties/basis/properties", BASIS),
         ] {
             let mut known: Vec<&str> = known.to_vec();

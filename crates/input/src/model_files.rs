@@ -33,6 +33,8 @@ pub struct ModelFiles {
     pub geometric_stiffness: Vec<GeometricStiffness<StressStiffnessSource>>,
     /// Rows to read off the body.
     pub recoveries: Vec<RecoverySource>,
+    /// Nodal forces with a name.
+    pub named_loads: Vec<NamedLoadSource>,
     /// Loads whose static responses join the modes.
     pub residual_vectors: Vec<LoadSource>,
     /// Path of the manifest, if there is one.
@@ -90,6 +92,17 @@ pub enum InterfaceNodes {
     Set(String),
     /// Nodes that lie in a region.
     Region(Region),
+}
+
+/// Nodal forces with a name, and their file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedLoadSource {
+    /// Name, unique within the model.
+    pub name: String,
+    /// File of the forces, one value for each matrix row of the model.
+    pub vector: MatrixLocation,
+    /// True if the load acts always with amplitude 1.
+    pub preload: bool,
 }
 
 /// Rows to read off the body, and the files of their operator.
@@ -318,6 +331,7 @@ impl ModelFiles {
             .chain(geometric)
             .chain(interfaces)
             .chain(self.recoveries.iter().flat_map(RecoverySource::files).map(Path::to_path_buf))
+            .chain(self.named_loads.iter().map(|load| load.vector.path.clone()))
             .collect()
     }
 
@@ -350,6 +364,7 @@ impl ModelFiles {
             damping: None,
             geometric_stiffness: Vec::new(),
             recoveries: Vec::new(),
+            named_loads: Vec::new(),
             residual_vectors: Vec::new(),
             manifest: None,
             manifest_sha256: None,

@@ -5,11 +5,12 @@ use super::jobs::{JobModel, comparable, read_job};
 use super::mapping::Mapping;
 use super::mesh::MeshReading;
 use super::model_files::{
-    InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, OperatorSource, RecoverySource,
+    InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
+    OperatorSource, RecoverySource,
 };
 use super::node_files::{NodeFile, NodeSets, Unresolved, read_node_file};
 use super::reader::{MatrixRole, MatrixSource, reader_for};
-use super::recovery_files::{OperatorColumns, read_offset, read_operator};
+use super::recovery_files::{OperatorColumns, read_forces, read_offset, read_operator};
 use super::rows_of_model::{by_rows_of_model, in_order_of_nodes, refuse_followers, turned};
 use super::tables::{read_masses, read_node_list, read_recovery_rows};
 use super::with_stress::{PlainStiffness, StressMatrix, difference_note, read_stress_matrix};
@@ -21,8 +22,8 @@ use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::quotes::without_foreign_quotes;
 use flexbody_linalg::{CscMatrix, parallel};
 use flexbody_model::{
-    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, ModelRecovery, NodeSet, Nodes, RawMatrix,
-    RawModel, RecoveryOperator, Reference, filled_rows,
+    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes,
+    RawMatrix, RawModel, RecoveryOperator, Reference, filled_rows,
 };
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -105,6 +106,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, opened, files)))
         .collect();
     let recoveries = places.recoveries(opened, files, &mut diagnostics);
+    let named_loads = read_loads(opened, files, &mut diagnostics);
     let mesh_file = parsed.mesh.and_then(|mesh| take(&mut diagnostics, mesh));
     let mesh = matrices.as_ref().map(|matrices| {
         let from = mesh_file.as_ref().zip(files.mesh.as_deref());
@@ -138,6 +140,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         damping,
         geometric_stiffness,
         recoveries,
+        named_loads,
         allow_implausible: files.allow_implausible,
         sources: Sources::default(),
         diagnostics,
@@ -580,6 +583,16 @@ fn read_opened(
     read
 }
 
+/// Returns the named loads of the model, by the rows of their files; adds errors.
+fn read_loads(opened: &OpenFiles, files: &ModelFiles, diagnostics: &mut Vec<Diagnostic>) -> Vec<ModelLoad> {
+    let read = |load: &NamedLoadSource| {
+        let forces = read_forces(opened.get(&load.vector.path)?, load.vector.group.as_deref())?;
+        let path = load.vector.path.clone();
+        Ok(ModelLoad { name: load.name.clone(), forces, preload: load.preload, path })
+    };
+    files.named_loads.iter().filter_map(|load| take(diagnostics, read(load))).collect()
+}
+
 /// Returns a warning if the stiffness matrix has few digits. Its digits decide how well rigid motion and bending can be
 /// distinguished. Those of the mass matrix enter results unchanged, and exact short numbers are common there.
 fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
@@ -670,6 +683,7 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
         InterfaceNodes::File(path) => Some(("interface", path.as_path())),
         _ => None,
     }));
+    roles.extend(files.named_loads.iter().map(|load| ("named_load", load.vector.path.as_path())));
     roles.extend(files.recoveries.iter().flat_map(RecoverySource::files).map(|path| ("recovery", path)));
     roles
 }

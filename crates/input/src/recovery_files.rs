@@ -134,13 +134,27 @@ pub(super) fn read_operator(file: &InputFile, name: Option<&str>) -> Found<Opera
 /// # Errors
 /// The errors of dense arrays; FB322 for an array with several columns and several rows.
 pub(super) fn read_offset(file: &InputFile, dataset: Option<&str>) -> Found<Vec<f64>> {
+    read_vector(file, dataset, (Code::RecoverySize, "of the offset"))
+}
+
+/// Reads the nodal forces of a named load.
+///
+/// # Errors
+/// The errors of dense arrays; FB328 for an array with several columns and several rows.
+pub(super) fn read_forces(file: &InputFile, dataset: Option<&str>) -> Found<Vec<f64>> {
+    read_vector(file, dataset, (Code::NamedLoadMisfit, "of a named load"))
+}
+
+/// Reads an array with one row or one column; `misfit` is the code and the name of any other.
+fn read_vector(file: &InputFile, dataset: Option<&str>, misfit: (Code, &str)) -> Found<Vec<f64>> {
     let about = |found: Vec<Diagnostic>| -> Vec<Diagnostic> {
         found.into_iter().map(|diagnostic| diagnostic.in_file(file.path())).collect()
     };
     let Array { rows, cols, values, .. } = shapes::read(file, dataset).map_err(about)?;
     if rows != 1 && cols != 1 {
-        let message = format!("array of the offset is {rows} x {cols}, expected one value for each row");
-        return Err(about(vec![Diagnostic::new(Code::RecoverySize, message)]));
+        let (code, name) = misfit;
+        let message = format!("array {name} is {rows} x {cols}, expected one value for each row");
+        return Err(about(vec![Diagnostic::new(code, message)]));
     }
     Ok(values)
 }

@@ -4,12 +4,14 @@
 use super::drilling::{Following, with_following_rotations};
 use super::geometric_stiffness::check_loads;
 use super::layout::{Layout, layout};
+use super::named_load::checked_loads;
 use super::recovery::{RowsOfFiles, checked_recoveries};
 use super::references::resolve_references;
 use super::rows::{extents, rigid_count};
 use super::wording::name_some;
 use super::{
-    Damping, DofLabel, GeometricStiffness, ModelRecovery, Nodes, RawMatrix, RawModel, Rows, SurfaceMesh,
+    Damping, DofLabel, GeometricStiffness, ModelLoad, ModelRecovery, Nodes, RawMatrix, RawModel, Rows,
+    SurfaceMesh,
 };
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
@@ -43,6 +45,8 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     let of_files = RowsOfFiles { given: &raw.given_rows, matrix_rows, to: &layout.row_to_internal };
     let asked = std::mem::take(&mut raw.recoveries);
     let recoveries = checked_recoveries(asked, &of_files, &nodes, &mut found);
+    let given = std::mem::take(&mut raw.named_loads);
+    let named_loads = checked_loads(given, &of_files, &raw.interfaces, &layout.rows, &mut found);
     stop_on_error(&mut found)?;
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
         unreachable!("an asymmetric matrix is an error")
@@ -66,6 +70,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
         damping,
         geometric_stiffness,
         recoveries,
+        named_loads,
     };
     Ok((body, found))
 }
@@ -445,4 +450,6 @@ pub(super) struct Assembled {
     pub geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
     /// Rows to read off the body, in the internal order.
     pub recoveries: Vec<ModelRecovery>,
+    /// Nodal forces with a name, in the internal order.
+    pub named_loads: Vec<ModelLoad>,
 }

@@ -4,6 +4,7 @@ use super::assemble::{Assembled, assemble, block_tolerance, rounding};
 use super::density::{Densities, LocalMass, SoundSpeed, check_density, check_exchanged, check_speed};
 use super::geometric_stiffness::missing_components;
 use super::mass_structure::{MassForm, mass_form};
+use super::named_load::{check_preloads, refuse_stiff_preloads};
 use super::node_pairs::check_mass_pairs;
 use super::recovery::check_rigid_responses;
 use super::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
@@ -137,6 +138,8 @@ fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Res
     let rigid_residual = check_rigid_motion(body, rounded, limit, found);
     check_rigid_damping(body, found);
     found.extend(check_rigid_responses(&body.recoveries, &body.rows, &body.nodes));
+    found.extend(refuse_stiff_preloads(&body.named_loads, &body.geometric_stiffness));
+    found.extend(check_preloads(&body.named_loads, &body.rows, &body.nodes));
     found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
     Ok(rigid_residual)
 }

@@ -4,8 +4,8 @@
 use super::assemble::Assembled;
 use super::mass_structure::MassForm;
 use super::{
-    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, ModelRecovery, NodeSet,
-    Nodes, Rows, SurfaceMesh,
+    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery,
+    NodeSet, Nodes, Rows, SurfaceMesh,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
@@ -35,6 +35,7 @@ pub struct FeModel {
     damping: Option<Damping<SymmetricMatrix>>,
     geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
     recoveries: Vec<ModelRecovery>,
+    named_loads: Vec<ModelLoad>,
     interfaces: Vec<NodeSet>,
     sources: Sources,
     digits: u8,
@@ -71,6 +72,7 @@ impl FeModel {
             damping,
             geometric_stiffness,
             recoveries,
+            named_loads,
             ..
         } = body;
         let scalar = form.commutes && rows.len() == rows.displacements();
@@ -89,6 +91,7 @@ impl FeModel {
             damping,
             geometric_stiffness,
             recoveries,
+            named_loads,
             interfaces: raw.interfaces,
             sources: raw.sources,
             rigid_residual,
@@ -212,6 +215,11 @@ impl FeModel {
     /// Returns the rows to read off the body; operators have the internal rows.
     pub fn recoveries(&self) -> &[ModelRecovery] {
         &self.recoveries
+    }
+
+    /// Returns the nodal forces with a name, by internal rows.
+    pub fn named_loads(&self) -> &[ModelLoad] {
+        &self.named_loads
     }
 
     /// Returns the elimination order shared by all factors of [`pencil`](Self::pencil).

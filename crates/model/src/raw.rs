@@ -1,6 +1,8 @@
 //! A model as delivered by the readers: parsed, but not yet checked as a mechanical body.
 
-use super::{Damping, DofLabel, GeometricStiffness, GivenRows, ModelRecovery, NodeSet, Nodes, SurfaceMesh};
+use super::{
+    Damping, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes, SurfaceMesh,
+};
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::{SourceFile, Sources};
@@ -87,10 +89,12 @@ pub struct RawModel {
     pub geometric_stiffness: Vec<GeometricStiffness<RawMatrix>>,
     /// Rows to read off the body; the operators have the rows of the files.
     pub recoveries: Vec<ModelRecovery>,
+    /// Nodal forces with a name, by the rows of the files.
+    pub named_loads: Vec<ModelLoad>,
     /// True if findings that the user has accepted are warnings instead of errors: implausible densities,
     /// and mass coupling without stiffness.
     pub allow_implausible: bool,
-    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `recovery`, `mesh`, `manifest`), file name
+    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `recovery`, `named_load`, `mesh`, `manifest`), file name
     /// and SHA-256 (hex) of every file read.
     pub sources: Sources,
     /// Warnings and notes of the readers; no errors.
@@ -126,6 +130,7 @@ impl RawModel {
             damping: None,
             geometric_stiffness: Vec::new(),
             recoveries: Vec::new(),
+            named_loads: Vec::new(),
             allow_implausible: false,
             sources: Sources::default(),
             diagnostics: Vec::new(),

@@ -189,7 +189,7 @@ pub(super) fn checked_recoveries(
 }
 
 /// Code and message about a recovery.
-type Problem = (Code, String);
+pub(super) type Problem = (Code, String);
 
 fn refuse_name(name: &str, seen: &mut HashSet<String>) -> Result<(), Problem> {
     let wrong = match name {

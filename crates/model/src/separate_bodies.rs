@@ -3,6 +3,7 @@
 
 use super::assemble::{Assembled, assemble};
 use super::checks::{CheckedModel, check_body, groups};
+use super::named_load::{loads_of_body, refuse_loads_of_several_bodies};
 use super::recovery::{recoveries_of_body, refuse_several_bodies};
 use super::wording::{in_words, name_some};
 use super::{BodyNumber, Damping, FeModel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
@@ -70,6 +71,7 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
     check_loads_of_others(&whole, &component, &interfaces, &mut found);
     let body: HashMap<i64, usize> = whole.nodes.ids.iter().copied().zip(component.iter().copied()).collect();
     let of_row = |row: usize| component[whole.rows.vertex(row)];
+    refuse_loads_of_several_bodies(&whole.named_loads, of_row, &mut found);
     refuse_several_bodies(&whole.recoveries, of_row, |id| body.get(&id).copied(), &mut found);
     if found.iter().any(|d| d.severity() == Severity::Error) {
         return Err(found);
@@ -172,6 +174,7 @@ fn body_model(
     let recoveries = recoveries_of_body(&whole.recoveries, kept, &nodes);
     Assembled {
         recoveries,
+        named_loads: loads_of_body(&whole.named_loads, kept),
         raw: RawModel { name, interfaces, given_rows: whole.raw.given_rows.of_body(), ..whole.raw.clone() },
         mesh: whole.mesh.as_ref().and_then(|mesh| mesh.among(&whole.nodes.ids, &nodes.ids)),
         nodes,

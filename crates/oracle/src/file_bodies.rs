@@ -6,8 +6,9 @@ use flexbody_base::provenance::{SourceFile, sha256_hex};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
-    InterfaceCoordinates, InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, Parts,
-    Quantity, Recovery, RecoveryRow, ReferenceConditions, Source, Storage, SurfaceMesh, Truncation, UnitLoad,
+    InterfaceCoordinates, InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, NamedLoad,
+    Parts, Quantity, Recovery, RecoveryRow, ReferenceConditions, Source, Storage, SurfaceMesh, Truncation,
+    UnitLoad,
 };
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, TermGroups,
@@ -130,7 +131,7 @@ fn guarantee(r: &mut Random, eigenvalue: &[f64]) -> Guarantee {
 }
 
 /// Returns a recovery of a few rows with loads at the `loaded` interfaces.
-fn recovery(r: &mut Random, number: usize, nf: usize, loaded: &[String]) -> Recovery {
+fn recovery(r: &mut Random, number: usize, nf: usize, loaded: &[String], named: usize) -> Recovery {
     let rows = 1 + r.below(3);
     let row = |(i, r): (usize, &mut Random)| RecoveryRow {
         name: format!("{}-{i}", r.name()),
@@ -150,6 +151,21 @@ fn recovery(r: &mut Random, number: usize, nf: usize, loaded: &[String]) -> Reco
             .iter()
             .map(|interface| LoadColumns { interface: interface.clone(), columns: r.matrix(rows, 6) })
             .collect(),
+        named: r.matrix(rows, named),
+    }
+}
+
+/// Returns a named load.
+fn named_load(r: &mut Random, number: usize, nf: usize) -> NamedLoad {
+    NamedLoad {
+        name: format!("{}-load{number}", r.name()),
+        preload: r.below(2) == 1,
+        modal: (0..nf).map(|_| r.value()).collect(),
+        force: Vector3::from_fn(|_, _| r.value()),
+        torque: Vector3::from_fn(|_, _| r.value()),
+        moments: Matrix3::from_fn(|_, _| r.value()),
+        turning: r.matrix(3, nf),
+        compliance: (r.below(2) == 1).then(|| r.positive()),
     }
 }
 
@@ -304,6 +320,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             .collect(),
         coordinates: (n * nf % 2 == 1).then(|| coordinates(&mut r, 1 + interfaces, nf)),
         recoveries: Vec::new(),
+        named_loads: Vec::new(),
         terms: Vec::new(),
         mesh: r.mesh(n),
         storage: Storage::F64,
@@ -315,7 +332,8 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
     if n * nf % 2 == 1 {
         let loaded = parts.interfaces.iter().filter(|interface| interface.reference.is_some());
         let loaded: Vec<String> = loaded.map(|interface| interface.name.clone()).collect();
-        parts.recoveries = (0..2).map(|i| recovery(&mut r, i, nf, &loaded)).collect();
+        parts.recoveries = (0..2).map(|i| recovery(&mut r, i, nf, &loaded, 2)).collect();
+        parts.named_loads = (0..2).map(|i| named_load(&mut r, i, nf)).collect();
     }
     parts
 }
@@ -378,11 +396,17 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     for one in &p.recoveries {
         bits.extend(one.offset.iter().map(|v| v.to_bits()));
         let columns = one.loads.iter().map(|load| &load.columns);
-        [&one.modes, &one.spin].into_iter().chain(columns).for_each(|m| matrix(&mut bits, m));
+        [&one.modes, &one.spin, &one.named].into_iter().chain(columns).for_each(|m| matrix(&mut bits, m));
+    }
+    for load in &p.named_loads {
+        let resultant = load.force.iter().chain(&load.torque).chain(&load.moments);
+        bits.extend(load.modal.iter().chain(resultant).chain(&load.compliance).map(|v| v.to_bits()));
+        matrix(&mut bits, &load.turning);
     }
     bits.extend(p.lumped.iter().flat_map(|l| &l.comparison).map(|(_, v)| v.to_bits()));
     let texts = format!(
-        "{:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+        "{:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+        p.named_loads.iter().map(|load| (&load.name, load.preload)).collect::<Vec<_>>(),
         p.recoveries
             .iter()
             .map(|one| (

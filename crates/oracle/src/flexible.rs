@@ -147,6 +147,7 @@ pub fn made_of(
         interfaces: Vec::new(),
         coordinates: None,
         recoveries: Vec::new(),
+        named_loads: Vec::new(),
         terms: Vec::new(),
         mesh: None,
         storage: Storage::F64,

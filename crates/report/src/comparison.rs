@@ -2,6 +2,7 @@
 //! eigenvalues, the order of the nodes or the body frame.
 
 mod entries;
+mod named_loads;
 
 use super::common_modes::{CommonModes, clusters};
 use super::comparison_report::{ComparisonFormat, ComparisonReport};
@@ -134,6 +135,7 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     };
     comparison.modal_matrices(&pair, basis.as_ref(), tolerances.invariants);
     comparison.recoveries(&pair, tolerances.invariants);
+    comparison.named_loads(&pair, tolerances.invariants);
     comparison.interfaces(&pair, tolerances.centre_of_mass);
     // Notes on the limits of the comparison.
     if !placed {

@@ -6,6 +6,7 @@ use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts,
 use super::held::HeldFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
+use super::named_loads::NamedLoadFacts;
 use super::numbers::{coordinates, counted, percent, significant};
 use super::run_data::{Phase, RunData, SearchAttempt};
 use flexbody_base::diagnostic::Diagnostic;
@@ -66,6 +67,9 @@ pub(super) struct ModelFacts {
     pub interfaces: Vec<InterfaceFacts>,
     /// Rows to read off the deformed body.
     pub recoveries: Vec<RecoveryFacts>,
+    /// Nodal forces with a name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub named_loads: Vec<NamedLoadFacts>,
     /// Size of the surface; `None` if no surface is known.
     pub mesh: Option<MeshFacts>,
     pub settings: serde_json::Value,
@@ -389,6 +393,7 @@ impl ModelFacts {
                 .map(|interface| InterfaceFacts::of(interface, body))
                 .collect(),
             recoveries: body.recoveries().iter().map(RecoveryFacts::of).collect(),
+            named_loads: NamedLoadFacts::of(body),
             mesh: MeshFacts::of(body),
             settings: source.settings.clone(),
         }

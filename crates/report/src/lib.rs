@@ -32,6 +32,7 @@ mod html;
 mod lumped;
 mod mass_properties;
 mod measured_run;
+mod named_loads;
 mod numbers;
 mod picture;
 mod random;

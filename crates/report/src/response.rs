@@ -12,7 +12,7 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;
 use flexbody_study::response::{
-    At, Complex, Effectivity, Function, Output, Pair, Response, ResponseSettings, Spacing,
+    At, Complex, Direction, Effectivity, Function, Output, Pair, Response, ResponseSettings, Spacing,
 };
 use serde::Serialize;
 
@@ -187,6 +187,9 @@ fn unit(function: &Function, by_base: bool, units: &UnitSystem) -> String {
         Output::Row(row) if row.unit.is_empty() => "1",
         Output::Row(row) => &row.unit,
     };
+    if function.from == Direction::Amplitude {
+        return motion.to_owned();
+    }
     let load = match (by_base, function.from.turns()) {
         (false, false) => force,
         (false, true) => format!("({force} {})", length.name()),

@@ -470,6 +470,7 @@ pub fn simulation_csv(recording: &Recording) -> String {
     for interface in loads.iter().flat_map(|states| states.layout.interfaces()) {
         head.extend(["force", "torque"].iter().flat_map(|part| xyz(&format!("{interface} {part}"))));
     }
+    head.extend(loads.iter().flat_map(|states| states.layout.named_loads()).cloned());
     let mut table = String::new();
     csv::push_row(&mut table, head.iter().map(|cell| csv::text(cell)));
     for (i, (time, (state, balance))) in time.iter().zip(states.iter().zip(balances)).enumerate() {
@@ -498,6 +499,8 @@ pub fn simulation_csv(recording: &Recording) -> String {
         if let Some(states) = loads {
             let of = |interface: usize| states.layout.load_of(states.state(i), interface);
             row.extend((0..states.layout.interfaces().len()).flat_map(of));
+            let amplitude = |load: usize| states.layout.amplitude_of(states.state(i), load);
+            row.extend((0..states.layout.named_loads().len()).map(amplitude));
         }
         csv::push_row(&mut table, row.into_iter().map(csv::number));
     }

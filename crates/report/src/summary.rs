@@ -7,6 +7,7 @@ use super::document::{Block, Term, Tone, listed_to};
 use super::facts::{InterfaceFacts, RecoveryFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
 use super::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
+use super::named_loads::NamedLoadFacts;
 use super::numbers::{bytes, coordinates, counted, duration, frequency, frequency_range, triple};
 use super::text::{self, Screen};
 use super::{Facts, html};
@@ -63,6 +64,10 @@ fn body(facts: &Facts<'_>) -> Vec<Term> {
     if !model.recoveries.is_empty() {
         let all: Vec<String> = model.recoveries.iter().map(RecoveryFacts::in_words).collect();
         items.push(entry(Tone::Plain, "recovery", all.join("; "), 4));
+    }
+    if !model.named_loads.is_empty() {
+        let all: Vec<String> = model.named_loads.iter().map(NamedLoadFacts::in_words).collect();
+        items.push(entry(Tone::Plain, "loads", all.join("; "), 4));
     }
     items
 }

@@ -131,7 +131,8 @@ fn rows_of_a_run_are_those_of_the_body() {
         let (force, torque) = (along(0), along(3));
         let right = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
         let found: Vec<f64> = line.split(',').skip(1).map(|cell| cell.parse().expect("a number")).collect();
-        let state = RecoveryState { q, angular_velocity: axes * omega, loads: &[[0.0; 6], right] };
+        let state =
+            RecoveryState { q, angular_velocity: axes * omega, loads: &[[0.0; 6], right], named: &[] };
         let mut expected = body.recoveries()[0].values(&state);
         let measures = |s: &[f64]| {
             let stress = nalgebra::Matrix3::new(s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2]);
@@ -409,4 +410,76 @@ fn random_vibration_of_an_interface_is_written() {
     refused(place, "response body.h5 --base 3:y --band 100..8000 --rows root --damping 0.02", "FB218");
     refused(place, "response body.h5 --from right:y --band 100..8000 --psd psd.csv --damping 0.02", "FB215");
     assert!(!place.join("rms.vtu").exists());
+}
+
+/// Writes nodal forces as a Matrix Market array.
+fn write_vector(place: &Path, name: &str, forces: &[f64]) {
+    let mut text = format!("%%MatrixMarket matrix array real general\n{} 1\n", forces.len());
+    forces.iter().for_each(|force| writeln!(text, "{force:.17e}").expect("memory"));
+    fs::write(place.join(name), text).expect("written");
+}
+
+/// Returns the rows of a table without its first line.
+fn numbers(path: &Path) -> Vec<Vec<f64>> {
+    let table = fs::read_to_string(path).expect("a table");
+    let row = |line: &str| line.split(',').map(|cell| cell.parse().expect("a number")).collect();
+    table.lines().skip(1).map(row).collect()
+}
+
+/// A named load and a preload of the manifest act in a simulation, and its table gives the same rows to `recover`.
+#[test]
+fn named_loads_of_the_manifest_act_and_are_recovered() {
+    let (folder, raw) = folder();
+    let place = folder.path();
+    let last = 3 * (raw.nodes.len() - 1);
+    let (mut push, mut bolts) = (vec![0.0; 3 * raw.nodes.len()], vec![0.0; 3 * raw.nodes.len()]);
+    push[last + 1] = 1e3;
+    // Opposite forces along the connection of two nodes.
+    let x = &raw.nodes.positions;
+    let along = (Vector3::from(x[last / 3]) - Vector3::from(x[0])).normalize() * 1e4;
+    (0..3).for_each(|k| (bolts[k], bolts[last + k]) = (along[k], -along[k]));
+    write_vector(place, "push.mtx", &push);
+    write_vector(place, "bolts.mtx", &bolts);
+    runs(place, "convert model.toml --modes 6 -o plain.h5 --quiet");
+    let manifest = fs::read_to_string(place.join("model.toml")).expect("a manifest");
+    let loads = "[[named_load]]\nname = \"push\"\nvector = \"push.mtx\"\n\
+                 [[named_load]]\nname = \"bolts\"\nvector = \"bolts.mtx\"\npreload = true\n";
+    fs::write(place.join("model.toml"), manifest + loads).expect("written");
+    runs(place, "convert model.toml --modes 6 --frame principal -o body.h5 --quiet");
+    let minor = |name: &str| {
+        flexbody_file::structure(place.join(name)).expect("a file")["attributes"]["format_minor"].clone()
+    };
+    assert_eq!((minor("plain.h5"), minor("body.h5")), (8.into(), 9.into()));
+    let text = runs(place, "inspect body.h5");
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains("push: load, ") && text.contains("bolts: preload, "), "{text}");
+    let scene = "[run]\nduration = 0.002\noutputs = 20\n[initial]\nangular_velocity = [10, 20, 30]\n\
+                 deformation = \"static\"\n[[load]]\nnamed_load = \"push\"\n\
+                 history = { amplitude = 2, frequency = 700, phase = 0 }\n";
+    fs::write(place.join("push.toml"), scene).expect("written");
+    runs(place, "simulate body.h5 --scene push.toml --csv run.csv --rows rows.csv --quiet");
+    runs(place, "recover body.h5 --history run.csv -o again.csv --quiet");
+    let (rows, again) = (numbers(&place.join("rows.csv")), numbers(&place.join("again.csv")));
+    let largest = rows.iter().flat_map(|row| &row[1..]).fold(0.0f64, |most, v| most.max(v.abs()));
+    assert_eq!((rows.len(), rows[0].len()), (again.len(), again[0].len()));
+    for (a, b) in rows.iter().flatten().zip(again.iter().flatten()) {
+        assert!((a - b).abs() < 1e-9 * largest, "{a:e} {b:e}");
+    }
+    // At rest there is the stress of the preload, of which no column tells; without the column of the other load its static
+    // stresses are missing, and the program says so.
+    assert!(rows[0][1..].iter().any(|v| v.abs() > 1e-3 * largest));
+    let table = fs::read_to_string(place.join("run.csv")).expect("a table");
+    assert!(table.lines().next().is_some_and(|head| head.ends_with(",push,bolts")));
+    fs::write(place.join("other.csv"), table.replacen(",push,", ",other,", 1)).expect("written");
+    let text = runs(place, "recover body.h5 --history other.csv -o less.csv");
+    assert!(text.contains("push: the table has no columns of their loads"), "{text}");
+    let less = numbers(&place.join("less.csv"));
+    let apart = rows.iter().flatten().zip(less.iter().flatten()).map(|(a, b)| (a - b).abs());
+    assert!(apart.fold(0.0, f64::max) > 1e-3 * largest);
+    // Formats that have no place for the loads say so.
+    refused(place, "export body.h5 --to mbsim -o body.xml", "named-loads");
+    runs(place, "compare body.h5 body.h5");
+    let run = flexbody(place, &["compare", "plain.h5", "body.h5"]);
+    let said = String::from_utf8_lossy(&run.stdout).into_owned();
+    assert!(!run.status.success() && said.contains("named load `push` is in the second body only"), "{said}");
 }

@@ -1,10 +1,11 @@
 //! Last stage of a conversion: the body, the lumped comparators, and diagnostics.
 
 use super::modal_matrices::softening_warning;
+use super::recovery::Recovered;
 use super::{Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping};
 use crate::flex_body::{
     Certificate, FlexBody, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure, Modes,
-    Parts, Recovery, ReferenceConditions, Source, Storage,
+    Parts, ReferenceConditions, Source, Storage,
 };
 use crate::invariants::{FrameChoice, Invariants, MassProperties};
 use faer::Mat;
@@ -51,7 +52,8 @@ impl ModalModel<'_> {
     /// # Errors
     /// An error for damping that adds energy to the modes.
     pub fn body(&self, condensed: &Condensation) -> Result<FlexBody> {
-        FlexBody::new(self.parts(condensed, Vec::new(), Vec::new())?.0)
+        let recovered = Recovered { named_loads: self.named_loads(), ..Recovered::default() };
+        FlexBody::new(self.parts(condensed, Vec::new(), recovered)?.0)
     }
 
     /// Finishes the conversion with the condensed data.
@@ -68,9 +70,9 @@ impl ModalModel<'_> {
             .iter()
             .map(|masses| lumped::pipeline(&self, masses, exact, &without_counter))
             .collect::<Result<_>>()?;
-        let (recoveries, of_recoveries) =
-            self.recoveries(condensed.invariants.groups().w1, &without_counter)?;
-        let (parts, overdamped) = self.parts(&condensed, lumped, recoveries)?;
+        let mut recovered = self.recoveries(condensed.invariants.groups().w1, &without_counter)?;
+        let of_recoveries = std::mem::take(&mut recovered.diagnostics);
+        let (parts, overdamped) = self.parts(&condensed, lumped, recovered)?;
         let body = FlexBody::new(parts)?;
         let mut diagnostics = self.remarks(overdamped, &body);
         diagnostics.extend(of_recoveries);
@@ -91,7 +93,7 @@ impl ModalModel<'_> {
         &self,
         condensed: &Condensation,
         lumped: Vec<LumpedBody>,
-        recoveries: Vec<Recovery>,
+        recovered: Recovered,
     ) -> Result<(Parts, Option<Diagnostic>)> {
         let (modes, overdamped) = self.damped_modes(&condensed.invariants)?;
         let parts = Parts {
@@ -113,7 +115,8 @@ impl ModalModel<'_> {
             inertia_stiffness: self.inertia_stiffness.clone(),
             lumped,
             certificate: self.certificate(condensed.guarantee.clone()),
-            recoveries,
+            recoveries: recovered.recoveries,
+            named_loads: recovered.named_loads,
             terms: condensed.terms.clone(),
             storage: Storage::default(),
         };

@@ -6,7 +6,7 @@ use super::answered::{Targets, mapped_answers};
 use crate::basis::{
     CoupledModel, accurate_static_responses, centrifugal_loads, interface_loads, rigid_modes,
 };
-use crate::flex_body::{LOAD_COMPONENTS, LoadColumns, LoadKind, Recovery, UnitLoad};
+use crate::flex_body::{LOAD_COMPONENTS, LoadColumns, LoadKind, NamedLoad, Recovery, UnitLoad};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -24,32 +24,47 @@ const COMPONENTS: [&str; LOAD_COMPONENTS] = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"]
 /// Names of the axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
+/// Recoveries and named loads of a body.
+#[derive(Debug, Default)]
+pub(super) struct Recovered {
+    pub recoveries: Vec<Recovery>,
+    pub named_loads: Vec<NamedLoad>,
+    /// Notes and warnings.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Static responses of the free body.
+struct Responses {
+    /// G_r F (N x m), relative to the frame of the body.
+    fields: Mat<f64>,
+    /// f'G f of each named load.
+    compliances: Vec<f64>,
+}
+
 impl ModalModel<'_> {
-    /// Returns the recoveries that the model asks for, with notes and warnings. Their static columns need one factor of K + tau M; cuts need
-    /// none.
+    /// Returns the recoveries and named loads that the model asks for, with notes and warnings. Their static responses need one factor of
+    /// K + tau M; cuts need none.
     ///
     /// * `responds_to_spin`: true if the body holds the group W1, by which the modes respond to spin.
     ///
     /// # Errors
     /// [`RecoveryCut`](Code::RecoveryCut) for a cut through a rigid interface; failures of the factor, and responses
     /// that are not accurate.
-    pub(super) fn recoveries(
-        &self,
-        responds_to_spin: bool,
-        context: &Context<'_>,
-    ) -> Result<(Vec<Recovery>, Vec<Diagnostic>)> {
-        let asked = self.model.recoveries();
-        if asked.is_empty() {
-            return Ok(Default::default());
+    pub(super) fn recoveries(&self, responds_to_spin: bool, context: &Context<'_>) -> Result<Recovered> {
+        let (asked, mut named_loads) = (self.model.recoveries(), self.named_loads());
+        if asked.is_empty() && named_loads.is_empty() {
+            return Ok(Recovered::default());
         }
         context.phase("recovery");
         let basis = FreeBasis::new(self.model, &self.modes.vectors, self.modal_stiffness.clone())?;
         let loads = StaticLoads::new(self.model)?;
         let is_cut = |one: &ModelRecovery| matches!(one.operator, RecoveryOperator::Cut { .. });
-        let responses = match !asked.iter().all(is_cut) {
+        let responses = match !asked.iter().all(is_cut) || !named_loads.is_empty() {
             true => self.responses(&basis, &loads, responds_to_spin, context)?,
-            false => Mat::new(),
+            false => Responses { fields: Mat::new(), compliances: Vec::new() },
         };
+        named_loads.iter_mut().zip(&responses.compliances).for_each(|(load, c)| load.compliance = Some(*c));
+        let responses = responses.fields;
         let mut diagnostics = Vec::new();
         let one = |one: &ModelRecovery| match &one.operator {
             RecoveryOperator::Rows { transposed, labels, offset } => {
@@ -81,19 +96,21 @@ impl ModalModel<'_> {
         };
         let along_model = asked.iter().map(one).collect::<Result<Vec<Recovery>>>()?;
         let recoveries = along_model.iter().map(|one| one.in_axes(&self.place.frame.axes)).collect();
-        Ok((recoveries, diagnostics))
+        Ok(Recovered { recoveries, named_loads, diagnostics })
     }
 
-    /// Returns the static responses G_r F to all loads (N x m), relative to the frame of the body.
+    /// Returns the static responses G_r F to all loads (N x m), relative to the frame of the body, and the compliances of the
+    /// named loads.
     fn responses(
         &self,
         basis: &FreeBasis<'_>,
         loads: &StaticLoads,
         responds_to_spin: bool,
         context: &Context<'_>,
-    ) -> Result<Mat<f64>> {
+    ) -> Result<Responses> {
         let first = self.found.solution.eigenvalues[0];
         let mut responses = basis.responses(loads, first, responds_to_spin, context)?;
+        let compliances = basis.compliances(loads, &responses);
         // A frame on an interface follows its motion.
         if let Some(name) = self.settings.frame.interface()
             && let Some(measure) = interface_loads(self.model, name)?
@@ -102,7 +119,7 @@ impl ModalModel<'_> {
             let rigid = self.model.rigid_fields(self.place.frame.origin.into(), 1.0);
             subtract_combination(responses.as_mut(), rigid.as_ref(), motion.as_ref());
         }
-        Ok(responses)
+        Ok(Responses { fields: responses, compliances })
     }
 
     /// Returns an error if a cut divides an interface that all modes leave rigid: its inner forces are unknown.
@@ -182,6 +199,19 @@ impl<'m> FreeBasis<'m> {
         accurate_static_responses(&self.coupled, loads.forces.clone(), first, context)
     }
 
+    /// Returns f'G f of each named load, for its `responses` G_r F in mean axes among those to all loads.
+    fn compliances(&self, loads: &StaticLoads, responses: &Mat<f64>) -> Vec<f64> {
+        let first = loads.forces.ncols() - loads.named.len();
+        let amplitudes = self.static_amplitudes(loads, true);
+        let modal = loads.modal(&self.modes, true);
+        let one = |c: usize| -> f64 {
+            let outside: f64 = (0..responses.nrows()).map(|i| loads.forces[(i, c)] * responses[(i, c)]).sum();
+            let inside: f64 = (0..modal.nrows()).map(|j| modal[(j, c)] * amplitudes[(j, c)]).sum();
+            outside + inside
+        };
+        (first..loads.forces.ncols()).map(one).collect()
+    }
+
     /// Removes rigid motion from fields (N x m): the part that rounding leaves.
     pub(super) fn remove_rigid_motion(&self, fields: &mut Mat<f64>) {
         let moved = self.coupled.model().pencil().apply_mass(fields.as_ref());
@@ -250,7 +280,7 @@ fn solve(a: &Mat<f64>, b: &Mat<f64>) -> Option<Mat<f64>> {
 }
 
 /// Loads of the columns, along the axes of the model: six (in the plane one) centrifugal loads, then six (in the plane
-/// three) for each interface with a reference point.
+/// three) for each interface with a reference point, then the named loads.
 pub(super) struct StaticLoads {
     /// Nodal forces (N x m).
     forces: Mat<f64>,
@@ -259,6 +289,7 @@ pub(super) struct StaticLoads {
     interfaces: Vec<String>,
     /// Components of force and torque of the loads at an interface.
     components: &'static [usize],
+    named: Vec<String>,
 }
 
 impl StaticLoads {
@@ -271,12 +302,15 @@ impl StaticLoads {
                 parts.push(loads);
             }
         }
+        let named = model.named_loads();
+        parts.push(Mat::from_fn(model.rows().len(), named.len(), |i, c| named[c].forces[i]));
         let parts: Vec<_> = parts.iter().map(Mat::as_ref).collect();
         Ok(Self {
             forces: side_by_side(&parts),
             spins: LoadKind::Spin.of_dimension(model.dimension()),
             interfaces,
             components: rigid_axes(model.dimension()),
+            named: named.iter().map(|load| load.name.clone()).collect(),
         })
     }
 
@@ -289,7 +323,7 @@ impl StaticLoads {
         let at = |interface: &String| {
             self.components.iter().map(|&c| format!("{interface} {}", COMPONENTS[c])).collect::<Vec<_>>()
         };
-        spin.chain(self.interfaces.iter().flat_map(at)).collect()
+        spin.chain(self.interfaces.iter().flat_map(at)).chain(self.named.iter().cloned()).collect()
     }
 
     /// Returns the unit loads of geometric stiffness that the loads are, in their order.
@@ -302,7 +336,9 @@ impl StaticLoads {
             };
             self.components.iter().map(one).collect::<Vec<_>>()
         };
-        spin.chain(self.interfaces.iter().flat_map(at)).collect()
+        let named =
+            self.named.iter().map(|name| UnitLoad { kind: LoadKind::Named(name.clone()), component: 0 });
+        spin.chain(self.interfaces.iter().flat_map(at)).chain(named).collect()
     }
 
     /// Returns the modal loads Psi_m'F (nf x m); those of spin are zero if the modes do not respond to it.
@@ -337,7 +373,9 @@ impl StaticLoads {
             LoadColumns { interface: interface.clone(), columns: own }
         };
         let loads = self.interfaces.iter().enumerate().map(at).collect();
-        Recovery { name: name.to_owned(), rows, offset, modes, spin, loads }
+        let first = columns.ncols() - self.named.len();
+        let named = columns.as_ref().subcols(first, self.named.len()).to_owned();
+        Recovery { name: name.to_owned(), rows, offset, modes, spin, loads, named }
     }
 }
 

@@ -8,7 +8,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{gram, largest_entry, side_by_side};
-use flexbody_model::{FeModel, UnitLoad, extents};
+use flexbody_model::{FeModel, LoadKind, ModelLoad, UnitLoad, extents};
 
 /// Difference of Psi'K Psi from the stored K_ff, relative to its largest entry, above which the model is another one.
 const MAX_STIFFNESS_DIFFERENCE: f64 = 1e-5;
@@ -78,8 +78,9 @@ pub fn recovery_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) 
     Ok(scaled(model, &columns, &fields, &kept))
 }
 
-/// Returns the whole static responses G F of `model` to unit spin and to unit loads at its interfaces, balanced by
-/// inertia relief: the displacements of the stress of each load. Interfaces that `body` keeps rigid are rigid. Loads
+/// Returns the whole static responses G F of `model` to unit spin, unit loads at its interfaces and named loads, balanced by
+/// inertia relief: the displacements of the stress of each load. Preloads are left out, since their stress stiffness
+/// belongs into K. Interfaces that `body` keeps rigid are rigid. Loads
 /// without a response are left out.
 ///
 /// # Errors
@@ -96,7 +97,13 @@ pub fn load_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) -> R
         let same = unit_loads.iter().zip(&norms).filter(|(other, _)| other.kind.name() == load.kind.name());
         same.map(|(_, norm)| *norm).fold(0.0, f64::max)
     };
-    let is_kept = |j: &usize| norms[*j] > MIN_RESPONSE * of_kind(&unit_loads[*j]);
+    // The stress stiffness of a preload belongs into K.
+    let is_preload = |load: &UnitLoad| {
+        let named = |one: &ModelLoad| one.preload && load.kind == LoadKind::Named(one.name.clone());
+        model.named_loads().iter().any(named)
+    };
+    let is_kept =
+        |j: &usize| norms[*j] > MIN_RESPONSE * of_kind(&unit_loads[*j]) && !is_preload(&unit_loads[*j]);
     let kept: Vec<usize> = (0..unit_loads.len()).filter(is_kept).collect();
     let columns: Vec<ShapeColumn> = unit_loads.iter().cloned().map(ShapeColumn::Load).collect();
     Ok(scaled(model, &columns, &responses, &kept))

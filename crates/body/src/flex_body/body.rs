@@ -2,8 +2,8 @@
 
 use super::validate::problems;
 use super::{
-    Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, Recovery, ReferenceConditions,
-    Source, Storage, TermDecision, TermGroups,
+    Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, NamedLoad, Parts, Recovery,
+    ReferenceConditions, Source, Storage, TermDecision, TermGroups,
 };
 use crate::basis::BasisKind;
 use crate::invariants::{
@@ -70,7 +70,7 @@ impl FlexBody {
     /// interfaces are unique and not empty; loads of geometric stiffness are those of the dimension, each
     /// once; surface and interfaces name existing nodes, interfaces declared free have no reference point; matrices in
     /// interface coordinates are symmetric; names of recoveries are unique and not empty, and their loads act at
-    /// interfaces with a reference point; a group of the kinetic energy is dropped by a decision of
+    /// interfaces with a reference point; names of named loads are unique and no names of interfaces; a group of the kinetic energy is dropped by a decision of
     /// [`Parts::terms`] or held, here and by the lumped comparators; no text contains a NUL character (no
     /// file could hold it).
     ///
@@ -141,6 +141,11 @@ impl FlexBody {
     /// Returns the rows to read off the deformed body: stresses, strains, forces, displacements.
     pub fn recoveries(&self) -> &[Recovery] {
         &self.parts.recoveries
+    }
+
+    /// Returns the nodal forces with a name.
+    pub fn named_loads(&self) -> &[NamedLoad] {
+        &self.parts.named_loads
     }
 
     /// Returns the surface to draw the body by, if it is known.

@@ -112,6 +112,7 @@ impl FlexBody {
         for lumped in &mut parts.lumped {
             lumped.invariants = lumped.invariants.without_rigid_motion(motion.as_ref());
         }
+        parts.named_loads = parts.named_loads.iter().map(|load| load.without_rigid_motion(&motion)).collect();
         parts.geometric_stiffness = geometric_stiffness;
         // The nodes turn relative to the carrier, which turns the frame.
         parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {

@@ -2,7 +2,7 @@
 
 use super::{
     Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LoadColumns,
-    LumpedBody, Modes, Parts, Recovery,
+    LumpedBody, Modes, NamedLoad, Parts, Recovery,
 };
 use crate::invariants::{InertiaStiffness, Invariants, UnitFactors};
 use faer::Mat;
@@ -132,6 +132,20 @@ impl Change {
         }
     }
 
+    /// Returns a named load in the new units; the amplitude 1 stays the same load.
+    fn named_load(self, given: &NamedLoad) -> NamedLoad {
+        let (force, torque) = (self.of(2, 1, -2), self.of(2, 2, -2));
+        NamedLoad {
+            modal: given.modal.iter().map(|value| value * force / self.of(1, 0, 0)).collect(),
+            force: given.force * force,
+            torque: given.torque * torque,
+            moments: given.moments * torque,
+            turning: times(&given.turning, force / self.of(1, 0, 0)),
+            compliance: given.compliance.map(|value| value * torque),
+            ..given.clone()
+        }
+    }
+
     /// Returns the factor of a coordinate by its name: a modal amplitude, the rotation `... rx`, or a
     /// displacement.
     fn coordinate(self, name: &str) -> f64 {
@@ -196,6 +210,7 @@ impl FlexBody {
             interface.reference = interface.reference.as_ref().map(point);
         }
         parts.recoveries = parts.recoveries.iter().map(|one| change.recovery(one)).collect();
+        parts.named_loads = parts.named_loads.iter().map(|one| change.named_load(one)).collect();
         parts.coordinates = parts.coordinates.as_ref().map(|coordinates| change.coordinates(coordinates));
         Self::new(parts)
     }

@@ -176,6 +176,11 @@ impl ModalChange {
         Ok(Self { modes, taken: None, left_out: split.rigid_motions })
     }
 
+    /// Returns the rigid motion (6 x nf) that is removed from each old mode; `None` if none is.
+    pub(super) fn taken(&self) -> Option<&Mat<f64>> {
+        self.taken.as_ref()
+    }
+
     /// Returns the rigid motions among the modes, which are removed.
     pub fn left_out(&self) -> &RigidMotions {
         &self.left_out

@@ -1,7 +1,8 @@
 //! Transformation of a body to a frame along the axes of its model, and its modes in the rows of the model.
 
 use super::{
-    FlexBody, GeometricStiffness, Interface, InternalRows, LumpedBody, ReferenceConditions, UnitLoad,
+    FlexBody, GeometricStiffness, Interface, InternalRows, LumpedBody, NamedLoad, ReferenceConditions,
+    UnitLoad,
 };
 use crate::basis::CoupledModel;
 use crate::invariants::InertiaStiffness;
@@ -66,6 +67,7 @@ impl FlexBody {
             .collect();
         parts.geometric_stiffness = self.geometric_stiffness_in(&origin, &to_body);
         parts.inertia_stiffness = self.inertia_stiffness_in(&origin, &to_body);
+        parts.named_loads = self.named_loads_in(&origin, &to_body);
         parts.recoveries = parts.recoveries.iter().map(|one| one.in_axes(&to_body)).collect();
         parts.coordinates = None;
         Self::new(parts)
@@ -79,6 +81,11 @@ impl FlexBody {
         axes: &Matrix3<f64>,
     ) -> Vec<GeometricStiffness<Mat<f64>>> {
         along(&stiffness_about(self.geometric_stiffness(), d, self.dimension()), axes)
+    }
+
+    /// Returns the named loads about the point `d` and along the columns of `axes`, both in the body frame.
+    pub fn named_loads_in(&self, d: &Vector3<f64>, axes: &Matrix3<f64>) -> Vec<NamedLoad> {
+        self.named_loads().iter().map(|load| load.in_frame(d, axes)).collect()
     }
 
     /// Returns the stiffness of inertia about the point `d` and along the columns of `axes`, both in the

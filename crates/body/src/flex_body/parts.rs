@@ -1,6 +1,6 @@
 //! Plain data of a flexible body, not yet checked.
 
-use super::{Interface, Recovery, ReferenceConditions, Storage, TermDecision};
+use super::{Interface, NamedLoad, Recovery, ReferenceConditions, Storage, TermDecision};
 use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
 use crate::invariants::{DIGITS, Frame, InertiaStiffness, Invariants};
 use faer::Mat;
@@ -206,6 +206,8 @@ pub struct Parts {
     pub coordinates: Option<InterfaceCoordinates>,
     /// Rows to read off the deformed body: stresses, strains, forces, displacements.
     pub recoveries: Vec<Recovery>,
+    /// Nodal forces with a name.
+    pub named_loads: Vec<NamedLoad>,
     /// Decisions about the groups of the kinetic energy; empty if no selection was made, and then all
     /// groups are held.
     pub terms: Vec<TermDecision>,

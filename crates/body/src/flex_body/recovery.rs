@@ -9,7 +9,7 @@
 //! terms: G M (rigid motion) = 0.
 
 use super::modal_change::RigidCoupling;
-use super::{FlexBody, LoadKind, TermGroups, UnitLoad};
+use super::{FlexBody, LoadKind, NamedLoad, TermGroups, UnitLoad};
 use crate::invariants::Invariants;
 use faer::Mat;
 use flexbody_model::RecoveryRow;
@@ -35,6 +35,8 @@ pub struct Recovery {
     pub spin: Mat<f64>,
     /// Columns of the loads at each interface with a reference point.
     pub loads: Vec<LoadColumns>,
+    /// R G_r f (rows x number of named loads), in the order of the named loads of the body.
+    pub named: Mat<f64>,
 }
 
 /// Columns of the loads at one interface.
@@ -55,6 +57,8 @@ pub struct RecoveryState<'a> {
     pub angular_velocity: Vector3<f64>,
     /// Force and torque at the reference point of each interface, body axes, in the order of [`Recovery::loads`].
     pub loads: &'a [[f64; LOAD_COMPONENTS]],
+    /// Amplitudes of the named loads, in the order of the body; 1 for a preload.
+    pub named: &'a [f64],
 }
 
 impl Recovery {
@@ -65,6 +69,7 @@ impl Recovery {
     pub fn values(&self, state: &RecoveryState<'_>) -> Vec<f64> {
         assert_eq!(state.q.len(), self.modes.ncols(), "modal coordinates");
         assert_eq!(state.loads.len(), self.loads.len(), "loads");
+        assert_eq!(state.named.len(), self.named.ncols(), "named loads");
         let w = state.angular_velocity;
         let products = LoadKind::SPIN.map(|(k, l)| w[k] * w[l]);
         let of_loads = |i: usize| -> f64 {
@@ -76,7 +81,8 @@ impl Recovery {
         let value = |i: usize| {
             let of_modes: f64 = state.q.iter().enumerate().map(|(j, q)| self.modes[(i, j)] * q).sum();
             let of_spin: f64 = products.iter().enumerate().map(|(c, w)| self.spin[(i, c)] * w).sum();
-            self.offset[i] + of_modes + of_loads(i) + of_spin
+            let of_named: f64 = state.named.iter().enumerate().map(|(c, a)| self.named[(i, c)] * a).sum();
+            self.offset[i] + of_modes + of_loads(i) + of_named + of_spin
         };
         (0..self.rows.len()).map(value).collect()
     }
@@ -118,6 +124,8 @@ struct ModalLoads {
     spin: Option<Mat<f64>>,
     /// Of unit forces and torques at an interface (nf x 6), by its name.
     at_interfaces: Vec<(String, Mat<f64>)>,
+    /// Of the named loads (nf x their number).
+    named: Mat<f64>,
 }
 
 /// Static response of modal coordinates to unit loads.
@@ -128,6 +136,8 @@ pub struct StaticCoordinates {
     pub spin: Option<Mat<f64>>,
     /// Response (nf x 6) to unit forces and torques at each interface, by its name.
     pub at_interfaces: Vec<(String, Mat<f64>)>,
+    /// Response (nf x number of named loads) to each named load with amplitude 1.
+    pub named: Mat<f64>,
 }
 
 impl FlexBody {
@@ -165,6 +175,7 @@ impl FlexBody {
             if let Some(spin) = &loads.spin {
                 take_over(one, &mut new.spin, spin, if loses_w1 { &all } else { &dropped });
             }
+            take_over(one, &mut new.named, &loads.named, &dropped);
             for at in &mut new.loads {
                 if let Some((_, load)) = loads.at_interfaces.iter().find(|(name, _)| *name == at.interface) {
                     take_over(one, &mut at.columns, load, &dropped);
@@ -193,13 +204,14 @@ impl FlexBody {
             modes: Mat::zeros(recovery.rows.len(), 0),
             spin: whole(&recovery.spin, loads.spin.as_ref()),
             loads: recovery.loads.iter().map(at_interface).collect(),
+            named: whole(&recovery.named, Some(&loads.named)),
             ..recovery.clone()
         };
         along_body.in_axes(&self.frame().axes.transpose())
     }
 
     /// Returns the largest part of a static response of a recovery that its static columns hold, and that the modes alone
-    /// leave out, over unit loads at the interfaces and unit products of the angular velocity along the axes of the
+    /// leave out, over unit loads at the interfaces, named loads and unit products of the angular velocity along the axes of the
     /// model: the largest value of a column relative to that of the response.
     pub fn part_of_static_columns(&self, recovery: &Recovery) -> f64 {
         let (columns, whole) = (recovery.in_axes(&self.frame().axes.transpose()), self.static_rows(recovery));
@@ -212,7 +224,8 @@ impl FlexBody {
             (0..columns.ncols()).map(ratio).fold(0.0, f64::max)
         };
         let loads = columns.loads.iter().zip(&whole.loads).map(|(own, whole)| (&own.columns, &whole.columns));
-        std::iter::once((&columns.spin, &whole.spin)).chain(loads).map(part).fold(0.0, f64::max)
+        let others = [(&columns.spin, &whole.spin), (&columns.named, &whole.named)];
+        others.into_iter().chain(loads).map(part).fold(0.0, f64::max)
     }
 
     /// Returns the static response of the modes `of` to modal loads (nf x c), K_ff restricted to these modes. The
@@ -235,7 +248,23 @@ impl FlexBody {
                 .iter()
                 .map(|(name, load)| (name.clone(), response(load)))
                 .collect(),
+            named: response(&loads.named),
         }
+    }
+
+    /// Returns the error of the static response of the modes to each named load, in the order of the loads: |x - x_modes| /
+    /// |x| in the norm of K, whose square is the missing part of the compliance. `None` where the compliance is not known.
+    pub fn named_load_truncation(&self) -> Vec<Option<f64>> {
+        if self.named_loads().is_empty() {
+            return Vec::new();
+        }
+        let (loads, all) = (self.modal_loads().named, (0..self.n_modes()).collect::<Vec<_>>());
+        let response = self.static_response(&loads, &all);
+        let error = |(c, load): (usize, &NamedLoad)| {
+            let of_modes: f64 = (0..self.n_modes()).map(|j| loads[(j, c)] * response[(j, c)]).sum();
+            load.compliance.map(|whole| (1.0 - of_modes / whole).clamp(0.0, 1.0).sqrt())
+        };
+        self.named_loads().iter().enumerate().map(error).collect()
     }
 
     fn modal_loads(&self) -> ModalLoads {
@@ -255,7 +284,13 @@ impl FlexBody {
             });
             Some((interface.name.clone(), loads))
         };
+        let named = self.named_loads();
+        let of_named = |j: usize, c: usize| {
+            let resultant = named[c].resultant();
+            named[c].modal[j] - (0..6).map(|k| taken[(k, j)] * resultant[k]).sum::<f64>()
+        };
         ModalLoads {
+            named: Mat::from_fn(self.n_modes(), named.len(), of_named),
             spin: centrifugal_loads(invariants, &taken),
             at_interfaces: self.interfaces().iter().filter_map(at_interface).collect(),
         }

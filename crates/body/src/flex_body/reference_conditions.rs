@@ -185,6 +185,7 @@ impl FlexBody {
         parts.recoveries.retain(Recovery::ignores_rigid_motion);
         parts.recoveries =
             parts.recoveries.iter().map(|one| one.with_modes(change.combined(&one.modes))).collect();
+        parts.named_loads = parts.named_loads.iter().map(|one| one.with_modes(change)).collect();
         parts.certificate = unproved(&parts);
         (parts.invariants, parts.conditions, parts.coordinates) = (invariants, conditions, None);
         Self::new(parts)

@@ -72,6 +72,7 @@ impl FlexBody {
             interfaces: parts.interfaces.clone(),
             coordinates: parts.coordinates.clone().filter(|_| all),
             recoveries: self.reduced_recoveries(modes, invariants.groups()),
+            named_loads: parts.named_loads.iter().map(|load| load.of_modes(modes)).collect(),
             terms: before.cloned().chain(terms.iter().cloned()).collect(),
             invariants,
             storage: parts.storage,

@@ -50,6 +50,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.reference_conditions(parts);
     check.coordinates(parts, nf);
     check.recoveries(parts, nf);
+    check.named_loads(parts, nf);
     check.text("source.name", &parts.source.name);
     if let Some(number) = parts.source.number.filter(|n| n.number == 0 || n.number > n.of) {
         check.add(format!("`source.number` is {number}"));
@@ -387,6 +388,22 @@ impl Problems {
         }
     }
 
+    fn named_loads(&mut self, parts: &Parts, nf: usize) {
+        self.names("a named load", parts.named_loads.iter().map(|load| &load.name));
+        for load in &parts.named_loads {
+            let name = format!("named load `{}`", load.name);
+            self.length(&format!("{name} modal"), load.modal.len(), nf, "mode");
+            self.finite(&format!("{name} modal"), load.modal.iter().copied());
+            let resultant = load.force.iter().chain(&load.torque).chain(&load.moments);
+            self.finite(&format!("{name} resultant"), resultant.copied());
+            self.matrix(&format!("{name} turning"), &load.turning, 3, nf);
+            self.finite(&format!("{name} compliance"), load.compliance);
+            if parts.interfaces.iter().any(|interface| interface.name == load.name) {
+                self.add(format!("{name} has the name of an interface"));
+            }
+        }
+    }
+
     fn recoveries(&mut self, parts: &Parts, nf: usize) {
         self.names("a recovery", parts.recoveries.iter().map(|one| &one.name));
         for one in &parts.recoveries {
@@ -402,6 +419,7 @@ impl Problems {
             self.finite(&format!("{name} offset"), one.offset.iter().copied());
             self.matrix(&format!("{name} modes"), &one.modes, rows, nf);
             self.matrix(&format!("{name} spin"), &one.spin, rows, LoadKind::SPIN.len());
+            self.matrix(&format!("{name} named"), &one.named, rows, parts.named_loads.len());
             self.names(&format!("an interface of {name}"), one.loads.iter().map(|load| &load.interface));
             for LoadColumns { interface, columns } in &one.loads {
                 self.matrix(&format!("{name} loads at `{interface}`"), columns, rows, LOAD_COMPONENTS);

@@ -116,7 +116,7 @@ fn static_values(body: &FlexBody, name: &str, case: &Case, columns: bool) -> Vec
     let recovery = body.recoveries().iter().find(|one| one.name == name).expect("a recovery");
     let nothing = [[0.0; 6]; 2];
     let (w, loads) = if columns { (w, at_interfaces.as_slice()) } else { (Vector3::zeros(), &nothing[..]) };
-    recovery.values(&RecoveryState { q: &q, angular_velocity: w, loads })
+    recovery.values(&RecoveryState { q: &q, angular_velocity: w, loads, named: &[] })
 }
 
 /// Static solution of all nodes under inertia relief, dense: u = T y of a body whose interfaces are rigid if T says so.
@@ -448,7 +448,12 @@ fn stresses_under_a_slow_sine_load_follow_those_of_all_nodes() {
             }
             let q: Vec<f64> = (0..count).map(|j| response(lambda[j], modal[j], t)).collect();
             let now = |loads: [[f64; 6]; 2]| {
-                recovery.values(&RecoveryState { q: &q, angular_velocity: Vector3::zeros(), loads: &loads })
+                recovery.values(&RecoveryState {
+                    q: &q,
+                    angular_velocity: Vector3::zeros(),
+                    loads: &loads,
+                    named: &[],
+                })
             };
             let loaded = at_interfaces.map(|load| load.map(|f| f * (w * t).sin()));
             let difference = |found: Vec<f64>| {

@@ -1,6 +1,6 @@
 //! The rows of `/recovery/<name>`.
 
-use super::super::item::Extent::{Fixed, LoadedInterfaces, Modes, RecoveryRows};
+use super::super::item::Extent::{Fixed, LoadedInterfaces, Modes, NamedLoads, RecoveryRows};
 use super::super::item::Item;
 use super::super::item::ItemKind::{Floats, Text};
 use super::super::item::{both, field};
@@ -131,4 +131,43 @@ pub(super) const RECOVERY: &[Item] = &[
         ),
     )
     .added(8),
+    attribute(
+        "named_loads",
+        Text,
+        ONE,
+        "named loads of `named`, as a JSON array of names; absent: the body has none",
+        both(
+            |v| {
+                let names: Vec<&str> = v.body.named_loads.iter().map(|load| load.name.as_str()).collect();
+                v.recovery?;
+                text((!names.is_empty()).then(|| serde_json::to_string(&names).expect("strings are valid JSON"))?)
+            },
+            |d, read| {
+                let names: Vec<String> = read.json("a JSON array of names")?;
+                d.recovery_named(names)
+            },
+        ),
+    )
+    .added(9),
+    dataset(
+        "named",
+        Floats(&[RecoveryRows, NamedLoads]),
+        Units::Mixed,
+        "R G_r f",
+        "static values beside the modes for each named load of `named_loads` with the amplitude 1, in the unit of each row",
+        both(
+            |v| {
+                let named = &v.recovery?.named;
+                (named.ncols() > 0).then(|| Value::Floats(crate::value::rows(named.as_ref()).collect()))
+            },
+            |d, read| {
+                let rows = d.recovery().rows.len();
+                let values = read.floats();
+                let count = values.len() / rows.max(1);
+                d.recovery().named = Mat::from_fn(rows, count, |i, c| values[i * count + c]);
+                Ok(())
+            },
+        ),
+    )
+    .added(9),
 ];

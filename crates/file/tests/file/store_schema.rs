@@ -38,7 +38,7 @@ fn every_required_entry_is_missed_when_it_is_not_there() {
         let (parent, key) = pointer.rsplit_once('/').unwrap();
         let key = key.replace("~1", "/").replace("~0", "~");
         broken.pointer_mut(parent).unwrap().as_object_mut().unwrap().remove(&key);
-        let optional = ["comparison", "lumped", "interfaces", "geometric_stiffness", "inertia_stiffness", "recovery"]
+        let optional = ["comparison", "lumped", "interfaces", "geometric_stiffness", "inertia_stiffness", "recovery", "named_loads"]
             .iter()
             .any(|g| parent == format!("/groups/{g}/groups"))
             || ["geometric_stiffness", "inertia_stiffness", "interface", "recovery"].contains(&key.as_str())
@@ -59,7 +59,7 @@ fn every_required_entry_is_missed_when_it_is_not_there() {
             || ["datasets", "attributes"]
                 .iter()
                 .any(|s| parent == format!("/groups/interface_coordinates/{s}"))
-            || ["loaded_interfaces", "loads"].contains(&key.as_str())
+            || ["loaded_interfaces", "loads", "named_loads", "named", "compliance"].contains(&key.as_str())
             || key.starts_with("digits_")
             || ["mesh", "triangles", "edges"].contains(&key.as_str())
             // All attributes of the frame are optional, but the section of a group with attributes is always

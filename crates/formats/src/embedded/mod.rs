@@ -4,7 +4,7 @@ mod layout;
 
 use crate::export::Holding::{Held, NotApplicable};
 use crate::export::losses::geometric_stiffness;
-use crate::export::stresses::without_recoveries;
+use crate::export::stresses::{without_named_loads, without_recoveries};
 use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, Points, frames};
 use flate2::Crc;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -69,6 +69,7 @@ impl ExportFormat for Embedded {
             origins_of_modes: NotApplicable,
             units: Held,
             storage: NotApplicable,
+            named_loads: without_named_loads(body),
             recoveries: without_recoveries(body),
         }
     }

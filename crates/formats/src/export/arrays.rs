@@ -26,6 +26,7 @@ pub(crate) const ALL_ENTRIES: ExportChecklist = ExportChecklist {
     origins_of_modes: Held,
     units: Held,
     storage: Held,
+    named_loads: Held,
     recoveries: Held,
 };
 

@@ -255,6 +255,8 @@ pub struct ExportChecklist {
     pub units: Holding,
     /// Storage of large arrays in 32-bit floats.
     pub storage: Holding,
+    /// Named loads, and preloads among them.
+    pub named_loads: Holding,
     /// Recoveries. A loss is a note, whatever is allowed, since `recover` computes them from a run of any program; its
     /// text completes "the file ...".
     pub recoveries: Holding,
@@ -291,6 +293,7 @@ impl ExportChecklist {
             ("origins-of-modes", self.origins_of_modes),
             ("units", self.units),
             ("storage", self.storage),
+            ("named-loads", self.named_loads),
         ];
         all.into_iter().filter_map(|(name, holding)| holding.lost(name)).collect()
     }
@@ -309,7 +312,7 @@ pub struct Loss {
 
 impl Loss {
     /// Names of all properties that may be lost.
-    pub const PROPERTIES: [&'static str; 19] = [
+    pub const PROPERTIES: [&'static str; 20] = [
         "rigid-coupling",
         "plane",
         "deformed-inertia",
@@ -329,6 +332,7 @@ impl Loss {
         "origins-of-modes",
         "units",
         "storage",
+        "named-loads",
     ];
 }
 

@@ -3,7 +3,7 @@
 
 use super::Holding::{Held, NotApplicable};
 use super::{ExportChecklist, ExportOptions, losses};
-use crate::export::stresses::without_recoveries;
+use crate::export::stresses::{without_named_loads, without_recoveries};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -114,6 +114,7 @@ pub(crate) fn matrix_checklist(body: &FlexBody, options: &ExportOptions) -> Expo
         origins_of_modes: NotApplicable,
         units: Held,
         storage: NotApplicable,
+        named_loads: without_named_loads(body),
         recoveries: without_recoveries(body),
     }
 }

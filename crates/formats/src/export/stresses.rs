@@ -94,6 +94,18 @@ impl<'b> NodalStresses<'b> {
 /// Part of the static response that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
+/// Returns the holding of the named loads by a file without any.
+pub(crate) fn without_named_loads(body: &FlexBody) -> Holding {
+    let names: Vec<String> = body.named_loads().iter().map(|load| format!("`{}`", load.name)).collect();
+    match names.as_slice() {
+        [] => NotApplicable,
+        names if body.named_loads().iter().any(|load| load.preload) => {
+            Lost(format!("named loads, among them preloads, which act always: {}", names.join(", ")))
+        }
+        names => Lost(format!("named loads: {}", names.join(", "))),
+    }
+}
+
 /// Returns the holding of the recoveries by a file without any.
 pub(crate) fn without_recoveries(body: &FlexBody) -> Holding {
     match body.recoveries() {

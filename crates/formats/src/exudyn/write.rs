@@ -10,7 +10,7 @@ use crate::export::Holding::{self, Held, Lost, NotApplicable, Slight};
 use crate::export::frames::{ExportFrame, interface_frames, named_nodes};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
 use crate::export::matrices::inertia;
-use crate::export::stresses::NodalStresses;
+use crate::export::stresses::{NodalStresses, without_named_loads};
 use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, Points, losses};
 use faer::Mat;
 use flexbody_base::error::Result;
@@ -56,6 +56,7 @@ impl ExportFormat for Exudyn {
             origins_of_modes: NotApplicable,
             units: NotApplicable,
             storage: NotApplicable,
+            named_loads: without_named_loads(body),
             recoveries: {
                 let numbers = Mesh::new(body, &options.points).numbers;
                 let found = NodalStresses::new(body, numbers.iter().copied());

@@ -76,6 +76,7 @@ impl ExportFormat for Gltf {
             origins_of_modes: Held,
             units: Held,
             storage: NotApplicable,
+            named_loads: NotApplicable,
             recoveries: NotApplicable,
         }
     }

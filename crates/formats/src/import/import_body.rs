@@ -217,6 +217,7 @@ fn parts(
         interfaces: interfaces(given),
         coordinates: None,
         recoveries: Vec::new(),
+        named_loads: Vec::new(),
         terms: invariants.groups().dropped().map(|group| not_in_file(group, file.format)).collect(),
         storage: Storage::F64,
         modes: modes(

@@ -9,7 +9,7 @@
 
 use crate::export::Holding::{self, Held, NotApplicable};
 use crate::export::matrices::inertia;
-use crate::export::stresses::without_recoveries;
+use crate::export::stresses::{without_named_loads, without_recoveries};
 use crate::export::{ExportChecklist, ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -72,6 +72,7 @@ impl ExportFormat for Mbdyn {
             origins_of_modes: NotApplicable,
             units: Held,
             storage: NotApplicable,
+            named_loads: without_named_loads(body),
             recoveries: without_recoveries(body),
         }
     }

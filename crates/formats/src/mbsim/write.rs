@@ -9,7 +9,7 @@ use crate::export::Holding::{self, Held, Lost, NotApplicable};
 use crate::export::frames::{frame_table, numbered_interfaces};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
 use crate::export::matrices::inertia;
-use crate::export::stresses::NodalStresses;
+use crate::export::stresses::{NodalStresses, without_named_loads};
 use crate::export::{ExportChecklist, ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
 use faer::Mat;
 use flexbody_base::error::Result;
@@ -57,6 +57,7 @@ impl ExportFormat for Mbsim {
             origins_of_modes: NotApplicable,
             units: NotApplicable,
             storage: NotApplicable,
+            named_loads: without_named_loads(body),
             recoveries: {
                 let places = frames(body, &options.points);
                 let found = NodalStresses::new(body, places.iter().map(|place| place.id));

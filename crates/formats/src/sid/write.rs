@@ -4,7 +4,7 @@ use super::text::{Blocks, DIALECTS, Dialect, EMBS, Limits, ModalName, NAMES, Tay
 use crate::export::Holding::{self, Held, NotApplicable};
 use crate::export::frames::{frame_table, numbered_interfaces};
 use crate::export::losses::{general_w0, geometric_stiffness, internal_rows, is_damped, plane};
-use crate::export::stresses::NodalStresses;
+use crate::export::stresses::{NodalStresses, without_named_loads};
 use crate::export::{ExportChecklist, ExportFormat, ExportFrame, ExportOptions, Exported, frames};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -67,6 +67,7 @@ impl ExportFormat for Sid {
             origins_of_modes: NotApplicable,
             units: Held,
             storage: NotApplicable,
+            named_loads: without_named_loads(body),
             recoveries: {
                 let places = frames(body, &options.points);
                 let found = NodalStresses::new(body, places.iter().map(|place| place.id));

@@ -4,11 +4,12 @@
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
-    FlexBody, InternalRows, Parts, Quantity, Recovery, RecoveryRow, Storage, SurfaceMesh,
+    FlexBody, InternalRows, NamedLoad, Parts, Quantity, Recovery, RecoveryRow, Storage, SurfaceMesh,
 };
 use flexbody_formats::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, Holding};
 use flexbody_formats::{FORMATS, export};
 use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
+use nalgebra::{Matrix3, Vector3};
 use oracle::exported::jointed_bodies;
 
 /// A property of a body and its entry in the checklist.
@@ -54,6 +55,15 @@ const PROPERTIES: &[Property] = &[
         moves: false,
         remove: |parts| parts.mesh = None,
         entry: |list| &list.surface,
+    },
+    Property {
+        name: "named loads",
+        moves: true,
+        remove: |parts| {
+            parts.named_loads.clear();
+            parts.recoveries.iter_mut().for_each(|one| one.named = Mat::zeros(one.rows.len(), 0));
+        },
+        entry: |list| &list.named_loads,
     },
     Property {
         name: "recoveries",
@@ -106,7 +116,19 @@ fn body_with_everything() -> FlexBody {
     parts.modes.internal =
         Some(InternalRows { dofs: vec![[9999, 1]], shape: Mat::from_fn(1, nf, |_, j| j as f64) });
     parts.mesh = Some(SurfaceMesh::new(vec![[0, 1, 2]], Vec::new(), n).expect("a surface"));
-    parts.recoveries = vec![nodal_stresses(&parts.nodes.ids[..2], nf)];
+    let mut stresses = nodal_stresses(&parts.nodes.ids[..2], nf);
+    stresses.named = Mat::full(stresses.rows.len(), 1, 0.25);
+    parts.recoveries = vec![stresses];
+    parts.named_loads = vec![NamedLoad {
+        name: "bolts".to_owned(),
+        preload: false,
+        modal: vec![0.5; nf],
+        force: Vector3::x(),
+        torque: Vector3::y(),
+        moments: Matrix3::identity(),
+        turning: Mat::full(3, nf, 0.1),
+        compliance: Some(2.0),
+    }];
     FlexBody::new(parts).expect("a body")
 }
 
@@ -128,6 +150,7 @@ pub(crate) fn nodal_stresses(nodes: &[i64], nf: usize) -> Recovery {
         modes: Mat::from_fn(rows.len(), nf, |i, j| ((i * nf + j) as f64).sin()),
         spin: Mat::zeros(rows.len(), 6),
         loads: Vec::new(),
+        named: Mat::zeros(rows.len(), 0),
         rows,
     }
 }

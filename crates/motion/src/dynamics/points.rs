@@ -4,7 +4,7 @@ use super::equations::{Stiffening, stiffness_under};
 use super::kernels::{ModalMatrix, add_scaled, dot};
 use super::{Evaluation, LoadAxes, LoadJacobian, Orientation, RotationVector, Terms};
 use faer::Mat;
-use flexbody_body::flex_body::{FlexBody, Interface};
+use flexbody_body::flex_body::{FlexBody, Interface, NamedLoad};
 use flexbody_model::LoadKind;
 use nalgebra::{Matrix3, Vector3};
 
@@ -95,6 +95,23 @@ pub struct BodyPoint {
     position: Vector3<f64>,
     translation: PointMotion,
     rotation: Option<PointMotion>,
+    /// Resultants of a named load, whose amplitude is the component x of its force.
+    named: Option<Box<Resultants>>,
+}
+
+/// Force, and torque T + L q about the origin of the frame, of a load with the amplitude 1.
+#[derive(Debug, Clone)]
+struct Resultants {
+    force: Vector3<f64>,
+    torque: Vector3<f64>,
+    /// L (3 x nf).
+    turning: PointMotion,
+}
+
+impl Resultants {
+    fn torque_at(&self, q: &[f64]) -> Vector3<f64> {
+        self.torque + self.turning.product(q)
+    }
 }
 
 impl BodyPoint {
@@ -113,6 +130,7 @@ impl BodyPoint {
             position: Vector3::from(body.nodes().positions[node]),
             translation: motion(&modes.shape),
             rotation,
+            named: None,
         }
     }
 
@@ -136,7 +154,40 @@ impl BodyPoint {
                 .rotation
                 .as_ref()
                 .map(|rows| motion(rows, LoadKind::Moment(interface.name.clone()))),
+            named: None,
         })
+    }
+
+    /// Creates the place of `load`, a named load of a body: a force (a, 0, 0) at it is the load with the amplitude a, along
+    /// any axes. Its displacement along x is f'u of the forces f and the displacements u of the nodes. It has no
+    /// orientation.
+    #[doc(hidden)] // Its argument is no part of the interface of the library.
+    pub fn named_load(load: &NamedLoad) -> Self {
+        let nf = load.modal.len();
+        let torque = load.torque_at(&vec![0.0; nf]);
+        let turning = |k: usize, j: usize| if load.preload { 0.0 } else { load.turning[(k, j)] };
+        Self {
+            position: Vector3::zeros(),
+            translation: PointMotion::new(nf, |k, j| if k == 0 { load.modal[j] } else { 0.0 }),
+            rotation: None,
+            named: Some(Box::new(Resultants {
+                force: load.resultant_force(),
+                torque,
+                turning: PointMotion::new(nf, turning),
+            })),
+        }
+    }
+
+    /// Returns the largest torque about the origin of the frame of a unit force at the undeformed body.
+    pub fn lever(&self) -> f64 {
+        self.named.as_ref().map_or_else(|| self.position.norm(), |named| named.torque.norm())
+    }
+
+    /// Returns rows (3 x nf) whose product with the modal coordinates, times a force, bounds the torque that the force gains
+    /// by the deformation.
+    pub fn lever_rows(&self) -> Mat<f64> {
+        let motion = self.named.as_ref().map_or(&self.translation, |named| &named.turning);
+        Mat::from_fn(3, motion.nf, |k, j| motion.row(k)[j])
     }
 
     /// Returns true if the point has an orientation.
@@ -221,8 +272,11 @@ impl BodyPoint {
     /// # Panics
     /// When `forces` has another length.
     pub fn add_force(&self, evaluation: &Evaluation<'_>, force: &Vector3<f64>, forces: &mut [f64]) {
-        let torque = self.place(evaluation).cross(force);
-        let modal = evaluation.equations().add_rigid(*force, torque, forces);
+        let (resultant, torque) = match &self.named {
+            Some(named) => (named.force * force.x, named.torque_at(&evaluation.q) * force.x),
+            None => (*force, self.place(evaluation).cross(force)),
+        };
+        let modal = evaluation.equations().add_rigid(resultant, torque, forces);
         self.translation.add_work(force, &evaluation.q, modal);
     }
 
@@ -265,11 +319,14 @@ impl BodyPoint {
         let (body, q) = (evaluation.equations(), &evaluation.q[..]);
         jacobian.check(body);
         for j in 0..body.nf {
-            let moved = self.translation.column(j, q);
-            jacobian.add_by_q(body, j, &moved.cross(force));
+            let torque = match &self.named {
+                Some(named) => named.turning.column(j, q) * force.x,
+                None => self.translation.column(j, q).cross(force),
+            };
+            jacobian.add_by_q(body, j, &torque);
         }
         self.add_second(evaluation, &self.translation, force, jacobian);
-        if axes == LoadAxes::World {
+        if axes == LoadAxes::World && self.named.is_none() {
             let place = self.place(evaluation);
             for (at, &axis) in body.axes.iter().enumerate() {
                 let turned = force.cross(&Vector3::ith(axis, 1.0));

@@ -6,6 +6,8 @@
 //! ```text
 //! y(t) = y0 + sum_k channel_k(t) y_k,        channel_k = q_j / factor, f_a / factor or w_k w_l / factor
 //! ```
+//!
+//! The load f_a of a named load is its amplitude, that of a preload 1.
 
 use super::LoadedHistory;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -57,6 +59,9 @@ enum Source {
     Spin(usize, usize),
     /// Index of the load of the history, and the component of force and torque.
     Load(usize, usize),
+    /// Index of the named load of the history.
+    Amplitude(usize),
+    Preload,
     /// Load that the history does not have.
     Unloaded,
 }
@@ -76,6 +81,8 @@ impl LoadedHistory {
             Source::Mode(j) => self.q[i][j],
             Source::Spin(k, l) => self.angular_velocity.as_ref().map_or(0.0, |w| w[i][k] * w[i][l]),
             Source::Load(at, component) => self.loads[at].values[i][component / 3][component % 3],
+            Source::Amplitude(at) => self.named[at].values[i],
+            Source::Preload => 1.0,
             Source::Unloaded => 0.0,
         };
         let at = |i: usize| {
@@ -141,6 +148,11 @@ impl LoadedHistory {
                 let load = self.loads.iter().position(|load| load.interface == interface.name);
                 return Ok(load.map_or(Source::Unloaded, |load| Source::Load(load, component)));
             }
+        }
+        if let Some(load) = body.named_loads().iter().find(|load| load.name == name) {
+            let own = self.named.iter().position(|one| one.load == name);
+            let acting = own.map_or(Source::Unloaded, Source::Amplitude);
+            return Ok(if load.preload { Source::Preload } else { acting });
         }
         Err(foreign(format!("step `{name}` is no mode and no load of the body")).into())
     }

@@ -1,6 +1,6 @@
 //! A scene as data. Numbers are in the units of the body that the scene is for.
 
-use super::{Axes, Requirements, VectorHistory};
+use super::{Axes, History, Requirements, VectorHistory};
 use crate::dynamics::{RotationVector, Terms};
 use flexbody_base::provenance::SourceFile;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
@@ -224,6 +224,8 @@ pub enum Point {
     Node(i64),
     /// Interface of this name.
     Interface(String),
+    /// Nodal forces of the named load of this name: the component x of a force at it is their amplitude.
+    NamedLoad(String),
 }
 
 impl std::fmt::Display for Point {
@@ -231,6 +233,7 @@ impl std::fmt::Display for Point {
         match self {
             Self::Node(number) => write!(f, "node {number}"),
             Self::Interface(name) => write!(f, "interface {name}"),
+            Self::NamedLoad(name) => write!(f, "named load {name}"),
         }
     }
 }
@@ -258,6 +261,21 @@ pub struct Load {
 }
 
 impl Load {
+    /// Creates a named load with an amplitude over time.
+    pub fn named(name: impl Into<String>, amplitude: History) -> Self {
+        Self {
+            at: Point::NamedLoad(name.into()),
+            force: VectorHistory::Along { direction: Vector3::x(), factor: amplitude },
+            torque: VectorHistory::nothing(),
+            axes: Axes::Model,
+        }
+    }
+
+    /// Returns true for a named load, which has an amplitude and no direction.
+    pub fn is_named(&self) -> bool {
+        matches!(self.at, Point::NamedLoad(_))
+    }
+
     /// Returns force and torque at a time, along the axes of the load.
     pub fn at_time(&self, time: f64) -> (Vector3<f64>, Vector3<f64>) {
         (self.force.at(time).0, self.torque.at(time).0)
@@ -446,7 +464,7 @@ impl Scene {
         match change {
             Change::Turn { axis, angle, load } => {
                 let rotation = Rotation3::from_axis_angle(axis, *angle);
-                self.with_loads(*load, |history| history.turned(rotation.matrix()))
+                self.with_turned_loads(*load, rotation.matrix())
             }
             Change::Scale { factor, load } => self.with_loads(*load, |history| history.scaled(*factor)),
             Change::Move { load, to } => {
@@ -465,6 +483,14 @@ impl Scene {
                 scene
             }
         }
+    }
+
+    /// Returns the scene with one load, or all of them, turned; a named load has no direction and stays.
+    fn with_turned_loads(&self, load: Option<usize>, rotation: &Matrix3<f64>) -> Self {
+        let mut scene = self.with_loads(load, |history| history.turned(rotation));
+        let named = scene.loads.iter_mut().zip(&self.loads).filter(|(load, _)| load.is_named());
+        named.for_each(|(load, unchanged)| load.clone_from(unchanged));
+        scene
     }
 
     /// Returns the scene with the histories of one load, or of all, replaced by `change` of each.
@@ -512,8 +538,9 @@ impl Scene {
     /// Returns the scene with its loads turned or, without loads, with its prescribed translation turned. Returns `None`
     /// if it has neither.
     fn turned_excitation(&self, rotation: &Matrix3<f64>) -> Option<(&'static str, Scene)> {
-        if self.acting().any(|history| !history.is_nothing()) {
-            return Some(("loads", self.with_loads(None, |history| history.turned(rotation))));
+        let stays = |load: &Load| load.is_named() || load.force.is_nothing() && load.torque.is_nothing();
+        if !self.loads.iter().all(stays) {
+            return Some(("loads", self.with_turned_loads(None, rotation)));
         }
         let mut scene = self.clone();
         let drive = scene.carried.as_mut()?.translation.as_mut()?;

@@ -4,11 +4,11 @@
 //! of a scene does not depend on this choice: everything is computed in the frame defined here, and vectors
 //! of the results are along its axes, which are those of the model.
 
-use super::{Axes, Carried, Load, Point, Range, Scene, VectorHistory};
+use super::{Axes, Carried, History, Load, Point, Range, Scene, VectorHistory};
 use crate::dynamics::{Orientation, RotationVector};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_body::flex_body::{Carrier, FlexBody};
+use flexbody_body::flex_body::{Carrier, FlexBody, LoadKind};
 use nalgebra::{Matrix3, Vector3};
 use std::borrow::Cow;
 
@@ -45,6 +45,7 @@ impl<'a> FramedScene<'a> {
             return Ok(Self { body: Cow::Borrowed(body), scene: Cow::Borrowed(scene), found: Vec::new() });
         }
         refuse_beyond_range(scene, &body.frame().axes)?;
+        refuse_loaded_preloads(body, scene)?;
         let (framed_body, mut found) = match &scene.carried {
             Some(carried) => {
                 let carrier = carried.carrier();
@@ -64,10 +65,55 @@ impl<'a> FramedScene<'a> {
                 (centred(body)?, Vec::new())
             }
         };
-        let resolved = resolved(scene, &body.frame().axes, &framed_body.frame().origin);
+        let mut resolved = resolved(scene, &body.frame().axes, &framed_body.frame().origin);
         found.extend(idle(&framed_body, &resolved));
+        found.extend(released_preloads(body, scene));
+        found.extend(unused_stiffness(body, scene));
+        let preloads = body.named_loads().iter().filter(|load| load.preload);
+        let acting = preloads.map(|load| Load::named(&load.name, History::Constant(1.0)));
+        resolved.loads.extend(acting);
         Ok(Self { body: framed_body, scene: Cow::Owned(resolved), found })
     }
+}
+
+/// Returns an error for a scene that gives a preload an amplitude.
+fn refuse_loaded_preloads(body: &FlexBody, scene: &Scene) -> Result<()> {
+    let is_preload = |point: &&Point| match point {
+        Point::NamedLoad(name) => body.named_loads().iter().any(|load| load.preload && load.name == *name),
+        _ => false,
+    };
+    let Some(point) = scene.loads.iter().map(|load| &load.at).find(is_preload) else { return Ok(()) };
+    let message = format!("{point} is a preload, which acts always with amplitude 1");
+    let help = "remove this [[load]], or convert the model with `preload = false` in its [[named_load]]";
+    Err(Diagnostic::new(Code::SceneContradicts, message).with_help(help).into())
+}
+
+/// Returns a warning if the body starts undeformed although it has preloads.
+fn released_preloads(body: &FlexBody, scene: &Scene) -> Option<Diagnostic> {
+    let preloads = body.named_loads().iter().filter(|load| load.preload);
+    let names: Vec<String> = preloads.map(|load| format!("`{}`", load.name)).collect();
+    let starts = scene.run.duration.is_some() && !scene.initial.settled && scene.initial.modes.is_empty();
+    (starts && !names.is_empty()).then(|| {
+        let message = format!(
+            "the body starts undeformed under the preload {}, which begins at time zero with a shock",
+            names.join(", ")
+        );
+        Diagnostic::new(Code::PreloadReleased, message)
+    })
+}
+
+/// Returns a warning if a named load of the scene has geometric stiffness.
+fn unused_stiffness(body: &FlexBody, scene: &Scene) -> Option<Diagnostic> {
+    let has_stiffness = |name: &str| {
+        let of = |kind: &LoadKind| matches!(kind, LoadKind::Named(load) if load == name);
+        body.geometric_stiffness().iter().any(|one| of(&one.load.kind))
+    };
+    let point = scene.loads.iter().map(|load| &load.at).find(|point| match point {
+        Point::NamedLoad(name) => has_stiffness(name),
+        _ => false,
+    })?;
+    let message = format!("{point} acts without its geometric stiffness");
+    Some(Diagnostic::new(Code::NamedStiffnessUnused, message))
 }
 
 /// Returns an error for initial values of modes by number if the body is simulated in mean axes, where it
@@ -89,7 +135,8 @@ impl Carried {
     pub fn carrier(&self) -> Carrier {
         match &self.by {
             Point::Node(number) => Carrier::Node(*number),
-            Point::Interface(name) => Carrier::Interface(name.clone()),
+            // The reader accepts nodes and interfaces; a body has no carrier of another name.
+            Point::Interface(name) | Point::NamedLoad(name) => Carrier::Interface(name.clone()),
         }
     }
 }

@@ -43,7 +43,7 @@ pub use history::{Axes, History, VectorHistory};
 pub use instants::{Instant, highest_excited_rate, instants, unsettled_rate};
 pub use load_cases::LoadCases;
 pub use prepared::{damped, damped_once, ends_a_run, fastest_history, find_nodal_point, nodal_point};
-pub use recovered::{LoadHistory, LoadedHistory, RecoveredMotion};
+pub use recovered::{AmplitudeHistory, LoadHistory, LoadedHistory, RecoveredMotion};
 pub use recovery_errors::{RecoveryMeasure, TracedRecoveries};
 pub use requirements::{
     Attachment, AttachmentKind, Limits, MotionRange, PerQuantity, Range, RecoveryLimit, RecoveryTolerance,

@@ -335,13 +335,17 @@ impl Effort {
 // Points of a scene among the nodes of a model.
 
 /// Finds `point` among the nodes of `model`. Returns `None` if the model has no such node, or no such
-/// interface with a reference point.
+/// interface with a reference point, or no such named load.
 ///
 /// # Errors
 /// [`InterfaceNode`](Code::InterfaceNode) if the model has no interfaces.
 pub fn find_nodal_point(model: &FeModel, point: &Point) -> Result<Option<NodalPoint>> {
     match point {
         Point::Interface(name) => NodalPoint::interface(model, name),
+        Point::NamedLoad(name) => {
+            let load = model.named_loads().iter().find(|load| load.name == *name);
+            Ok(load.map(NodalPoint::named_load))
+        }
         Point::Node(number) => {
             let node = model.nodes().ids.iter().position(|id| id == number);
             Ok(node.map(|node| NodalPoint::node(model, node)))

@@ -3,11 +3,11 @@
 use super::read_columns::{HistoryFiles, columns_history, finite, place_of, positive};
 use super::read_requirements::{self, requirements};
 use super::read_values::{
-    EVERY, axes, direction, history, list, mode_number, place, transposed, turning, vector,
+    EVERY, axes, direction, history, list, loaded_place, mode_number, place, transposed, turning, vector,
 };
 use super::{
-    Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, ModeStart, Run, Scene, Scheme,
-    Spin, VectorHistory,
+    Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, ModeStart, Point, Run, Scene,
+    Scheme, Spin, VectorHistory,
 };
 use crate::dynamics::Terms;
 use flexbody_base::diagnostic::Code;
@@ -24,7 +24,7 @@ const INITIAL: &[&str] =
     &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode", "deformation"];
 const MODE: &[&str] = &["number", "amplitude", "rate"];
 const LOAD: &[&str] =
-    &["node", "interface", "force", "torque", "force_from", "torque_from", "axes", "history"];
+    &["node", "interface", "named_load", "force", "torque", "force_from", "torque_from", "axes", "history"];
 const SPIN: &[&str] = &["axis", "axes", "rate", "angular_velocity_from", "attitude_from", "hold"];
 const WATCH: &[&str] = &["node", "interface"];
 /// Default number of output times.
@@ -230,12 +230,21 @@ fn settled(walk: &mut Walk<'_>, value: &Value) -> Option<bool> {
 
 fn load(walk: &mut Walk<'_>, files: &HistoryFiles, table: &TomlTable, span: Range<usize>) -> Option<Load> {
     walk.known_keys(table, "[[load]]", LOAD);
-    let at = place(walk, table, span.clone());
+    let at = loaded_place(walk, table, span.clone());
     let factor = match table.get("history") {
         Some(value) => history(walk, files, "history", value),
         None => Some(History::Constant(1.0)),
     };
     let has = |key: &str| table.contains_key(key);
+    if has("named_load") {
+        let of_places = ["force", "torque", "force_from", "torque_from", "axes"];
+        for key in of_places.into_iter().filter(|key| has(key)) {
+            let message = format!("a named load has no `{key}`: `history` is its amplitude");
+            walk.wrong(span.clone(), message);
+        }
+        let Some(Point::NamedLoad(name)) = at else { return None };
+        return Some(Load::named(name, factor?));
+    }
     if !["force", "torque", "force_from", "torque_from"].into_iter().any(has) {
         walk.wrong(span.clone(), "load has neither `force` nor `torque`".to_owned());
     }

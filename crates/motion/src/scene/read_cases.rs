@@ -306,7 +306,19 @@ fn varied(
     let mut varied_scene = scene(walk, &merged(case, table), unchanged.name.clone())?;
     varied_scene.name.clone_from(&unchanged.name);
     varied_scene.case.clone_from(&unchanged.case);
-    for change in changes(walk, table, span, varied_scene.loads.len())? {
+    let all = changes(walk, table, span, varied_scene.loads.len())?;
+    let is_named = |load: usize| varied_scene.loads[load].is_named();
+    let misplaced = |change: &Change| match change {
+        Change::Move { load, .. } | Change::Turn { load: Some(load), .. } => is_named(*load),
+        _ => false,
+    };
+    if all.iter().any(misplaced) {
+        let message =
+            "a named load has neither a point nor a direction that a variation can change: give `scale`";
+        walk.wrong(span.clone(), message.to_owned());
+        return None;
+    }
+    for change in all {
         varied_scene = varied_scene.changed(&change);
     }
     if varied_scene == *unchanged {

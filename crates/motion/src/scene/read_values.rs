@@ -77,6 +77,18 @@ pub(super) fn direction(walk: &mut Walk<'_>, table: &TomlTable, key: &str) -> Op
     unit
 }
 
+/// Reads a node, an interface or a named load.
+pub(super) fn loaded_place(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<Point> {
+    if !table.contains_key("named_load") {
+        return place(walk, table, span);
+    }
+    if table.contains_key("node") || table.contains_key("interface") {
+        walk.wrong(span, "a load is at one place: `node`, `interface` or `named_load`".to_owned());
+        return None;
+    }
+    Some(Point::NamedLoad(walk.string(table, "named_load")?))
+}
+
 /// Reads a node or an interface.
 pub(super) fn place(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<Point> {
     match (table.get("node"), table.contains_key("interface")) {

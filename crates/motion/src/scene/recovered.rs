@@ -36,6 +36,17 @@ pub struct LoadedHistory {
     pub angular_velocity: Option<Vec<Vector3<f64>>>,
     /// Loads of the interfaces that the file has columns of.
     pub loads: Vec<LoadHistory>,
+    /// Amplitudes of the named loads that the file has columns of.
+    pub named: Vec<AmplitudeHistory>,
+}
+
+/// Amplitude of a named load over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AmplitudeHistory {
+    /// Name of the load.
+    pub load: String,
+    /// Amplitude at each time.
+    pub values: Vec<f64>,
 }
 
 /// Force and torque at the reference point of an interface over time.
@@ -71,9 +82,10 @@ impl RecoveredMotion {
 }
 
 impl LoadedHistory {
-    /// Reads the columns `time`, `q_1` to `q_n`, `angular_velocity_x` to `_z` and, for every interface of the body with
-    /// a reference point, `NAME force_x` to `_z` and `NAME torque_x` to `_z`. Columns of an interface without load may be
-    /// absent. Other columns are ignored.
+    /// Reads the columns `time`, `q_1` to `q_n`, `angular_velocity_x` to `_z`, for every interface of the body with
+    /// a reference point `NAME force_x` to `_z` and `NAME torque_x` to `_z`, and for every named load but preloads `NAME`.
+    /// Columns of an interface without load, and of a named load that does not act, may be absent. Other columns are
+    /// ignored.
     ///
     /// # Errors
     /// FB215 for missing columns, also if a vector has only some of its three; FB216 for rows that cannot be read and for
@@ -97,6 +109,14 @@ impl LoadedHistory {
                 loaded.push((interface.name.clone(), parts));
             }
         }
+        let acting = body.named_loads().iter().filter(|load| !load.preload);
+        let named: Vec<(&str, usize)> = acting
+            .filter(|load| has_column(&file, &load.name))
+            .map(|load| {
+                wanted.push(load.name.clone());
+                (load.name.as_str(), wanted.len() - 1)
+            })
+            .collect();
         let keys: Vec<ColumnKey> = wanted.into_iter().map(ColumnKey::Name).collect();
         let all = read_series(&file, &ColumnKey::Name("time".to_owned()), &keys).map_err(Error::new)?;
         let rows = 0..all.times.len();
@@ -109,18 +129,29 @@ impl LoadedHistory {
             values: rows.clone().map(|i| parts.map(|part| at(part, i))).collect(),
         };
         let loads = loaded.into_iter().map(load).collect();
+        let amplitude = |(load, place): (&str, usize)| AmplitudeHistory {
+            load: load.to_owned(),
+            values: all.columns[place].clone(),
+        };
+        let named = named.into_iter().map(amplitude).collect();
         let angular_velocity = spin.map(|_| rows.clone().map(|i| at(spin, i)).collect());
         let modes = &all.columns[..body.n_modes()];
         let q = rows.map(|i| modes.iter().map(|column| column[i]).collect()).collect();
-        Ok(Self { path: path.to_owned(), time: all.times, q, angular_velocity, loads })
+        Ok(Self { path: path.to_owned(), time: all.times, q, angular_velocity, loads, named })
     }
 
-    /// Returns the names of the interfaces that `body` has columns of and this history has no loads of; they count as
-    /// unloaded.
+    /// Returns the names of the interfaces and of the named loads that `body` has columns of and this history has no loads
+    /// of; they count as unloaded.
     pub fn unloaded<'b>(&self, body: &'b FlexBody) -> Vec<&'b str> {
         let known = |name: &str| self.loads.iter().any(|load| load.interface == name);
         let interfaces = body.interfaces().iter().filter(|interface| interface.reference.is_some());
-        interfaces.map(|interface| interface.name.as_str()).filter(|name| !known(name)).collect()
+        let acting = body.named_loads().iter().filter(|load| !load.preload).map(|load| load.name.as_str());
+        let absent = acting.filter(|name| self.named.iter().all(|one| one.load != *name));
+        interfaces
+            .map(|interface| interface.name.as_str())
+            .filter(|name| !known(name))
+            .chain(absent)
+            .collect()
     }
 
     /// Returns recoveries of `body` over this motion: all of them, or those with the given names. Their largest values
@@ -133,7 +164,7 @@ impl LoadedHistory {
     pub fn recover(&self, body: &FlexBody, names: &[String]) -> Result<RecoveredMotion> {
         let chosen = chosen(body, names)?;
         self.refuse_torque_without_rotation(body)?;
-        let layout = RowLayout::new(body.n_modes(), chosen.iter().copied());
+        let layout = RowLayout::new(body, chosen.iter().copied());
         let recoveries: Vec<RowMap> = chosen.iter().map(|one| RowMap::new(one, &layout)).collect();
         self.refuse_unknown_spin(&recoveries)?;
         let states = self.states(body, layout)?;
@@ -171,6 +202,11 @@ impl LoadedHistory {
             for (place, load) in &places {
                 let [force, torque] = load.values[i].map(|vector| to_body * vector);
                 states.layout.add_load(&mut z, *place, &force, &torque);
+            }
+            for (place, load) in body.named_loads().iter().enumerate() {
+                let own = self.named.iter().find(|one| one.load == load.name);
+                let amplitude = if load.preload { 1.0 } else { own.map_or(0.0, |one| one.values[i]) };
+                states.layout.add_amplitude(&mut z, place, amplitude);
             }
             states.push(time, &z);
         }
@@ -252,7 +288,7 @@ impl SceneRows {
         if all.is_empty() {
             return None;
         }
-        let layout = RowLayout::new(body.n_modes(), all);
+        let layout = RowLayout::new(body, all);
         let recoveries: Vec<RowMap> = all.iter().map(|one| RowMap::new(one, &layout)).collect();
         let sampler = RowSampler::new(layout.clone(), scene);
         let unseen = sampler.unseen(scene);

@@ -34,7 +34,7 @@ impl TracedRecoveries {
             return Ok(None);
         }
         let chosen = limits.iter().map(|one| limited(body, one)).collect::<Result<Vec<_>>>()?;
-        let layout = RowLayout::new(body.n_modes(), chosen.iter().copied());
+        let layout = RowLayout::new(body, chosen.iter().copied());
         let maps = chosen.iter().map(|one| RowMap::new(one, &layout)).collect();
         let sampler = RowSampler::new(layout.clone(), scene);
         Ok(Some((Self { maps, states: RowStates::new(layout) }, sampler)))
@@ -172,7 +172,7 @@ impl RecoveryMeasure {
         let own: Vec<RowMap> = match recovered {
             Some(motion) => motion.recoveries.clone(),
             None => {
-                let layout = RowLayout::new(body.n_modes(), body.recoveries());
+                let layout = RowLayout::new(body, body.recoveries());
                 body.recoveries().iter().map(|one| RowMap::new(one, &layout)).collect()
             }
         };

@@ -4,29 +4,32 @@ use super::surroundings::SceneForces;
 use super::{Point, Scene, StressPoint};
 use crate::dynamics::Snapshot;
 use faer::Mat;
-use flexbody_body::flex_body::{LOAD_COMPONENTS, Recovery, RecoveryRow, StaticCoordinates};
+use flexbody_body::flex_body::{FlexBody, LOAD_COMPONENTS, Recovery, RecoveryRow, StaticCoordinates};
 use flexbody_model::LoadKind;
 use nalgebra::Vector3;
 
-/// Order of the numbers z = (1, q, f_1 ... f_m, w_k w_l) that rows are linear in: a constant, modal coordinates, force
-/// and torque at each interface, products of the angular velocity in the order of [`LoadKind::SPIN`].
+/// Order of the numbers z = (1, q, f_1 ... f_m, a, w_k w_l) that rows are linear in: a constant, modal coordinates, force
+/// and torque at each interface, amplitudes of the named loads, products of the angular velocity in the order of
+/// [`LoadKind::SPIN`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RowLayout {
     modes: usize,
     interfaces: Vec<String>,
+    named: Vec<String>,
 }
 
 impl RowLayout {
-    /// Creates the order for `recoveries` of one body with the given number of modes: all interfaces that any of them
-    /// has columns of.
-    pub fn new<'r>(modes: usize, recoveries: impl IntoIterator<Item = &'r Recovery>) -> Self {
+    /// Creates the order for `recoveries` of `body`: all interfaces that any of them has columns of, and all named loads
+    /// of the body.
+    pub fn new<'r>(body: &FlexBody, recoveries: impl IntoIterator<Item = &'r Recovery>) -> Self {
         let mut interfaces: Vec<String> = Vec::new();
         for load in recoveries.into_iter().flat_map(|one| &one.loads) {
             if !interfaces.contains(&load.interface) {
                 interfaces.push(load.interface.clone());
             }
         }
-        Self { modes, interfaces }
+        let named = body.named_loads().iter().map(|load| load.name.clone()).collect();
+        Self { modes: body.n_modes(), interfaces, named }
     }
 
     /// Returns the length of z.
@@ -63,8 +66,27 @@ impl RowLayout {
         1 + self.modes + LOAD_COMPONENTS * interface
     }
 
+    /// Returns the names of the named loads, in the order of their amplitudes.
+    pub fn named_loads(&self) -> &[String] {
+        &self.named
+    }
+
+    /// Returns the amplitude of a named load in the state z.
+    pub fn amplitude_of(&self, z: &[f64], named: usize) -> f64 {
+        z[self.amplitude(named)]
+    }
+
+    /// Adds to the amplitude of a named load in the state z.
+    pub fn add_amplitude(&self, z: &mut [f64], named: usize, amplitude: f64) {
+        z[self.amplitude(named)] += amplitude;
+    }
+
+    fn amplitude(&self, named: usize) -> usize {
+        self.load(self.interfaces.len()) + named
+    }
+
     fn spin(&self) -> usize {
-        self.load(self.interfaces.len())
+        self.amplitude(self.named.len())
     }
 
     /// Returns z of a state without loads.
@@ -90,6 +112,11 @@ impl RowLayout {
                 z[self.load(at)..][..LOAD_COMPONENTS].copy_from_slice(order.load_of(of, known));
             }
         }
+        for (at, name) in self.named.iter().enumerate() {
+            if let Some(known) = order.named.iter().position(|other| other == name) {
+                z[self.amplitude(at)] = order.amplitude_of(of, known);
+            }
+        }
         z[self.spin()..].copy_from_slice(&of[order.spin()..]);
         z
     }
@@ -105,6 +132,7 @@ impl RowLayout {
                 place(self.load(at), part);
             }
         }
+        place(self.amplitude(0), &of.named);
         if let Some(spin) = &of.spin {
             place(self.spin(), spin);
         }
@@ -192,31 +220,45 @@ impl<'a> SampledStates<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct RowSampler {
     pub layout: RowLayout,
-    /// Interface of each load of the scene among those with static columns; `None` for a place without.
-    loaded: Vec<Option<usize>>,
+    /// Static columns of each load of the scene; `None` for a place without.
+    loaded: Vec<Option<Columns>>,
     /// Interface that carries the body.
     carrier: Option<usize>,
+}
+
+/// Static columns of a load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Columns {
+    /// The columns of an interface, by its place in the layout.
+    Interface(usize),
+    /// The column of a named load, by its place in the layout.
+    Named(usize),
 }
 
 impl RowSampler {
     /// Creates the states in the order `layout` for `scene`.
     pub(super) fn new(layout: RowLayout, scene: &Scene) -> Self {
         let column = |place: &Point| match place {
-            Point::Interface(name) => layout.interface(name),
+            Point::Interface(name) => layout.interface(name).map(Columns::Interface),
+            Point::NamedLoad(name) => layout.named.iter().position(|known| known == name).map(Columns::Named),
             Point::Node(_) => None,
         };
+        let carrier = scene.carried.as_ref().and_then(|carried| column(&carried.by));
         Self {
             loaded: scene.loads.iter().map(|load| column(&load.at)).collect(),
-            carrier: scene.carried.as_ref().and_then(|carried| column(&carried.by)),
+            carrier: match carrier {
+                Some(Columns::Interface(place)) => Some(place),
+                _ => None,
+            },
             layout,
         }
     }
 
     /// Returns the places of loads and of a carrier without static columns.
     pub(super) fn unseen<'s>(&self, scene: &'s Scene) -> Vec<&'s Point> {
-        let loads = scene.loads.iter().map(|load| &load.at).zip(self.loaded.iter().copied());
-        let carrier = scene.carried.iter().map(|carried| (&carried.by, self.carrier));
-        loads.chain(carrier).filter(|(_, column)| column.is_none()).map(|(place, _)| place).collect()
+        let loads = scene.loads.iter().map(|load| &load.at).zip(self.loaded.iter().map(Option::is_some));
+        let carrier = scene.carried.iter().map(|carried| (&carried.by, self.carrier.is_some()));
+        loads.chain(carrier).filter(|(_, is_seen)| !is_seen).map(|(place, _)| place).collect()
     }
 
     /// Returns z of the body at a state of its motion.
@@ -224,8 +266,10 @@ impl RowSampler {
         let evaluation = now.evaluation();
         let mut z = self.layout.state(evaluation.modal_coordinates(), &evaluation.rigid_velocity().1);
         for (place, (_, force, torque)) in self.loaded.iter().zip(forces.acting(time, now.place())) {
-            if let Some(place) = *place {
-                self.layout.add_load(&mut z, place, &force, &torque);
+            match *place {
+                Some(Columns::Interface(place)) => self.layout.add_load(&mut z, place, &force, &torque),
+                Some(Columns::Named(place)) => self.layout.add_amplitude(&mut z, place, force.x),
+                None => {}
             }
         }
         // The frame of a carried body has its origin at the reference point of the carrier.
@@ -246,7 +290,8 @@ pub struct RowMap {
     pub rows: Vec<RecoveryRow>,
     /// Points with all six stresses among the rows.
     pub points: Vec<StressPoint>,
-    /// Columns y0, R Psi, R G_r b_a of all interfaces of the layout, -R G_r M c_kl (rows x length of z).
+    /// Columns y0, R Psi, R G_r b_a of all interfaces of the layout, R G_r f of the named loads, -R G_r M c_kl (rows x length
+    /// of z).
     pub(super) matrix: Mat<f64>,
 }
 
@@ -262,6 +307,8 @@ impl RowMap {
                     layout.load(layout.interface(&load.interface).expect("a layout of this recovery"));
                 (0..LOAD_COMPONENTS).for_each(|a| matrix[(i, first + a)] = load.columns[(i, a)]);
             }
+            (0..recovery.named.ncols())
+                .for_each(|c| matrix[(i, layout.amplitude(c))] = recovery.named[(i, c)]);
             (0..LoadKind::SPIN.len()).for_each(|c| matrix[(i, layout.spin() + c)] = recovery.spin[(i, c)]);
         }
         let points = StressPoint::among(&recovery.rows);

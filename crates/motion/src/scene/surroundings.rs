@@ -71,13 +71,21 @@ pub fn points_of(body: &FlexBody, scene: &Scene) -> Result<(Vec<BodyPoint>, Vec<
     Ok((forces.loads.into_iter().map(|(point, _)| point).collect(), watched))
 }
 
-/// Returns a node or the reference point of an interface of `body`, with geometric stiffness if `terms`
+/// Returns a node, the reference point of an interface or a named load of `body`, with geometric stiffness if `terms`
 /// contain it; or the reason why there is no such point.
 pub fn body_point(body: &FlexBody, terms: Terms, place: &Point) -> std::result::Result<BodyPoint, String> {
     match place {
         Point::Node(number) => {
             let at = body.nodes().ids.iter().position(|id| id == number);
             at.map(|at| BodyPoint::node(body, at)).ok_or_else(|| format!("the body has no node {number}"))
+        }
+        Point::NamedLoad(name) => {
+            let load = body.named_loads().iter().find(|load| load.name == *name);
+            load.map(BodyPoint::named_load).ok_or_else(|| {
+                let all: Vec<&str> = body.named_loads().iter().map(|load| load.name.as_str()).collect();
+                let known = if all.is_empty() { "it has none".to_owned() } else { all.join(", ") };
+                format!("the body has no named load `{name}`: {known}")
+            })
         }
         Point::Interface(name) => {
             let interface = body.interfaces().iter().find(|interface| interface.name == *name);

@@ -62,7 +62,9 @@ fn stresses(body: &FlexBody, omega: Vector3<f64>, instants: &[f64]) -> [Vec<Vec<
         let now = other.evaluate(time, state)?;
         let q = now.evaluation().modal_coordinates();
         let omega = now.evaluation().rigid_velocity().1;
-        let at = |angular_velocity| recovery.values(&RecoveryState { q, angular_velocity, loads: &[] });
+        let at = |angular_velocity| {
+            recovery.values(&RecoveryState { q, angular_velocity, loads: &[], named: &[] })
+        };
         with.push(at(omega));
         alone.push(at(Vector3::zeros()));
         Ok::<(), Failure>(())
@@ -112,7 +114,7 @@ fn numbers(seed: u64) -> impl FnMut() -> f64 {
 fn extremes_are_those_of_all_rows_and_instants() {
     let body = arm(8);
     let recovery = &body.recoveries()[0];
-    let layout = RowLayout::new(body.n_modes(), [recovery]);
+    let layout = RowLayout::new(&body, [recovery]);
     let map = RowMap::new(recovery, &layout);
     for seed in 0..20 {
         let mut random = numbers(seed);

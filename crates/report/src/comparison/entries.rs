@@ -281,7 +281,8 @@ impl BodyComparison {
         let (mut differing, mut in_modes, mut at_rest) = (0, 0.0, 0.0);
         for own in a {
             let other = b.iter().find(|other| other.name == own.name);
-            let Some(other) = other.filter(|other| are_alike(own, other)) else {
+            let same_loads = pair.named_loads_alike();
+            let Some(other) = other.filter(|other| same_loads && are_alike(own, other)) else {
                 let what = if other.is_some() {
                     "differs in its rows or loads"
                 } else {
@@ -305,6 +306,17 @@ impl BodyComparison {
         self.row("rows in the modes", meaning, in_modes, tolerance);
         let meaning = "under constant unit loads and undeformed / largest row of the load";
         self.row("rows at rest", meaning, at_rest, tolerance);
+    }
+}
+
+impl Pair<'_> {
+    /// Returns true if both bodies have the same named loads in the same order.
+    fn named_loads_alike(&self) -> bool {
+        self.a.named_loads().iter().map(|load| &load.name).eq(self
+            .b
+            .named_loads()
+            .iter()
+            .map(|load| &load.name))
     }
 }
 
@@ -339,6 +351,9 @@ fn difference_at_rest(a: &Recovery, b: &Recovery) -> f64 {
         worst = larger(worst, relative(largest_entry((a - b).as_ref()), size));
     };
     see(a.spin.as_ref(), b.spin.as_ref());
+    for c in 0..a.named.ncols() {
+        see(a.named.as_ref().subcols(c, 1), b.named.as_ref().subcols(c, 1));
+    }
     for own in &a.loads {
         let other = b.loads.iter().find(|other| other.interface == own.interface).expect("the same loads");
         for kind in COLUMNS {

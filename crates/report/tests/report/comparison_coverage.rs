@@ -5,7 +5,7 @@ use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     FixedInterface, FlexBody, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
-    LoadColumns, LoadKind, LumpedBody, MassStructure, Parts, Quantity, Recovery, RecoveryRow,
+    LoadColumns, LoadKind, LumpedBody, MassStructure, NamedLoad, Parts, Quantity, Recovery, RecoveryRow,
     ReferenceConditions, Storage, SurfaceMesh, TermDecision, TermGroup, UnitLoad,
 };
 use flexbody_body::invariants::{BodyFrame, DIGITS, Frame, GeneralTerms, InertiaStiffness};
@@ -111,6 +111,17 @@ fn complete() -> FlexBody {
         modes: Mat::from_fn(1, nf, number),
         spin: Mat::from_fn(1, 6, number),
         loads: vec![LoadColumns { interface: "left".to_owned(), columns: Mat::from_fn(1, 6, number) }],
+        named: Mat::from_fn(1, 1, number),
+    }];
+    parts.named_loads = vec![NamedLoad {
+        name: "bolts".to_owned(),
+        preload: false,
+        modal: (0..nf).map(|j| number(0, j)).collect(),
+        force: Vector3::new(1.0, -0.5, 0.25),
+        torque: Vector3::new(0.5, 1.0, -2.0),
+        moments: Matrix3::from_fn(number),
+        turning: Mat::from_fn(3, nf, number),
+        compliance: Some(1.0),
     }];
     parts.conditions = ReferenceConditions::Interface("right".to_owned());
     parts.mesh = Some(SurfaceMesh::new(vec![[0, 1, 4]], vec![[0, 1]], n).expect("a triangle"));
@@ -162,6 +173,15 @@ const CHANGES: &[Change] = &[
     ("/recovery/<name>/offset", |p| p.recoveries[0].offset[0] += 1e-3),
     ("/recovery/<name>/modes", |p| p.recoveries[0].modes[(0, 2)] += 1e-3),
     ("/recovery/<name>/spin", |p| p.recoveries[0].spin[(0, 2)] += 1e-3),
+    ("/recovery/<name>@named_loads", |p| p.named_loads[0].name = "nuts".to_owned()),
+    ("/recovery/<name>/named", |p| p.recoveries[0].named[(0, 0)] += 1e-3),
+    ("/named_loads/<name>@preload", |p| p.named_loads[0].preload = true),
+    ("/named_loads/<name>/modal", |p| p.named_loads[0].modal[2] += 1e-3),
+    ("/named_loads/<name>/force", |p| p.named_loads[0].force.x += 1e-3),
+    ("/named_loads/<name>/torque", |p| p.named_loads[0].torque.y += 1e-3),
+    ("/named_loads/<name>/moments", |p| p.named_loads[0].moments[(1, 2)] += 1e-3),
+    ("/named_loads/<name>/turning", |p| p.named_loads[0].turning[(1, 2)] += 1e-3),
+    ("/named_loads/<name>@compliance", |p| p.named_loads[0].compliance = Some(1.001)),
     ("/recovery/<name>/loads", |p| p.recoveries[0].loads[0].columns[(0, 2)] += 1e-3),
 ];
 

@@ -55,7 +55,7 @@ impl<'v> Projected<'v> {
         let turned = |a: usize, x: &Mat<f64>| rows.turned(&Vector3::ith(a, 1.0), x);
         let project_inertia = |forces: Mat<f64>| project(rows.restrict(forces));
         // The columns of F, term by term: loads, elastic, damping and inertia forces of the modes.
-        let mut parts: Vec<Mat<f64>> = view.loads.iter().map(|load| project(-load)).collect();
+        let mut parts: Vec<Mat<f64>> = view.loads.iter().map(|load| project(-&load.unit)).collect();
         parts.push(project(view.model.pencil().apply_stiffness(view.vectors.as_ref())));
         parts.push(project(view.damped.clone()));
         parts.push(project(view.weighted.clone()));
@@ -232,6 +232,7 @@ pub(super) fn principal(gram: Mat<f64>, left_out: f64, most: usize) -> Option<(M
 
 #[cfg(test)]
 mod tests {
+    use super::super::residual::SceneLoad;
     use super::*;
     use flexbody_body::basis::{CoupledModel, ModeSettings};
     use flexbody_body::convert::{ConvertSettings, convert};
@@ -297,7 +298,7 @@ mod tests {
             let body = convert(&model, &settings, &Context::QUIET).expect("a body").body;
             let at =
                 |node: usize| nodal_point(&model, &Point::Node(model.nodes().ids[node])).expect("a node");
-            let load = at(3).unit_loads(&model);
+            let load = SceneLoad::new(&model, &at(3));
             let carrier = carried.then(|| at(0));
             let view = NodalView::new(
                 CoupledModel::uncoupled(&model),

@@ -1,7 +1,7 @@
 //! Estimate of the truncation error of a body along its motion in a scene.
 
 use super::compressed::MOST_FORCES;
-use super::residual::NodalView;
+use super::residual::{NodalView, SceneLoad};
 use super::truncated_motion::{TruncatedMotion, TruncationErrors, energy_scale};
 use super::truncated_responses::{ResonanceCriteria, TruncatedResponses};
 use faer::Mat;
@@ -13,7 +13,7 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::not_negative;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{
-    FramedScene, Instant, OutputErrors, Point, Scene, Trace, damped_once, fastest_history,
+    FramedScene, Instant, Load, OutputErrors, Point, Scene, Trace, damped_once, fastest_history,
     highest_excited_rate, instants, nodal_point, trace,
 };
 use std::f64::consts::TAU;
@@ -197,7 +197,8 @@ impl Estimate {
         let coupled = body.coupled_model(model, vectors.as_ref());
         let interfaces = coupled.rigid_interfaces();
         let at = |point: &Point| Ok(nodal_point(model, point)?.unit_loads(model));
-        let loads = scene.loads.iter().map(|load| at(&load.at)).collect::<Result<Vec<_>>>()?;
+        let load_at = |load: &Load| Ok(SceneLoad::new(model, &nodal_point(model, &load.at)?));
+        let loads = scene.loads.iter().map(load_at).collect::<Result<Vec<_>>>()?;
         let watched = scene.watched.iter().map(at).collect::<Result<Vec<_>>>()?;
         let carrier = scene.carried.as_ref().map(|carried| nodal_point(model, &carried.by)).transpose()?;
         let of_model = model.damping().filter(|_| !given);

@@ -45,7 +45,7 @@ pub(super) struct NodalView<'m> {
     /// Axes of the frame in the model.
     pub axes: Matrix3<f64>,
     /// Nodal forces of unit forces and torques at the point of each load of the scene (N x 6, in the plane N x 3).
-    pub loads: Vec<Mat<f64>>,
+    pub loads: Vec<SceneLoad>,
     /// Point that carries the body; `None` for a free body.
     pub held: Option<Held>,
 }
@@ -56,6 +56,21 @@ pub(super) struct Unbalanced {
     pub forces: Mat<f64>,
     /// Modal forces (nf x instants).
     pub in_modes: Mat<f64>,
+}
+
+/// Load of a scene at the nodes of the model.
+#[derive(Debug, Clone)]
+pub(super) struct SceneLoad {
+    /// Nodal forces of unit forces and torques at its point (N x 6, in the plane N x 3).
+    pub unit: Mat<f64>,
+    /// Nodal loads whose products with the displacements are the torque that a named load gains (N x 3); `None` for a point.
+    pub turning: Option<Mat<f64>>,
+}
+
+impl SceneLoad {
+    pub(super) fn new(model: &FeModel, point: &NodalPoint) -> Self {
+        Self { unit: point.unit_loads(model), turning: point.turning_loads(model) }
+    }
 }
 
 /// Displacements of all rows of the model with their rates and accelerations, relative to the frame (N x instants).
@@ -87,7 +102,7 @@ impl<'m> NodalView<'m> {
     pub(super) fn new(
         coupled: CoupledModel<'m>,
         body: &FlexBody,
-        loads: Vec<Mat<f64>>,
+        loads: Vec<SceneLoad>,
         carrier: Option<&NodalPoint>,
         damping: Option<&'m Damping<SymmetricMatrix>>,
     ) -> Option<Self> {
@@ -305,7 +320,7 @@ impl<'m> NodalView<'m> {
     fn loads_of(&self, motion: &[Instant]) -> Mat<f64> {
         let mut forces = Mat::zeros(self.vectors.nrows(), motion.len());
         for (at, columns) in self.loads.iter().enumerate() {
-            forces += combine(columns.as_ref(), self.load_amplitudes(motion, at).as_ref());
+            forces += combine(columns.unit.as_ref(), self.load_amplitudes(motion, at).as_ref());
         }
         forces
     }
@@ -313,7 +328,7 @@ impl<'m> NodalView<'m> {
     /// Returns force and torque of load `at`, with the components that act on its point.
     pub(super) fn load_amplitudes(&self, motion: &[Instant], at: usize) -> Mat<f64> {
         let amplitudes = self.along_model(motion, |now| now.loads[at]);
-        amplitudes.as_ref().subrows(0, self.loads[at].ncols()).to_owned()
+        amplitudes.as_ref().subrows(0, self.loads[at].unit.ncols()).to_owned()
     }
 }
 
@@ -414,13 +429,25 @@ impl NodalView<'_> {
     /// Returns the torque that the loads gain by the displacements `u` of their points, at every instant.
     fn shifts(&self, motion: &[Instant], u: &Mat<f64>) -> Vec<Vector3<f64>> {
         let mut torques = vec![Vector3::zeros(); motion.len()];
-        for (at, unit) in self.loads.iter().enumerate() {
-            let moved = self.moved(unit.as_ref(), u.as_ref());
+        for (at, load) in self.loads.iter().enumerate() {
+            let arms = self.arms(load, u.as_ref());
             for (i, torque) in torques.iter_mut().enumerate() {
-                *torque += moved[i].cross(&(self.axes * motion[i].loads[at].0));
+                *torque += arms[i] * (self.axes * motion[i].loads[at].0);
             }
         }
         torques
+    }
+
+    /// Returns, for every column of `displacements`, the matrix that gives the torque that a load gains by them from its force:
+    /// u x of the displacement u of its point; of a named load the torque of its forces in the first column.
+    pub(super) fn arms(&self, load: &SceneLoad, displacements: MatRef<'_, f64>) -> Vec<Matrix3<f64>> {
+        let Some(turning) = &load.turning else {
+            let moved = self.moved(load.unit.as_ref(), displacements);
+            return moved.iter().map(Vector3::cross_matrix).collect();
+        };
+        let torques = gram(turning.as_ref(), displacements);
+        let of = |i: usize| Matrix3::from_fn(|k, c| if c == 0 { torques[(k, i)] } else { 0.0 });
+        (0..torques.ncols()).map(of).collect()
     }
 
     /// Returns the displacement of the point with the unit loads `unit`, axes of the model, for every column.

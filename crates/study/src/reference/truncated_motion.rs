@@ -1,7 +1,7 @@
 //! Truncated part of a motion, and the errors that it causes in the outputs.
 
 use super::estimate::Grid;
-use super::residual::{BLOCK, NodalView};
+use super::residual::{BLOCK, NodalView, SceneLoad};
 use super::truncated_equations::{TruncatedAmplitudes, TruncatedDamping, TruncatedEquations};
 use super::truncated_responses::TruncatedResponses;
 use faer::{Mat, MatRef};
@@ -247,8 +247,8 @@ struct Turning {
     inertia: Matrix3<f64>,
     /// First-order change of J by each response.
     changes: Vec<Matrix3<f64>>,
-    /// Displacement of each load's point by each response.
-    at_loads: Vec<Vec<Vector3<f64>>>,
+    /// Matrix from the force of each load to the torque that it gains by each response.
+    at_loads: Vec<Vec<Matrix3<f64>>>,
     plane: bool,
 }
 
@@ -279,11 +279,9 @@ impl Turning {
             half + half.transpose()
         };
         let changes = (0..responses.ncols()).map(change).collect();
-        let at_load = |unit: &Mat<f64>| {
-            let moved = gram(unit.as_ref().subcols(0, view.model.dimension()), responses.as_ref());
-            let along_model =
-                |j: usize| Vector3::from_fn(|k, _| if k < moved.nrows() { moved[(k, j)] } else { 0.0 });
-            (0..moved.ncols()).map(|j| view.axes.transpose() * along_model(j)).collect()
+        let at_load = |load: &SceneLoad| {
+            let arms = view.arms(load, responses.as_ref());
+            arms.into_iter().map(|arm| view.axes.transpose() * arm * view.axes).collect()
         };
         Self { inertia, changes, at_loads: view.loads.iter().map(at_load).collect(), plane }
     }
@@ -321,8 +319,8 @@ impl Turning {
         let mut torque = Vector3::zeros();
         for (at, moved) in self.at_loads.iter().enumerate() {
             let force = 0.5 * (first.loads[at].0 + second.loads[at].0);
-            let shift = moved.iter().zip(c).fold(Vector3::zeros(), |sum, (own, c)| sum + own * *c);
-            torque += shift.cross(&force);
+            let shift = moved.iter().zip(c).fold(Matrix3::zeros(), |sum, (own, c)| sum + own * *c);
+            torque += shift * force;
         }
         let inverse = self.inverse();
         let turning = omega.cross_matrix();
@@ -394,7 +392,7 @@ mod tests {
         Turning {
             inertia: Matrix3::from_diagonal(&Vector3::new(2.0, 3.0, 4.0)),
             changes: vec![Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, 0.04))],
-            at_loads: vec![vec![Vector3::new(1e-3, 0.0, 0.0)]],
+            at_loads: vec![vec![Vector3::new(1e-3, 0.0, 0.0).cross_matrix()]],
             plane: false,
         }
     }

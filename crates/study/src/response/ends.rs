@@ -161,10 +161,10 @@ impl ChosenRows<'_> {
         })
     }
 
-    /// Returns the static rows outside the modes for unit forces and torques of `places` (rows x inputs); zero for loads
-    /// at nodes.
-    pub(super) fn direct(&self, places: &[Place], dimension: usize) -> Mat<f64> {
-        let all = static_columns(self.recovery, places, dimension);
+    /// Returns the static rows outside the modes for unit loads of `places` on `body` (rows x inputs); zero for loads at
+    /// nodes.
+    pub(super) fn direct(&self, places: &[Place], body: &FlexBody) -> Mat<f64> {
+        let all = static_columns(self.recovery, places, body);
         Mat::from_fn(self.rows.len(), all.ncols(), |i, c| all[(self.rows[i], c)])
     }
 
@@ -184,12 +184,15 @@ impl ChosenRows<'_> {
     }
 }
 
-/// Returns all rows of a recovery under unit forces and torques of `places`, outside the modes (rows x inputs).
-pub(super) fn static_columns(recovery: &Recovery, places: &[Place], dimension: usize) -> Mat<f64> {
+/// Returns all rows of a recovery of `body` under unit loads of `places`, outside the modes (rows x inputs).
+pub(super) fn static_columns(recovery: &Recovery, places: &[Place], body: &FlexBody) -> Mat<f64> {
     let of_place = |place: &Place| {
+        if let Some(column) = place.named_column(body) {
+            return Mat::from_fn(recovery.rows.len(), 1, |i, _| recovery.named[(i, column)]);
+        }
         let columns =
             recovery.loads.iter().find(|load| place.point == Point::Interface(load.interface.clone()));
-        let directions = place.directions_of(dimension);
+        let directions = place.directions_of(body.dimension());
         Mat::from_fn(recovery.rows.len(), directions.len(), |i, at| {
             let component = directions[at] as usize;
             debug_assert!(component < LOAD_COMPONENTS);

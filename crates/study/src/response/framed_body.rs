@@ -128,7 +128,7 @@ pub(super) fn reduced_sum(body: &FlexBody, read: &Read<'_>, damping: Option<Mat<
     let mut direct = Mat::zeros(count, forces.ncols());
     let mut first = motions.ncols();
     for one in &read.rows {
-        let own = one.direct(&read.from, body.dimension());
+        let own = one.direct(&read.from, body);
         direct.as_mut().subrows_mut(first, own.nrows()).copy_from(&own);
         first += own.nrows();
     }

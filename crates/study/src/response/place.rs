@@ -3,7 +3,7 @@
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::FlexBody;
+use flexbody_body::flex_body::{FlexBody, NamedLoad};
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{Point, find_nodal_point};
 use nalgebra::Vector3;
@@ -23,20 +23,22 @@ pub enum Direction {
     Ry,
     /// About z.
     Rz,
+    /// Amplitude of a named load, which has no direction in space.
+    Amplitude,
 }
 
 impl Direction {
-    /// All six directions.
+    /// All six directions in space.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
 
-    /// Returns the name of the direction: `x`, `y`, `z`, `rx`, `ry` or `rz`.
+    /// Returns the name of the direction: `x`, `y`, `z`, `rx`, `ry`, `rz` or `amplitude`.
     pub fn name(self) -> &'static str {
-        ["x", "y", "z", "rx", "ry", "rz"][self as usize]
+        ["x", "y", "z", "rx", "ry", "rz", "amplitude"][self as usize]
     }
 
     /// Returns true for a torque and a rotation.
     pub fn turns(self) -> bool {
-        self as usize >= 3
+        matches!(self, Self::Rx | Self::Ry | Self::Rz)
     }
 
     /// Returns the index of the axis: 0, 1 or 2.
@@ -48,6 +50,7 @@ impl Direction {
     /// direction.
     fn column(self, dimension: usize) -> Option<usize> {
         match (dimension, self) {
+            (_, Self::Amplitude) => Some(0),
             (3, _) | (_, Self::X | Self::Y) => Some(self as usize),
             (_, Self::Rz) => Some(2),
             _ => None,
@@ -111,13 +114,14 @@ impl Place {
     pub(super) fn stated_name(&self) -> String {
         match &self.point {
             Point::Node(number) => number.to_string(),
-            Point::Interface(name) => name.clone(),
+            Point::Interface(name) | Point::NamedLoad(name) => name.clone(),
         }
     }
 
     /// Returns the directions of the place in a body of the given dimension.
     pub(super) fn directions_of(&self, dimension: usize) -> Vec<Direction> {
         match self.directions.as_slice() {
+            _ if matches!(self.point, Point::NamedLoad(_)) => vec![Direction::Amplitude],
             [] => Direction::ALL[..dimension].to_vec(),
             directions => directions.to_vec(),
         }
@@ -129,6 +133,13 @@ impl Place {
     /// # Errors
     /// [`PlaceUnknown`](Code::PlaceUnknown) for a point or direction that the body does not have.
     pub(super) fn rows(&self, body: &FlexBody) -> Result<PlaceRows> {
+        if let Some(load) = self.named_load(body) {
+            let resultant = [load.resultant_force(), load.torque_at(&vec![0.0; load.modal.len()])];
+            return Ok(PlaceRows {
+                modal: Mat::from_fn(load.modal.len(), 1, |j, _| load.modal[j]),
+                rigid: Mat::from_fn(6, 1, |i, _| resultant[i / 3][i % 3]),
+            });
+        }
         let (nf, d) = (body.n_modes(), body.dimension());
         let PointMotion { position, translation, rotation } = self.motion(body)?;
         let directions = self.directions_of(d);
@@ -154,6 +165,41 @@ impl Place {
         Ok(PlaceRows { modal, rigid })
     }
 
+    /// Returns the place with the named load of `body` in place of an unknown interface of its name.
+    ///
+    /// # Errors
+    /// [`PlaceUnknown`](Code::PlaceUnknown) for a preload, and for directions of a named load.
+    pub(super) fn resolved(&self, body: &FlexBody) -> Result<Self> {
+        let (Point::Interface(name) | Point::NamedLoad(name)) = &self.point else { return Ok(self.clone()) };
+        let Some(load) = body.named_loads().iter().find(|load| load.name == *name) else {
+            return Ok(self.clone());
+        };
+        let refuse = |message: String, help: &str| {
+            Err(Diagnostic::new(Code::PlaceUnknown, message).with_help(help.to_owned()).into())
+        };
+        if load.preload {
+            let message = format!("`{name}` is a preload, which is constant");
+            return refuse(message, "give a load whose amplitude oscillates");
+        }
+        if !self.directions.is_empty() {
+            let message = format!("named load `{name}` has no directions: its input is its amplitude");
+            return refuse(message, "leave the directions out");
+        }
+        Ok(Self::of(Point::NamedLoad(name.clone())))
+    }
+
+    /// Returns the named load of the place.
+    fn named_load<'b>(&self, body: &'b FlexBody) -> Option<&'b NamedLoad> {
+        let Point::NamedLoad(name) = &self.point else { return None };
+        body.named_loads().iter().find(|load| load.name == *name)
+    }
+
+    /// Returns the place of the named load in the list of the body.
+    pub(super) fn named_column(&self, body: &FlexBody) -> Option<usize> {
+        let Point::NamedLoad(name) = &self.point else { return None };
+        body.named_loads().iter().position(|load| load.name == *name)
+    }
+
     fn motion(&self, body: &FlexBody) -> Result<PointMotion> {
         let (modes, nf) = (body.modes(), body.n_modes());
         match &self.point {
@@ -167,6 +213,7 @@ impl Place {
                 let position = Vector3::from(body.nodes().positions[node]);
                 Ok(PointMotion { position, translation: rows_of_node(&modes.shape), rotation })
             }
+            Point::NamedLoad(_) => Err(self.unknown(body)),
             Point::Interface(name) => {
                 let found = body.interfaces().iter().find(|interface| interface.name == *name);
                 let interface = found.ok_or_else(|| self.unknown(body))?;

@@ -310,7 +310,7 @@ impl RandomStudy<'_> {
     /// Returns the rows of a recovery of the body over the states.
     fn rows_of(&self, recovery: &Recovery, length: usize) -> Mat<f64> {
         let nf = recovery.modes.ncols();
-        let columns = static_columns(recovery, &self.read.from, self.framed.damped.dimension());
+        let columns = static_columns(recovery, &self.read.from, &self.framed.damped);
         Mat::from_fn(recovery.rows.len(), length, |i, c| match c {
             c if c < nf => recovery.modes[(i, c)],
             c if c < nf + columns.ncols() => columns[(i, c - nf)],

@@ -79,7 +79,7 @@ impl ResponseRequest {
     ) -> Result<(Response, ResponseSettings)> {
         self.refuse_impossible()?;
         let settings = self.settings(scene, body)?;
-        let (from, to) = self.ends(scene)?;
+        let (from, to) = self.ends(scene, body)?;
         let ends =
             ResponseEnds { from: &from, to: &to, rows: &self.rows, densities: self.densities.as_deref() };
         let response = respond(model, body, &ends, &settings, context)?;
@@ -126,9 +126,10 @@ impl ResponseRequest {
     }
 
     /// Returns the excitation, and the places of measured displacements.
-    fn ends(&self, scene: Option<&Scene>) -> Result<(Excitation, Vec<Place>)> {
+    fn ends(&self, scene: Option<&Scene>, body: &FlexBody) -> Result<(Excitation, Vec<Place>)> {
         let watched = scene.map_or_else(Vec::new, |scene| scene.watched.iter().collect());
         let to = chosen(&self.to, &watched);
+        refuse_read_loads(to.iter().chain(&self.base), body)?;
         if to.is_empty() && self.rows.is_empty() && self.densities.is_none() {
             return Err(missing("displacements", "to", "watch").into());
         }
@@ -141,11 +142,27 @@ impl ResponseRequest {
         }
         let loaded = scene.map_or_else(Vec::new, |scene| scene.loads.iter().map(|load| &load.at).collect());
         let from = chosen(&self.from, &loaded);
+        let from = from.iter().map(|place| place.resolved(body)).collect::<Result<Vec<_>>>()?;
         if from.is_empty() {
             return Err(missing("forces", "from", "load").into());
         }
         Ok((Excitation::Forces(from), to))
     }
+}
+
+/// Refuses named loads as places whose motion is read or prescribed.
+fn refuse_read_loads<'p>(places: impl Iterator<Item = &'p Place>, body: &FlexBody) -> Result<()> {
+    for place in places {
+        if matches!(place.resolved(body)?.point, Point::NamedLoad(_)) {
+            let message = format!(
+                "`{}` is a named load: it excites the body and has no displacement",
+                place.stated_name()
+            );
+            let help = "give it to --from; give a node or an interface to --to and --base";
+            return Err(Diagnostic::new(Code::PlaceUnknown, message).with_help(help).into());
+        }
+    }
+    Ok(())
 }
 
 /// Returns the stated places, or else those of a scene, each once. A scene may load a point twice.

@@ -205,12 +205,16 @@ pub fn participations(
             Point::Interface(interface) => {
                 name.strip_prefix(interface.as_str()).is_some_and(|rest| rest.starts_with(' '))
             }
-            Point::Node(_) => false,
+            Point::Node(_) | Point::NamedLoad(_) => false,
         };
         for direction in load.force.directions() {
             let forces = (0..eigenvalues.len()).map(|j| psi.column(j).dot(&direction)).collect();
             let [x, y, z] = direction.into();
-            add(format!("force {x}, {y}, {z} at {}", load.at), forces, &at_interface);
+            let name = match load.is_named() {
+                true => load.at.to_string(),
+                false => format!("force {x}, {y}, {z} at {}", load.at),
+            };
+            add(name, forces, &at_interface);
         }
     }
     // Steady spin: W1'w w / 2 along its axis.

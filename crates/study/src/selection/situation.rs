@@ -72,7 +72,7 @@ impl Situation {
             None => (softest, "first mode of the free body"),
         };
         // Largest spin, angular acceleration and modal amplitudes.
-        let (spin, acceleration) = turning(body, scene, &inertia, duration.value, points);
+        let (spin, acceleration) = turning(scene, &inertia, duration.value, points);
         let mode_amplitudes = amplitudes(body, scene);
         let limits = &demands.limits;
         let named = [
@@ -117,15 +117,9 @@ impl Situation {
 type Sourced = (f64, String);
 
 /// Returns the largest angular velocity and acceleration of the frame.
-fn turning(
-    body: &FlexBody,
-    scene: &Scene,
-    inertia: &Matrix3<f64>,
-    duration: f64,
-    points: &[BodyPoint],
-) -> (Input, Input) {
+fn turning(scene: &Scene, inertia: &Matrix3<f64>, duration: f64, points: &[BodyPoint]) -> (Input, Input) {
     let motion = &scene.requirements.motion;
-    let [spin, acceleration] = turning_of_run(body, scene, inertia, duration, points);
+    let [spin, acceleration] = turning_of_run(scene, inertia, duration, points);
     // A range stated for a free body replaces the worst case of its loads; a prescribed spin is only increased by the
     // range.
     let larger = |range: &Option<Range>, (value, source): Sourced, key: &str| match range {
@@ -150,7 +144,6 @@ fn turning(
 
 /// Returns the largest angular velocity and acceleration in the run of the scene.
 fn turning_of_run(
-    body: &FlexBody,
     scene: &Scene,
     inertia: &Matrix3<f64>,
     duration: f64,
@@ -169,7 +162,7 @@ fn turning_of_run(
         (None, None) => {
             // Angular momentum of a free body: the initial one plus the impulse of the torques.
             let start = inertia * scene.initial.angular_velocity;
-            let torque = largest_torque(body, scene, duration, points);
+            let torque = largest_torque(scene, duration, points);
             let principal = inertia.symmetric_eigenvalues();
             let (least, most) = (principal.min(), principal.max());
             let spin = (start.norm() + torque * duration) / least;
@@ -186,11 +179,10 @@ fn turning_of_run(
 }
 
 /// Returns the largest torque of the loads on the undeformed body.
-fn largest_torque(body: &FlexBody, scene: &Scene, duration: f64, points: &[BodyPoint]) -> f64 {
+fn largest_torque(scene: &Scene, duration: f64, points: &[BodyPoint]) -> f64 {
     let torque = |(load, point): (&Load, &BodyPoint)| {
         let largest = |history: &VectorHistory| Variation::of_vector(history, duration).largest;
-        let lever = point.place(&Evaluation::new(&EquationsOfMotion::new(body, Terms::NONE))).norm();
-        largest(&load.force) * lever + largest(&load.torque)
+        largest(&load.force) * point.lever() + largest(&load.torque)
     };
     scene.loads.iter().zip(points).map(torque).sum()
 }
@@ -407,6 +399,12 @@ impl<'b> PointRows<'b> {
     /// Returns Psi of a point (3 x nf), body axes.
     pub(super) fn of(&self, point: &BodyPoint) -> DMatrix<f64> {
         self.works(|rest, axis, forces| point.add_force(rest, axis, forces))
+    }
+
+    /// Returns the rows (3 x nf), body axes, whose product with a force is the torque that the force gains by deformation.
+    pub(super) fn of_lever(point: &BodyPoint) -> DMatrix<f64> {
+        let rows = point.lever_rows();
+        DMatrix::from_fn(3, rows.ncols(), |k, j| rows[(k, j)])
     }
 
     /// Returns the rotations of a point by the modes (3 x nf), body axes. The point must have an orientation.

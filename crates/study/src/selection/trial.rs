@@ -258,10 +258,9 @@ impl TrialRuns<'_> {
 
     /// Returns the torques of the loads for |Lambda^(1/2) e| = 1, from the deformation of their lever arms.
     fn lever_torques(&self, driven: &Driven) -> f64 {
-        let rows = PointRows::new(self.body);
         let lever = |(load, point): (&Load, &BodyPoint)| {
             let largest = Variation::of_vector(&load.force, driven.rotation.duration).largest;
-            largest * self.reach_of(&rows.of(point))
+            largest * self.reach_of(&PointRows::of_lever(point))
         };
         self.scene.loads.iter().zip(self.loads).map(lever).sum::<f64>()
     }

@@ -4,6 +4,7 @@
 
 mod advice;
 mod continuous_motion;
+mod named_loads;
 mod nodal_reference;
 mod random_response;
 mod random_verdicts;

@@ -51,6 +51,10 @@ impl<'t> Tested<'t> {
                 BodyPoint::interface(body, interface.expect("one of the body"), scene.run.terms)
                     .expect("a point")
             }
+            Point::NamedLoad(name) => {
+                let load = body.named_loads().iter().find(|load| load.name == *name);
+                BodyPoint::named_load(load.expect("one of the body"))
+            }
         };
         let loads: Vec<BodyPoint> = scene.loads.iter().map(|load| point(&load.at)).collect();
         let watched = scene.watched.iter().map(point).collect();

@@ -4,7 +4,7 @@ use super::NodalError;
 use faer::{Mat, MatRef};
 use flexbody_base::error::Result;
 use flexbody_body::basis::interface_loads;
-use flexbody_model::{DofLabel, FeModel};
+use flexbody_model::{DofLabel, FeModel, ModelLoad};
 use nalgebra::{Vector3, Vector6};
 
 /// Conditions C u = 0 on the displacements, as many as rigid motions, that define the frame of the deformed
@@ -91,6 +91,17 @@ pub struct NodalPoint {
     pub(super) translation: Weights,
     /// Empty if the point has no orientation.
     pub(super) rotation: Weights,
+    /// True if the point stands for the nodal forces of a named load; its resultants are zero for a preload.
+    pub(super) named: Option<NamedForces>,
+}
+
+/// Kind of the nodal forces of a named load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum NamedForces {
+    /// Forces from outside, with a resultant on the deformed body.
+    Applied,
+    /// Forces between parts of the body.
+    Preload,
 }
 
 impl NodalPoint {
@@ -108,6 +119,7 @@ impl NodalPoint {
             place: model.nodes().positions[node].into(),
             translation: (0..d).map(|k| (d * node + k, unit(k))).collect(),
             rotation: of_node.map(|(row, &(_, axis))| (row, unit(axis.into()))).collect(),
+            named: None,
         }
     }
 
@@ -128,7 +140,38 @@ impl NodalPoint {
             place: place.into(),
             translation: weights(forces, 0),
             rotation: weights(torques, about),
+            named: None,
         }))
+    }
+
+    /// Creates the place of a named load: a force (a, 0, 0) at it, along the axes of the frame, is the load with the
+    /// amplitude a, and its displacement along x is f'u of the forces f.
+    pub fn named_load(load: &ModelLoad) -> Self {
+        let loaded = load.forces.iter().enumerate().filter(|(_, force)| **force != 0.0);
+        Self {
+            place: Vector3::zeros(),
+            translation: loaded.map(|(row, force)| (row, [*force, 0.0, 0.0])).collect(),
+            rotation: Vec::new(),
+            named: Some(if load.preload { NamedForces::Preload } else { NamedForces::Applied }),
+        }
+    }
+
+    /// Returns the nodal loads (N x 3) whose products with the displacements u are the torque sum u_i x f_i that a named
+    /// load with the amplitude 1 gains by them, model axes; `None` for a point.
+    pub fn turning_loads(&self, model: &FeModel) -> Option<Mat<f64>> {
+        let kind = self.named?;
+        let mut loads = Mat::zeros(model.rows().len(), 3);
+        let d = model.dimension();
+        let displaced = self.translation.iter().filter(|(row, _)| *row < d * model.nodes().len());
+        for &(row, [force, ..]) in displaced.filter(|_| kind == NamedForces::Applied) {
+            let (first, force) = (row / d * d, Vector3::ith(row % d, force));
+            for k in 0..3 {
+                // (u x f)_k = u . (f x e_k)
+                let by_u = force.cross(&Vector3::ith(k, 1.0));
+                (0..d).for_each(|l| loads[(first + l, k)] += by_u[l]);
+            }
+        }
+        Some(loads)
     }
 
     /// Returns the position in the undeformed model, model axes.

@@ -1,7 +1,7 @@
 //! Evaluation of the nodal equations at one state.
 
 use super::NodalPoint;
-use super::conditions::{Weights, add_motion, halves, joined, sums};
+use super::conditions::{NamedForces, Weights, add_motion, halves, joined, sums};
 use super::directors::Workspace;
 use super::driven::{Drive, LOST};
 use super::equations::{Amplitudes, ModalDamping, NodalEquations};
@@ -432,6 +432,9 @@ impl NodalEvaluation<'_> {
     /// * `force`: along `axes` of the world or of the frame; for a plane body the component along z is
     ///   ignored.
     pub fn add_force_at(&mut self, point: &NodalPoint, force: &Vector3<f64>, axes: LoadAxes) {
+        if let Some(kind) = point.named {
+            return self.add_named(&point.translation, kind, force.x);
+        }
         let mut force_model = self.along_model(force, axes);
         if self.equations.model.dimension() == 2 {
             force_model.z = 0.0;
@@ -455,6 +458,20 @@ impl NodalEvaluation<'_> {
         self.torque += torque_model;
         let moment = RotationVector(point.rotation(&self.u)).map() * torque_model;
         self.add_weighted(&point.rotation, &moment);
+    }
+
+    /// Adds the nodal forces of a named load.
+    fn add_named(&mut self, forces: &Weights, kind: NamedForces, amplitude: f64) {
+        if kind == NamedForces::Applied {
+            let mut rows = std::mem::take(&mut self.first);
+            rows.fill(0.0);
+            forces.iter().for_each(|(row, weights)| rows[*row] = amplitude * weights[0]);
+            let (force, torque) = halves(&self.equations.onto_frame(&self.u, &rows));
+            self.force += force;
+            self.torque += torque;
+            self.first = rows;
+        }
+        self.add_weighted(forces, &Vector3::new(amplitude, 0.0, 0.0));
     }
 
     fn along_model(&self, load: &Vector3<f64>, axes: LoadAxes) -> Vector3<f64> {
