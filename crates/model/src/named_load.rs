@@ -89,10 +89,25 @@ fn refuse_name(name: &str, seen: &mut HashSet<String>, interfaces: &[NodeSet]) -
         _ if is_other(name) => {
             format!("`{name}` has the name of a column of the table of a run: give it another one")
         }
+        _ if is_step(name, interfaces) => {
+            format!("`{name}` has the name of a step of `flexbody shapes`: give it another one")
+        }
         _ if !seen.insert(name.to_owned()) => format!("`{name}` is given twice"),
         _ => return Ok(()),
     };
     Err((Code::ManifestSyntax, wrong))
+}
+
+/// Returns true for the names that `flexbody shapes` gives to modes, and to static responses to spin and to unit loads at
+/// interfaces: `mode 1`, `spin xy`, `tip Fx`.
+fn is_step(name: &str, interfaces: &[NodeSet]) -> bool {
+    const COMPONENTS: [&str; 6] = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
+    let Some((of, part)) = name.rsplit_once(' ') else { return false };
+    match of {
+        "mode" => part.parse::<u32>().is_ok(),
+        "spin" => part.len() == 2 && part.bytes().all(|axis| b"xyz".contains(&axis)),
+        _ => COMPONENTS.contains(&part) && interfaces.iter().any(|set| set.name == of),
+    }
 }
 
 /// Returns the forces in the internal order of rows.

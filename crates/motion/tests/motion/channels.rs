@@ -7,15 +7,15 @@ use flexbody_body::convert::recovery_shapes;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
 use flexbody_linalg::context::Context;
-use flexbody_model::{CheckedModel, FeModel, NodeSet, RawModel, RecoveryOperator};
-use flexbody_motion::scene::{LoadHistory, LoadedHistory, ShapeSteps};
+use flexbody_model::{CheckedModel, FeModel, ModelLoad, NodeSet, RawModel, RecoveryOperator};
+use flexbody_motion::scene::{AmplitudeHistory, LoadHistory, LoadedHistory, ShapeSteps};
 use nalgebra::Vector3;
 use oracle::flexible::body_of;
 use std::path::PathBuf;
 
 const MODES: usize = 6;
 
-/// Returns the arm with two interfaces and values at rest.
+/// Returns the arm with two interfaces, values at rest, a named load and a preload.
 fn model() -> RawModel {
     let mut raw = arm_model();
     let column = |first: i64| (0..6).map(|row| first + 7 * row).collect();
@@ -25,10 +25,30 @@ fn model() -> RawModel {
             *offset = Some((0..labels.len()).map(|row| 0.01 * (row as f64).sin()).collect());
         }
     }
+    raw.named_loads = named_loads(&raw);
     raw
 }
 
-/// Returns a motion with all coordinates, loads at both interfaces and spin about all axes.
+/// Returns a load with a resultant, and a preload: two opposite forces along the line between two nodes.
+fn named_loads(raw: &RawModel) -> Vec<ModelLoad> {
+    let rows = 3 * raw.nodes.len();
+    let named = |name: &str, preload: bool, forces: Vec<f64>| ModelLoad {
+        name: name.to_owned(),
+        forces,
+        preload,
+        path: PathBuf::new(),
+    };
+    let [a, b] = [raw.nodes.positions[2], raw.nodes.positions[9]].map(Vector3::from);
+    let mut pair = vec![0.0; rows];
+    for k in 0..3 {
+        pair[3 * 2 + k] = 0.02 * (b - a)[k];
+        pair[3 * 9 + k] = -0.02 * (b - a)[k];
+    }
+    let wave = (0..rows).map(|row| 1e-3 * (0.7 * row as f64).sin()).collect();
+    vec![named("wind", false, wave), named("bolts", true, pair)]
+}
+
+/// Returns a motion with all coordinates, spin about all axes, and loads at both interfaces and of the named load.
 fn history() -> LoadedHistory {
     let count = 12;
     let wave = |seed: f64| move |i: usize| (1.3 * seed + 0.7 * i as f64 * (1.0 + 0.1 * seed)).sin();
@@ -43,6 +63,10 @@ fn history() -> LoadedHistory {
         q: (0..count).map(|i| (0..MODES).map(|j| 1e-3 * wave(j as f64)(i)).collect()).collect(),
         angular_velocity: Some((0..count).map(|i| 0.4 * vector(3.1, i)).collect()),
         loads: vec![load("root", 4.0), load("free tip", 6.0)],
+        named: vec![AmplitudeHistory {
+            load: "wind".to_owned(),
+            values: (0..count).map(wave(8.0)).collect(),
+        }],
     }
 }
 
@@ -84,7 +108,7 @@ fn superposed_results_are_the_rows_of_the_recovery() {
         let body = body_of(self::model(), MODES, frame);
         let (steps, answers) = steps(&body, &model);
         assert!(steps.factors.iter().any(|factor| (factor - 1.0).abs() > 0.1), "shapes are scaled");
-        assert_eq!(steps.columns.len(), MODES + 6 + 12);
+        assert_eq!(steps.columns.len(), MODES + 6 + 12 + 2);
         let channels = history.channels(&body, &steps).expect("channels");
         assert_eq!(channels.names.last().map(String::as_str), Some("constant"));
         let recovered = history.recover(&body, &[]).expect("rows");
