@@ -159,7 +159,7 @@ class TransferFunction(NamedTuple):
     source: str
     """Place of the force: "interface tip", "node 17"."""
     source_direction: str
-    """Direction of the force or torque: "x", "y", "z", "rx", "ry" or "rz"."""
+    """Direction of the force or torque: "x", "y", "z", "rx", "ry" or "rz"; "amplitude" of a named load."""
     target: str
     """Place of the displacement: "interface tip", "node 17"."""
     target_direction: str
