@@ -59,6 +59,7 @@ fn recovery(
             _ => 0.0,
         }),
         loads: Vec::new(),
+        named: Mat::zeros(n, 0),
         rows,
     }
 }
