@@ -13,12 +13,12 @@ use std::path::{Path, PathBuf};
 
 /// Kind of a file of recoveries over time.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Kind {
+pub(super) enum RowsFile {
     Csv,
     Hdf5,
 }
 
-impl Kind {
+impl RowsFile {
     /// Returns the kind of a file by its extension.
     ///
     /// # Errors
@@ -35,9 +35,7 @@ impl Kind {
             }
         }
     }
-}
 
-impl Kind {
     /// Writes channels of the steps of an FE program to the temporary file of `slot`.
     fn fill_channels(
         self,
@@ -73,8 +71,8 @@ impl Kind {
 
 pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
-    let kind = arguments.output.as_deref().map(Kind::of).transpose()?;
-    let of_channels = arguments.channels.as_deref().map(Kind::of).transpose()?;
+    let kind = arguments.output.as_deref().map(RowsFile::of).transpose()?;
+    let of_channels = arguments.channels.as_deref().map(RowsFile::of).transpose()?;
     let envelope = arguments.envelope.as_deref().map(EnvelopeKind::of).transpose()?;
     let RecoverArguments { output, channels, .. } = arguments;
     let outputs = || output.iter().chain(channels).chain(&arguments.envelope).chain(&arguments.report);

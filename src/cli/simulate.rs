@@ -2,7 +2,7 @@
 
 use super::arguments::{Printing, SimulateArguments};
 use super::outcome::{Outcome, format_of, marked, refuse_replacing, refuse_replacing_read, refuse_warnings};
-use super::recover::Kind;
+use super::recover::RowsFile;
 use super::resources::{context, use_threads};
 use super::terminal::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
-    let rows = arguments.rows.as_deref().map(Kind::of).transpose()?;
+    let rows = arguments.rows.as_deref().map(RowsFile::of).transpose()?;
     let envelope = arguments.envelope.as_deref().map(EnvelopeKind::of).transpose()?;
     let places = SimulationOutputs::of(arguments, None);
     let of_all_cases = || arguments.envelope.iter();
@@ -104,7 +104,7 @@ struct Job<'a> {
     printing: Printing,
     body: &'a FlexBody,
     formats: &'a [Format],
-    rows: Option<Kind>,
+    rows: Option<RowsFile>,
     envelope: Option<EnvelopeKind>,
     threads: usize,
 }

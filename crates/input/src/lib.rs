@@ -35,6 +35,7 @@ mod model_files;
 mod named_matrices;
 mod node_files;
 mod npy;
+mod open_files;
 mod output4;
 mod petsc;
 mod read_model;

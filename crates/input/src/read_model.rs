@@ -9,6 +9,7 @@ use super::model_files::{
     OperatorSource, RecoverySource,
 };
 use super::node_files::{NodeFile, NodeSets, Unresolved, read_node_file};
+use super::open_files::OpenFiles;
 use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::recovery_files::{OperatorColumns, read_forces, read_offset, read_operator};
 use super::rows_of_model::{by_rows_of_model, in_order_of_nodes, refuse_followers, turned};
@@ -47,7 +48,7 @@ pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMat
 /// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, geometric stiffness,
 /// interfaces, mesh; FB132 for files that changed during reading, in place of other errors.
 pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
-    let mut opened = OpenFiles::new(files);
+    let mut opened = OpenFiles::new(roles(files).into_iter().map(|(_, path)| path));
     let read = read_opened_files(files, &opened);
     opened.refuse_changed()?;
     let (model, of_job) = read.map_err(|error| without_outside_quotes(files, error))?;
@@ -613,54 +614,6 @@ fn collect(diagnostics: &mut Vec<Diagnostic>, found: Vec<Diagnostic>) {
         if !diagnostics.contains(&diagnostic) {
             diagnostics.push(diagnostic);
         }
-    }
-}
-
-/// Files of the model, each opened once.
-struct OpenFiles {
-    files: Vec<(PathBuf, std::result::Result<InputFile, Diagnostic>)>,
-}
-
-impl OpenFiles {
-    fn new(files: &ModelFiles) -> Self {
-        let mut opened: Vec<(PathBuf, _)> = Vec::new();
-        for (_, path) in roles(files) {
-            if opened.iter().all(|(known, _)| known != path) {
-                opened.push((path.to_path_buf(), InputFile::open_unread(path)));
-            }
-        }
-        Self { files: opened }
-    }
-
-    /// Returns a file whose bytes are in memory.
-    fn get(&self, path: &Path) -> Found<&InputFile> {
-        let file = self.unread(path)?;
-        file.load().map_err(|diagnostic| vec![diagnostic])?;
-        Ok(file)
-    }
-
-    fn unread(&self, path: &Path) -> Found<&InputFile> {
-        let (_, file) =
-            self.files.iter().find(|(known, _)| known == path).expect("every path of the model is opened");
-        file.as_ref().map_err(|diagnostic| vec![diagnostic.clone()])
-    }
-
-    /// Returns the files that could be opened.
-    fn all(&self) -> impl Iterator<Item = &InputFile> {
-        self.files.iter().filter_map(|(_, file)| file.as_ref().ok())
-    }
-
-    /// Checks that no file has changed.
-    ///
-    /// # Errors
-    /// FB132 for every file that is no longer the one that was opened.
-    fn refuse_changed(&self) -> Result<()> {
-        let changed: Vec<Diagnostic> = self.all().filter_map(|file| file.refuse_changed().err()).collect();
-        if changed.is_empty() { Ok(()) } else { Err(Error::new(changed)) }
-    }
-
-    fn forget_bytes(&mut self) {
-        self.files.iter_mut().filter_map(|(_, file)| file.as_mut().ok()).for_each(InputFile::forget_bytes);
     }
 }
 

@@ -209,7 +209,7 @@ fn the_point_of_a_set_is_stated_and_told() {
         ("end=RIGHT,averaging,1/2/z", "`1/2/z` is not a point"),
         ("end=RIGHT,glued,1/2/3", "`glued` is not a coupling"),
         ("end=RIGHT,free,0.2/0/0", "is free, but has a reference point"),
-        ("end=RIGHT,averaging,1/2/inf", "is not finite"),
+        ("end=RIGHT,averaging,1/2/inf", "`1/2/inf` is not a point"),
     ] {
         let (done, text) = run(interface);
         assert!(!done && text.contains(said), "{interface}: {text}");

@@ -55,7 +55,7 @@ impl Form {
 /// # Errors
 /// FB327.
 pub(super) fn read(file: &InputFile) -> Found<StepValues> {
-    let mut reading = Reading {
+    let mut reading = FrdReading {
         file,
         bytes: file.bytes(),
         at: 0,
@@ -65,7 +65,7 @@ pub(super) fn read(file: &InputFile) -> Found<StepValues> {
         materials: HashMap::new(),
     };
     reading.all()?;
-    let Reading { steps, digits, materials, .. } = reading;
+    let FrdReading { steps, digits, materials, .. } = reading;
     let mut values = StepValues::of(steps, digits.min(15), file)?.with_stresses(file)?;
     let is_mixed = |place: &Place| match place {
         Place::Node(node) => (materials.get(node) == Some(&Material::Several)).then_some(*node),
@@ -82,7 +82,7 @@ enum Material {
     Several,
 }
 
-struct Reading<'f> {
+struct FrdReading<'f> {
     file: &'f InputFile,
     bytes: &'f [u8],
     /// First byte that is not read yet.
@@ -103,7 +103,7 @@ struct Heading {
     form: Form,
 }
 
-impl<'f> Reading<'f> {
+impl<'f> FrdReading<'f> {
     fn all(&mut self) -> Found<()> {
         let mut heading = None;
         while self.at < self.bytes.len() {

@@ -1,6 +1,6 @@
 //! Errors of recoveries: the distance between the rows of two motions, relative to the limits of a scene.
 
-use super::row_extremes::{Directions, LinearRows, Magnitude, RowExtreme, Search};
+use super::row_extremes::{Directions, LargestSearch, LinearRows, Magnitude, RowExtreme};
 use super::row_states::{RowSampler, SampledStates};
 use super::{
     RecoveredMotion, RecoveryLimit, RecoveryTolerance, Resolution, RowLayout, RowMap, RowStates, Scene,
@@ -115,12 +115,12 @@ struct MeasuredRecovery {
     map: RowMap,
     n_modes: usize,
     static_columns: bool,
-    groups: Vec<Group>,
+    groups: Vec<RowGroup>,
 }
 
 /// Rows of one quantity and unit, or points with all six stresses, whose errors have one scale.
 #[derive(Debug, Clone)]
-struct Group {
+struct RowGroup {
     magnitude: Magnitude,
     /// Rows or points.
     places: Vec<usize>,
@@ -142,7 +142,7 @@ enum Limit {
     Absolute(f64),
 }
 
-impl Group {
+impl RowGroup {
     /// Returns the largest allowed error, if the largest value of the reference may be smaller by `uncertain`.
     fn allowed(&self, uncertain: f64) -> f64 {
         match self.limit {
@@ -196,8 +196,13 @@ impl RecoveryMeasure {
             let groups = groups_of(map).into_iter().map(|(magnitude, places)| {
                 let rows = LinearRows::of(map);
                 let largest = states.map_or(0.0, |states| {
-                    let search =
-                        Search { magnitude, rows, states, directions: directions.as_ref(), between: true };
+                    let search = LargestSearch {
+                        magnitude,
+                        rows,
+                        states,
+                        directions: directions.as_ref(),
+                        between: true,
+                    };
                     largest_of(&search, &places, |_| {})
                 });
                 let of_place = |place: &usize| {
@@ -217,7 +222,7 @@ impl RecoveryMeasure {
                         Limit::Absolute(value * factor(of_value, unit).unwrap_or(1.0))
                     }
                 };
-                Group { magnitude, places, limit, largest, reach }
+                RowGroup { magnitude, places, limit, largest, reach }
             });
             MeasuredRecovery {
                 groups: groups.collect(),
@@ -271,8 +276,13 @@ impl RecoveryMeasure {
             let rows = LinearRows { matrix: matrix.as_ref(), points: &one.map.points };
             for group in &one.groups {
                 let magnitude = group.magnitude;
-                let search =
-                    Search { magnitude, rows, states, directions: directions.as_ref(), between: false };
+                let search = LargestSearch {
+                    magnitude,
+                    rows,
+                    states,
+                    directions: directions.as_ref(),
+                    between: false,
+                };
                 let allowed = group.allowed(0.0);
                 largest_of(&search, &group.places, |values| raise(&mut history, values, allowed));
             }
@@ -328,7 +338,7 @@ impl RecoveryMeasure {
     /// Returns a bound of the errors, relative to the limits, of a motion whose deformation e differs from the reference by
     /// |Lambda^(1/2) e| = `energy`, with the same loads and spin.
     pub fn bound(&self, energy: f64) -> f64 {
-        let of_group = |group: &Group| {
+        let of_group = |group: &RowGroup| {
             let error = group.reach * energy;
             if error == 0.0 { 0.0 } else { error / group.allowed(error) }
         };
@@ -380,7 +390,7 @@ fn first_row(map: &RowMap, magnitude: Magnitude, place: usize) -> usize {
 }
 
 /// Returns the largest magnitude at any of `places`.
-fn largest_of(search: &Search<'_>, places: &[usize], see: impl FnMut(&[f64])) -> f64 {
+fn largest_of(search: &LargestSearch<'_>, places: &[usize], see: impl FnMut(&[f64])) -> f64 {
     let mut best: Option<RowExtreme> = None;
     search.raise(places.iter().copied(), &mut best, see);
     best.map_or(0.0, |best| best.value.abs())

@@ -235,7 +235,7 @@ impl ExtremeSearch {
                     Magnitude::Tension => &mut found.tension,
                     Magnitude::Compression => &mut found.compression,
                 };
-                let search = Search {
+                let search = LargestSearch {
                     magnitude,
                     rows,
                     states,
@@ -255,7 +255,7 @@ impl ExtremeSearch {
 }
 
 /// Search for the place with the largest magnitude over sampled states.
-pub(super) struct Search<'a> {
+pub(super) struct LargestSearch<'a> {
     pub magnitude: Magnitude,
     pub rows: LinearRows<'a>,
     pub states: SampledStates<'a>,
@@ -265,7 +265,7 @@ pub(super) struct Search<'a> {
     pub between: bool,
 }
 
-impl Search<'_> {
+impl LargestSearch<'_> {
     /// Raises `best` to the largest value at any of `places`. `see` receives the values of every evaluated place at all
     /// instants. Returns the number of evaluated places.
     pub(super) fn raise(
