@@ -1,8 +1,8 @@
 //! Random bodies: solids, plane bodies, nodes with rotations, singular mass matrices.
 
 use crate::draws::{between, one_in, pick};
-use crate::recoveries;
 use crate::stress::of_spin;
+use crate::{named_loads, recoveries};
 use flexbody_model::{Coupling, Damping, NodeSet, RawModel, Reference};
 use nalgebra::Vector3;
 use oracle::beams::{BeamMass, elbow, star};
@@ -38,8 +38,8 @@ pub fn body(kind: usize, random: &mut Random) -> RawModel {
         _ => raw_fixture("plane_frame"),
     };
     let raw = with_ends(raw, kind == 2);
-    let recoveries = recoveries::of(&raw);
-    RawModel { damping: damping(random), recoveries, ..raw }
+    let (recoveries, named_loads) = (recoveries::of(&raw), named_loads::of(&raw));
+    RawModel { damping: damping(random), recoveries, named_loads, ..raw }
 }
 
 /// Returns damping of the model in a third of the draws.

@@ -20,6 +20,7 @@ pub fn features(subject: &Subject) -> Vec<&'static str> {
         ("force", loads(&|load| !load.force.is_nothing())),
         ("moment", loads(&|load| !load.torque.is_nothing())),
         ("load at interface", loads(&|load| matches!(load.at, Point::Interface(_)))),
+        ("named load", loads(&|load| load.is_named())),
         ("load in world axes", loads(&|load| world(load.axes))),
         ("load in model axes", loads(&|load| !world(load.axes))),
         ("sine", has(&|history| factor(history).is_some_and(|h| matches!(h, History::Sine { .. })))),

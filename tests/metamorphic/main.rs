@@ -9,6 +9,7 @@ mod correspondence;
 mod draws;
 mod features;
 mod matrix;
+mod named_loads;
 mod nodes_in_world;
 mod outputs;
 mod recoveries;

@@ -2,8 +2,8 @@
 
 use crate::bodies::{self, KINDS, turns};
 use crate::draws::{axis, between, direction, one_in, pick, stream};
-use crate::recoveries;
 use crate::subject::{Basis, Subject};
+use crate::{named_loads, recoveries};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
@@ -218,6 +218,9 @@ impl Scales<'_> {
 
     /// Returns a load of about unit size.
     fn load(&mut self, raw: &RawModel) -> Load {
+        if one_in(self.random, 6) {
+            return Load::named(named_loads::WIND, self.history());
+        }
         let node = raw.nodes.ids[pick(self.random, raw.nodes.len())];
         let at = match one_in(self.random, 3) {
             true => Point::Interface("tip".to_owned()),

@@ -54,7 +54,9 @@ fn simpler_scenes(scene: &Scene) -> Vec<Scene> {
     for i in 0..scene.loads.len() {
         with(&|simpler| drop(simpler.loads.remove(i)));
         with(&|simpler| simpler.loads[i].torque = VectorHistory::nothing());
-        with(&|simpler| simpler.loads[i].axes = Axes::World);
+        if !scene.loads[i].is_named() {
+            with(&|simpler| simpler.loads[i].axes = Axes::World);
+        }
     }
     with(&|simpler| simpler.gravity = None);
     with(&|simpler| simpler.requirements.damping = None);

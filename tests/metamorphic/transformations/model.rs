@@ -5,8 +5,8 @@ use super::moved::Motion;
 use super::world::{extent, turning};
 use crate::correspondence::Correspondence;
 use crate::draws::direction;
-use crate::recoveries;
 use crate::subject::Subject;
+use crate::{named_loads, recoveries};
 use flexbody_base::error::Result;
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{Damping, DofLabel, GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad};
@@ -77,6 +77,7 @@ pub fn permute(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
         stiffness.matrix = permuted(&stiffness.matrix);
     }
     changed.raw.recoveries = recoveries::permuted(raw, &place);
+    changed.raw.named_loads = named_loads::permuted(raw, &place);
     changed.raw.dofs = Some(order.iter().map(|&old| labels[old]).collect());
     let nodes = random.permutation(raw.nodes.len());
     changed.raw.nodes.ids = nodes.iter().map(|&i| raw.nodes.ids[i]).collect();

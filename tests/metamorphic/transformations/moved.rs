@@ -2,8 +2,8 @@
 
 use super::model::{conjugated, geometric};
 use super::scene::start_axes;
-use crate::recoveries;
 use crate::subject::Subject;
+use crate::{named_loads, recoveries};
 use flexbody_model::{Damping, RawMatrix, RawModel, Reference};
 use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{Axes, Drive, Scene, VectorHistory};
@@ -60,6 +60,7 @@ impl Motion {
             }
         }
         moved.recoveries = recoveries::moved(raw, &self.model, |x| self.place(x));
+        moved.named_loads = named_loads::turned(raw, &self.model);
         if self.model != Matrix3::identity() {
             let turned = |matrix: &RawMatrix| RawMatrix {
                 matrix: conjugated(raw, &matrix.matrix, &self.model),
@@ -87,7 +88,7 @@ impl Motion {
         initial.velocity = self.world * initial.velocity;
         initial.angular_velocity = self.of(initial.axes, true) * initial.angular_velocity;
         moved.gravity = scene.gravity.map(|gravity| self.world * gravity);
-        for load in &mut moved.loads {
+        for load in moved.loads.iter_mut().filter(|load| !load.is_named()) {
             load.force = load.force.turned(&self.of(load.axes, false));
             load.torque = load.torque.turned(&self.of(load.axes, true));
         }

@@ -34,7 +34,7 @@ pub fn axes(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     if initial.angular_velocity != Vector3::zeros() {
         initial.axes = to;
     }
-    for load in &mut scene.loads {
+    for load in scene.loads.iter_mut().filter(|load| !load.is_named()) {
         if load.axes != Axes::World && to != Axes::World {
             (load.force, load.torque) =
                 (load.force.turned(&turn(load.axes)), load.torque.turned(&turn(load.axes)));

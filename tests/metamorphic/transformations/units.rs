@@ -5,8 +5,8 @@ use super::histories::{Clock, Driven, for_driving};
 use super::model::rows;
 use crate::correspondence::Correspondence;
 use crate::draws::pick;
-use crate::recoveries;
 use crate::subject::Subject;
+use crate::{named_loads, recoveries};
 use flexbody_base::error::Result;
 use flexbody_base::units::UnitSystem;
 use flexbody_linalg::CscMatrix;
@@ -84,6 +84,7 @@ impl Units {
             own.matrix = self.matrix(raw, &own.matrix, self.stiffness() / load);
         }
         changed.recoveries = recoveries::scaled(raw, self.length);
+        changed.named_loads = named_loads::scaled(raw, self.force(), self.length);
         changed.units = self.named(&raw.units);
         changed
     }
@@ -117,7 +118,7 @@ impl Units {
         }
         changed.gravity = scene.gravity.map(|gravity| gravity * (velocity * rate));
         Clock { factor: self.time, delay: 0.0 }.scene(&mut changed);
-        for load in &mut changed.loads {
+        for load in changed.loads.iter_mut().filter(|load| !load.is_named()) {
             load.force = load.force.scaled(self.force());
             load.torque = load.torque.scaled(self.force() * self.length);
         }
