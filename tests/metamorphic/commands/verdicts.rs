@@ -19,8 +19,7 @@ const BEYOND: f64 = 2.0;
 /// Bodies that are enriched with responses to residual forces depend on rounding, so that their modes and
 /// dependent outputs are open.
 fn outputs(subject: &Subject, selection: &Selection, modes: usize) -> Outputs {
-    // A body that is converted for a scene has fewer modes than the enriched one that they were chosen from.
-    let is_enriched = matches!(subject.basis, Basis::Lowest(count) if modes.max(selection.n_modes) > count);
+    let is_enriched = matches!(subject.basis, Basis::Lowest(count) if modes > count);
     let name = |name: &str| if is_enriched { format!("{name} {ENRICHED}") } else { name.to_owned() };
     let Selection { groups, guideline, chosen, n_modes, .. } = selection;
     let mut all = vec![
