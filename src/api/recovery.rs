@@ -169,8 +169,9 @@ impl FlexBody {
     /// * `steps`: archive (`.npz`) that `flexbody shapes` wrote with the steps.
     ///
     /// # Errors
-    /// FB101 and FB106 if the archive cannot be read; FB326 for steps of another body; FB215 if the history has no angular
-    /// velocity and there are steps of spin; FB212 for loads without steps; FB804 for another number of modal coordinates.
+    /// FB101 and FB106 if the archive cannot be read, FB103 if it is damaged; FB326 for another archive and for steps of
+    /// another body; FB215 if the history has no angular velocity and there are steps of spin; FB212 for loads without
+    /// steps; FB804 for another number of modal coordinates.
     pub fn channels(&self, history: &LoadedHistory, steps: impl AsRef<Path>) -> Result<Channels> {
         history.refuse_foreign(self)?;
         let path = steps.as_ref();
