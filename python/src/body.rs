@@ -4,6 +4,7 @@ use crate::arguments::{Argument, counts, path, positive, real, text, texts, unit
 use crate::arrays::{by_node, matrix, matrix3, triples, vector};
 use crate::body_arguments::{attached_mass, motion_history, points_of, recorded};
 use crate::body_class::Body;
+use crate::channels::Channels;
 use crate::checks::{Check, Comparison, View, identities, tolerances};
 use crate::choice::called;
 use crate::equations::EquationsOfMotion;
@@ -475,14 +476,37 @@ impl Body {
         Recovered::of(py, Arc::clone(&self.inner), history, only)
     }
 
+    /// Returns the factor of each FE step over a motion of any program, like `flexbody recover --channels`, for a program
+    /// that superposes the results of the steps: Channels with names (nc) and values (nt x nc).
+    ///
+    /// `history` is one as for `recover`, `shapes` the archive (.npz) that `flexbody shapes` wrote with the steps. Raises
+    /// InputError for steps of another body, of other modes or terms (FB326).
+    fn channels(
+        &self,
+        py: Python<'_>,
+        history: &Bound<'_, PyAny>,
+        shapes: &Bound<'_, PyAny>,
+    ) -> PyResult<Channels> {
+        Channels::of(py, Arc::clone(&self.inner), history, shapes)
+    }
+
     /// Returns the page of `flexbody view`: of the modes of the body, or of a motion (a Motion, or the path of its file).
     /// `triangles` limits the surface; without it the page stays below 10 MB.
-    #[pyo3(signature = (motion=None, *, triangles=None))]
-    fn view(&self, py: Python<'_>, motion: Argument<'_, '_>, triangles: Argument<'_, '_>) -> PyResult<View> {
-        let motion = motion.map(recorded).transpose()?;
-        let triangles = triangles.map(|given| positive(given, "triangles")).transpose()?;
-        let body = Arc::clone(&self.inner);
-        Ok(View { inner: run(py, move |_| body.view(motion.as_ref(), triangles))? })
+    ///
+    /// With `recovery`, the name of a recovery, the modes have the colours of its equivalent stress of von Mises, per unit of
+    /// the largest displacement. With `envelope`, the path of a table (.csv) of `Recovered.write_envelope` or
+    /// `write_envelope_of_cases`, the body, at rest or in the motion, has the colours of the largest equivalent stresses.
+    /// Raises InputError for stresses that cannot be drawn (FB221).
+    #[pyo3(signature = (motion=None, *, recovery=None, envelope=None, triangles=None))]
+    fn view(
+        &self,
+        py: Python<'_>,
+        motion: Argument<'_, '_>,
+        recovery: Argument<'_, '_>,
+        envelope: Argument<'_, '_>,
+        triangles: Argument<'_, '_>,
+    ) -> PyResult<View> {
+        View::of(py, Arc::clone(&self.inner), motion, recovery, envelope, triangles)
     }
 
     /// Returns which terms of the equations of motion a body needs for ranges of its motion, like `flexbody advise`, as a

@@ -1,12 +1,14 @@
 //! Checks of bodies, comparisons, and audits of files of other programs.
 
-use crate::arguments::{Argument, path, real, text};
-use crate::errors::{diagnostics, value};
+use crate::arguments::{Argument, path, positive, real, text};
+use crate::body_arguments::recorded;
+use crate::errors::{diagnostics, exception, value, value_error};
 use crate::report::report_in;
 use crate::work::{alone, run};
-use flexbody::{ComparisonFormat, Tolerances};
+use flexbody::{Code, ComparisonFormat, Diagnostic, FlexBody, Tolerances};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
+use std::sync::Arc;
 
 /// Forms of a report that has no page.
 const WITHOUT_PAGE: [(&str, bool); 3] = [("dict", true), ("json", true), ("text", false)];
@@ -84,7 +86,7 @@ fn not_negative(given: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
         return Ok(number);
     }
     let message = format!("`{name}` is {number}, expected a number, 0 or larger");
-    Err(crate::errors::value_error(given.py(), message))
+    Err(value_error(given.py(), message))
 }
 
 #[pymethods]
@@ -192,7 +194,7 @@ pub fn audit(
             tolerance if tolerance > 0.0 => tolerance,
             other => {
                 let message = format!("`tolerance` is {other}, expected a positive number");
-                return Err(crate::errors::value_error(py, message));
+                return Err(value_error(py, message));
             }
         },
         None => flexbody::Audit::TOLERANCE,
@@ -213,7 +215,39 @@ pub fn recipe(py: Python<'_>, program: &Bound<'_, PyAny>) -> PyResult<String> {
 /// shows it.
 #[pyclass(frozen, module = "flexbody")]
 pub struct View {
-    pub inner: flexbody::View,
+    inner: flexbody::View,
+}
+
+impl View {
+    /// Returns the page of a body with the arguments of `Body.view`.
+    pub fn of(
+        py: Python<'_>,
+        body: Arc<FlexBody>,
+        motion: Argument<'_, '_>,
+        recovery: Argument<'_, '_>,
+        envelope: Argument<'_, '_>,
+        triangles: Argument<'_, '_>,
+    ) -> PyResult<Self> {
+        let recovery = recovery.map(|given| text(given, "recovery")).transpose()?;
+        let envelope = envelope.map(|given| path(given, "envelope")).transpose()?;
+        let triangles = triangles.map(|given| positive(given, "triangles")).transpose()?;
+        if recovery.is_some() && envelope.is_some() {
+            return Err(value_error(py, "`recovery` and `envelope` are given, expected one of them"));
+        }
+        if let (Some(name), Some(_)) = (&recovery, motion) {
+            let message = format!("recovery `{name}` colours modes, and a simulation has none");
+            let help = "draw the largest stresses of the simulation: `envelope`, a table of Recovered.write_envelope";
+            let refused = Diagnostic::new(Code::RecoveryUnknown, message).with_help(help);
+            return Err(exception(py, &refused.into()));
+        }
+        let motion = motion.map(recorded).transpose()?;
+        let inner = run(py, move |_| match (recovery, envelope) {
+            (Some(name), _) => body.view_recovery(&name, triangles),
+            (None, Some(table)) => body.view_envelope(&table, motion.as_ref(), triangles),
+            (None, None) => body.view(motion.as_ref(), triangles),
+        })?;
+        Ok(Self { inner })
+    }
 }
 
 #[pymethods]

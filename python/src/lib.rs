@@ -7,6 +7,7 @@ mod batch;
 mod body;
 mod body_arguments;
 mod body_class;
+mod channels;
 mod checks;
 mod choice;
 mod command;
@@ -29,6 +30,8 @@ mod _flexbody {
     use crate::batch::{Batch, batch};
     #[pymodule_export]
     use crate::body_class::Body;
+    #[pymodule_export]
+    use crate::channels::Channels;
     #[pymodule_export]
     use crate::checks::{Audit, Check, Comparison, View, audit, recipe};
     #[pymodule_export]

@@ -1,11 +1,11 @@
 //! Recoveries over a motion of any program.
 
-use crate::arguments::{Argument, mistyped, path, texts};
+use crate::arguments::{Argument, mistyped, path, text, texts};
 use crate::arrays::{ArrayCache, Given, matrix, rows_of, rows_of_many, sequence, vector};
 use crate::errors::{value, value_error};
 use crate::report::report;
 use crate::work::{brief, run};
-use flexbody::{FlexBody, LoadedHistory, Matrix, RecoveryRow, ReportFormat};
+use flexbody::{Code, Diagnostic, FlexBody, LoadedHistory, Matrix, RecoveryRow, ReportFormat};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
@@ -24,7 +24,7 @@ pub struct Recovered {
 }
 
 /// Returns the history that a caller gives: the path of a table, or a dict of time, q, angular_velocity and loads.
-fn history_of(given: &Bound<'_, PyAny>, body: &FlexBody) -> PyResult<LoadedHistory> {
+pub fn history_of(given: &Bound<'_, PyAny>, body: &FlexBody) -> PyResult<LoadedHistory> {
     let py = given.py();
     let Ok(values) = given.cast::<PyMapping>() else {
         let expected = "the path of a table, or a dict of time, q, angular_velocity and loads";
@@ -143,6 +143,46 @@ impl Recovered {
     fn write_envelope(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         let path = self::path(path, "path")?;
         brief(py, || self.inner.write_envelope(&self.body, &path))
+    }
+
+    /// Writes the largest stresses of every point over several load cases, like `--envelope` for a scene with several: a
+    /// table (.csv), or the body with them at its nodes (.vtu), with the load case of each extreme. Of two equal extremes the
+    /// first is taken.
+    ///
+    /// `cases` is a dict of the name of a load case to its Recovered, all of one body, with the same recoveries. Those of a
+    /// simulation need `Body.simulate(scene, envelope=True)`. Raises InputError for recoveries of another body.
+    #[staticmethod]
+    fn write_envelope_of_cases(
+        py: Python<'_>,
+        cases: &Bound<'_, PyAny>,
+        path: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let path = self::path(path, "path")?;
+        let expected = "a dict of load case to its Recovered";
+        let given = cases.cast::<PyMapping>().map_err(|_| mistyped(cases, "cases", expected))?;
+        let mut named: Vec<(String, Bound<'_, Self>)> = Vec::new();
+        for item in given.items()? {
+            let (name, rows): (Given<'_>, Given<'_>) = item.extract()?;
+            let name = text(&name, "name of a load case")?;
+            let rows =
+                rows.cast_into().map_err(|error| mistyped(&error.into_inner(), &name, "a Recovered"))?;
+            named.push((name, rows));
+        }
+        let cases: Vec<(&str, &Self)> =
+            named.iter().map(|(name, rows)| (name.as_str(), rows.get())).collect();
+        let Some((first, of_first)) = cases.first() else {
+            return Err(value_error(py, "`cases` is empty, expected one load case or more"));
+        };
+        brief(py, || {
+            let body = &of_first.body;
+            let is_foreign = |own: &Self| !Arc::ptr_eq(&own.body, body) && own.body != *body;
+            if let Some((name, _)) = cases.iter().find(|(_, own)| is_foreign(own)) {
+                let message = format!("load case `{name}` is of another body than load case `{first}`");
+                return Err(Diagnostic::new(Code::Argument, message).into());
+            }
+            let cases: Vec<_> = cases.iter().map(|(name, own)| (*name, &own.inner)).collect();
+            flexbody::Recovered::write_envelope_of_cases(&cases, body, &path)
+        })
     }
 
     /// Returns the table of `flexbody recover -o FILE.csv` and `flexbody simulate --rows FILE.csv`, as a str: one line per

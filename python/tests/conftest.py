@@ -1,8 +1,11 @@
-"""Models of the fixtures as a Python code has them: matrices of scipy and arrays of numpy."""
+"""Models of the fixtures as a Python code has them: matrices of scipy and arrays of numpy. Runs of the command, and their results."""
 
 from __future__ import annotations
 
 import gzip
+import json
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -47,6 +50,35 @@ def given(name: str) -> Given:
     stated = tomllib.loads((folder / "model.toml").read_text())["model"]["units"]
     units = (stated["length"], stated["mass"], stated["time"])
     return Given(matrix("K"), matrix("M"), nodes[:, 1:], nodes[:, 0].astype(np.int64), dofs, units)
+
+
+def command(*words: object, cwd: Path | None = None) -> str:
+    """Runs the command of the package and returns what it prints."""
+    line = [sys.executable, "-m", "flexbody", *map(str, words)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=cwd)
+    assert done.returncode == 0, done.stderr + done.stdout
+    return done.stdout
+
+
+def results(*words: object) -> dict[str, Any]:
+    """The results that a command prints with --json."""
+    found = json.loads(command(*words, "--json"))["results"]
+    assert isinstance(found, dict)
+    return found
+
+
+OF_A_RUN = ("diagnostics", "run", "wall_seconds", "cpu_seconds", "threads", "seconds", "history", "command", "body")
+
+
+def same(found: Any, expected: Any) -> None:
+    """Asserts that two reports agree apart from times, messages and paths."""
+
+    def stripped(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: stripped(own) for key, own in value.items() if key not in OF_A_RUN}
+        return [stripped(own) for own in value] if isinstance(value, list) else value
+
+    assert stripped(found) == stripped(expected)
 
 
 @pytest.fixture(scope="session")

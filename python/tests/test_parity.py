@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 import os
 import pickle
 import re
@@ -18,7 +17,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse
-from conftest import MODELS
+from conftest import MODELS, command, results, same
 
 import flexbody
 
@@ -35,7 +34,7 @@ FUNCTIONS = {
     "trade": ("Body.trade", "Model.trade"),
     "advise": ("Body.advise",),
     "measure": ("Body.measure",),
-    "recover": ("Body.recover",),
+    "recover": ("Body.recover", "Body.channels", "Recovered.write_envelope_of_cases"),
     "reduce": ("Body.subset",),
     "response": ("Body.response", "Model.response"),
     "view": ("Body.view",),
@@ -55,35 +54,6 @@ WITHOUT = {
     "help": "is about the command line",
 }
 """Commands without a function, with the reason."""
-
-
-def command(*words: object, cwd: Path | None = None) -> str:
-    """Runs the command of the package and returns what it prints."""
-    line = [sys.executable, "-m", "flexbody", *map(str, words)]
-    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=cwd)
-    assert done.returncode == 0, done.stderr + done.stdout
-    return done.stdout
-
-
-def results(*words: object) -> dict[str, Any]:
-    """The results that a command prints with --json."""
-    found = json.loads(command(*words, "--json"))["results"]
-    assert isinstance(found, dict)
-    return found
-
-
-OF_A_RUN = ("diagnostics", "run", "wall_seconds", "cpu_seconds", "threads", "seconds", "history", "command", "body")
-
-
-def same(found: Any, expected: Any) -> None:
-    """Asserts that two reports agree apart from times, messages and paths."""
-
-    def stripped(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {key: stripped(own) for key, own in value.items() if key not in OF_A_RUN}
-        return [stripped(own) for own in value] if isinstance(value, list) else value
-
-    assert stripped(found) == stripped(expected)
 
 
 def test_every_command_has_a_function_or_a_reason() -> None:

@@ -62,6 +62,13 @@ def test_misspelt_choices_are_found(tmp_path: Path) -> None:
         "body.export('sid', 'body.sid', dialect='py-sid', points=[1, 2], to_units=('m', 'kg', 's'))\n"
         "body.simulate({'run': {'duration': 1.0}})\n"
         "model.response('tip:z', 17, band=(0.0, 100.0)).report('html')\n"
+        "body.view('motion.h5', envelope='envelope.csv').write('a.html')\n"
+        "maybe: str | None = 'stress' if body.recoveries else None\n"
+        "body.view(recovery=maybe, triangles=100)\n"
+        "rows = body.recover('run.csv')\n"
+        "flexbody.Recovered.write_envelope_of_cases({'slow': rows}, 'envelope.csv')\n"
+        "channels: flexbody.Channels = body.channels({'time': [0.0], 'q': [[0.0]]}, 'ask.npz')\n"
+        "factors = channels.values @ np.ones(len(channels.names))\n"
     )
     wrong = [
         "flexbody.convert('model.toml', basis='craig_bampton')",
@@ -75,6 +82,10 @@ def test_misspelt_choices_are_found(tmp_path: Path) -> None:
         "body.report('pdf')",
         "model.trade('scene.toml', reference='all')",
         "flexbody.recipe('patran')",
+        "body.view(recovery='stress', envelope='envelope.csv')",
+        "body.view('motion.h5', recovery='stress')",
+        "flexbody.Recovered.write_envelope_of_cases([rows], 'envelope.csv')",
+        "body.channels('run.csv')",
     ]
     user = tmp_path / "user.py"
     user.write_text(right + "".join(f"{line}\n" for line in wrong))

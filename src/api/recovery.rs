@@ -214,14 +214,15 @@ impl FlexBody {
     /// * `steps`: archive (`.npz`) that `flexbody shapes` wrote with the steps.
     ///
     /// # Errors
-    /// FB101 and FB106 if the archive cannot be read; FB326 for steps of another body; FB215 if the history has no angular
-    /// velocity and there are steps of spin; FB212 for loads without steps; FB804 for another number of modal coordinates.
+    /// FB101 and FB106 if the archive cannot be read, FB103 if it is damaged; FB326 for another archive and for steps of
+    /// another body; FB215 if the history has no angular velocity and there are steps of spin; FB212 for loads without
+    /// steps; FB804 for another number of modal coordinates.
     pub fn channels(&self, history: &LoadedHistory, steps: impl AsRef<Path>) -> Result<Channels> {
         history.refuse_foreign(self)?;
-        let WrittenSteps { columns, factors, nodes, displacements, modes_follow_spin } =
-            read_steps(steps.as_ref())?;
+        let path = steps.as_ref();
+        let WrittenSteps { columns, factors, nodes, displacements, modes_follow_spin } = read_steps(path)?;
         let steps = scene::ShapeSteps { columns, factors, nodes, displacements, modes_follow_spin };
-        let channels = history.0.channels(&self.0, &steps)?;
+        let channels = history.0.channels(&self.0, &steps).map_err(|error| error.in_file(path))?;
         Ok(Channels { channels, history: history.0.path.display().to_string() })
     }
 
@@ -352,7 +353,8 @@ impl Recovered {
     /// for a scene with several: the file names the load case of each extreme.
     ///
     /// # Errors
-    /// The errors of [`Recovered::write_envelope`]; FB804 without load cases.
+    /// The errors of [`Recovered::write_envelope`]; FB804 without load cases, for two of one name, and for load cases with
+    /// different recoveries or points.
     pub fn write_envelope_of_cases(
         cases: &[(&str, &Self)],
         body: &FlexBody,
@@ -362,6 +364,15 @@ impl Recovered {
         for (name, own) in cases {
             let own = own.envelope(Some(name))?;
             match &mut of_all {
+                Some(known) if known.cases.iter().any(|case| case == name) => {
+                    return refused(format!("two load cases have the name `{name}`"));
+                }
+                Some(known) if !points_of(known).eq(points_of(&own)) => {
+                    let first = &known.cases[0];
+                    return refused(format!(
+                        "load case `{name}` has other recoveries or points than load case `{first}`"
+                    ));
+                }
                 Some(known) => known.join(own),
                 None => of_all = Some(own),
             }
@@ -385,6 +396,15 @@ impl Recovered {
             None => refused("the motion has no largest stresses of points".to_owned()),
         }
     }
+}
+
+/// Returns recovery, name, node, element and unit of every point of an envelope.
+fn points_of(envelope: &Envelope) -> impl Iterator<Item = (&str, &str, Option<i64>, Option<i64>, &str)> {
+    envelope.recoveries.iter().flat_map(|recovery| {
+        let name = recovery.name.as_str();
+        let points = recovery.points.iter();
+        points.map(move |point| (name, point.name.as_str(), point.node, point.element, point.unit.as_str()))
+    })
 }
 
 fn write_envelope(envelope: Envelope, body: &FlexBody, path: &Path) -> Result<()> {

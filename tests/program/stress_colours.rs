@@ -3,11 +3,13 @@
 use crate::program::flexbody;
 use crate::view::{browse, browser};
 use faer::Mat;
+use flexbody::{LoadedHistory, Progress, RecordedMotion, Recovered, Scene};
 use flexbody_body::flex_body::{FlexBody, Recovery};
 use flexbody_model::{Quantity, RecoveryRow, StressPoint};
 use oracle::fixtures;
 use serde_json::Value;
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -251,6 +253,49 @@ fn stresses_that_cannot_be_drawn_are_refused_with_the_reason() {
     let page = fs::read_to_string(folder.path().join("motion.html")).expect("a page");
     let data: Value = serde_json::from_str(element(&page, "data")).expect("JSON");
     assert!(data["motion"].is_object() && data["fields"].as_array().is_some_and(|all| all.len() == 1));
+}
+
+/// The library draws the pages and writes the envelope of the command; it refuses load cases that do not fit each other.
+#[test]
+fn the_library_draws_the_pages_of_the_command() {
+    let (folder, _) = block();
+    let path = |name: &str| folder.path().join(name);
+    let case = |name: &str, spin: &str| {
+        format!("[[case]]\nname = \"{name}\"\n[case.initial]\nangular_velocity = [{spin}]\n")
+    };
+    let cases = case("slow-x", "9, 0.5, 0") + &case("fast", "0.5, 0, 9");
+    fs::write(path("spin.toml"), format!("[run]\nduration = 0.002\noutputs = 10\n{cases}")).expect("written");
+    done(folder.path(), "simulate body.flex.h5 --scene spin.toml --envelope command.csv");
+    done(folder.path(), "simulate body.flex.h5 --scene spin.toml --case fast -o fast.h5");
+    done(folder.path(), "view body.flex.h5 --recovery skin -o modes.html");
+    done(folder.path(), "view body.flex.h5 --envelope command.csv -o still.html");
+    done(folder.path(), "view body.flex.h5 --envelope command.csv --simulation fast.h5 -o motion.html");
+    let body = flexbody::FlexBody::read(path("body.flex.h5")).expect("a body");
+    let page = |name: &str| fs::read_to_string(path(name)).expect("a page");
+    assert_eq!(body.view_recovery("skin", None).expect("a page").html(), page("modes.html"));
+    let motion = RecordedMotion::read(path("fast.h5")).expect("a motion");
+    let table = path("command.csv");
+    assert_eq!(body.view_envelope(&table, None, None).expect("a page").html(), page("still.html"));
+    let moving = body.view_envelope(&table, Some(&motion), None).expect("a page");
+    assert_eq!(moving.html(), page("motion.html"));
+    let go_on = |_: Progress<'_>| ControlFlow::Continue(());
+    let recovered = |case: &str| {
+        let scene = Scene::read_case(path("spin.toml"), Some(case)).expect("a scene");
+        let motion = body.simulate_with_envelope(&scene, &go_on).expect("a motion");
+        motion.recovered().expect("recoveries")
+    };
+    let (slow, fast) = (recovered("slow-x"), recovered("fast"));
+    let write =
+        |cases: &[(&str, &Recovered)]| Recovered::write_envelope_of_cases(cases, &body, path("library.csv"));
+    write(&[("slow-x", &slow), ("fast", &fast)]).expect("written");
+    assert_eq!(page("library.csv"), page("command.csv"));
+    let history = LoadedHistory::new(vec![0.0], vec![vec![0.0; body.n_modes()]]).expect("a history");
+    let history = history.angular_velocity(&[[0.0; 3]]).expect("a spin");
+    let skin = body.recover(&history, &["skin"]).expect("rows");
+    let refused = |cases: &[(&str, &Recovered)]| write(cases).expect_err("refused").to_string();
+    let other = refused(&[("slow-x", &slow), ("skin", &skin)]);
+    assert!(other.contains("FB804") && other.contains("other recoveries or points"), "{other}");
+    assert!(refused(&[("fast", &slow), ("fast", &fast)]).contains("two load cases have the name `fast`"));
 }
 
 /// A browser draws the colours, the scale with its unit and the mark of the largest value without errors.
