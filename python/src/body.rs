@@ -459,13 +459,20 @@ impl Body {
         self.inner.recoveries()
     }
 
+    /// Names of the named loads of the body, preloads included.
+    #[getter]
+    fn named_loads(&self) -> Vec<&str> {
+        self.inner.named_loads()
+    }
+
     /// Computes the recoveries of the body over a motion of any program, like `flexbody recover`: all, or `only` those
     /// with these names.
     ///
     /// `history` is the path of a table (docs/reference/recovery.md), or a dict of "time" (nt), "q" (nt x nf),
-    /// "angular_velocity" (nt x 3) and "loads", a dict of interface to a tuple of forces and torques (nt x 3 each) at its
-    /// reference point. Vectors are along the axes of the model, which turn with the body. Interfaces without loads count as
-    /// unloaded.
+    /// "angular_velocity" (nt x 3), "loads", a dict of interface to a tuple of forces and torques (nt x 3 each) at its
+    /// reference point, and "amplitudes", a dict of named load to its amplitudes (nt). Vectors are along the axes of the
+    /// model, which turn with the body. Interfaces without loads count as unloaded, named loads without amplitudes as zero;
+    /// preloads act always and take none.
     #[pyo3(signature = (history, only=None))]
     fn recover(
         &self,

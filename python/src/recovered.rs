@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Keys of a history of numbers.
-const KEYS: [&str; 4] = ["time", "q", "angular_velocity", "loads"];
+const KEYS: [&str; 5] = ["time", "q", "angular_velocity", "loads", "amplitudes"];
 
 /// Recoveries of a body over a motion, of a run of any program or of a simulation: stresses, strains, forces.
 #[pyclass(frozen, module = "flexbody")]
@@ -23,11 +23,12 @@ pub struct Recovered {
     cache: ArrayCache,
 }
 
-/// Returns the history that a caller gives: the path of a table, or a dict of time, q, angular_velocity and loads.
+/// Returns the history that a caller gives: the path of a table, or a dict of time, q, angular_velocity, loads and
+/// amplitudes.
 pub fn history_of(given: &Bound<'_, PyAny>, body: &FlexBody) -> PyResult<LoadedHistory> {
     let py = given.py();
     let Ok(values) = given.cast::<PyMapping>() else {
-        let expected = "the path of a table, or a dict of time, q, angular_velocity and loads";
+        let expected = "the path of a table, or a dict of time, q, angular_velocity, loads and amplitudes";
         let path: PathBuf = given.extract().map_err(|_| mistyped(given, "history", expected))?;
         return value(py, LoadedHistory::read(&path, body));
     };
@@ -54,6 +55,22 @@ pub fn history_of(given: &Bound<'_, PyAny>, body: &FlexBody) -> PyResult<LoadedH
     }
     if let Some(loads) = entry("loads")? {
         history = with_loads(history, &loads)?;
+    }
+    if let Some(amplitudes) = entry("amplitudes")? {
+        history = with_amplitudes(history, &amplitudes)?;
+    }
+    Ok(history)
+}
+
+/// Returns the history with amplitudes: a dict of the name of a named load to its amplitudes.
+fn with_amplitudes(mut history: LoadedHistory, amplitudes: &Bound<'_, PyAny>) -> PyResult<LoadedHistory> {
+    let expected = "a dict of named load to its amplitudes (nt)";
+    let amplitudes =
+        amplitudes.cast::<PyMapping>().map_err(|_| mistyped(amplitudes, "amplitudes", expected))?;
+    for item in amplitudes.items()? {
+        let (name, values): (String, Given<'_>) = item.extract()?;
+        let values = sequence(&values, &format!("amplitudes of {name}"))?;
+        history = value(amplitudes.py(), history.amplitude(name, &values))?;
     }
     Ok(history)
 }

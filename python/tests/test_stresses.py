@@ -251,3 +251,41 @@ def test_channels_of_other_steps_are_refused(stresses: Stresses) -> None:
         with pytest.raises(flexbody.InputError) as caught:
             own.channels(given, archive)  # type: ignore[arg-type]
         assert caught.value.codes == (code,), str(caught.value)
+
+
+def test_amplitudes_of_named_loads(stresses: Stresses, tmp_path: Path) -> None:
+    folder = tmp_path / "model"
+    shutil.copytree(stresses.folder, folder)
+    manifest = folder / "model.toml"
+    model = flexbody.read_model(manifest)
+    wind = np.sin(0.7 * np.arange(model.n_dofs))
+    # Two opposite forces along the line between two nodes.
+    bolts = np.zeros(model.n_dofs)
+    axis = model.positions[300] - model.positions[8]
+    bolts[24:27], bolts[900:903] = axis, -axis
+    np.save(folder / "wind.npy", wind)
+    np.save(folder / "bolts.npy", bolts)
+    parts = '\n[[named_load]]\nname = "wind"\nvector = "wind.npy"\n\n[[named_load]]\nname = "bolts"\nvector = "bolts.npy"\npreload = true\n'
+    manifest.write_text(manifest.read_text() + parts)
+    body = flexbody.convert(manifest, modes=6)
+    assert body.named_loads == ["wind", "bolts"]
+    time, amplitude = np.linspace(0, 1, 5), np.array([0.0, 2.0, -1.0, 0.5, 3.0])
+    q = 1e-6 * np.sin(np.arange(30)).reshape(5, 6)
+    head = ",".join(["time", *(f"q_{j}" for j in range(1, 7)), *(f"angular_velocity_{k}" for k in "xyz"), "wind"])
+    table = np.column_stack([time, q, np.zeros((5, 3)), amplitude])
+    np.savetxt(folder / "run.csv", table, delimiter=",", header=head, comments="", fmt="%.17g")
+    history = {"time": time, "q": q, "angular_velocity": np.zeros((5, 3))}
+    given = body.recover({**history, "amplitudes": {"wind": amplitude}}).rows["skin"].values
+    np.testing.assert_array_equal(given, body.recover(folder / "run.csv").rows["skin"].values)
+    # The rows are linear in the amplitude, and the preload acts in all of them.
+    unloaded = body.recover(history).rows["skin"].values
+    one = (given - unloaded)[1] / 2.0
+    np.testing.assert_allclose(given - unloaded, np.outer(amplitude, one), atol=1e-9 * np.abs(one).max())
+    assert np.abs(unloaded - stresses.body.recover(history).rows["skin"].values).max() > 0
+    for amplitudes, said in (
+        ({"rain": amplitude}, "the body has no named load `rain`"),
+        ({"bolts": amplitude}, "`bolts` is a preload"),
+        ({"wind": amplitude[:3]}, "3 amplitudes of the named load `wind` for 5 times"),
+    ):
+        with pytest.raises(flexbody.FlexbodyError, match=said):
+            body.recover({**history, "amplitudes": amplitudes})
