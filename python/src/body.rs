@@ -448,7 +448,19 @@ impl Body {
         points: Argument<'_, '_>,
     ) -> PyResult<Response> {
         let (tolerance, solves) = (None, None);
-        let stated = ResponseArguments { source, target, base, rows, psd, band, scene, damping, tolerance, points, solves };
+        let stated = ResponseArguments {
+            source,
+            target,
+            base,
+            rows,
+            psd,
+            band,
+            scene,
+            damping,
+            tolerance,
+            points,
+            solves,
+        };
         let (options, body) = (stated.options(py)?, Arc::clone(&self.inner));
         Response::with_warnings(py, run(py, move |listener| body.response(&options, listener))?, 0)
     }

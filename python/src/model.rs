@@ -382,7 +382,19 @@ impl Model {
         modes: Argument<'_, '_>,
         basis: Argument<'_, '_>,
     ) -> PyResult<Response> {
-        let stated = ResponseArguments { source, target, base, rows, psd, band, scene, damping, tolerance, points, solves };
+        let stated = ResponseArguments {
+            source,
+            target,
+            base,
+            rows,
+            psd,
+            band,
+            scene,
+            damping,
+            tolerance,
+            points,
+            solves,
+        };
         let mut options = stated.options(py)?.basis(self::basis(basis)?);
         if let Some(modes) = modes {
             options = options.modes(positive(modes, "modes")?);

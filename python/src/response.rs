@@ -141,7 +141,8 @@ impl Response {
             let values = PyDict::new(py);
             values.set_item("rows", one.rows.iter().map(|row| row.name.as_str()).collect::<Vec<_>>())?;
             values.set_item("rms", vector(py, &one.rms))?;
-            values.set_item("points", one.points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>())?;
+            values
+                .set_item("points", one.points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>())?;
             values.set_item("von_mises", vector(py, &one.von_mises))?;
             all.set_item(&one.name, values)?;
         }

@@ -121,6 +121,7 @@ impl Field {
     }
 
     /// Returns the name of the values.
+    #[cfg(feature = "hdf5")]
     pub(crate) fn label(&self) -> &str {
         &self.label
     }
