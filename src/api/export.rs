@@ -7,9 +7,8 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_file::RecordedMotion;
 use flexbody_formats::export::{self, AllowedLosses, Points};
-use flexbody_formats::{FORMATS, export_in_units, find_format};
+use flexbody_formats::{FORMATS, export_in_units, find_format, motion_of_losses};
 use flexbody_input::parse_units;
-use flexbody_motion::scene::FrameMotion;
 use std::path::Path;
 
 /// Settings of an export. By default it has the first dialect of the format, its usual points, all modes and the units
@@ -106,18 +105,18 @@ impl FlexBody {
         let (format, path) = (find_format(format)?, path.as_ref());
         let units = options.units.as_deref().map(parse_units).transpose()?;
         let points = options.points.as_deref().map(str::parse::<Points>).transpose()?;
-        let in_scene = match &options.scene {
-            Some(scene) => heard(NO_LISTENER, |context| FrameMotion::in_cases(&self.0, &scene.0, context))?,
-            None => Vec::new(),
-        };
-        let asked = export::ExportOptions {
+        let mut asked = export::ExportOptions {
             dialect: options.dialect.clone(),
             points: points.unwrap_or_default(),
             modes: options.modes,
             motion: options.motion.clone(),
             name: Some(path.to_owned()),
-            in_scene,
+            in_scene: Vec::new(),
         };
+        if let Some(scene) = &options.scene {
+            asked.in_scene =
+                heard(NO_LISTENER, |context| motion_of_losses(&self.0, format, &asked, &scene.0, context))?;
+        }
         let slot = OutputSlot::prepare(path)?;
         let (exported, diagnostics) =
             export_in_units(&self.0, format, &asked, units.as_ref(), options.allowed.clone())?;

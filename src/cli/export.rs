@@ -7,10 +7,10 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_file::read_simulation;
 use flexbody_formats::export::{AllowedLosses, ExportOptions, Exported, Points};
-use flexbody_formats::{export_in_units, find_format};
+use flexbody_formats::{export_in_units, find_format, motion_of_losses};
 use flexbody_input::parse_units;
 use flexbody_linalg::context::Context;
-use flexbody_motion::scene::{FrameMotion, LoadCases};
+use flexbody_motion::scene::LoadCases;
 use std::borrow::Cow;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -39,7 +39,8 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     if let Some(scene) = &arguments.scene {
         let limits = context(None, true, Context::QUIET.watch);
-        options.in_scene = FrameMotion::in_cases(&body, &LoadCases::read(scene, None)?, &limits)?;
+        let cases = LoadCases::read(scene, None)?;
+        options.in_scene = motion_of_losses(&body, format, &options, &cases, &limits)?;
     }
     let (exported, findings) = export_in_units(&body, format, &options, units.as_ref(), allowed)
         .map_err(|error| error.in_file(arguments.simulation.as_ref().unwrap_or(&arguments.body)))?;

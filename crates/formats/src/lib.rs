@@ -35,6 +35,6 @@ mod vtk;
 pub use embedded::embedded_markdown;
 pub use registry::{
     FORMATS, IMPORT_FORMATS, audit_file, export, export_in_units, find_format, find_import_format,
-    import_file, recognise,
+    import_file, motion_of_losses, recognise,
 };
 pub use vtk::{PointValues, envelope_vtu, stresses_vtu};

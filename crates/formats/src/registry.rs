@@ -15,6 +15,8 @@ use flexbody_base::units::UnitSystem;
 use flexbody_body::convert::interface_compliance;
 use flexbody_body::flex_body::{FlexBody, Storage};
 use flexbody_body::invariants::FrameChoice;
+use flexbody_linalg::context::Context;
+use flexbody_motion::scene::{FrameMotion, FramedScene, LoadCases};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -120,6 +122,27 @@ pub fn export_in_units(
     let (exported, mut findings) = export(&body, format, options, allowed)?;
     findings.extend(interface_compliance(&body).filter(|_| !format.is_picture()));
     Ok((exported, findings))
+}
+
+/// Returns the motion of `body` in the load cases of a scene, for [`ExportOptions::in_scene`]; empty if no loss of this
+/// format depends on it.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) for options that the format does not have; the errors of [`FramedScene::new`], and those of
+/// [`FrameMotion::in_cases`] where the motion counts.
+pub fn motion_of_losses(
+    body: &FlexBody,
+    format: &dyn ExportFormat,
+    options: &ExportOptions,
+    cases: &LoadCases,
+    context: &Context<'_>,
+) -> Result<Vec<FrameMotion>> {
+    check_options(body, format, options)?;
+    if format.checklist(body, options).losses().iter().any(|loss| loss.is_slight) {
+        return FrameMotion::in_cases(body, cases, context);
+    }
+    cases.iter().try_for_each(|scene| FramedScene::new(body, scene).map(drop))?;
+    Ok(Vec::new())
 }
 
 fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOptions) -> Result<()> {
