@@ -5,7 +5,7 @@ use super::{FlexBody, Matrix, ReportFormat};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_input::{WrittenSteps, read_steps};
+use flexbody_input::read_steps;
 use flexbody_model::RecoveryRow;
 use flexbody_motion::scene::{
     self, AmplitudeHistory, Envelope, LoadHistory, RecoveredMotion, RowMap, StressPoint,
@@ -220,8 +220,7 @@ impl FlexBody {
     pub fn channels(&self, history: &LoadedHistory, steps: impl AsRef<Path>) -> Result<Channels> {
         history.refuse_foreign(self)?;
         let path = steps.as_ref();
-        let WrittenSteps { columns, factors, nodes, displacements, modes_follow_spin } = read_steps(path)?;
-        let steps = scene::ShapeSteps { columns, factors, nodes, displacements, modes_follow_spin };
+        let steps = read_steps(path)?;
         let channels = history.0.channels(&self.0, &steps).map_err(|error| error.in_file(path))?;
         Ok(Channels { channels, history: history.0.path.display().to_string() })
     }

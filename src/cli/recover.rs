@@ -6,8 +6,8 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_input::{WrittenSteps, read_steps};
-use flexbody_motion::scene::{Channels, Envelope, LoadedHistory, RecoveredMotion, ShapeSteps};
+use flexbody_input::read_steps;
+use flexbody_motion::scene::{Channels, Envelope, LoadedHistory, RecoveredMotion};
 use flexbody_report::{EnvelopeKind, Format, RecoveredFacts, RunData, channels_csv, recovered_csv};
 use std::path::{Path, PathBuf};
 
@@ -120,9 +120,7 @@ pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
 
 /// Returns the channels of the steps in an archive of `flexbody shapes`.
 fn channels_of(body: &FlexBody, history: &LoadedHistory, steps: &Path) -> Result<Channels> {
-    let WrittenSteps { columns, factors, nodes, displacements, modes_follow_spin } = read_steps(steps)?;
-    let known = ShapeSteps { columns, factors, nodes, displacements, modes_follow_spin };
-    history.channels(body, &known).map_err(|error| error.in_file(steps))
+    history.channels(body, &read_steps(steps)?).map_err(|error| error.in_file(steps))
 }
 
 /// Returns the numbers of channels and instants in words; empty without channels.

@@ -35,15 +35,7 @@ pub fn fill_recovered(
 }
 
 fn fill(body: &FlexBody, motion: &RecoveredMotion, origin: (&str, &str), path: &Path) -> hdf5::Result<()> {
-    let file = create(path)?;
-    put_text(&file, "format", FORMAT)?;
-    file.new_attr::<i64>().create("format_version")?.write_scalar(&VERSION)?;
-    put_text(&file, "generator", &generator())?;
-    put_text(&file, "body", &body.source().name)?;
-    put_text(&file, origin.0, origin.1)?;
-    let times = &motion.states.times;
-    let time = put(&file.as_group()?, "time", &[times.len()], times)?;
-    put_text(&time, "units", body.units().time.name())?;
+    let file = begun(path, FORMAT, body, origin, &motion.states.times)?;
     make(&file, "/recovery")?;
     for one in &motion.recoveries {
         let group = make(&file, &format!("/recovery/{}", names::encode(&one.name)))?;
@@ -51,6 +43,25 @@ fn fill(body: &FlexBody, motion: &RecoveredMotion, origin: (&str, &str), path: &
     }
     file.flush()?;
     file.close()
+}
+
+/// Creates a file with the format, the body, the origin of the motion and its times.
+fn begun(
+    path: &Path,
+    format: &str,
+    body: &FlexBody,
+    origin: (&str, &str),
+    times: &[f64],
+) -> hdf5::Result<hdf5::File> {
+    let file = create(path)?;
+    put_text(&file, "format", format)?;
+    file.new_attr::<i64>().create("format_version")?.write_scalar(&VERSION)?;
+    put_text(&file, "generator", &generator())?;
+    put_text(&file, "body", &body.source().name)?;
+    put_text(&file, origin.0, origin.1)?;
+    let time = put(&file.as_group()?, "time", &[times.len()], times)?;
+    put_text(&time, "units", body.units().time.name())?;
+    Ok(file)
 }
 
 /// Writes channels of the steps of an FE program to the temporary file of `slot`, which appears under its name when the
@@ -62,17 +73,14 @@ fn fill(body: &FlexBody, motion: &RecoveredMotion, origin: (&str, &str), path: &
 /// FB104 if the file cannot be written, FB602 if the disk is full.
 pub fn fill_channels(body: &FlexBody, channels: &Channels, history: &str, slot: &OutputSlot) -> Result<()> {
     let fill = || -> hdf5::Result<()> {
-        let file = create(slot.temporary())?;
-        put_text(&file, "format", "flexbody-channels")?;
-        file.new_attr::<i64>().create("format_version")?.write_scalar(&VERSION)?;
-        put_text(&file, "generator", &generator())?;
-        put_text(&file, "body", &body.source().name)?;
-        put_text(&file, "history", history)?;
-        let root = file.as_group()?;
-        let time = put(&root, "time", &[channels.times.len()], &channels.times)?;
-        put_text(&time, "units", body.units().time.name())?;
-        let values =
-            put(&root, "channels", &[channels.times.len(), channels.names.len()], &channels.values.concat())?;
+        let origin = ("history", history);
+        let file = begun(slot.temporary(), "flexbody-channels", body, origin, &channels.times)?;
+        let values = put(
+            &file.as_group()?,
+            "channels",
+            &[channels.times.len(), channels.names.len()],
+            &channels.values.concat(),
+        )?;
         put_text(&values, "names", &serde_json::to_string(&channels.names).expect("strings are valid JSON"))?;
         put_text(
             &values,

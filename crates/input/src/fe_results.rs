@@ -18,7 +18,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Error;
 use flexbody_base::text::InputFile;
 use flexbody_base::units::UnitSystem;
-use flexbody_model::{AnsweredShapes, DofLabel, Quantity, RecoveryOperator, RecoveryRow};
+use flexbody_model::{AnsweredShapes, DofLabel, Quantity, RecoveryOperator, RecoveryRow, ShapeSteps};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -432,27 +432,12 @@ impl ShapeArchive {
     }
 }
 
-/// Steps of an FE program in the archive that `flexbody shapes` writes with them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WrittenSteps {
-    /// Mode or static column of each step.
-    pub columns: Vec<String>,
-    /// Factor of each step.
-    pub factors: Vec<f64>,
-    /// Numbers of the nodes.
-    pub nodes: Vec<i64>,
-    /// Displacements of each step and node, axes of the model.
-    pub displacements: Vec<Vec<[f64; 3]>>,
-    /// True if the modes respond to spin.
-    pub modes_follow_spin: bool,
-}
-
 /// Reads the steps in an archive of `flexbody shapes`.
 ///
 /// # Errors
 /// FB101 and FB106 for a file that cannot be read, FB326 for a file that is no such archive, FB103, FB301 to FB306 for
 /// damaged arrays.
-pub fn read_steps(path: &Path) -> Result<WrittenSteps, Error> {
+pub fn read_steps(path: &Path) -> Result<ShapeSteps, Error> {
     let file = InputFile::open(path)?;
     let about = |diagnostic: Diagnostic| Error::new(vec![diagnostic.in_file(path)]);
     let foreign = |message: &str| {
@@ -490,7 +475,7 @@ pub fn read_steps(path: &Path) -> Result<WrittenSteps, Error> {
     }
     let step = |step: &[f64]| step.as_chunks::<3>().0.to_vec();
     let displacements = blocks.values.chunks((3 * nodes.len()).max(1)).map(step).collect();
-    Ok(WrittenSteps { columns, factors, nodes, displacements, modes_follow_spin: follows.unwrap_or(true) })
+    Ok(ShapeSteps { columns, factors, nodes, displacements, modes_follow_spin: follows.unwrap_or(true) })
 }
 
 /// Returns the labels of three displacements for each node.

@@ -50,7 +50,7 @@ mod tables;
 mod with_stress;
 
 pub use assemble::check_size;
-pub use fe_results::{PointStresses, WrittenSteps, read_point_stresses, read_steps};
+pub use fe_results::{PointStresses, read_point_stresses, read_steps};
 pub use jobs::{ElementDeck, JobFile, is_job, job_programs};
 pub use manifest::read_manifest;
 pub use model_files::{

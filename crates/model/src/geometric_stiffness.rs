@@ -101,6 +101,26 @@ impl UnitLoad {
         }
     }
 
+    /// Returns the name of the step of an FE program with the static response to the load: `spin xy`, `tip Fz`, `tip Mx`
+    /// (interface `tip`), the name of a named load.
+    pub fn step(&self) -> String {
+        let axis = self.axis();
+        match &self.kind {
+            LoadKind::Force(at) => format!("{at} F{axis}"),
+            LoadKind::Moment(at) => format!("{at} M{axis}"),
+            LoadKind::Named(name) => name.clone(),
+            kind => format!("{} {axis}", kind.name().replace('_', " ")),
+        }
+    }
+
+    /// Returns the unit forces and moments at an interface, in the order of the components of a static column.
+    pub fn at_interface(name: &str) -> [Self; 6] {
+        std::array::from_fn(|k| Self {
+            kind: if k < 3 { LoadKind::Force(name.to_owned()) } else { LoadKind::Moment(name.to_owned()) },
+            component: k % 3,
+        })
+    }
+
     /// Returns the load with the name `label`; the inverse of [`UnitLoad::label`].
     pub fn from_label(label: &str) -> Option<Self> {
         let split = |kind: &&'static str| Some((*kind, label.strip_prefix(*kind)?.strip_prefix('_')?));

@@ -51,7 +51,7 @@ pub use layout::filled_rows;
 pub use named_load::ModelLoad;
 pub use nodes::{DofLabel, ElementShape, Elements, Nodes};
 pub use raw::{RawMatrix, RawModel, RawModes, RawShapes};
-pub use recovery::{AnsweredShapes, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
+pub use recovery::{AnsweredShapes, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow, ShapeSteps};
 pub use rows::{Rows, centre_and_length, extents, rigid_axes, rigid_count, rigid_fields, span};
 pub use separate_bodies::check_bodies;
 pub use stress_points::{StressPoint, pascals};

@@ -1,8 +1,8 @@
 //! Named loads: nodal forces that act on the body as one load with an amplitude.
 
-use super::recovery::{Problem, RowsOfFiles};
+use super::recovery::{self, Problem, RowsOfFiles};
 use super::rows::{centre_and_length, rigid_count};
-use super::{GeometricStiffness, LoadKind, NodeSet, Nodes, Rows};
+use super::{GeometricStiffness, LoadKind, LostRow, NodeSet, Nodes, Rows, UnitLoad};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use std::collections::HashSet;
@@ -20,9 +20,6 @@ pub struct ModelLoad {
     /// File of the forces, for messages; empty for data in memory.
     pub path: PathBuf,
 }
-
-/// Longest name of a load in bytes, since the name becomes a group name in the file.
-const MAX_NAME_BYTES: usize = 200;
 
 /// Columns of the tables of runs whose names no load may have, since its own column has its name.
 const OTHER_COLUMNS: [&str; 4] = ["time", "kinetic", "elastic", "work"];
@@ -78,43 +75,32 @@ fn refuse_name(name: &str, seen: &mut HashSet<String>, interfaces: &[NodeSet]) -
         OTHER_COLUMNS.contains(&name) || OTHER_VECTORS.iter().any(is_vector)
     };
     let wrong = match name {
-        "" => "has no name".to_owned(),
-        _ if name.len() > MAX_NAME_BYTES || name.chars().any(char::is_control) => format!(
-            "`{}` has a name that is longer than {MAX_NAME_BYTES} bytes or has control characters in it",
-            name.escape_debug()
-        ),
-        _ if interfaces.iter().any(|set| set.name == name) => {
-            format!("`{name}` has the name of an interface: give it another one")
-        }
-        _ if is_other(name) => {
-            format!("`{name}` has the name of a column of the table of a run: give it another one")
-        }
-        _ if is_step(name, interfaces) => {
-            format!("`{name}` has the name of a step of `flexbody shapes`: give it another one")
-        }
-        _ if !seen.insert(name.to_owned()) => format!("`{name}` is given twice"),
-        _ => return Ok(()),
+        _ if interfaces.iter().any(|set| set.name == name) => "an interface",
+        _ if is_other(name) => "a column of the table of a run",
+        _ if is_step(name, interfaces) => "a step of `flexbody shapes`",
+        _ => return recovery::refuse_name(name, seen),
     };
-    Err((Code::ManifestSyntax, wrong))
+    Err((Code::ManifestSyntax, format!("`{name}` has the name of {wrong}: give it another one")))
 }
 
 /// Returns true for the names that `flexbody shapes` gives to modes, and to static responses to spin and to unit loads at
 /// interfaces: `mode 1`, `spin xy`, `tip Fx`.
 fn is_step(name: &str, interfaces: &[NodeSet]) -> bool {
-    const COMPONENTS: [&str; 6] = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
     let Some((of, part)) = name.rsplit_once(' ') else { return false };
     match of {
         "mode" => part.parse::<u32>().is_ok(),
         "spin" => part.len() == 2 && part.bytes().all(|axis| b"xyz".contains(&axis)),
-        _ => COMPONENTS.contains(&part) && interfaces.iter().any(|set| set.name == of),
+        _ => {
+            UnitLoad::at_interface(of).iter().any(|load| load.step() == name)
+                && interfaces.iter().any(|set| set.name == of)
+        }
     }
 }
 
 /// Returns the forces in the internal order of rows.
 fn in_internal_rows(name: &str, forces: &[f64], of_files: &RowsOfFiles<'_>) -> Result<Vec<f64>, Problem> {
     let refuse = |message: String| (Code::NamedLoadMisfit, format!("`{name}`: {message}"));
-    let known: Vec<usize> = std::iter::once(of_files.matrix_rows).chain(of_files.given.counts()).collect();
-    if !known.contains(&forces.len()) {
+    if !of_files.fit(forces.len()) {
         return Err(refuse(format!(
             "its vector has {} values, the matrices have {} rows",
             forces.len(),
@@ -133,16 +119,12 @@ fn in_internal_rows(name: &str, forces: &[f64], of_files: &RowsOfFiles<'_>) -> R
         return Err(refuse("all of its forces are zero".to_owned()));
     }
     let column = CscMatrix::from_triplets(forces.len(), 1, &entries);
-    let lost = || refuse("it has forces in rows that K and M leave empty".to_owned());
-    let column = of_files.given.sparse_forces(column).map_err(|_| lost())?;
-    let mut internal = vec![0.0; of_files.to.iter().filter(|to| **to != u32::MAX).count()];
+    let column = of_files
+        .internal(column)
+        .map_err(|LostRow| refuse("it has forces in rows that K and M leave empty".to_owned()))?;
+    let mut internal = vec![0.0; column.n_rows()];
     let (rows, values) = column.column(0);
-    for (&row, &value) in rows.iter().zip(values) {
-        match of_files.to[row as usize] {
-            u32::MAX => return Err(lost()),
-            to => internal[to as usize] += value,
-        }
-    }
+    rows.iter().zip(values).for_each(|(&row, &value)| internal[row as usize] += value);
     Ok(internal)
 }
 

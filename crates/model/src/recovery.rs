@@ -94,6 +94,21 @@ pub struct AnsweredShapes {
     pub energies: Option<Vec<f64>>,
 }
 
+/// Steps of an FE program that `flexbody shapes` has written: modes and static columns as displacements of all nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShapeSteps {
+    /// Mode or static column of each step: `mode 1`, or the name of [`UnitLoad::step`](super::UnitLoad::step).
+    pub columns: Vec<String>,
+    /// Factor of each step: a step is the factor times its mode or column.
+    pub factors: Vec<f64>,
+    /// Numbers of the nodes.
+    pub nodes: Vec<i64>,
+    /// Displacements of each step and node, axes of the model.
+    pub displacements: Vec<Vec<[f64; 3]>>,
+    /// True if the modes of the body respond to spin, so that the static columns of spin are what they leave out.
+    pub modes_follow_spin: bool,
+}
+
 /// Linear map from the displacements of the body to the rows of a recovery.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RecoveryOperator {
@@ -155,6 +170,34 @@ pub(super) struct RowsOfFiles<'a> {
     pub to: &'a [u32],
 }
 
+impl RowsOfFiles<'_> {
+    /// Returns true for the number of rows of K, or of a file of the model.
+    pub(super) fn fit(&self, rows: usize) -> bool {
+        rows == self.matrix_rows || self.given.counts().any(|count| count == rows)
+    }
+
+    /// Returns columns by the rows of the files in the internal order of rows.
+    ///
+    /// # Errors
+    /// [`LostRow`] for entries in rows that K and M leave empty.
+    pub(super) fn internal(&self, columns: CscMatrix) -> Result<CscMatrix, LostRow> {
+        let count = columns.n_cols();
+        let given = self.given.sparse_forces(columns)?;
+        let mut entries = Vec::with_capacity(given.nnz());
+        for j in 0..count {
+            let (rows, values) = given.column(j);
+            for (&row, &value) in rows.iter().zip(values) {
+                match self.to[row as usize] {
+                    u32::MAX => return Err(LostRow),
+                    to => entries.push((to, j as u32, value)),
+                }
+            }
+        }
+        let internal = self.to.iter().filter(|to| **to != u32::MAX).count();
+        Ok(CscMatrix::from_triplets(internal, count, &entries))
+    }
+}
+
 /// Returns the recoveries with operators in the internal order; adds an error for each that is not valid.
 pub(super) fn checked_recoveries(
     asked: Vec<ModelRecovery>,
@@ -191,7 +234,8 @@ pub(super) fn checked_recoveries(
 /// Code and message about a recovery.
 pub(super) type Problem = (Code, String);
 
-fn refuse_name(name: &str, seen: &mut HashSet<String>) -> Result<(), Problem> {
+/// Refuses a name that cannot be that of a group in the file, or that is given twice.
+pub(super) fn refuse_name(name: &str, seen: &mut HashSet<String>) -> Result<(), Problem> {
     let wrong = match name {
         "" => "has no name".to_owned(),
         _ if name.len() > MAX_NAME_BYTES || name.chars().any(char::is_control) => format!(
@@ -213,9 +257,8 @@ fn in_internal_rows(
     of_files: &RowsOfFiles<'_>,
 ) -> Result<CscMatrix, Problem> {
     let (n, count) = (transposed.n_rows(), transposed.n_cols());
-    let known: Vec<usize> = std::iter::once(of_files.matrix_rows).chain(of_files.given.counts()).collect();
-    if !known.contains(&n) {
-        let transposed = if known.contains(&count) { "; it may be the transposed operator" } else { "" };
+    if !of_files.fit(n) {
+        let transposed = if of_files.fit(count) { "; it may be the transposed operator" } else { "" };
         let message = format!(
             "`{name}`: its operator is {count} x {n}, the matrices have {} rows{transposed}",
             of_files.matrix_rows
@@ -241,23 +284,9 @@ fn in_internal_rows(
             format!("`{name}`: value {} of its offset is not finite", j + 1),
         ));
     }
-    let lost = |LostRow| {
+    of_files.internal(transposed).map_err(|LostRow| {
         (Code::RecoverySize, format!("`{name}`: its operator has entries in rows that K and M leave empty"))
-    };
-    let given = of_files.given.sparse_forces(transposed).map_err(lost)?;
-    let mut entries = Vec::with_capacity(given.nnz());
-    for j in 0..count {
-        let (rows, values) = given.column(j);
-        for (&row, &value) in rows.iter().zip(values) {
-            let to = of_files.to[row as usize];
-            if to == u32::MAX {
-                return Err(lost(LostRow));
-            }
-            entries.push((to, j as u32, value));
-        }
-    }
-    let internal = of_files.to.iter().filter(|to| **to != u32::MAX).count();
-    Ok(CscMatrix::from_triplets(internal, count, &entries))
+    })
 }
 
 /// Refuses labels that do not describe `count` rows.

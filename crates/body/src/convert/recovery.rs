@@ -21,9 +21,6 @@ use std::collections::HashSet;
 /// Names of the components of force and torque.
 const COMPONENTS: [&str; LOAD_COMPONENTS] = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
 
-/// Names of the axes.
-const AXES: [&str; 3] = ["x", "y", "z"];
-
 /// Recoveries and named loads of a body.
 #[derive(Debug, Default)]
 pub(super) struct Recovered {
@@ -316,25 +313,15 @@ impl StaticLoads {
 
     /// Returns the names of the loads, in their order.
     pub(super) fn names(&self) -> Vec<String> {
-        let spin = self.spins.iter().map(|&c| {
-            let (k, l) = LoadKind::SPIN[c];
-            format!("spin {}{}", AXES[k], AXES[l])
-        });
-        let at = |interface: &String| {
-            self.components.iter().map(|&c| format!("{interface} {}", COMPONENTS[c])).collect::<Vec<_>>()
-        };
-        spin.chain(self.interfaces.iter().flat_map(at)).chain(self.named.iter().cloned()).collect()
+        self.unit_loads().iter().map(UnitLoad::step).collect()
     }
 
     /// Returns the unit loads of geometric stiffness that the loads are, in their order.
     pub(super) fn unit_loads(&self) -> Vec<UnitLoad> {
         let spin = self.spins.iter().map(|&component| UnitLoad { kind: LoadKind::Spin, component });
         let at = |interface: &String| {
-            let one = |&component: &usize| match component {
-                0..3 => UnitLoad { kind: LoadKind::Force(interface.clone()), component },
-                _ => UnitLoad { kind: LoadKind::Moment(interface.clone()), component: component - 3 },
-            };
-            self.components.iter().map(one).collect::<Vec<_>>()
+            let all = UnitLoad::at_interface(interface);
+            self.components.iter().map(|&component| all[component].clone()).collect::<Vec<_>>()
         };
         let named =
             self.named.iter().map(|name| UnitLoad { kind: LoadKind::Named(name.clone()), component: 0 });

@@ -21,14 +21,7 @@ pub(super) fn read_vtu(file: &InputFile) -> Found<StepValues> {
         let message = "no array `node` of whole numbers numbers the points";
         return Err(unreadable(file, message));
     };
-    let of_step = |what: &str, step: usize| {
-        let is_asked = |array: &&PointArray| {
-            let name = array.name.to_lowercase();
-            let number = name.strip_prefix(what).map(|rest| rest.trim_start_matches([' ', '_']));
-            number.is_some_and(|number| number.parse() == Ok(step))
-        };
-        arrays.iter().find(is_asked)
-    };
+    let of_step = |what: &str, step: usize| arrays.iter().find(|array| step_of(array, what) == Some(step));
     let (mut steps, mut digits) = (Vec::new(), 15);
     for number in 1.. {
         let (moved, stressed) = match (of_step("displacement", number), of_step("stress", number)) {
@@ -56,13 +49,15 @@ pub(super) fn read_vtu(file: &InputFile) -> Found<StepValues> {
     StepValues::of(steps, digits, file)?.with_stresses(file)
 }
 
+/// Returns the number of the step whose values of this kind the array has: `stress 2` or `Stress_2` are those of step 2.
+fn step_of(array: &PointArray, what: &str) -> Option<usize> {
+    let name = array.name.to_lowercase();
+    name.strip_prefix(what)?.trim_start_matches([' ', '_']).parse().ok()
+}
+
 /// Refuses arrays of steps behind a missing one.
 fn refuse_unfinished(file: &InputFile, arrays: &[PointArray], steps: usize) -> Found<()> {
-    let of_steps = arrays.iter().filter(|array| {
-        let name = array.name.to_lowercase();
-        let number = name.strip_prefix("stress").map(|rest| rest.trim_start_matches([' ', '_']));
-        number.is_some_and(|number| number.parse::<usize>().is_ok())
-    });
+    let of_steps = arrays.iter().filter(|array| step_of(array, "stress").is_some());
     match of_steps.count() {
         0 => Err(unreadable(file, "file has no arrays `displacement 1` and `stress 1` at its points")),
         count if count != steps => {

@@ -294,11 +294,17 @@ pub(super) fn text_of(attribute: &Attribute, heaps: &Heaps<'_>) -> Option<String
 
 /// Reads the dataset `name`, or the only array of the file.
 pub(crate) fn read_array(file: &InputFile, name: Option<&str>) -> Found<Array> {
-    let opened = opened(file)?;
-    let numbers = match name {
-        Some(name) => named(&opened, name)?,
-        None => search(&opened)?,
-    };
+    array_of(&named_or_only(&opened(file)?, name)?)
+}
+
+fn named_or_only(file: &File, name: Option<&str>) -> Found<Numbers> {
+    match name {
+        Some(name) => named(file, name),
+        None => search(file),
+    }
+}
+
+fn array_of(numbers: &Numbers) -> Found<Array> {
     let shape = numbers.dataset.shape();
     let (rows, cols) = match *shape.as_slice() {
         [rows] => (rows, 1),
@@ -319,13 +325,10 @@ pub(crate) fn read_array(file: &InputFile, name: Option<&str>) -> Found<Array> {
 
 /// Reads the dataset `name`, or the only array of the file, as a matrix. MATLAB stores the transposed array.
 pub(super) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
-    let opened_file = opened(file)?;
-    let numbers = match name {
-        Some(name) => named(&opened_file, name)?,
-        None => search(&opened_file)?,
-    };
+    let opened = opened(file)?;
+    let numbers = named_or_only(&opened, name)?;
     let is_transposed = numbers.dataset.attr("MATLAB_class").is_ok();
-    let Array { rows, cols, values, .. } = read_array(file, name)?;
+    let Array { rows, cols, values, .. } = array_of(&numbers)?;
     let mut entries = Vec::new();
     for (at, &value) in values.iter().enumerate().filter(|(_, value)| **value != 0.0) {
         let (row, col) = ((at / cols.max(1)) as u32, (at % cols.max(1)) as u32);

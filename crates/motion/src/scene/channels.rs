@@ -13,34 +13,15 @@ use super::LoadedHistory;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_model::LoadKind;
+use flexbody_model::{LoadKind, ShapeSteps, UnitLoad};
 use nalgebra::{SMatrix, SVector, Vector3};
 
-/// Names of force and torque of an interface in the steps, after its name.
-const COMPONENTS: [&str; 6] = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
-/// Names of the axes.
-const AXES: [&str; 3] = ["x", "y", "z"];
 /// Name of the channel of the values at rest.
 const AT_REST: &str = "constant";
 
 /// Largest difference of a mode in the steps from that of the body, relative to its largest displacement, after the best
 /// rigid motion. Steps of the body reach 1e-12, bodies in single precision 1e-7; another mode has about 1.
 const MAX_DIFFERENCE: f64 = 1e-5;
-
-/// Steps of an FE program that `flexbody shapes` has written.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ShapeSteps {
-    /// Mode or static column of each step, as in `mode 1`, `spin xy`, `tip Fx`.
-    pub columns: Vec<String>,
-    /// Factor of each step.
-    pub factors: Vec<f64>,
-    /// Numbers of the nodes.
-    pub nodes: Vec<i64>,
-    /// Displacements of each step and node, axes of the model.
-    pub displacements: Vec<Vec<[f64; 3]>>,
-    /// True if the modes of the body respond to spin, so that the static columns of spin are what they leave out.
-    pub modes_follow_spin: bool,
-}
 
 /// Factor of each step of an FE program over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,7 +54,7 @@ impl LoadedHistory {
     /// [`RecoveryShapes`](Code::RecoveryShapes) for steps of another body, FB215 if the history has no angular velocity
     /// and there are steps of spin.
     pub fn channels(&self, body: &FlexBody, steps: &ShapeSteps) -> Result<Channels> {
-        steps.refuse_foreign(body)?;
+        refuse_foreign(steps, body)?;
         self.refuse_torque_without_rotation(body)?;
         self.refuse_load_without_step(body, steps)?;
         let sources = steps.columns.iter().map(|name| self.source(body, name)).collect::<Result<Vec<_>>>()?;
@@ -101,12 +82,8 @@ impl LoadedHistory {
         for load in &self.loads {
             let is_loaded = load.values.iter().flatten().any(|vector| *vector != Vector3::zeros());
             let has_step = || {
-                let of_load = |name: &String| {
-                    let rest =
-                        name.strip_prefix(load.interface.as_str()).and_then(|rest| rest.strip_prefix(' '));
-                    rest.is_some_and(|rest| COMPONENTS.contains(&rest))
-                };
-                steps.columns.iter().any(of_load)
+                let all = UnitLoad::at_interface(&load.interface);
+                all.iter().any(|one| steps.columns.contains(&one.step()))
             };
             let mut known = body.recoveries().iter().flat_map(|one| &one.loads);
             if is_loaded && !has_step() && !known.any(|own| own.interface == load.interface) {
@@ -127,7 +104,9 @@ impl LoadedHistory {
         if let Some(number) = number.filter(|number| (1..=body.n_modes()).contains(number)) {
             return Ok(Source::Mode(number - 1));
         }
-        let spin = LoadKind::SPIN.into_iter().find(|(k, l)| name == format!("spin {}{}", AXES[*k], AXES[*l]));
+        let is_spin =
+            |component: &usize| UnitLoad { kind: LoadKind::Spin, component: *component }.step() == name;
+        let spin = (0..LoadKind::SPIN.len()).find(is_spin).map(|component| LoadKind::SPIN[component]);
         if let Some((k, l)) = spin {
             if self.angular_velocity.is_none() {
                 let message =
@@ -141,9 +120,7 @@ impl LoadedHistory {
             return Ok(Source::Spin(k, l));
         }
         for interface in body.interfaces() {
-            let of_interface =
-                name.strip_prefix(interface.name.as_str()).and_then(|rest| rest.strip_prefix(' '));
-            let component = of_interface.and_then(|rest| COMPONENTS.iter().position(|known| *known == rest));
+            let component = UnitLoad::at_interface(&interface.name).iter().position(|one| one.step() == name);
             if let Some(component) = component {
                 let load = self.loads.iter().position(|load| load.interface == interface.name);
                 return Ok(load.map_or(Source::Unloaded, |load| Source::Load(load, component)));
@@ -158,84 +135,78 @@ impl LoadedHistory {
     }
 }
 
-impl ShapeSteps {
-    /// Refuses steps of another body.
-    ///
-    /// # Errors
-    /// [`RecoveryShapes`](Code::RecoveryShapes).
-    fn refuse_foreign(&self, body: &FlexBody) -> Result<()> {
-        let steps = self.columns.len();
-        let fits = self.factors.len() == steps
-            && self.displacements.len() == steps
-            && self.displacements.iter().all(|own| own.len() == self.nodes.len());
-        if !fits || self.factors.iter().any(|factor| !(factor.is_finite() && *factor > 0.0)) {
-            return Err(foreign(
-                "the names, factors and displacements of the steps do not fit each other".to_owned(),
-            )
-            .into());
-        }
-        if self.nodes != body.nodes().ids {
-            return Err(foreign("the nodes of the steps are not those of the body".to_owned()).into());
-        }
-        let modes = self.columns.iter().filter(|name| name.starts_with("mode ")).count();
-        if modes != body.n_modes() {
-            let message = format!("the steps have {modes} modes, the body has {}", body.n_modes());
+/// Refuses steps of another body.
+///
+/// # Errors
+/// [`RecoveryShapes`](Code::RecoveryShapes).
+fn refuse_foreign(steps: &ShapeSteps, body: &FlexBody) -> Result<()> {
+    let count = steps.columns.len();
+    let fits = steps.factors.len() == count
+        && steps.displacements.len() == count
+        && steps.displacements.iter().all(|own| own.len() == steps.nodes.len());
+    if !fits || steps.factors.iter().any(|factor| !(factor.is_finite() && *factor > 0.0)) {
+        return Err(foreign(
+            "the names, factors and displacements of the steps do not fit each other".to_owned(),
+        )
+        .into());
+    }
+    if steps.nodes != body.nodes().ids {
+        return Err(foreign("the nodes of the steps are not those of the body".to_owned()).into());
+    }
+    let modes = steps.columns.iter().filter(|name| name.starts_with("mode ")).count();
+    if modes != body.n_modes() {
+        let message = format!("the steps have {modes} modes, the body has {}", body.n_modes());
+        return Err(foreign(message).into());
+    }
+    if steps.modes_follow_spin != body.groups().w1 {
+        let message =
+            "the steps belong to the same modes with other terms: their static columns of spin differ";
+        return Err(foreign(message.to_owned()).into());
+    }
+    for j in 0..body.n_modes() {
+        let name = format!("mode {}", j + 1);
+        let Some(step) = steps.columns.iter().position(|known| *known == name) else {
+            return Err(foreign(format!("no step is {name}")).into());
+        };
+        let difference = difference(steps, body, step, j);
+        if difference.is_nan() || difference > MAX_DIFFERENCE {
+            let message = format!(
+                "step {} is not {name} of the body: its displacements differ by {difference:.1e} of the largest",
+                step + 1
+            );
             return Err(foreign(message).into());
         }
-        if self.modes_follow_spin != body.groups().w1 {
-            let message =
-                "the steps belong to the same modes with other terms: their static columns of spin differ";
-            return Err(foreign(message.to_owned()).into());
-        }
-        for j in 0..body.n_modes() {
-            let name = format!("mode {}", j + 1);
-            let Some(step) = self.columns.iter().position(|known| *known == name) else {
-                return Err(foreign(format!("no step is {name}")).into());
-            };
-            let difference = self.difference(body, step, j);
-            if difference.is_nan() || difference > MAX_DIFFERENCE {
-                let message = format!(
-                    "step {} is not {name} of the body: its displacements differ by {difference:.1e} of the largest",
-                    step + 1
-                );
-                return Err(foreign(message).into());
-            }
-        }
-        Ok(())
     }
+    Ok(())
+}
 
-    /// Returns the largest difference of a step from mode `j` of the body after the best rigid motion, relative to the
-    /// largest displacement.
-    fn difference(&self, body: &FlexBody, step: usize, j: usize) -> f64 {
-        let (frame, shape) = (body.frame(), &body.modes().shape);
-        let size = body.largest_displacement(j);
-        let places: Vec<Vector3<f64>> = body
-            .nodes()
-            .positions
-            .iter()
-            .map(|x| Vector3::from(frame.to_model(*x)) / body.extent())
-            .collect();
-        let middle = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
-        let apart = |node: usize| {
-            let own = frame.axes * Vector3::from_fn(|k, _| shape[(3 * node + k, j)]);
-            (Vector3::from(self.displacements[step][node]) / self.factors[step] - own) / size
-        };
-        // Least squares of translation and rotation.
-        let motions = |node: usize| {
-            let [x, y, z] = <[f64; 3]>::from(places[node] - middle);
-            SMatrix::<f64, 3, 6>::from_row_slice(&[
-                1.0, 0.0, 0.0, 0.0, z, -y, 0.0, 1.0, 0.0, -z, 0.0, x, 0.0, 0.0, 1.0, y, -x, 0.0,
-            ])
-        };
-        let (mut gram, mut along) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
-        for node in 0..places.len() {
-            let own = motions(node);
-            gram += own.transpose() * own;
-            along += own.transpose() * apart(node);
-        }
-        let rigid = gram.svd(true, true).solve(&along, 1e-12).unwrap_or_default();
-        (0..places.len()).map(|node| (apart(node) - motions(node) * rigid).amax()).fold(0.0, f64::max)
+/// Returns the largest difference of a step from mode `j` of the body after the best rigid motion, relative to the
+/// largest displacement.
+fn difference(steps: &ShapeSteps, body: &FlexBody, step: usize, j: usize) -> f64 {
+    let (frame, shape) = (body.frame(), &body.modes().shape);
+    let size = body.largest_displacement(j);
+    let places: Vec<Vector3<f64>> =
+        body.nodes().positions.iter().map(|x| Vector3::from(frame.to_model(*x)) / body.extent()).collect();
+    let middle = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
+    let apart = |node: usize| {
+        let own = frame.axes * Vector3::from_fn(|k, _| shape[(3 * node + k, j)]);
+        (Vector3::from(steps.displacements[step][node]) / steps.factors[step] - own) / size
+    };
+    // Least squares of translation and rotation.
+    let motions = |node: usize| {
+        let [x, y, z] = <[f64; 3]>::from(places[node] - middle);
+        SMatrix::<f64, 3, 6>::from_row_slice(&[
+            1.0, 0.0, 0.0, 0.0, z, -y, 0.0, 1.0, 0.0, -z, 0.0, x, 0.0, 0.0, 1.0, y, -x, 0.0,
+        ])
+    };
+    let (mut gram, mut along) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
+    for node in 0..places.len() {
+        let own = motions(node);
+        gram += own.transpose() * own;
+        along += own.transpose() * apart(node);
     }
+    let rigid = gram.svd(true, true).solve(&along, 1e-12).unwrap_or_default();
+    (0..places.len()).map(|node| (apart(node) - motions(node) * rigid).amax()).fold(0.0, f64::max)
 }
 
 fn foreign(message: String) -> Diagnostic {

@@ -26,7 +26,7 @@ mod simulate;
 mod surroundings;
 mod trace;
 
-pub use channels::{Channels, ShapeSteps};
+pub use channels::Channels;
 pub use description::{
     Carried, CarriedSpin, CaseName, Change, Drive, Initial, Load, ModeStart, Point, Run, Scene,
     SceneVariation, Scheme, SeriesFile, Spin, Variations,

@@ -195,6 +195,11 @@ impl LoadedHistory {
                 None => {}
             }
         }
+        let named: Vec<_> = body
+            .named_loads()
+            .iter()
+            .map(|load| (load.preload, self.named.iter().find(|one| one.load == load.name)))
+            .collect();
         let mut states = RowStates::new(layout);
         for (i, &time) in self.time.iter().enumerate() {
             let spin = self.angular_velocity.as_ref().map_or_else(Vector3::zeros, |omega| to_body * omega[i]);
@@ -203,9 +208,8 @@ impl LoadedHistory {
                 let [force, torque] = load.values[i].map(|vector| to_body * vector);
                 states.layout.add_load(&mut z, *place, &force, &torque);
             }
-            for (place, load) in body.named_loads().iter().enumerate() {
-                let own = self.named.iter().find(|one| one.load == load.name);
-                let amplitude = if load.preload { 1.0 } else { own.map_or(0.0, |one| one.values[i]) };
+            for (place, (is_preload, own)) in named.iter().enumerate() {
+                let amplitude = if *is_preload { 1.0 } else { own.map_or(0.0, |one| one.values[i]) };
                 states.layout.add_amplitude(&mut z, place, amplitude);
             }
             states.push(time, &z);

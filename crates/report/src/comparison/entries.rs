@@ -279,9 +279,9 @@ impl BodyComparison {
         }
         let (a, b) = (pair.a.recoveries(), pair.b.recoveries());
         let (mut differing, mut in_modes, mut at_rest) = (0, 0.0, 0.0);
+        let same_loads = pair.named_loads_alike();
         for own in a {
             let other = b.iter().find(|other| other.name == own.name);
-            let same_loads = pair.named_loads_alike();
             let Some(other) = other.filter(|other| same_loads && are_alike(own, other)) else {
                 let what = if other.is_some() {
                     "differs in its rows or loads"
