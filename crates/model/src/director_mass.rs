@@ -158,27 +158,31 @@ impl DirectorMass {
     /// When a matrix does not have one row per row of the model, or the numbers of columns differ.
     pub fn extend_turned(&self, motion: [MatRef<'_, f64>; 3]) -> [Mat<f64>; 3] {
         let mut extended = motion.map(|x| self.extend(x));
-        for of_node in self.rotations.chunk_by(|a, b| a.place == b.place) {
-            for column in 0..motion[0].ncols() {
-                let [turn, rate, acceleration] = motion.map(|x| {
-                    let mut theta = Vector3::zeros();
-                    of_node.iter().for_each(|rotation| theta[rotation.axis] = x[(rotation.row, column)]);
-                    theta.cross_matrix()
-                });
-                let second = [
-                    turn * turn,
-                    turn * rate + rate * turn,
-                    turn * acceleration + acceleration * turn + 2.0 * rate * rate,
-                ];
-                for (extended, second) in extended.iter_mut().zip(second) {
-                    for a in 0..self.dimension {
-                        let row = self.director(of_node[0].place, a);
-                        (0..self.dimension).for_each(|k| extended[(row + k, column)] += 0.5 * second[(k, a)]);
-                    }
-                }
-            }
+        for column in 0..motion[0].ncols() {
+            let [turn, rate, acceleration] = motion.map(|x| contiguous(x.col(column)));
+            let [value, first, second] = extended.each_mut().map(|x| x.col_as_slice_mut(column));
+            self.add_second_order_motion(turn, turn, 0.5, value);
+            self.add_second_order_motion(turn, rate, 1.0, first);
+            self.add_second_order_motion(turn, acceleration, 1.0, second);
+            self.add_second_order_motion(rate, rate, 1.0, second);
         }
         extended
+    }
+
+    /// Adds `factor` times the displacements of second order, (theta x (phi x e_a) + phi x (theta x e_a)) / 2, to the
+    /// directors of every node; theta from `x` and phi from `y` (N rows of the model).
+    ///
+    /// # Panics
+    /// When a vector has another length.
+    pub fn add_second_order_motion(&self, x: &[f64], y: &[f64], factor: f64, extended: &mut [f64]) {
+        for (place, rotations) in self.turning_nodes() {
+            let [theta, phi] = [x, y].map(|u| rotation_vector(rotations, u).cross_matrix());
+            let second = (theta * phi + phi * theta) * (0.5 * factor);
+            for a in 0..self.dimension {
+                let row = self.director(place, a);
+                (0..self.dimension).for_each(|k| extended[row + k] += second[(k, a)]);
+            }
+        }
     }
 
     /// Adds the rotation of a node about an axis of the model to its directors.
@@ -237,6 +241,28 @@ impl DirectorMass {
         }
     }
 
+    /// Adds the moments that `forces` on extended rows gain by the rotations theta in `u` (N rows of the model), to first
+    /// order in theta: sum_a ((theta x e_a) x f_a + e_a x (f_a x theta)) / 2 for every node. With the moments of
+    /// [`DirectorMass::restrict`] they have the power of forces on directors that move as
+    /// [`DirectorMass::extend_turned`] says.
+    ///
+    /// # Panics
+    /// When a vector has another length.
+    pub fn add_turned_moments(&self, forces: &[f64], u: &[f64], restricted: &mut [f64]) {
+        let d = self.dimension;
+        for (place, rotations) in self.turning_nodes() {
+            let theta = rotation_vector(rotations, u);
+            let gained = |a: usize| {
+                let row = self.director(place, a);
+                let force = Vector3::from_fn(|k, _| if k < d { forces[row + k] } else { 0.0 });
+                let axis = Vector3::ith(a, 1.0);
+                theta.cross(&axis).cross(&force) + axis.cross(&force.cross(&theta))
+            };
+            let moment = (0..d).map(gained).sum::<Vector3<f64>>() * 0.5;
+            rotations.iter().for_each(|rotation| restricted[rotation.row] += moment[rotation.axis]);
+        }
+    }
+
     /// Computes y = E x of extended rows.
     ///
     /// # Panics
@@ -272,12 +298,16 @@ impl DirectorMass {
     /// When `u` or `forces` does not have one entry per row of the model.
     pub fn add_second_order(&self, h: impl Fn(usize) -> Matrix3<f64>, u: &[f64], forces: &mut [f64]) {
         assert!(u.len() == self.model_rows && forces.len() == u.len(), "one row per row of the model");
-        for of_node in self.rotations.chunk_by(|a, b| a.place == b.place) {
-            let mut theta = Vector3::zeros();
-            of_node.iter().for_each(|rotation| theta[rotation.axis] = u[rotation.row]);
-            let moment = h(of_node[0].place) * theta;
-            of_node.iter().for_each(|rotation| forces[rotation.row] += moment[rotation.axis]);
+        for (place, rotations) in self.turning_nodes() {
+            let moment = h(place) * rotation_vector(rotations, u);
+            rotations.iter().for_each(|rotation| forces[rotation.row] += moment[rotation.axis]);
         }
+    }
+
+    /// Returns the rotations that the rows of the model have of every node, with the index of the node in
+    /// [`DirectorMass::nodes`].
+    fn turning_nodes(&self) -> impl Iterator<Item = (usize, &[Rotation])> {
+        self.rotations.chunk_by(|a, b| a.place == b.place).map(|rotations| (rotations[0].place, rotations))
     }
 
     /// Returns the moments of the mass that turns with every node, about the point and along the axes of
@@ -310,6 +340,13 @@ impl DirectorMass {
         };
         (0..self.nodes.len()).map(of_node).collect()
     }
+}
+
+/// Returns the rotation vector of a node, from its rotations in `u` (N rows of the model).
+fn rotation_vector(rotations: &[Rotation], u: &[f64]) -> Vector3<f64> {
+    let mut theta = Vector3::zeros();
+    rotations.iter().for_each(|rotation| theta[rotation.axis] = u[rotation.row]);
+    theta
 }
 
 /// Computes every column of `to` from that of `from`, on all threads.

@@ -100,6 +100,33 @@ impl<'m> InertialRows<'m> {
         }
     }
 
+    /// Returns the moments (N rows of the model) that every column of `forces` on these rows gains by the rotations of the
+    /// nodes, in column j of `turn(j)` ([`DirectorMass::add_turned_moments`]).
+    pub fn turned_moments<'u>(
+        &self,
+        forces: &Mat<f64>,
+        turn: impl Fn(usize) -> &'u [f64] + Sync,
+    ) -> Mat<f64> {
+        let mut moments = Mat::zeros(self.model.rows().len(), forces.ncols());
+        if let Some(Directors { mass, .. }) = &self.directors {
+            parallel::for_each(moments.col_iter_mut().enumerate(), |(j, moments)| {
+                mass.add_turned_moments(forces.col_as_slice(j), turn(j), contiguous_mut(moments));
+            });
+        }
+        moments
+    }
+
+    /// Returns, on these rows, the displacements of second order of directors that turn by `x` and by `y[j]`, for every j
+    /// (theory 6.2a).
+    pub fn second_order_motions(&self, x: &[f64], y: &[&[f64]]) -> Mat<f64> {
+        let Some(Directors { mass, .. }) = &self.directors else { return Mat::zeros(x.len(), y.len()) };
+        let mut motions = Mat::zeros(mass.rows(), y.len());
+        parallel::for_each(motions.col_iter_mut().zip(y), |(motion, y)| {
+            mass.add_second_order_motion(x, y, 1.0, contiguous_mut(motion));
+        });
+        motions
+    }
+
     /// Returns the number of rows of vectors that turn with the body and come first.
     fn turning_rows(&self) -> usize {
         match &self.directors {

@@ -2,6 +2,7 @@
 //! compression of many force vectors to a few by proper orthogonal decomposition.
 
 use super::residual::NodalView;
+use super::turning_products::TurningProducts;
 use faer::Mat;
 use flexbody_linalg::{combine, gram, side_by_side, symmetric_eigen};
 use flexbody_model::{FeModel, RigidAcceleration};
@@ -20,7 +21,7 @@ const BLOCK: usize = 256;
 /// ```
 ///
 /// with V, V' - g and R of [`Inertia`](super::residual::Inertia), and the stiffness of inertia H, which is linear in
-/// V' - g, omega' and the products of omega.
+/// V' - g, omega' and the products of omega. Forces of second order of nodes that turn are those of [`TurningProducts`].
 ///
 /// P maps forces to modal forces and to amplitudes of compressed forces. P F is computed once; P r = (P F) phi then
 /// holds at every instant.
@@ -30,6 +31,8 @@ pub(super) struct Projected<'v> {
     matrix: Mat<f64>,
     /// Axes about which the body may turn.
     turns: &'static [usize],
+    /// Forces of second order; `None` if nodal rotations carry no mass.
+    products: Option<TurningProducts>,
 }
 
 /// Amplitudes of the unbalanced forces.
@@ -42,8 +45,8 @@ pub(super) struct UnbalancedAmplitudes {
 
 impl<'v> Projected<'v> {
     /// Projects the fixed vectors F. The forces are compressed by the basis of `compressed`; no amplitudes are computed
-    /// if there is none.
-    pub(super) fn new(view: &'v NodalView<'v>, compressed: Option<&Compressed>) -> Self {
+    /// if there is none. Forces of second order hold along `motion`.
+    pub(super) fn new(view: &'v NodalView<'v>, compressed: Option<&Compressed>, motion: &[Instant]) -> Self {
         let turns: &[usize] = if view.model.dimension() == 2 { &[2] } else { &[0, 1, 2] };
         let project = |forces: Mat<f64>| {
             let unbalanced = view.part(forces);
@@ -77,9 +80,11 @@ impl<'v> Projected<'v> {
             }
             project(forces)
         }));
+        let products = TurningProducts::new(view, motion);
+        parts.extend(products.iter().flat_map(|products| products.vectors(view, project)));
         // All terms after the loads are subtracted from the loads.
         let matrix = -side_by_side(&parts.iter().map(Mat::as_ref).collect::<Vec<_>>());
-        Self { view, matrix, turns }
+        Self { view, matrix, turns, products }
     }
 
     /// Returns the amplitudes along a motion, one column for every instant.
@@ -133,6 +138,9 @@ impl<'v> Projected<'v> {
                     + rigid.angular.dot(&unit.angular)
                     + rigid.spin.component_mul(&unit.spin).sum();
                 now.q.iter().for_each(|q| put(amount * q));
+            }
+            if let Some(products) = &self.products {
+                products.amplitudes(view, now, &mut put);
             }
         }
         functions
@@ -243,12 +251,16 @@ mod tests {
     use flexbody_model::FeModel;
     use flexbody_motion::scene::{Point, nodal_point};
 
-    /// Returns random instants, with elastic forces as large as the inertia forces.
+    /// Returns random instants, with elastic forces as large as the inertia forces. At most four modes move alone, so that
+    /// few combinations of the modes describe the motion.
     fn instants(eigenvalues: &[f64]) -> Vec<Instant> {
         let modes = eigenvalues.len();
         let value = |i: usize, j: usize| uniform(7, i as u64, j as u64);
         let vector = |i: usize, j: usize| Vector3::from_fn(|k, _| value(i, 10 * j + k));
-        let many = |i: usize, j: usize| -> Vec<f64> { (0..modes).map(|k| value(i, 1000 * j + k)).collect() };
+        let many = |i: usize, j: usize| -> Vec<f64> {
+            let four: Vec<f64> = (0..4).map(|k| value(i, 1000 * j + k)).collect();
+            (0..modes).map(|k| four[k % 4] * if k < 4 { 1.0 } else { uniform(8, k as u64, 1) }).collect()
+        };
         let at = |i: usize| Instant {
             time: i as f64,
             velocity: vector(i, 1),
@@ -283,17 +295,18 @@ mod tests {
     /// and carried.
     #[test]
     fn amplitudes_are_those_of_the_forces_at_all_nodes() {
-        for (name, carried) in [
-            ("bracket_hex20", false),
-            ("shell_folded", false),
-            ("shell_folded", true),
-            ("plane_frame", false),
+        for (name, carried, modes) in [
+            ("bracket_hex20", false, 4),
+            ("shell_folded", false, 4),
+            ("shell_folded", true, 4),
+            ("plane_frame", false, 4),
+            ("shell_folded", false, 16),
         ] {
             let files =
                 read_manifest(format!("../../fixtures/models/{name}/model.toml")).expect("a manifest");
             let raw = read_model(&files).expect("a model");
             let model = FeModel::from_raw(raw).expect("a sound model").model;
-            let modes = ModeSettings { wanted: Wanted::Lowest(4), ..ModeSettings::default() };
+            let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
             let settings = ConvertSettings { modes, lumped: Vec::new(), ..ConvertSettings::default() };
             let body = convert(&model, &settings, &Context::QUIET).expect("a body").body;
             let at =
@@ -312,7 +325,7 @@ mod tests {
             let motion = if model.dimension() == 2 { in_plane(motion) } else { motion };
             let direct = view.unbalanced(&motion);
             let compressed = Compressed::new(&model, &view.residual(&motion[..20])).expect("forces");
-            let own = Projected::new(&view, Some(&compressed)).amplitudes(&motion);
+            let own = Projected::new(&view, Some(&compressed), &motion).amplitudes(&motion);
             let apart = difference(&own.in_modes, &direct.in_modes);
             assert!(apart < 1e-9, "{name}: {apart:.1e}");
             let apart = difference(&own.compressed, &compressed.amplitudes(&direct.forces));

@@ -9,6 +9,7 @@ mod residual;
 mod truncated_equations;
 mod truncated_motion;
 mod truncated_responses;
+mod turning_products;
 
 pub use enrich::{Enriched, Enrichment, enrich, enrich_from, varied_errors};
 pub use estimate::{CouplingEffect, MAX_REFERENCE_ERROR, PART_OF_FINE, PART_OF_REFERENCE, ReferenceError};

@@ -148,28 +148,36 @@ impl<'m> NodalView<'m> {
     }
 
     /// Returns r = f - K u - D u' - omega x w - M (R (V', omega') + omega' x u + omega x u' + u'') with w = M (R (V,
-    /// omega) + omega x u + u') and u = Psi q (theory 6.9 to 6.13), one column for every instant. The forces are split
-    /// into g = Psi'r and r - M Psi m_ff^-1 g; the resultants of the latter act on the carrying point, if there is one.
-    /// g vanishes except for approximations in the equations of the body. Geometric stiffness is not included, since
-    /// the nodal equations do not have it.
+    /// omega) + omega x u + u') and u = Psi q (theory 6.9 to 6.13), one column for every instant. Nodes whose rotations carry
+    /// mass turn to second order. The forces are split into g = Psi'r and r - M Psi m_ff^-1 g; the resultants of the
+    /// latter act on the carrying point, if there is one. g vanishes except for approximations in the equations of the
+    /// body. Geometric stiffness is not included, since the nodal equations do not have it.
     pub(super) fn unbalanced(&self, motion: &[Instant]) -> Unbalanced {
-        // Inertia and Coriolis forces, with the stiffness of inertia if nodal rotations carry mass.
         let own = |of: fn(&Instant) -> &Vec<f64>| self.displacements(motion, of);
         let field = Displacements { u: own(|now| &now.q), ud: own(|now| &now.qd), udd: own(|now| &now.qdd) };
-        let Inertia { momentum, mut change, .. } = self.inertia(motion, &field);
-        self.rows.add_turned(|i| self.axes * motion[i].omega, &momentum, &mut change);
-        let mut taken = self.rows.restrict(change);
-        if self.rows.have_directors() {
-            for (i, now) in motion.iter().enumerate() {
-                let rigid = self.rigid_acceleration(now);
-                self.rows.add_second_order(&rigid, field.u.col_as_slice(i), taken.col_as_slice_mut(i));
-            }
-        }
+        let mut taken = self.inertial_forces(motion, &field);
         // Elastic and damping forces; the loads minus all of these are unbalanced.
         taken += self.model.pencil().apply_stiffness(field.u.as_ref());
         let rates = Mat::from_fn(self.vectors.ncols(), motion.len(), |j, i| motion[i].qd[j]);
         taken += combine(self.damped.as_ref(), rates.as_ref());
         self.part(self.loads_of(motion) - taken)
+    }
+
+    /// Returns the forces that give the displacements `field` their acceleration, with terms of second order if
+    /// directors turn: d'Alembert's principle for directors at e_a + theta x e_a + theta x (theta x e_a) / 2.
+    fn inertial_forces(&self, motion: &[Instant], field: &Displacements) -> Mat<f64> {
+        let on_rows = |extended: [Mat<f64>; 3]| {
+            let Inertia { momentum, mut change, .. } = self.inertia_of(motion, extended);
+            self.rows.add_turned(|i| self.axes * motion[i].omega, &momentum, &mut change);
+            change
+        };
+        let Displacements { u, ud, udd } = field;
+        let linear = [u, ud, udd].map(|x| self.rows.extend(x).into_owned());
+        if !self.rows.have_directors() {
+            return self.rows.restrict(on_rows(linear));
+        }
+        let moments = self.rows.turned_moments(&on_rows(linear), |i| u.col_as_slice(i));
+        self.rows.restrict(on_rows(self.rows.extend_turned([u, ud, udd]))) + moments
     }
 
     /// Splits forces into modal forces and the nodal rest.
@@ -225,11 +233,6 @@ impl<'m> NodalView<'m> {
             }
             Damping::Ratio(_) | Damping::Bands(_) => None,
         }
-    }
-
-    /// Returns the inertia of the displacements `field` in a frame that moves as in `motion`.
-    fn inertia(&self, motion: &[Instant], field: &Displacements) -> Inertia {
-        self.inertia_of(motion, [&field.u, &field.ud, &field.udd].map(|x| self.rows.extend(x).into_owned()))
     }
 
     /// Returns the inertia of the displacements `field` with directors that turn to second order, as momenta require.

@@ -66,7 +66,7 @@ impl TruncatedResponses {
         let few: Vec<Instant> = grid.few(histories(motion)).into_iter().map(|i| motion[i].clone()).collect();
         let compressed = Compressed::new(model, &view.residual(&few));
         let UnbalancedAmplitudes { in_modes, compressed: amplitudes } =
-            Projected::new(view, compressed.as_ref()).amplitudes(motion);
+            Projected::new(view, compressed.as_ref(), motion).amplitudes(motion);
         let Some(compressed) = compressed else {
             let nothing = || Mat::zeros(view.vectors.nrows(), 0);
             let (forces, responses) = (nothing(), nothing());
