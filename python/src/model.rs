@@ -235,12 +235,13 @@ impl Model {
         program: Argument<'_, 'py>,
         units: Option<[String; 3]>,
         sets: Vec<(String, String, Option<Bound<'py, PyAny>>)>,
+        damping: Option<String>,
     ) -> PyResult<Self> {
         let path = self::path(path, "path")?;
         let program = program.map(|program| text(program, "program")).transpose()?;
         if path.extension().is_some_and(|extension| extension == "toml") {
-            if program.is_some() || units.is_some() || !sets.is_empty() {
-                let message = "`program`, `units` or `interfaces` is given together with a manifest (.toml), which states them itself: leave it out";
+            if program.is_some() || units.is_some() || !sets.is_empty() || damping.is_some() {
+                let message = "`program`, `units`, `interfaces` or `damping` is given together with a manifest (.toml), which states them itself: leave it out";
                 return Err(value_error(py, message));
             }
             return Self::with_warnings(py, run(py, move |_| flexbody::Model::read(path))?);
@@ -253,7 +254,7 @@ impl Model {
             let sets: Vec<_> =
                 sets.iter().map(|(name, set, how)| (name.as_str(), set.as_str(), *how)).collect();
             let units = units.as_ref().map(|units| units.each_ref().map(String::as_str));
-            flexbody::Model::read_job(path, program.as_deref(), units, &sets)
+            flexbody::Model::read_job(path, program.as_deref(), units, &sets, damping.as_deref())
         })?;
         Self::with_warnings(py, read)
     }

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse
 from conftest import MODELS, Given, given
+from numpy.typing import NDArray
 
 import flexbody
 
@@ -307,6 +308,25 @@ def test_jobs_of_fe_programs() -> None:
     assert caught.value.codes
     with pytest.raises(ValueError, match="given together with a manifest"):
         flexbody.read_model(MODELS / "cube_hex8" / "model.toml", units=("m", "kg", "s"))
+
+
+@pytest.mark.filterwarnings("ignore::flexbody.FlexbodyWarning")
+def test_damping_of_jobs() -> None:
+    job = MODELS.parent / "small" / "calculix" / "job.inp"
+
+    def ratios(damping: float | tuple[float, float] | list[tuple[float | None, float]]) -> NDArray[np.float64]:
+        return flexbody.read_model(job, units=("m", "kg", "s"), damping=damping).convert(modes=4).damping_ratios
+
+    body = flexbody.read_model(job, units=("m", "kg", "s")).convert(modes=4)
+    omega = 2 * np.pi * body.frequencies_hz
+    assert np.allclose(ratios(0.02), 0.02)
+    assert np.allclose(ratios((3.0, 1e-6)), 0.5 * (3.0 / omega + 1e-6 * omega))
+    end = float(np.mean(body.frequencies_hz[[0, -1]]))
+    assert np.allclose(ratios([(end, 0.01), (None, 0.03)]), np.where(body.frequencies_hz < end, 0.01, 0.03))
+    with pytest.raises(flexbody.InputError):
+        flexbody.read_model(job, units=("m", "kg", "s"), damping="no such file.mtx")
+    with pytest.raises(ValueError, match="damping of a job"):
+        flexbody.read_model(job, units=("m", "kg", "s"), damping=np.eye(3))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

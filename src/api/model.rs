@@ -6,7 +6,8 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::verification::model_of;
 use flexbody_input::{
-    InterfaceSource, LoadSource, ModelFiles, check_size, interface_in_memory, read_manifest, read_model,
+    InterfaceSource, LoadSource, ModelFiles, check_size, interface_in_memory, parse_damping, read_manifest,
+    read_model,
 };
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{
@@ -111,14 +112,18 @@ impl Model {
     /// * `units`: units of length, mass and time, as in a manifest; `None` if not stated.
     /// * `interfaces`: names of interfaces, each with a node set of the deck (or a region, as `--interface` has it) and a
     ///   coupling.
+    /// * `damping`: damping of the model as `--damping` has it: a ratio, `rayleigh=ALPHA,BETA`, `bands=...` or
+    ///   `matrix=FILE`.
     ///
     /// # Errors
-    /// The errors of [`Model::read`]; FB108 to FB112 for errors of the job, FB220 for a set that the job does not have.
+    /// The errors of [`Model::read`]; FB108 to FB112 for errors of the job, FB220 for a set that the job does not have;
+    /// [`Usage`](Code::Usage) for another text of damping.
     pub fn read_job(
         path: impl AsRef<Path>,
         program: Option<&str>,
         units: Option<[&str; 3]>,
         interfaces: &[(&str, &str, Option<Coupling>)],
+        damping: Option<&str>,
     ) -> Result<Self> {
         let source = |&(name, nodes, coupling): &(&str, &str, Option<Coupling>)| {
             InterfaceSource::named(name, nodes, coupling, 3)
@@ -126,7 +131,8 @@ impl Model {
         let interfaces = interfaces.iter().map(source).collect::<Result<Vec<_>>>()?;
         let units = units.map(|units| units.join(","));
         let path = path.as_ref();
-        let files = ModelFiles::from_job(path, program.map(str::to_owned), interfaces, units.as_deref())?;
+        let mut files = ModelFiles::from_job(path, program.map(str::to_owned), interfaces, units.as_deref())?;
+        files.damping = damping.map(parse_damping).transpose()?;
         Self::checked(read_model(&files)?, Vec::new())
     }
 

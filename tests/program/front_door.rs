@@ -137,9 +137,9 @@ fn what_a_builder_states_is_checked_and_kept() {
 #[test]
 fn jobs_of_fe_programs_are_read() {
     let deck = fixtures().join("small/calculix/job.inp");
-    let model = Model::read_job(&deck, None, Some(["m", "kg", "s"]), &[]).expect("a job");
+    let model = Model::read_job(&deck, None, Some(["m", "kg", "s"]), &[], None).expect("a job");
     assert!(model.n_dofs() > 0);
-    let wrong = Model::read_job(&deck, None, None, &[("end", "NO SUCH SET", Some(Coupling::Rigid))]);
+    let wrong = Model::read_job(&deck, None, None, &[("end", "NO SUCH SET", Some(Coupling::Rigid))], None);
     assert!(wrong.expect_err("no set").has(Code::NodeSetUnknown));
 }
 

@@ -226,7 +226,7 @@ codes! {
     ResonanceDropped = "FB544", Warning, Done, "dropped mode is near the frequency of a load", "keep the mode, or lengthen the run until the resonance would show";
     LoadIdle = "FB545", Warning, Done, "load has no effect", "let an interface carry the body to see gravity and inertia bend it: [carried] in docs/reference/scenes.md";
     CarrierUnresolved = "FB546", Warning, Done, "modes resolve the carried interface poorly", "convert with --basis craig-bampton, or with --residual-vectors interfaces, and with the interface in the manifest";
-    CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness does not act while the body is carried", "convert the model with the frame on the carrier: --frame interface=NAME; without it trust spin rates far below the first frequency only";
+    CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness does not act while the body is carried", "convert the model again: the file is of a version before 1.10 or comes from another program; without it trust spin rates far below the first frequency only";
     ReferenceIncomplete = "FB548", Warning, Done, "error of the reference body relative to the model uses more of the tolerances than intended", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where the difference comes from";
     LumpedWithoutBody = "FB549", Note, Done, "no body can be computed with a lumped mass, so it is missing in the comparison", "nothing to do: a program that lumps the mass in this way cannot compute the body either";
     RunTooLong = "FB550", Error, BadInput, "run takes more steps than allowed", "simulate a shorter `duration`, leave out modes beyond the frequencies of the loads, or raise `most_steps` in [run]";
@@ -240,7 +240,6 @@ codes! {
     RecoveryUnjudged = "FB561", Note, Done, "truncation error of a recovery is not known", "give the recovery by an operator (`operator` in [[recovery]]); or make a body of more shapes and compare";
     VariationFails = "FB559", Warning, Done, "recommended body does not hold in a variation of the scene", "make the variation a [[case]] of the scene, so that the body is made for it as well; or leave out a [[variation]] that cannot occur";
     PreloadReleased = "FB562", Warning, Done, "body starts undeformed under a preload and vibrates", "start in the equilibrium of the preload: deformation = \"static\" in [initial]";
-    NamedStiffnessUnused = "FB563", Warning, Done, "geometric stiffness of a named load is not used in a simulation", "give K with the mean stress of the load as stiffness (docs/how_to/geometric_stiffness.md), or leave out the [[geometric_stiffness]] of the load";
     InertiaIndefinite = "FB560", Warning, Done, "W3 is kept without W2, and deflections make the inertia indefinite", "keep W2 as well (--terms W2,W3 or all), unless joints prescribe the rotation or the deflections stay far below the value in the message";
     CouplingEffect = "FB558", Note, Done, "effect of rigid interfaces that the body and its reference model share", "nothing to do where a stiff part is mounted at the interface; otherwise set coupling = \"averaging\", which lets the interface deform";
     // FB6xx: resources; FB603 stays unused (checkpoints of earlier versions)

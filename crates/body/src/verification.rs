@@ -3,17 +3,17 @@
 
 use super::recounts::{interface_checks, recounts};
 use crate::convert::{
-    BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, poor_fits, rigid_mass,
+    BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, poor_fits, rigid_mass, unit_rotations,
 };
-use crate::flex_body::{FlexBody, Guarantee, ReferenceConditions, Storage};
+use crate::flex_body::{FlexBody, Guarantee, ReferenceConditions, Storage, joined};
 use crate::invariants::{
     BodyFrame, DIGITS, IdentityCheck, Invariants, condense_certified, primary_differences,
 };
-use faer::Mat;
+use faer::{Mat, Scale};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_eigen::{relative_residual, residual_scale, rounding_residual};
-use flexbody_linalg::{SymmetricMatrix, gram, larger, largest, largest_entry};
+use flexbody_linalg::{SymmetricMatrix, gram, larger, largest, largest_entry, side_by_side};
 use flexbody_model::{CheckedModel, Damping, FeModel, GeometricStiffness, RawModel, UnitLoad};
 use nalgebra::Vector3;
 
@@ -382,10 +382,9 @@ impl Difference {
 
 /// Returns an upper bound of the rounding error of |psi_p' A psi_q|.
 fn rounding_of(a: &SymmetricMatrix, shapes: &Mat<f64>, storage: Storage) -> f64 {
-    let longest = shapes.col_iter().fold(0.0f64, |m, column| m.max(column.norm_l2()));
     MAX_ROUNDING_ESTIMATES
         * storage.roundings()
-        * longest
+        * longest_column(shapes)
         * rounding_residual(a, shapes.as_ref()).into_iter().fold(0.0, f64::max)
 }
 
@@ -423,28 +422,42 @@ fn damping_check(
 
 /// Compares the stored geometric stiffness with that of the model. Returns `None` if neither has any.
 fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Result<Option<Difference>> {
-    let nf = shapes.ncols();
     let shift = match body.conditions() {
         // The model gives geometric stiffness about the centre of mass.
         ReferenceConditions::Interface(_) => -body.invariants().first_moment() / body.invariants().mass(),
         _ => Vector3::zeros(),
     };
-    let found = modal_geometric_stiffness(model, shapes.as_ref(), &body.frame().axes, &shift)?;
-    let stored = body.geometric_stiffness();
+    let (mut found, rotated) = modal_geometric_stiffness(model, shapes, body.frame(), &shift)?;
+    let (mut stored, mut shapes) = (body.geometric_stiffness().to_vec(), shapes.clone());
+    let stored_rotated = &body.parts().rotated_stiffness;
+    if !stored_rotated.is_empty() {
+        // Rotations of the size of the modes, so that both have the same rounding.
+        let rotations = unit_rotations(model, body.frame());
+        let scale = longest_column(&shapes) / longest_column(&rotations);
+        found = joined(&found, &rotated, scale);
+        stored = joined(&stored, stored_rotated, scale);
+        shapes = side_by_side(&[shapes.as_ref(), (rotations * Scale(scale)).as_ref()]);
+    }
+    let size = shapes.ncols();
     let matrix_of = |list: &[GeometricStiffness<Mat<f64>>], load: &UnitLoad| {
         let one = list.iter().find(|one| one.load == *load);
-        one.map_or_else(|| Mat::zeros(nf, nf), |one| one.matrix.clone())
+        one.map_or_else(|| Mat::zeros(size, size), |one| one.matrix.clone())
     };
     let loads = stored.iter().chain(&found).map(|one| &one.load);
     let difference = |load: &UnitLoad| {
-        let (stored, recomputed) = (matrix_of(stored, load), matrix_of(&found, load));
+        let (stored, recomputed) = (matrix_of(&stored, load), matrix_of(&found, load));
         // Every component of the kind may contribute.
         let given = model.geometric_stiffness().iter().filter(|one| one.load.kind == load.kind);
-        let rounding = given.map(|one| rounding_of(&one.matrix, shapes, body.storage())).sum();
+        let rounding = given.map(|one| rounding_of(&one.matrix, &shapes, body.storage())).sum();
         let size = stored.norm_max().max(recomputed.norm_max());
         Difference::new(largest_entry((&stored - &recomputed).as_ref()), size, rounding)
     };
     Ok(loads.map(difference).reduce(Difference::worse))
+}
+
+/// Returns the largest length of a column.
+fn longest_column(x: &Mat<f64>) -> f64 {
+    x.col_iter().fold(0.0f64, |longest, column| longest.max(column.norm_l2()))
 }
 
 /// Returns the largest difference between R'MR of the unit translations and rotations of the body frame (3

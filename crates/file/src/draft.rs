@@ -9,7 +9,8 @@ use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     Certificate, FixedInterface, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
     InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, NamedLoad, Parts, Recovery,
-    ReferenceConditions, Source, Storage, SurfaceMesh, TermDecision, TermGroup, TermGroups, UnitLoad,
+    ReferenceConditions, RotatedStiffness, Source, Storage, SurfaceMesh, TermDecision, TermGroup, TermGroups,
+    UnitLoad,
 };
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass,
@@ -60,10 +61,9 @@ impl Draft {
     /// The expected names, if `name` is none of them.
     pub(super) fn begin(&mut self, per: Per, at: usize, name: &str) -> Result<(), String> {
         (self.per, self.at) = (per, at);
-        let load = || GeometricStiffness {
-            load: UnitLoad::from_label(name).unwrap_or(UnitLoad { kind: LoadKind::Spin, component: 0 }),
-            matrix: Mat::new(),
-        };
+        let unit_load =
+            || UnitLoad::from_label(name).unwrap_or(UnitLoad { kind: LoadKind::Spin, component: 0 });
+        let load = || GeometricStiffness { load: unit_load(), matrix: Mat::new() };
         match per {
             Per::Body => {}
             Per::LumpingScheme if at < self.of_lumped.len() => {}
@@ -104,8 +104,14 @@ impl Draft {
             }),
             Per::UnitLoad => self.body.geometric_stiffness.push(load()),
             Per::InertiaLoad => self.inertia().stiffness.push(load()),
+            Per::RotatedLoad => self.body.rotated_stiffness.push(RotatedStiffness {
+                load: unit_load(),
+                modes: Mat::new(),
+                rotation: Mat::new(),
+            }),
         }
-        let known = !matches!(per, Per::UnitLoad | Per::InertiaLoad) || UnitLoad::from_label(name).is_some();
+        let known = !matches!(per, Per::UnitLoad | Per::InertiaLoad | Per::RotatedLoad)
+            || UnitLoad::from_label(name).is_some();
         if known { Ok(()) } else { Err("expected a kind of load with its axis or name".to_owned()) }
     }
 
@@ -246,6 +252,11 @@ impl Draft {
             Per::InertiaLoad => &mut self.inertia().stiffness[at],
             _ => &mut self.body.geometric_stiffness[at],
         }
+    }
+
+    /// Returns the geometric stiffness of rotations of the current instance.
+    pub(super) fn rotated(&mut self) -> &mut RotatedStiffness {
+        &mut self.body.rotated_stiffness[self.at]
     }
 
     /// Returns the invariants of the current group: the exact ones, or those of its lumping scheme.
@@ -392,6 +403,7 @@ fn empty_body(units: UnitSystem, storage: Storage, invariants: Invariants) -> Pa
         },
         invariants,
         geometric_stiffness: Vec::new(),
+        rotated_stiffness: Vec::new(),
         inertia_stiffness: None,
         lumped: Vec::new(),
         certificate: Certificate {

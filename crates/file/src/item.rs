@@ -164,6 +164,7 @@ pub(super) enum Per {
     LumpingScheme,
     Interface,
     UnitLoad,
+    RotatedLoad,
     InertiaLoad,
     Recovery,
     NamedLoad,
@@ -319,6 +320,7 @@ impl SchemaGroup {
             lumped: None,
             interface: None,
             geometric_stiffness: None,
+            rotated: None,
             recovery: None,
             named_load: None,
         };
@@ -335,6 +337,10 @@ impl SchemaGroup {
             Per::UnitLoad => {
                 let view = |g| View { geometric_stiffness: Some(g), ..view };
                 body.geometric_stiffness.iter().map(|g| (Some(g.load.label()), view(g))).collect()
+            }
+            Per::RotatedLoad => {
+                let view = |r| View { rotated: Some(r), ..view };
+                body.rotated_stiffness.iter().map(|r| (Some(r.load.label()), view(r))).collect()
             }
             Per::Recovery => {
                 let one = |r: &'a Recovery| (Some(r.name.clone()), View { recovery: Some(r), ..view });

@@ -18,7 +18,9 @@ use flexbody_base::provenance;
 use flexbody_body::flex_body::{MassStructure, Parts, ReferenceConditions, Storage};
 use flexbody_model::NodeMoments;
 use interfaces::{COORDINATES, INTERFACES};
-use invariants::{COMPARISON, DAMPING, GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS, INVARIANTS, LUMPED};
+use invariants::{
+    COMPARISON, DAMPING, GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS, INVARIANTS, LUMPED, ROTATED_STIFFNESS,
+};
 use nalgebra::{Matrix3, Vector3};
 use named_load::NAMED_LOAD;
 use recovery::RECOVERY;
@@ -34,7 +36,9 @@ pub(super) const WHOLE: &str = "sha256";
 /// Major version of the format. Readers refuse a newer major version; a newer minor version only adds entries.
 pub(super) const MAJOR: i64 = 1;
 /// Minor version with all entries, see [`MAJOR`]. A file states the lowest version that has all entries which it holds.
-pub(super) const MINOR: i64 = 9;
+pub(super) const MINOR: i64 = 10;
+/// Minor version of files of bodies without geometric stiffness of rotations.
+const WITHOUT_ROTATED_STIFFNESS: i64 = 9;
 /// Minor version of files of bodies without named loads.
 const WITHOUT_NAMED_LOADS: i64 = 8;
 /// Minor version of files of bodies without recoveries.
@@ -129,7 +133,8 @@ const ROOT: &[Item] = &[
         written(|v| {
             let Parts { conditions, inertia_stiffness, mesh, recoveries, named_loads, .. } = v.body;
             Some(Value::Int(match (conditions.is_mean(), inertia_stiffness, mesh) {
-                _ if !named_loads.is_empty() => MINOR,
+                _ if !v.body.rotated_stiffness.is_empty() => MINOR,
+                _ if !named_loads.is_empty() => WITHOUT_ROTATED_STIFFNESS,
                 _ if !recoveries.is_empty() => WITHOUT_NAMED_LOADS,
                 (false, _, _) => WITHOUT_RECOVERIES,
                 (true, Some(_), _) => MEAN_AXES_ONLY,
@@ -641,6 +646,12 @@ pub(super) const TABLE: &[SchemaGroup] = &[
         per: Per::UnitLoad,
         description: "Stiffness that the stress under a unit load adds. Named `kind_axis`, `kind_axis_interface` or `load_name`; loads along body axes, accelerations and spin about the frame origin. Absent: zero, or not known.",
         items: &[GEOMETRIC_STIFFNESS],
+    },
+    SchemaGroup {
+        path: "/rotated_stiffness/<load>",
+        per: Per::RotatedLoad,
+        description: "Geometric stiffness of unit rotations R of the body about the axes of the frame, for every load of `/geometric_stiffness`: what modes lose or gain where a rigid motion is taken from them, as that of a carrier (theory section 7). Translations cause no force. Absent: not known. Since 1.10; a file without it is one of 1.9.",
+        items: &[ROTATED_STIFFNESS],
     },
     SchemaGroup {
         path: "/inertia_stiffness/<load>",

@@ -4,7 +4,7 @@ use faer::{Mat, MatRef};
 use flexbody_base::units::{Unit, UnitSystem};
 use flexbody_body::flex_body::{
     FixedInterface, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InterfaceRows,
-    InternalRows, LumpedBody, NamedLoad, Parts, Recovery,
+    InternalRows, LumpedBody, NamedLoad, Parts, Recovery, RotatedStiffness,
 };
 use flexbody_body::invariants::Invariants;
 use flexbody_model::BodyNumber;
@@ -31,6 +31,7 @@ pub(super) struct View<'a> {
     pub interface: Option<&'a Interface>,
     /// Geometric stiffness or stiffness of inertia of a unit load.
     pub geometric_stiffness: Option<&'a GeometricStiffness<Mat<f64>>>,
+    pub rotated: Option<&'a RotatedStiffness>,
     pub recovery: Option<&'a Recovery>,
     pub named_load: Option<&'a NamedLoad>,
 }
@@ -78,6 +79,10 @@ impl<'a> View<'a> {
 
     pub(crate) fn load(&self) -> Option<&'a GeometricStiffness<Mat<f64>>> {
         self.geometric_stiffness
+    }
+
+    pub(crate) fn rotated(&self) -> Option<&'a RotatedStiffness> {
+        self.rotated
     }
 
     pub(crate) fn recovery(&self) -> Option<&'a Recovery> {

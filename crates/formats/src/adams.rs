@@ -43,7 +43,7 @@ impl ExportFormat for AdamsInvariants {
             coriolis_force: Held,
             general_w3: Held,
             separate_w2: Held,
-            geometric_stiffness: losses::geometric_stiffness(body, |_| false),
+            geometric_stiffness: losses::geometric_stiffness(body, options, |_| false),
             inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
             damping: Held,
             shapes: Held,

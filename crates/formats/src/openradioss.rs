@@ -12,7 +12,7 @@
 //! its I0, C2 and W1. The rows of the three rotations are zero: their inertia is contained in the other
 //! twelve modes, to which the program ties them.
 
-use super::export::Holding::{self, Held, NotApplicable};
+use super::export::Holding::{Held, NotApplicable};
 use super::export::frames::{ExportFrame, frames};
 use super::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, losses};
 use crate::export::stresses::{without_named_loads, without_recoveries};
@@ -40,13 +40,14 @@ impl ExportFormat for OpenRadioss {
 
     fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
         let other = losses::is_damped(body) && rayleigh(body).is_none();
-        let damping = other.then(|| "damping of the modes other than alpha M + beta K".to_owned());
+        let what = "damping of the modes other than alpha M + beta K";
         ExportChecklist {
             rigid_coupling: Held,
             plane: losses::plane(body),
             // The velocities of the program omit the rotation of the deformation (`fxbodvp.F`).
             deformed_inertia: losses::changing_inertia(
                 body,
+                options,
                 "W1 except its centrifugal load",
                 "OpenRadioss takes the inertia of the undeformed body",
             ),
@@ -55,9 +56,9 @@ impl ExportFormat for OpenRadioss {
             coriolis_force: NotApplicable,
             general_w3: NotApplicable,
             separate_w2: NotApplicable,
-            geometric_stiffness: losses::geometric_stiffness(body, |_| false),
+            geometric_stiffness: losses::geometric_stiffness(body, options, |_| false),
             inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
-            damping: Holding::held_but_for(damping),
+            damping: if other { losses::damping(body, options, what) } else { Held },
             shapes: Held,
             rotations: Held,
             internal_rows: losses::internal_rows(body),

@@ -138,7 +138,8 @@ pub fn motion_of_losses(
     context: &Context<'_>,
 ) -> Result<Vec<FrameMotion>> {
     check_options(body, format, options)?;
-    if format.checklist(body, options).losses().iter().any(|loss| loss.is_slight) {
+    let judged = |loss: &Loss| loss.is_slight || loss.property == "deformed-inertia";
+    if format.checklist(body, options).losses().iter().any(judged) {
         return FrameMotion::in_cases(body, cases, context);
     }
     cases.iter().try_for_each(|scene| FramedScene::new(body, scene).map(drop))?;

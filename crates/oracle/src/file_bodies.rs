@@ -7,8 +7,8 @@ use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
     InterfaceCoordinates, InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, NamedLoad,
-    Parts, Quantity, Recovery, RecoveryRow, ReferenceConditions, Source, Storage, SurfaceMesh, Truncation,
-    UnitLoad,
+    Parts, Quantity, Recovery, RecoveryRow, ReferenceConditions, RotatedStiffness, Source, Storage,
+    SurfaceMesh, Truncation, UnitLoad,
 };
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, TermGroups,
@@ -282,6 +282,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             invariants
         },
         geometric_stiffness: geometric_stiffness(&mut r, nf, interfaces),
+        rotated_stiffness: Vec::new(),
         inertia_stiffness: None,
         lumped,
         certificate: Certificate {
@@ -334,6 +335,12 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
         let loaded: Vec<String> = loaded.map(|interface| interface.name.clone()).collect();
         parts.recoveries = (0..2).map(|i| recovery(&mut r, i, nf, &loaded, 2)).collect();
         parts.named_loads = (0..2).map(|i| named_load(&mut r, i, nf)).collect();
+        let rotated = |given: &GeometricStiffness<_>| RotatedStiffness {
+            load: given.load.clone(),
+            modes: r.matrix(nf, 3),
+            rotation: r.matrix(3, 3),
+        };
+        parts.rotated_stiffness = parts.geometric_stiffness.iter().map(rotated).collect();
     }
     parts
 }
@@ -371,6 +378,10 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     }
     matrix(&mut bits, &p.modes.shape);
     p.geometric_stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
+    for one in &p.rotated_stiffness {
+        matrix(&mut bits, &one.modes);
+        matrix(&mut bits, &one.rotation);
+    }
     if let Some(own) = &p.inertia_stiffness {
         own.stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
         let moments = own.moments.iter().flat_map(|m| m.first.iter().chain(m.second.iter()));

@@ -129,6 +129,7 @@ pub fn made_of(
         },
         invariants,
         geometric_stiffness: Vec::new(),
+        rotated_stiffness: Vec::new(),
         inertia_stiffness: None,
         lumped: Vec::new(),
         certificate: Certificate {
@@ -166,6 +167,7 @@ pub fn to_first_order(body: FlexBody) -> FlexBody {
 pub fn stressed(body: FlexBody, kinds: &[LoadKind], size: f64, random: &mut Random) -> FlexBody {
     let (nf, dimension) = (body.n_modes(), body.dimension());
     let mut parts = body.into_parts();
+    parts.rotated_stiffness.clear();
     for kind in kinds {
         for &component in kind.of_dimension(dimension) {
             let a = Mat::from_fn(nf, nf, |_, _| 0.5 * size * random.signed());

@@ -108,6 +108,7 @@ pub fn engine_mount() -> FlexBody {
         },
         invariants: invariants(1.25, 1.0),
         geometric_stiffness: vec![],
+        rotated_stiffness: vec![],
         inertia_stiffness: None,
         lumped: vec![lumped("row-sum", 312, 1.0), lumped("diagonal-scaling", 0, 0.125)],
         certificate: Certificate {
@@ -271,6 +272,7 @@ pub fn condensed(
         },
         invariants,
         geometric_stiffness: vec![],
+        rotated_stiffness: vec![],
         inertia_stiffness: None,
         lumped: vec![],
         certificate: Certificate {

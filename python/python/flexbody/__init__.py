@@ -191,6 +191,7 @@ def read_model(
     program: _types.Program | None = None,
     units: _types.Units | None = None,
     interfaces: Mapping[str, str | tuple[str, _types.Coupling | None]] | None = None,
+    damping: _types.JobDamping | None = None,
 ) -> Model:
     """Reads a model: a manifest (`model.toml`, docs/reference/input.md), or the files of an FE program
     (docs/how_to/import_modes.md), whose deck is `path`.
@@ -203,13 +204,15 @@ def read_model(
         Units of length, mass and time of a job, as in ("mm", "t", "s").
     interfaces
         Name to the node set of the deck that it is (or a region, as for `model`), or to a tuple of it and a coupling.
+    damping
+        Damping of a job: a ratio, a tuple (alpha, beta) or a list of bands as for `model`, or the file of a damping matrix.
 
     Raises
     ------
     InputError
         If the files or the model are invalid; has all findings.
     """
-    return Model._read(path, program, _inputs.unit_names(units), _inputs.set_list(interfaces))
+    return Model._read(path, program, _inputs.unit_names(units), _inputs.set_list(interfaces), _inputs.damping_text(damping))
 
 
 @overload

@@ -54,6 +54,7 @@ class Model:
         program: str | None,
         units: tuple[str, str, str] | None,
         sets: Sequence[tuple[str, str, str | None]],
+        damping: str | None,
     ) -> Model: ...
     @property
     def name(self) -> str: ...

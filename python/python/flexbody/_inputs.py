@@ -222,6 +222,22 @@ def damping_of(damping: Any) -> Any:
     return compressed(damping, "damping")
 
 
+def damping_text(damping: Any) -> Any:
+    """Returns the damping of a job as `--damping` has it: a ratio, Rayleigh damping, bands, or the file of a matrix."""
+    if damping is None:
+        return None
+    if isinstance(damping, (str, os.PathLike)):
+        return f"matrix={os.fspath(damping)}"
+    given = damping_of(damping)
+    if isinstance(given, float):
+        return repr(given)
+    if isinstance(given, tuple):
+        return f"rayleigh={given[0]!r},{given[1]!r}"
+    if isinstance(given, list):
+        return "bands=" + ",".join(repr(ratio) if np.isinf(end) else f"{end!r}:{ratio!r}" for end, ratio in given)
+    raise value_error("damping of a job is a ratio, a tuple (alpha, beta), a list of bands or the file of a matrix")
+
+
 def residual_loads(names: Any) -> tuple[bool, bool]:
     """Returns two flags for residual vectors: loads at interfaces, and centrifugal loads."""
     if not isinstance(names, Iterable):

@@ -93,6 +93,8 @@ InterfaceNodes: TypeAlias = Union[
 """Nodes of an interface, or a tuple of these, a coupling, and perhaps a reference point (3)."""
 Damping: TypeAlias = Union[float, tuple[float, float], list[tuple[Union[float, None], float]], Matrix]
 """A ratio, (alpha, beta), ratios by frequency, or a matrix."""
+JobDamping: TypeAlias = Union[float, tuple[float, float], list[tuple[Union[float, None], float]], Path]
+"""A ratio, (alpha, beta), ratios by frequency, or the file of a matrix."""
 Attached: TypeAlias = Union[float, tuple[float, str]]
 """Attached mass, or a tuple of it and the interface that carries it."""
 Places: TypeAlias = Union[str, int, Sequence[Union[str, int]]]

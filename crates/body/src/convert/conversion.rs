@@ -112,6 +112,7 @@ impl ModalModel<'_> {
             modes,
             invariants: condensed.invariants.clone(),
             geometric_stiffness: self.geometric_stiffness.clone(),
+            rotated_stiffness: self.rotated_stiffness.clone(),
             inertia_stiffness: self.inertia_stiffness.clone(),
             lumped,
             certificate: self.certificate(condensed.guarantee.clone()),

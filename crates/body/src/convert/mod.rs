@@ -21,7 +21,7 @@ mod shapes;
 pub use body_modes::{BodyModes, NodesInFrame, interfaces_in_frame, rigid_mass};
 pub use conversion::{Conversion, convert, interface_compliance, poor_fits};
 pub use lumped::LumpedPipeline;
-pub use modal_matrices::{modal_damping, modal_geometric_stiffness};
+pub use modal_matrices::{modal_damping, modal_geometric_stiffness, unit_rotations};
 pub use modal_model::{Condensation, ModalModel};
 pub use recovery::{recovered_rows, recovery_loads};
 pub use settings::{ConvertSettings, Lumping, MeshChoice};

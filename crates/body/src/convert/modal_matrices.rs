@@ -3,15 +3,15 @@
 
 use super::body_modes::reduced;
 use crate::basis::{BasisChoice, Loads};
-use crate::flex_body::{FlexBody, SOFTENING, axis_in_words, stiffness_about};
+use crate::flex_body::{FlexBody, Frame, RotatedStiffness, SOFTENING, axis_in_words, split, stiffness_about};
 use crate::invariants::Invariants;
 use faer::{Mat, MatRef, Scale};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_eigen::energy_noise;
-use flexbody_linalg::{SymmetricMatrix, symmetric_eigen};
+use flexbody_linalg::{SymmetricMatrix, side_by_side, symmetric_eigen};
 use flexbody_model::{Damping, FeModel, GeometricStiffness, LoadKind, UnitLoad, ratio_at};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// Number of standard deviations of the noise due to the digits of D that count as rounding.
 const NOISE_DEVIATIONS: f64 = 30.0;
@@ -129,8 +129,8 @@ const ROUNDING_COSINE: f64 = 4.0 * f64::EPSILON;
 /// Largest entry whose products stay finite.
 const MAX_ENTRY: f64 = 1e290;
 
-/// Returns Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body) for unit
-/// loads along the columns of `axes`. Components that are not given count as zero, so that K_geo of any
+/// Returns Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body), and K_geo of unit
+/// rotations about the axes of the body, for unit loads along the axes of `frame`. Components that are not given count as zero, so that K_geo of any
 /// load is equal in all axes. Components without any contribution are omitted. Kinds are in the order of
 /// the model, components in their own order.
 ///
@@ -141,19 +141,26 @@ const MAX_ENTRY: f64 = 1e290;
 /// [`MatrixNotFinite`](Code::MatrixNotFinite) if the products overflow.
 pub fn modal_geometric_stiffness(
     model: &FeModel,
-    vectors: MatRef<'_, f64>,
-    axes: &Matrix3<f64>,
+    vectors: &Mat<f64>,
+    frame: &Frame,
     shift: &Vector3<f64>,
-) -> Result<Vec<GeometricStiffness<Mat<f64>>>> {
+) -> Result<(Vec<GeometricStiffness<Mat<f64>>>, Vec<RotatedStiffness>)> {
     let mut out: Vec<GeometricStiffness<Mat<f64>>> = Vec::new();
+    if model.geometric_stiffness().is_empty() {
+        return Ok((out, Vec::new()));
+    }
+    let shapes = side_by_side(&[vectors.as_ref(), unit_rotations(model, frame).as_ref()]);
     for GeometricStiffness { load, matrix } in model.geometric_stiffness() {
-        let reduced_matrix = reduced(matrix, vectors);
+        let reduced_matrix = reduced(matrix, shapes.as_ref());
         if reduced_matrix.col_iter().any(|column| column.iter().any(|v| v.is_nan() || v.abs() > MAX_ENTRY)) {
             let message = format!("geometric stiffness for {load} overflows on the modes");
             return Err(Diagnostic::new(Code::MatrixNotFinite, message).into());
         }
-        let along =
-            load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING_COSINE);
+        let along = load
+            .along(&frame.axes)
+            .into_iter()
+            .enumerate()
+            .filter(|(_, factor)| factor.abs() > ROUNDING_COSINE);
         for (component, factor) in along {
             let load = UnitLoad { kind: load.kind.clone(), component };
             let part = &reduced_matrix * Scale(factor);
@@ -166,7 +173,19 @@ pub fn modal_geometric_stiffness(
     let mut out = stiffness_about(&out, shift, model.dimension());
     let place = |kind: &LoadKind| model.geometric_stiffness().iter().position(|one| one.load.kind == *kind);
     out.sort_by_key(|one| (place(&one.load.kind), one.load.component));
-    Ok(out)
+    Ok(split(out))
+}
+
+/// Returns unit rotations (N x 3) about the origin and the axes of the frame; in the plane those about x and y are zero.
+pub fn unit_rotations(model: &FeModel, frame: &Frame) -> Mat<f64> {
+    let fields = model.rigid_fields(frame.origin.into(), 1.0);
+    match model.dimension() {
+        2 => Mat::from_fn(fields.nrows(), 3, |i, k| if k == 2 { fields[(i, 2)] } else { 0.0 }),
+        _ => {
+            let about = |i: usize, k: usize| (0..3).map(|l| fields[(i, 3 + l)] * frame.axes[(l, k)]).sum();
+            Mat::from_fn(fields.nrows(), 3, about)
+        }
+    }
 }
 
 /// Returns a warning if the basis contains centrifugal loads, which means that the body spins, but

@@ -4,7 +4,7 @@
 use super::body_modes::{self, reduced, reduced_in_twice_the_precision};
 use super::{BodyModes, ConvertSettings, NodesInFrame, modal_geometric_stiffness, rigid_mass};
 use crate::basis::{BasisChoice, ModalBasis, Task};
-use crate::flex_body::{Guarantee, Interface, TermDecision, TermGroup, TermGroups};
+use crate::flex_body::{Guarantee, Interface, RotatedStiffness, TermDecision, TermGroup, TermGroups};
 use crate::invariants::{
     BodyFrame, Frame, FrameChoice, InertiaStiffness, Invariants, LumpedMasses, MassProperties, choose_frame,
     choose_general_frame, choose_plane_frame, condense_certified,
@@ -32,6 +32,7 @@ pub struct ModalModel<'m> {
     pub(super) modal_stiffness: Mat<f64>,
     /// Psi' K_geo Psi of unit loads along the body axes.
     pub(super) geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
+    pub(super) rotated_stiffness: Vec<RotatedStiffness>,
     pub(super) inertia_stiffness: Option<InertiaStiffness>,
     pub(super) nodes: Nodes,
     pub(super) interfaces: Vec<Interface>,
@@ -76,8 +77,8 @@ impl<'m> ModalModel<'m> {
             Some(frame) => frame.origin - mass_properties.centre_of_mass,
             None => Vector3::zeros(),
         };
-        let geometric_stiffness =
-            modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes, &shift)?;
+        let (geometric_stiffness, rotated_stiffness) =
+            modal_geometric_stiffness(model, &modes.vectors, &frame, &shift)?;
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
         let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
         let interfaces = body_modes::interfaces_in_frame(model, &frame, coupled);
@@ -91,6 +92,7 @@ impl<'m> ModalModel<'m> {
             modes,
             modal_stiffness,
             geometric_stiffness,
+            rotated_stiffness,
             inertia_stiffness,
             nodes,
             interfaces,

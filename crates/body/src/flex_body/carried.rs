@@ -12,7 +12,8 @@
 //! interface has the eigenpairs of (K_ff, m_ff), with m_ff of the new modes.
 
 use super::modal_change::{rotations_without, shapes_without, stacked};
-use super::{FlexBody, GeometricStiffness, LoadKind, ReferenceConditions, TermGroups};
+use super::rotated_stiffness::{split, transformed, without_rotation};
+use super::{FlexBody, GeometricStiffness, ReferenceConditions, RotatedStiffness, TermGroups};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -73,9 +74,9 @@ impl FlexBody {
     /// axes are those of the model, and the carrier is at rest in every mode (see the module
     /// documentation). A body already carried there keeps its modes.
     ///
-    /// Geometric stiffness includes that of the reaction at the carrier, where it is given (theory 7.6). It is dropped if the carrier moves in the modes of this body: the
-    /// geometric stiffness of the rigid motion that is removed from them is not known. The stiffness of
-    /// inertia follows from the moments of the nodes and their rotations relative to the carrier.
+    /// Geometric stiffness includes that of the reaction at the carrier, where it is given (theory 7.6). If the carrier
+    /// moves in the modes of this body, it is reduced to the modes without that motion, or dropped if that of rotations is
+    /// not known. The stiffness of inertia follows from the moments of the nodes and their rotations relative to the carrier.
     ///
     /// # Errors
     /// FB212 if the body has no interface or node of this name; FB214 if `carrier` has no reference point
@@ -91,16 +92,14 @@ impl FlexBody {
         let along_model = self.frame().axes == nalgebra::Matrix3::identity();
         if along_model && self.has_carrier_at_rest(carrier)? {
             let mut parts = self.clone().into_parts();
-            parts.geometric_stiffness = self.stiffness_with_reaction(carrier);
+            (parts.geometric_stiffness, parts.rotated_stiffness) = self.carried_stiffness(carrier, None);
             return Self::new(parts);
         }
         let at = self.place_of(carrier)?;
         let body = self.in_model_axes(at.reference)?;
         let CarriedPoint { motion, .. } = body.place_of(carrier)?;
-        let geometric_stiffness = match body.is_at_rest(&motion) {
-            true => body.stiffness_with_reaction(carrier),
-            false => body.stiffness_without_place(),
-        };
+        let moved = (!body.is_at_rest(&motion)).then_some(&motion);
+        let (geometric_stiffness, rotated_stiffness) = body.carried_stiffness(carrier, moved);
         let mut parts = body.into_parts();
         parts.conditions = match carrier {
             Carrier::Interface(name) => ReferenceConditions::Interface(name.clone()),
@@ -113,7 +112,7 @@ impl FlexBody {
             lumped.invariants = lumped.invariants.without_rigid_motion(motion.as_ref());
         }
         parts.named_loads = parts.named_loads.iter().map(|load| load.without_rigid_motion(&motion)).collect();
-        parts.geometric_stiffness = geometric_stiffness;
+        (parts.geometric_stiffness, parts.rotated_stiffness) = (geometric_stiffness, rotated_stiffness);
         // The nodes turn relative to the carrier, which turns the frame.
         parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
             (Some(inertia), Some(rotation)) => {
@@ -124,15 +123,27 @@ impl FlexBody {
         Self::new(parts)
     }
 
-    /// Returns true if this body has geometric stiffness of a load that is known by more than its name.
-    pub fn has_geometric_stiffness(&self) -> bool {
-        self.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_)))
-    }
-
-    /// Returns the geometric stiffness of loads that are known by their name only.
-    fn stiffness_without_place(&self) -> Vec<GeometricStiffness<Mat<f64>>> {
-        let is_named = |one: &&GeometricStiffness<_>| matches!(one.load.kind, LoadKind::Named(_));
-        self.geometric_stiffness().iter().filter(is_named).cloned().collect()
+    /// Returns the geometric stiffness of this body, whose origin is the carrier, in the modes in which the carrier is at
+    /// rest, with that of the reaction; none if it is not known.
+    ///
+    /// * `moved`: translation and rotation of the carrier in the modes (6 x nf); `None` if it is at rest.
+    fn carried_stiffness(
+        &self,
+        carrier: &Carrier,
+        moved: Option<&Mat<f64>>,
+    ) -> (Vec<GeometricStiffness<Mat<f64>>>, Vec<RotatedStiffness>) {
+        let identity = || Mat::identity(self.n_modes(), self.n_modes());
+        match (self.stiffness_with_rotation(), moved) {
+            (Some(all), Some(moved)) => {
+                let change = without_rotation(moved.as_ref().subrows(3, 3), &identity());
+                split(self.stiffness_with_reaction(transformed(all, &change), carrier))
+            }
+            (Some(all), None) => split(self.stiffness_with_reaction(all, carrier)),
+            (None, Some(_)) => (Vec::new(), Vec::new()),
+            (None, None) => {
+                (self.stiffness_with_reaction(self.geometric_stiffness().to_vec(), carrier), Vec::new())
+            }
+        }
     }
 
     /// Returns the eigenvalues lambda of (K_ff, m_ff), ascending: for free modes their eigenvalues, for a

@@ -22,14 +22,23 @@ struct Resultant {
     moment: Vector3<f64>,
 }
 
+impl Resultant {
+    fn none() -> Self {
+        Self { force: Vector3::zeros(), moment: Vector3::zeros() }
+    }
+}
+
 impl FlexBody {
-    /// Returns the geometric stiffness of this body when `carrier`, which lies at the origin and moves in no
-    /// mode, carries it: that of the reaction is added to that of the loads that cause it.
-    pub(super) fn stiffness_with_reaction(&self, carrier: &Carrier) -> Vec<GeometricStiffness<Mat<f64>>> {
-        let Carrier::Interface(name) = carrier else { return self.geometric_stiffness().to_vec() };
+    /// Returns `given`, the geometric stiffness of this body in modes in which `carrier` is at rest, for the body that
+    /// `carrier` carries at the origin: that of the reaction is added to that of the loads that cause it.
+    pub(super) fn stiffness_with_reaction(
+        &self,
+        given: Vec<GeometricStiffness<Mat<f64>>>,
+        carrier: &Carrier,
+    ) -> Vec<GeometricStiffness<Mat<f64>>> {
+        let Carrier::Interface(name) = carrier else { return given };
         let is_reaction = |load: &UnitLoad| load.kind.interface() == Some(name);
-        let (reaction, mut all): (Vec<_>, Vec<_>) =
-            self.geometric_stiffness().iter().cloned().partition(|one| is_reaction(&one.load));
+        let (reaction, mut all): (Vec<_>, Vec<_>) = given.into_iter().partition(|one| is_reaction(&one.load));
         if reaction.is_empty() {
             return all;
         }
@@ -50,7 +59,7 @@ impl FlexBody {
         all
     }
 
-    /// Returns the unit loads that the carrier reacts to: motions of the frame, and loads at other interfaces.
+    /// Returns the unit loads that the carrier reacts to: motions of the frame, loads at other interfaces, named loads.
     fn loads_with_reaction(&self, carrier: &str) -> Vec<UnitLoad> {
         let mut kinds = vec![LoadKind::Acceleration, LoadKind::AngularAcceleration, LoadKind::Spin];
         for interface in self.interfaces() {
@@ -61,6 +70,7 @@ impl FlexBody {
                 ]);
             }
         }
+        kinds.extend(self.named_loads().iter().map(|load| LoadKind::Named(load.name.clone())));
         let of_kind = |kind: LoadKind| {
             let components = kind.of_dimension(self.dimension());
             components.iter().map(move |&component| UnitLoad { kind: kind.clone(), component })
@@ -103,7 +113,14 @@ impl FlexBody {
                 Resultant { force, moment: point.cross(&force) }
             }
             LoadKind::Moment(_) => Resultant { force: Vector3::zeros(), moment: -unit(load.component) },
-            LoadKind::Named(_) => Resultant { force: Vector3::zeros(), moment: Vector3::zeros() },
+            LoadKind::Named(name) => {
+                let load = self.named_loads().iter().find(|load| load.name == *name);
+                let undeformed = vec![0.0; self.n_modes()];
+                load.map_or_else(Resultant::none, |load| Resultant {
+                    force: -load.resultant_force(),
+                    moment: -load.torque_at(&undeformed),
+                })
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LoadColumns,
-    LumpedBody, Modes, NamedLoad, Parts, Recovery,
+    LumpedBody, Modes, NamedLoad, Parts, Recovery, RotatedStiffness, UnitLoad,
 };
 use crate::invariants::{InertiaStiffness, Invariants, UnitFactors};
 use faer::Mat;
@@ -62,17 +62,29 @@ impl Change {
 
     /// Returns K_geo of a unit load in the new units: 1/time^2 over the unit of the load.
     fn geometric(self, given: &GeometricStiffness<Mat<f64>>) -> GeometricStiffness<Mat<f64>> {
-        let load = match given.load.kind {
+        let factor = self.eigenvalue() / self.load(&given.load);
+        GeometricStiffness { load: given.load.clone(), matrix: times(&given.matrix, factor) }
+    }
+
+    /// Returns K_geo of rotations for a unit load in the new units.
+    fn rotated(self, given: &RotatedStiffness) -> RotatedStiffness {
+        let load = self.load(&given.load);
+        RotatedStiffness {
+            load: given.load.clone(),
+            modes: times(&given.modes, self.of(1, 1, -2) / load),
+            rotation: times(&given.rotation, self.of(2, 2, -2) / load),
+        }
+    }
+
+    /// Returns the factor of the unit of a load.
+    fn load(self, load: &UnitLoad) -> f64 {
+        match load.kind {
             LoadKind::Acceleration => self.of(0, 1, -2),
             LoadKind::AngularAcceleration | LoadKind::Spin => self.of(0, 0, -2),
             LoadKind::Force(_) => self.of(2, 1, -2),
             LoadKind::Moment(_) => self.of(2, 2, -2),
             // The unit of a load known by its name only is chosen by the user.
             LoadKind::Named(_) => 1.0,
-        };
-        GeometricStiffness {
-            load: given.load.clone(),
-            matrix: times(&given.matrix, self.eigenvalue() / load),
         }
     }
 
@@ -200,6 +212,7 @@ impl FlexBody {
         parts.invariants = change.invariants(&parts.invariants);
         parts.geometric_stiffness =
             parts.geometric_stiffness.iter().map(|one| change.geometric(one)).collect();
+        parts.rotated_stiffness = parts.rotated_stiffness.iter().map(|one| change.rotated(one)).collect();
         parts.inertia_stiffness =
             parts.inertia_stiffness.as_ref().map(|inertia| change.inertia_stiffness(inertia));
         let lumped =

@@ -13,6 +13,7 @@ mod named_load;
 mod parts;
 mod recovery;
 mod reference_conditions;
+mod rotated_stiffness;
 mod softening;
 mod storage;
 mod terms;
@@ -35,6 +36,7 @@ pub use parts::{
 };
 pub use recovery::{LOAD_COMPONENTS, LoadColumns, Recovery, RecoveryState, StaticCoordinates};
 pub use reference_conditions::ReferenceConditions;
+pub use rotated_stiffness::{RotatedStiffness, joined, split};
 pub use softening::{SOFTENING, axis_in_words};
 pub use storage::Storage;
 pub use terms::{Subset, TermDecision};

@@ -1,6 +1,7 @@
 //! Changes of the modal coordinates of a body: to mean axes, or to normalised modes in the present frame
 //! (theory 5.2).
 
+use super::rotated_stiffness::without_rotation;
 use crate::invariants::{GeneralTerms, Invariants, symmetric_part};
 use faer::{Mat, MatRef};
 use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
@@ -184,6 +185,13 @@ impl ModalChange {
     /// Returns the rigid motions among the modes, which are removed.
     pub fn left_out(&self) -> &RigidMotions {
         &self.left_out
+    }
+
+    /// Returns T ((nf + 3) x (nf' + 3)) of the new modes and unit rotations from the old ones.
+    pub(super) fn beside_rotations(&self) -> Mat<f64> {
+        let none = Mat::zeros(3, self.modes.nrows());
+        let rotations = self.taken.as_ref().map_or(none.as_ref(), |taken| taken.as_ref().subrows(3, 3));
+        without_rotation(rotations, &self.modes)
     }
 
     /// Returns X'A X.

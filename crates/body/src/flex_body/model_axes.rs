@@ -1,5 +1,6 @@
 //! Transformation of a body to a frame along the axes of its model, and its modes in the rows of the model.
 
+use super::rotated_stiffness::{about_axes, split, transformed};
 use super::{
     FlexBody, GeometricStiffness, Interface, InternalRows, LumpedBody, NamedLoad, ReferenceConditions,
     UnitLoad,
@@ -65,7 +66,13 @@ impl FlexBody {
                 ..lumped
             })
             .collect();
-        parts.geometric_stiffness = self.geometric_stiffness_in(&origin, &to_body);
+        (parts.geometric_stiffness, parts.rotated_stiffness) = match self.stiffness_with_rotation() {
+            Some(all) => {
+                let all = along(&stiffness_about(&all, &origin, self.dimension()), &to_body);
+                split(transformed(all, &about_axes(self.n_modes(), &to_body)))
+            }
+            None => (self.geometric_stiffness_in(&origin, &to_body), Vec::new()),
+        };
         parts.inertia_stiffness = self.inertia_stiffness_in(&origin, &to_body);
         parts.named_loads = self.named_loads_in(&origin, &to_body);
         parts.recoveries = parts.recoveries.iter().map(|one| one.in_axes(&to_body)).collect();

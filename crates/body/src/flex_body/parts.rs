@@ -1,6 +1,6 @@
 //! Plain data of a flexible body, not yet checked.
 
-use super::{Interface, NamedLoad, Recovery, ReferenceConditions, Storage, TermDecision};
+use super::{Interface, NamedLoad, Recovery, ReferenceConditions, RotatedStiffness, Storage, TermDecision};
 use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
 use crate::invariants::{DIGITS, Frame, InertiaStiffness, Invariants};
 use faer::Mat;
@@ -193,6 +193,10 @@ pub struct Parts {
     /// plus the sum of these matrices times their loads. Missing loads are zero or unknown. Unit: 1/time^2
     /// over the unit of the load.
     pub geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
+    /// Geometric stiffness of unit rotations for the same loads, in the same order. Empty if unknown (files of format
+    /// versions before 1.10, files of other programs); a body whose carrier moves in its modes then loses its
+    /// geometric stiffness while it is carried.
+    pub rotated_stiffness: Vec<RotatedStiffness>,
     /// Stiffness of inertia of nodes whose rotations carry mass; `None` if no rotation carries mass, or if
     /// the stiffness is unknown (files of format versions before 1.6, files of other programs).
     pub inertia_stiffness: Option<InertiaStiffness>,

@@ -2,6 +2,7 @@
 //! an interface.
 
 use super::modal_change::{ModalChange, diagonal_eigenvalues, reduced_residuals};
+use super::rotated_stiffness::{split, transformed};
 use super::{Carrier, Certificate, FlexBody, LoadKind, LumpedBody, Modes, Parts, Recovery};
 use crate::invariants::{BodyFrame, FrameChoice, Invariants, TermGroups, error_norms, principal_axes};
 use faer::Mat;
@@ -178,7 +179,10 @@ impl FlexBody {
             load: one.load.clone(),
             matrix: change.congruent(&one.matrix),
         };
-        parts.geometric_stiffness = parts.geometric_stiffness.iter().map(stiffness).collect();
+        (parts.geometric_stiffness, parts.rotated_stiffness) = match self.stiffness_with_rotation() {
+            Some(all) => split(transformed(all, &change.beside_rotations())),
+            None => (parts.geometric_stiffness.iter().map(stiffness).collect(), Vec::new()),
+        };
         parts.lumped =
             parts.lumped.iter().map(|lumped| changed_lumped(lumped, change, &invariants)).collect();
         // Rows that rigid motion changes are known only relative to the former frame.

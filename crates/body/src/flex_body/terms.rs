@@ -2,8 +2,8 @@
 //! selection for a scene, and the reduction of the body to some of them.
 
 use super::{
-    Certificate, FixedInterface, FlexBody, Guarantee, InternalRows, LumpedBody, Modes, Parts, Storage,
-    TermGroup, TermGroups,
+    Certificate, FixedInterface, FlexBody, Guarantee, InternalRows, LumpedBody, Modes, Parts,
+    RotatedStiffness, Storage, TermGroup, TermGroups,
 };
 use crate::invariants::{InertiaStiffness, error_norms};
 use faer::Mat;
@@ -52,6 +52,10 @@ impl FlexBody {
             load: one.load.clone(),
             matrix: square(&one.matrix, modes),
         };
+        let rotated = |one: &RotatedStiffness| RotatedStiffness {
+            modes: Mat::from_fn(modes.len(), 3, |i, k| one.modes[(modes[i], k)]),
+            ..one.clone()
+        };
         let before = parts.terms.iter().filter(|old| terms.iter().all(|new| new.group != old.group));
         let body = Self::new(Parts {
             source: parts.source.clone(),
@@ -63,6 +67,7 @@ impl FlexBody {
             mesh: parts.mesh.clone(),
             modes: parts.modes.some(modes),
             geometric_stiffness: parts.geometric_stiffness.iter().map(stiffness).collect(),
+            rotated_stiffness: parts.rotated_stiffness.iter().map(rotated).collect(),
             inertia_stiffness: parts.inertia_stiffness.as_ref().map(|inertia| InertiaStiffness {
                 moments: inertia.moments.clone(),
                 stiffness: inertia.stiffness.iter().map(stiffness).collect(),

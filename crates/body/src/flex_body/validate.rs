@@ -36,6 +36,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     }
     check.structure(parts);
     check.geometric_stiffness(parts, nf);
+    check.rotated_stiffness(parts, nf);
     check.inertia_stiffness(parts, n, nf);
     check.lumped(parts, nf);
     let c = &parts.certificate;
@@ -224,6 +225,21 @@ impl Problems {
                 let dimension = parts.dimension;
                 self.add(format!("geometric stiffness `{label}` of a body of dimension {dimension}"));
             }
+        }
+    }
+
+    fn rotated_stiffness(&mut self, parts: &Parts, nf: usize) {
+        let (given, rotated) = (&parts.geometric_stiffness, &parts.rotated_stiffness);
+        if rotated.is_empty() {
+            return;
+        }
+        if !given.iter().map(|one| &one.load).eq(rotated.iter().map(|one| &one.load)) {
+            self.add("`rotated_stiffness` has other loads than `geometric_stiffness`".to_owned());
+        }
+        for one in rotated {
+            let label = one.load.label();
+            self.matrix(&format!("rotated_stiffness `{label}` of modes"), &one.modes, nf, 3);
+            self.matrix(&format!("rotated_stiffness `{label}` of rotations"), &one.rotation, 3, 3);
         }
     }
 

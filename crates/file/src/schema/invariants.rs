@@ -150,6 +150,30 @@ pub(super) const GEOMETRIC_STIFFNESS: &[Item] = &[
     .added(2),
 ];
 
+/// Unit of the modes of [`ROTATED_STIFFNESS`]: square root of mass times length over time squared.
+const ROOT_MASS_LENGTH_PER_TIME2: Units = Units::Of { mass_halves: 1, length: 1, time: -2 };
+
+pub(super) const ROTATED_STIFFNESS: &[Item] = &[
+    dataset(
+        "modes",
+        Floats(&[Modes, Fixed(3)]),
+        ROOT_MASS_LENGTH_PER_TIME2,
+        "Psi' K_geo R",
+        "K_geo of unit rotations R, at the modes, for one unit of the load",
+        field!(rotated: modes),
+    )
+    .within(10),
+    dataset(
+        "rotations",
+        Floats(&[Fixed(3), Fixed(3)]),
+        MOMENT,
+        "R' K_geo R",
+        "K_geo of unit rotations, at unit rotations, for one unit of the load",
+        field!(rotated: rotation),
+    )
+    .within(10),
+];
+
 pub(super) const INERTIA_STIFFNESS: &[Item] = &[
     dataset(
         "stiffness",

@@ -38,10 +38,10 @@ fn every_required_entry_is_missed_when_it_is_not_there() {
         let (parent, key) = pointer.rsplit_once('/').unwrap();
         let key = key.replace("~1", "/").replace("~0", "~");
         broken.pointer_mut(parent).unwrap().as_object_mut().unwrap().remove(&key);
-        let optional = ["comparison", "lumped", "interfaces", "geometric_stiffness", "inertia_stiffness", "recovery", "named_loads"]
+        let optional = ["comparison", "lumped", "interfaces", "geometric_stiffness", "rotated_stiffness", "inertia_stiffness", "recovery", "named_loads"]
             .iter()
             .any(|g| parent == format!("/groups/{g}/groups"))
-            || ["geometric_stiffness", "inertia_stiffness", "interface", "recovery"].contains(&key.as_str())
+            || ["geometric_stiffness", "rotated_stiffness", "inertia_stiffness", "interface", "recovery"].contains(&key.as_str())
             || key.starts_with("rotational_")
             || (parent.starts_with("/groups/comparison/groups/") && parent.ends_with("/attributes"))
             || ["proved_modes", "negative_pivots", "shift_below", "negative_pivots_below"]

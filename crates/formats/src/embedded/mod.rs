@@ -57,7 +57,7 @@ impl ExportFormat for Embedded {
             coriolis_force: Held,
             general_w3: Held,
             separate_w2: Held,
-            geometric_stiffness: geometric_stiffness(body, holds),
+            geometric_stiffness: geometric_stiffness(body, options, holds),
             inertia_stiffness: Held,
             damping: Held,
             shapes: Held,

@@ -5,8 +5,9 @@ use crate::export::Holding::{self, Held, Lost, NotApplicable, Slight};
 use faer::Mat;
 use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_body::invariants::{CauchySchwarz, InertiaShares};
+use flexbody_body::invariants::{CauchySchwarz, InertiaShares, relative_norm};
 use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
+use flexbody_motion::scene::{FrameMotion, Omission};
 
 /// Largest difference, relative to a Cauchy-Schwarz bound, that counts as rounding and not as a loss. A
 /// larger value hides small losses; a smaller one reports rounding.
@@ -18,6 +19,9 @@ const REPORTED_STIFFNESS: f64 = 0.01;
 /// Largest part of a stiffness in a scene that may be lost without permission. A larger value lets files with
 /// larger errors pass with a warning.
 const MAX_SLIGHT_STIFFNESS: f64 = 0.05;
+
+/// Largest change of the attitude in a scene, in radians, that a loss without permission may cause.
+const MAX_SLIGHT_ATTITUDE: f64 = 0.05;
 
 /// Returns the holding of the restriction to a plane, for a format in space.
 pub(crate) fn plane(body: &FlexBody) -> Holding {
@@ -86,24 +90,95 @@ pub(crate) fn is_damped(body: &FlexBody) -> bool {
     body.modes().modal_damping.is_some() || body.modes().damping_ratio.iter().any(|ratio| *ratio != 0.0)
 }
 
-/// Returns the holding of damping, for a format without damping.
-#[cfg(feature = "hdf5")]
-pub(crate) fn damping(body: &FlexBody) -> Holding {
-    if is_damped(body) { Lost("the damping of the modes".to_owned()) } else { NotApplicable }
+/// Returns the holding of damping, for a format without that of the body; `what` names the lost damping.
+pub(crate) fn damping(body: &FlexBody, options: &ExportOptions, what: &str) -> Holding {
+    if !is_damped(body) {
+        return NotApplicable;
+    }
+    if let Some(measured) = in_scene(options, &Omission::Damping, what) {
+        return measured;
+    }
+    // An oscillating load at the part r of the frequency of a mode deflects it by 1 / (1 - r^2) without, and by
+    // 1 / sqrt((1 - r^2)^2 + (2 zeta r)^2) with the damping ratio zeta.
+    let apart = ((1.0 + REPORTED_STIFFNESS).powi(2) - 1.0).sqrt();
+    let from = |(lambda, ratio): (&f64, &f64)| {
+        let relative = ratio / apart;
+        lambda.sqrt() * ((relative.powi(2) + 1.0).sqrt() - relative)
+    };
+    let modes = body.modes();
+    let damped = modes.eigenvalue.iter().zip(&modes.damping_ratio).filter(|(_, ratio)| **ratio > 0.0);
+    let rate = damped.map(from).fold(f64::INFINITY, f64::min);
+    let hertz = significant(body.units().frequency_of(rate * rate), 3);
+    Slight(format!(
+        "{what}, which changes deflections under an oscillating load by 1 % from {hertz} Hz on, and without which vibrations do not decay"
+    ))
 }
 
 /// Returns the holding of geometric stiffness, for a format that takes the loads for which `holds` returns
 /// true.
-pub(crate) fn geometric_stiffness(body: &FlexBody, holds: impl Fn(&UnitLoad) -> bool) -> Holding {
-    let lost: Vec<String> = body
-        .geometric_stiffness()
-        .iter()
-        .filter(|one| !holds(&one.load))
-        .map(|one| one.load.to_string())
-        .collect();
-    Holding::held_but_for(
-        (!lost.is_empty()).then(|| format!("the geometric stiffness for {}", lost.join(", "))),
-    )
+pub(crate) fn geometric_stiffness(
+    body: &FlexBody,
+    options: &ExportOptions,
+    holds: impl Fn(&UnitLoad) -> bool,
+) -> Holding {
+    let lost: Vec<GeometricStiffness<Mat<f64>>> =
+        body.geometric_stiffness().iter().filter(|one| !holds(&one.load)).cloned().collect();
+    if lost.is_empty() {
+        return Held;
+    }
+    let loads: Vec<UnitLoad> = lost.iter().map(|one| one.load.clone()).collect();
+    let names: Vec<String> = loads.iter().map(UnitLoad::to_string).collect();
+    let what = format!("the geometric stiffness for {}", names.join(", "));
+    if let Some(measured) = in_scene(options, &Omission::GeometricStiffness(loads), &what) {
+        return measured;
+    }
+    let own = body.invariants().modal_stiffness();
+    let Some(shares) = InertiaShares::of(&lost, own.as_ref()) else {
+        return Lost(format!("{what}, whose effect is not known"));
+    };
+    let rates = body.rates_of(&shares, REPORTED_STIFFNESS).in_words(body.units(), |_| true);
+    // Loads at interfaces and named loads, each by its size.
+    let at_place = lost.iter().filter_map(|one| {
+        let share = relative_norm(one.matrix.as_ref(), own.as_ref()).filter(|share| *share > 0.0)?;
+        let size = significant(REPORTED_STIFFNESS / share, 3);
+        let units = body.units();
+        let (mass, length, time) = (units.mass.name(), units.length.name(), units.time.name());
+        match one.load.kind {
+            LoadKind::Force(_) => Some(format!("{} of {size} {mass} {length}/{time}^2", one.load)),
+            LoadKind::Moment(_) => Some(format!("{} of {size} {mass} {length}^2/{time}^2", one.load)),
+            LoadKind::Named(_) => Some(format!("{size} times {}", one.load)),
+            _ => None,
+        }
+    });
+    let all: Vec<String> =
+        Some(rates).filter(|rates| !rates.is_empty()).into_iter().chain(at_place).collect();
+    Slight(format!("{what}, which changes deflections by 1 % and frequencies by 0.5 % at {}", all.join(", ")))
+}
+
+/// Returns the loss of a property by the largest change of the motion in the load cases without it; `None` without a
+/// scene. It is slight up to a change of deflections by 5 %, and of the attitude by 0.05 radians.
+fn in_scene(options: &ExportOptions, omission: &Omission, what: &str) -> Option<Holding> {
+    let change = |case: &FrameMotion| {
+        let errors = case.change_without(omission)?;
+        Some((errors.deflection.unwrap_or(0.0), errors.attitude.unwrap_or(0.0), case.scene.clone()))
+    };
+    let all = options.in_scene.iter().map(change).collect::<Option<Vec<_>>>()?;
+    let (deflection, attitude, scene) = all.into_iter().max_by(|a, b| {
+        let size = |(deflection, attitude, _): &(f64, f64, String)| deflection.max(*attitude);
+        size(a).total_cmp(&size(b))
+    })?;
+    if !deflection.is_finite() || !attitude.is_finite() {
+        return Some(Lost(format!("{what}: the scene `{scene}` cannot be simulated without it")));
+    }
+    let turned = if attitude > ROUNDING {
+        format!(", the attitude by {} radians", significant(attitude, 2))
+    } else {
+        String::new()
+    };
+    let deflections = significant(100.0 * deflection, 2);
+    let text = format!("{what}: in the scene `{scene}` deflections change by {deflections} %{turned}");
+    let is_slight = deflection <= MAX_SLIGHT_STIFFNESS && attitude <= MAX_SLIGHT_ATTITUDE;
+    Some(if is_slight { Slight(text) } else { Lost(text) })
 }
 
 /// Returns the holding of the stiffness of inertia, for a format that takes the loads for which `holds`
@@ -170,12 +245,13 @@ pub(crate) fn internal_rows(body: &FlexBody) -> Holding {
 
 /// Returns the holding of the groups of the kinetic energy, for a format with the inertia of the undeformed
 /// body; `w1` names the lost part of W1.
-pub(crate) fn changing_inertia(body: &FlexBody, w1: &str, why: &str) -> Holding {
+pub(crate) fn changing_inertia(body: &FlexBody, options: &ExportOptions, w1: &str, why: &str) -> Holding {
     let groups = body.groups();
     let held = [(groups.w1, w1), (groups.w2, "W2"), (groups.w3, "W3")];
     let lost: Vec<&str> = held.into_iter().filter(|(held, _)| *held).map(|(_, name)| name).collect();
     if lost.is_empty() {
         return NotApplicable;
     }
-    Lost(format!("the change of the inertia with the deformation ({}): {why}", lost.join(", ")))
+    let what = format!("the change of the inertia with the deformation ({}; {why})", lost.join(", "));
+    in_scene(options, &Omission::DeformedInertia, &what).unwrap_or(Lost(what))
 }

@@ -96,13 +96,13 @@ pub(crate) fn matrix_checklist(body: &FlexBody, options: &ExportOptions) -> Expo
         rigid_coupling: Held,
         // Plane bodies were rejected before.
         plane: NotApplicable,
-        deformed_inertia: losses::changing_inertia(body, "W1", small),
+        deformed_inertia: losses::changing_inertia(body, options, "W1", small),
         general_w0: losses::general_w0(body),
         // These terms are lost with the inertia of the deformed body.
         coriolis_force: NotApplicable,
         general_w3: NotApplicable,
         separate_w2: NotApplicable,
-        geometric_stiffness: losses::geometric_stiffness(body, |_| false),
+        geometric_stiffness: losses::geometric_stiffness(body, options, |_| false),
         inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
         damping: Held,
         shapes: NotApplicable,

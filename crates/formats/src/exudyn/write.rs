@@ -43,9 +43,9 @@ impl ExportFormat for Exudyn {
             coriolis_force: Held,
             general_w3: losses::general_w3(body, options),
             separate_w2: Held,
-            geometric_stiffness: losses::geometric_stiffness(body, |_| false),
+            geometric_stiffness: losses::geometric_stiffness(body, options, |_| false),
             inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
-            damping: losses::damping(body),
+            damping: losses::damping(body, options, "the damping of the modes"),
             shapes: Held,
             // An interface written as a cross of nodes rotates exactly as in the body.
             rotations: if options.points.of_interfaces() { Held } else { rotations(body) },

@@ -58,7 +58,7 @@ impl ExportFormat for Mbdyn {
             coriolis_force: if exact { Held } else { NotApplicable },
             general_w3: if exact { losses::general_w3(body, options) } else { NotApplicable },
             separate_w2: if exact { Held } else { NotApplicable },
-            geometric_stiffness: losses::geometric_stiffness(body, |load| {
+            geometric_stiffness: losses::geometric_stiffness(body, options, |load| {
                 exact && tag(load, &places).is_some()
             }),
             inertia_stiffness: losses::inertia_stiffness(body, options, |_| exact),

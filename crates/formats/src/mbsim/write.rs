@@ -45,7 +45,7 @@ impl ExportFormat for Mbsim {
             coriolis_force: Held,
             general_w3: losses::general_w3(body, options),
             separate_w2: other_w2(body, options),
-            geometric_stiffness: losses::geometric_stiffness(body, |_| false),
+            geometric_stiffness: losses::geometric_stiffness(body, options, |_| false),
             inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
             damping: Held,
             shapes: Held,

@@ -54,7 +54,7 @@ impl ExportFormat for Sid {
             coriolis_force: if embs { coriolis_of_frame(body) } else { Held },
             general_w3: Held,
             separate_w2: Held,
-            geometric_stiffness: geometric_stiffness(body, holds),
+            geometric_stiffness: geometric_stiffness(body, options, holds),
             // The stiffness of inertia is written like geometric stiffness.
             inertia_stiffness: Held,
             damping: Held,

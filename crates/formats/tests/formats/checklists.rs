@@ -35,7 +35,10 @@ const PROPERTIES: &[Property] = &[
     Property {
         name: "geometric stiffness",
         moves: true,
-        remove: |parts| parts.geometric_stiffness.clear(),
+        remove: |parts| {
+            parts.geometric_stiffness.clear();
+            parts.rotated_stiffness.clear();
+        },
         entry: |list| &list.geometric_stiffness,
     },
     Property {
@@ -110,6 +113,7 @@ fn body_with_everything() -> FlexBody {
     assert!(parts.modes.provenance.len() == nf && parts.modes.rotation.is_some() && n > 3);
     parts.modes.damping_ratio.fill(0.02);
     let load = UnitLoad { kind: LoadKind::Acceleration, component: 0 };
+    parts.rotated_stiffness.clear();
     parts.geometric_stiffness.retain(|one| one.load != load);
     let matrix = Mat::from_fn(nf, nf, |i, j| 1e-3 * ((i + j) as f64 + 1.0));
     parts.geometric_stiffness.push(GeometricStiffness { load, matrix });

@@ -517,9 +517,10 @@ fn damping_and_geometric_stiffness_are_held_where_there_is_a_place() {
     });
 
     let (bytes, losses) = written(&body, "mbdyn", &ExportOptions::default());
-    assert_eq!(
-        losses,
-        ["mbdyn cannot hold the geometric stiffness for load `pretension` (geometric-stiffness)"]
+    let [lost] = &losses[..] else { panic!("{losses:?}") };
+    assert!(
+        lost.starts_with("mbdyn cannot hold the geometric stiffness for load `pretension`, which"),
+        "{lost}"
     );
     let found = read(&bytes, "mbdyn").body;
     assert_eq!(found.modal_damping.as_ref(), Some(&damping));

@@ -40,6 +40,7 @@ fn sid() -> &'static dyn ExportFormat {
 fn strained(model: &str, random: &mut Random) -> FlexBody {
     let mut parts = fixture(model, MODES, BodyFrame::Model).into_parts();
     parts.geometric_stiffness.clear();
+    parts.rotated_stiffness.clear();
     stressed(FlexBody::new(parts).expect("valid parts"), &MOTION, 1e-3, random)
 }
 
@@ -482,9 +483,8 @@ fn what_cannot_be_held_is_told() {
     assert!(said("frame_beams").is_empty(), "{:?}", said("frame_beams"));
     let body = fixture("bracket_hex20", MODES, BodyFrame::Model);
     let body = stressed(body, &[LoadKind::Named("bolts".to_owned())], 1.0, &mut Random(2));
-    let refused = export(&body, sid(), &ExportOptions::default(), false).expect_err("a load without a place");
-    assert!(refused.to_string().contains("FB720") && refused.to_string().contains("bolts"), "{refused}");
-    let (_, warnings) = export(&body, sid(), &ExportOptions::default(), true).expect("with the loss");
+    let (_, warnings) = export(&body, sid(), &ExportOptions::default(), false).expect("with the loss");
+    assert!(warnings.iter().any(|one| one.message().contains("times load `bolts`")), "{warnings:?}");
     let lost = warnings.iter().filter(|one| one.code() == Code::ExportLost);
     assert_eq!(lost.count(), 1, "{warnings:?}");
 }

@@ -9,13 +9,15 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{BodyFrame, relative_norm};
 use flexbody_formats::export::{AllowedLosses, ExportOptions, Loss, Points};
 use flexbody_formats::import::import_body;
-use flexbody_formats::{export, find_format, find_import_format};
+use flexbody_formats::{export, find_format, find_import_format, motion_of_losses};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::symmetric_eigen;
 use flexbody_model::RigidAcceleration;
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
-use flexbody_motion::scene::FrameMotion;
+use flexbody_motion::scene::{Axes, FrameMotion, History, Load, Point, Scene, VectorHistory};
 use nalgebra::{Matrix3, Vector3};
 use oracle::flexible::fixture;
+use oracle::scenes::nothing_happens;
 use std::path::Path;
 
 const MODES: usize = 6;
@@ -124,8 +126,12 @@ fn stated_errors_are_those_of_the_body_in_the_file() {
             let back = exported(&body, format, &plain);
             for (kind, size) in sizes.into_iter().enumerate() {
                 let motions = Motions::new(kind, size);
-                let case =
-                    FrameMotion { scene: "turn".into(), body: body.clone(), motion: motions.motion.clone() };
+                let case = FrameMotion {
+                    scene: "turn".into(),
+                    body: body.clone(),
+                    motion: motions.motion.clone(),
+                    run: None,
+                };
                 let options = ExportOptions { in_scene: vec![case], ..plain.clone() };
                 let checklist = find_format(format).expect("a format").checklist(&body, &options);
                 let losses =
@@ -159,7 +165,7 @@ fn files_of_frames_are_written_unless_a_scene_makes_their_losses_large() {
     let case = |part: f64| {
         let motion = Motions::new(0, one_percent * (part / 0.01).sqrt()).motion;
         ExportOptions {
-            in_scene: vec![FrameMotion { scene: "spin".into(), body: body.clone(), motion }],
+            in_scene: vec![FrameMotion { scene: "spin".into(), body: body.clone(), motion, run: None }],
             ..ExportOptions::default()
         }
     };
@@ -185,4 +191,59 @@ fn files_of_frames_are_written_unless_a_scene_makes_their_losses_large() {
         let named = AllowedLosses::named(vec!["damping".into()]).expect("a name");
         assert!(written(&ExportOptions::default(), named).is_err());
     }
+}
+
+/// Returns what an export says of a loss in a scene: the message, and true if the file is written without permission.
+fn in_scene(body: &FlexBody, format: &str, scene: &Scene, property: &str) -> (String, bool) {
+    let format = find_format(format).expect("a format");
+    let plain = ExportOptions::default();
+    let cases = scene.clone().into();
+    let in_scene = motion_of_losses(body, format, &plain, &cases, &Context::QUIET).expect("a motion");
+    let options = ExportOptions { in_scene, ..plain };
+    let losses = format.checklist(body, &options).losses();
+    let loss = losses.into_iter().find(|loss| loss.property == property).expect("a loss");
+    assert!(loss.text.contains("in the scene `losses` deflections change by"), "{}", loss.text);
+    (loss.text, loss.is_slight)
+}
+
+/// Properties whose loss no motion of the frame bounds are judged by the motion of the body without them: damping hardly
+/// changes slow deflections and limits those at resonance; the inertia of the deformed body matters if the body turns.
+#[test]
+fn other_losses_are_judged_by_the_motion_without_them() {
+    let mut parts = fixture("bracket_hex20", MODES, BodyFrame::Com).into_parts();
+    parts.modes.damping_ratio.fill(0.02);
+    let body = FlexBody::new(parts).expect("a body");
+    let first = body.modes().eigenvalue[0].sqrt() / std::f64::consts::TAU;
+    let size = 1e-7 * body.extent() * body.invariants().mass() * body.modes().eigenvalue[0];
+    let pushed = |frequency: f64, spin: f64| {
+        let mut scene = nothing_happens("losses", 20.0 / first, 1e-9);
+        scene.initial.angular_velocity = Vector3::x() * spin;
+        scene.loads = vec![Load {
+            at: Point::Node(body.nodes().ids[0]),
+            force: VectorHistory::Along {
+                direction: Vector3::z() * size,
+                factor: History::Sine { amplitude: 1.0, frequency, phase: 0.0 },
+            },
+            torque: VectorHistory::nothing(),
+            axes: Axes::Body,
+        }];
+        scene
+    };
+    let (text, written) = in_scene(&body, "exudyn", &pushed(0.02 * first, 0.0), "damping");
+    assert!(written, "{text}");
+    let (text, written) = in_scene(&body, "exudyn", &pushed(first, 0.0), "damping");
+    assert!(!written, "{text}");
+    let (text, written) = in_scene(&body, "openradioss", &pushed(0.02 * first, 0.0), "deformed-inertia");
+    assert!(written, "{text}");
+    let fast = 0.3 * std::f64::consts::TAU * first;
+    let (text, written) = in_scene(&body, "openradioss", &pushed(0.02 * first, fast), "deformed-inertia");
+    assert!(!written, "{text}");
+    // Without a scene the warning states the frequency from which the load would have to oscillate: 0.87 of the first.
+    let losses =
+        find_format("exudyn").expect("a format").checklist(&body, &ExportOptions::default()).losses();
+    let loss = losses.iter().find(|loss| loss.property == "damping").expect("a loss");
+    let hertz = loss.text.split("from ").nth(1).and_then(|rest| rest.split(' ').next()?.parse::<f64>().ok());
+    let part = hertz.expect("a frequency") / (body.units().frequency_of(body.modes().eigenvalue[0]));
+    let response = |damped: f64| ((1.0 - part * part).powi(2) + damped * (2.0 * 0.02 * part).powi(2)).sqrt();
+    assert!(loss.is_slight && (response(1.0) / response(0.0) - 1.01).abs() < 1e-3, "{part}: {}", loss.text);
 }

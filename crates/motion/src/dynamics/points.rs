@@ -159,16 +159,21 @@ impl BodyPoint {
     }
 
     /// Creates the place of `load`, a named load of a body: a force (a, 0, 0) at it is the load with the amplitude a, along
-    /// any axes. Its displacement along x is f'u of the forces f and the displacements u of the nodes. It has no
-    /// orientation.
-    #[doc(hidden)] // Its argument is no part of the interface of the library.
-    pub fn named_load(load: &NamedLoad) -> Self {
+    /// any axes. Its displacement along x is f'u of the forces f and the displacements u of the nodes, with geometric
+    /// stiffness for the load -q'K q / 2 more (theory 7.5), if `terms` contain it. It has no orientation.
+    #[doc(hidden)] // Its arguments are no part of the interface of the library.
+    pub fn named_load(body: &FlexBody, load: &NamedLoad, terms: Terms) -> Self {
         let nf = load.modal.len();
         let torque = load.torque_at(&vec![0.0; nf]);
         let turning = |k: usize, j: usize| if load.preload { 0.0 } else { load.turning[(k, j)] };
+        let linear = PointMotion::new(nf, |k, j| if k == 0 { load.modal[j] } else { 0.0 });
+        let translation = match terms.geometric_stiffness {
+            true => linear.with_geometric_stiffness(body, &LoadKind::Named(load.name.clone())),
+            false => linear,
+        };
         Self {
             position: Vector3::zeros(),
-            translation: PointMotion::new(nf, |k, j| if k == 0 { load.modal[j] } else { 0.0 }),
+            translation,
             rotation: None,
             named: Some(Box::new(Resultants {
                 force: load.resultant_force(),

@@ -1,12 +1,14 @@
-//! Motion of the frame of a body in a scene, and the size of a stiffness that this motion causes.
+//! Motion of the frame of a body in a scene, the size of a stiffness that this motion causes, and the change of the motion
+//! by a property that the body does not have.
 
-use super::{FramedScene, LoadCases, Scene, instants, trace};
+use super::{FramedScene, LoadCases, Measure, OutputErrors, Scene, Trace, instants, trace, trace_at};
+use crate::dynamics::Terms;
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{InertiaShares, relative_norm};
 use flexbody_linalg::context::Context;
-use flexbody_model::{GeometricStiffness, LoadKind, RigidAcceleration};
+use flexbody_model::{GeometricStiffness, LoadKind, RigidAcceleration, UnitLoad};
 
 /// Number of instants at which the stiffness is evaluated exactly. Beyond it the bound over the directions counts; a
 /// larger value costs an eigenvalue problem of the modes for each.
@@ -21,6 +23,27 @@ pub struct FrameMotion {
     pub body: FlexBody,
     /// Acceleration minus gravity, angular acceleration and spin at the output times, along the axes of that frame.
     pub motion: Vec<RigidAcceleration>,
+    /// Run of the load case; `None` for a motion of the frame that no scene states.
+    pub run: Option<CaseRun>,
+}
+
+/// Body, load case and motion of [`FrameMotion`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct CaseRun {
+    body: FlexBody,
+    scene: Scene,
+    trace: Trace,
+}
+
+/// Property of a body that another program may leave out.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Omission {
+    /// Damping of the modes.
+    Damping,
+    /// Geometric stiffness for these loads.
+    GeometricStiffness(Vec<UnitLoad>),
+    /// Change of the inertia with the deformation: W1, W2 and W3.
+    DeformedInertia,
 }
 
 impl FrameMotion {
@@ -37,7 +60,16 @@ impl FrameMotion {
             RigidAcceleration::new(linear, now.omega_rate, &now.omega)
         });
         let motion = motion.collect();
-        Ok(Self { scene: scene.name.clone(), body: framed.body.into_owned(), motion })
+        let run = Some(CaseRun { body: body.clone(), scene: scene.clone(), trace });
+        Ok(Self { scene: scene.name.clone(), body: framed.body.into_owned(), motion, run })
+    }
+
+    /// Returns the largest errors of the motion of the body without a property. `None` if no scene states the motion.
+    /// Infinite if the motion without it cannot be computed.
+    pub fn change_without(&self, omission: &Omission) -> Option<OutputErrors> {
+        let run = self.run.as_ref()?;
+        let unknown = OutputErrors::all(Some(f64::INFINITY));
+        Some(run.change_without(omission).unwrap_or(unknown))
     }
 
     /// Computes the motion in each load case.
@@ -74,6 +106,32 @@ impl FrameMotion {
             largest = largest.max(relative_norm(stiffness_of(stiffness, motion).as_ref(), own.as_ref())?);
         }
         Some(largest)
+    }
+}
+
+impl CaseRun {
+    fn change_without(&self, omission: &Omission) -> Result<OutputErrors> {
+        let mut scene = self.scene.clone();
+        scene.run.scheme = self.trace.scheme;
+        let mut parts = self.body.clone().into_parts();
+        match omission {
+            Omission::Damping => {
+                parts.modes.damping_ratio.fill(0.0);
+                parts.modes.modal_damping = None;
+            }
+            Omission::GeometricStiffness(loads) => {
+                parts.geometric_stiffness.retain(|one| !loads.contains(&one.load));
+                parts.rotated_stiffness.retain(|one| !loads.contains(&one.load));
+            }
+            Omission::DeformedInertia => {
+                let geometric_stiffness = scene.run.terms.geometric_stiffness;
+                scene.run.terms = Terms { geometric_stiffness, ..Terms::NONE };
+            }
+        }
+        let without = trace_at(&FlexBody::new(parts)?, &scene, &self.trace.time, &Context::QUIET)?;
+        let framed = FramedScene::new(&self.body, &self.scene)?;
+        let all: Vec<usize> = (0..framed.body.n_modes()).collect();
+        Ok(Measure::new(&framed.body, &framed.scene, &self.trace).of_subset(&without, &all).largest())
     }
 }
 

@@ -8,7 +8,7 @@ use super::{Axes, Carried, History, Load, Point, Range, Scene, VectorHistory};
 use crate::dynamics::{Orientation, RotationVector};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_body::flex_body::{Carrier, FlexBody, LoadKind};
+use flexbody_body::flex_body::{Carrier, FlexBody};
 use nalgebra::{Matrix3, Vector3};
 use std::borrow::Cow;
 
@@ -52,9 +52,10 @@ impl<'a> FramedScene<'a> {
                 let carried_body = body.carried(&carrier)?;
                 let mut found = Vec::from_iter(carried_body.unresolved(&carrier, body));
                 found.extend(body.softened(&carrier));
-                if body.has_geometric_stiffness() && !carried_body.has_geometric_stiffness() {
+                let is_stiff = |body: &FlexBody| !body.geometric_stiffness().is_empty();
+                if is_stiff(body) && !is_stiff(&carried_body) {
                     let message = format!(
-                        "the geometric stiffness of the body is not used while {carrier} carries it, because {carrier} moves in the modes of the body"
+                        "the geometric stiffness of the body is not used while {carrier} carries it: {carrier} moves in the modes of the body, and the file does not have the geometric stiffness of that motion"
                     );
                     found.push(Diagnostic::new(Code::CarriedGeometricStiffness, message));
                 }
@@ -68,7 +69,6 @@ impl<'a> FramedScene<'a> {
         let mut resolved = resolved(scene, &body.frame().axes, &framed_body.frame().origin);
         found.extend(idle(&framed_body, &resolved));
         found.extend(released_preloads(body, scene));
-        found.extend(unused_stiffness(body, scene));
         let preloads = body.named_loads().iter().filter(|load| load.preload);
         let acting = preloads.map(|load| Load::named(&load.name, History::Constant(1.0)));
         resolved.loads.extend(acting);
@@ -100,20 +100,6 @@ fn released_preloads(body: &FlexBody, scene: &Scene) -> Option<Diagnostic> {
         );
         Diagnostic::new(Code::PreloadReleased, message)
     })
-}
-
-/// Returns a warning if a named load of the scene has geometric stiffness.
-fn unused_stiffness(body: &FlexBody, scene: &Scene) -> Option<Diagnostic> {
-    let has_stiffness = |name: &str| {
-        let of = |kind: &LoadKind| matches!(kind, LoadKind::Named(load) if load == name);
-        body.geometric_stiffness().iter().any(|one| of(&one.load.kind))
-    };
-    let point = scene.loads.iter().map(|load| &load.at).find(|point| match point {
-        Point::NamedLoad(name) => has_stiffness(name),
-        _ => false,
-    })?;
-    let message = format!("{point} acts without its geometric stiffness");
-    Some(Diagnostic::new(Code::NamedStiffnessUnused, message))
 }
 
 /// Returns an error for initial values of modes by number if the body is simulated in mean axes, where it

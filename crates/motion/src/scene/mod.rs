@@ -37,7 +37,7 @@ pub use errors::{
 };
 pub use extremes::{Drift, Extremes, Peak};
 pub use flexbody_model::StressPoint;
-pub use frame_motion::FrameMotion;
+pub use frame_motion::{CaseRun, FrameMotion, Omission};
 pub use framed_scene::FramedScene;
 pub use history::{Axes, History, VectorHistory};
 pub use instants::{Instant, highest_excited_rate, instants, unsettled_rate};

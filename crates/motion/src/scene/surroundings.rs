@@ -81,7 +81,7 @@ pub fn body_point(body: &FlexBody, terms: Terms, place: &Point) -> std::result::
         }
         Point::NamedLoad(name) => {
             let load = body.named_loads().iter().find(|load| load.name == *name);
-            load.map(BodyPoint::named_load).ok_or_else(|| {
+            load.map(|load| BodyPoint::named_load(body, load, terms)).ok_or_else(|| {
                 let all: Vec<&str> = body.named_loads().iter().map(|load| load.name.as_str()).collect();
                 let known = if all.is_empty() { "it has none".to_owned() } else { all.join(", ") };
                 format!("the body has no named load `{name}`: {known}")

@@ -526,6 +526,11 @@ const NEVER_COMPARED: &[Entries] = &[
     },
     Entries { name: "surface", paths: "/mesh", has: |body| body.mesh().is_some() },
     Entries {
+        name: "geometric stiffness of rotations, which `flexbody check --against` holds to the model",
+        paths: "/rotated_stiffness",
+        has: |body| !body.parts().rotated_stiffness.is_empty(),
+    },
+    Entries {
         name: "matrices in interface coordinates, which `flexbody check` holds to the modes",
         paths: "/interface_coordinates",
         has: |body| body.coordinates().is_some(),

@@ -6,7 +6,7 @@ use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     FixedInterface, FlexBody, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
     LoadColumns, LoadKind, LumpedBody, MassStructure, NamedLoad, Parts, Quantity, Recovery, RecoveryRow,
-    ReferenceConditions, Storage, SurfaceMesh, TermDecision, TermGroup, UnitLoad,
+    ReferenceConditions, RotatedStiffness, Storage, SurfaceMesh, TermDecision, TermGroup, UnitLoad,
 };
 use flexbody_body::invariants::{BodyFrame, DIGITS, Frame, GeneralTerms, InertiaStiffness};
 use flexbody_file::contents;
@@ -57,6 +57,12 @@ fn complete() -> FlexBody {
         load(LoadKind::Force("left".to_owned()), 1),
         load(LoadKind::Named("preload".to_owned()), 0),
     ];
+    let rotated = |own: &GeometricStiffness<_>| RotatedStiffness {
+        load: own.load.clone(),
+        modes: Mat::from_fn(nf, 3, number),
+        rotation: symmetric(3),
+    };
+    parts.rotated_stiffness = parts.geometric_stiffness.iter().map(rotated).collect();
     let interface = |name: &str, nodes: [usize; 4], x: f64| Interface {
         name: name.to_owned(),
         nodes: nodes.to_vec(),
@@ -341,7 +347,10 @@ fn interfaces_that_differ_are_named() {
 fn damping_and_stiffness_of_loads_that_differ_are_named() {
     let (rows, text) = differing(|p| p.modes.modal_damping = None);
     assert_eq!(rows, ["damping"], "{text}");
-    let (rows, text) = differing(|p| drop(p.geometric_stiffness.remove(2)));
+    let (rows, text) = differing(|p| {
+        p.rotated_stiffness.clear();
+        p.geometric_stiffness.remove(2);
+    });
     assert_eq!(rows, ["geometric stiffness"], "{text}");
     assert!(text.contains("geometric stiffness for force y at `left`: none in the second body"), "{text}");
     let (rows, text) = differing(|p| p.inertia_stiffness = None);
@@ -358,6 +367,7 @@ fn what_a_file_of_another_program_has_none_of_is_listed() {
     parts.recoveries.clear();
     parts.conditions = ReferenceConditions::Unstated;
     parts.geometric_stiffness.clear();
+    parts.rotated_stiffness.clear();
     parts.inertia_stiffness = None;
     (parts.modes.modal_damping, parts.modes.rotation, parts.modes.internal) = (None, None, None);
     parts.modes.damping_ratio.fill(0.0);

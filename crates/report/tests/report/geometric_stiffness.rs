@@ -451,7 +451,16 @@ fn file_reports_and_recomputation_hold_what_was_given() {
     assert_eq!(tampered(&|p| p.modes.modal_damping = None), damping);
     let geometric = ["geometric_stiffness_recomputed"];
     assert_eq!(tampered(&|p| p.geometric_stiffness[1].matrix[(0, 3)] *= 1.0 + 1e-6), geometric);
-    assert_eq!(tampered(&|p| p.geometric_stiffness.truncate(5)), geometric);
+    let fewer = |p: &mut flexbody_body::flex_body::Parts| {
+        p.geometric_stiffness.truncate(5);
+        p.rotated_stiffness.truncate(5);
+    };
+    assert_eq!(tampered(&fewer), geometric);
+    assert_eq!(
+        tampered(&|p| p.rotated_stiffness[1].modes[(2, 1)] += 1e-5 * p.rotated_stiffness[1].modes.norm_max()),
+        geometric
+    );
+    assert_eq!(tampered(&|p| p.rotated_stiffness.clear()), Vec::<&str>::new());
     let none = RawModel { geometric_stiffness: Vec::new(), damping: None, ..raw };
     let none = FeModel::from_raw(none).expect("sound").model;
     let both = ["damping_recomputed", "geometric_stiffness_recomputed"];
@@ -598,6 +607,7 @@ fn files_without_the_group_are_older_and_those_that_break_it_are_refused() {
     // Digests exist since format 1.4.
     let older = changed(&|file| {
         file.unlink("geometric_stiffness").expect("removed");
+        file.unlink("rotated_stiffness").expect("removed");
         ["digests", "sha256"].iter().for_each(|name| file.delete_attr(name).expect("removed"));
         file.attr("format_minor").expect("a version").write_scalar(&1i64).expect("written");
     })

@@ -125,8 +125,8 @@ impl<'m> NodalReference<'m> {
     /// FB801 for geometric stiffness; FB212 for points that the model does not have; FB604 for too much work.
     pub fn refuse(model: &FeModel, body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<()> {
         let is_stiffened = match &scene.carried {
-            Some(carried) => body.carried(&carried.carrier())?.has_geometric_stiffness(),
-            None => body.has_geometric_stiffness(),
+            Some(carried) => !body.carried(&carried.carrier())?.geometric_stiffness().is_empty(),
+            None => !body.geometric_stiffness().is_empty(),
         };
         if is_stiffened && scene.run.terms.geometric_stiffness {
             let what = "the model has geometric stiffness, which the equations of all nodes do not support";

@@ -18,7 +18,7 @@ use flexbody_model::{
 };
 use flexbody_motion::scene::{
     Axes, FramedScene, History, Load, Point, RecoveryLimit, RecoveryTolerance, Scene, Scheme, Trace,
-    VectorHistory, simulate, trace, trace_at,
+    VectorHistory, instants, simulate, trace, trace_at,
 };
 use flexbody_study::response::{Band, Direction, Place, ResponseRequest};
 use flexbody_study::selection::select;
@@ -412,25 +412,44 @@ fn loads_that_do_not_fit_are_refused() {
     }
     let twice = refused(vec![named("a", some.clone(), false), named("a", some, false)]);
     assert!(twice.has(Code::ManifestSyntax), "{twice}");
-    // Geometric stiffness of a preload would act always, which no mode of the body shows; that of another load is reported.
-    let stiff = |preload: bool| {
-        let load = UnitLoad { kind: LoadKind::Named("bolts".to_owned()), component: 0 };
-        // A string between two nodes.
-        let string = |k: u32| [(k, k, 1e-3), (k + 3, k + 3, 1e-3), (k, k + 3, -1e-3), (k + 3, k, -1e-3)];
-        let entries: Vec<_> = (0..3).flat_map(string).collect();
-        let matrix = CscMatrix::from_triplets(rows, rows, &entries);
-        let matrix = RawMatrix { matrix, ..raw.stiffness.clone() };
-        RawModel {
-            named_loads: vec![named("bolts", pairs(&raw, 1e-3), preload)],
-            geometric_stiffness: vec![GeometricStiffness { load, matrix }],
-            ..raw.clone()
-        }
-    };
-    let error = FeModel::from_raw(stiff(true)).expect_err("refused");
+    // Geometric stiffness of a preload would act always, which no mode of the body shows.
+    let error = FeModel::from_raw(with_string(&raw, 1e-3, true)).expect_err("refused");
     assert!(error.has(Code::NamedLoadMisfit), "{error}");
-    let few = body(&stiff(false), 4, BodyFrame::Com);
-    let mut scene = nothing_happens("pressed", 0.1, 1e-6);
-    scene.loads = vec![Load::named("bolts", History::Constant(1.0))];
-    let (_, found) = simulate(&few, &scene, &Context::QUIET).expect("a run");
-    assert!(found.iter().any(|one| one.code() == Code::NamedStiffnessUnused), "{found:?}");
+}
+
+/// Returns the model with the load `bolts`, and the geometric stiffness `size` of a string between two nodes for it.
+fn with_string(raw: &RawModel, size: f64, preload: bool) -> RawModel {
+    let rows = 3 * raw.nodes.len();
+    let load = UnitLoad { kind: LoadKind::Named("bolts".to_owned()), component: 0 };
+    let string = |k: u32| [(k, k, size), (k + 3, k + 3, size), (k, k + 3, -size), (k + 3, k, -size)];
+    let triplets: Vec<_> = (0..3).flat_map(string).collect();
+    let matrix = CscMatrix::from_triplets(rows, rows, &triplets);
+    let matrix = RawMatrix { matrix, ..raw.stiffness.clone() };
+    RawModel {
+        named_loads: vec![named("bolts", pairs(raw, 1e-4), preload)],
+        geometric_stiffness: vec![GeometricStiffness { load, matrix }],
+        ..raw.clone()
+    }
+}
+
+/// In the static equilibrium under the amplitude a, (K_ff + a K_geo) q = a Psi'f.
+#[test]
+fn a_named_load_acts_with_its_geometric_stiffness() {
+    let few = body(&with_string(&skewed_beam(4.0, 3), 2.0, false), 12, BodyFrame::Com);
+    let mut scene = nothing_happens("pressed", 20.0, 1e-11);
+    let amplitude = 0.4;
+    scene.initial.settled = true;
+    scene.loads = vec![Load::named("bolts", History::Constant(amplitude))];
+    let framed = FramedScene::new(&few, &scene).expect("a scene");
+    let q = &instants(&framed.body, &framed.scene, &[0.0]).expect("a start")[0].q;
+    let (load, stress) = (&framed.body.named_loads()[0], &framed.body.geometric_stiffness()[0].matrix);
+    let elastic = framed.body.invariants().modal_stiffness();
+    let (mut left, mut bent) = (0.0f64, 0.0f64);
+    for i in 0..q.len() {
+        let force = |matrix: &Mat<f64>| (0..q.len()).map(|j| matrix[(i, j)] * q[j]).sum::<f64>();
+        left = left.max((force(elastic) + amplitude * (force(stress) - load.modal[i])).abs());
+        bent = bent.max((amplitude * force(stress)).abs());
+    }
+    let size = amplitude * largest(&load.modal);
+    assert!(left < 1e-6 * size && bent > 0.01 * size, "{left:e} {bent:e} {size:e}");
 }

@@ -472,7 +472,7 @@ fn long_work_is_refused_with_what_it_takes() {
 }
 
 #[test]
-fn geometric_stiffness_is_refused_unless_the_body_is_carried() {
+fn geometric_stiffness_is_refused_where_it_acts() {
     let model = model_of(raw_fixture("turbine_blade"));
     let body = body_of(&model, 4);
     let mut scene = Size::new(&body).scene(Scheme::Adaptive { tolerance: 1e-9 });
@@ -482,6 +482,13 @@ fn geometric_stiffness_is_refused_unless_the_body_is_carried() {
     assert_eq!(found.code(), Code::Usage);
     assert!(found.message().contains("geometric stiffness"), "{}", found.message());
     scene.carried = Some(Carried { by: Point::Interface("root".to_owned()), spin: None, translation: None });
+    assert!(NodalReference::refuse(&model, &body, &scene, &Context::QUIET).is_err());
+    // A file of an earlier version, or a scene, may leave it out.
+    let mut parts = body.clone().into_parts();
+    parts.rotated_stiffness.clear();
+    let older = FlexBody::new(parts).expect("a body");
+    assert!(NodalReference::refuse(&model, &older, &scene, &Context::QUIET).is_ok());
+    scene.run.terms.geometric_stiffness = false;
     assert!(NodalReference::refuse(&model, &body, &scene, &Context::QUIET).is_ok());
 }
 

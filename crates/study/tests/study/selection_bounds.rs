@@ -53,7 +53,7 @@ impl<'t> Tested<'t> {
             }
             Point::NamedLoad(name) => {
                 let load = body.named_loads().iter().find(|load| load.name == *name);
-                BodyPoint::named_load(load.expect("one of the body"))
+                BodyPoint::named_load(body, load.expect("one of the body"), scene.run.terms)
             }
         };
         let loads: Vec<BodyPoint> = scene.loads.iter().map(|load| point(&load.at)).collect();
