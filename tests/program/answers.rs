@@ -42,10 +42,12 @@ fn answers_in_all_formats_give_the_same_stresses() {
     for name in ["answers.csv", "raw.vtu", "base64.vtu", "answers.e"] {
         assert_eq!(read(name), expected, "{name}");
     }
-    // Text has fewer digits.
-    let text = read("text.vtu");
-    let apart = (&text.modes - &expected.modes).norm_max() / expected.modes.norm_max();
-    assert!(text.rows == expected.rows && apart < 1e-8, "{apart:e}");
+    // Text has fewer digits: nine, and the seven of a punch file.
+    for (name, limit) in [("text.vtu", 1e-8), ("corners.pch", 1e-6), ("volume.pch", 1e-6)] {
+        let text = read(name);
+        let apart = (&text.modes - &expected.modes).norm_max() / expected.modes.norm_max();
+        assert!(text.rows == expected.rows && apart < limit, "{name}: {apart:e}");
+    }
 }
 
 #[test]
@@ -58,7 +60,9 @@ fn answers_of_other_files_are_refused_by_name() {
     put("numbers.vtu", text.replace("\"node\"", "\"id\"").as_bytes());
     put("none.vtu", text.replace("\"displacement ", "\"u ").replace("\"stress ", "\"s ").as_bytes());
     put("classic.e", b"CDF\x01 and more");
-    for name in ["raw.vtu", "base64.vtu", "answers.e"] {
+    let punched = fs::read_to_string(place.join("corners.pch")).expect("a punch file");
+    put("shells.pch", punched.replace("39   (CTETRA)", "33   (CQUAD4)").as_bytes());
+    for name in ["raw.vtu", "base64.vtu", "answers.e", "corners.pch", "volume.pch"] {
         let whole = fs::read(place.join(name)).expect("a file");
         put(&format!("cut_{name}"), &whole[..whole.len() / 2]);
     }
@@ -70,6 +74,9 @@ fn answers_of_other_files_are_refused_by_name() {
         ("cut_raw.vtu", "FB327", ""),
         ("cut_base64.vtu", "FB327", ""),
         ("cut_answers.e", "FB", ""),
+        ("cut_corners.pch", "FB327", ""),
+        ("cut_volume.pch", "FB327", ""),
+        ("shells.pch", "FB327", "stresses of CQUAD4 elements"),
     ] {
         let said = converted(folder.path(), &folder.path().join(name)).expect_err(name);
         assert!(said.contains(code) && said.contains(part), "{name}: {said}");

@@ -149,6 +149,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB448", "crates/input/src/fe_results/tests.rs"),
     ("FB449", "crates/body/tests/body/answered_shapes.rs"),
     ("FB451", "tests/program/motion/stiffening.rs"),
+    ("FB453", "crates/input/src/fe_results/tests/punch.rs"),
     ("FB501", "crates/body/tests/body/single_precision.rs"),
     ("FB505", "crates/body/tests/body/single_precision.rs"),
     ("FB506", "tests/program/cluster.rs"),

@@ -2,12 +2,15 @@
 //! Each format has one file and is recognised by its content.
 
 mod any_program;
+mod averaged;
 mod dat;
 mod frd;
 mod mesh_files;
+mod punch;
 #[cfg(test)]
 mod tests;
 
+use self::averaged::Averaged;
 use super::hdf5::{Hdf5, has_nodal_variables};
 use super::node_files;
 use super::reader::{HEAD, Reader};
@@ -80,13 +83,13 @@ pub(super) fn read_answers(
             Diagnostic::new(Code::RecoveryShapes, message).in_file(file.path()).with_help(help),
         ]);
     }
-    let averaged = averaged_warning(&values, files.answers);
+    let averaged = values.averaged.diagnostics(files.answers);
     let labels = labels(&values.places, units);
     let energies = energies.map(|(energies, _)| energies);
     let ShapeArchive { dofs, displacements, digits } = shapes;
     let (answers, answer_digits) = (values.stresses(), values.digits);
     let shapes = AnsweredShapes { dofs, displacements, digits, answers, answer_digits, energies };
-    Ok((RecoveryOperator::Shapes { shapes, labels }, averaged.into_iter().collect()))
+    Ok((RecoveryOperator::Shapes { shapes, labels }, averaged))
 }
 
 /// Stresses at integration points and displacements of nodes, as CalculiX prints them for all steps of a deck.
@@ -145,6 +148,9 @@ fn read_values(file: &InputFile) -> Found<StepValues> {
     if dat::recognises(&head) {
         return dat::read(file);
     }
+    if punch::recognises(&head) {
+        return punch::read(file);
+    }
     if node_files::is_vtk_xml(&head) {
         return mesh_files::read_vtu(file);
     }
@@ -190,23 +196,6 @@ fn refuse_other_displacements(
         }
     }
     Ok(())
-}
-
-/// Returns a warning about nodes whose elements have several materials.
-fn averaged_warning(values: &StepValues, file: &InputFile) -> Option<Diagnostic> {
-    let mut nodes = values.averaged.clone();
-    if nodes.is_empty() {
-        return None;
-    }
-    nodes.sort_unstable();
-    let named: Vec<String> = nodes.iter().take(5).map(i64::to_string).collect();
-    let more = if nodes.len() > named.len() { ", ..." } else { "" };
-    let message = format!(
-        "stresses of {} nodes are means over elements of several materials: node {}{more}",
-        nodes.len(),
-        named.join(", ")
-    );
-    Some(Diagnostic::new(Code::RecoveryAveraged, message).in_file(file.path()))
 }
 
 /// Returns six labels for each place.
@@ -265,8 +254,8 @@ struct StepValues {
     energies: Vec<f64>,
     /// Significant decimal digits of stresses and displacements.
     digits: u8,
-    /// Nodes whose stresses are means over several materials.
-    averaged: Vec<i64>,
+    /// Means among the stresses.
+    averaged: Averaged,
 }
 
 /// Values of one step.

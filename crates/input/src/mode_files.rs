@@ -52,6 +52,11 @@ pub(super) fn read_modes(file: &InputFile, role: &str) -> Option<Found<RawModes>
     Some((format.read)(file).and_then(modes))
 }
 
+/// Returns true when a file begins like a punch file of Nastran with results.
+pub(super) fn is_punch(head: &[u8]) -> bool {
+    punch::recognises(head)
+}
+
 /// Returns FB128 at a line.
 fn syntax(file: &InputFile, line: usize, message: impl Into<String>) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::ModeFileSyntax, message).in_file(file.path()).at_line(line)]

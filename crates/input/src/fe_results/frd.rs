@@ -71,7 +71,7 @@ pub(super) fn read(file: &InputFile) -> Found<StepValues> {
         Place::Node(node) => (materials.get(node) == Some(&Material::Several)).then_some(*node),
         Place::Point { .. } => None,
     };
-    values.averaged = values.places.iter().filter_map(is_mixed).collect();
+    values.averaged.over_materials = values.places.iter().filter_map(is_mixed).collect();
     Ok(values)
 }
 

@@ -1,5 +1,7 @@
 //! Results in every format, written by the tests.
 
+mod punch;
+
 use super::{AnswerFiles, Found, read_answers};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -264,12 +266,14 @@ fn every_format_gives_the_same_stresses() {
     place.put("points.dat", dat(3, true).as_bytes());
     place.put("ask.dat", dat(3, false).as_bytes());
     place.put("table.csv", csv(3).as_bytes());
-    let files: [(&str, Option<&str>, u8, f64); 5] = [
+    place.put("volume.pch", punch::of_volume(3, &WATCHED).as_bytes());
+    let files: [(&str, Option<&str>, u8, f64); 6] = [
         ("text.frd", None, 6, 1e-5),
         ("single.frd", None, 7, 1e-6),
         ("double.frd", Some("ask.dat"), 15, 1e-15),
         ("points.dat", None, 7, 1e-6),
         ("table.csv", None, 6, 1e-6),
+        ("volume.pch", None, 7, 1e-6),
     ];
     for (name, energies, digits, limit) in files {
         let (operator, warnings) = place.read(name, energies).expect(name);

@@ -9,9 +9,17 @@ use flexbody_model::DofLabel;
 /// Returns true when a file begins like a punch file with results.
 pub(super) fn recognises(head: &[u8]) -> bool {
     let first = head.trim_ascii_start();
-    [&b"$TITLE"[..], b"$SUBTITLE", b"$LABEL", b"$EIGENVECTOR", b"$DISPLACEMENTS", b"$SUBCASE"]
-        .iter()
-        .any(|word| first.starts_with(word))
+    const HEADS: [&[u8]; 8] = [
+        b"$TITLE",
+        b"$SUBTITLE",
+        b"$LABEL",
+        b"$EIGENVECTOR",
+        b"$DISPLACEMENTS",
+        b"$SUBCASE",
+        b"$ELEMENT STRESSES",
+        b"$GRID POINT STRESSES",
+    ];
+    HEADS.iter().any(|word| first.starts_with(word))
 }
 
 /// Number of digits of a value and of an eigenvalue, as in 1.234567E-02.
