@@ -39,11 +39,12 @@ fn answers_in_all_formats_give_the_same_stresses() {
         |name: &str| converted(folder.path(), &at(name)).unwrap_or_else(|said| panic!("{name}: {said}"));
     let expected = read("answers.h5");
     assert!(expected.modes.norm_max() > 1e3 && expected.rows.len() == 24);
-    for name in ["answers.csv", "raw.vtu", "base64.vtu", "answers.e"] {
+    for name in ["answers.csv", "raw.vtu", "base64.vtu", "answers.e", "binary.vtk", "answers.pvd"] {
         assert_eq!(read(name), expected, "{name}");
     }
     // Text has fewer digits: nine, and the seven of a punch file.
-    for (name, limit) in [("text.vtu", 1e-8), ("corners.pch", 1e-6), ("volume.pch", 1e-6)] {
+    for (name, limit) in [("text.vtu", 1e-8), ("text.vtk", 1e-8), ("corners.pch", 1e-6), ("volume.pch", 1e-6)]
+    {
         let text = read(name);
         let apart = (&text.modes - &expected.modes).norm_max() / expected.modes.norm_max();
         assert!(text.rows == expected.rows && apart < limit, "{name}: {apart:e}");
@@ -62,7 +63,8 @@ fn answers_of_other_files_are_refused_by_name() {
     put("classic.e", b"CDF\x01 and more");
     let punched = fs::read_to_string(place.join("corners.pch")).expect("a punch file");
     put("shells.pch", punched.replace("39   (CTETRA)", "33   (CQUAD4)").as_bytes());
-    for name in ["raw.vtu", "base64.vtu", "answers.e", "corners.pch", "volume.pch"] {
+    for name in ["raw.vtu", "base64.vtu", "answers.e", "corners.pch", "volume.pch", "text.vtk", "binary.vtk"]
+    {
         let whole = fs::read(place.join(name)).expect("a file");
         put(&format!("cut_{name}"), &whole[..whole.len() / 2]);
     }
@@ -74,6 +76,8 @@ fn answers_of_other_files_are_refused_by_name() {
         ("cut_raw.vtu", "FB327", ""),
         ("cut_base64.vtu", "FB327", ""),
         ("cut_answers.e", "FB", ""),
+        ("cut_text.vtk", "FB327", ""),
+        ("cut_binary.vtk", "FB327", "file ends before"),
         ("cut_corners.pch", "FB327", ""),
         ("cut_volume.pch", "FB327", ""),
         ("shells.pch", "FB327", "stresses of CQUAD4 elements"),
@@ -81,4 +85,47 @@ fn answers_of_other_files_are_refused_by_name() {
         let said = converted(folder.path(), &folder.path().join(name)).expect_err(name);
         assert!(said.contains(code) && said.contains(part), "{name}: {said}");
     }
+}
+
+#[test]
+fn collections_are_refused_where_a_step_is_not_a_mesh_with_answers() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = fixtures().join("small/answers");
+    let list = fs::read_to_string(place.join("answers.pvd")).expect("a collection");
+    for step in 1..10 {
+        let name = format!("step{step}.vtu");
+        fs::copy(place.join(&name), folder.path().join(&name)).expect("copied");
+    }
+    fs::copy(place.join("raw.vtu"), folder.path().join("raw.vtu")).expect("copied");
+    let listed = |name: &str, text: String| {
+        fs::write(folder.path().join(name), text).expect("written");
+        converted(folder.path(), &folder.path().join(name))
+    };
+    listed("whole.pvd", list.clone()).unwrap_or_else(|said| panic!("{said}"));
+    for (name, text, code, part) in [
+        ("other.txt", list.clone(), "FB327", "its own name does not end with .pvd"),
+        ("missing.pvd", list.replace("step4.vtu", "gone.vtu"), "FB101", "gone.vtu"),
+        (
+            "arrays.pvd",
+            list.replace("step4.vtu", "raw.vtu"),
+            "FB327",
+            "no array at the points is `displacement`",
+        ),
+        ("itself.pvd", list.replace("step4.vtu", "itself.pvd"), "FB327", "`Collection`"),
+        ("twice.pvd", list.replace("\"3.5\"", "\"4.5\""), "FB327", "time 4.5 has several files"),
+        ("time.pvd", list.replace("\"3.5\"", "\"later\""), "FB327", "no time or no file"),
+        ("order.pvd", list.replace("\"3.5\"", "\"10\""), "FB326", "displacements of step 4 differ"),
+        ("fewer.pvd", list.replace("<DataSet timestep=\"3.5\"", "<Other"), "FB326", "8 steps"),
+        ("cut.pvd", list[..list.len() / 2].to_owned(), "FB327", ""),
+    ] {
+        let said = listed(name, text).expect_err(name);
+        assert!(said.contains(code) && said.contains(part), "{name}: {said}");
+    }
+    // The meshes of a collection are inputs, although no argument names them.
+    fs::write(folder.path().join("whole.pvd"), list).expect("written");
+    let manifest = fs::read_to_string(folder.path().join("model.toml")).expect("a manifest");
+    fs::write(folder.path().join("model.toml"), manifest.replace("cut.pvd", "whole.pvd")).expect("written");
+    let run = flexbody(folder.path(), &["convert", "model.toml", "--modes", "3", "-o", "step3.vtu"]);
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(said.contains("step3.vtu is an input or another output of this run"), "{said}");
 }

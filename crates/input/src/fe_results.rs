@@ -12,7 +12,6 @@ mod tests;
 
 use self::averaged::Averaged;
 use super::hdf5::{Hdf5, has_nodal_variables};
-use super::node_files;
 use super::reader::{HEAD, Reader};
 use crate::npy::{self, Blocks};
 use crate::scipy_npz::{Archive, ScipyNpz};
@@ -23,7 +22,7 @@ use flexbody_base::text::InputFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_model::{AnsweredShapes, DofLabel, Quantity, RecoveryOperator, RecoveryRow, ShapeSteps};
 use std::collections::{HashMap, HashSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
@@ -42,6 +41,13 @@ pub(super) struct AnswerFiles<'a> {
     pub displacements: &'a InputFile,
     /// Printed results with the strain energy of every step.
     pub energies: Option<&'a InputFile>,
+    /// Files that the answers or the displacements list (.pvd).
+    pub listed: Vec<&'a InputFile>,
+}
+
+/// Returns the files that results list: those of a collection of VTK (.pvd).
+pub(super) fn files_listed_by(results: &Path) -> Vec<PathBuf> {
+    mesh_files::files_of(results)
 }
 
 /// Returns the recovery of the answers of an FE program: six stresses for each node or integration point, with
@@ -54,11 +60,14 @@ pub(super) fn read_answers(
     files: &AnswerFiles<'_>,
     units: &UnitSystem,
 ) -> Found<(RecoveryOperator, Vec<Diagnostic>)> {
-    let values = read_values(files.answers)?;
+    let values = read_values(files.answers, &files.listed)?;
     let is_archive = ShapeArchive::recognises(files.displacements);
     let shapes = match is_archive {
         true => ShapeArchive::read(files.displacements)?,
-        false => ShapeArchive::of_results(&read_values(files.displacements)?, files.displacements)?,
+        false => {
+            let moved = read_values(files.displacements, &files.listed)?;
+            ShapeArchive::of_results(&moved, files.displacements)?
+        }
     };
     let count = shapes.count();
     if values.steps() != count {
@@ -127,8 +136,8 @@ pub fn read_point_stresses(path: &Path) -> Result<PointStresses, Error> {
     Ok(PointStresses { points, stresses, nodes: moved, displacements, digits })
 }
 
-/// Reads results in any of the formats.
-fn read_values(file: &InputFile) -> Found<StepValues> {
+/// Reads results in any of the formats; `listed` are the files of collections.
+fn read_values(file: &InputFile, listed: &[&InputFile]) -> Found<StepValues> {
     let head = file.first_bytes(HEAD);
     if Hdf5.recognises(&head) {
         return match has_nodal_variables(file) {
@@ -151,8 +160,8 @@ fn read_values(file: &InputFile) -> Found<StepValues> {
     if punch::recognises(&head) {
         return punch::read(file);
     }
-    if node_files::is_vtk_xml(&head) {
-        return mesh_files::read_vtu(file);
+    if mesh_files::is_vtk(&head) {
+        return mesh_files::read_vtk(file, listed);
     }
     any_program::read_table(file)
 }

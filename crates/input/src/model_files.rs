@@ -134,6 +134,8 @@ pub enum OperatorSource {
         displacements: PathBuf,
         /// Printed results with the strain energies of the shapes.
         energies: Option<PathBuf>,
+        /// Files that the answers or the displacements list (.pvd).
+        listed: Vec<PathBuf>,
     },
     /// Section forces of the nodes on one side of a cut.
     Cut {
@@ -210,8 +212,9 @@ impl RecoverySource {
                 let offset = offset.as_ref().map(|offset| offset.path.as_path());
                 [operator.path.as_path(), rows.as_path()].into_iter().chain(offset).collect()
             }
-            OperatorSource::Shapes { answers, displacements, energies } => {
-                [answers.as_path(), displacements].into_iter().chain(energies.as_deref()).collect()
+            OperatorSource::Shapes { answers, displacements, energies, listed } => {
+                let named = [answers.as_path(), displacements].into_iter().chain(energies.as_deref());
+                named.chain(listed.iter().map(PathBuf::as_path)).collect()
             }
             OperatorSource::Cut { nodes: InterfaceNodes::File(path), .. } => vec![path],
             OperatorSource::Cut { .. } => Vec::new(),

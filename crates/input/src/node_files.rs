@@ -7,7 +7,8 @@ mod gmsh;
 mod vtk_legacy;
 mod vtk_xml;
 
-pub(super) use vtk_xml::{PointArray, point_arrays};
+pub(super) use vtk_legacy::point_arrays as legacy_point_arrays;
+pub(super) use vtk_xml::{CollectionMember, PointArray, PointData, collection, point_arrays};
 
 use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};
@@ -130,6 +131,11 @@ pub(super) struct NodeFile {
 /// Returns true when a file begins like VTK in XML.
 pub(super) fn is_vtk_xml(head: &[u8]) -> bool {
     vtk_xml::recognises(&String::from_utf8_lossy(head))
+}
+
+/// Returns true when a file begins like VTK in its legacy form.
+pub(super) fn is_vtk_legacy(head: &[u8]) -> bool {
+    vtk_legacy::recognises(&String::from_utf8_lossy(head))
 }
 
 #[cfg(test)]

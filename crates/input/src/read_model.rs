@@ -481,11 +481,12 @@ impl<'m> NodeLookup<'m> {
                 let operator = RecoveryOperator::Rows { transposed, labels, offset: offset.transpose()? };
                 Ok((ModelRecovery { name, operator, path: operator_path }, Vec::new()))
             }
-            OperatorSource::Shapes { answers, displacements, energies } => {
+            OperatorSource::Shapes { answers, displacements, energies, listed } => {
                 let answer_files = AnswerFiles {
                     answers: opened.unread(answers)?,
                     displacements: opened.unread(displacements)?,
                     energies: energies.as_ref().map(|path| opened.unread(path)).transpose()?,
+                    listed: listed.iter().map(|path| opened.unread(path)).collect::<Found<_>>()?,
                 };
                 let (operator, found) = read_answers(&answer_files, &files.units)?;
                 Ok((ModelRecovery { name, operator, path: answers.clone() }, found))

@@ -1,26 +1,55 @@
-//! Results in files of meshes: VTK in XML (.vtu), with the arrays `displacement N` and `stress N` of each step at the
-//! points, and Exodus in netCDF-4, with variables of the nodes at every time.
+//! Results in files of meshes: VTK in XML (.vtu) and in the legacy form (.vtk), with the arrays `displacement N` and
+//! `stress N` of each step at the points, collections of such files (.pvd), and Exodus in netCDF-4, with variables of the
+//! nodes at every time.
 
 use super::{Found, Place, Step, StepValues, unreadable};
 use crate::hdf5::{NodalVariables, read_nodal_variables};
-use crate::node_files::{PointArray, point_arrays};
+use crate::node_files::{
+    self, CollectionMember, PointArray, PointData, collection, legacy_point_arrays, point_arrays,
+};
+use crate::reader::HEAD;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::text::InputFile;
+use std::path::{Path, PathBuf};
 
 /// Places of the stresses xx, yy, zz, xy, yz, xz in a tensor of nine numbers, row by row.
 const IN_TENSOR: [usize; 6] = [0, 4, 8, 1, 5, 2];
 
-/// Reads the arrays `displacement N` (3 numbers) and `stress N` (6 numbers xx, yy, zz, xy, yz, xz, or 9) of the steps 1,
-/// 2, .... Points without stresses have NaN. The array of global ids, or `node`, numbers the points.
+/// Returns true if a file begins like VTK, in XML or in the legacy form.
+pub(super) fn is_vtk(head: &[u8]) -> bool {
+    node_files::is_vtk_xml(head) || node_files::is_vtk_legacy(head)
+}
+
+/// Returns the paths of the files of a collection (.pvd); none if the file is no collection or cannot be read.
+pub(super) fn files_of(path: &Path) -> Vec<PathBuf> {
+    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("pvd")) {
+        return Vec::new();
+    }
+    let members = InputFile::open(path).ok().and_then(|file| collection(file.bytes()).ok()).flatten();
+    members.unwrap_or_default().iter().map(|member| beside(path, member)).collect()
+}
+
+fn beside(collection: &Path, member: &CollectionMember) -> PathBuf {
+    collection.parent().unwrap_or(Path::new("")).join(&member.file)
+}
+
+/// Reads meshes of VTK: a file with the arrays `displacement N` (3 numbers) and `stress N` (6 numbers xx, yy, zz, xy,
+/// yz, xz, or 9) of the steps 1, 2, ..., or a collection of files with `displacement` and `stress`, one for each step.
+/// Points without stresses have NaN. The array of global ids, or `node`, numbers the points.
+///
+/// * `members`: files of the collections, opened.
 ///
 /// # Errors
 /// FB327 for another mesh, for a step without one of the two arrays, and for points without numbers.
-pub(super) fn read_vtu(file: &InputFile) -> Found<StepValues> {
-    let (ids, arrays) = point_arrays(file.bytes()).map_err(|message| unreadable(file, message))?;
-    let Some(ids) = ids else {
-        let message = "no array `node` of whole numbers numbers the points";
-        return Err(unreadable(file, message));
+pub(super) fn read_vtk(file: &InputFile, members: &[&InputFile]) -> Found<StepValues> {
+    let listed = match node_files::is_vtk_xml(&file.first_bytes(HEAD)) {
+        true => collection(file.bytes()).map_err(|message| unreadable(file, message))?,
+        false => None,
     };
+    if let Some(listed) = listed {
+        return read_collection(file, &listed, members);
+    }
+    let (ids, arrays) = point_data(file)?;
     let of_step = |what: &str, step: usize| arrays.iter().find(|array| step_of(array, what) == Some(step));
     let (mut steps, mut digits) = (Vec::new(), 15);
     for number in 1.. {
@@ -30,23 +59,71 @@ pub(super) fn read_vtu(file: &InputFile) -> Found<StepValues> {
             (None, _) => return Err(unreadable(file, format!("array `displacement {number}` is missing"))),
             (_, None) => return Err(unreadable(file, format!("array `stress {number}` is missing"))),
         };
-        let places: &[usize] = match (moved.components, stressed.components) {
-            (3, 6) => &[0, 1, 2, 3, 4, 5],
-            (3, 9) => &IN_TENSOR,
-            (displacements, stresses) => {
-                let message = format!(
-                    "arrays of step {number} have {displacements} and {stresses} numbers for each point, expected 3 displacements and 6 or 9 stresses"
-                );
-                return Err(unreadable(file, message));
-            }
-        };
         digits = digits.min(moved.digits).min(stressed.digits);
-        let displacement = |at: usize, k: usize| moved.values[3 * at + k];
-        let stress = |at: usize, k: usize| stressed.values[stressed.components * at + places[k]];
-        steps.push(step(&ids, displacement, stress));
+        let step = step_of_arrays(&ids, moved, stressed);
+        steps.push(step.map_err(|message| unreadable(file, format!("arrays of step {number} {message}")))?);
     }
     refuse_unfinished(file, &arrays, steps.len())?;
     StepValues::of(steps, digits, file)?.with_stresses(file)
+}
+
+/// Reads the files of a collection, one for each step, in the order of their times.
+fn read_collection(
+    file: &InputFile,
+    listed: &[CollectionMember],
+    members: &[&InputFile],
+) -> Found<StepValues> {
+    let (mut steps, mut digits) = (Vec::new(), 15);
+    for member in listed {
+        let path = beside(file.path(), member);
+        let Some(own) = members.iter().find(|own| own.path() == path) else {
+            let message =
+                format!("the collection lists {} and its own name does not end with .pvd", member.file);
+            return Err(unreadable(file, message));
+        };
+        own.load().map_err(|diagnostic| vec![diagnostic])?;
+        let (ids, arrays) = point_data(own)?;
+        let named = |what: &str| {
+            let found = arrays.iter().find(|array| array.name.eq_ignore_ascii_case(what));
+            found.ok_or_else(|| unreadable(own, format!("no array at the points is `{what}`")))
+        };
+        let (moved, stressed) = (named("displacement")?, named("stress")?);
+        digits = digits.min(moved.digits).min(stressed.digits);
+        let step = step_of_arrays(&ids, moved, stressed);
+        steps.push(step.map_err(|message| unreadable(own, format!("arrays {message}")))?);
+    }
+    StepValues::of(steps, digits, file)?.with_stresses(file)
+}
+
+/// Returns the numbers of the points of a mesh and the arrays at them.
+fn point_data(file: &InputFile) -> Found<(Vec<i64>, Vec<PointArray>)> {
+    let PointData { ids, arrays } = if node_files::is_vtk_legacy(&file.first_bytes(HEAD)) {
+        legacy_point_arrays(file.bytes()).map_err(|(line, message)| {
+            unreadable(file, message).into_iter().map(|found| found.at_line(line)).collect::<Vec<_>>()
+        })?
+    } else {
+        point_arrays(file.bytes()).map_err(|message| unreadable(file, message))?
+    };
+    match ids {
+        Some(ids) => Ok((ids, arrays)),
+        None => Err(unreadable(file, "no array `node` of whole numbers numbers the points")),
+    }
+}
+
+/// Returns the values of a step; the error is a clause about its arrays.
+fn step_of_arrays(ids: &[i64], moved: &PointArray, stressed: &PointArray) -> Result<Step, String> {
+    let places: &[usize] = match (moved.components, stressed.components) {
+        (3, 6) => &[0, 1, 2, 3, 4, 5],
+        (3, 9) => &IN_TENSOR,
+        (displacements, stresses) => {
+            return Err(format!(
+                "have {displacements} and {stresses} numbers for each point, expected 3 displacements and 6 or 9 stresses"
+            ));
+        }
+    };
+    let displacement = |at: usize, k: usize| moved.values[3 * at + k];
+    let stress = |at: usize, k: usize| stressed.values[stressed.components * at + places[k]];
+    Ok(step(ids, displacement, stress))
 }
 
 /// Returns the number of the step whose values of this kind the array has: `stress 2` or `Stress_2` are those of step 2.

@@ -236,8 +236,8 @@ impl Place {
         let open = |name: &str| InputFile::open_unread(self.0.path().join(Path::new(name))).expect("a file");
         let (answers, displacements) = (open(answers), open("ask.npz"));
         let energies = energies.map(open);
-        let files =
-            AnswerFiles { answers: &answers, displacements: &displacements, energies: energies.as_ref() };
+        let (energies, listed) = (energies.as_ref(), Vec::new());
+        let files = AnswerFiles { answers: &answers, displacements: &displacements, energies, listed };
         read_answers(&files, &UnitSystem::parse("mm", "t", "s").expect("units"))
     }
 

@@ -1,6 +1,7 @@
 //! The tables `[[recovery]]`.
 
 use super::{ManifestWalk, MatrixLocation, TomlTable};
+use crate::fe_results::files_listed_by;
 use crate::model_files::{InterfaceNodes, OperatorSource, RecoverySource};
 use flexbody_base::diagnostic::Code;
 use std::collections::HashSet;
@@ -93,7 +94,11 @@ impl ManifestWalk<'_, '_> {
             let printed = Some(answers.with_extension("dat"));
             let has_tables = |path: &PathBuf| path.metadata().is_ok_and(|file| file.len() > 0);
             let energies = printed.filter(|path| is_frd && has_tables(path));
-            OperatorSource::Shapes { answers, displacements, energies }
+            let mut listed = files_listed_by(&answers);
+            if displacements != answers {
+                listed.extend(files_listed_by(&displacements));
+            }
+            OperatorSource::Shapes { answers, displacements, energies, listed }
         } else {
             let nodes = match key {
                 "cut" => InterfaceNodes::File(folder.join(self.string(table, key)?)),

@@ -1,5 +1,9 @@
-//! Meshes of VTK in its legacy form (.vtk, text and binary): the points.
+//! Meshes of VTK in its legacy form (.vtk, text and binary): the points, and in `arrays` the values at them.
 //! <https://docs.vtk.org/en/latest/vtk_file_formats/vtk_legacy_file_format.html>
+
+mod arrays;
+
+pub(crate) use arrays::point_arrays;
 
 use super::{Found, NodeFile, syntax};
 use flexbody_base::memory::left;

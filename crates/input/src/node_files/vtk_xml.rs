@@ -45,15 +45,23 @@ pub(crate) struct PointArray {
     pub digits: u8,
 }
 
+/// Values at the points of a mesh.
+pub(crate) struct PointData {
+    /// Numbers of the points, if the file has any.
+    pub ids: Option<Vec<i64>>,
+    /// Arrays of real numbers.
+    pub arrays: Vec<PointArray>,
+}
+
 /// Significant decimal digits that an array in text is assumed to have.
-const DIGITS_OF_TEXT: u8 = 6;
+pub(super) const DIGITS_OF_TEXT: u8 = 6;
 
 /// Returns the numbers of the points (the global ids, or the array `node`; `None` without either) and the arrays of real
 /// numbers at the points of a mesh.
 ///
 /// # Errors
 /// A description of the problem.
-pub(crate) fn point_arrays(bytes: &[u8]) -> Unpacked<(Option<Vec<i64>>, Vec<PointArray>)> {
+pub(crate) fn point_arrays(bytes: &[u8]) -> Unpacked<PointData> {
     let mesh = Mesh::of(elements(bytes, "AppendedData")?)?;
     let named_node = || mesh.lists().find_map(|array| array.attribute("Name").filter(|name| *name == "node"));
     let ids = mesh.global_ids().or_else(named_node).map(|name| mesh.numbered_by(name)).transpose()?;
@@ -75,7 +83,53 @@ pub(crate) fn point_arrays(bytes: &[u8]) -> Unpacked<(Option<Vec<i64>>, Vec<Poin
         };
         arrays.push(PointArray { name, components: components as usize, values, digits });
     }
-    Ok((ids, arrays))
+    Ok(PointData { ids, arrays })
+}
+
+/// File of a collection.
+pub(crate) struct CollectionMember {
+    /// Instant at which its values hold.
+    pub time: f64,
+    /// Path relative to the folder of the collection.
+    pub file: String,
+}
+
+/// Returns the files of a collection (.pvd) by ascending time; `None` for a file that is no collection.
+///
+/// # Errors
+/// A description of the problem.
+pub(crate) fn collection(bytes: &[u8]) -> Unpacked<Option<Vec<CollectionMember>>> {
+    let elements = elements(bytes, "AppendedData")?;
+    if elements.first().and_then(|head| head.attribute("type")) != Some("Collection") {
+        return Ok(None);
+    }
+    let mut members = Vec::new();
+    for element in elements.iter().filter(|element| element.name == "DataSet") {
+        let time = element.attribute("timestep").and_then(|time| number(time.trim().as_bytes()));
+        let time = time.filter(|time| time.is_finite());
+        let file = element.attribute("file").filter(|file| !file.is_empty());
+        let (Some(time), Some(file)) = (time, file) else {
+            return Err(format!("data set {} has no time or no file", members.len() + 1));
+        };
+        members.push(CollectionMember { time, file: file.to_owned() });
+    }
+    members.sort_by(|one, other| one.time.total_cmp(&other.time));
+    match members.windows(2).find(|pair| pair[0].time == pair[1].time) {
+        Some(pair) => Err(format!("time {} has several files, expected one mesh in one piece", pair[0].time)),
+        None => Ok(Some(members)),
+    }
+}
+
+/// Returns the numbers of points as integers.
+///
+/// # Errors
+/// A description of the problem.
+pub(super) fn exact_ids(name: &str, ids: &[f64]) -> Unpacked<Vec<i64>> {
+    // Larger numbers are not exact in f64.
+    match ids.iter().find(|id| id.abs() > 9e15) {
+        Some(id) => Err(format!("array `{name}` numbers a point {id}")),
+        None => Ok(ids.iter().map(|id| *id as i64).collect()),
+    }
 }
 
 fn is_list_of_whole_numbers(array: &Element<'_>) -> bool {
@@ -145,12 +199,7 @@ impl<'a> Mesh<'a> {
         let array = self.lists().find(|array| array.attribute("Name") == Some(name));
         let array =
             array.ok_or_else(|| format!("the global ids `{name}` are not a list of whole numbers"))?;
-        let ids = self.list(array)?;
-        // Larger numbers are not exact in f64.
-        match ids.iter().find(|id| id.abs() > 9e15) {
-            Some(id) => Err(format!("array `{name}` numbers a point {id}")),
-            None => Ok(ids.iter().map(|id| *id as i64).collect()),
-        }
+        exact_ids(name, &self.list(array)?)
     }
 
     /// Returns the sets: lists of zeros and ones, which mark their points.
