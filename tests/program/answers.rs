@@ -39,7 +39,10 @@ fn answers_in_all_formats_give_the_same_stresses() {
         |name: &str| converted(folder.path(), &at(name)).unwrap_or_else(|said| panic!("{name}: {said}"));
     let expected = read("answers.h5");
     assert!(expected.modes.norm_max() > 1e3 && expected.rows.len() == 24);
-    for name in ["answers.csv", "raw.vtu", "base64.vtu", "answers.e", "binary.vtk", "answers.pvd"] {
+    for name in ["answers.csv", "raw.vtu", "base64.vtu", "answers.e", "binary.vtk", "answers.pvd"]
+        .into_iter()
+        .chain(["classic.e", "offset64.e", "data64.e"])
+    {
         assert_eq!(read(name), expected, "{name}");
     }
     // Text has fewer digits: nine, and the seven of a punch file.
@@ -60,11 +63,23 @@ fn answers_of_other_files_are_refused_by_name() {
     put("gap.vtu", text.replace("\"stress 2\"", "\"other\"").as_bytes());
     put("numbers.vtu", text.replace("\"node\"", "\"id\"").as_bytes());
     put("none.vtu", text.replace("\"displacement ", "\"u ").replace("\"stress ", "\"s ").as_bytes());
-    put("classic.e", b"CDF\x01 and more");
+    put("other.e", b"CDF\x01 and more");
+    let classic = fs::read(place.join("classic.e")).expect("Exodus");
+    let at = classic.windows(6).position(|bytes| bytes == b"disp_y").expect("a name");
+    put("names.e", &[&classic[..at], b"part_y", &classic[at + 6..]].concat());
     let punched = fs::read_to_string(place.join("corners.pch")).expect("a punch file");
     put("shells.pch", punched.replace("39   (CTETRA)", "33   (CQUAD4)").as_bytes());
-    for name in ["raw.vtu", "base64.vtu", "answers.e", "corners.pch", "volume.pch", "text.vtk", "binary.vtk"]
-    {
+    for name in [
+        "raw.vtu",
+        "base64.vtu",
+        "answers.e",
+        "classic.e",
+        "data64.e",
+        "corners.pch",
+        "volume.pch",
+        "text.vtk",
+        "binary.vtk",
+    ] {
         let whole = fs::read(place.join(name)).expect("a file");
         put(&format!("cut_{name}"), &whole[..whole.len() / 2]);
     }
@@ -72,7 +87,10 @@ fn answers_of_other_files_are_refused_by_name() {
         ("gap.vtu", "FB327", "array `stress 2` is missing"),
         ("numbers.vtu", "FB327", "no array `node`"),
         ("none.vtu", "FB327", "no arrays `displacement 1` and `stress 1`"),
-        ("classic.e", "FB327", "netCDF in its classic form"),
+        ("other.e", "FB327", "the header"),
+        ("names.e", "FB327", "no variable of the nodes is `disp_y`"),
+        ("cut_classic.e", "FB327", "the file ends before the values of"),
+        ("cut_data64.e", "FB327", "the file ends before the values of"),
         ("cut_raw.vtu", "FB327", ""),
         ("cut_base64.vtu", "FB327", ""),
         ("cut_answers.e", "FB", ""),

@@ -11,7 +11,9 @@ mod punch;
 mod tests;
 
 use self::averaged::Averaged;
-use super::hdf5::{Hdf5, has_nodal_variables};
+use super::classic_netcdf::is_classic;
+use super::exodus::has_nodal_variables;
+use super::hdf5::Hdf5;
 use super::reader::{HEAD, Reader};
 use crate::npy::{self, Blocks};
 use crate::scipy_npz::{Archive, ScipyNpz};
@@ -145,10 +147,8 @@ fn read_values(file: &InputFile, listed: &[&InputFile]) -> Found<StepValues> {
             false => any_program::read_hdf5(file),
         };
     }
-    if head.starts_with(b"CDF") {
-        let message = "file is netCDF in its classic form, which is not read";
-        let found = Diagnostic::new(Code::FeResultsSyntax, message).in_file(file.path());
-        return Err(vec![found.with_help("write it as netCDF-4: nccopy -k netCDF-4 OLD.e NEW.e")]);
+    if is_classic(&head) {
+        return mesh_files::read_exodus(file);
     }
     file.load().map_err(|diagnostic| vec![diagnostic])?;
     if frd::recognises(&head) {

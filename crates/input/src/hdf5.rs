@@ -17,7 +17,7 @@ use hdf5_metno::{File, Group, LinkType};
 use std::collections::BTreeMap;
 use values::Found;
 
-pub(super) use exodus::{NodalVariables, has_nodal_variables, read_exodus, read_nodal_variables};
+pub(super) use exodus::with_exodus;
 pub(super) use values::read_array;
 
 /// Reader of HDF5 files.

@@ -13,9 +13,11 @@
 mod array;
 mod assemble;
 mod bulk_cards;
+mod classic_netcdf;
 mod coordinates;
 mod digits;
 mod dmig;
+mod exodus;
 mod fe_results;
 #[cfg(feature = "hdf5")]
 mod hdf5;

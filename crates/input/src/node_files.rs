@@ -7,7 +7,7 @@ mod gmsh;
 mod vtk_legacy;
 mod vtk_xml;
 
-pub(super) use vtk_legacy::point_arrays as legacy_point_arrays;
+pub(super) use vtk_legacy::{NumberType, point_arrays as legacy_point_arrays};
 pub(super) use vtk_xml::{CollectionMember, PointArray, PointData, collection, point_arrays};
 
 use super::bulk_cards::is_bulk_data;

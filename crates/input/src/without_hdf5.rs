@@ -1,12 +1,13 @@
 //! HDF5 files in a build without HDF5: recognised, and refused by name.
 
 use super::array::Array;
+use super::exodus::ExodusFile;
 use super::reader::{MatrixSource, Reader};
 use super::recovery_files::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::input_file::{InputFile, is_hdf5};
-use flexbody_model::{Elements, Nodes, RawMatrix};
+use flexbody_model::RawMatrix;
 
 /// Substitute of the HDF5 reader, which refuses every file.
 pub(super) struct Hdf5;
@@ -42,32 +43,11 @@ pub(super) fn read_rectangular(
     Err(vec![left_out()])
 }
 
-/// Node numbers of sets by name.
-type NamedSets = Vec<(String, Vec<i64>)>;
-
 /// Refuses an Exodus file.
-pub(super) fn read_exodus(
+pub(super) fn with_exodus<T>(
     _: &InputFile,
-) -> std::result::Result<(Nodes, NamedSets, Elements), Vec<Diagnostic>> {
-    Err(vec![left_out()])
-}
-
-/// Variables of the nodes of an Exodus file at every time.
-pub(super) struct NodalVariables {
-    pub ids: Vec<i64>,
-    pub names: Vec<String>,
-    pub values: Vec<Vec<f64>>,
-    pub times: usize,
-    pub is_single: bool,
-}
-
-/// Returns false: Exodus files are not told apart.
-pub(super) fn has_nodal_variables(_: &InputFile) -> bool {
-    false
-}
-
-/// Refuses an Exodus file.
-pub(super) fn read_nodal_variables(_: &InputFile) -> std::result::Result<NodalVariables, Vec<Diagnostic>> {
+    _: impl FnOnce(&dyn ExodusFile) -> T,
+) -> std::result::Result<T, Vec<Diagnostic>> {
     Err(vec![left_out()])
 }
 

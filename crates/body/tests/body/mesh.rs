@@ -178,14 +178,16 @@ fn meshes_of_vtk_give_the_surface_of_their_cells() {
     }
 }
 
-/// The tetrahedron of `fixtures/small` in an Exodus file: four faces.
+/// The tetrahedron of `fixtures/small` in Exodus files of HDF5 and of classic netCDF: four faces.
 #[test]
 fn meshes_of_exodus_give_the_surface_of_their_elements() {
-    let raw = read(&fixtures().join("small/meshes/tet4.exo"));
-    let mesh = raw.mesh.as_ref().expect("a surface");
-    assert_closed(mesh);
-    assert_eq!((mesh.triangles().len(), mesh.edges().len()), (4, 6));
-    assert!(volume_and_area(mesh.triangles(), &raw.nodes.positions).0 > 0.0);
+    for name in ["tet4.exo", "tet4_classic.exo"] {
+        let raw = read(&fixtures().join("small/meshes").join(name));
+        let mesh = raw.mesh.as_ref().expect(name);
+        assert_closed(mesh);
+        assert_eq!((mesh.triangles().len(), mesh.edges().len()), (4, 6), "{name}");
+        assert!(volume_and_area(mesh.triangles(), &raw.nodes.positions).0 > 0.0, "{name}");
+    }
 }
 
 /// Second-order tetrahedra with explicit triangles on their faces, which are not drawn twice.

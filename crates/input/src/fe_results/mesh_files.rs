@@ -1,9 +1,9 @@
 //! Results in files of meshes: VTK in XML (.vtu) and in the legacy form (.vtk), with the arrays `displacement N` and
-//! `stress N` of each step at the points, collections of such files (.pvd), and Exodus in netCDF-4, with variables of the
+//! `stress N` of each step at the points, collections of such files (.pvd), and Exodus, with variables of the
 //! nodes at every time.
 
 use super::{Found, Place, Step, StepValues, unreadable};
-use crate::hdf5::{NodalVariables, read_nodal_variables};
+use crate::exodus::{NodalVariables, read_nodal_variables};
 use crate::node_files::{
     self, CollectionMember, PointArray, PointData, collection, legacy_point_arrays, point_arrays,
 };

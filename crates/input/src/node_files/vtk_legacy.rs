@@ -139,7 +139,7 @@ pub(super) type Unpacked<T> = Result<T, String>;
 
 /// Type of the numbers of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum NumberType {
+pub(crate) enum NumberType {
     Signed(usize),
     Unsigned(usize),
     Float,
@@ -165,7 +165,7 @@ impl NumberType {
     }
 
     /// Returns the number of bytes of a number.
-    pub(super) fn bytes(self) -> usize {
+    pub(crate) fn bytes(self) -> usize {
         match self {
             Self::Signed(bytes) | Self::Unsigned(bytes) => bytes,
             Self::Float => 4,
@@ -178,7 +178,7 @@ impl NumberType {
     }
 
     /// Returns the numbers in `bytes`; incomplete bytes at the end are left out.
-    pub(super) fn decode(self, bytes: &[u8], big_endian: bool) -> Vec<f64> {
+    pub(crate) fn decode(self, bytes: &[u8], big_endian: bool) -> Vec<f64> {
         bytes.chunks_exact(self.bytes()).map(|chunk| self.number(digits(chunk, big_endian))).collect()
     }
 

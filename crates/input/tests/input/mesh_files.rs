@@ -62,15 +62,18 @@ fn global_ids_and_marks_are_read() {
     }
 }
 
-/// Exodus meshes written by meshio (one array of coordinates, positions as numbers) and by Exodus itself.
+/// Exodus meshes written by meshio (one array of coordinates, positions as numbers) and as Exodus lays them out, in netCDF-4
+/// and in classic netCDF.
 #[test]
 fn meshes_of_exodus_have_nodes_and_sets() {
     let own = nodes();
-    let raw = tetrahedron(&mesh("tet4_named.exo"), None, &["left", "9"]).expect("readable");
-    let read: Vec<_> = raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied()).collect();
-    assert_eq!(read, own);
-    assert_eq!(raw.interfaces[0].nodes, [10, 30, 40]);
-    assert_eq!(raw.interfaces[1].nodes, [20], "a set without a name is called by its number");
+    for name in ["tet4_named.exo", "tet4_classic.exo"] {
+        let raw = tetrahedron(&mesh(name), None, &["left", "9"]).expect(name);
+        let read: Vec<_> = raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied()).collect();
+        assert_eq!(read, own, "{name}");
+        assert_eq!(raw.interfaces[0].nodes, [10, 30, 40], "{name}");
+        assert_eq!(raw.interfaces[1].nodes, [20], "{name}: a set without a name is called by its number");
+    }
     let raw = tetrahedron(&mesh("tet4.exo"), None, &[]).expect("readable");
     assert_eq!(raw.nodes.ids, [1, 2, 3, 4]);
     assert_eq!(raw.nodes.positions, own.iter().map(|(_, x)| *x).collect::<Vec<_>>());

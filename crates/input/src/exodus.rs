@@ -1,0 +1,264 @@
+//! Meshes and nodal variables of Exodus II, in HDF5 (netCDF-4) and in classic netCDF: `coordx`, `coordy`, `coordz` (or
+//! `coord`), `node_num_map`, `node_ns1`, ... and their names `ns_names`, or numbers `ns_prop1`, `connect1`, ...,
+//! `name_nod_var` with `vals_nod_var1`, ....
+
+use super::classic_netcdf::{ClassicNetcdf, is_classic};
+use super::hdf5;
+use super::mesh::in_order_of_shape;
+use super::reader::HEAD;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::InputFile;
+use flexbody_model::{ElementShape, Elements, Nodes};
+
+type Found<T> = Result<T, Vec<Diagnostic>>;
+
+const HELP: &str =
+    "give an Exodus mesh in netCDF-4 or classic netCDF, or a table with the columns node, x, y, z";
+
+/// Node numbers of sets by name.
+pub(super) type NamedSets = Vec<(String, Vec<i64>)>;
+
+/// Variables of a file, by their names.
+pub(super) trait ExodusFile {
+    /// Returns true if there is a variable of this name.
+    fn has(&self, name: &str) -> bool;
+
+    /// Returns the numbers of a variable with one extent.
+    fn floats(&self, name: &str) -> Found<Vec<f64>>;
+
+    /// Returns the whole numbers of a variable with one extent.
+    fn whole_numbers(&self, name: &str) -> Found<Vec<i64>>;
+
+    /// Returns a variable with two extents.
+    fn table(&self, name: &str) -> Found<NumberTable>;
+
+    /// Returns a list of texts.
+    fn names(&self, name: &str) -> Found<Vec<String>>;
+
+    /// Returns the attribute `elem_type` of a variable; empty without one.
+    fn element_type(&self, name: &str) -> String;
+}
+
+/// Numbers in rows.
+pub(super) struct NumberTable {
+    pub rows: usize,
+    pub columns: usize,
+    /// Values row by row.
+    pub values: Vec<f64>,
+    pub is_single_precision: bool,
+}
+
+/// Variables of the nodes at every time.
+pub(super) struct NodalVariables {
+    pub ids: Vec<i64>,
+    pub names: Vec<String>,
+    /// Values of each variable, time by time.
+    pub values: Vec<Vec<f64>>,
+    pub times: usize,
+    /// True if any variable has single precision.
+    pub is_single: bool,
+}
+
+/// Runs `read` on the file in either form.
+fn with_file<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> Found<T>) -> Found<T> {
+    let found = if is_classic(&file.first_bytes(HEAD)) {
+        file.load().map_err(|diagnostic| vec![diagnostic])?;
+        let opened = ClassicNetcdf::open(file.bytes()).map_err(wrong)?;
+        read(&opened)
+    } else {
+        hdf5::with_exodus(file, read)?
+    };
+    // Errors of datasets are reported as errors of nodes, not of matrices.
+    found.map_err(|found| found.iter().flat_map(|one| wrong(one.message().to_owned())).collect())
+}
+
+/// Reads nodes, node sets and elements. Nodes have the numbers of `node_num_map`, or 1, 2, ... without it.
+///
+/// # Errors
+/// FB101 for a file that cannot be opened, FB115 for a file that is no such mesh.
+pub(super) fn read_mesh(file: &InputFile) -> Found<(Nodes, NamedSets, Elements)> {
+    with_file(file, |opened| {
+        let positions = positions(opened)?;
+        let ids = ids(opened, positions.len())?;
+        if ids.len() != positions.len() {
+            let message = format!("`node_num_map` has {} numbers for {} nodes", ids.len(), positions.len());
+            return Err(wrong(message));
+        }
+        let sets = sets(opened, &ids)?;
+        let elements = elements(opened, &ids)?;
+        Ok((Nodes { ids, positions }, sets, elements))
+    })
+}
+
+/// Returns true if a file is an Exodus file with variables of the nodes.
+pub(super) fn has_nodal_variables(file: &InputFile) -> bool {
+    with_file(file, |opened| Ok(opened.has("name_nod_var"))).unwrap_or(false)
+}
+
+/// Reads the variables of the nodes: `name_nod_var` and `vals_nod_var1`, `vals_nod_var2`, ... (times x nodes).
+///
+/// # Errors
+/// FB101 for a file that cannot be opened, FB115 for variables that do not fit the nodes.
+pub(super) fn read_nodal_variables(file: &InputFile) -> Found<NodalVariables> {
+    with_file(file, |opened| {
+        let ids = ids(opened, positions(opened)?.len())?;
+        let names = opened.names("name_nod_var")?;
+        let (mut values, mut times, mut is_single) = (Vec::new(), None, false);
+        for variable in 1..=names.len() {
+            let name = format!("vals_nod_var{variable}");
+            let table = opened.table(&name)?;
+            let (steps, nodes) = (table.rows, table.columns);
+            if nodes != ids.len() || *times.get_or_insert(steps) != steps {
+                let message = format!("`{name}` has {steps} times of {nodes} nodes");
+                return Err(wrong(format!("{message}, expected {} of {}", times.unwrap_or(0), ids.len())));
+            }
+            is_single |= table.is_single_precision;
+            values.push(table.values);
+        }
+        Ok(NodalVariables { ids, names, values, times: times.unwrap_or(0), is_single })
+    })
+}
+
+fn wrong(message: String) -> Vec<Diagnostic> {
+    vec![Diagnostic::new(Code::NodeFileSyntax, message).with_help(HELP)]
+}
+
+/// Returns the numbers of `count` nodes.
+fn ids(file: &dyn ExodusFile, count: usize) -> Found<Vec<i64>> {
+    match file.has("node_num_map") {
+        true => file.whole_numbers("node_num_map"),
+        false => Ok((1..=count as i64).collect()),
+    }
+}
+
+fn positions(file: &dyn ExodusFile) -> Found<Vec<[f64; 3]>> {
+    let axes: Vec<Vec<f64>> = if file.has("coordx") {
+        let names = ["coordx", "coordy", "coordz"].into_iter().filter(|name| file.has(name));
+        names.map(|name| file.floats(name)).collect::<Found<_>>()?
+    } else if file.has("coord") {
+        let table = file.table("coord")?;
+        table.values.chunks(table.columns.max(1)).map(<[f64]>::to_vec).collect()
+    } else {
+        return Err(wrong("file has neither `coordx` nor `coord`: it is not an Exodus mesh".to_owned()));
+    };
+    let count = axes.first().map_or(0, Vec::len);
+    if axes.len() > 3 || axes.iter().any(|axis| axis.len() != count) {
+        return Err(wrong("the coordinates along the axes differ in number".to_owned()));
+    }
+    let along = |axis: usize, node: usize| axes.get(axis).map_or(0.0, |values| values[node]);
+    Ok((0..count).map(|node| [0, 1, 2].map(|axis| along(axis, node))).collect())
+}
+
+/// Returns the elements of all blocks, which list node positions from 1.
+fn elements(file: &dyn ExodusFile, ids: &[i64]) -> Found<Elements> {
+    let mut elements = Elements::default();
+    for name in (1..).map(|k| format!("connect{k}")).take_while(|name| file.has(name)) {
+        let kind = file.element_type(&name);
+        let table = file.table(&name)?;
+        for places in table.values.chunks(table.columns.max(1)) {
+            let whole = |place: &f64| (place.fract() == 0.0).then_some(*place as i64);
+            let nodes = nodes_at(&name, ids, places.iter().map(whole))?;
+            add_element(&mut elements, &kind, &nodes);
+        }
+    }
+    Ok(elements)
+}
+
+/// Returns the node sets, which list node positions from 1. A set without a name is named by its number.
+fn sets(file: &dyn ExodusFile, ids: &[i64]) -> Found<NamedSets> {
+    let names = if file.has("ns_names") { file.names("ns_names")? } else { Vec::new() };
+    let numbers = if file.has("ns_prop1") { file.whole_numbers("ns_prop1")? } else { Vec::new() };
+    let mut sets = Vec::new();
+    for k in 0.. {
+        let list = format!("node_ns{}", k + 1);
+        if !file.has(&list) {
+            // A set without nodes has no list.
+            if k < names.len().max(numbers.len()) { continue } else { break }
+        }
+        let places = file.whole_numbers(&list)?;
+        let nodes = nodes_at(&list, ids, places.iter().map(|place| Some(*place)))?;
+        let number = numbers.get(k).copied().unwrap_or(k as i64 + 1);
+        let name = names.get(k).filter(|name| !name.is_empty()).cloned();
+        sets.push((name.unwrap_or_else(|| number.to_string()), nodes));
+    }
+    Ok(sets)
+}
+
+/// Returns the numbers of the nodes at `places` (from 1), which a variable lists; `None` is an invalid position.
+fn nodes_at(list: &str, ids: &[i64], places: impl Iterator<Item = Option<i64>>) -> Found<Vec<i64>> {
+    let node = |place: Option<i64>| {
+        let at = usize::try_from(place?.checked_sub(1)?).ok()?;
+        ids.get(at).copied()
+    };
+    let nodes: Option<Vec<i64>> = places.map(node).collect();
+    nodes.ok_or_else(|| wrong(format!("`{list}` names a node that does not exist")))
+}
+
+impl ExodusFile for ClassicNetcdf<'_> {
+    fn has(&self, name: &str) -> bool {
+        self.variable(name).is_some()
+    }
+
+    fn floats(&self, name: &str) -> Found<Vec<f64>> {
+        let variable = self.variable(name).ok_or_else(|| missing(name))?;
+        match variable.shape.len() {
+            1 => self.numbers(variable).map_err(wrong),
+            _ => Err(wrong(format!("`{name}` is not a list of numbers"))),
+        }
+    }
+
+    fn whole_numbers(&self, name: &str) -> Found<Vec<i64>> {
+        let whole = |value: f64| (value.fract() == 0.0 && value.abs() < 9e15).then_some(value as i64);
+        let numbers: Option<Vec<i64>> = self.floats(name)?.into_iter().map(whole).collect();
+        numbers.ok_or_else(|| wrong(format!("`{name}` has a number that is not whole")))
+    }
+
+    fn table(&self, name: &str) -> Found<NumberTable> {
+        let variable = self.variable(name).ok_or_else(|| missing(name))?;
+        let &[rows, columns] = variable.shape.as_slice() else {
+            return Err(wrong(format!("`{name}` is not a table of numbers")));
+        };
+        let values = self.numbers(variable).map_err(wrong)?;
+        Ok(NumberTable { rows, columns, values, is_single_precision: variable.is_single_precision() })
+    }
+
+    fn names(&self, name: &str) -> Found<Vec<String>> {
+        let variable = self.variable(name).ok_or_else(|| missing(name))?;
+        self.lines(variable).map_err(wrong)
+    }
+
+    fn element_type(&self, name: &str) -> String {
+        self.variable(name).map_or(String::new(), |variable| variable.text("elem_type").to_owned())
+    }
+}
+
+fn missing(name: &str) -> Vec<Diagnostic> {
+    wrong(format!("file has no variable `{name}`"))
+}
+
+/// Adds an element of a type with an Exodus name (`HEX8`, `TETRA`, `SHELL4`). Points are not drawn.
+fn add_element(elements: &mut Elements, kind: &str, nodes: &[i64]) {
+    let name = kind.to_ascii_uppercase();
+    let begins = |heads: &[&str]| heads.iter().any(|head| name.starts_with(head));
+    let shape = if begins(&["HEX"]) {
+        ElementShape::Hexahedron
+    } else if begins(&["TET"]) {
+        ElementShape::Tetrahedron
+    } else if begins(&["WEDGE", "PENTA"]) {
+        ElementShape::Wedge
+    } else if begins(&["PYR"]) {
+        ElementShape::Pyramid
+    } else if begins(&["TRI"]) || begins(&["SHELL"]) && [3, 6, 7].contains(&nodes.len()) {
+        ElementShape::Triangle
+    } else if begins(&["QUAD", "SHELL"]) {
+        ElementShape::Quadrilateral
+    } else if begins(&["BAR", "BEAM", "TRUSS", "EDGE"]) {
+        ElementShape::Line
+    } else {
+        if !begins(&["SPHERE", "CIRCLE"]) {
+            elements.leave_out(kind, 1);
+        }
+        return;
+    };
+    elements.add(kind, shape, &in_order_of_shape(shape, nodes));
+}
