@@ -349,6 +349,14 @@ struct ShapeArchive {
 
 const HELP: &str = "keep the archive that flexbody shapes writes beside the results";
 
+/// Returns a diagnostic about an archive of shapes with this help in the place of that about matrices of SciPy.
+fn of_archive(diagnostic: Diagnostic, help: &str) -> Diagnostic {
+    match diagnostic.code() {
+        Code::MemoryShort => diagnostic,
+        _ => diagnostic.with_help(help),
+    }
+}
+
 impl ShapeArchive {
     /// Returns the displacements of results, for shapes that the FE program has chosen itself.
     ///
@@ -379,7 +387,7 @@ impl ShapeArchive {
     /// # Errors
     /// FB326 for a file that is no such archive; FB103, FB301 to FB306 for damaged arrays.
     fn read(file: &InputFile) -> Found<Self> {
-        let about = |diagnostic: Diagnostic| vec![diagnostic.in_file(file.path()).with_help(HELP)];
+        let about = |diagnostic: Diagnostic| vec![of_archive(diagnostic, HELP).in_file(file.path())];
         let foreign = |message: String| about(Diagnostic::new(Code::RecoveryShapes, message));
         file.load().map_err(|diagnostic| vec![diagnostic])?;
         let mut archive = Archive::open(file.bytes()).map_err(about)?;
@@ -437,13 +445,13 @@ impl ShapeArchive {
 /// damaged arrays.
 pub fn read_steps(path: &Path) -> Result<ShapeSteps, Error> {
     let file = InputFile::open(path)?;
-    let about = |diagnostic: Diagnostic| Error::new(vec![diagnostic.in_file(path)]);
-    let foreign = |message: &str| {
-        about(
-            Diagnostic::new(Code::RecoveryShapes, message)
-                .with_help("give the archive (.npz) that flexbody shapes wrote"),
-        )
+    let about = |diagnostic: Diagnostic| {
+        Error::new(vec![
+            of_archive(diagnostic, "give the archive (.npz) that flexbody shapes wrote, or write it again")
+                .in_file(path),
+        ])
     };
+    let foreign = |message: &str| about(Diagnostic::new(Code::RecoveryShapes, message));
     if !ShapeArchive::recognises(&file) {
         return Err(foreign("file is no archive of shapes"));
     }

@@ -2,7 +2,7 @@
 
 mod punch;
 
-use super::{AnswerFiles, Found, read_answers};
+use super::{AnswerFiles, Found, read_answers, read_steps};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
@@ -358,6 +358,27 @@ fn results_of_other_shapes_are_refused() {
     assert_eq!(place.refused("still.dat", None).0, Code::RecoveryShapes);
     place.put("ask.npz", &archive(3)[..400]);
     assert_eq!(place.refused("double.frd", None).0, Code::FileCompressionBroken);
+}
+
+/// Archives are read by the code for matrices of SciPy, whose help is about matrices.
+#[test]
+fn the_help_about_damaged_archives_is_about_shapes() {
+    let place = Place::new(3);
+    place.put("answers.csv", csv(3).as_bytes());
+    let whole = archive(3);
+    for end in [whole.len() - 60, 400, 200] {
+        let path = place.put("ask.npz", &whole[..end]);
+        let channels = read_steps(&path).expect_err("cut off");
+        let answers = place.read("answers.csv", None).expect_err("cut off");
+        for found in channels.diagnostics().iter().chain(&answers) {
+            assert_eq!(found.code(), Code::FileCompressionBroken);
+            assert!(
+                found.help().contains("flexbody shapes") && !found.help().contains("scipy"),
+                "{}",
+                found.help()
+            );
+        }
+    }
 }
 
 #[test]
