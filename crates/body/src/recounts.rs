@@ -29,7 +29,7 @@ fn apart(a: usize, b: usize) -> f64 {
 }
 
 /// Compares the proof with the inertia count and with the eigenvalues below its shift. A body of only the
-/// lowest modes has fewer than were counted.
+/// lowest free modes has fewer than were counted, and its residual vectors may stand for some of the others.
 fn counted_modes(body: &FlexBody) -> Option<IdentityCheck> {
     let certificate = body.certificate();
     let proved = certificate.proved_modes?;
@@ -37,7 +37,13 @@ fn counted_modes(body: &FlexBody) -> Option<IdentityCheck> {
     let below = body.modes().eigenvalue.iter().filter(|lambda| **lambda < certificate.shift).count();
     let pivots =
         certificate.negative_pivots.map_or(f64::INFINITY, |n| apart(n, proved.saturating_add(rigid)));
-    let value = pivots + apart(certificate.rigid_modes, rigid) + apart(below, proved.min(body.n_modes()));
+    let is_free = |from: &&String| *from == "free mode";
+    let free = match body.modes().provenance.iter().filter(is_free).count() {
+        0 => body.n_modes(),
+        count => count,
+    };
+    let counted = below.clamp(proved.min(free), proved);
+    let value = pivots + apart(certificate.rigid_modes, rigid) + apart(below, counted);
     let formula = "negative pivots = rigid + proved modes; modes below sigma are proved";
     Some(IdentityCheck::new("counted_modes", formula, value, 0.0))
 }

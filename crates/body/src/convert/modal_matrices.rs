@@ -3,7 +3,7 @@
 
 use super::body_modes::reduced;
 use crate::basis::{BasisChoice, Loads};
-use crate::flex_body::{FlexBody, Frame, RotatedStiffness, SOFTENING, axis_in_words, split, stiffness_about};
+use crate::flex_body::{FlexBody, Frame, SOFTENING, SplitStiffness, axis_in_words, split, stiffness_about};
 use crate::invariants::Invariants;
 use faer::{Mat, MatRef, Scale};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -144,7 +144,7 @@ pub fn modal_geometric_stiffness(
     vectors: &Mat<f64>,
     frame: &Frame,
     shift: &Vector3<f64>,
-) -> Result<(Vec<GeometricStiffness<Mat<f64>>>, Vec<RotatedStiffness>)> {
+) -> Result<SplitStiffness> {
     let mut out: Vec<GeometricStiffness<Mat<f64>>> = Vec::new();
     if model.geometric_stiffness().is_empty() {
         return Ok((out, Vec::new()));

@@ -12,8 +12,8 @@
 //! interface has the eigenpairs of (K_ff, m_ff), with m_ff of the new modes.
 
 use super::modal_change::{rotations_without, shapes_without, stacked};
-use super::rotated_stiffness::{split, transformed, without_rotation};
-use super::{FlexBody, GeometricStiffness, ReferenceConditions, RotatedStiffness, TermGroups};
+use super::rotated_stiffness::{SplitStiffness, split, transformed, without_rotation};
+use super::{FlexBody, ReferenceConditions, TermGroups};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -127,11 +127,7 @@ impl FlexBody {
     /// rest, with that of the reaction; none if it is not known.
     ///
     /// * `moved`: translation and rotation of the carrier in the modes (6 x nf); `None` if it is at rest.
-    fn carried_stiffness(
-        &self,
-        carrier: &Carrier,
-        moved: Option<&Mat<f64>>,
-    ) -> (Vec<GeometricStiffness<Mat<f64>>>, Vec<RotatedStiffness>) {
+    fn carried_stiffness(&self, carrier: &Carrier, moved: Option<&Mat<f64>>) -> SplitStiffness {
         let identity = || Mat::identity(self.n_modes(), self.n_modes());
         match (self.stiffness_with_rotation(), moved) {
             (Some(all), Some(moved)) => {

@@ -36,7 +36,7 @@ pub use parts::{
 };
 pub use recovery::{LOAD_COMPONENTS, LoadColumns, Recovery, RecoveryState, StaticCoordinates};
 pub use reference_conditions::ReferenceConditions;
-pub use rotated_stiffness::{RotatedStiffness, joined, split};
+pub use rotated_stiffness::{RotatedStiffness, SplitStiffness, joined, split};
 pub use softening::{SOFTENING, axis_in_words};
 pub use storage::Storage;
 pub use terms::{Subset, TermDecision};

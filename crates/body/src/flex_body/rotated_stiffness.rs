@@ -20,10 +20,11 @@ pub struct RotatedStiffness {
     pub rotation: Mat<f64>,
 }
 
-/// Returns the parts of K_geo on modes and rotations ((nf + 3) square): K_geo of the modes, and of the rotations.
-pub fn split(
-    all: Vec<GeometricStiffness<Mat<f64>>>,
-) -> (Vec<GeometricStiffness<Mat<f64>>>, Vec<RotatedStiffness>) {
+/// Geometric stiffness of the modes, and of unit rotations, for the same loads in the same order.
+pub type SplitStiffness = (Vec<GeometricStiffness<Mat<f64>>>, Vec<RotatedStiffness>);
+
+/// Returns the parts of K_geo on modes and rotations ((nf + 3) square).
+pub fn split(all: Vec<GeometricStiffness<Mat<f64>>>) -> SplitStiffness {
     let parts = all.into_iter().map(|GeometricStiffness { load, matrix }| {
         let nf = matrix.nrows() - 3;
         let part = |row: usize, column: usize, rows: usize, columns: usize| {

@@ -4,12 +4,17 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Scale, Side};
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Result;
-use flexbody_body::basis::{Basis, FreeSurface, Loads, ModalBasis, ModeSettings, Task, UserLoads};
+use flexbody_body::basis::{
+    Basis, BasisChoice, FreeSurface, Loads, ModalBasis, ModeSettings, Task, UserLoads,
+};
+use flexbody_body::convert::{ConvertSettings, convert};
+use flexbody_body::verification::accept;
 use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{combine, gram};
 use flexbody_model::{FeModel, NodeSet, RawShapes};
 use oracle::elements::{ElementKind, MassRule, Material};
+use oracle::general::raw_fixture;
 use oracle::mesh::{Assembly, Mesh, grid};
 use oracle::reference::{dense, dense_modes};
 use std::path::PathBuf;
@@ -374,4 +379,24 @@ fn a_frequency_of_a_mode_that_is_kept_is_no_resonance_and_of_another_one_is_told
     assert!(basis.truncation.is_empty(), "of static responses only");
     let error = modes(&model, &lowest(6), at(9)).expect_err("a resonance that no mode has");
     assert!(error.has(Code::FactorizationFailed), "{error}");
+}
+
+/// A wheel has pairs of modes of one frequency. If the number of modes parts a pair, its count proves one mode more than
+/// the body has, and a residual vector stands for the other one.
+#[test]
+fn bodies_that_part_a_pair_of_modes_keep_their_proof() {
+    let model = FeModel::from_raw(raw_fixture("gear_disc")).expect("a sound model").model;
+    let mut parted = 0;
+    for count in 6..=12 {
+        let settings = ConvertSettings {
+            modes: lowest(count),
+            basis: BasisChoice::Free(FreeSurface { residual_vectors: vec![Loads::Interfaces] }),
+            lumped: Vec::new(),
+            ..ConvertSettings::default()
+        };
+        let body = convert(&model, &settings, &Context::QUIET).expect("a body").body;
+        accept(&body).unwrap_or_else(|error| panic!("{count} modes: {error}"));
+        parted += usize::from(body.certificate().proved_modes.is_some_and(|proved| proved > count));
+    }
+    assert!(parted > 0, "a number of modes parts a pair");
 }
