@@ -5,7 +5,7 @@
     cargo build --release --locked
     python3 scripts/pages/make_trade.py
 
-Runs in Exudyn and in a C program are those of scripts/pages/trade_seconds.py; all of it takes some two hours. `--only PART ...` measures some parts again (a scene by
+Runs in Exudyn and in a C program are those of scripts/pages/trade_seconds.py, in MBDyn those of trade_mbdyn.py where it is installed (the variable MBDYN or the PATH); all of it takes some two hours. `--only PART ...` measures some parts again (a scene by
 the name of its file, or guidelines, block, conversions) and keeps the rest of the page, which is written after each part.
 """
 
@@ -28,6 +28,7 @@ import numpy as np  # noqa: E402
 
 from trade_figure import figure  # noqa: E402
 from trade_guidelines import Body, read_scene, study  # noqa: E402
+import trade_mbdyn  # noqa: E402
 from trade_seconds import TURNS, InC, InExudyn, Measure, Task, cheapest  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -74,7 +75,7 @@ programs. Each part names the versions and the processor that it was measured wi
   against the reference is within what the error of the reference leaves of the tolerances; a candidate beyond the tolerances may get a tenth worse. An error in **bold** is the smallest where no number of steps is enough. `flexbody measure` finds the error of a run from its modal coordinates and attitude.
   Times are those of the processor, medians of {turns} runs in turns; those of *simulate* are of one run, by the clock. *simulate*: explicit steps of order 8 with error control, or the method that the scene states. *Exudyn*: generalised alpha, implicit, order 2. *C*: the header of
   `export --to embedded` in a Runge-Kutta program of order 4, explicit: its step is limited by the highest mode of the body, so that a high mode that is not needed costs steps.
-* **Candidates that are run**: those near the tolerances that no other candidate beats in both cost and accuracy, the recommended one and the whole body.
+{mbdyn}* **Candidates that are run**: those near the tolerances that no other candidate beats in both cost and accuracy, the recommended one and the whole body.
 * **Out of sample**: *variations* are motions that the body was not made for; a recommended body holds in them, or the verdict says where it does not.
 * **Percentages** are the largest of the errors of attitude, deflection, stress and reaction over its tolerance; the dashed line of the figures is 100 %.
 * **Whole body**: N free modes with residual vectors and all terms, the body that one would convert without knowing the scene. If its error exceeds the tolerances (**bold**),
@@ -89,6 +90,8 @@ those of `convert --scene --basis scene`, which represent this motion only ([sel
 
 {bases}
 
+"""
+MBDYN = """* **MBDyn** (in the parts {parts}): `export --to mbdyn` in its modal joint with its Runge-Kutta method {method}, implicit, order {order}; the seconds are those of the process, with the writing of its results and without its start-up.
 """
 GUIDE = """## Guidelines I to IV
 
@@ -198,8 +201,14 @@ def usual(told):
     return usual[0]["number"]
 
 
+def programs():
+    """The other programs, by the name of their column, with the class of their runs."""
+    found = {"Exudyn": InExudyn, "C": InC}
+    return {**found, "MBDyn": trade_mbdyn.InMbdyn} if trade_mbdyn.installed() else found
+
+
 class Timed:
-    """A candidate in both programs, each with the fewest steps that the tolerances allow."""
+    """A candidate in the other programs, each with the fewest steps that the tolerances allow."""
 
     def __init__(self, program, folder, row, scene, start, measure, most):
         own = folder / f"{row['number']:03}"
@@ -207,7 +216,7 @@ class Timed:
         path = folder / f"candidate_{row['number']:03}.flex.h5"
         task = Task(path, scene, start)
         self.task, self.programs, self.runs, self.errors, self.meets, self.seconds, self.why = task, {}, {}, {}, {}, {}, {}
-        for name, kind in (("exudyn", InExudyn), ("c", InC)):
+        for name, kind in programs().items():
             try:
                 made = kind(program, task, own)
                 best = cheapest(made, measure, task, row["measured"]["worst"], most, own)
@@ -229,7 +238,7 @@ class Timed:
 
 
 def timed(program, folder, told, scene, model):
-    """The rows that are shown in both programs; seconds are taken in turns."""
+    """The rows that are shown in the other programs; seconds are taken in turns."""
     reference = folder / "candidate_001.flex.h5"
     measure = Measure(program, scene[0], reference, model)
     lacks = told["reference_lacks"]
@@ -252,10 +261,8 @@ def timed(program, folder, told, scene, model):
 
 def measured(told, times):
     """What is shown, as a table."""
-    out = [
-        "| candidate | error of the body | in `simulate` | in Exudyn | in C | file (kB) |",
-        "|---|---|---|---|---|---|",
-    ]
+    heads = ["candidate", "error of the body", "in `simulate`", *(f"in {name}" for name in programs()), "file (kB)"]
+    out = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for row in shown(told):
         own, one = row["measured"], times.get(row["number"])
         name, error, _ = worst_error(row, told["tolerance"])
@@ -276,10 +283,10 @@ def simulated_run(measured):
 
 
 def other_runs(one):
-    """The runs in Exudyn and in C: seconds, error of the same run, number of steps; empty for candidates that were not run."""
+    """The runs in the other programs: seconds, error of the same run, number of steps; empty for candidates that were not run."""
     if one is None:
-        return ["", ""]
-    return [run_in_words(one, name) if name in one.runs else one.why[name] for name in ("exudyn", "c")]
+        return [""] * len(programs())
+    return [run_in_words(one, name) if name in one.runs else one.why[name] for name in programs()]
 
 
 def run_in_words(one, name):
@@ -291,11 +298,11 @@ def run_in_words(one, name):
 def too_long(told, times):
     """A paragraph on the runs in Exudyn for which no number of steps is enough; empty if there is none."""
     one = times[told["recommended"] or usual(told)]
-    if one.meets.get("exudyn", True):
+    if one.meets.get("Exudyn", True):
         return []
     if one.task.is_stiffened:
         return ["Errors in **bold**: no number of steps is enough. The body has geometric stiffness, which Exudyn does not have: the error of its runs does not depend on the step."]
-    steps, periods = one.runs["exudyn"].steps, np.sqrt([one.task.eigenvalue.min(), one.task.eigenvalue.max()]) / (2 * np.pi) * one.task.duration
+    steps, periods = one.runs["Exudyn"].steps, np.sqrt([one.task.eigenvalue.min(), one.task.eigenvalue.max()]) / (2 * np.pi) * one.task.duration
     return [
         f"Errors in **bold**: no number of steps that was tried is enough (in Exudyn up to {InExudyn.most:,}, in C up to {InC.most:,}). The recommended body has {periods[0]:.0f} periods of its lowest and {periods[1]:.0f} of its highest mode in this scene; with {steps:,} steps "
         f"Exudyn takes {steps / periods[1]:.0f} steps per period of the highest one, and the errors of a method of order 2 in phase, and its numerical damping, add up over the periods."
@@ -315,9 +322,9 @@ def drawn(told, times, name):
     points = []
     for row in shown(told):
         one = times.get(row["number"])
-        seconds = one.median("exudyn") if one else None
+        seconds = one.median("Exudyn") if one else None
         if seconds:
-            points.append((seconds, 100 * one.errors["exudyn"], described(row), bool(row["lumped"]), row["number"] == told["recommended"]))
+            points.append((seconds, 100 * one.errors["Exudyn"], described(row), bool(row["lumped"]), row["number"] == told["recommended"]))
     if not points:
         return []
     (ROOT / "docs/images" / f"trade_{name}.svg").write_text(figure(told["scene"], points))
@@ -346,7 +353,7 @@ def summary(told, times):
             return f"no number of steps is enough: {time_in_words(before)} and {time_in_words(after)} ({errors})"
         return f"{time_in_words(before)} to {time_in_words(after)}: **{number(before / after)} times** ({errors})"
 
-    return f"| {told['scene']} | {described(row)} | {own_error(name, error, allowed)} | {beside} | {reference} | {saved('exudyn')} | {saved('c')} |"
+    return f"| {told['scene']} | {described(row)} | {own_error(name, error, allowed)} | {beside} | {reference} | {saved('Exudyn')} | {saved('C')} |"
 
 
 def scene_part(program, name, model, modes):
@@ -523,7 +530,8 @@ def processor():
 def versions(program):
     """The programs and the processor of a measurement."""
     version = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
-    return f"`flexbody {version}`, Exudyn {metadata.version('exudyn')}; {processor()}"
+    others = [f"Exudyn {metadata.version('exudyn')}", *([f"MBDyn {trade_mbdyn.version()}"] if trade_mbdyn.installed() else [])]
+    return f"`flexbody {version}`, {', '.join(others)}; {processor()}"
 
 
 def main():
@@ -576,6 +584,13 @@ def read_page(text):
     return parts
 
 
+def mbdyn_in_words(sections):
+    """A line on the runs in MBDyn, with the titles of the parts that have them; empty if there is none."""
+    titles = [section.splitlines()[0].removeprefix("## ") for section in sections if "| in MBDyn |" in section]
+    kind = trade_mbdyn.InMbdyn
+    return MBDYN.format(parts=", ".join(f"*{title}*" for title in titles), method=kind.method, order=kind.order) if titles else ""
+
+
 def assembled(parts):
     """The page, of the parts that are there."""
     scenes = [name for name, *_ in SCENES if name in parts]
@@ -583,7 +598,7 @@ def assembled(parts):
     top = "\n".join(head + [parts[name][1] for name in scenes])
     head = ["| scene | free modes | and residual vectors | those of the reference that do most | shapes of the motion |", "|---|---|---|---|---|"]
     ways = "\n".join(head + [parts[name][2] for name in scenes])
-    text = HEAD.format(turns=TURNS, table=top, bases=ways)
+    text = HEAD.format(turns=TURNS, table=top, bases=ways, mbdyn=mbdyn_in_words([parts[name][0] for name in scenes]))
     missing = [name for name, *_ in SCENES if name not in parts]
     if missing:
         text += f"Not measured yet in this form: {', '.join(missing)} (`python3 scripts/pages/make_trade.py --only ...`).\n\n"

@@ -502,8 +502,16 @@ class Measure:
         words = [*self.words, body, *self.against, "--history", history]
         done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
         if done.returncode not in (0, 1):
-            raise RuntimeError(done.stderr)
+            raise self.refused(done, history)
         return json.loads(done.stdout)["results"]["worst"]
+
+    @staticmethod
+    def refused(done, history):
+        """The error of `measure`: a `ValueError` if no run of the body can be measured, because scene or body are refused and not the run."""
+        told = json.loads(done.stdout)["diagnostics"] if done.stdout else []
+        message = next((one["message"] for one in told if one["severity"] == "error"), done.stderr)
+        of_run = not told or any(one["file"] == str(history) for one in told)
+        return RuntimeError(message) if of_run else ValueError(f"not measured: {message}")
 
 
 def cheapest(program, measure, task, worst, most, folder):

@@ -10,17 +10,19 @@ the words of flexbody and of MBDyn:
 * led: a blade is brought to speed by a joint, forces at its interfaces, with geometric stiffness;
 * let go: the same blade is let go at speed, with forces and a couple.
 
-The blade has geometric stiffness for spin and acceleration; that for angular acceleration, a force and a moment is made of the same matrices, of a size
-that counts. Two things of second order are in flexbody and not in MBDyn: the reaction of the geometric stiffness on the frame and on the place of an interface
-(theory 7.4, 7.5), and the axes on which a couple does work, which flexbody turns by a finite angle. `couple` and `let go` are therefore also integrated here, by
-equations without these two, with which MBDyn must agree, and with them, with which flexbody must. Where a joint leads the frame, and where forces act alone,
-flexbody and MBDyn solve the same equations.
+The blade has geometric stiffness for spin and acceleration; that for angular acceleration, a force and a moment is made here by element code. Two things of second
+order are in flexbody and not in MBDyn: the reaction of the geometric stiffness on the frame and on the place of an interface (theory 7.4, 7.5), and the axes on which
+a couple does work, which flexbody turns by a finite angle. `couple` and `let go` are therefore also integrated here, by equations without these two, with which MBDyn
+must agree, and with them, with which flexbody must. Where a joint leads the frame, and where forces act alone, flexbody and MBDyn solve the same equations.
 
 Differences are the largest over all recorded instants: of places over the radius of gyration, of direction cosines, of modal amplitudes over the
 largest. With half the step they must fall by the order of the method, until rounding is reached.
 """
 
+import gzip
+import re
 import shutil
+import sys
 from dataclasses import dataclass, field
 
 import h5py
@@ -31,6 +33,9 @@ from scipy.integrate import solve_ivp
 
 import common
 from common import ROOT, Absent, Row, run
+
+sys.path.insert(0, str(ROOT / "scripts/pages"))
+from geometric_elements import Element, Part  # noqa: E402
 
 SOURCE = "sources at www.mbdyn.org, of 2024 or later"
 MODES, INSTANTS = 6, 20
@@ -158,12 +163,31 @@ class Body:
         return found
 
 
+class Blade(Part):
+    """The mesh of the blade, of its deck."""
+
+    def __init__(self, folder):
+        deck = gzip.open(folder / "matrices.inp.gz", "rt").read()
+        words = lambda keyword: re.sub(r",?\s+", ",", re.search(rf"\*{keyword}.*\n((?:[^*].*\n)+)", deck).group(1).strip()).split(",")
+        nodes = np.array(words("NODE"), float).reshape(-1, 4)
+        self.ids, self.points = nodes[:, 0].astype(int), nodes[:, 1:]
+        self.element, self.elements = Element("C3D20"), np.searchsorted(self.ids, np.array(words("ELEMENT"), int).reshape(-1, 21)[:, 1:])
+        self.young, self.poisson = map(float, words("ELASTIC"))
+        self.ends = {name: np.searchsorted(self.ids, np.array(words(f"NSET, NSET={name.upper()}"), int)) for name in ("root", "tip")}
+
+
 def made(folder):
-    """Matrices for the loads of `GEOMETRIC`."""
-    spin, acceleration = (scipy.io.mmread(folder / f"Kg_{name}.mtx.gz").tocsr() for name in ["spin_zz", "acceleration_x"])
-    matrices = {"turn": 2 * spin, "force": 1000 * acceleration + 500 * spin, "moment": 40 * spin - 60 * acceleration}
-    for name, matrix in matrices.items():
-        scipy.io.mmwrite(folder / f"{name}.mtx", matrix, symmetry="general", precision=17)
+    """Matrices for the loads of `GEOMETRIC`, by element code: of the stress that a load causes with what balances it, inertia or the moment at the root that turns the blade."""
+    blade = Blade(folder)
+    k, m = (scipy.io.mmread(folder / f"{name}.mtx.gz").tocsr() for name in "KM")
+    mass = blade.rigid().T @ m @ blade.rigid()
+    rigid = blade.rigid(np.array([mass[5, 1], mass[3, 2], mass[4, 0]]) / mass[0, 0])
+    inertia, root = m @ rigid, blade.at("root")
+    loads = {"turn": (-inertia[:, 5], root), "force": (blade.at("tip")[:, 1], inertia), "moment": (root[:, 3], inertia)}
+    flexibility = np.linalg.pinv(k.toarray(), rcond=1e-11, hermitian=True)
+    for name, (load, balance) in loads.items():
+        balanced = load - balance @ np.linalg.solve(rigid.T @ balance, rigid.T @ load)
+        scipy.io.mmwrite(folder / f"{name}.mtx", blade.stress_stiffness(flexibility @ balanced), symmetry="general", precision=17)
 
 
 def places(fem):
