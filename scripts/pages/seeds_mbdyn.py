@@ -70,7 +70,8 @@ def deck(parts, speed):
     elements += [f"joint: {number}, {joint};" for number, joint in enumerate(joints, 3)]
     end = TURNS * 2 * np.pi / speed
     step = end / STEPS
-    return DECK.format(end=end - step / 2, step=step, coefficient=1e-3 * step, nodes="\n".join(nodes), elements="\n".join(elements))
+    # A hundredth of this coefficient kicks the crank at the start, and the kick grows as the step falls.
+    return DECK.format(end=end - step / 2, step=step, coefficient=0.1 * step, nodes="\n".join(nodes), elements="\n".join(elements))
 
 
 def run(mbdyn, program, bodies, speed, folder):
