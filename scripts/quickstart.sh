@@ -11,6 +11,7 @@ fi
 # shellcheck source=scripts/cmake.sh
 source scripts/cmake.sh
 
+echo "building the program: some ten minutes of the processor the first time"
 cargo build --release --locked --package flexbody
 mkdir -p target/quickstart
 cargo run --release --locked --quiet --package flexbody -- convert fixtures/models/connecting_rod/model.toml \
@@ -19,3 +20,5 @@ cargo run --release --locked --quiet --package flexbody -- convert fixtures/mode
 echo
 echo "flexible body: target/quickstart/connecting_rod.flex.h5"
 echo "report:        target/quickstart/connecting_rod.html"
+echo
+echo 'next: export PATH="$PWD/target/release:$PATH", then docs/start/tour.md'

@@ -325,7 +325,7 @@ pub struct JobArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=3))]
     pub dimension: Option<u8>,
     /// Interface of a model without a manifest: NAME=SET of its node sets, or in place of SET nodes:1/2/3, file:TABLE.csv,
-    /// box:X/Y/Z:X/Y/Z (corners), cylinder:X/Y/Z:X/Y/Z:R (ends of the axis, radius or least/largest),
+    /// box:X/Y/Z:X/Y/Z (corners), cylinder:X/Y/Z:X/Y/Z:R (ends of the axis, largest radius or least/largest),
     /// plane:X/Y/Z:X/Y/Z:WITHIN (point, normal, distance) or nearest:X/Y/Z:COUNT; then a coupling (rigid, averaging,
     /// free) and a reference point in model axes or node:N, each after a comma, as in bore=SET_BORE,rigid,0/0/12.5
     /// (repeatable) [default point: the centre of its faces, of a cylinder a point on its axis]

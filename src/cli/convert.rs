@@ -408,7 +408,9 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
         ConvertArguments { accuracy: Accuracy::Certified, .. } if slepc => {
             "--accuracy certified needs --engine built-in"
         }
-        _ if residual && !searches_free_modes => "residual vectors need --basis free or craig-chang",
+        _ if residual && !searches_free_modes => {
+            "residual vectors need --basis free or craig-chang; craig-bampton has the responses to loads at its interfaces: leave --residual-vectors out"
+        }
         ConvertArguments { split: true, .. } if loads.iter().any(|set| set.file().is_some()) => {
             "--split cannot be used with nodal loads, whose rows belong to all bodies together"
         }

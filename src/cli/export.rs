@@ -56,8 +56,11 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     OutputSlot::commit_all(exported.fill(slot)?)?;
     let written = [vec![(arguments.output.clone(), exported.file.len())], beside].concat();
 
-    let line = |(path, size): &(PathBuf, usize)| {
-        format!("{}, {} bytes: {} for {}\n", path.display(), size, format.name(), format.reader())
+    let line = |(path, size): &(PathBuf, usize)| match path.extension() {
+        Some(extension) if extension == "py" => {
+            format!("{}, {size} bytes: a program, run it with python3\n", path.display())
+        }
+        _ => format!("{}, {size} bytes: {} for {}\n", path.display(), format.name(), format.reader()),
     };
     let file = |(path, size): &(PathBuf, usize)| serde_json::json!({ "path": path.display().to_string(), "bytes": size });
     let files: serde_json::Value = written.iter().map(file).collect();

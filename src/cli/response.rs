@@ -134,7 +134,7 @@ fn refuse_contradictions(arguments: &ResponseArguments, is_model: bool) -> Resul
             "--basis imported works only in convert: convert the model first, then give the body after the model"
         }
         ResponseArguments { basis: Some(BasisKind::CraigBampton), residual_vectors: Some(_), .. } => {
-            "residual vectors need --basis free or craig-chang"
+            "residual vectors need --basis free or craig-chang; craig-bampton has the responses to loads at its interfaces: leave --residual-vectors out"
         }
         _ => return Ok(()),
     };

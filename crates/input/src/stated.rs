@@ -71,7 +71,7 @@ impl InterfaceSource {
 
 impl InterfaceNodes {
     /// Forms of [`InterfaceNodes::parse`] as a hint.
-    pub const FORMS: &str = "name a node set, or write nodes:1/2/3, file:TABLE.csv, box:X/Y/Z:X/Y/Z (corners), cylinder:X/Y/Z:X/Y/Z:R (ends of the axis, radius or least/largest), plane:X/Y/Z:X/Y/Z:WITHIN (point, normal, distance), nearest:X/Y/Z:COUNT";
+    pub const FORMS: &str = "name a node set, or write nodes:1/2/3, file:TABLE.csv, box:X/Y/Z:X/Y/Z (corners), cylinder:X/Y/Z:X/Y/Z:R (ends of the axis, largest radius or least/largest), plane:X/Y/Z:X/Y/Z:WITHIN (point, normal, distance), nearest:X/Y/Z:COUNT";
 
     /// Parses nodes: the name of a set (after `set:` if it begins like another form), `nodes:1/2/3`, `file:TABLE`, or a
     /// region: `box:`, `cylinder:`, `plane:` and `nearest:` with their values after colons, points as `X/Y/Z`.

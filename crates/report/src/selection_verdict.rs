@@ -7,6 +7,9 @@ use flexbody_study::reference::ReferenceError;
 use flexbody_study::selection::{DecisiveError, Selection};
 use serde::Serialize;
 
+/// Ratio of the multiplications below which the saving is stated in percent.
+const NEARLY_AS_MANY: f64 = 1.5;
+
 /// The five lines of the verdict.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct SelectionVerdict {
@@ -111,46 +114,53 @@ fn held_groups(selection: &Selection) -> impl Iterator<Item = TermGroup> {
 }
 
 /// Decision about groups with the same reason.
-struct CommonDecision {
+struct CommonDecision<'a> {
     kept: bool,
     error: Option<DecisiveError>,
+    /// Reason of the decision, for one that no error decided.
+    reason: &'a str,
     groups: Vec<TermGroup>,
 }
 
 /// Returns the reasons of the decisions; groups with the same reason and error share a sentence.
 fn why(selection: &Selection) -> String {
-    let mut decisions: Vec<CommonDecision> = Vec::new();
+    let mut decisions: Vec<CommonDecision<'_>> = Vec::new();
     for (term, error) in selection.terms.iter().zip(&selection.decisive_errors) {
-        match decisions.iter_mut().find(|one| one.kept == term.kept && one.error == *error) {
+        let reason = if error.is_none() { term.reason.as_str() } else { "" };
+        let is_common = |one: &&mut CommonDecision<'_>| {
+            one.kept == term.kept && one.error == *error && one.reason == reason
+        };
+        match decisions.iter_mut().find(is_common) {
             Some(known) => known.groups.push(term.group),
             None => {
                 let groups = vec![term.group];
-                decisions.push(CommonDecision { kept: term.kept, error: *error, groups });
+                decisions.push(CommonDecision { kept: term.kept, error: *error, reason, groups });
             }
         }
     }
     decisions.sort_by_key(|decision| !decision.kept);
     let parts = decisions.iter().map(|decision| {
         let case = decision.error.and_then(|error| error.case);
-        reason(decision.kept, decision.error, &decision.groups) + &in_case(case, selection)
+        reason(decision) + &in_case(case, selection)
     });
     parts.collect::<Vec<_>>().join("; ")
 }
 
-fn reason(kept: bool, decisive_error: Option<DecisiveError>, groups: &[TermGroup]) -> String {
+fn reason(decision: &CommonDecision<'_>) -> String {
+    let CommonDecision { kept, error: decisive_error, reason, groups } = decision;
     let names: Vec<String> =
         groups.iter().map(|group| format!("{} ({})", group.name(), meaning(*group))).collect();
     let names = names.join(" and ");
     let Some(DecisiveError { output, error, tier, .. }) = decisive_error else {
-        return if kept {
-            format!("keep {names}: no bound or run shows that it can be dropped")
+        return if *kept {
+            format!("keep {names}: {reason}")
         } else {
             let are = if groups.len() == 1 { "is" } else { "are" };
             format!("{names} {are} not in the body")
         };
     };
-    let error = error_in_words(output, error, 2);
-    match (kept, tier) {
+    let error = error_in_words(output, *error, 2);
+    match (*kept, tier) {
         (true, 2) => format!("without {names} the error in {output} is {error}"),
         (true, _) => format!("without {names} the error in {output} may reach {error}"),
         (false, 2) => format!("dropping {names} makes an error of {error} in {output}"),
@@ -192,5 +202,11 @@ fn saves(selection: &Selection) -> String {
     if own == all {
         return "nothing: the scene needs the whole body".to_owned();
     }
-    format!("{own} multiplications per evaluation instead of {all}: {} times fewer", significant(ratio, 2))
+    let fewer = match ratio {
+        ratio if ratio < NEARLY_AS_MANY => {
+            format!("{} % fewer", significant(100.0 * (1.0 - ratio.recip()), 2))
+        }
+        ratio => format!("{} times fewer", significant(ratio, 2)),
+    };
+    format!("{own} multiplications per evaluation instead of {all}: {fewer}")
 }

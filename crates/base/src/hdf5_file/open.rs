@@ -40,7 +40,12 @@ pub fn open_unrecorded(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::
     // locks.
     let opened =
         by_utf8_name(path, |path| hdf5::File::with_options().with_fapl(|p| p.file_locking(false)).open(path));
-    let file = opened.map_err(|e| unreadable(foreign, e.to_string()))?;
+    let file = opened.map_err(|e| match e.to_string() {
+        text if text.contains("file signature not found") => {
+            unreadable(foreign, "it is no HDF5 file".to_owned())
+        }
+        text => unreadable(foreign, text),
+    })?;
     // The check of the heaps supports 8-byte sizes only, which all files in use have.
     let sizes = file.create_plist().and_then(|p| p.get_sizes());
     if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (Sizeof::Bytes8, Sizeof::Bytes8)) {

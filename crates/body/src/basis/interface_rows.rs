@@ -227,7 +227,7 @@ pub(super) fn coupled_interfaces(model: &FeModel, what: &str) -> Result<Vec<Coup
     if model.interfaces().is_empty() {
         let message = format!("the model has no interfaces, so there are no {what}");
         return Err(Diagnostic::new(Code::InterfaceNode, message)
-            .with_help("name node sets as [[interface]] in the manifest")
+            .with_help("name node sets as [[interface]] in the manifest, or with --interface NAME=SET,rigid")
             .into());
     }
     Ok(coupled_sets(model, model.interfaces()))

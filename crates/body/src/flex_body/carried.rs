@@ -13,7 +13,7 @@
 
 use super::modal_change::{rotations_without, shapes_without, stacked};
 use super::rotated_stiffness::{SplitStiffness, split, transformed, without_rotation};
-use super::{FlexBody, ReferenceConditions, TermGroups};
+use super::{FlexBody, Interface, ReferenceConditions, TermGroups};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -235,6 +235,20 @@ impl FlexBody {
             || modes.truncation.iter().any(|one| named(&one.load))
                 && modes.truncation.iter().all(|one| !named(&one.load) || one.after < MAX_TRUNCATION)
             || modes.provenance.iter().any(|one| made_for(one))
+            || self.is_whole_craig_bampton(name)
+    }
+
+    /// Returns true for a Craig-Bampton body with all of its modes, whose boundary holds the interface `name`. With the frame
+    /// on an interface it has no interface coordinates that would tell.
+    fn is_whole_craig_bampton(&self, name: &str) -> bool {
+        let settings = &self.source().settings;
+        let at_boundary = |interface: &&Interface| interface.coupling != Some(Coupling::Free);
+        let boundary: Vec<&Interface> = self.interfaces().iter().filter(at_boundary).collect();
+        let rigid = if self.dimension() == 2 { 3 } else { 6 };
+        let whole = settings["modes"]
+            .as_u64()
+            .is_some_and(|fixed| self.n_modes() + rigid >= fixed as usize + rigid * boundary.len());
+        settings["basis"] == "craig-bampton" && whole && boundary.iter().any(|one| one.name == name)
     }
 
     /// Returns eigenvalues and m_ff-orthonormal eigenvectors of (K_ff, m_ff).

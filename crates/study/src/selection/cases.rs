@@ -260,6 +260,8 @@ pub struct VariedSelection {
     pub chosen: Trial,
     /// The model that the scene alone would select; `None` if it is the selected one.
     pub of_scene: Option<Trial>,
+    /// The groups that the scene alone would select, with all modes; `None` unless these groups fail in a variation.
+    pub with_all_modes: Option<Trial>,
     /// Truncation errors of the whole body in the variation; empty if no model is at hand.
     pub reference_errors: Vec<ReferenceError>,
 }
@@ -375,8 +377,9 @@ impl<'v> VariedRuns<'v> {
         self.cases.iter().zip(measures).enumerate().map(trial).collect()
     }
 
-    /// Judges `choice`. Unless the scene limits the cost, modes in the order `ranked` and groups of `held` are added
-    /// until the model is within the tolerances of every variation. Returns the errors in each variation.
+    /// Judges `choice`. Unless the scene limits the cost, modes in the order `ranked` are added until the model is within
+    /// the tolerances of every variation; before, all groups of `held` if those of `choice` are not enough even with all
+    /// modes. Returns the errors in each variation.
     pub(super) fn judge(
         &self,
         choice: &mut Choice,
@@ -393,17 +396,22 @@ impl<'v> VariedRuns<'v> {
         let mut chosen = of_scene.clone();
         let passed = |trials: &[Trial]| trials.iter().all(Trial::passed);
         let mut count = choice.modes.len();
-        while !is_limited && !passed(&chosen) {
-            // All groups with as many modes, then more modes.
-            if choice.groups == held {
-                if count == ranked.len() {
-                    break;
-                }
-                count = ((count as f64 * GROWTH).ceil() as usize).min(ranked.len());
-                choice.keep_most(ranked, count);
-            } else {
+        let mut with_all_modes = None;
+        if !is_limited && !passed(&chosen) && choice.groups != held {
+            // Groups are at fault only if they fail with all modes.
+            let modes = choice.modes.clone();
+            choice.keep_most(ranked, ranked.len());
+            let whole = self.measured(&measures, choice)?;
+            choice.keep(modes);
+            if !passed(&whole) {
                 choice.groups = held;
+                chosen = self.measured(&measures, choice)?;
+                with_all_modes = Some(whole);
             }
+        }
+        while !is_limited && !passed(&chosen) && count < ranked.len() {
+            count = ((count as f64 * GROWTH).ceil() as usize).min(ranked.len());
+            choice.keep_most(ranked, count);
             chosen = self.measured(&measures, choice)?;
         }
         let is_changed = chosen != of_scene;
@@ -413,6 +421,7 @@ impl<'v> VariedRuns<'v> {
             is_stated: cases.states_variations(),
             chosen,
             of_scene: is_changed.then_some(before),
+            with_all_modes: with_all_modes.as_ref().map(|all: &Vec<Trial>| all[at].clone()),
             reference_errors: self.reference_errors[at].to_vec(),
         };
         Ok(chosen.into_iter().zip(of_scene).enumerate().map(row).collect())

@@ -238,7 +238,8 @@ fn needed_by_variations(
     varied: &[VariedSelection],
     cases: &LoadCases,
 ) -> (TermDecision, Option<DecisiveError>) {
-    let without = |one: &VariedSelection| Some((one.name.clone(), one.case.clone(), one.of_scene.clone()?));
+    let without =
+        |one: &VariedSelection| Some((one.name.clone(), one.case.clone(), one.with_all_modes.clone()?));
     let worst = varied.iter().filter_map(without).max_by(|a, b| a.2.worst.total_cmp(&b.2.worst));
     let error = worst.as_ref().and_then(|(_, case, trial)| {
         let at = (0..cases.len()).find(|at| cases.case_name(*at) == case.as_deref());
@@ -248,7 +249,9 @@ fn needed_by_variations(
         Some(DecisiveError { output, error, tolerance, budget: trial.budget, tier: 2, case })
     });
     let reason = match &worst {
-        Some((name, ..)) => format!("variation `{name}`: error of the model that the scene alone needs"),
+        Some((name, ..)) => {
+            format!("variation `{name}`: error of the groups that the scene alone needs, with all modes")
+        }
         None => "needed by a variation of the scene".to_owned(),
     };
     let (bound, limit) = error.map_or((0.0, 0.0), |one| (one.error, one.tolerance * one.budget));
@@ -341,6 +344,9 @@ impl DecisionInput<'_> {
             Some(trial) => {
                 let rotation = &demand_of(trial, self.demands).situation.spin;
                 (decision(group, kept, trial, self.demands, rotation), decisive_error(trial, self.demands))
+            }
+            None if self.demands.iter().any(|demand| demand.scene.carried.is_some()) => {
+                (undecided(group, kept, "a body that is carried keeps all groups"), None)
             }
             None => (undecided(group, kept, "no bound or run shows that it can be dropped"), None),
         };

@@ -5,12 +5,14 @@ use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
-    AttachmentKind, Measure, MotionRange, PerQuantity, Range, Requirements, Scene, simulate, trace, trace_at,
+    AttachmentKind, LoadCases, Measure, MotionRange, PerQuantity, Range, Requirements, Scene, simulate,
+    trace, trace_at,
 };
-use flexbody_study::selection::{Selection, select};
+use flexbody_study::selection::{Selection, VariedSelection, select};
 use nalgebra::Vector3;
 use oracle::scenes::{bodies, doing, nothing_happens, seeded, some_modes};
 use proptest::prelude::*;
+use std::path::Path;
 
 /// Contribution of the integration to the errors.
 const INTEGRATION: f64 = 1e-5;
@@ -142,4 +144,31 @@ fn without_a_run_only_bounds_and_the_band_decide() {
     slow.motion.angular_velocity = Some(Range::Any(0.5 * body.modes().eigenvalue[0].sqrt()));
     let selection = selected(body, &idle(slow));
     assert_eq!(selection.groups, TermGroups::ALL, "half the first frequency is not slow");
+}
+
+/// Where a variation only excites other modes, it adds modes and no groups; a group that a variation adds fails there with
+/// all modes.
+#[test]
+fn variations_add_groups_only_where_modes_are_not_enough() {
+    let mut of_modes = 0;
+    for body in &bodies()[..3] {
+        let period = std::f64::consts::TAU / body.modes().eigenvalue[0].sqrt();
+        let size = 1e-6 * body.extent() * body.invariants().mass() * body.modes().eigenvalue[0];
+        let node = body.nodes().ids[0];
+        let (end, start) = (4.0 * period, 3.0 * period);
+        let text = format!(
+            "[run]\nduration = {end:e}\ntolerance = 1e-8\n[initial]\ndeformation = \"static\"\n[tolerance]\ndeflection = 0.02\nstress = 0.02\n\
+             [[load]]\nnode = {node}\nforce = [{size:e}, 0, 0]\naxes = \"body\"\nhistory = {{ to = 1, duration = {start:e} }}\n"
+        );
+        let cases = LoadCases::parse(&text, Path::new("pushed.toml")).expect("a scene");
+        let selection = select(body, &[], &cases, &Context::QUIET).expect("a selection");
+        assert!(!selection.varied.is_empty());
+        let groups_fail =
+            |one: &VariedSelection| one.with_all_modes.as_ref().is_some_and(|all| !all.passed());
+        let added = selection.terms.iter().any(|term| term.kept && term.reason.starts_with("variation `"));
+        assert!(!added || selection.varied.iter().any(groups_fail), "{:?}", selection.terms);
+        let more_modes = selection.varied.iter().any(|one| one.of_scene.is_some());
+        of_modes += usize::from(more_modes && !added);
+    }
+    assert!(of_modes > 0, "a scene whose variations need more modes alone");
 }
