@@ -72,7 +72,7 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
     for group in TABLE {
         let instances = group.instances(body.parts());
         // Groups since 1.8 are there only if they have members, so that other files keep their bytes.
-        let is_new = matches!(group.per, Per::Recovery | Per::NamedLoad);
+        let is_new = matches!(group.per, Per::Recovery | Per::NamedLoad | Per::RotatedLoad);
         if group.per != Per::Body && !(is_new && instances.is_empty()) {
             make(&file, group.parent())?;
         }

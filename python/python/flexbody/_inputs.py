@@ -231,7 +231,7 @@ def damping_text(damping: Any) -> Any:
     given = damping_of(damping)
     if isinstance(given, float):
         return repr(given)
-    if isinstance(given, tuple):
+    if isinstance(given, tuple) and len(given) == 2:
         return f"rayleigh={given[0]!r},{given[1]!r}"
     if isinstance(given, list):
         return "bands=" + ",".join(repr(ratio) if np.isinf(end) else f"{end!r}:{ratio!r}" for end, ratio in given)
