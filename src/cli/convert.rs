@@ -363,6 +363,9 @@ fn refuse_without_modes(arguments: &ConvertArguments) -> Result<()> {
     Ok(())
 }
 
+/// Message about residual vectors of a basis without free modes.
+pub(super) const RESIDUALS_NEED_FREE_MODES: &str = "residual vectors need --basis free or craig-chang; craig-bampton has the responses to loads at its interfaces: leave --residual-vectors out";
+
 /// Refuses contradictory options. `loads` are the loads of residual vectors.
 fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> Result<()> {
     let basis = arguments.basis;
@@ -408,9 +411,7 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
         ConvertArguments { accuracy: Accuracy::Certified, .. } if slepc => {
             "--accuracy certified needs --engine built-in"
         }
-        _ if residual && !searches_free_modes => {
-            "residual vectors need --basis free or craig-chang; craig-bampton has the responses to loads at its interfaces: leave --residual-vectors out"
-        }
+        _ if residual && !searches_free_modes => RESIDUALS_NEED_FREE_MODES,
         ConvertArguments { split: true, .. } if loads.iter().any(|set| set.file().is_some()) => {
             "--split cannot be used with nodal loads, whose rows belong to all bodies together"
         }

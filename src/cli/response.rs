@@ -1,6 +1,7 @@
 //! Command `flexbody response`.
 
 use super::arguments::{JobArguments, ResponseArguments};
+use super::convert::RESIDUALS_NEED_FREE_MODES;
 use super::convert::load_sources;
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, format_of, refuse_replacing, refuse_replacing_read, refuse_warnings};
@@ -134,7 +135,7 @@ fn refuse_contradictions(arguments: &ResponseArguments, is_model: bool) -> Resul
             "--basis imported works only in convert: convert the model first, then give the body after the model"
         }
         ResponseArguments { basis: Some(BasisKind::CraigBampton), residual_vectors: Some(_), .. } => {
-            "residual vectors need --basis free or craig-chang; craig-bampton has the responses to loads at its interfaces: leave --residual-vectors out"
+            RESIDUALS_NEED_FREE_MODES
         }
         _ => return Ok(()),
     };

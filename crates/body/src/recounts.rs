@@ -1,6 +1,7 @@
 //! Checks of the statements of a file against its own numbers and against the model: counts of the certificate, rigid
 //! interfaces, interface coordinates, errors of lumped comparators, and the interfaces of the model.
 
+use crate::basis::FREE_MODE;
 use crate::convert::interfaces_in_frame;
 use crate::flex_body::{FixedInterface, FlexBody, Interface, InterfaceCoordinates, LumpedBody};
 use crate::invariants::{IdentityCheck, error_norms};
@@ -37,7 +38,7 @@ fn counted_modes(body: &FlexBody) -> Option<IdentityCheck> {
     let below = body.modes().eigenvalue.iter().filter(|lambda| **lambda < certificate.shift).count();
     let pivots =
         certificate.negative_pivots.map_or(f64::INFINITY, |n| apart(n, proved.saturating_add(rigid)));
-    let is_free = |from: &&String| *from == "free mode";
+    let is_free = |from: &&String| *from == FREE_MODE;
     let free = match body.modes().provenance.iter().filter(is_free).count() {
         0 => body.n_modes(),
         count => count,

@@ -12,6 +12,7 @@ use super::run_data::{Phase, RunData, SearchAttempt};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::{self, SourceFile};
 use flexbody_base::units::UnitSystem;
+use flexbody_body::basis::FREE_MODE;
 use flexbody_body::flex_body::{
     Coupling, FlexBody, Interface, MassStructure, Quantity, Recovery, Storage, Truncation, is_static,
 };
@@ -463,7 +464,7 @@ impl ModeFacts {
                 None => origins.push((origin, 1)),
             }
         }
-        if matches!(origins.as_slice(), [("free mode", _)]) { Vec::new() } else { origins }
+        if matches!(origins.as_slice(), [(FREE_MODE, _)]) { Vec::new() } else { origins }
     }
 }
 

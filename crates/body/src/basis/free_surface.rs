@@ -71,7 +71,7 @@ pub fn free_surface(model: &FeModel, settings: &ModeSettings, context: &Context<
         order: Some(model.elimination()),
     };
     let solution = solve(&problem, settings, context).map_err(|failure| explain(model, failure))?;
-    let mut basis = ModalBasis::new(model, &problem, settings, solution, "free mode")?;
+    let mut basis = ModalBasis::new(model, &problem, settings, solution, super::FREE_MODE)?;
     describe(&basis.solution, settings, &problem, &mut basis.diagnostics);
     basis.diagnostics.extend(single_precision_note(&basis.solution, settings));
     Ok(basis)

@@ -30,3 +30,6 @@ pub use residual_vectors::{
 };
 pub(crate) use residual_vectors::{accurate_static_responses, centrifugal_loads};
 pub use solved::{CountElsewhere, SolvedModes};
+
+/// Provenance of an eigenvector of the free body, in [`ModalBasis::provenance`] and in files.
+pub const FREE_MODE: &str = "free mode";

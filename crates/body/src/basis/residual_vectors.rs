@@ -559,7 +559,7 @@ impl Added {
         let origin = |p: usize| {
             let share = |c: usize| parts[(c, p)].powi(2);
             if (0..free).map(share).sum::<f64>() > 0.5 {
-                return "free mode".to_owned();
+                return super::FREE_MODE.to_owned();
             }
             let largest = (free..parts.nrows()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
             let largest = largest.expect("the span is more than the free modes");

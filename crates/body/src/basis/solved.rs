@@ -67,7 +67,7 @@ impl Basis for SolvedModes {
         self.refuse_others(&solution, settings.accuracy)?;
         solution.completeness = self.completeness(model, rigid.ncols(), solution.completeness)?;
         let notes = self.cut(model, &mut solution, settings.wanted);
-        let mut basis = ModalBasis::new(model, &problem, settings, solution, "free mode")?;
+        let mut basis = ModalBasis::new(model, &problem, settings, solution, super::FREE_MODE)?;
         basis.diagnostics.extend(notes);
         Ok(basis)
     }

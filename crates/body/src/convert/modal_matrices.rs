@@ -3,14 +3,16 @@
 
 use super::body_modes::reduced;
 use crate::basis::{BasisChoice, Loads};
-use crate::flex_body::{FlexBody, Frame, SOFTENING, SplitStiffness, axis_in_words, split, stiffness_about};
+use crate::flex_body::{
+    FlexBody, Frame, SOFTENING, SplitStiffness, along, axis_in_words, split, stiffness_about,
+};
 use crate::invariants::Invariants;
-use faer::{Mat, MatRef, Scale};
+use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_eigen::energy_noise;
 use flexbody_linalg::{SymmetricMatrix, side_by_side, symmetric_eigen};
-use flexbody_model::{Damping, FeModel, GeometricStiffness, LoadKind, UnitLoad, ratio_at};
+use flexbody_model::{Damping, FeModel, GeometricStiffness, LoadKind, ratio_at};
 use nalgebra::Vector3;
 
 /// Number of standard deviations of the noise due to the digits of D that count as rounding.
@@ -123,16 +125,13 @@ fn check_semidefinite(
     }
 }
 
-/// Direction cosines up to this magnitude are rounding and count as zero.
-const ROUNDING_COSINE: f64 = 4.0 * f64::EPSILON;
-
 /// Largest entry whose products stay finite.
 const MAX_ENTRY: f64 = 1e290;
 
 /// Returns Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body), and K_geo of unit
-/// rotations about the axes of the body, for unit loads along the axes of `frame`. Components that are not given count as zero, so that K_geo of any
-/// load is equal in all axes. Components without any contribution are omitted. Kinds are in the order of
-/// the model, components in their own order.
+/// rotations about the axes of the body, for unit loads along the axes of `frame`. Components that are not given count
+/// as zero, so that K_geo of any load is equal in all axes. Components without any contribution are omitted. Kinds are
+/// in the order of the model, components in their own order.
 ///
 /// * `shift`: origin of the frame relative to the point that spin and angular acceleration refer to, frame
 ///   axes; zero except for a frame on an interface. Unit: length.
@@ -156,21 +155,9 @@ pub fn modal_geometric_stiffness(
             let message = format!("geometric stiffness for {load} overflows on the modes");
             return Err(Diagnostic::new(Code::MatrixNotFinite, message).into());
         }
-        let along = load
-            .along(&frame.axes)
-            .into_iter()
-            .enumerate()
-            .filter(|(_, factor)| factor.abs() > ROUNDING_COSINE);
-        for (component, factor) in along {
-            let load = UnitLoad { kind: load.kind.clone(), component };
-            let part = &reduced_matrix * Scale(factor);
-            match out.iter_mut().find(|known| known.load == load) {
-                Some(sum) => sum.matrix += part,
-                None => out.push(GeometricStiffness { load, matrix: part }),
-            }
-        }
+        out.push(GeometricStiffness { load: load.clone(), matrix: reduced_matrix });
     }
-    let mut out = stiffness_about(&out, shift, model.dimension());
+    let mut out = stiffness_about(&along(&out, &frame.axes), shift, model.dimension());
     let place = |kind: &LoadKind| model.geometric_stiffness().iter().position(|one| one.load.kind == *kind);
     out.sort_by_key(|one| (place(&one.load.kind), one.load.component));
     Ok(split(out))

@@ -14,11 +14,12 @@
 use super::modal_change::{rotations_without, shapes_without, stacked};
 use super::rotated_stiffness::{SplitStiffness, split, transformed, without_rotation};
 use super::{FlexBody, Interface, ReferenceConditions, TermGroups};
+use crate::basis::BasisKind;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
-use flexbody_model::{Coupling, DampingRatios};
+use flexbody_model::{Coupling, DampingRatios, rigid_count};
 use nalgebra::{Matrix3, Vector3};
 
 /// Largest truncation error of the static response of a carried body that passes without a warning.
@@ -244,11 +245,13 @@ impl FlexBody {
         let settings = &self.source().settings;
         let at_boundary = |interface: &&Interface| interface.coupling != Some(Coupling::Free);
         let boundary: Vec<&Interface> = self.interfaces().iter().filter(at_boundary).collect();
-        let rigid = if self.dimension() == 2 { 3 } else { 6 };
+        let rigid = rigid_count(self.dimension());
         let whole = settings["modes"]
             .as_u64()
             .is_some_and(|fixed| self.n_modes() + rigid >= fixed as usize + rigid * boundary.len());
-        settings["basis"] == "craig-bampton" && whole && boundary.iter().any(|one| one.name == name)
+        settings["basis"] == BasisKind::CraigBampton.name()
+            && whole
+            && boundary.iter().any(|one| one.name == name)
     }
 
     /// Returns eigenvalues and m_ff-orthonormal eigenvectors of (K_ff, m_ff).

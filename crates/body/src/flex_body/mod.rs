@@ -29,7 +29,7 @@ pub use flexbody_model::{
 pub use held_modes::HeldMode;
 pub use interface::{Interface, InterfaceRows};
 pub use modal_change::{ModalChange, RigidMotions, diagonal_eigenvalues, reduced_residuals, rigid_motions};
-pub use model_axes::stiffness_about;
+pub use model_axes::{along, stiffness_about};
 pub use named_load::NamedLoad;
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, is_static,

@@ -169,7 +169,10 @@ pub fn stiffness_about(
 }
 
 /// Returns the geometric stiffness for loads along the columns of `axes` (given in the present axes).
-fn along(given: &[GeometricStiffness<Mat<f64>>], axes: &Matrix3<f64>) -> Vec<GeometricStiffness<Mat<f64>>> {
+pub fn along(
+    given: &[GeometricStiffness<Mat<f64>>],
+    axes: &Matrix3<f64>,
+) -> Vec<GeometricStiffness<Mat<f64>>> {
     let mut all = Vec::new();
     for GeometricStiffness { load, matrix } in given {
         let factors =

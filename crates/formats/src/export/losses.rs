@@ -132,8 +132,14 @@ pub(crate) fn geometric_stiffness(
     if let Some(measured) = in_scene(options, &Omission::GeometricStiffness(loads), &what) {
         return measured;
     }
+    from_one_percent(body, &what, &lost)
+}
+
+/// Returns the loss of stiffnesses of unit loads, with the sizes of motions and loads at which it reaches 1 % of the stiffness
+/// of the body.
+fn from_one_percent(body: &FlexBody, what: &str, lost: &[GeometricStiffness<Mat<f64>>]) -> Holding {
     let own = body.invariants().modal_stiffness();
-    let Some(shares) = InertiaShares::of(&lost, own.as_ref()) else {
+    let Some(shares) = InertiaShares::of(lost, own.as_ref()) else {
         return Lost(format!("{what}, whose effect is not known"));
     };
     let rates = body.rates_of(&shares, REPORTED_STIFFNESS).in_words(body.units(), |_| true);
@@ -229,12 +235,10 @@ pub(crate) fn in_motion(
         let text = format!("{what}: {size}");
         return if error <= MAX_SLIGHT_STIFFNESS { Slight(text) } else { Lost(text) };
     }
-    let own = body.invariants().modal_stiffness();
-    let Some(shares) = lost(body).and_then(|lost| InertiaShares::of(&lost, own.as_ref())) else {
-        return Lost(format!("{what}, whose effect is not known"));
-    };
-    let rates = body.rates_of(&shares, REPORTED_STIFFNESS).in_words(body.units(), |_| true);
-    Slight(format!("{what}, which changes deflections by 1 % and frequencies by 0.5 % at {rates}"))
+    match lost(body) {
+        Some(lost) => from_one_percent(body, what, &lost),
+        None => Lost(format!("{what}, whose effect is not known")),
+    }
 }
 
 /// Returns the holding of rows of the modes that belong to no node.

@@ -8,6 +8,7 @@ use super::trial::{ModeShare, Trial, TrialRuns, multiplications};
 use crate::reference::PART_OF_REFERENCE;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_body::basis::FREE_MODE;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{Axes, History, LoadCases, Measure, Scene, Tolerance, Trace, VectorHistory};
@@ -70,7 +71,7 @@ impl<'s> SelectionState<'s> {
         let within = |&j: &usize| {
             let frequency = modes.eigenvalue[j].sqrt() / std::f64::consts::TAU;
             // Residual vectors are kept: they replace the modes beyond the band.
-            let free = modes.provenance.get(j).is_none_or(|from| from == "free mode");
+            let free = modes.provenance.get(j).is_none_or(|from| from == FREE_MODE);
             band.is_none_or(|band| !free || frequency <= BEYOND_BAND * band)
         };
         let within: Vec<usize> = self.choice.modes.iter().copied().filter(within).collect();

@@ -146,8 +146,8 @@ fn without_a_run_only_bounds_and_the_band_decide() {
     assert_eq!(selection.groups, TermGroups::ALL, "half the first frequency is not slow");
 }
 
-/// Where a variation only excites other modes, it adds modes and no groups; a group that a variation adds fails there with
-/// all modes.
+/// A variation that only excites other modes adds modes and no groups. The groups of the scene fail with all modes in a
+/// variation that adds a group.
 #[test]
 fn variations_add_groups_only_where_modes_are_not_enough() {
     let mut of_modes = 0;
