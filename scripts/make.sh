@@ -46,6 +46,10 @@ pages)
     peers) "${PYTHON:-python3}" tests/peers/suite.py --install --write ;;
     performance) ./benches/page.sh ;;
     plausibility) cargo run --release --locked --example plausibility ;;
+    recovery)
+        "${PYTHON:-python3}" scripts/pages/make_recovery.py "${@:3}"
+        FLEXBODY_BLESS=1 cargo test --release --locked --package flexbody-study stresses_in_motion -- --ignored
+        ;;
     verdicts) FLEXBODY_BLESS=1 FLEXBODY_VERDICTS="${3:-100}" cargo test --release --locked --package flexbody-study random_verdicts -- --include-ignored ;;
     "")
         for script in scripts/pages/make_*.py scripts/pages/image_*.py; do "${PYTHON:-python3}" "$script"; done

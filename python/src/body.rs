@@ -481,18 +481,22 @@ impl Body {
     /// with these names.
     ///
     /// `history` is the path of a table (docs/reference/recovery.md), or a dict of "time" (nt), "q" (nt x nf),
-    /// "angular_velocity" (nt x 3), "loads", a dict of interface to a tuple of forces and torques (nt x 3 each) at its
+    /// "angular_velocity" (nt x 3), if the body has columns of forces of motion "qd", "qdd" (nt x nf) and
+    /// "angular_acceleration" (nt x 3), "loads", a dict of interface to a tuple of forces and torques (nt x 3 each) at its
     /// reference point, and "amplitudes", a dict of named load to its amplitudes (nt). Vectors are along the axes of the
     /// model, which turn with the body. Interfaces without loads count as unloaded, named loads without amplitudes as zero;
-    /// preloads act always and take none.
-    #[pyo3(signature = (history, only=None))]
+    /// preloads act always and take none. `carried_by` names the interface (or the number of the node) in whose frame the
+    /// motion is, that of a body carried by it.
+    #[pyo3(signature = (history, only=None, carried_by=None))]
     fn recover(
         &self,
         py: Python<'_>,
         history: &Bound<'_, PyAny>,
         only: Argument<'_, '_>,
+        carried_by: Argument<'_, '_>,
     ) -> PyResult<Recovered> {
-        Recovered::of(py, Arc::clone(&self.inner), history, only)
+        let carrier = carried_by.map(|carrier| text(carrier, "carried_by")).transpose()?;
+        Recovered::of(py, Arc::clone(&self.inner), history, only, carrier.as_deref())
     }
 
     /// Returns the factor of each FE step over a motion of any program, like `flexbody recover --channels`, for a program

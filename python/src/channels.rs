@@ -25,7 +25,7 @@ impl Channels {
         history: &Bound<'_, PyAny>,
         shapes: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let (history, shapes) = (history_of(history, &body)?, path(shapes, "shapes")?);
+        let (history, shapes) = (history_of(history, &body, None)?, path(shapes, "shapes")?);
         let own = Arc::clone(&body);
         let inner = run(py, move |_| own.channels(&history, &shapes))?;
         Ok(Self { body, inner, cache: ArrayCache::default() })

@@ -2,7 +2,7 @@
 
 use crate::arguments::{Argument, mistyped, path, text, texts};
 use crate::arrays::{ArrayCache, Given, matrix, rows_of, rows_of_many, sequence, vector};
-use crate::errors::{value, value_error};
+use crate::errors::{value, value_error, warn};
 use crate::report::report;
 use crate::work::{brief, run};
 use flexbody::{Code, Diagnostic, FlexBody, LoadedHistory, Matrix, RecoveryRow, ReportFormat};
@@ -13,7 +13,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Keys of a history of numbers.
-const KEYS: [&str; 5] = ["time", "q", "angular_velocity", "loads", "amplitudes"];
+const KEYS: [&str; 8] =
+    ["time", "q", "qd", "qdd", "angular_velocity", "angular_acceleration", "loads", "amplitudes"];
 
 /// Recoveries of a body over a motion, of a run of any program or of a simulation: stresses, strains, forces.
 #[pyclass(frozen, module = "flexbody")]
@@ -23,9 +24,22 @@ pub struct Recovered {
     cache: ArrayCache,
 }
 
-/// Returns the history that a caller gives: the path of a table, or a dict of time, q, angular_velocity, loads and
-/// amplitudes.
-pub fn history_of(given: &Bound<'_, PyAny>, body: &FlexBody) -> PyResult<LoadedHistory> {
+/// Returns the history that a caller gives: the path of a table, or a dict with the keys [`KEYS`].
+///
+/// * `carried_by`: interface or node that carries the body.
+pub fn history_of(
+    given: &Bound<'_, PyAny>,
+    body: &FlexBody,
+    carried_by: Option<&str>,
+) -> PyResult<LoadedHistory> {
+    let history = frame_history_of(given, body)?;
+    Ok(match carried_by {
+        Some(carrier) => history.carried_by(body, carrier),
+        None => history,
+    })
+}
+
+fn frame_history_of(given: &Bound<'_, PyAny>, body: &FlexBody) -> PyResult<LoadedHistory> {
     let py = given.py();
     let Ok(values) = given.cast::<PyMapping>() else {
         let expected = "the path of a table, or a dict of time, q, angular_velocity, loads and amplitudes";
@@ -52,6 +66,18 @@ pub fn history_of(given: &Bound<'_, PyAny>, body: &FlexBody) -> PyResult<LoadedH
     let mut history = value(py, LoadedHistory::new(time, q))?;
     if let Some(spin) = entry("angular_velocity")? {
         history = value(py, history.angular_velocity(&rows_of_many::<3>(&spin, "angular_velocity")?))?;
+    }
+    if let Some(rates) = entry("angular_acceleration")? {
+        let rates = rows_of_many::<3>(&rates, "angular_acceleration")?;
+        history = value(py, history.angular_acceleration(&rates))?;
+    }
+    let (first, second) = (entry("qd")?, entry("qdd")?);
+    if first.is_none() && second.is_some() {
+        return Err(value_error(py, "`history` has the key `qdd` without `qd`".to_owned()));
+    }
+    if let Some(first) = first {
+        let second = second.map(|second| rows_of(&second, "qdd")).transpose()?;
+        history = value(py, history.modal_rates(rows_of(&first, "qd")?, second))?;
     }
     if let Some(loads) = entry("loads")? {
         history = with_loads(history, &loads)?;
@@ -105,14 +131,16 @@ impl Recovered {
         body: Arc<FlexBody>,
         history: &Bound<'_, PyAny>,
         only: Argument<'_, '_>,
+        carried_by: Option<&str>,
     ) -> PyResult<Self> {
-        let history = history_of(history, &body)?;
+        let history = history_of(history, &body, carried_by)?;
         let names = only.map_or_else(|| Ok(Vec::new()), |only| texts(only, "only"))?;
         let own = Arc::clone(&body);
         let inner = run(py, move |_| {
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
             own.recover(&history, &names)
         })?;
+        warn(py, inner.diagnostics())?;
         Ok(Self::new(body, inner))
     }
 }

@@ -149,7 +149,7 @@ impl Motion {
     /// Returns the recoveries of the body over this motion, at the instants of the output; `None` if the body has none.
     pub fn recovered(&self) -> Option<Recovered> {
         let source = RowSource::Scene(self.recording.scene.clone());
-        self.recording.recovered.clone().map(|motion| Recovered { motion, source })
+        self.recording.recovered.clone().map(|motion| Recovered { motion, source, diagnostics: Vec::new() })
     }
 
     /// Writes the motion to an HDF5 file in the format of `flexbody simulate -o` (docs/reference/simulate.md). The

@@ -5,6 +5,7 @@ use super::{FlexBody, Matrix, ReportFormat};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
+use flexbody_body::flex_body::Carrier;
 use flexbody_input::read_steps;
 use flexbody_model::RecoveryRow;
 use flexbody_motion::scene::{
@@ -51,9 +52,21 @@ impl LoadedHistory {
             time,
             q,
             angular_velocity: None,
+            rate: None,
+            acceleration: None,
+            angular_acceleration: None,
             loads: Vec::new(),
             named: Vec::new(),
+            carrier: None,
+            is_of_carried: false,
         }))
+    }
+
+    /// States that the motion is that of the frame of the interface, or of the node with this number, that carries `body`
+    /// in the simulation: its origin is the reference point of the carrier.
+    pub fn carried_by(mut self, body: &FlexBody, carrier: &str) -> Self {
+        self.0.carrier = Some(Carrier::named(&body.0, carrier));
+        self
     }
 
     /// Sets the angular velocity of the body frame at each time.
@@ -62,6 +75,36 @@ impl LoadedHistory {
     /// FB804 if the number of rows is not that of the times, and for numbers that are not finite.
     pub fn angular_velocity(mut self, rows: &[[f64; 3]]) -> Result<Self> {
         self.0.angular_velocity = Some(self.vectors("angular velocity", rows)?);
+        Ok(self)
+    }
+
+    /// Sets the angular acceleration of the body frame at each time, on which the inertia of the deformation depends.
+    ///
+    /// # Errors
+    /// FB804 if the number of rows is not that of the times, and for numbers that are not finite.
+    pub fn angular_acceleration(mut self, rows: &[[f64; 3]]) -> Result<Self> {
+        self.0.angular_acceleration = Some(self.vectors("angular acceleration", rows)?);
+        Ok(self)
+    }
+
+    /// Sets the first and, if they are known, the second time derivatives of the modal coordinates at each time, on which
+    /// damping forces and the inertia of the deformation depend.
+    ///
+    /// # Errors
+    /// FB804 if the numbers of rows or of columns are not those of the modal coordinates, and for numbers that are not
+    /// finite.
+    pub fn modal_rates(mut self, first: Vec<Vec<f64>>, second: Option<Vec<Vec<f64>>>) -> Result<Self> {
+        for rows in [Some(&first), second.as_ref()].into_iter().flatten() {
+            let fits = |(row, q): (&Vec<f64>, &Vec<f64>)| row.len() == q.len();
+            if rows.len() != self.0.q.len() || !rows.iter().zip(&self.0.q).all(fits) {
+                return refused("rates of the modal coordinates have another size than these".to_owned());
+            }
+            if !rows.iter().flatten().all(|value| value.is_finite()) {
+                return refused("a rate of a modal coordinate is not a finite number".to_owned());
+            }
+        }
+        self.0.rate = Some(first);
+        self.0.acceleration = second;
         Ok(self)
     }
 
@@ -163,6 +206,7 @@ fn refused<T>(message: String) -> Result<T> {
 pub struct Recovered {
     pub(super) motion: RecoveredMotion,
     pub(super) source: RowSource,
+    pub(super) diagnostics: Vec<Diagnostic>,
 }
 
 /// Motion that recoveries are made of.
@@ -205,7 +249,8 @@ impl FlexBody {
         history.refuse_foreign(self)?;
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
         let motion = history.0.recover(&self.0, &names)?;
-        Ok(Recovered { motion, source: RowSource::History(history.clone()) })
+        let diagnostics = history.0.left_out(&self.0, &names).into_iter().collect();
+        Ok(Recovered { motion, source: RowSource::History(history.clone()), diagnostics })
     }
 
     /// Returns the factor of each FE step over a history, like `flexbody recover --channels`, for a program that
@@ -278,6 +323,11 @@ impl Channels {
 }
 
 impl Recovered {
+    /// Returns warnings: forces of motion that the rows leave out, since the history does not have what they depend on.
+    pub fn diagnostics(&self) -> &[Diagnostic] {
+        &self.diagnostics
+    }
+
     /// Returns the times of the motion.
     pub fn times(&self) -> &[f64] {
         &self.motion.states.times

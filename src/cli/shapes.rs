@@ -11,7 +11,9 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::convert::recovery_shapes;
 use flexbody_formats::shapes::{NodalShapes, StressDeck, StressPlaces};
-use flexbody_input::{ElementDeck, ModelFiles, ModelSource, read_model, read_nodes_of_table};
+use flexbody_input::{
+    ElementDeck, ModelFiles, ModelSource, OperatorSource, RecoverySource, read_model, read_nodes_of_table,
+};
 use flexbody_linalg::context::Event;
 use flexbody_model::{CheckedModel, FeModel, extents};
 use std::collections::HashMap;
@@ -34,9 +36,11 @@ pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
         true => vec![arguments.output.clone()],
         false => vec![arguments.output.clone(), archive],
     };
+    let files = of_manifest_or_job(&arguments.model, &arguments.job)?;
+    let of_shapes = |one: &RecoverySource| matches!(one.operator, OperatorSource::Shapes { .. });
+    let deformed_inertia = files.recoveries.iter().any(|one| of_shapes(one) && one.deformed_inertia);
     // Recoveries of the manifest may name results that do not exist yet.
-    let files =
-        ModelFiles { recoveries: Vec::new(), ..of_manifest_or_job(&arguments.model, &arguments.job)? };
+    let files = ModelFiles { recoveries: Vec::new(), ..files };
     let inputs = [&arguments.body, &arguments.model];
     let deck = arguments.deck.as_ref();
     let named = files.paths();
@@ -52,7 +56,7 @@ pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
     };
     refuse_replacing_read(outputs.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
-    let shapes = recovery_shapes(&body, &model, &context(None, false, &watch))
+    let shapes = recovery_shapes(&body, &model, deformed_inertia, &context(None, false, &watch))
         .map_err(|error| error.in_file(&arguments.body))?;
     let shapes = NodalShapes::new(&shapes, &model, &body);
     watcher.finish();

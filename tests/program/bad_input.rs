@@ -164,6 +164,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB561", "crates/study/tests/study/recovery_limits.rs"),
     ("FB547", "crates/motion/tests/motion/carried_stiffness.rs"),
     ("FB562", "crates/study/tests/study/named_loads.rs"),
+    ("FB564", "tests/program/motion/recovery.rs"),
     ("FB602", "tests/program/limits.rs"),
     ("FB605", "tests/program/front_door.rs"),
     ("FB606", "python/tests/test_running.py"),

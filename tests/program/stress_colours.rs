@@ -62,6 +62,7 @@ fn recovery(
         }),
         loads: Vec::new(),
         named: Mat::zeros(n, 0),
+        motion: Vec::new(),
         rows,
     }
 }

@@ -241,6 +241,7 @@ codes! {
     RecoveryUnjudged = "FB561", Note, Done, "truncation error of a recovery is not known", "give the recovery by an operator (`operator` in [[recovery]]); or make a body of more shapes and compare";
     VariationFails = "FB559", Warning, Done, "recommended body does not hold in a variation of the scene", "make the variation a [[case]] of the scene, so that the body is made for it as well; or leave out a [[variation]] that cannot occur";
     PreloadReleased = "FB562", Warning, Done, "body starts undeformed under a preload and vibrates", "start in the equilibrium of the preload: deformation = \"static\" in [initial]";
+    RecoveryMotionUnknown = "FB564", Warning, Done, "run lacks columns that forces of motion in the recoveries depend on", "write the columns that the message names to the table of the run: `simulate --csv` writes all of them";
     InertiaIndefinite = "FB560", Warning, Done, "W3 is kept without W2, and deflections make the inertia indefinite", "keep W2 as well (--terms W2,W3 or all), unless joints prescribe the rotation or the deflections stay far below the value in the message";
     CouplingEffect = "FB558", Note, Done, "effect of rigid interfaces that the body and its reference model share", "nothing to do where a stiff part is mounted at the interface; otherwise set coupling = \"averaging\", which lets the interface deform";
     // FB6xx: resources; FB603 stays unused (checkpoints of earlier versions)

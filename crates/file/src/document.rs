@@ -172,6 +172,7 @@ fn symbol(extent: Extent) -> String {
         Extent::Nodes => "n".to_owned(),
         Extent::Modes => "nf".to_owned(),
         Extent::ThreeModes => "3nf".to_owned(),
+        Extent::SixModes => "6nf".to_owned(),
         Extent::InterfaceNodes => "k".to_owned(),
         Extent::InternalRows => "m".to_owned(),
         Extent::Coordinates => "nc".to_owned(),
@@ -308,6 +309,7 @@ fn entry(item: &Item) -> Value {
             let sizes = extents.iter().map(|extent| match extent {
                 Extent::Fixed(size) => json!({ "const": size }),
                 Extent::ThreeModes => json!({ "type": "integer", "minimum": 3, "multipleOf": 3 }),
+                Extent::SixModes => json!({ "type": "integer", "minimum": 6, "multipleOf": 6 }),
                 _ => json!({ "type": "integer", "minimum": 1 }),
             });
             json!({

@@ -90,6 +90,7 @@ impl Draft {
                     spin: Mat::new(),
                     loads: Vec::new(),
                     named: Mat::new(),
+                    motion: Vec::new(),
                 });
             }
             Per::NamedLoad => self.body.named_loads.push(NamedLoad {

@@ -16,6 +16,8 @@ pub(super) enum Extent {
     Modes,
     /// Three times the number of modes, 3 nf.
     ThreeModes,
+    /// Six times the number of modes, 6 nf.
+    SixModes,
     /// Number of nodes of the group's interface.
     InterfaceNodes,
     /// Number of rows of the modes without a position.
@@ -35,7 +37,7 @@ pub(super) enum Extent {
 }
 use Extent::{
     Coordinates, Edges, Fixed, InterfaceNodes, InternalRows, LoadedInterfaces, Modes, NamedLoads, Nodes,
-    RecoveryRows, ThreeModes, Triangles,
+    RecoveryRows, SixModes, ThreeModes, Triangles,
 };
 
 /// Storage of an entry in the file.
@@ -284,6 +286,7 @@ impl Item {
             Nodes => view.body.nodes.len(),
             Modes => nf,
             ThreeModes => 3 * nf,
+            SixModes => 6 * nf,
             InterfaceNodes => view.interface_nodes().len(),
             Coordinates => view.body.coordinates.as_ref().map_or(0, |c| c.names.len()),
             Triangles => view.body.mesh.as_ref().map_or(0, |mesh| mesh.triangles().len()),

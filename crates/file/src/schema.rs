@@ -36,7 +36,9 @@ pub(super) const WHOLE: &str = "sha256";
 /// Major version of the format. Readers refuse a newer major version; a newer minor version only adds entries.
 pub(super) const MAJOR: i64 = 1;
 /// Minor version with all entries, see [`MAJOR`]. A file states the lowest version that has all entries which it holds.
-pub(super) const MINOR: i64 = 10;
+pub(super) const MINOR: i64 = 11;
+/// Minor version of files of bodies whose recoveries have no columns of forces of motion.
+const WITHOUT_MOTION_COLUMNS: i64 = 10;
 /// Minor version of files of bodies without geometric stiffness of rotations.
 const WITHOUT_ROTATED_STIFFNESS: i64 = 9;
 /// Minor version of files of bodies without named loads.
@@ -133,7 +135,8 @@ const ROOT: &[Item] = &[
         written(|v| {
             let Parts { conditions, inertia_stiffness, mesh, recoveries, named_loads, .. } = v.body;
             Some(Value::Int(match (conditions.is_mean(), inertia_stiffness, mesh) {
-                _ if !v.body.rotated_stiffness.is_empty() => MINOR,
+                _ if recoveries.iter().any(|one| !one.motion.is_empty()) => MINOR,
+                _ if !v.body.rotated_stiffness.is_empty() => WITHOUT_MOTION_COLUMNS,
                 _ if !named_loads.is_empty() => WITHOUT_ROTATED_STIFFNESS,
                 _ if !recoveries.is_empty() => WITHOUT_NAMED_LOADS,
                 (false, _, _) => WITHOUT_RECOVERIES,

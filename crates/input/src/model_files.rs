@@ -112,6 +112,8 @@ pub struct RecoverySource {
     pub name: String,
     /// Source of the operator.
     pub operator: OperatorSource,
+    /// True for static columns of the inertia of the deformation.
+    pub deformed_inertia: bool,
 }
 
 /// Source of the operator of a recovery.

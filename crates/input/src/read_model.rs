@@ -468,7 +468,7 @@ impl<'m> NodeLookup<'m> {
         opened: &OpenFiles,
         files: &ModelFiles,
     ) -> Found<(ModelRecovery, Vec<Diagnostic>)> {
-        let name = source.name.clone();
+        let (name, deformed_inertia) = (source.name.clone(), source.deformed_inertia);
         match &source.operator {
             OperatorSource::Rows { operator, rows, offset } => {
                 let given = read_operator(opened.get(&operator.path)?, operator.group.as_deref())?;
@@ -479,7 +479,7 @@ impl<'m> NodeLookup<'m> {
                     offset.map(|place| read_offset(opened.get(&place.path)?, place.group.as_deref()));
                 let operator_path = operator.path.clone();
                 let operator = RecoveryOperator::Rows { transposed, labels, offset: offset.transpose()? };
-                Ok((ModelRecovery { name, operator, path: operator_path }, Vec::new()))
+                Ok((ModelRecovery { name, operator, path: operator_path, deformed_inertia }, Vec::new()))
             }
             OperatorSource::Shapes { answers, displacements, energies, listed } => {
                 let answer_files = AnswerFiles {
@@ -489,7 +489,7 @@ impl<'m> NodeLookup<'m> {
                     listed: listed.iter().map(|path| opened.unread(path)).collect::<Found<_>>()?,
                 };
                 let (operator, found) = read_answers(&answer_files, &files.units)?;
-                Ok((ModelRecovery { name, operator, path: answers.clone() }, found))
+                Ok((ModelRecovery { name, operator, path: answers.clone(), deformed_inertia }, found))
             }
             OperatorSource::Cut { nodes, about } => {
                 let (coupling, reference) = (None, Reference::Centre);
@@ -501,7 +501,7 @@ impl<'m> NodeLookup<'m> {
                     _ => files.manifest.clone().unwrap_or_default(),
                 };
                 let operator = RecoveryOperator::Cut { nodes, about: *about };
-                Ok((ModelRecovery { name, operator, path }, Vec::new()))
+                Ok((ModelRecovery { name, operator, path, deformed_inertia }, Vec::new()))
             }
         }
     }

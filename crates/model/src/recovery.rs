@@ -146,6 +146,8 @@ pub struct ModelRecovery {
     pub name: String,
     /// Map from the displacements.
     pub operator: RecoveryOperator,
+    /// True for static columns of the inertia of the deformation: terms of higher order in the deformation and the motion.
+    pub deformed_inertia: bool,
     /// File of the operator or of the nodes, for messages; empty for data in memory.
     pub path: PathBuf,
 }
@@ -207,7 +209,7 @@ pub(super) fn checked_recoveries(
 ) -> Vec<ModelRecovery> {
     let mut names = HashSet::new();
     let mut checked = Vec::with_capacity(asked.len());
-    for ModelRecovery { name, operator, path } in asked {
+    for ModelRecovery { name, operator, path, deformed_inertia } in asked {
         let complain =
             |(code, message): Problem| Diagnostic::new(code, format!("recovery {message}")).in_file(&path);
         let result = match refuse_name(&name, &mut names) {
@@ -224,7 +226,7 @@ pub(super) fn checked_recoveries(
             },
         };
         match result {
-            Ok(operator) => checked.push(ModelRecovery { name, operator, path }),
+            Ok(operator) => checked.push(ModelRecovery { name, operator, path, deformed_inertia }),
             Err(problem) => found.push(complain(problem)),
         }
     }

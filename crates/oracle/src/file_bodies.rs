@@ -6,9 +6,9 @@ use flexbody_base::provenance::{SourceFile, sha256_hex};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
-    InterfaceCoordinates, InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, NamedLoad,
-    Parts, Quantity, Recovery, RecoveryRow, ReferenceConditions, RotatedStiffness, Source, Storage,
-    SurfaceMesh, Truncation, UnitLoad,
+    InterfaceCoordinates, InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes,
+    MotionColumns, MotionLoad, NamedLoad, Parts, Quantity, Recovery, RecoveryRow, ReferenceConditions,
+    RotatedStiffness, Source, Storage, SurfaceMesh, Truncation, UnitLoad,
 };
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, TermGroups,
@@ -152,6 +152,13 @@ fn recovery(r: &mut Random, number: usize, nf: usize, loaded: &[String], named: 
             .map(|interface| LoadColumns { interface: interface.clone(), columns: r.matrix(rows, 6) })
             .collect(),
         named: r.matrix(rows, named),
+        motion: MotionLoad::ALL
+            .into_iter()
+            .filter(|_| r.below(3) == 0)
+            .collect::<Vec<_>>()
+            .into_iter()
+            .map(|load| MotionColumns { load, columns: r.matrix(rows, load.components() * nf) })
+            .collect(),
     }
 }
 

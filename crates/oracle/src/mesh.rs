@@ -215,7 +215,7 @@ impl Mesh {
     pub fn stresses(&self, material: &Material) -> ModelRecovery {
         let (transposed, labels) = self.stress_operator(material);
         let operator = RecoveryOperator::Rows { transposed, labels, offset: None };
-        ModelRecovery { name: "stress".to_owned(), operator, path: PathBuf::new() }
+        ModelRecovery { name: "stress".to_owned(), operator, path: PathBuf::new(), deformed_inertia: false }
     }
 }
 

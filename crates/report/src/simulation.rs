@@ -442,7 +442,8 @@ fn line_chart(title: &str, time: &[f64], time_unit: &str, lines: Vec<Line>, unit
 
 /// Returns a recording as comma-separated values with one row per output time; numbers round-trip.
 pub fn simulation_csv(recording: &Recording) -> String {
-    let Recording { time, states, balances, paths, reactions, conditions, recovered, .. } = recording;
+    let Recording { time, states, balances, paths, reactions, conditions, recovered, accelerations, .. } =
+        recording;
     let loads = recovered.as_ref().map(|recovered| &recovered.states);
     let nf = states.first().map_or(0, |state| state.q.len());
     let mut head = vec!["time".to_owned()];
@@ -471,6 +472,10 @@ pub fn simulation_csv(recording: &Recording) -> String {
         head.extend(["force", "torque"].iter().flat_map(|part| xyz(&format!("{interface} {part}"))));
     }
     head.extend(loads.iter().flat_map(|states| states.layout.named_loads()).cloned());
+    if accelerations.is_some() {
+        head.extend(xyz("angular_acceleration"));
+        head.extend((1..=nf).map(|j| format!("qdd_{j}")));
+    }
     let mut table = String::new();
     csv::push_row(&mut table, head.iter().map(|cell| csv::text(cell)));
     for (i, (time, (state, balance))) in time.iter().zip(states.iter().zip(balances)).enumerate() {
@@ -501,6 +506,10 @@ pub fn simulation_csv(recording: &Recording) -> String {
             row.extend((0..states.layout.interfaces().len()).flat_map(of));
             let amplitude = |load: usize| states.layout.amplitude_of(states.state(i), load);
             row.extend((0..states.layout.named_loads().len()).map(amplitude));
+        }
+        if let Some(accelerations) = accelerations {
+            row.extend(&accelerations[i].0);
+            row.extend(&accelerations[i].1);
         }
         csv::push_row(&mut table, row.into_iter().map(csv::number));
     }

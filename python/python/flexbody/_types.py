@@ -100,7 +100,7 @@ Attached: TypeAlias = Union[float, tuple[float, str]]
 Places: TypeAlias = Union[str, int, Sequence[Union[str, int]]]
 """Places of a frequency response: interfaces or numbers of nodes, perhaps with directions, as in "tip:z"."""
 History: TypeAlias = Union[Path, Mapping[str, Any]]
-"""A run of any program: the path of a table, or a dict of time, q, angular_velocity and loads."""
+"""A run of any program: the path of a table, or a dict of time, q, angular_velocity, loads and others (`Body.recover`)."""
 
 
 class Interface(NamedTuple):

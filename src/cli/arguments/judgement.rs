@@ -79,6 +79,10 @@ pub struct RecoverArguments {
     /// Recovery to compute (repeatable) [default: all]
     #[arg(long, value_name = "NAME")]
     pub only: Vec<String>,
+    /// Interface, or number of the node, that carries the body in the run of `simulate`: the motion is that of its frame,
+    /// which matters to recoveries with the inertia of the deformation
+    #[arg(long, value_name = "NAME")]
+    pub carried_by: Option<String>,
     /// File to write the factor of each FE step over time to, .csv or .h5, for a fatigue program that superposes the
     /// results of these steps
     #[arg(long, value_name = "FILE.csv|FILE.h5", requires = "shapes")]

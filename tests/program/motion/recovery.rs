@@ -1,7 +1,7 @@
 //! Recoveries from the manifest to the rows over a run, through the command line.
 
 use crate::program::flexbody;
-use flexbody_body::flex_body::{FlexBody, RecoveryState};
+use flexbody_body::flex_body::{FlexBody, ModalMotion, RecoveryState};
 use flexbody_model::{RawModel, RecoveryOperator};
 use nalgebra::Vector3;
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -131,8 +131,11 @@ fn rows_of_a_run_are_those_of_the_body() {
         let (force, torque) = (along(0), along(3));
         let right = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
         let found: Vec<f64> = line.split(',').skip(1).map(|cell| cell.parse().expect("a number")).collect();
-        let state =
-            RecoveryState { q, angular_velocity: axes * omega, loads: &[[0.0; 6], right], named: &[] };
+        let state = RecoveryState {
+            motion: ModalMotion::steady(q, axes * omega),
+            loads: &[[0.0; 6], right],
+            named: &[],
+        };
         let mut expected = body.recoveries()[0].values(&state);
         let measures = |s: &[f64]| {
             let stress = nalgebra::Matrix3::new(s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2]);
@@ -242,6 +245,41 @@ fn rows_of_a_simulation_are_those_of_its_table() {
         place,
         "convert model.toml --modes 6 --residual-vectors interfaces --frame principal -o body.h5 --quiet",
     );
+    assert_rows_of_tables(place);
+}
+
+/// The same of a body with columns of damping forces and of the inertia of the deformation. A table without the rates that
+/// these depend on gives the rows without them, with a warning; one of a carried body needs its carrier.
+#[test]
+fn rows_with_forces_of_motion_are_those_of_the_table() {
+    let (folder, _) = folder();
+    let place = folder.path();
+    let manifest = fs::read_to_string(place.join("model.toml")).expect("a manifest");
+    let manifest = manifest
+        .replace("rows = \"rows.csv\"\n", "rows = \"rows.csv\"\ndeformed_inertia = true\n")
+        .replacen("[[interface]]", "[damping]\nrayleigh = { alpha = 900, beta = 1e-6 }\n[[interface]]", 1);
+    fs::write(place.join("model.toml"), manifest).expect("written");
+    let convert = "convert model.toml --modes 6 --residual-vectors interfaces --frame principal -o";
+    runs(place, &format!("{convert} body.h5 --quiet"));
+    assert_rows_of_tables(place);
+    refused(place, "recover body.h5 --history run.csv -o again.csv", "--carried-by");
+    let free = "[run]\nduration = 2e-4\n[initial]\nangular_velocity = [100, 50, 300]\n";
+    fs::write(place.join("scene.toml"), free).expect("written");
+    runs(place, "simulate body.h5 --scene scene.toml --csv run.csv --quiet");
+    let table = fs::read_to_string(place.join("run.csv")).expect("a table");
+    assert!(table.contains(",angular_acceleration_x,") && table.contains(",qdd_6"), "{}", &table[..900]);
+    let without = |columns: &str| {
+        let all = table.lines().next().expect("a head").split(',').filter(|name| name.starts_with(columns));
+        let renamed = all.fold(table.clone(), |text, name| text.replacen(name, &format!("other {name}"), 1));
+        fs::write(place.join("less.csv"), renamed).expect("written");
+        refused(place, "recover body.h5 --history less.csv -o again.csv --deny-warnings", "FB564");
+        runs(place, "recover body.h5 --history less.csv -o again.csv --quiet");
+    };
+    ["qd_", "qdd_", "angular_acceleration_"].into_iter().for_each(without);
+}
+
+/// Compares the rows of `simulate` with those that `recover` computes from its table, of the body `body.h5` in `place`.
+fn assert_rows_of_tables(place: &Path) {
     let load = "[[load]]\ninterface = \"right\"\nforce = [300, -200, 1000]\ntorque = [5, 4, 3]\naxes = \"world\"\n\
                 history = { amplitude = 1, frequency = 700 }\n";
     let free = "[run]\nduration = 2e-3\noutputs = 400\n[initial]\nangular_velocity = [100, 50, 300]\n";
@@ -251,7 +289,8 @@ fn rows_of_a_simulation_are_those_of_its_table() {
         fs::write(place.join("scene.toml"), format!("{scene}{load}")).expect("written");
         let told = runs(place, "simulate body.h5 --scene scene.toml --csv run.csv --rows rows.csv --json");
         runs(place, "simulate body.h5 --scene scene.toml --rows rows.h5 --quiet");
-        runs(place, "recover body.h5 --history run.csv -o again.csv --quiet");
+        let carrier = if name == "carried" { " --carried-by left" } else { "" };
+        runs(place, &format!("recover body.h5 --history run.csv -o again.csv --quiet{carrier}"));
         let (own, again) = (columns(&place.join("rows.csv")), columns(&place.join("again.csv")));
         assert_eq!(own.len(), again.len());
         let size = |prefix: &str| {

@@ -70,7 +70,7 @@ impl ModalModel<'_> {
             .iter()
             .map(|masses| lumped::pipeline(&self, masses, exact, &without_counter))
             .collect::<Result<_>>()?;
-        let mut recovered = self.recoveries(condensed.invariants.groups().w1, &without_counter)?;
+        let mut recovered = self.recoveries(condensed.invariants.groups(), &without_counter)?;
         let of_recoveries = std::mem::take(&mut recovered.diagnostics);
         let (parts, overdamped) = self.parts(&condensed, lumped, recovered)?;
         let body = FlexBody::new(parts)?;

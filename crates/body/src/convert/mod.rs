@@ -13,6 +13,7 @@ mod conversion;
 mod lumped;
 mod modal_matrices;
 mod modal_model;
+mod motion_forces;
 mod named_loads;
 mod recovery;
 mod settings;

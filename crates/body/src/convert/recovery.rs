@@ -3,10 +3,14 @@
 
 use super::ModalModel;
 use super::answered::{Targets, mapped_answers};
+use super::motion_forces::{MotionForces, motion_forces};
 use crate::basis::{
     CoupledModel, accurate_static_responses, centrifugal_loads, interface_loads, rigid_modes,
 };
-use crate::flex_body::{LOAD_COMPONENTS, LoadColumns, LoadKind, NamedLoad, Recovery, UnitLoad};
+use crate::flex_body::{
+    LOAD_COMPONENTS, LoadColumns, LoadKind, MotionColumns, MotionLoad, NamedLoad, Recovery, TermGroups,
+    UnitLoad, modes_respond,
+};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -42,53 +46,59 @@ impl ModalModel<'_> {
     /// Returns the recoveries and named loads that the model asks for, with notes and warnings. Their static responses need one factor of
     /// K + tau M; cuts need none.
     ///
-    /// * `responds_to_spin`: true if the body holds the group W1, by which the modes respond to spin.
+    /// * `groups`: groups that the body holds, by which the modes respond to its motion.
     ///
     /// # Errors
     /// [`RecoveryCut`](Code::RecoveryCut) for a cut through a rigid interface; failures of the factor, and responses
     /// that are not accurate.
-    pub(super) fn recoveries(&self, responds_to_spin: bool, context: &Context<'_>) -> Result<Recovered> {
+    pub(super) fn recoveries(&self, groups: TermGroups, context: &Context<'_>) -> Result<Recovered> {
         let (asked, mut named_loads) = (self.model.recoveries(), self.named_loads());
         if asked.is_empty() && named_loads.is_empty() {
             return Ok(Recovered::default());
         }
         context.phase("recovery");
         let basis = FreeBasis::new(self.model, &self.modes.vectors, self.modal_stiffness.clone())?;
-        let loads = StaticLoads::new(self.model)?;
+        let inertia = asked.iter().any(|one| one.deformed_inertia);
+        let loads = StaticLoads::new(self.model, &basis, &self.modes.vectors, inertia)?;
         let is_cut = |one: &ModelRecovery| matches!(one.operator, RecoveryOperator::Cut { .. });
         let responses = match !asked.iter().all(is_cut) || !named_loads.is_empty() {
-            true => self.responses(&basis, &loads, responds_to_spin, context)?,
+            true => self.responses(&basis, &loads, groups, context)?,
             false => Responses { fields: Mat::new(), compliances: Vec::new() },
         };
         named_loads.iter_mut().zip(&responses.compliances).for_each(|(load, c)| load.compliance = Some(*c));
         let responses = responses.fields;
+        let sizes = match responses.ncols() {
+            0 => Vec::new(),
+            _ => basis.sizes_of_responses(&responses, &loads, groups),
+        };
         let mut diagnostics = Vec::new();
         let one = |one: &ModelRecovery| match &one.operator {
             RecoveryOperator::Rows { transposed, labels, offset } => {
                 let modes = product(transposed, &self.modes.vectors);
                 let columns = product(transposed, &responses);
                 let offset = offset.clone().unwrap_or_else(|| vec![0.0; labels.len()]);
-                Ok(loads.recovery(&one.name, labels.clone(), offset, modes, &columns))
+                Ok(loads.recovery(one, labels.clone(), offset, modes, &columns))
             }
             RecoveryOperator::Shapes { shapes, labels } => {
+                let responses = responses.as_ref().subcols(0, loads.count_for(one)).to_owned();
                 let targets = Targets {
                     modes: &basis.modes,
                     responses: &responses,
-                    sizes: basis.sizes_of_responses(&responses, &loads, responds_to_spin),
+                    sizes: sizes[..responses.ncols()].to_vec(),
                     names: loads.names(),
                 };
                 let mapped = mapped_answers(self.model, one, shapes, &targets)?;
                 diagnostics.extend(mapped.diagnostics);
                 let offset = vec![0.0; labels.len()];
-                Ok(loads.recovery(&one.name, labels.clone(), offset, mapped.modes, &mapped.columns))
+                Ok(loads.recovery(one, labels.clone(), offset, mapped.modes, &mapped.columns))
             }
             RecoveryOperator::Cut { nodes, about } => {
                 self.refuse_divided_interface(one, nodes, &basis.coupled)?;
                 let side = one_side(self.model, nodes, *about);
-                let (modes, columns) = basis.section_forces(self.model, &side, &loads, responds_to_spin);
+                let (modes, columns) = basis.section_forces(self.model, &side, &loads, groups);
                 let labels = section_labels(self.model);
                 let offset = vec![0.0; labels.len()];
-                Ok(loads.recovery(&one.name, labels, offset, modes, &columns))
+                Ok(loads.recovery(one, labels, offset, modes, &columns))
             }
         };
         let along_model = asked.iter().map(one).collect::<Result<Vec<Recovery>>>()?;
@@ -102,11 +112,11 @@ impl ModalModel<'_> {
         &self,
         basis: &FreeBasis<'_>,
         loads: &StaticLoads,
-        responds_to_spin: bool,
+        groups: TermGroups,
         context: &Context<'_>,
     ) -> Result<Responses> {
         let first = self.found.solution.eigenvalues[0];
-        let mut responses = basis.responses(loads, first, responds_to_spin, context)?;
+        let mut responses = basis.responses(loads, first, groups, context)?;
         let compliances = basis.compliances(loads, &responses);
         // A frame on an interface follows its motion.
         if let Some(name) = self.settings.frame.interface()
@@ -174,12 +184,12 @@ impl<'m> FreeBasis<'m> {
         &self,
         loads: &StaticLoads,
         first: f64,
-        responds_to_spin: bool,
+        groups: TermGroups,
         context: &Context<'_>,
     ) -> Result<Mat<f64>> {
         let mut responses = self.whole_responses(loads, first, context)?;
         // Less the part that the modes contain.
-        let amplitudes = self.static_amplitudes(loads, responds_to_spin);
+        let amplitudes = self.static_amplitudes(loads, groups);
         subtract_combination(responses.as_mut(), self.modes.as_ref(), amplitudes.as_ref());
         Ok(responses)
     }
@@ -198,15 +208,34 @@ impl<'m> FreeBasis<'m> {
 
     /// Returns f'G f of each named load, for its `responses` G_r F in mean axes among those to all loads.
     fn compliances(&self, loads: &StaticLoads, responses: &Mat<f64>) -> Vec<f64> {
-        let first = loads.forces.ncols() - loads.named.len();
-        let amplitudes = self.static_amplitudes(loads, true);
-        let modal = loads.modal(&self.modes, true);
+        let amplitudes = self.static_amplitudes(loads, TermGroups::ALL);
+        let modal = loads.modal(&self.modes, TermGroups::ALL);
         let one = |c: usize| -> f64 {
             let outside: f64 = (0..responses.nrows()).map(|i| loads.forces[(i, c)] * responses[(i, c)]).sum();
             let inside: f64 = (0..modal.nrows()).map(|j| modal[(j, c)] * amplitudes[(j, c)]).sum();
             outside + inside
         };
-        (first..loads.forces.ncols()).map(one).collect()
+        loads.named_columns().map(one).collect()
+    }
+
+    /// Returns the parts of nodal forces (N x m), beside those of rigid motion, that the inertia of the modes does not balance,
+    /// F - M R R'F - M Psi_m m^-1 Psi_m'F with m = Psi_m'M Psi_m, and that their stiffness does not, with K and K_ff in place of
+    /// M and m. Sections depend on the former, rows of an operator on the latter.
+    fn outside(&self, forces: &Mat<f64>) -> [Mat<f64>; 2] {
+        let pencil = self.coupled.model().pencil();
+        let (inertial, elastic) =
+            (pencil.apply_mass(self.modes.as_ref()), pencil.apply_stiffness(self.modes.as_ref()));
+        let mass = gram(self.modes.as_ref(), inertial.as_ref());
+        let modal = gram(self.modes.as_ref(), forces.as_ref());
+        let resultants = gram(self.rigid.as_ref(), forces.as_ref());
+        let beside_rigid =
+            forces - combine(pencil.apply_mass(self.rigid.as_ref()).as_ref(), resultants.as_ref());
+        [(inertial, &mass), (elastic, &self.stiffness)].map(|(balanced, matrix)| {
+            let amplitudes =
+                solve(matrix, &modal).expect("mass and stiffness of modes are positive definite");
+            // Inner forces of rigid interfaces do not deform the body.
+            self.coupled.restrict(&beside_rigid - combine(balanced.as_ref(), amplitudes.as_ref()))
+        })
     }
 
     /// Removes rigid motion from fields (N x m): the part that rounding leaves.
@@ -221,9 +250,9 @@ impl<'m> FreeBasis<'m> {
         &self,
         responses: &Mat<f64>,
         loads: &StaticLoads,
-        responds_to_spin: bool,
+        groups: TermGroups,
     ) -> Vec<f64> {
-        let amplitudes = self.static_amplitudes(loads, responds_to_spin);
+        let amplitudes = self.static_amplitudes(loads, groups);
         let of_modes = combine(self.modes.as_ref(), amplitudes.as_ref());
         let both = self.norms(responses).into_iter().zip(self.norms(&of_modes));
         both.map(|(outside, inside)| outside + inside).collect()
@@ -236,10 +265,10 @@ impl<'m> FreeBasis<'m> {
         squares.into_iter().map(|square| square.max(0.0).sqrt()).collect()
     }
 
-    /// Returns the amplitudes K_ff^-1 Psi_m'F of the modes under constant loads. Without response to spin they are
-    /// zero for the centrifugal loads.
-    fn static_amplitudes(&self, loads: &StaticLoads, responds_to_spin: bool) -> Mat<f64> {
-        let solved = solve(&self.stiffness, &loads.modal(&self.modes, responds_to_spin));
+    /// Returns the amplitudes K_ff^-1 Psi_m'F of the modes under constant loads; zero for the forces of motion that the modes
+    /// do not respond to without a group.
+    fn static_amplitudes(&self, loads: &StaticLoads, groups: TermGroups) -> Mat<f64> {
+        let solved = solve(&self.stiffness, &loads.modal(&self.modes, groups));
         solved.expect("the stiffness of modes with positive eigenvalues is positive definite")
     }
 
@@ -251,7 +280,7 @@ impl<'m> FreeBasis<'m> {
         model: &FeModel,
         side: &Mat<f64>,
         loads: &StaticLoads,
-        responds_to_spin: bool,
+        groups: TermGroups,
     ) -> (Mat<f64>, Mat<f64>) {
         let pencil = model.pencil();
         let moved = pencil.apply_mass(side.as_ref());
@@ -264,7 +293,7 @@ impl<'m> FreeBasis<'m> {
         let resultants = gram(self.rigid.as_ref(), forces.as_ref());
         let of_rigid = combine(pencil.apply_mass(self.rigid.as_ref()).as_ref(), resultants.as_ref());
         forces -= of_rigid;
-        let modal = accelerations(&loads.modal(&self.modes, responds_to_spin));
+        let modal = accelerations(&loads.modal(&self.modes, groups));
         let columns = gram(side.as_ref(), forces.as_ref()) - combine(of_inertia.as_ref(), modal.as_ref());
         (combine(of_inertia.as_ref(), accelerations(&self.stiffness).as_ref()), columns)
     }
@@ -277,7 +306,8 @@ fn solve(a: &Mat<f64>, b: &Mat<f64>) -> Option<Mat<f64>> {
 }
 
 /// Loads of the columns, along the axes of the model: six (in the plane one) centrifugal loads, then six (in the plane
-/// three) for each interface with a reference point, then the named loads.
+/// three) for each interface with a reference point, then the named loads, then the forces of the deformed body by its
+/// motion.
 pub(super) struct StaticLoads {
     /// Nodal forces (N x m).
     forces: Mat<f64>,
@@ -287,10 +317,33 @@ pub(super) struct StaticLoads {
     /// Components of force and torque of the loads at an interface.
     components: &'static [usize],
     named: Vec<String>,
+    /// Kinds of forces of the deformed body, with the components of the model's dimension.
+    motion: Vec<(MotionLoad, &'static [usize])>,
+    /// Number of modes whose deformation exerts forces.
+    modes: usize,
 }
 
 impl StaticLoads {
-    pub(super) fn new(model: &FeModel) -> Result<Self> {
+    /// Creates the loads of a model and the forces of its modes `vectors` (N x nf) in the frame of the body, whose span with
+    /// rigid motion is that of `basis`.
+    ///
+    /// * `inertia`: true to add the inertia of the deformation.
+    pub(super) fn new(
+        model: &FeModel,
+        basis: &FreeBasis<'_>,
+        vectors: &Mat<f64>,
+        inertia: bool,
+    ) -> Result<Self> {
+        let motion = motion_forces(model, vectors, inertia, |forces| basis.outside(forces));
+        Self::with_motion(model, motion, vectors.ncols())
+    }
+
+    /// Creates the loads of a model alone.
+    pub(super) fn of_model(model: &FeModel) -> Result<Self> {
+        Self::with_motion(model, Vec::new(), 0)
+    }
+
+    fn with_motion(model: &FeModel, motion: Vec<MotionForces>, modes: usize) -> Result<Self> {
         let mut parts = centrifugal_loads(model);
         let mut interfaces = Vec::new();
         for set in model.interfaces().iter().filter(|set| set.coupling() != Coupling::Free) {
@@ -301,6 +354,9 @@ impl StaticLoads {
         }
         let named = model.named_loads();
         parts.push(Mat::from_fn(model.rows().len(), named.len(), |i, c| named[c].forces[i]));
+        let of_motion = |one: &MotionForces| (one.load, one.load.of_dimension(model.dimension()));
+        let kinds = motion.iter().map(of_motion).collect();
+        parts.extend(motion.into_iter().map(|one| one.forces));
         let parts: Vec<_> = parts.iter().map(Mat::as_ref).collect();
         Ok(Self {
             forces: side_by_side(&parts),
@@ -308,15 +364,45 @@ impl StaticLoads {
             interfaces,
             components: rigid_axes(model.dimension()),
             named: named.iter().map(|load| load.name.clone()).collect(),
+            motion: kinds,
+            modes,
         })
     }
 
     /// Returns the names of the loads, in their order.
     pub(super) fn names(&self) -> Vec<String> {
-        self.unit_loads().iter().map(UnitLoad::step).collect()
+        let of_kind = |&(load, components): &(MotionLoad, &'static [usize])| {
+            components.iter().flat_map(move |&c| (0..self.modes).map(move |j| load.step(c, j)))
+        };
+        let loads = self.unit_loads();
+        loads.iter().map(UnitLoad::step).chain(self.motion.iter().flat_map(of_kind)).collect()
     }
 
-    /// Returns the unit loads of geometric stiffness that the loads are, in their order.
+    /// Returns the columns of the named loads.
+    fn named_columns(&self) -> std::ops::Range<usize> {
+        let first = self.spins.len() + self.interfaces.len() * self.components.len();
+        first..first + self.named.len()
+    }
+
+    /// Returns the number of loads that have columns in a recovery, which come first: the inertia of the deformation where it
+    /// is asked for, and all others.
+    fn count_for(&self, asked: &ModelRecovery) -> usize {
+        let of_inertia =
+            self.of_motion().find(|(load, ..)| *load != MotionLoad::Damping && !asked.deformed_inertia);
+        of_inertia.map_or(self.forces.ncols(), |(.., first)| first)
+    }
+
+    /// Returns the kinds of forces of the deformed body, their components and their first column.
+    fn of_motion(&self) -> impl Iterator<Item = (MotionLoad, &'static [usize], usize)> {
+        let mut next = self.named_columns().end;
+        self.motion.iter().map(move |&(load, components)| {
+            let first = next;
+            next += components.len() * self.modes;
+            (load, components, first)
+        })
+    }
+
+    /// Returns the unit loads of geometric stiffness that the loads are, in their order, without forces of motion.
     pub(super) fn unit_loads(&self) -> Vec<UnitLoad> {
         let spin = self.spins.iter().map(|&component| UnitLoad { kind: LoadKind::Spin, component });
         let at = |interface: &String| {
@@ -328,11 +414,17 @@ impl StaticLoads {
         spin.chain(self.interfaces.iter().flat_map(at)).chain(named).collect()
     }
 
-    /// Returns the modal loads Psi_m'F (nf x m); those of spin are zero if the modes do not respond to it.
-    fn modal(&self, modes: &Mat<f64>, responds_to_spin: bool) -> Mat<f64> {
+    /// Returns the modal loads Psi_m'F (nf x m); those of spin and of other motion are zero if the modes do not respond to it
+    /// without a group.
+    fn modal(&self, modes: &Mat<f64>, groups: TermGroups) -> Mat<f64> {
         let mut modal = gram(modes.as_ref(), self.forces.as_ref());
-        if !responds_to_spin {
+        if !groups.w1 {
             modal.as_mut().subcols_mut(0, self.spins.len()).fill(0.0);
+        }
+        for (load, components, first) in self.of_motion() {
+            if !modes_respond(load, groups) {
+                modal.as_mut().subcols_mut(first, components.len() * self.modes).fill(0.0);
+            }
         }
         modal
     }
@@ -340,7 +432,7 @@ impl StaticLoads {
     /// Returns the recovery with the rows in the modes and under all loads (rows x m), along the axes of the model.
     fn recovery(
         &self,
-        name: &str,
+        asked: &ModelRecovery,
         rows: Vec<RecoveryRow>,
         offset: Vec<f64>,
         modes: Mat<f64>,
@@ -360,9 +452,19 @@ impl StaticLoads {
             LoadColumns { interface: interface.clone(), columns: own }
         };
         let loads = self.interfaces.iter().enumerate().map(at).collect();
-        let first = columns.ncols() - self.named.len();
-        let named = columns.as_ref().subcols(first, self.named.len()).to_owned();
-        Recovery { name: name.to_owned(), rows, offset, modes, spin, loads, named }
+        let named = columns.as_ref().subcols(self.named_columns().start, self.named.len()).to_owned();
+        let nf = self.modes;
+        let of_kind = |(load, components, first): (MotionLoad, &'static [usize], usize)| {
+            let mut own = Mat::zeros(count, load.components() * nf);
+            for (from, &to) in components.iter().enumerate() {
+                let columns = columns.as_ref().subcols(first + from * nf, nf);
+                own.as_mut().subcols_mut(to * nf, nf).copy_from(columns);
+            }
+            MotionColumns { load, columns: own }
+        };
+        let asked_for = self.of_motion().filter(|(.., first)| *first < self.count_for(asked));
+        let motion = asked_for.map(of_kind).collect();
+        Recovery { name: asked.name.clone(), rows, offset, modes, spin, loads, named, motion }
     }
 }
 

@@ -5,7 +5,7 @@ use super::recovery::{FreeBasis, StaticLoads};
 use crate::flex_body::FlexBody;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::Result;
+use flexbody_base::error::{Error, Result};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{gram, largest_entry, side_by_side};
 use flexbody_model::{FeModel, LoadKind, ModelLoad, UnitLoad, extents};
@@ -55,15 +55,22 @@ pub struct RecoveryShapes {
 /// Returns the shapes of `body`, whose combinations are its modes and the static columns of every recovery, except
 /// static columns that the modes contain.
 ///
+/// * `deformed_inertia`: true for the columns of the inertia of the deformation too.
+///
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) if the body is not of `model`; failures of the factor.
-pub fn recovery_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) -> Result<RecoveryShapes> {
+pub fn recovery_shapes(
+    body: &FlexBody,
+    model: &FeModel,
+    deformed_inertia: bool,
+    context: &Context<'_>,
+) -> Result<RecoveryShapes> {
     let basis = basis_of(body, model)?;
     context.phase("static responses");
-    let loads = StaticLoads::new(model)?;
-    let responds_to_spin = body.groups().w1;
-    let mut responses = basis.responses(&loads, body.modes().eigenvalue[0], responds_to_spin, context)?;
-    let sizes = basis.sizes_of_responses(&responses, &loads, responds_to_spin);
+    let (groups, vectors) = (body.groups(), vectors_of(body, model)?);
+    let loads = StaticLoads::new(model, &basis, &vectors, deformed_inertia)?;
+    let mut responses = basis.responses(&loads, body.modes().eigenvalue[0], groups, context)?;
+    let sizes = basis.sizes_of_responses(&responses, &loads, groups);
     basis.remove_rigid_motion(&mut responses);
     let norms = basis.norms(&responses);
     let modes = basis.modes.ncols();
@@ -88,7 +95,7 @@ pub fn recovery_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) 
 pub fn load_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) -> Result<RecoveryShapes> {
     let basis = basis_of(body, model)?;
     context.phase("static responses");
-    let loads = StaticLoads::new(model)?;
+    let loads = StaticLoads::of_model(model)?;
     let mut responses = basis.whole_responses(&loads, body.modes().eigenvalue[0], context)?;
     basis.remove_rigid_motion(&mut responses);
     let norms = basis.norms(&responses);
@@ -114,19 +121,25 @@ pub fn load_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) -> R
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) if the body is not of `model`.
 fn basis_of<'m>(body: &FlexBody, model: &'m FeModel) -> Result<FreeBasis<'m>> {
-    let incomparable = |message: &str| Diagnostic::new(Code::BodyIncomparable, message);
-    let vectors = (body.nodes().ids == model.nodes().ids).then(|| body.vectors_of(model)).flatten();
-    let Some(vectors) = vectors else {
-        return Err(incomparable("the nodes and rows of the body are not those of the model").into());
-    };
+    let vectors = vectors_of(body, model)?;
     let stored = body.invariants().modal_stiffness();
     let computed = gram(vectors.as_ref(), model.pencil().apply_stiffness(vectors.as_ref()).as_ref());
     let apart = largest_entry((&computed - stored).as_ref());
     let allowed = (MAX_STIFFNESS_DIFFERENCE + body.storage().rounding()) * largest_entry(stored.as_ref());
     if apart.is_nan() || apart > allowed {
-        return Err(incomparable("the stiffness of the body's modes is not that of the model").into());
+        return Err(incomparable("the stiffness of the body's modes is not that of the model"));
     }
     FreeBasis::new(model, &vectors, stored.clone())
+}
+
+/// Returns the modes of `body` by the rows of `model` (N x nf), in the frame of the body and along the axes of the model.
+fn vectors_of(body: &FlexBody, model: &FeModel) -> Result<Mat<f64>> {
+    let vectors = (body.nodes().ids == model.nodes().ids).then(|| body.vectors_of(model)).flatten();
+    vectors.ok_or_else(|| incomparable("the nodes and rows of the body are not those of the model"))
+}
+
+fn incomparable(message: &str) -> Error {
+    Diagnostic::new(Code::BodyIncomparable, message).into()
 }
 
 /// Returns the columns `kept` of the fields (N x m), each with its largest displacement set to the size of a shape.

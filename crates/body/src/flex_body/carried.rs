@@ -13,7 +13,7 @@
 
 use super::modal_change::{rotations_without, shapes_without, stacked};
 use super::rotated_stiffness::{SplitStiffness, split, transformed, without_rotation};
-use super::{FlexBody, Interface, ReferenceConditions, TermGroups};
+use super::{FlexBody, Interface, Recovery, ReferenceConditions, TermGroups};
 use crate::basis::BasisKind;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -43,6 +43,15 @@ pub enum Carrier {
 }
 
 impl Carrier {
+    /// Returns the interface of `body` with this name, or else the node with this number.
+    pub fn named(body: &FlexBody, name: &str) -> Self {
+        let is_interface = body.interfaces().iter().any(|interface| interface.name == name);
+        match name.parse() {
+            Ok(number) if !is_interface => Self::Node(number),
+            _ => Self::Interface(name.to_owned()),
+        }
+    }
+
     /// Parses the name of a carrier in simulation files: `interface NAME` or `node 17`.
     pub fn from_words(words: &str) -> Option<Self> {
         match words.split_once(' ')? {
@@ -113,6 +122,7 @@ impl FlexBody {
             lumped.invariants = lumped.invariants.without_rigid_motion(motion.as_ref());
         }
         parts.named_loads = parts.named_loads.iter().map(|load| load.without_rigid_motion(&motion)).collect();
+        parts.recoveries = parts.recoveries.iter().map(|one| one.without_rigid_motion(&motion)).collect();
         (parts.geometric_stiffness, parts.rotated_stiffness) = (geometric_stiffness, rotated_stiffness);
         // The nodes turn relative to the carrier, which turns the frame.
         parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
@@ -151,7 +161,7 @@ impl FlexBody {
 
     /// Sets modal damping: each eigenpair in the frame of the body gets the ratio of `ratios` at its
     /// frequency, D = m_ff X diag(2 ratio omega) X' m_ff. For a body of free modes the eigenpairs are the
-    /// modes.
+    /// modes. Static columns of other damping forces are left out of recoveries.
     ///
     /// # Errors
     /// The errors of [`FlexBody::new`].
@@ -160,6 +170,7 @@ impl FlexBody {
         let ratio = |eigenvalue: f64| ratios.at(self.units().frequency_of(eigenvalue.max(0.0)));
         parts.modes.damping_ratio = self.modes().eigenvalue.iter().map(|&lambda| ratio(lambda)).collect();
         parts.modes.modal_damping = None;
+        parts.recoveries.iter_mut().for_each(Recovery::remove_damping);
         let mass = self.invariants().modal_mass();
         let apart = |i: usize, j: usize| (mass[(i, j)] - f64::from(i == j)).abs();
         let nf = self.n_modes();

@@ -2,7 +2,7 @@
 
 use super::{
     Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LoadColumns,
-    LumpedBody, Modes, NamedLoad, Parts, Recovery, RotatedStiffness, UnitLoad,
+    LumpedBody, Modes, MotionColumns, NamedLoad, Parts, Recovery, RotatedStiffness, UnitLoad,
 };
 use crate::invariants::{InertiaStiffness, Invariants, UnitFactors};
 use faer::Mat;
@@ -136,10 +136,15 @@ impl Change {
             }),
             ..one.clone()
         };
+        let of_motion = |one: &MotionColumns| {
+            let amplitude = self.modal() * self.of(0, 0, one.load.power_of_time());
+            MotionColumns { columns: times(&one.columns, 1.0 / amplitude), ..*one }
+        };
         Recovery {
             modes: times(&given.modes, 1.0 / self.modal()),
             spin: times(&given.spin, 1.0 / self.of(0, 0, -2)),
             loads: given.loads.iter().map(loads).collect(),
+            motion: given.motion.iter().map(of_motion).collect(),
             ..given.clone()
         }
     }

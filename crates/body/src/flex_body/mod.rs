@@ -9,6 +9,7 @@ mod in_units;
 mod interface;
 mod modal_change;
 mod model_axes;
+mod motion_columns;
 mod named_load;
 mod parts;
 mod recovery;
@@ -30,6 +31,7 @@ pub use held_modes::HeldMode;
 pub use interface::{Interface, InterfaceRows};
 pub use modal_change::{ModalChange, RigidMotions, diagonal_eigenvalues, reduced_residuals, rigid_motions};
 pub use model_axes::{along, stiffness_about};
+pub use motion_columns::{ModalMotion, MotionColumns, MotionLoad, modes_respond};
 pub use named_load::NamedLoad;
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, is_static,

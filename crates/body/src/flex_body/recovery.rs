@@ -6,14 +6,16 @@
 //!
 //! of the deformed body (theory section 12), with the modal coordinates q, the loads f_a on the body and the angular
 //! velocity w. G_r is the static flexibility of the free body outside the modes. Accelerations and gravity have no
-//! terms: G M (rigid motion) = 0.
+//! terms: G M (rigid motion) = 0. Damping forces and the inertia of the deformation have the columns of [`MotionLoad`].
 
-use super::modal_change::RigidCoupling;
-use super::{FlexBody, LoadKind, NamedLoad, TermGroups, UnitLoad};
+use super::modal_change::{ModalChange, RigidCoupling};
+use super::motion_columns::{modal_forces, modes_respond};
+use super::{FlexBody, LoadKind, ModalMotion, MotionColumns, MotionLoad, NamedLoad, TermGroups, UnitLoad};
 use crate::invariants::Invariants;
 use faer::Mat;
 use flexbody_model::RecoveryRow;
 use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeSet;
 
 /// Number of columns of a load at an interface: force and torque along three axes.
 pub const LOAD_COMPONENTS: usize = 6;
@@ -37,6 +39,9 @@ pub struct Recovery {
     pub loads: Vec<LoadColumns>,
     /// R G_r f (rows x number of named loads), in the order of the named loads of the body.
     pub named: Mat<f64>,
+    /// Columns of the forces that the deformed body exerts by its motion, in the order of [`MotionLoad::ALL`]; of each
+    /// kind once at most.
+    pub motion: Vec<MotionColumns>,
 }
 
 /// Columns of the loads at one interface.
@@ -51,10 +56,8 @@ pub struct LoadColumns {
 /// State of the body that the rows follow from.
 #[derive(Debug, Clone, Copy)]
 pub struct RecoveryState<'a> {
-    /// Modal coordinates (nf).
-    pub q: &'a [f64],
-    /// Angular velocity of the frame, body axes. Unit: 1/time.
-    pub angular_velocity: Vector3<f64>,
+    /// Modal coordinates, their rates and the turning of the frame.
+    pub motion: ModalMotion<'a>,
     /// Force and torque at the reference point of each interface, body axes, in the order of [`Recovery::loads`].
     pub loads: &'a [[f64; LOAD_COMPONENTS]],
     /// Amplitudes of the named loads, in the order of the body; 1 for a preload.
@@ -67,11 +70,24 @@ impl Recovery {
     /// # Panics
     /// When the numbers of modes or of loads differ.
     pub fn values(&self, state: &RecoveryState<'_>) -> Vec<f64> {
-        assert_eq!(state.q.len(), self.modes.ncols(), "modal coordinates");
+        let q = state.motion.q;
+        assert_eq!(q.len(), self.modes.ncols(), "modal coordinates");
         assert_eq!(state.loads.len(), self.loads.len(), "loads");
         assert_eq!(state.named.len(), self.named.ncols(), "named loads");
-        let w = state.angular_velocity;
+        let w = state.motion.angular_velocity;
         let products = LoadKind::SPIN.map(|(k, l)| w[k] * w[l]);
+        let amplitudes = |one: &MotionColumns| {
+            let mut amplitudes = vec![0.0; one.columns.ncols()];
+            one.load.write_amplitudes(&state.motion, &mut amplitudes);
+            amplitudes
+        };
+        let of_motion: Vec<Vec<f64>> = self.motion.iter().map(amplitudes).collect();
+        let of_deformed = |i: usize| -> f64 {
+            let one = |(own, amplitudes): (&MotionColumns, &Vec<f64>)| -> f64 {
+                amplitudes.iter().enumerate().map(|(c, a)| own.columns[(i, c)] * a).sum()
+            };
+            self.motion.iter().zip(&of_motion).map(one).sum()
+        };
         let of_loads = |i: usize| -> f64 {
             let one = |(of_interface, load): (&LoadColumns, &[f64; LOAD_COMPONENTS])| -> f64 {
                 load.iter().enumerate().map(|(a, f)| of_interface.columns[(i, a)] * f).sum()
@@ -79,10 +95,10 @@ impl Recovery {
             self.loads.iter().zip(state.loads).map(one).sum()
         };
         let value = |i: usize| {
-            let of_modes: f64 = state.q.iter().enumerate().map(|(j, q)| self.modes[(i, j)] * q).sum();
+            let of_modes: f64 = q.iter().enumerate().map(|(j, q)| self.modes[(i, j)] * q).sum();
             let of_spin: f64 = products.iter().enumerate().map(|(c, w)| self.spin[(i, c)] * w).sum();
             let of_named: f64 = state.named.iter().enumerate().map(|(c, a)| self.named[(i, c)] * a).sum();
-            self.offset[i] + of_modes + of_loads(i) + of_named + of_spin
+            self.offset[i] + of_modes + of_loads(i) + of_named + of_spin + of_deformed(i)
         };
         (0..self.rows.len()).map(value).collect()
     }
@@ -108,13 +124,34 @@ impl Recovery {
         Self {
             spin: Mat::from_fn(self.rows.len(), LoadKind::SPIN.len(), spin),
             loads: self.loads.iter().map(load).collect(),
+            motion: self.motion.iter().map(|one| one.in_axes(axes)).collect(),
             ..self.clone()
         }
     }
 
-    /// Returns the recovery with other modal coordinates, for which R Psi is `modes`.
-    pub(super) fn with_modes(&self, modes: Mat<f64>) -> Self {
-        Self { modes, ..self.clone() }
+    /// Removes the static columns of damping forces, for a body with other damping.
+    pub fn remove_damping(&mut self) {
+        self.motion.retain(|one| one.load != MotionLoad::Damping);
+    }
+
+    /// Returns the recovery in a frame that follows the rigid motion `taken` (6 x nf) of the modes. Its rows stay relative to
+    /// the former frame.
+    pub(super) fn without_rigid_motion(&self, taken: &Mat<f64>) -> Self {
+        let turned = taken.as_ref().subrows(3, 3).to_owned();
+        let of_motion = |one: &MotionColumns| one.with_modes(Mat::clone, Some(&turned), &self.spin);
+        Self { motion: self.motion.iter().map(of_motion).collect(), ..self.clone() }
+    }
+
+    /// Returns the recovery after a change of the modes, for rows that rigid motion does not change.
+    pub(super) fn with_modes(&self, change: &ModalChange) -> Self {
+        let turned = change.taken().map(|taken| taken.as_ref().subrows(3, 3).to_owned());
+        let combined = |rows: &Mat<f64>| change.combined(rows);
+        let of_motion = |one: &MotionColumns| one.with_modes(combined, turned.as_ref(), &self.spin);
+        Self {
+            modes: change.combined(&self.modes),
+            motion: self.motion.iter().map(of_motion).collect(),
+            ..self.clone()
+        }
     }
 }
 
@@ -126,6 +163,9 @@ struct ModalLoads {
     at_interfaces: Vec<(String, Mat<f64>)>,
     /// Of the named loads (nf x their number).
     named: Mat<f64>,
+    /// Of the forces of the deformed body by its motion (nf x components nf), by their kind; none that the modes do not
+    /// respond to.
+    motion: Vec<(MotionLoad, Mat<f64>)>,
 }
 
 /// Static response of modal coordinates to unit loads.
@@ -138,6 +178,8 @@ pub struct StaticCoordinates {
     pub at_interfaces: Vec<(String, Mat<f64>)>,
     /// Response (nf x number of named loads) to each named load with amplitude 1.
     pub named: Mat<f64>,
+    /// Response (nf x components nf) to the forces of the deformed body by its motion, by their kind.
+    pub motion: Vec<(MotionLoad, Mat<f64>)>,
 }
 
 impl FlexBody {
@@ -153,7 +195,7 @@ impl FlexBody {
         let dropped: Vec<usize> = (0..nf).filter(|j| kept.binary_search(j).is_err()).collect();
         let all: Vec<usize> = (0..nf).collect();
         let loses_w1 = self.groups().w1 && !groups.w1;
-        if dropped.is_empty() && !loses_w1 {
+        if dropped.is_empty() && self.groups() == groups {
             return recoveries.clone();
         }
         let loads = self.modal_loads();
@@ -176,6 +218,14 @@ impl FlexBody {
                 take_over(one, &mut new.spin, spin, if loses_w1 { &all } else { &dropped });
             }
             take_over(one, &mut new.named, &loads.named, &dropped);
+            for of_motion in &mut new.motion {
+                let responded = loads.motion.iter().find(|(load, _)| *load == of_motion.load);
+                if let Some((load, force)) = responded {
+                    let from = if modes_respond(*load, groups) { &dropped } else { &all };
+                    take_over(one, &mut of_motion.columns, force, from);
+                }
+                *of_motion = of_motion.of_modes(kept);
+            }
             for at in &mut new.loads {
                 if let Some((_, load)) = loads.at_interfaces.iter().find(|(name, _)| *name == at.interface) {
                     take_over(one, &mut at.columns, load, &dropped);
@@ -205,9 +255,22 @@ impl FlexBody {
             spin: whole(&recovery.spin, loads.spin.as_ref()),
             loads: recovery.loads.iter().map(at_interface).collect(),
             named: whole(&recovery.named, Some(&loads.named)),
+            motion: Vec::new(),
             ..recovery.clone()
         };
         along_body.in_axes(&self.frame().axes.transpose())
+    }
+
+    /// Returns the rows of a recovery under the static response to the forces of motion of one kind (rows x components nf),
+    /// modes and static columns together; `None` if the recovery does not have them.
+    pub fn motion_rows(&self, recovery: &Recovery, load: MotionLoad) -> Option<Mat<f64>> {
+        let columns = recovery.of_motion(load)?;
+        let all: Vec<usize> = (0..self.n_modes()).collect();
+        let forces = self.modal_loads().motion;
+        Some(match forces.iter().find(|(own, _)| *own == load) {
+            Some((_, forces)) => columns + &recovery.modes * self.static_response(forces, &all),
+            None => columns.clone(),
+        })
     }
 
     /// Returns the largest part of a static response of a recovery that its static columns hold, and that the modes alone
@@ -249,6 +312,7 @@ impl FlexBody {
                 .map(|(name, load)| (name.clone(), response(load)))
                 .collect(),
             named: response(&loads.named),
+            motion: loads.motion.iter().map(|(load, force)| (*load, response(force))).collect(),
         }
     }
 
@@ -289,7 +353,12 @@ impl FlexBody {
             let resultant = named[c].resultant();
             named[c].modal[j] - (0..6).map(|k| taken[(k, j)] * resultant[k]).sum::<f64>()
         };
+        let kinds = self.recoveries().iter().flat_map(|one| &one.motion).map(|one| one.load);
+        let kinds: BTreeSet<MotionLoad> = kinds.collect();
+        let damping = self.damping();
+        let of_motion = |load: MotionLoad| Some((load, modal_forces(load, invariants, &damping, &taken)?));
         ModalLoads {
+            motion: kinds.into_iter().filter_map(of_motion).collect(),
             named: Mat::from_fn(self.n_modes(), named.len(), of_named),
             spin: centrifugal_loads(invariants, &taken),
             at_interfaces: self.interfaces().iter().filter_map(at_interface).collect(),

@@ -187,8 +187,7 @@ impl FlexBody {
             parts.lumped.iter().map(|lumped| changed_lumped(lumped, change, &invariants)).collect();
         // Rows that rigid motion changes are known only relative to the former frame.
         parts.recoveries.retain(Recovery::ignores_rigid_motion);
-        parts.recoveries =
-            parts.recoveries.iter().map(|one| one.with_modes(change.combined(&one.modes))).collect();
+        parts.recoveries = parts.recoveries.iter().map(|one| one.with_modes(change)).collect();
         parts.named_loads = parts.named_loads.iter().map(|one| one.with_modes(change)).collect();
         parts.certificate = unproved(&parts);
         (parts.invariants, parts.conditions, parts.coordinates) = (invariants, conditions, None);

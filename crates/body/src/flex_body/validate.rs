@@ -1,7 +1,8 @@
 //! Conditions on the parts of a flexible body, checked once; all violations are collected.
 
 use super::{
-    LOAD_COMPONENTS, LoadColumns, LoadKind, MassStructure, Parts, ReferenceConditions, SurfaceMesh, TermGroup,
+    LOAD_COMPONENTS, LoadColumns, LoadKind, MassStructure, MotionColumns, Parts, ReferenceConditions,
+    SurfaceMesh, TermGroup,
 };
 use crate::invariants::{DIGITS, InertiaStiffness};
 use crate::problems::{MAX_NUMBER, Problems};
@@ -436,6 +437,12 @@ impl Problems {
             self.matrix(&format!("{name} modes"), &one.modes, rows, nf);
             self.matrix(&format!("{name} spin"), &one.spin, rows, LoadKind::SPIN.len());
             self.matrix(&format!("{name} named"), &one.named, rows, parts.named_loads.len());
+            for MotionColumns { load, columns } in &one.motion {
+                self.matrix(&format!("{name} {}", load.name()), columns, rows, load.components() * nf);
+            }
+            if one.motion.windows(2).any(|pair| pair[0].load >= pair[1].load) {
+                self.add(format!("{name} has columns of motion twice or out of order"));
+            }
             self.names(&format!("an interface of {name}"), one.loads.iter().map(|load| &load.interface));
             for LoadColumns { interface, columns } in &one.loads {
                 self.matrix(&format!("{name} loads at `{interface}`"), columns, rows, LOAD_COMPONENTS);

@@ -5,7 +5,7 @@ use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisChoice, CraigBampton, FreeSurface};
 use flexbody_body::convert::{Conversion, ConvertSettings, ShapeColumn, convert, recovery_shapes};
-use flexbody_body::flex_body::{FlexBody, Recovery};
+use flexbody_body::flex_body::{FlexBody, MotionLoad, Recovery};
 use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{column_products, combine};
@@ -60,7 +60,16 @@ fn free() -> BasisChoice {
 
 /// Returns what an FE program answers to the shapes of `body`.
 fn answered(body: &FlexBody, model: &FeModel) -> (AnsweredShapes, Vec<ShapeColumn>) {
-    let shapes = recovery_shapes(body, model, &Context::QUIET).expect("shapes");
+    answered_with(body, model, false)
+}
+
+/// Returns the answers to the shapes with those of the inertia of the deformation or without.
+fn answered_with(
+    body: &FlexBody,
+    model: &FeModel,
+    deformed_inertia: bool,
+) -> (AnsweredShapes, Vec<ShapeColumn>) {
+    let shapes = recovery_shapes(body, model, deformed_inertia, &Context::QUIET).expect("shapes");
     let RecoveryOperator::Rows { transposed, .. } = operator().operator else { panic!("an operator") };
     let u = &shapes.fields;
     // The rows of this model are in the order of its files.
@@ -106,6 +115,31 @@ fn answers_to_the_shapes_of_a_body_give_its_recovery() {
         assert!(difference(&found.body.recoveries()[0], &expected.recoveries()[0]) < 1e-9);
         let codes: Vec<Code> = found.diagnostics.iter().map(|one| one.code()).collect();
         assert!(codes.contains(&Code::RecoveryMapped), "{codes:?}");
+    }
+}
+
+/// The columns of the inertia of the deformation are steps too; without them the recovery is refused.
+#[test]
+fn answers_have_the_columns_of_the_inertia_of_the_deformation() {
+    let deformed = |one: ModelRecovery| ModelRecovery { deformed_inertia: true, ..one };
+    for basis in [free, || BasisChoice::CraigBampton(CraigBampton)] {
+        let expected = made(deformed(operator()), basis(), 5, BodyFrame::Principal).expect("converts").body;
+        let (shapes, columns) = answered_with(&expected, &model(bracket(operator())), true);
+        assert!(columns.iter().any(|one| one.to_string() == "turning z of mode 2"), "{columns:?}");
+        let answers = deformed(recovery_of(shapes));
+        let found = made(answers, basis(), 5, BodyFrame::Principal).expect("converts").body;
+        let (own, other) = (&found.recoveries()[0], &expected.recoveries()[0]);
+        assert!(difference(own, other) < 1e-8);
+        for load in MotionLoad::INERTIA {
+            let rows = |body: &FlexBody, one: &Recovery| body.motion_rows(one, load).expect("columns");
+            let (own, other) = (rows(&found, own), rows(&expected, other));
+            let apart = (&own - &other).norm_max() / other.norm_max();
+            assert!(apart < 1e-8, "{}: {apart:e}", load.name());
+        }
+        let (shapes, _) = answered(&expected, &model(bracket(operator())));
+        let error =
+            made(deformed(recovery_of(shapes)), basis(), 5, BodyFrame::Principal).expect_err("refused");
+        assert!(error.has(Code::RecoveryUnanswered), "{error}");
     }
 }
 

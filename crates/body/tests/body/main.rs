@@ -20,6 +20,7 @@ mod invariants;
 mod lumped_modes;
 mod mesh;
 mod mode_files;
+mod motion_columns;
 mod multigrid;
 mod nastran;
 mod nastran_rows;

@@ -6,7 +6,7 @@ use flexbody_base::diagnostic::Code;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{BasisChoice, CraigBampton, FreeSurface, Loads};
 use flexbody_body::convert::{ConvertSettings, convert};
-use flexbody_body::flex_body::{FlexBody, Quantity, RecoveryState, TermGroup, TermGroups};
+use flexbody_body::flex_body::{FlexBody, ModalMotion, Quantity, RecoveryState, TermGroup, TermGroups};
 use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_linalg::CscMatrix;
 use flexbody_linalg::context::Context;
@@ -51,7 +51,12 @@ pub(crate) fn bracket(mesh: &Mesh, coupling: Coupling) -> RawModel {
     let lattice = Mesh::bracket(ElementKind::Hex8, 4, 2, CELL).nodes;
     let side = (1..).zip(&lattice).filter(|(_, x)| x[0] > 2.9 * CELL).map(|(id, _)| id).collect();
     let cut = RecoveryOperator::Cut { nodes: side, about: mesh.nodes[0] };
-    let cut = ModelRecovery { name: "arm".to_owned(), operator: cut, path: PathBuf::new() };
+    let cut = ModelRecovery {
+        name: "arm".to_owned(),
+        operator: cut,
+        path: PathBuf::new(),
+        deformed_inertia: false,
+    };
     raw.recoveries = vec![mesh.stresses(&Material::STEEL), cut];
     raw
 }
@@ -116,11 +121,11 @@ fn static_values(body: &FlexBody, name: &str, case: &Case, columns: bool) -> Vec
     let recovery = body.recoveries().iter().find(|one| one.name == name).expect("a recovery");
     let nothing = [[0.0; 6]; 2];
     let (w, loads) = if columns { (w, at_interfaces.as_slice()) } else { (Vector3::zeros(), &nothing[..]) };
-    recovery.values(&RecoveryState { q: &q, angular_velocity: w, loads, named: &[] })
+    recovery.values(&RecoveryState { motion: ModalMotion::steady(&q, w), loads, named: &[] })
 }
 
 /// Static solution of all nodes under inertia relief, dense: u = T y of a body whose interfaces are rigid if T says so.
-struct Statics {
+pub(crate) struct Statics {
     k: Mat<f64>,
     m: Mat<f64>,
     /// T (N x y).
@@ -129,7 +134,7 @@ struct Statics {
 }
 
 impl Statics {
-    fn new(raw: &RawModel, rigid: bool) -> Self {
+    pub(crate) fn new(raw: &RawModel, rigid: bool) -> Self {
         let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
         let nodes = raw.nodes.positions.clone();
         let n = k.nrows();
@@ -157,7 +162,7 @@ impl Statics {
     }
 
     /// Returns u of K u = f - M R a, with the acceleration a that balances the loads.
-    fn solve(&self, f: &Mat<f64>) -> Mat<f64> {
+    pub(crate) fn solve(&self, f: &Mat<f64>) -> Mat<f64> {
         let n = self.k.nrows();
         let rigid =
             Mat::from_fn(n, 6, |row, c| rigid_of(&self.nodes[row / 3], &Vector3::zeros())[c][row % 3]);
@@ -178,6 +183,20 @@ impl Statics {
             y += factor.solve(&left);
         }
         t * y
+    }
+
+    /// Returns the resultant about a point of the inner forces K u of the nodes on one side.
+    pub(crate) fn section(&self, u: &Mat<f64>, side: &[i64], about: &[f64; 3]) -> Vec<f64> {
+        let inner = &self.k * u;
+        let mut resultant = vec![0.0; 6];
+        for id in side {
+            let i = *id as usize - 1;
+            let motion = rigid_of(&self.nodes[i], &Vector3::from(*about));
+            for c in 0..6 {
+                resultant[c] += (0..3).map(|k| motion[c][k] * inner[(3 * i + k, 0)]).sum::<f64>();
+            }
+        }
+        resultant
     }
 
     /// Returns the nodal forces of a case: forces at the means of the interface nodes and -M (w x (w x x)).
@@ -217,7 +236,7 @@ fn rigid_of(x: &[f64; 3], centre: &Vector3<f64>) -> [Vector3<f64>; 6] {
 }
 
 /// Returns R u.
-fn rows_of(transposed: &CscMatrix, u: &Mat<f64>) -> Vec<f64> {
+pub(crate) fn rows_of(transposed: &CscMatrix, u: &Mat<f64>) -> Vec<f64> {
     let row = |j: usize| {
         let (rows, values) = transposed.column(j);
         rows.iter().zip(values).map(|(r, v)| v * u[(*r as usize, 0)]).sum()
@@ -226,7 +245,7 @@ fn rows_of(transposed: &CscMatrix, u: &Mat<f64>) -> Vec<f64> {
 }
 
 /// Returns the largest difference, relative to the largest value expected.
-fn error(found: &[f64], expected: &[f64]) -> f64 {
+pub(crate) fn error(found: &[f64], expected: &[f64]) -> f64 {
     let size = expected.iter().fold(0.0f64, |most, v| most.max(v.abs()));
     found.iter().zip(expected).fold(0.0f64, |most, (a, b)| most.max((a - b).abs())) / size
 }
@@ -449,8 +468,7 @@ fn stresses_under_a_slow_sine_load_follow_those_of_all_nodes() {
             let q: Vec<f64> = (0..count).map(|j| response(lambda[j], modal[j], t)).collect();
             let now = |loads: [[f64; 6]; 2]| {
                 recovery.values(&RecoveryState {
-                    q: &q,
-                    angular_velocity: Vector3::zeros(),
+                    motion: ModalMotion::steady(&q, Vector3::zeros()),
                     loads: &loads,
                     named: &[],
                 })
@@ -491,15 +509,7 @@ fn section_forces_are_the_loads_less_the_inertia_of_one_side() {
             let f = statics.forces(&raw, &case);
             let u = statics.solve(&f);
             // The inner forces of one side, K u of its nodes, by the definition of the resultant.
-            let inner = &statics.k * &u;
-            let mut expected = [0.0; 6];
-            for id in nodes {
-                let i = *id as usize - 1;
-                let motion = rigid_of(&raw.nodes.positions[i], &Vector3::from(*about));
-                for c in 0..6 {
-                    expected[c] += (0..3).map(|k| motion[c][k] * inner[(3 * i + k, 0)]).sum::<f64>();
-                }
-            }
+            let expected = statics.section(&u, nodes, about);
             let found = static_values(&body, "arm", &case, true);
             let alone = static_values(&body, "arm", &case, false);
             for part in [0..3, 3..6] {
@@ -558,8 +568,12 @@ fn cuts_of_a_frame_are_the_end_forces_of_its_beams() {
         labels: (0..6).map(label).collect(),
         offset: None,
     };
-    let recovery =
-        |name: &str, operator| ModelRecovery { name: name.to_owned(), operator, path: PathBuf::new() };
+    let recovery = |name: &str, operator| ModelRecovery {
+        name: name.to_owned(),
+        operator,
+        path: PathBuf::new(),
+        deformed_inertia: false,
+    };
     raw.recoveries =
         vec![recovery("beam", rows), recovery("cut", RecoveryOperator::Cut { nodes: side, about })];
     let body = body(raw, BasisChoice::default(), 4, BodyFrame::Principal);

@@ -1,13 +1,17 @@
 //! The rows of `/recovery/<name>`.
 
-use super::super::item::Extent::{Fixed, LoadedInterfaces, Modes, NamedLoads, RecoveryRows};
+use super::super::item::Extent::{
+    Fixed, LoadedInterfaces, Modes, NamedLoads, RecoveryRows, SixModes, ThreeModes,
+};
 use super::super::item::Item;
 use super::super::item::ItemKind::{Floats, Text};
 use super::super::item::{both, field};
 use super::{ONE, attribute, dataset};
 use crate::value::{Units, Value, text};
 use faer::Mat;
-use flexbody_body::flex_body::{LOAD_COMPONENTS, LoadColumns, Quantity, RecoveryRow};
+use flexbody_body::flex_body::{
+    LOAD_COMPONENTS, LoadColumns, MotionColumns, MotionLoad, Quantity, Recovery, RecoveryRow,
+};
 
 /// Label of a row as it is written.
 #[derive(serde::Serialize, serde::Deserialize)]
@@ -43,6 +47,19 @@ impl Label {
 pub(crate) fn labels_json(rows: &[RecoveryRow]) -> String {
     let labels: Vec<Label> = rows.iter().map(Label::of).collect();
     serde_json::to_string(&labels).expect("structs of strings are valid JSON")
+}
+
+/// Returns the columns of the forces of motion of one kind; `None` if the recovery does not have them.
+fn motion_of(recovery: &Recovery, load: MotionLoad) -> Option<Value> {
+    recovery.of_motion(load).map(|columns| Value::Floats(crate::value::rows(columns.as_ref()).collect()))
+}
+
+/// Adds the columns of the forces of motion of one kind to a recovery whose rows are known.
+fn add_motion(recovery: &mut Recovery, load: MotionLoad, values: &[f64]) {
+    let rows = recovery.rows.len();
+    let count = values.len() / rows.max(1);
+    let columns = Mat::from_fn(rows, count, |i, c| values[i * count + c]);
+    recovery.motion.push(MotionColumns { load, columns });
 }
 
 pub(super) const RECOVERY: &[Item] = &[
@@ -170,4 +187,64 @@ pub(super) const RECOVERY: &[Item] = &[
         ),
     )
     .added(9),
+    dataset(
+        "damping",
+        Floats(&[RecoveryRows, Modes]),
+        Units::Mixed,
+        "-R G_r D Psi",
+        "static values beside the modes for the rates of the modal coordinates, of damping forces that the modes do not hold: the unit of each row times time over mass^(1/2) length",
+        both(
+            |v| motion_of(v.recovery?, MotionLoad::Damping),
+            |d, read| {
+                add_motion(d.recovery(), MotionLoad::Damping, &read.floats());
+                Ok(())
+            },
+        ),
+    )
+    .added(11),
+    dataset(
+        "acceleration",
+        Floats(&[RecoveryRows, Modes]),
+        Units::Mixed,
+        "-R G_r M Psi",
+        "static values beside the modes for the second time derivatives of the modal coordinates: the unit of each row times time^2 over mass^(1/2) length",
+        both(
+            |v| motion_of(v.recovery?, MotionLoad::Acceleration),
+            |d, read| {
+                add_motion(d.recovery(), MotionLoad::Acceleration, &read.floats());
+                Ok(())
+            },
+        ),
+    )
+    .added(11),
+    dataset(
+        "turning",
+        Floats(&[RecoveryRows, ThreeModes]),
+        Units::Mixed,
+        "-R G_r M S_k Psi",
+        "static values beside the modes for alpha_k q_j + 2 w_k qd_j, the modes of x, then of y, then of z, along body axes: the unit of each row times time^2 over mass^(1/2) length",
+        both(
+            |v| motion_of(v.recovery?, MotionLoad::Turning),
+            |d, read| {
+                add_motion(d.recovery(), MotionLoad::Turning, &read.floats());
+                Ok(())
+            },
+        ),
+    )
+    .added(11),
+    dataset(
+        "centrifugal",
+        Floats(&[RecoveryRows, SixModes]),
+        Units::Mixed,
+        "-R G_r M C_kl Psi",
+        "static values beside the modes for w_k w_l q_j, the modes of each product in the order of `spin`, along body axes: the unit of each row times time^2 over mass^(1/2) length",
+        both(
+            |v| motion_of(v.recovery?, MotionLoad::Centrifugal),
+            |d, read| {
+                add_motion(d.recovery(), MotionLoad::Centrifugal, &read.floats());
+                Ok(())
+            },
+        ),
+    )
+    .added(11),
 ];

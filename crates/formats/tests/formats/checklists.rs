@@ -155,6 +155,7 @@ pub(crate) fn nodal_stresses(nodes: &[i64], nf: usize) -> Recovery {
         spin: Mat::zeros(rows.len(), 6),
         loads: Vec::new(),
         named: Mat::zeros(rows.len(), 0),
+        motion: Vec::new(),
         rows,
     }
 }

@@ -7,6 +7,7 @@ use flexbody_base::diagnostic::Code;
 use std::collections::HashSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use toml::de::DeValue;
 
 pub(super) const RECOVERY: &[&str] = &[
     "name",
@@ -21,6 +22,7 @@ pub(super) const RECOVERY: &[&str] = &[
     "cylinder",
     "plane",
     "about",
+    "deformed_inertia",
 ];
 
 /// Keys of [`RECOVERY`] that define the rows.
@@ -111,6 +113,14 @@ impl ManifestWalk<'_, '_> {
             };
             OperatorSource::Cut { nodes, about }
         };
-        Some(RecoverySource { name, operator })
+        let deformed_inertia = match table.get("deformed_inertia").map(|value| (value, value.get_ref())) {
+            None => false,
+            Some((_, DeValue::Boolean(given))) => *given,
+            Some((value, _)) => {
+                self.mistyped("deformed_inertia", value, "true or false");
+                return None;
+            }
+        };
+        Some(RecoverySource { name, operator, deformed_inertia })
     }
 }

@@ -5,7 +5,7 @@ use super::{FramedScene, LoadCases, Measure, OutputErrors, Scene, Trace, instant
 use crate::dynamics::Terms;
 use faer::Mat;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::FlexBody;
+use flexbody_body::flex_body::{FlexBody, Recovery};
 use flexbody_body::invariants::{InertiaShares, relative_norm};
 use flexbody_linalg::context::Context;
 use flexbody_model::{GeometricStiffness, LoadKind, RigidAcceleration, UnitLoad};
@@ -118,6 +118,7 @@ impl CaseRun {
             Omission::Damping => {
                 parts.modes.damping_ratio.fill(0.0);
                 parts.modes.modal_damping = None;
+                parts.recoveries.iter_mut().for_each(Recovery::remove_damping);
             }
             Omission::GeometricStiffness(loads) => {
                 parts.geometric_stiffness.retain(|one| !loads.contains(&one.load));

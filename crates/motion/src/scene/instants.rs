@@ -80,15 +80,20 @@ fn see(
             if torque == Vector3::zeros() { torque } else { point.turned_torque(evaluation, &torque) };
         (force, turned)
     });
+    let (gravity, loads) = (run.forces.gravity(place), worked.collect());
+    let row_state = match sampler {
+        Some(sampler) => sampler.state(time, state, motion, &run.forces)?,
+        None => Vec::new(),
+    };
     Ok(Instant {
         time,
         velocity,
         velocity_rate: linear,
         omega,
         omega_rate: angular,
-        gravity: run.forces.gravity(place),
-        loads: worked.collect(),
-        row_state: sampler.map_or_else(Vec::new, |sampler| sampler.state(time, &now, &run.forces)),
+        gravity,
+        loads,
+        row_state,
         q: configuration.q,
         qd: configuration.qd,
         qdd,

@@ -2,17 +2,15 @@
 
 use super::row_extremes::RowSurvey;
 use super::row_states::RowSampler;
-use super::surroundings::SceneForces;
 use super::{
     EnvelopeSearch, ExtremeSearch, Point, PointEnvelope, RowExtremes, RowLayout, RowMap, RowStates, Scene,
 };
-use crate::dynamics::Snapshot;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::series::{ColumnKey, has_column, read_series};
-use flexbody_body::flex_body::{FlexBody, Recovery};
-use nalgebra::Vector3;
+use flexbody_body::flex_body::{Carrier, FlexBody, ModalMotion, MotionLoad, Recovery};
+use nalgebra::{Matrix3, Vector3};
 use std::path::{Path, PathBuf};
 
 /// Names of the columns of force and torque after the name of their interface.
@@ -21,6 +19,14 @@ const LOAD_COLUMNS: [[&str; 3]; 2] =
 
 /// Names of the columns of the angular velocity.
 const SPIN_COLUMNS: [&str; 3] = ["angular_velocity_x", "angular_velocity_y", "angular_velocity_z"];
+
+/// Names of the columns of the angular acceleration.
+const SPIN_RATE_COLUMNS: [&str; 3] =
+    ["angular_acceleration_x", "angular_acceleration_y", "angular_acceleration_z"];
+
+/// Columns of a table of `simulate` that tell a body with a prescribed motion, and one in mean axes.
+const REACTION: &str = "reaction_force_x";
+const CONDITIONS: &str = "conditions_torque_x";
 
 /// Motion and loads of a body, computed by any program, at its own instants. Vectors are along the axes of the model,
 /// which turn with the body.
@@ -34,10 +40,20 @@ pub struct LoadedHistory {
     pub q: Vec<Vec<f64>>,
     /// Angular velocity of the body frame at each time; `None` if the file does not have it.
     pub angular_velocity: Option<Vec<Vector3<f64>>>,
+    /// Rates of the modal coordinates at each time; `None` if the file does not have them.
+    pub rate: Option<Vec<Vec<f64>>>,
+    /// Second time derivatives of the modal coordinates at each time; `None` if the file does not have them.
+    pub acceleration: Option<Vec<Vec<f64>>>,
+    /// Angular acceleration of the body frame at each time; `None` if the file does not have it.
+    pub angular_acceleration: Option<Vec<Vector3<f64>>>,
     /// Loads of the interfaces that the file has columns of.
     pub loads: Vec<LoadHistory>,
     /// Amplitudes of the named loads that the file has columns of.
     pub named: Vec<AmplitudeHistory>,
+    /// Interface or node that carries the body, whose motion the frame has; `None` for the frame of the body's file.
+    pub carrier: Option<Carrier>,
+    /// True for the table that `simulate` writes of a carried body.
+    pub is_of_carried: bool,
 }
 
 /// Amplitude of a named load over time.
@@ -82,7 +98,8 @@ impl RecoveredMotion {
 }
 
 impl LoadedHistory {
-    /// Reads the columns `time`, `q_1` to `q_n`, `angular_velocity_x` to `_z`, for every interface of the body with
+    /// Reads the columns `time`, `q_1` to `q_n`, `angular_velocity_x` to `_z`; `qd_1` to `qd_n`, `qdd_1` to `qdd_n` and
+    /// `angular_acceleration_x` to `_z` if recoveries of the body have columns of forces of motion; for every interface of the body with
     /// a reference point `NAME force_x` to `_z` and `NAME torque_x` to `_z`, and for every named load but preloads `NAME`.
     /// Columns of an interface without load, and of a named load that does not act, may be absent. Other columns are
     /// ignored.
@@ -92,15 +109,24 @@ impl LoadedHistory {
     /// times that do not ascend; the errors of [`InputFile::open`].
     pub fn read(path: &Path, body: &FlexBody) -> Result<Self> {
         let file = InputFile::open(path)?;
-        let mut wanted: Vec<String> = (1..=body.n_modes()).map(|j| format!("q_{j}")).collect();
+        let modal =
+            |prefix: &str| -> Vec<String> { (1..=body.n_modes()).map(|j| format!("{prefix}_{j}")).collect() };
+        let mut wanted: Vec<String> = modal("q");
         // A vector is in the file if any of its columns is; then all must be. Returns the place of its first column.
-        let mut vector = |names: [String; 3]| {
+        let mut all_of = |names: Vec<String>| {
             names.iter().any(|name| has_column(&file, name)).then(|| {
+                let first = wanted.len();
                 wanted.extend(names);
-                wanted.len() - 3
+                first
             })
         };
-        let spin = vector(SPIN_COLUMNS.map(str::to_owned));
+        let spin = all_of(SPIN_COLUMNS.map(str::to_owned).to_vec());
+        let has_motion = body.recoveries().iter().any(|one| !one.motion.is_empty());
+        let [rate, acceleration] =
+            ["qd", "qdd"].map(|prefix| if has_motion { all_of(modal(prefix)) } else { None });
+        let turning = SPIN_RATE_COLUMNS.map(str::to_owned).to_vec();
+        let spin_rate = if has_motion { all_of(turning) } else { None };
+        let mut vector = |names: [String; 3]| all_of(names.to_vec());
         let mut loaded = Vec::new();
         for interface in body.interfaces().iter().filter(|interface| interface.reference.is_some()) {
             let parts =
@@ -134,10 +160,25 @@ impl LoadedHistory {
             values: all.columns[place].clone(),
         };
         let named = named.into_iter().map(amplitude).collect();
-        let angular_velocity = spin.map(|_| rows.clone().map(|i| at(spin, i)).collect());
-        let modes = &all.columns[..body.n_modes()];
-        let q = rows.map(|i| modes.iter().map(|column| column[i]).collect()).collect();
-        Ok(Self { path: path.to_owned(), time: all.times, q, angular_velocity, loads, named })
+        let vectors = |place: Option<usize>| place.map(|_| rows.clone().map(|i| at(place, i)).collect());
+        let modal = |first: usize| -> Vec<Vec<f64>> {
+            let columns = &all.columns[first..first + body.n_modes()];
+            rows.clone().map(|i| columns.iter().map(|column| column[i]).collect()).collect()
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            q: modal(0),
+            angular_velocity: vectors(spin),
+            rate: rate.map(modal),
+            acceleration: acceleration.map(modal),
+            angular_acceleration: vectors(spin_rate),
+            loads,
+            named,
+            time: all.times,
+            carrier: None,
+            // A body with a prescribed motion in mean axes has the torque of these too.
+            is_of_carried: has_column(&file, REACTION) && !has_column(&file, CONDITIONS),
+        })
     }
 
     /// Returns the names of the interfaces and of the named loads that `body` has columns of and this history has no loads
@@ -160,13 +201,17 @@ impl LoadedHistory {
     /// # Errors
     /// [`RecoveryUnknown`](Code::RecoveryUnknown) if the body has no recovery, or none of a name; FB215 if the history
     /// has no angular velocity and rows depend on it; FB212 for a torque at an interface whose nodes lie on one line,
-    /// and for loads at an interface without static columns.
+    /// for loads at an interface without static columns, and for the run of a carried body without its carrier, if rows
+    /// depend on the frame; the errors of [`FlexBody::carried`].
     pub fn recover(&self, body: &FlexBody, names: &[String]) -> Result<RecoveredMotion> {
+        let carried = self.carrier.as_ref().map(|carrier| body.carried(carrier)).transpose()?;
+        let body = carried.as_ref().unwrap_or(body);
         let chosen = chosen(body, names)?;
+        self.refuse_other_frame(body, &chosen)?;
         self.refuse_torque_without_rotation(body)?;
         let layout = RowLayout::new(body, chosen.iter().copied());
         let recoveries: Vec<RowMap> = chosen.iter().map(|one| RowMap::new(one, &layout)).collect();
-        self.refuse_unknown_spin(&recoveries)?;
+        self.refuse_unknown_spin(&recoveries, &layout)?;
         let states = self.states(body, layout)?;
         let mut search = ExtremeSearch::new(recoveries.len(), false);
         search.see(&recoveries, &states);
@@ -202,8 +247,9 @@ impl LoadedHistory {
             .collect();
         let mut states = RowStates::new(layout);
         for (i, &time) in self.time.iter().enumerate() {
-            let spin = self.angular_velocity.as_ref().map_or_else(Vector3::zeros, |omega| to_body * omega[i]);
-            let mut z = states.layout.state(&self.q[i], &spin);
+            let motion = self.motion(i, &to_body);
+            let mut z = states.layout.state(motion.q, &motion.angular_velocity);
+            states.layout.set_motion(&mut z, &motion, |load| self.missing_for(load).is_empty());
             for (place, load) in &places {
                 let [force, torque] = load.values[i].map(|vector| to_body * vector);
                 states.layout.add_load(&mut z, *place, &force, &torque);
@@ -217,9 +263,86 @@ impl LoadedHistory {
         Ok(states)
     }
 
+    /// Refuses the run of a carried body for a body in another frame, to which the forces of the deformed body that turns
+    /// belong.
+    fn refuse_other_frame(&self, body: &FlexBody, chosen: &[&Recovery]) -> Result<()> {
+        let depends = |one: &&Recovery| one.motion.iter().any(|own| own.load != MotionLoad::Damping);
+        if !self.is_of_carried || !body.conditions().is_mean() || !chosen.iter().any(depends) {
+            return Ok(());
+        }
+        let message = "the run is that of a carried body, whose frame follows the interface that carries it: the inertia of the deformation depends on it";
+        let help = "name the interface, or the number of the node, that carries the body in the scene: --carried-by NAME";
+        Err(Diagnostic::new(Code::SceneBody, message).in_file(&self.path).with_help(help).into())
+    }
+
+    /// Returns the motion at the instant `i`, along the rows of `axes` (given in the axes of the model). Rates that the
+    /// history does not have are zero.
+    fn motion(&self, i: usize, axes: &Matrix3<f64>) -> ModalMotion<'_> {
+        let vector =
+            |all: &Option<Vec<Vector3<f64>>>| all.as_ref().map_or_else(Vector3::zeros, |all| axes * all[i]);
+        ModalMotion {
+            q: &self.q[i],
+            rate: self.rate.as_ref().map_or(&[], |rows| &rows[i]),
+            acceleration: self.acceleration.as_ref().map_or(&[], |rows| &rows[i]),
+            angular_velocity: vector(&self.angular_velocity),
+            angular_acceleration: vector(&self.angular_acceleration),
+        }
+    }
+
+    /// Returns an amplitude of the forces of motion of one kind at the instant `i`, along the axes of the model.
+    pub(super) fn amplitude_of_motion(
+        &self,
+        body: &FlexBody,
+        load: MotionLoad,
+        place: usize,
+        i: usize,
+    ) -> f64 {
+        let mut amplitudes = vec![0.0; load.components() * body.n_modes()];
+        load.write_amplitudes(&self.motion(i, &Matrix3::identity()), &mut amplitudes);
+        amplitudes[place]
+    }
+
+    /// Returns the columns that forces of motion depend on and that the history does not have.
+    pub(super) fn missing_for(&self, load: MotionLoad) -> Vec<&'static str> {
+        let (rate, acceleration) =
+            (("qd_1 to qd_n", self.rate.is_some()), ("qdd_1 to qdd_n", self.acceleration.is_some()));
+        let turning = ("angular_acceleration_x to _z", self.angular_acceleration.is_some());
+        let needed = match load {
+            MotionLoad::Damping => vec![rate],
+            MotionLoad::Acceleration => vec![acceleration],
+            MotionLoad::Turning => vec![rate, turning],
+            MotionLoad::Centrifugal => Vec::new(),
+        };
+        needed.into_iter().filter(|(_, is_there)| !is_there).map(|(name, _)| name).collect()
+    }
+
+    /// Returns a warning about the forces of motion that recoveries of `body` have columns of and that are left out, since
+    /// the history lacks columns.
+    pub fn left_out(&self, body: &FlexBody, names: &[String]) -> Option<Diagnostic> {
+        let read = body.recoveries().iter().filter(|one| names.is_empty() || names.contains(&one.name));
+        let layout = RowLayout::new(body, read);
+        let lacking: Vec<&MotionLoad> =
+            layout.motion().iter().filter(|load| !self.missing_for(**load).is_empty()).collect();
+        let mut columns: Vec<&str> = lacking.iter().flat_map(|load| self.missing_for(**load)).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        let forces: Vec<&str> = lacking.iter().map(|load| load.in_words()).collect();
+        let message = format!(
+            "the rows leave out {}, since the history has no columns {}",
+            forces.join(" and "),
+            columns.join(", ")
+        );
+        (!lacking.is_empty()).then(|| {
+            Diagnostic::new(Code::RecoveryMotionUnknown, message)
+                .in_file(&self.path)
+                .with_help("write these columns to the table of the run, as `simulate --csv` does")
+        })
+    }
+
     /// Refuses recoveries that depend on an angular velocity that the history does not have.
-    fn refuse_unknown_spin(&self, recoveries: &[RowMap]) -> Result<()> {
-        let needs = recoveries.iter().find(|one| self.angular_velocity.is_none() && one.depends_on_spin());
+    fn refuse_unknown_spin(&self, recoveries: &[RowMap], layout: &RowLayout) -> Result<()> {
+        let needs =
+            recoveries.iter().find(|one| self.angular_velocity.is_none() && one.depends_on_spin(layout));
         let Some(recovery) = needs else { return Ok(()) };
         let message = format!(
             "recovery `{}` depends on the angular velocity, whose columns are missing: {}",
@@ -277,7 +400,7 @@ fn chosen<'b>(body: &'b FlexBody, names: &[String]) -> Result<Vec<&'b Recovery>>
 /// Recoveries of a body along its motion: states at the output times, extremes of the continuous motion.
 pub(super) struct SceneRows {
     recoveries: Vec<RowMap>,
-    sampler: RowSampler,
+    pub(super) sampler: RowSampler,
     states: RowStates,
     survey: RowSurvey,
 }
@@ -305,16 +428,14 @@ impl SceneRows {
         Some((rows, Vec::from_iter(unseen_loads(&unseen))))
     }
 
-    /// Records the rows at an output time.
-    pub(super) fn record(&mut self, time: f64, now: &Snapshot<'_>, forces: &SceneForces<'_>) {
-        let z = self.sampler.state(time, now, forces);
-        self.states.push(time, &z);
+    /// Records the state z at an output time.
+    pub(super) fn record(&mut self, time: f64, z: &[f64]) {
+        self.states.push(time, z);
     }
 
-    /// Takes a sampled state of the motion for the extremes.
-    pub(super) fn see(&mut self, time: f64, now: &Snapshot<'_>, forces: &SceneForces<'_>) {
-        let z = self.sampler.state(time, now, forces);
-        self.survey.see(&self.recoveries, time, &z);
+    /// Takes the state z of the motion for the extremes.
+    pub(super) fn see(&mut self, time: f64, z: &[f64]) {
+        self.survey.see(&self.recoveries, time, z);
     }
 
     /// Returns the recoveries over the motion.

@@ -2,39 +2,64 @@
 
 use super::surroundings::SceneForces;
 use super::{Point, Scene, StressPoint};
-use crate::dynamics::Snapshot;
+use crate::dynamics::Motion;
+use crate::integration::Failure;
 use faer::Mat;
-use flexbody_body::flex_body::{FlexBody, LOAD_COMPONENTS, Recovery, RecoveryRow, StaticCoordinates};
+use flexbody_body::flex_body::{
+    FlexBody, LOAD_COMPONENTS, ModalMotion, MotionLoad, Recovery, RecoveryRow, StaticCoordinates,
+};
 use flexbody_model::LoadKind;
 use nalgebra::Vector3;
+use std::ops::Range;
 
-/// Order of the numbers z = (1, q, f_1 ... f_m, a, w_k w_l) that rows are linear in: a constant, modal coordinates, force
-/// and torque at each interface, amplitudes of the named loads, products of the angular velocity in the order of
-/// [`LoadKind::SPIN`].
+/// Order of the numbers z = (1, q, f_1 ... f_m, a, w_k w_l, ...) that rows are linear in: a constant, modal coordinates,
+/// force and torque at each interface, amplitudes of the named loads, products of the angular velocity in the order of
+/// [`LoadKind::SPIN`], and the amplitudes of the forces that the deformed body exerts by its motion
+/// ([`MotionLoad::write_amplitudes`]).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RowLayout {
     modes: usize,
     interfaces: Vec<String>,
     named: Vec<String>,
+    motion: Vec<MotionLoad>,
 }
 
 impl RowLayout {
-    /// Creates the order for `recoveries` of `body`: all interfaces that any of them has columns of, and all named loads
-    /// of the body.
+    /// Creates the order for `recoveries` of `body`: all interfaces and forces of motion that any of them has columns of, and
+    /// all named loads of the body.
     pub fn new<'r>(body: &FlexBody, recoveries: impl IntoIterator<Item = &'r Recovery>) -> Self {
         let mut interfaces: Vec<String> = Vec::new();
-        for load in recoveries.into_iter().flat_map(|one| &one.loads) {
-            if !interfaces.contains(&load.interface) {
-                interfaces.push(load.interface.clone());
+        let mut motion: Vec<MotionLoad> = Vec::new();
+        for recovery in recoveries {
+            for load in &recovery.loads {
+                if !interfaces.contains(&load.interface) {
+                    interfaces.push(load.interface.clone());
+                }
             }
+            motion.extend(recovery.motion.iter().map(|one| one.load));
         }
+        motion.sort_unstable();
+        motion.dedup();
         let named = body.named_loads().iter().map(|load| load.name.clone()).collect();
-        Self { modes: body.n_modes(), interfaces, named }
+        Self { modes: body.n_modes(), interfaces, named, motion }
     }
 
     /// Returns the length of z.
     pub fn len(&self) -> usize {
-        self.spin() + LoadKind::SPIN.len()
+        self.first_motion() + self.motion.iter().map(|load| load.components() * self.modes).sum::<usize>()
+    }
+
+    /// Returns the kinds of forces of motion, in the order of their amplitudes.
+    pub fn motion(&self) -> &[MotionLoad] {
+        &self.motion
+    }
+
+    /// Returns the places of the amplitudes of the forces of one kind; `None` if z does not have them.
+    fn amplitudes(&self, load: MotionLoad) -> Option<Range<usize>> {
+        let at = self.motion.iter().position(|one| *one == load)?;
+        let length = |one: &MotionLoad| one.components() * self.modes;
+        let first = self.first_motion() + self.motion[..at].iter().map(length).sum::<usize>();
+        Some(first..first + length(&load))
     }
 
     /// Returns the number of modal coordinates in z, which follow its constant.
@@ -89,7 +114,11 @@ impl RowLayout {
         self.amplitude(self.named.len())
     }
 
-    /// Returns z of a state without loads.
+    fn first_motion(&self) -> usize {
+        self.spin() + LoadKind::SPIN.len()
+    }
+
+    /// Returns z of a motion without loads and without forces of motion that depend on more than q and the angular velocity.
     ///
     /// * `angular_velocity`: of the frame, body axes.
     pub fn state(&self, q: &[f64], angular_velocity: &Vector3<f64>) -> Vec<f64> {
@@ -102,7 +131,17 @@ impl RowLayout {
         z
     }
 
-    /// Returns z with the modal coordinates `q`, and with the loads and the spin of a state `of` in another order.
+    /// Writes the amplitudes of the forces of motion to z, of the kinds for which `is_known` returns true.
+    pub fn set_motion(&self, z: &mut [f64], motion: &ModalMotion<'_>, is_known: impl Fn(MotionLoad) -> bool) {
+        for &load in self.motion.iter().filter(|load| is_known(**load)) {
+            if let Some(places) = self.amplitudes(load) {
+                load.write_amplitudes(motion, &mut z[places]);
+            }
+        }
+    }
+
+    /// Returns z with the modal coordinates `q`, and with the loads and the motion of a state `of` in another order. Forces
+    /// of motion are those of that state, of a body with equally many modes.
     pub(super) fn with_loads_of(&self, order: &Self, of: &[f64], q: &[f64]) -> Vec<f64> {
         let mut z = vec![0.0; self.len()];
         z[0] = 1.0;
@@ -117,7 +156,12 @@ impl RowLayout {
                 z[self.amplitude(at)] = order.amplitude_of(of, known);
             }
         }
-        z[self.spin()..].copy_from_slice(&of[order.spin()..]);
+        z[self.spin()..self.first_motion()].copy_from_slice(&of[order.spin()..order.first_motion()]);
+        for &load in self.motion.iter().filter(|_| self.modes == order.modes) {
+            if let (Some(own), Some(known)) = (self.amplitudes(load), order.amplitudes(load)) {
+                z[own].copy_from_slice(&of[known]);
+            }
+        }
         z
     }
 
@@ -135,6 +179,11 @@ impl RowLayout {
         place(self.amplitude(0), &of.named);
         if let Some(spin) = &of.spin {
             place(self.spin(), spin);
+        }
+        for (load, part) in &of.motion {
+            if let Some(places) = self.amplitudes(*load) {
+                place(places.start, part);
+            }
         }
         all
     }
@@ -262,7 +311,20 @@ impl RowSampler {
     }
 
     /// Returns z of the body at a state of its motion.
-    pub(super) fn state(&self, time: f64, now: &Snapshot<'_>, forces: &SceneForces<'_>) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// The errors of [`Motion::accelerations`].
+    pub(super) fn state(
+        &self,
+        time: f64,
+        state: &[f64],
+        motion: &mut Motion<'_>,
+        forces: &SceneForces<'_>,
+    ) -> Result<Vec<f64>, Failure> {
+        // Accelerations cost a solution, and only the inertia of the deformation depends on them.
+        let is_inertial = self.layout.motion.iter().any(|load| *load != MotionLoad::Damping);
+        let rates = if is_inertial { Some(motion.accelerations(time, state)?.to_vec()) } else { None };
+        let now = motion.evaluate(time, state)?;
         let evaluation = now.evaluation();
         let mut z = self.layout.state(evaluation.modal_coordinates(), &evaluation.rigid_velocity().1);
         for (place, (_, force, torque)) in self.loaded.iter().zip(forces.acting(time, now.place())) {
@@ -277,7 +339,19 @@ impl RowSampler {
             let (force, torque) = now.reaction();
             self.layout.add_load(&mut z, carrier, &force, &torque);
         }
-        z
+        let (_, angular_acceleration, acceleration) = match &rates {
+            Some(rates) => evaluation.equations().split(rates),
+            None => (Vector3::zeros(), Vector3::zeros(), &[][..]),
+        };
+        let modal = ModalMotion {
+            q: evaluation.modal_coordinates(),
+            rate: evaluation.modal_velocity(),
+            acceleration,
+            angular_velocity: evaluation.rigid_velocity().1,
+            angular_acceleration,
+        };
+        self.layout.set_motion(&mut z, &modal, |_| true);
+        Ok(z)
     }
 }
 
@@ -290,8 +364,8 @@ pub struct RowMap {
     pub rows: Vec<RecoveryRow>,
     /// Points with all six stresses among the rows.
     pub points: Vec<StressPoint>,
-    /// Columns y0, R Psi, R G_r b_a of all interfaces of the layout, R G_r f of the named loads, -R G_r M c_kl (rows x length
-    /// of z).
+    /// Columns y0, R Psi, R G_r b_a of all interfaces of the layout, R G_r f of the named loads, -R G_r M c_kl, and those of
+    /// the forces of motion (rows x length of z).
     pub(super) matrix: Mat<f64>,
 }
 
@@ -310,6 +384,10 @@ impl RowMap {
             (0..recovery.named.ncols())
                 .for_each(|c| matrix[(i, layout.amplitude(c))] = recovery.named[(i, c)]);
             (0..LoadKind::SPIN.len()).for_each(|c| matrix[(i, layout.spin() + c)] = recovery.spin[(i, c)]);
+            for one in &recovery.motion {
+                let places = layout.amplitudes(one.load).expect("a layout of this recovery");
+                places.enumerate().for_each(|(c, at)| matrix[(i, at)] = one.columns[(i, c)]);
+            }
         }
         let points = StressPoint::among(&recovery.rows);
         Self { name: recovery.name.clone(), rows: recovery.rows.clone(), points, matrix }
@@ -322,8 +400,12 @@ impl RowMap {
     }
 
     /// Returns true if any row depends on the angular velocity.
-    pub fn depends_on_spin(&self) -> bool {
-        let first = self.matrix.ncols() - LoadKind::SPIN.len();
-        self.matrix.as_ref().subcols(first, LoadKind::SPIN.len()).norm_max() > 0.0
+    ///
+    /// * `layout`: order of the states that the map was made for.
+    pub fn depends_on_spin(&self, layout: &RowLayout) -> bool {
+        let of_motion = [MotionLoad::Turning, MotionLoad::Centrifugal];
+        let of_motion = of_motion.iter().filter_map(|load| layout.amplitudes(*load));
+        let mut places = of_motion.chain([layout.spin()..layout.first_motion()]);
+        places.any(|places| self.matrix.as_ref().subcols(places.start, places.len()).norm_max() > 0.0)
     }
 }

@@ -10,7 +10,7 @@ use crate::integration::{Failure, ObserverEvent, Work};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
-use flexbody_body::flex_body::{FlexBody, SOFTENING, axis_in_words};
+use flexbody_body::flex_body::{FlexBody, MotionLoad, Recovery, SOFTENING, axis_in_words};
 use flexbody_linalg::context::Context;
 use flexbody_model::LoadKind;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -83,10 +83,10 @@ fn simulate_recording(
             recorder.record(time, state, motion)?;
         }
         if let Some(rows) = &mut rows {
-            let now = motion.evaluate(time, state)?;
+            let z = rows.sampler.state(time, state, motion, &run.forces)?;
             match event {
-                ObserverEvent::Instant => rows.record(time, &now, &run.forces),
-                _ => rows.see(time, &now, &run.forces),
+                ObserverEvent::Instant => rows.record(time, &z),
+                _ => rows.see(time, &z),
             }
         }
         Ok::<(), Failure>(())
@@ -113,6 +113,11 @@ fn left_out(body: &FlexBody, framed: &FlexBody) -> Vec<Diagnostic> {
         Diagnostic::new(Code::RecoveryLeftOut, message)
     })
     .collect()
+}
+
+/// Returns true if rows of a recovery depend on accelerations.
+fn has_inertia(recovery: &Recovery) -> bool {
+    recovery.motion.iter().any(|one| one.load != MotionLoad::Damping)
 }
 
 /// Recording under construction.
@@ -143,6 +148,7 @@ impl<'r> Recorder<'r> {
                 work: Work::default(),
                 extremes: Extremes::default(),
                 recovered: None,
+                accelerations: body.recoveries().iter().any(has_inertia).then(Vec::new),
             },
             watched: &run.watched,
             conditions,
@@ -159,6 +165,10 @@ impl<'r> Recorder<'r> {
         // State, energies and momenta, with the reaction of a prescribed motion.
         let accelerations = motion.accelerations(time, state)?.to_vec();
         let now = motion.evaluate(time, state)?;
+        if let Some(all) = &mut self.recording.accelerations {
+            let (_, angular, modal) = now.evaluation().equations().split(&accelerations);
+            all.push((angular, modal.to_vec()));
+        }
         self.recording.time.push(time);
         self.recording.states.push(now.configuration());
         self.recording.balances.push(now.balance());
@@ -273,6 +283,9 @@ pub struct Recording {
     pub extremes: Extremes,
     /// Recoveries of the body; `None` for a body without.
     pub recovered: Option<RecoveredMotion>,
+    /// Angular acceleration of the frame (axes of the model) and second time derivatives of the modal coordinates at every
+    /// output time; `None` if no recovery depends on them.
+    pub accelerations: Option<Vec<(Vector3<f64>, Vec<f64>)>>,
 }
 
 /// Frame of a recording, and the conditions that the body is exposed to.

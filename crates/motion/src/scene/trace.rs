@@ -230,7 +230,7 @@ impl<'r> Tracer<'r> {
             reactions.extend(reaction);
         }
         if let (Some(recovered), Some(sampler)) = (&mut trace.recovered, &self.sampler) {
-            let z = sampler.state(time, &motion.evaluate(time, state)?, &self.run.forces);
+            let z = sampler.state(time, state, motion, &self.run.forces)?;
             recovered.states.push(time, &z);
         }
         Ok(())

@@ -61,6 +61,11 @@ fn history() -> LoadedHistory {
         path: PathBuf::from("run.csv"),
         time: (0..count).map(|i| 0.1 * i as f64).collect(),
         q: (0..count).map(|i| (0..MODES).map(|j| 1e-3 * wave(j as f64)(i)).collect()).collect(),
+        carrier: None,
+        is_of_carried: false,
+        rate: None,
+        acceleration: None,
+        angular_acceleration: None,
         angular_velocity: Some((0..count).map(|i| 0.4 * vector(3.1, i)).collect()),
         loads: vec![load("root", 4.0), load("free tip", 6.0)],
         named: vec![AmplitudeHistory {
@@ -72,7 +77,7 @@ fn history() -> LoadedHistory {
 
 /// Returns the steps of a body, and the answers of an FE program with the operator of the model (rows x steps).
 fn steps(body: &FlexBody, model: &FeModel) -> (ShapeSteps, Mat<f64>) {
-    let shapes = recovery_shapes(body, model, &Context::QUIET).expect("shapes");
+    let shapes = recovery_shapes(body, model, false, &Context::QUIET).expect("shapes");
     let RecoveryOperator::Rows { transposed, .. } = &model.recoveries()[0].operator else {
         panic!("an operator")
     };

@@ -1,7 +1,7 @@
 //! Stresses of a tumbling body: a few modes with static columns, against all modes.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_body::flex_body::{Carrier, FlexBody, Quantity, RecoveryState};
+use flexbody_body::flex_body::{Carrier, FlexBody, ModalMotion, Quantity, RecoveryState};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_linalg::context::Context;
 use flexbody_model::{NodeSet, RawModel, RecoveryOperator};
@@ -63,7 +63,8 @@ fn stresses(body: &FlexBody, omega: Vector3<f64>, instants: &[f64]) -> [Vec<Vec<
         let q = now.evaluation().modal_coordinates();
         let omega = now.evaluation().rigid_velocity().1;
         let at = |angular_velocity| {
-            recovery.values(&RecoveryState { q, angular_velocity, loads: &[], named: &[] })
+            let motion = ModalMotion::steady(q, angular_velocity);
+            recovery.values(&RecoveryState { motion, loads: &[], named: &[] })
         };
         with.push(at(omega));
         alone.push(at(Vector3::zeros()));

@@ -5,7 +5,7 @@ use super::{BodyComparison, Pair, is_placed, product, relative, turned};
 use crate::mass_properties::gyration_radius;
 use faer::{Mat, MatRef};
 use flexbody_body::flex_body::{
-    FlexBody, GeometricStiffness, Interface, InternalRows, LoadKind, Recovery, UnitLoad,
+    FlexBody, GeometricStiffness, Interface, InternalRows, LoadKind, MotionLoad, Recovery, UnitLoad,
 };
 use flexbody_body::invariants::InertiaStiffness;
 use flexbody_linalg::{gram, larger, largest_entry};
@@ -265,6 +265,9 @@ impl BodyComparison {
 
 // Comparison of recoveries: by their rows in the modes and under constant unit loads.
 
+/// Largest difference of the axes of two bodies in one frame: rounding.
+const SAME_AXES: f64 = 1e-6;
+
 /// Kinds of unit loads of a recovery: their columns have units of their own.
 const COLUMNS: [Range<usize>; 2] = [0..3, 3..6];
 
@@ -279,6 +282,7 @@ impl BodyComparison {
         }
         let (a, b) = (pair.a.recoveries(), pair.b.recoveries());
         let (mut differing, mut in_modes, mut at_rest) = (0, 0.0, 0.0);
+        let mut in_motion: Option<f64> = None;
         let same_loads = pair.named_loads_alike();
         for own in a {
             let other = b.iter().find(|other| other.name == own.name);
@@ -293,6 +297,16 @@ impl BodyComparison {
                 continue;
             };
             in_modes = larger(in_modes, difference_in_modes(own, other, &pair.groups));
+            for load in own.motion.iter().map(|one| one.load) {
+                match difference_in_motion(pair, own, other, load) {
+                    Some(difference) => in_motion = Some(larger(in_motion.unwrap_or(0.0), difference)),
+                    None => {
+                        let what = "forces of motion are not compared in different frames";
+                        self.notes.push(format!("recovery `{}`: {what}", own.name));
+                        break;
+                    }
+                }
+            }
             let (own, other) = (pair.a.static_rows(own), pair.b.static_rows(other));
             at_rest = larger(at_rest, difference_at_rest(&own, &other));
         }
@@ -306,6 +320,11 @@ impl BodyComparison {
         self.row("rows in the modes", meaning, in_modes, tolerance);
         let meaning = "under constant unit loads and undeformed / largest row of the load";
         self.row("rows at rest", meaning, at_rest, tolerance);
+        if let Some(in_motion) = in_motion {
+            let meaning =
+                "static rows of damping and inertia of the deformation over a group of modes / largest";
+            self.row("rows of forces of motion", meaning, in_motion, tolerance);
+        }
     }
 }
 
@@ -320,12 +339,13 @@ impl Pair<'_> {
     }
 }
 
-/// Returns true if two recoveries have the same labels and loads.
+/// Returns true if two recoveries have the same labels, loads and kinds of forces of motion.
 fn are_alike(a: &Recovery, b: &Recovery) -> bool {
     let loads = |one: &Recovery| -> BTreeSet<String> {
         one.loads.iter().map(|load| load.interface.clone()).collect()
     };
-    a.rows == b.rows && loads(a) == loads(b)
+    let kinds = |one: &Recovery| one.motion.iter().map(|own| own.load).collect::<Vec<_>>();
+    a.rows == b.rows && loads(a) == loads(b) && kinds(a) == kinds(b)
 }
 
 /// Returns the largest difference of the norms of a row over a group of modes, relative to the largest norm. Norms are the
@@ -338,6 +358,29 @@ fn difference_in_modes(a: &Recovery, b: &Recovery, groups: &[Range<usize>]) -> f
     let size = pairs().map(|(i, g)| larger(norm(a, i, g), norm(b, i, g))).fold(0.0, larger);
     let difference = pairs().map(|(i, g)| (norm(a, i, g) - norm(b, i, g)).abs()).fold(0.0, larger);
     relative(difference, size)
+}
+
+/// Returns the largest difference of the norms of the rows under forces of motion of one kind, over a group of modes, relative
+/// to the largest; `None` for bodies in different frames, to whose motion the forces belong.
+fn difference_in_motion(pair: &Pair<'_>, own: &Recovery, other: &Recovery, load: MotionLoad) -> Option<f64> {
+    let (a, b) = (pair.a, pair.b);
+    if a.conditions() != b.conditions() || (a.frame().axes - b.frame().axes).norm() > SAME_AXES {
+        return None;
+    }
+    let (rows_a, rows_b) = (a.motion_rows(own, load)?, b.motion_rows(other, load)?);
+    let norm = |rows: &Mat<f64>, i: usize, component: usize, g: &Range<usize>| {
+        let modes = rows.ncols() / load.components();
+        g.clone().map(|j| rows[(i, component * modes + j)].powi(2)).sum::<f64>().sqrt()
+    };
+    let (mut difference, mut size) = (0.0, 0.0);
+    for (i, component) in (0..rows_a.nrows()).flat_map(|i| (0..load.components()).map(move |c| (i, c))) {
+        for g in &pair.groups {
+            let (of_a, of_b) = (norm(&rows_a, i, component, g), norm(&rows_b, i, component, g));
+            difference = larger(difference, (of_a - of_b).abs());
+            size = larger(size, larger(of_a, of_b));
+        }
+    }
+    Some(relative(difference, size))
 }
 
 /// Returns the largest difference of static rows, relative to the largest of the same kind of load.

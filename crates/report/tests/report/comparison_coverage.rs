@@ -5,8 +5,9 @@ use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     FixedInterface, FlexBody, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
-    LoadColumns, LoadKind, LumpedBody, MassStructure, NamedLoad, Parts, Quantity, Recovery, RecoveryRow,
-    ReferenceConditions, RotatedStiffness, Storage, SurfaceMesh, TermDecision, TermGroup, UnitLoad,
+    LoadColumns, LoadKind, LumpedBody, MassStructure, MotionColumns, MotionLoad, NamedLoad, Parts, Quantity,
+    Recovery, RecoveryRow, ReferenceConditions, RotatedStiffness, Storage, SurfaceMesh, TermDecision,
+    TermGroup, UnitLoad,
 };
 use flexbody_body::invariants::{BodyFrame, DIGITS, Frame, GeneralTerms, InertiaStiffness};
 use flexbody_file::contents;
@@ -118,6 +119,10 @@ fn complete() -> FlexBody {
         spin: Mat::from_fn(1, 6, number),
         loads: vec![LoadColumns { interface: "left".to_owned(), columns: Mat::from_fn(1, 6, number) }],
         named: Mat::from_fn(1, 1, number),
+        motion: MotionLoad::ALL
+            .into_iter()
+            .map(|load| MotionColumns { load, columns: Mat::from_fn(1, load.components() * nf, number) })
+            .collect(),
     }];
     parts.named_loads = vec![NamedLoad {
         name: "bolts".to_owned(),
@@ -179,6 +184,10 @@ const CHANGES: &[Change] = &[
     ("/recovery/<name>/offset", |p| p.recoveries[0].offset[0] += 1e-3),
     ("/recovery/<name>/modes", |p| p.recoveries[0].modes[(0, 2)] += 1e-3),
     ("/recovery/<name>/spin", |p| p.recoveries[0].spin[(0, 2)] += 1e-3),
+    ("/recovery/<name>/damping", |p| p.recoveries[0].motion[0].columns[(0, 2)] += 1e-3),
+    ("/recovery/<name>/acceleration", |p| p.recoveries[0].motion[1].columns[(0, 2)] += 1e-3),
+    ("/recovery/<name>/turning", |p| p.recoveries[0].motion[2].columns[(0, 2)] += 1e-3),
+    ("/recovery/<name>/centrifugal", |p| p.recoveries[0].motion[3].columns[(0, 2)] += 1e-3),
     ("/recovery/<name>@named_loads", |p| p.named_loads[0].name = "nuts".to_owned()),
     ("/recovery/<name>/named", |p| p.recoveries[0].named[(0, 0)] += 1e-3),
     ("/named_loads/<name>@preload", |p| p.named_loads[0].preload = true),

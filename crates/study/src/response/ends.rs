@@ -5,7 +5,7 @@ use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::convert::recovery_loads;
-use flexbody_body::flex_body::{FlexBody, LOAD_COMPONENTS, Recovery};
+use flexbody_body::flex_body::{FlexBody, LOAD_COMPONENTS, MotionLoad, Recovery};
 use flexbody_linalg::side_by_side;
 use flexbody_model::{FeModel, RecoveryRow};
 use flexbody_motion::scene::Point;
@@ -161,6 +161,18 @@ impl ChosenRows<'_> {
         })
     }
 
+    /// Returns the rows for unit first and second time derivatives of the modal coordinates, as outputs (nf x rows each):
+    /// static columns of damping and of inertia; `None` if the recovery has neither.
+    pub(super) fn of_rates(&self) -> Option<[Mat<f64>; 2]> {
+        let columns = RATE_LOADS.map(|load| self.recovery.of_motion(load));
+        let chosen = |columns: Option<&Mat<f64>>| {
+            Mat::from_fn(self.recovery.modes.ncols(), self.rows.len(), |j, i| {
+                columns.map_or(0.0, |columns| columns[(self.rows[i], j)])
+            })
+        };
+        columns.iter().any(Option::is_some).then(|| columns.map(chosen))
+    }
+
     /// Returns the static rows outside the modes for unit loads of `places` on `body` (rows x inputs); zero for loads at
     /// nodes.
     pub(super) fn direct(&self, places: &[Place], body: &FlexBody) -> Mat<f64> {
@@ -183,6 +195,10 @@ impl ChosenRows<'_> {
         })
     }
 }
+
+/// Forces of motion whose amplitudes are the first and the second time derivatives of the modal coordinates. Others are
+/// of second order in the motion, and vanish in a linear response about rest.
+pub(super) const RATE_LOADS: [MotionLoad; 2] = [MotionLoad::Damping, MotionLoad::Acceleration];
 
 /// Returns all rows of a recovery of `body` under unit loads of `places`, outside the modes (rows x inputs).
 pub(super) fn static_columns(recovery: &Recovery, places: &[Place], body: &FlexBody) -> Mat<f64> {

@@ -134,14 +134,35 @@ pub(super) fn reduced_sum(body: &FlexBody, read: &Read<'_>, damping: Option<Mat<
     }
     let places = joined(&to, |place| &place.modal, nf);
     let outputs: Vec<_> = std::iter::once(&places).chain(&of_recoveries).map(Mat::as_ref).collect();
+    let outputs_of_rates = of_rates(&read.rows, nf, places.ncols());
     Ok(ModalSum {
         stiffness: body.modes().eigenvalue.clone(),
         mass: vec![1.0; body.n_modes()],
         damping,
         inputs: joined(&from, |place| &place.modal, nf),
         outputs: side_by_side(&outputs),
+        outputs_of_rates,
         rigid,
         direct: Some(direct),
+    })
+}
+
+/// Returns the outputs of the first and second time derivatives of the modal coordinates (nf x outputs each), which only rows
+/// of recoveries have; `None` if none has.
+///
+/// * `before`: number of outputs before the rows.
+fn of_rates(rows: &[ChosenRows<'_>], nf: usize, before: usize) -> Option<[Mat<f64>; 2]> {
+    let own: Vec<_> = rows.iter().map(|one| (one.rows.len(), one.of_rates())).collect();
+    own.iter().any(|(_, rates)| rates.is_some()).then(|| {
+        std::array::from_fn(|order| {
+            let none = |count: usize| Mat::zeros(nf, count);
+            let of_rows = own.iter().map(|(count, rates)| match rates {
+                Some(rates) => rates[order].clone(),
+                None => none(*count),
+            });
+            let parts: Vec<Mat<f64>> = std::iter::once(none(before)).chain(of_rows).collect();
+            side_by_side(&parts.iter().map(Mat::as_ref).collect::<Vec<_>>())
+        })
     })
 }
 

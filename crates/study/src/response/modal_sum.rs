@@ -11,8 +11,8 @@ use flexbody_linalg::{
 };
 use nalgebra::{Complex, DMatrix};
 
-/// Receptances of a free body in coordinates of diagonal stiffness and mass: H(w) = -G / w^2 + C' (diag(k) - w^2
-/// diag(m) + i w D)^-1 B + S.
+/// Receptances of a free body in coordinates of diagonal stiffness and mass: H(w) = -G / w^2 + (C + i w C1 - w^2 C2)'
+/// (diag(k) - w^2 diag(m) + i w D)^-1 B + S.
 pub(super) struct ModalSum {
     /// Stiffness k of the coordinates (n).
     pub stiffness: Vec<f64>,
@@ -24,6 +24,8 @@ pub(super) struct ModalSum {
     pub inputs: Mat<f64>,
     /// Outputs C (n x outputs).
     pub outputs: Mat<f64>,
+    /// Outputs C1 and C2 of the first and second time derivatives of the coordinates (n x outputs); `None` for zero.
+    pub outputs_of_rates: Option<[Mat<f64>; 2]>,
     /// Rigid accelerations G for unit loads (outputs x inputs).
     pub rigid: Mat<f64>,
     /// Static response S outside the coordinates (outputs x inputs); `None` for zero.
@@ -36,9 +38,15 @@ impl ModalSum {
     pub(super) fn at(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let amplitudes = self.amplitudes(omega);
         let (outputs, inputs) = (self.outputs.ncols(), self.inputs.ncols());
+        let output = |j: usize, o: usize| match &self.outputs_of_rates {
+            None => Complex::new(self.outputs[(j, o)], 0.0),
+            Some([first, second]) => {
+                Complex::new(self.outputs[(j, o)] - omega * omega * second[(j, o)], omega * first[(j, o)])
+            }
+        };
         DMatrix::from_fn(outputs, inputs, |o, i| {
             let flexible: Complex<f64> =
-                (0..self.mass.len()).map(|j| amplitudes[(j, i)] * self.outputs[(j, o)]).sum();
+                (0..self.mass.len()).map(|j| amplitudes[(j, i)] * output(j, o)).sum();
             let direct = self.direct.as_ref().map_or(0.0, |direct| direct[(o, i)]);
             flexible - self.rigid[(o, i)] / (omega * omega) + direct
         })
@@ -207,6 +215,7 @@ impl NodalModes<'_> {
             damping,
             inputs: seen(self.loads.as_ref()),
             outputs: seen(self.measured.as_ref()),
+            outputs_of_rates: None,
             rigid,
             direct: None,
         };
@@ -277,6 +286,7 @@ mod tests {
                 let sign = if i == 0 { 1.0 } else { -1.0 };
                 if spread { 0.5 * sign * share } else { sign * share }
             }),
+            outputs_of_rates: None,
             rigid: Mat::from_fn(2, 2, |_, _| 0.5 / m),
             direct: None,
         };

@@ -14,7 +14,7 @@
 use super::Complex;
 use super::band::{Band, Resonance};
 use super::densities::SpectralDensities;
-use super::ends::static_columns;
+use super::ends::{RATE_LOADS, static_columns};
 use super::framed_body::{FramedBody, Read};
 use super::modal_sum::ModalSum;
 use super::place::Place;
@@ -148,7 +148,8 @@ impl Covariance {
 
 impl RandomStudy<'_> {
     /// Computes the root mean squares. States are, in this order, the coordinates of the body, the forces on it, the forces
-    /// over the square of the frequency and, with a model, the coordinates of the enriched response.
+    /// over the square of the frequency, the first and second time derivatives of the coordinates if recoveries depend on
+    /// them and, with a model, the coordinates of the enriched response.
     ///
     /// # Errors
     /// [`Usage`](Code::Usage) for a body without damping, whose response has no finite mean square.
@@ -230,9 +231,11 @@ impl RandomStudy<'_> {
             None => DMatrix::identity(self.reduced.inputs.ncols(), self.inputs.len()),
         };
         let own = forces(self.reduced);
-        let mut parts = vec![self.reduced.amplitudes(omega) * &own];
-        parts.push(own.clone());
-        parts.push(own / Complex::new(omega * omega, 0.0));
+        let coordinates = self.reduced.amplitudes(omega) * &own;
+        let rates = [Complex::new(0.0, omega), Complex::new(-omega * omega, 0.0)];
+        let rates = rates.iter().filter(|_| self.has_rates()).map(|factor| &coordinates * *factor);
+        let mut parts = vec![coordinates.clone(), own.clone(), own / Complex::new(omega * omega, 0.0)];
+        parts.extend(rates);
         if let Some(enriched) = self.known.and_then(|known| known.enriched.as_ref()) {
             parts.push(enriched.amplitudes(omega) * forces(enriched));
         }
@@ -244,6 +247,12 @@ impl RandomStudy<'_> {
             first += part.nrows();
         }
         all
+    }
+
+    /// Returns true if a recovery has columns of the rates of the modal coordinates.
+    fn has_rates(&self) -> bool {
+        let has = |one: &Recovery| RATE_LOADS.iter().any(|load| one.of_motion(*load).is_some());
+        self.framed.at_centre.recoveries().iter().any(has)
     }
 
     /// Returns the root mean squares of displacements and rotations.
@@ -311,9 +320,16 @@ impl RandomStudy<'_> {
     fn rows_of(&self, recovery: &Recovery, length: usize) -> Mat<f64> {
         let nf = recovery.modes.ncols();
         let columns = static_columns(recovery, &self.read.from, &self.framed.damped);
+        let (after_forces, rates) =
+            (nf + 2 * columns.ncols(), RATE_LOADS.map(|load| recovery.of_motion(load)));
+        let has_rates = self.has_rates();
+        let of_rate = |i: usize, c: usize| rates[c / nf].map_or(0.0, |columns| columns[(i, c % nf)]);
         Mat::from_fn(recovery.rows.len(), length, |i, c| match c {
             c if c < nf => recovery.modes[(i, c)],
             c if c < nf + columns.ncols() => columns[(i, c - nf)],
+            c if has_rates && (after_forces..after_forces + 2 * nf).contains(&c) => {
+                of_rate(i, c - after_forces)
+            }
             _ => 0.0,
         })
     }

@@ -4,6 +4,7 @@
 
 mod advice;
 mod continuous_motion;
+mod forces_of_motion;
 mod named_loads;
 mod nodal_reference;
 mod random_response;
@@ -14,3 +15,4 @@ mod scene_frames;
 mod selection_bounds;
 mod selection_verdicts;
 mod skewed_beam;
+mod stresses_in_motion;

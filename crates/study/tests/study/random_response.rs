@@ -178,7 +178,7 @@ fn rows_are_those_of_dense_equations() {
 }
 
 /// Returns the response to the densities in a table.
-fn random(
+pub(crate) fn random(
     request: &ResponseRequest,
     model: Option<&FeModel>,
     body: &FlexBody,

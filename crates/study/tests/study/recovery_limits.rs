@@ -33,7 +33,12 @@ fn raw_model() -> RawModel {
     let side =
         raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| at[0] < 0.7).map(|(id, _)| *id);
     let operator = RecoveryOperator::Cut { nodes: side.collect(), about: [0.7, 0.2, 0.1] };
-    raw.recoveries.push(ModelRecovery { name: "cut".to_owned(), operator, path: PathBuf::new() });
+    raw.recoveries.push(ModelRecovery {
+        name: "cut".to_owned(),
+        operator,
+        path: PathBuf::new(),
+        deformed_inertia: false,
+    });
     raw
 }
 
@@ -169,7 +174,7 @@ fn estimated(model: &FeModel, body: &FlexBody, scene: &Scene) -> ReferenceError 
 }
 
 /// Returns the error of the recovery relative to the equations of all nodes.
-fn of_all_nodes(model: &FeModel, body: &FlexBody, scene: &Scene) -> f64 {
+pub(crate) fn of_all_nodes(model: &FeModel, body: &FlexBody, scene: &Scene) -> f64 {
     let framed = FramedScene::new(body, scene).expect("a stage");
     let (motion, _) = trace(&framed.body, &framed.scene, &Context::QUIET).expect("a motion");
     let nodal = NodalReference::new(model, &framed.body, &framed.scene, &motion, &Context::QUIET)
