@@ -60,7 +60,8 @@ fn every_required_entry_is_missed_when_it_is_not_there() {
                 .iter()
                 .any(|s| parent == format!("/groups/interface_coordinates/{s}"))
             || ["loaded_interfaces", "loads", "named_loads", "named", "compliance"].contains(&key.as_str())
-            || ["damping", "acceleration", "turning", "centrifugal"].contains(&key.as_str())
+            || parent.starts_with("/groups/recovery/")
+                && ["damping", "acceleration", "turning", "centrifugal"].contains(&key.as_str())
             || key.starts_with("digits_")
             || ["mesh", "triangles", "edges"].contains(&key.as_str())
             // All attributes of the frame are optional, but the section of a group with attributes is always
