@@ -14,8 +14,14 @@ pub enum Progress<'a> {
     Phase(&'a str),
     /// Plan of the work and its needs, known before the work.
     Plan(&'a str),
-    /// Completed part of the current phase, 0 to 1.
+    /// Number of runs (simulations) of the current phase, if it is known before the first.
+    Runs(usize),
+    /// Start of a run of the current phase. Fractions refer to this run until the next one starts.
+    Run,
+    /// Completed part of the current phase or, in a phase with runs, of the current run, 0 to 1.
     Fraction(f64),
+    /// Advice about work that takes long, with an estimate of its time.
+    Advice(&'a str),
 }
 
 /// Callback that receives progress reports, from any thread of the computation, and returns whether it shall continue.
@@ -38,7 +44,10 @@ pub(super) fn heard<T>(listener: Listener<'_>, work: impl FnOnce(&Context<'_>) -
         let progress = match event {
             Event::Phase(name) => Progress::Phase(name),
             Event::Plan(text) => Progress::Plan(text),
+            Event::Runs(count) => Progress::Runs(count),
+            Event::Run => Progress::Run,
             Event::Fraction(part) => Progress::Fraction(part),
+            Event::Advice(text) => Progress::Advice(text),
         };
         if listener(progress).is_break() {
             resume_unwind(Box::new(Stopped));

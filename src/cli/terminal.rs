@@ -7,9 +7,8 @@ use flexbody_linalg::context::Event;
 use flexbody_report::{Facts, Format, Phase, Screen, render, summary};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::borrow::Cow;
-use std::fmt::Write;
-use std::io::IsTerminal;
-use std::sync::Mutex;
+use std::io::{IsTerminal, Write as _};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Returns the summary of a body, or with `verbose` all facts about it.
@@ -68,11 +67,18 @@ const PANIC_AT: &str = "FLEXBODY_TEST_PANIC";
 /// Listener of a job: shows a bar for the current phase and adds up the time of each phase.
 pub(super) struct Watcher {
     bar: ProgressBar,
+    quiet: bool,
     state: Mutex<State>,
 }
 
 struct State {
     name: String,
+    /// Number of the current run of the phase, from 1; 0 before the first.
+    run: usize,
+    /// Number of runs of the phase; 0 if it is not known.
+    runs: usize,
+    /// True after the first advice, which is the only one that is shown.
+    advised: bool,
     wall: Instant,
     cpu: f64,
     phases: Vec<Phase>,
@@ -84,7 +90,7 @@ impl Watcher {
         let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(1000) };
         let style = ProgressStyle::with_template("{spinner} {msg:<22} {bar:30} {elapsed} {left}")
             .unwrap_or_else(|_| ProgressStyle::default_bar())
-            .with_key("left", |state: &ProgressState, out: &mut dyn Write| {
+            .with_key("left", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
                 if let Some(left) = time_left(state.elapsed(), state.fraction().into()) {
                     // Errors of writing the progress are ignored.
                     let _ = write!(out, "{left}");
@@ -96,9 +102,16 @@ impl Watcher {
         if !bar.is_hidden() && has_thread() {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
-        let state =
-            State { name: first.to_owned(), wall: Instant::now(), cpu: cpu_seconds(), phases: Vec::new() };
-        Self { bar, state: Mutex::new(state) }
+        let state = State {
+            name: first.to_owned(),
+            run: 0,
+            runs: 0,
+            advised: false,
+            wall: Instant::now(),
+            cpu: cpu_seconds(),
+            phases: Vec::new(),
+        };
+        Self { bar, quiet, state: Mutex::new(state) }
     }
 
     /// Receives an event of a job.
@@ -107,20 +120,52 @@ impl Watcher {
             Event::Phase(name) => {
                 assert!(std::env::var_os(PANIC_AT).is_none_or(|at| at != name), "{PANIC_AT} is {name}");
                 self.close();
-                self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).name = name.to_owned();
+                let mut state = self.state();
+                state.name = name.to_owned();
+                (state.run, state.runs) = (0, 0);
+                drop(state);
                 self.bar.set_message(name.to_owned());
                 self.bar.reset();
             }
             Event::Plan(text) => self.bar.println(text),
-            Event::Fraction(part) => self.bar.set_position((1000.0 * part) as u64),
+            Event::Runs(count) => self.state().runs = count,
+            Event::Run => self.begin_run(),
+            Event::Fraction(part) => {
+                let State { run, runs, .. } = *self.state();
+                self.bar.set_position((1000.0 * part_of_phase(part, run, runs)) as u64);
+            }
+            Event::Advice(text) => self.advise(text),
         }
+    }
+
+    /// Shows the number of the run that begins. If the number of runs is not known, the bar starts again, for this run.
+    fn begin_run(&self) {
+        let mut state = self.state();
+        state.run += 1;
+        self.bar.set_message(run_in_words(&state.name, state.run, state.runs));
+        if state.runs == 0 {
+            self.bar.reset();
+        }
+    }
+
+    /// Prints the first advice of the command to stderr, also where no bar is shown.
+    fn advise(&self, text: &str) {
+        let first = !std::mem::replace(&mut self.state().advised, true);
+        if first && !self.quiet {
+            // Errors of writing the advice are ignored, as those of the bar are.
+            self.bar.suspend(|| drop(writeln!(std::io::stderr(), "note: {text}")));
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Ends the current phase and returns all phases, in the order of their first occurrence.
     pub(super) fn finish(&self) -> Vec<Phase> {
         self.close();
         self.bar.finish_and_clear();
-        std::mem::take(&mut self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).phases)
+        std::mem::take(&mut self.state().phases)
     }
 
     /// Removes the bar, so that other text can be printed.
@@ -129,7 +174,7 @@ impl Watcher {
     }
 
     fn close(&self) {
-        let mut state = self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut state = self.state();
         let (wall, cpu) = (Instant::now(), cpu_seconds());
         let (wall_seconds, cpu_seconds) = ((wall - state.wall).as_secs_f64(), cpu - state.cpu);
         let name = state.name.clone();
@@ -141,6 +186,21 @@ impl Watcher {
             None => state.phases.push(Phase { name, wall_seconds, cpu_seconds }),
         }
         (state.wall, state.cpu) = (wall, cpu);
+    }
+}
+
+/// Returns the completed part of a phase, of whose run number `run` (from 1) the part `part` is done. The part of the run
+/// if the number of runs is not known (0).
+fn part_of_phase(part: f64, run: usize, runs: usize) -> f64 {
+    if runs == 0 { part } else { (run.max(1) as f64 - 1.0 + part) / runs as f64 }
+}
+
+/// Returns the text beside the bar in run number `run` of a phase; a single run needs no number.
+fn run_in_words(phase: &str, run: usize, runs: usize) -> String {
+    match (run, runs) {
+        (_, 1) | (1, 0) => phase.to_owned(),
+        (_, 0) => format!("{phase}, run {run}"),
+        _ => format!("{phase}, run {run} of {runs}"),
     }
 }
 
@@ -180,6 +240,17 @@ mod tests {
         assert_eq!(columns(Some("many"), Some(120)), Some(120));
         assert_eq!(columns(None, Some(0)), None);
         assert_eq!(columns(None, None), None);
+    }
+
+    #[test]
+    fn the_bar_counts_runs_and_covers_all_of_them_where_their_number_is_known() {
+        assert_eq!(part_of_phase(0.5, 1, 0), 0.5);
+        assert_eq!(part_of_phase(0.5, 3, 0), 0.5);
+        assert_eq!(part_of_phase(0.5, 3, 4), 0.625);
+        assert_eq!(part_of_phase(1.0, 4, 4), 1.0);
+        let words = |run, runs| run_in_words("trials", run, runs);
+        assert_eq!([words(1, 0), words(3, 0)], ["trials", "trials, run 3"]);
+        assert_eq!([words(1, 1), words(2, 3)], ["trials", "trials, run 2 of 3"]);
     }
 
     #[test]

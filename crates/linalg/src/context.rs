@@ -9,8 +9,14 @@ pub enum Event<'a> {
     Phase(&'a str),
     /// Plan of the work and its resources, known before it starts.
     Plan(&'a str),
-    /// Completed fraction of the current phase, 0 to 1.
+    /// Number of runs (simulations) of the current phase, if it is known before the first.
+    Runs(usize),
+    /// Start of a run of the current phase. Fractions refer to this run until the next one starts.
+    Run,
+    /// Completed fraction of the current phase or, in a phase with runs, of the current run, 0 to 1.
     Fraction(f64),
+    /// Advice to the user about work that takes long. Only the first of a command is worth showing.
+    Advice(&'a str),
 }
 
 /// Callback that receives every progress report, from any thread of the work.
@@ -117,7 +123,22 @@ impl<'a> Context<'a> {
         (self.watch)(Event::Plan(plan));
     }
 
-    /// Reports the fraction of the current phase that is done, 0 to 1.
+    /// Reports the number of runs of the current phase.
+    pub fn runs(&self, count: usize) {
+        (self.watch)(Event::Runs(count));
+    }
+
+    /// Reports that a run of the current phase begins.
+    pub fn run(&self) {
+        (self.watch)(Event::Run);
+    }
+
+    /// Reports advice about work that takes long.
+    pub fn advice(&self, advice: &str) {
+        (self.watch)(Event::Advice(advice));
+    }
+
+    /// Reports the fraction of the current phase, or of its current run, that is done, 0 to 1.
     pub fn fraction(&self, done: f64) {
         (self.watch)(Event::Fraction(done));
     }

@@ -53,7 +53,7 @@ impl FrameMotion {
     /// The errors of [`simulate`](super::simulate).
     pub fn of(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<Self> {
         let framed = FramedScene::new(body, scene)?;
-        let (trace, _) = trace(body, scene, &context.without_listener())?;
+        let (trace, _) = trace(body, scene, context)?;
         let seen = instants(body, scene, &trace.time)?;
         let motion = seen.iter().map(|now| {
             let linear = now.velocity_rate + now.omega.cross(&now.velocity) - now.gravity;

@@ -135,7 +135,7 @@ const FINEST_TOLERANCE: f64 = 1e-13;
 /// runs are compared at the output times of `recording`.
 ///
 /// * `recording`: the motion of `body` in `scene`.
-/// * `context`: its memory limits the second recording.
+/// * `context`: its memory limits the second recording; its listener hears of it.
 ///
 /// # Errors
 /// The errors of [`FramedScene::new`]. If the finer run would take too long, the result is `None`.
@@ -151,7 +151,8 @@ pub fn unsettled_rate(
     let framed = FramedScene::new(body, scene)?;
     let inertia = framed.body.invariants().inertia();
     let Some(finer) = finer(&inertia, scene, recording.scheme) else { return Ok(None) };
-    let Ok((finer, _)) = simulate(body, &finer, &context.without_listener()) else { return Ok(None) };
+    context.phase("simulation with finer steps");
+    let Ok((finer, _)) = simulate(body, &finer, context) else { return Ok(None) };
     Ok(change(&inertia, recording, &finer))
 }
 

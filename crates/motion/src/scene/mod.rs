@@ -10,6 +10,7 @@ mod framed_scene;
 mod history;
 mod instants;
 mod load_cases;
+mod pace;
 mod prepared;
 mod read;
 mod read_cases;

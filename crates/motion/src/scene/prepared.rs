@@ -251,7 +251,7 @@ const STEPS_PER_PERIOD: f64 = 20.0;
 const STEPS_PER_OSCILLATION: f64 = 2.0;
 
 /// Longest stable explicit step, as the phase angle of the fastest mode per step.
-const STABLE: f64 = 6.0;
+pub(super) const STABLE: f64 = 6.0;
 
 /// Returns the frequency of the fastest history of a scene that lasts `duration`, in oscillations per time;
 /// zero without oscillation.

@@ -2,6 +2,7 @@
 
 use super::extremes::Survey;
 use super::framed_scene::{UNCOUPLED, is_uncoupled};
+use super::pace::Pace;
 use super::prepared::{PARTS, Prepared, damped};
 use super::recovered::SceneRows;
 use super::{Drift, Extremes, FramedScene, RecoveredMotion, Scene, Scheme};
@@ -31,7 +32,7 @@ const WATCHED: usize = 12;
 /// it.
 ///
 /// * `context`: its memory limits the recording and its tables; its listener gets the finished fraction of
-///   the duration.
+///   the duration and, if the run takes long, advice.
 ///
 /// # Errors
 /// FB212 if the scene does not fit the body; FB550, before any work, if the run needs more steps than
@@ -75,9 +76,10 @@ fn simulate_recording(
     let mut recorder = Recorder::new(body, scene, &run, time.len());
     let mut survey = Survey::new(body, &run.watched);
     let (mut rows, unseen) = SceneRows::new(body, scene, envelope).unzip();
+    let mut pace = Pace::new(&run, context);
     let record = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if event != ObserverEvent::Instant {
-            context.fraction(time / run.duration);
+            pace.see(time);
             run.survey(&mut survey, event, time, state, motion)?;
         } else {
             recorder.record(time, state, motion)?;

@@ -1,6 +1,7 @@
 //! Continuous motion along which errors are measured.
 
 use super::extremes::Survey;
+use super::pace::Pace;
 use super::prepared::{Finished, PARTS, Prepared, Reaction, Stop, damped};
 use super::recovery_errors::TracedRecoveries;
 use super::row_states::RowSampler;
@@ -117,6 +118,7 @@ pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(T
     let bytes = tracer.trace.bytes_of_instant(body.n_modes());
     let most = context.memory.map_or(f64::INFINITY, |memory| memory as f64 / bytes);
     let mut survey = Survey::new(body, &run.watched);
+    let mut pace = Pace::new(&run, context);
     let look = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if event == ObserverEvent::Instant {
             return Ok(());
@@ -124,7 +126,7 @@ pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(T
         if tracer.trace.time.len() as f64 >= most {
             return Err(Stop::Memory { time });
         }
-        context.fraction(time / run.duration);
+        pace.see(time);
         let reaction = run.survey(&mut survey, event, time, state, motion)?;
         tracer.see(time, state, motion, reaction)?;
         Ok(())
@@ -140,7 +142,7 @@ pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(T
 /// Extremes are not computed.
 ///
 /// * `times`: sample times, ascending, from 0 to the end of the scene.
-/// * `context`: its memory limits the motion.
+/// * `context`: its memory limits the motion; its listener gets the finished fraction of the duration.
 ///
 /// # Errors
 /// The errors of [`simulate`](super::simulate).
@@ -156,7 +158,9 @@ pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64], context: &Context
         &format!("the motion at {} instants", times.len()),
         "simulate a shorter `duration`",
     )?;
+    let mut pace = Pace::new(&run, context);
     let look = |event: ObserverEvent, time: f64, state: &[f64], motion: &mut Motion<'_>| {
+        pace.see(time);
         if event == ObserverEvent::Instant {
             let prescribes = framed.scene.prescribes();
             let reaction = if prescribes { Some(motion.evaluate(time, state)?.reaction()) } else { None };

@@ -205,7 +205,7 @@ impl Estimate {
         let view = |coupled| NodalView::new(coupled, body, loads.clone(), carrier.as_ref(), of_model);
         let Some(own) = view(coupled) else { return Ok(None) };
         // Simulate the motion and choose the instants at which the residual forces are evaluated.
-        let (motion, _) = trace(body, scene, &context.without_listener())?;
+        let (motion, _) = trace(body, scene, context)?;
         let Some(grid) = Grid::new(body, scene, &motion, duration) else {
             let error = ReferenceError::unknown(body.n_modes(), TOO_MANY_INSTANTS);
             return Ok(Some(Self { error, missing: Mat::zeros(model.rows().len(), 0) }));

@@ -54,7 +54,7 @@ impl<'m> MotionBodies<'m> {
         context: &Context<'_>,
     ) -> Result<Option<Self>> {
         let case = |scene: &'m Scene| -> Result<Case<'m>> {
-            let (motion, _) = trace(reference, scene, &context.without_listener())?;
+            let (motion, _) = trace(reference, scene, context)?;
             Ok(Case { scene, framed_body: FramedScene::new(reference, scene)?.body.into_owned(), motion })
         };
         let cases = cases.iter().map(case).collect::<Result<Vec<_>>>()?;

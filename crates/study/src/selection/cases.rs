@@ -96,7 +96,7 @@ impl<'c> Case<'c> {
     pub(super) fn new(body: &'c FlexBody, scene: &'c Scene, context: &Context<'c>) -> Result<Self> {
         let (loads, watched) = points_of(body, scene)?;
         let situation = Situation::new(body, scene, &loads);
-        Ok(Self { body, scene, situation, loads, watched, context: context.without_listener() })
+        Ok(Self { body, scene, situation, loads, watched, context: *context })
     }
 
     /// Returns norms of the terms at tier 0 and, if `tier_1` is set and the body holds all groups, at tier 1. Empty if

@@ -95,6 +95,7 @@ impl<'s> SelectionState<'s> {
         context: &Context<'_>,
     ) -> Result<String> {
         context.phase("reference motion");
+        context.runs(self.demands.iter().map(|demand| demand.cases.len()).sum());
         let references = self.reference_motions()?;
         let demands = self.demands;
         let both = demands.iter().zip(&references);

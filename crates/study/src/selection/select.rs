@@ -156,6 +156,7 @@ pub fn select_judged(
             let variations = cases.variations(body.dimension());
             let framed = framed_variations(body, &variations)?;
             context.phase("reference motion of the variations");
+            context.runs(variations.len());
             let varied = VariedRuns::new(&variations, cases, &framed, varied_reference_errors, context)?;
             selection_state.diagnostics.extend(varied.diagnostics.iter().cloned());
             let varied = Some(&varied).filter(|varied| !varied.is_empty());

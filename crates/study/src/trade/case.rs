@@ -1,6 +1,7 @@
 //! Reference motion of a load case, against which candidates are measured, and the judgement of candidates on variations
 //! of the scene that their bodies were not made for.
 
+use super::progress::Progress;
 use super::{
     Candidate, InCase, Measured, NodalReference, Recommendation, Source, TimedRun, TradeRow, front, reserved,
     timing,
@@ -105,11 +106,12 @@ impl<'m> StudyCase<'m> {
         measure: &Measure<'_>,
         candidate: &Candidate,
         body: &FlexBody,
+        context: &Context<'_>,
     ) -> Result<(InCase, usize)> {
         let mut scene = self.own_scene(body, candidate);
         scene.run.scheme = self.motion.scheme;
         let multiplications = EquationsOfMotion::new(body, scene.run.terms).multiplications();
-        Ok((self.errors(measure, candidate, body, &scene)?, multiplications))
+        Ok((self.errors(measure, candidate, body, &scene, context)?, multiplications))
     }
 
     /// Returns the errors of the run of `candidate`, whose body is `body`, in `scene`.
@@ -119,10 +121,11 @@ impl<'m> StudyCase<'m> {
         candidate: &Candidate,
         body: &FlexBody,
         scene: &Scene,
+        context: &Context<'_>,
     ) -> Result<InCase> {
         let source = &self.sources[candidate.source];
         let instants = self.nodal.as_ref().map_or(&self.motion.time[..], NodalReference::time);
-        let motion = trace_at(body, scene, instants, &Context::QUIET)?;
+        let motion = trace_at(body, scene, instants, context)?;
         let history = match &self.nodal {
             Some(nodal) => nodal.errors(body, &motion),
             None => source.errors(measure, body, &candidate.modes, &motion),
@@ -160,7 +163,7 @@ impl<'m> StudyCase<'m> {
                 return Some((scheme, *accurate));
             }
             scene.run.scheme = scheme;
-            let errors = self.errors(measure, candidate, body, &scene).ok()?;
+            let errors = self.errors(measure, candidate, body, &scene, &Context::QUIET).ok()?;
             (errors.worst <= most).then_some((scheme, errors))
         };
         let loosest = timing::schemes(finest, duration).into_iter().find_map(is_enough);
@@ -338,7 +341,6 @@ impl<'j> Judge<'j> {
         in_scene: Recommendation,
         context: &Context<'_>,
     ) -> Result<Recommendation> {
-        context.phase("variations");
         let (wanted, is_limited) = match in_scene {
             Recommendation::None => return Ok(in_scene),
             Recommendation::MostAccurate(row) => (vec![row], true),
@@ -347,13 +349,13 @@ impl<'j> Judge<'j> {
         // The measures look at all nodes and instants of the references: made once for all candidates.
         let measures: Vec<Measure<'_>> = self.cases.iter().map(StudyCase::measure).collect();
         let most = wanted.len().min(MOST_JUDGED);
-        for (done, &row) in wanted.iter().take(most).enumerate() {
-            let judged = self.judged(&measures, &rows[row].candidate)?;
+        let progress = Progress::new(context, "variations", most * self.cases.len());
+        for &row in wanted.iter().take(most) {
+            let judged = self.judged(&measures, &rows[row].candidate, &progress)?;
             let holds = judged.beyond == 0;
             if let Ok(measured) = &mut rows[row].outcome {
                 measured.varied = Some(judged);
             }
-            context.fraction((done + 1) as f64 / most as f64);
             if holds && !is_limited {
                 return Ok(Recommendation::Cheapest(row));
             }
@@ -362,9 +364,15 @@ impl<'j> Judge<'j> {
     }
 
     /// Measures a candidate in every variation.
-    fn judged(&self, measures: &[Measure<'_>], candidate: &Candidate) -> Result<InVariations> {
+    fn judged(
+        &self,
+        measures: &[Measure<'_>],
+        candidate: &Candidate,
+        progress: &Progress<'_>,
+    ) -> Result<InVariations> {
         let own = Candidate { source: candidate.source + self.before, ..candidate.clone() };
-        let measured = |(case, measure)| match measured(case, measure, &own) {
+        let run = |case, measure| progress.follow(1, |context| measured(case, measure, &own, context));
+        let measured = |(case, measure)| match run(case, measure) {
             Ok(found) => Ok(Some(found)),
             Err(error) if error.diagnostics().iter().all(|one| ends_a_run(one.code())) => Ok(None),
             Err(error) => Err(error),
@@ -379,9 +387,14 @@ impl<'j> Judge<'j> {
     }
 }
 
-fn measured(case: &StudyCase<'_>, measure: &Measure<'_>, candidate: &Candidate) -> Result<InCase> {
+fn measured(
+    case: &StudyCase<'_>,
+    measure: &Measure<'_>,
+    candidate: &Candidate,
+    context: &Context<'_>,
+) -> Result<InCase> {
     let body = case.body(candidate)?;
-    Ok(case.measured(measure, candidate, &body)?.0)
+    Ok(case.measured(measure, candidate, &body, context)?.0)
 }
 
 impl Measured {

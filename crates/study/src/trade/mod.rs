@@ -7,6 +7,7 @@ mod conversions;
 mod front;
 mod nodal_reference;
 mod nodal_trace;
+mod progress;
 mod study;
 mod timing;
 

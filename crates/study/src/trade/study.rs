@@ -2,6 +2,7 @@
 
 use super::candidate::{first_of, ladder, whole_candidates};
 use super::case::{Judge, StudyCase};
+use super::progress::Progress;
 use super::{
     Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Source, Timed,
     TradeRow, TradeVariation, Varied, front,
@@ -15,7 +16,6 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::parallel;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{LoadCases, Measure, Scene, Tolerance, ends_a_run};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Settings of a trade study.
 #[derive(Debug, Clone, Copy)]
@@ -224,25 +224,6 @@ impl TradeCase {
     }
 }
 
-/// Progress of a phase: reports the fraction of finished candidates.
-struct Progress<'w> {
-    context: &'w Context<'w>,
-    count: f64,
-    done: AtomicUsize,
-}
-
-impl<'w> Progress<'w> {
-    fn new(context: &'w Context<'w>, phase: &'static str, count: usize) -> Self {
-        context.phase(phase);
-        Self { context, count: count as f64, done: AtomicUsize::new(0) }
-    }
-
-    fn step(&self) {
-        let finished = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        self.context.fraction(finished as f64 / self.count);
-    }
-}
-
 /// Common data of all candidates.
 struct Job<'j> {
     cases: &'j [StudyCase<'j>],
@@ -277,13 +258,13 @@ impl Job<'_> {
         let some_modes = ladder(self.sources(), &most_excited, carried, worst_of);
         rows.extend(self.errors(some_modes, "errors of fewer modes", context)?);
         // Refine the number of modes near the tolerance.
-        self.refine(&most_excited, &mut rows)?;
+        self.refine(&most_excited, &mut rows, context)?;
         Ok(rows)
     }
 
     /// Bisects the number of modes between the cheapest candidate that holds and the largest smaller one that does not,
     /// as a selection does.
-    fn refine(&self, most_excited: &[usize], rows: &mut Vec<TradeRow>) -> Result<()> {
+    fn refine(&self, most_excited: &[usize], rows: &mut Vec<TradeRow>, context: &Context<'_>) -> Result<()> {
         if self.allowed.is_some() {
             return Ok(());
         }
@@ -309,9 +290,12 @@ impl Job<'_> {
         let fewer = rows.iter().filter(|row| row.candidate.modes.len() < count).filter(is_rung);
         let (mut too_few, mut enough) =
             (fewer.map(|row| row.candidate.modes.len()).max().unwrap_or(0), count);
+        context.phase("number of modes");
+        // The limits were checked before the first candidate.
+        let unlimited = Context { memory: None, ..*context };
         while too_few + 1 < enough {
             let count = too_few.midpoint(enough);
-            let row = self.measure(with(count))?;
+            let row = self.measure(with(count), &unlimited)?;
             let passed = row.outcome.as_ref().is_ok_and(|measured| measured.holds());
             if passed {
                 enough = count
@@ -352,17 +336,15 @@ impl Job<'_> {
     ) -> Result<Vec<TradeRow>> {
         let progress = Progress::new(context, phase, all.len());
         parallel::try_map(all, |candidate| {
-            let row = self.measure(candidate);
-            progress.step();
-            row
+            progress.follow(self.cases.len(), |context| self.measure(candidate, context))
         })
     }
 
     /// Measures a candidate, without times. An error that ends its simulation becomes the outcome of the row.
-    fn measure(&self, candidate: Candidate) -> Result<TradeRow> {
+    fn measure(&self, candidate: Candidate, context: &Context<'_>) -> Result<TradeRow> {
         let source = &self.sources()[candidate.source];
         let last = candidate.modes.last().copied().unwrap_or(0);
-        let outcome = match self.measured(&candidate) {
+        let outcome = match self.measured(&candidate, context) {
             Ok(measured) => Ok(measured),
             // A lumped mass matrix may be unphysical: its error becomes the outcome of the row.
             Err(error)
@@ -380,14 +362,14 @@ impl Job<'_> {
         })
     }
 
-    fn measured(&self, candidate: &Candidate) -> Result<Measured> {
+    fn measured(&self, candidate: &Candidate, context: &Context<'_>) -> Result<Measured> {
         let (mut by_case, mut multiplications, mut bytes) = (Vec::new(), 0, 0);
         for (case, measure) in self.cases.iter().zip(&self.measures) {
             let body = case.body(candidate)?;
             if by_case.is_empty() {
                 bytes = file_size(&body)?;
             }
-            let (own, cost) = case.measured(measure, candidate, &body).map_err(|error| {
+            let (own, cost) = case.measured(measure, candidate, &body, context).map_err(|error| {
                 Error::new(error.diagnostics().iter().cloned().map(|said| case.about(said)).collect())
             })?;
             multiplications = multiplications.max(cost);
