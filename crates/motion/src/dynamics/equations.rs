@@ -183,10 +183,14 @@ impl EquationsOfMotion {
         self.damping.add_product(factor, qd, y);
     }
 
+    /// Returns true if the modes are mass-normalised.
+    pub(super) fn is_normalised(&self) -> bool {
+        matches!(self.modal_mass, ModalMass::Identity)
+    }
+
     /// Returns stiffness and damping of mode `j`, if the modes are mass-normalised.
     pub(super) fn oscillator(&self, j: usize) -> Option<(f64, f64)> {
-        matches!(self.modal_mass, ModalMass::Identity)
-            .then(|| (self.stiffness.get(j, j), self.damping.get(j, j)))
+        self.is_normalised().then(|| (self.stiffness.get(j, j), self.damping.get(j, j)))
     }
 
     /// Returns qd'D qd, the power dissipated by damping.

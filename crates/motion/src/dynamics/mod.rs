@@ -8,6 +8,7 @@ mod evaluation;
 mod jacobian;
 mod kernels;
 mod motion;
+mod natural_modes;
 mod nodal;
 mod orientation;
 mod points;

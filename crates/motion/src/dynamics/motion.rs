@@ -1,6 +1,7 @@
 //! Motion of one body in space as a system for integration.
 
 use super::kernels::{add_scaled, dot};
+use super::natural_modes::NaturalModes;
 use super::{Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place, Snapshot};
 use crate::integration::{Failure, Oscillator, System};
 use nalgebra::{Matrix3, Vector3, Vector6};
@@ -57,6 +58,8 @@ pub struct Motion<'a> {
     reference: Vector3<f64>,
     size: Size,
     oscillators: Vec<Oscillator>,
+    /// Coordinates of the oscillators; `None` if the modes themselves are the oscillators.
+    natural: Option<NaturalModes>,
     momenta: Vec<f64>,
     forces: Vec<f64>,
     rates: Vec<f64>,
@@ -131,6 +134,12 @@ impl Layout {
     fn angular_impulse(self) -> usize {
         self.impulse() + 3
     }
+
+    /// Returns the entries of q and of pi.
+    fn deformation(self, state: &mut [f64]) -> (&mut [f64], &mut [f64]) {
+        let (before, momenta) = state.split_at_mut(self.modal());
+        (&mut before[Self::MODES..self.linear()], &mut momenta[..self.0])
+    }
 }
 
 fn vector(state: &[f64], at: usize) -> Vector3<f64> {
@@ -173,8 +182,13 @@ impl<'a> Motion<'a> {
         put(&(axes * evaluation.angular_momentum()), layout.angular(), &mut state);
         evaluation.modal_momentum(&mut state[layout.modal()..layout.offset()]);
 
+        let natural = match equations.is_normalised() {
+            true => None,
+            false => NaturalModes::new(equations, &surroundings.prescribed(0.0, &axes).0),
+        };
         let oscillator = |j: usize| {
-            let (stiffness, damping) = equations.oscillator(j)?;
+            let own = natural.as_ref().map(|natural| natural.oscillators[j]);
+            let (stiffness, damping) = own.or_else(|| equations.oscillator(j))?;
             Some(Oscillator {
                 coordinate: Layout::MODES + j,
                 momentum: layout.modal() + j,
@@ -188,6 +202,7 @@ impl<'a> Motion<'a> {
             reference: start.origin,
             size: Size::new(equations),
             oscillators: (0..nf).filter_map(oscillator).collect(),
+            natural,
             momenta: vec![0.0; n],
             forces: vec![0.0; n],
             rates: vec![0.0; n],
@@ -377,6 +392,20 @@ impl System for Motion<'_> {
 
     fn oscillators(&self) -> &[Oscillator] {
         &self.oscillators
+    }
+
+    fn to_oscillators(&self, residual: &mut [f64]) {
+        if let Some(natural) = &self.natural {
+            let (q, pi) = self.layout().deformation(residual);
+            natural.transform(q, pi);
+        }
+    }
+
+    fn from_oscillators(&self, residual: &mut [f64]) {
+        if let Some(natural) = &self.natural {
+            let (q, pi) = self.layout().deformation(residual);
+            natural.transform_back(q, pi);
+        }
     }
 
     /// Scales the Euler parameters to unit length.

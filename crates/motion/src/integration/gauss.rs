@@ -172,7 +172,11 @@ impl Gauss {
             self.find_residuals(h);
             let residuals = &mut self.rates[..self.tableau.stages];
             let own_size = system.correct_stages(h, &self.modes, &self.scales, residuals)?;
-            let in_scales = self.correct(h);
+            residuals.iter_mut().for_each(|residual| system.to_oscillators(residual));
+            self.filter(h);
+            let corrections = &mut self.rates[..self.tableau.stages];
+            corrections.iter_mut().for_each(|correction| system.from_oscillators(correction));
+            let in_scales = self.correct();
             let size = own_size.unwrap_or(in_scales);
             // Contraction of the corrections; unknown at the first correction.
             let ratio = before.map(|before: f64| size / before);
@@ -232,9 +236,8 @@ impl Gauss {
         }
     }
 
-    /// Corrects the increments by their residual, filtered by the oscillators; returns the root mean square
-    /// of the correction in scales.
-    fn correct(&mut self, h: f64) -> f64 {
+    /// Replaces the residuals of the oscillators by the corrections that solve them.
+    fn filter(&mut self, h: f64) {
         for (oscillator, inverse) in &self.oscillators {
             let (x, p) = (oscillator.coordinate, oscillator.momentum);
             let entry = |rates: &[Vec<f64>; STAGES], at: usize| rates.each_ref().map(|rates| rates[at]);
@@ -248,6 +251,10 @@ impl Gauss {
                 self.rates[i][x] = residuals[i] + h * product(&self.tableau.weights[i], &correction);
             }
         }
+    }
+
+    /// Adds the corrections to the increments; returns their root mean square in scales.
+    fn correct(&mut self) -> f64 {
         let mut sum = 0.0;
         for (increments, corrections) in self.increments.iter_mut().zip(&self.rates).take(self.tableau.stages)
         {

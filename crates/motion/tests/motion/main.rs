@@ -23,6 +23,7 @@ mod partial_bodies;
 mod recovery;
 mod rotation;
 mod settled_rates;
+mod slow_motion;
 mod turning_nodes;
 mod variations;
 mod watched;
