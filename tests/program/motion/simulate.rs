@@ -60,6 +60,7 @@ fn scenes_of_the_fixtures_fit_their_schema_and_run() {
         ("turbine_blade_runup", "turbine_blade"),
         ("mems_gyroscope", "mems_gyroscope"),
         ("robot_link", "robot_link"),
+        ("robot_link_slow", "robot_link"),
         ("gear_disc", "gear_disc"),
         ("conveyor_plate", "conveyor_plate"),
         ("block_79_periods", "cube_hex8"),

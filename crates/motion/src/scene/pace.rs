@@ -65,9 +65,11 @@ impl<'p> Pace<'p> {
 ///
 /// * `scheme`: integration scheme with the actual step length.
 fn advice(body: &FlexBody, scene: &Scene, scheme: Scheme, duration: f64, seconds: f64) -> String {
-    let root = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
+    // The carrier of a body changes its frequencies.
+    let in_frame = scene.carried.as_ref().and_then(|_| body.eigenvalues_in_frame());
+    let eigenvalues = in_frame.as_ref().unwrap_or(&body.modes().eigenvalue);
+    let root = eigenvalues.iter().copied().fold(0.0, f64::max).sqrt();
     let (periods, unit) = (duration * root / TAU, body.units().time.name());
-    let highest = body.frequencies_hz().into_iter().fold(0.0, f64::max);
     let takes = match seconds {
         ..90.0 => format!("about {seconds:.0} s"),
         _ => format!("about {:.0} min", seconds / 60.0),
@@ -86,11 +88,11 @@ fn advice(body: &FlexBody, scene: &Scene, scheme: Scheme, duration: f64, seconds
     };
     if by_modes < WORTHWHILE * by_motion {
         return format!(
-            "this run takes {takes}; a body with fewer modes or a shorter `duration` in [run] takes less"
+            "each run of this scene takes {takes}; a body with fewer modes or a shorter `duration` in [run] takes less"
         );
     }
     format!(
-        "this run takes {takes}: {followed} the {periods:.0} periods of the highest mode ({highest:.0} Hz) in {duration} {unit}, about {by_modes:.0} steps. If only the slow motion matters, method = \"conserving\" with step = {step} in [run] takes {by_motion:.0} steps, in which fast modes follow the loads statically; a body with fewer modes or a shorter `duration` is faster too"
+        "each run of this scene takes {takes}: {followed} the {periods:.0} periods of the highest mode in {duration} {unit}, at least {by_modes:.0} steps. If only the slow motion matters, method = \"conserving\" with step = {step} in [run] takes {by_motion:.0} steps, in which fast modes follow the loads statically; a body with fewer modes or a shorter `duration` is faster too"
     )
 }
 
