@@ -55,6 +55,7 @@ pub struct SimulationFacts<'a> {
     /// Largest torque that the reference conditions carry at the output times; `None` unless the frame is a
     /// mean-axis frame.
     largest_conditions_torque: Option<f64>,
+    geometric_stiffness: StiffeningFacts<'a>,
     points: Vec<PointFacts<'a>>,
     /// Largest values of the recoveries over the continuous motion; absent for a body without.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -89,6 +90,30 @@ struct CarriedFacts<'a> {
     frequency_hz: Vec<f64>,
     largest_force: f64,
     largest_torque: f64,
+}
+
+/// Part that geometric stiffness has in a simulation.
+#[derive(Debug, Clone, Serialize)]
+struct StiffeningFacts<'a> {
+    /// True if geometric stiffness acts in the simulation.
+    acts: bool,
+    /// True if `geometric_stiffness = false` in [run] of the scene leaves it out.
+    is_off: bool,
+    /// Loads and motions for which the body has geometric stiffness.
+    loads: &'a [String],
+}
+
+impl StiffeningFacts<'_> {
+    fn in_words(&self) -> String {
+        let loads = self.loads.join(", ");
+        match (self.loads.is_empty(), self.is_off) {
+            (true, _) => "no geometric stiffness in the body".to_owned(),
+            (false, false) => format!("geometric stiffness acts, for {loads}"),
+            (false, true) => format!(
+                "geometric stiffness is switched off (geometric_stiffness = false in [run]); the body has it for {loads}"
+            ),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -190,6 +215,11 @@ impl<'a> SimulationFacts<'a> {
             frame_origin: setting.origin_in_words(),
             reaction,
             largest_conditions_torque: recording.conditions.as_deref().map(longest),
+            geometric_stiffness: StiffeningFacts {
+                acts: !setting.stiffening.is_empty() && !setting.stiffening_is_off,
+                is_off: setting.stiffening_is_off,
+                loads: &setting.stiffening,
+            },
             points: points.map(|(path, peak)| PointFacts::new(path, peak.value)).collect(),
             recoveries: recording.recovered.as_ref().map_or_else(Vec::new, RecoveryFacts::of_motion),
             diagnostics: &run.diagnostics,
@@ -347,6 +377,7 @@ impl<'a> SimulationFacts<'a> {
         terms.extend(
             self.support_in_words().into_iter().map(|(label, words)| Term::new(label, quantity(words))),
         );
+        terms.push(Term::new("Stiffening", self.geometric_stiffness.in_words()));
         let part = significant(100.0 * self.largest_deflection, 3);
         terms.push(Term::new("Deflection", format!("{part} % of the largest extent of the body")));
         let length = self.units.length();

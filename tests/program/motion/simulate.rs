@@ -276,6 +276,31 @@ fn terms_are_those_of_the_scene() {
     assert_eq!(read(""), Terms::ALL);
     assert_eq!(read("terms = [\"W1\", \"W3\"]"), Terms { w2: false, ..Terms::ALL });
     assert_eq!(read("terms = []"), Terms { geometric_stiffness: true, ..Terms::NONE });
+    assert_eq!(read("geometric_stiffness = false"), Terms { geometric_stiffness: false, ..Terms::ALL });
+    assert_eq!(read("terms = []\ngeometric_stiffness = false"), Terms::NONE);
+}
+
+/// The scene switches the geometric stiffness of a blade off: without it the blade is softer, and the report says so.
+#[test]
+fn geometric_stiffness_can_be_switched_off_and_is_reported() {
+    let folder = folder_with("turbine_blade", 4);
+    let run = |setting: &str| -> Value {
+        let text = format!("[run]\nduration = 0.004\n{setting}\n[spin]\naxis = [0, 0, 1]\nrate = 1500\n[initial]\ndeformation = \"static\"\n");
+        scene(folder.path(), &text);
+        let run = done(folder.path(), &["simulate", "body.flex.h5", "--scene", "scene.toml", "--json"]);
+        serde_json::from_slice::<Value>(&run.stdout).expect("JSON")["results"].take()
+    };
+    let (on, off) = (run(""), run("geometric_stiffness = false"));
+    assert_eq!(on["geometric_stiffness"]["acts"], true, "{on:#}");
+    assert_eq!(on["geometric_stiffness"]["loads"][0], "spin");
+    assert_eq!(off["geometric_stiffness"]["acts"], false);
+    assert_eq!(off["geometric_stiffness"]["is_off"], true);
+    let deflection = |facts: &Value| facts["largest_deflection"].as_f64().expect("a number");
+    assert!(deflection(&off) > 1.02 * deflection(&on), "{} and {}", deflection(&off), deflection(&on));
+    scene(folder.path(), "[run]\nduration = 1\ngeometric_stiffness = \"no\"\n");
+    let refused = flexbody(folder.path(), &["simulate", "body.flex.h5", "--scene", "scene.toml"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("true or false"));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Reader of a scene from `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
 
 use super::read_columns::{HistoryFiles, columns_history, finite, place_of, positive};
-use super::read_requirements::{self, requirements};
+use super::read_requirements::{self, flag, requirements};
 use super::read_values::{
     EVERY, axes, direction, history, list, loaded_place, mode_number, place, transposed, turning, vector,
 };
@@ -19,7 +19,17 @@ use toml::de::DeValue;
 
 pub(super) const TOP: &[&str] =
     &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch", "case", "variation"];
-const RUN: &[&str] = &["duration", "outputs", "most_steps", "method", "tolerance", "order", "step", "terms"];
+const RUN: &[&str] = &[
+    "duration",
+    "outputs",
+    "most_steps",
+    "method",
+    "tolerance",
+    "order",
+    "step",
+    "terms",
+    "geometric_stiffness",
+];
 const INITIAL: &[&str] =
     &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode", "deformation"];
 const MODE: &[&str] = &["number", "amplitude", "rate"];
@@ -104,10 +114,12 @@ fn run(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<Run
         None => Some(Terms::ALL),
         Some(value) => terms(walk, value),
     };
+    let geometric_stiffness = flag(walk, table, "geometric_stiffness", true);
     let scheme = scheme(walk, table, &span);
     let outputs = usize::try_from(outputs?).ok()?;
     let most_steps = most_steps? as u64;
-    Some(Run { duration: duration?, outputs, most_steps, scheme: scheme?, terms: terms? })
+    let terms = Terms { geometric_stiffness: geometric_stiffness?, ..terms? };
+    Some(Run { duration: duration?, outputs, most_steps, scheme: scheme?, terms })
 }
 
 fn scheme(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option<Scheme> {
@@ -272,14 +284,7 @@ fn load(walk: &mut Walk<'_>, files: &HistoryFiles, table: &TomlTable, span: Rang
 
 fn spin(walk: &mut Walk<'_>, files: &HistoryFiles, table: &TomlTable, span: Range<usize>) -> Option<Spin> {
     walk.known_keys(table, "[spin]", SPIN);
-    let hold = match table.get("hold").map(|value| (value, value.get_ref())) {
-        None => Some(false),
-        Some((_, DeValue::Boolean(hold))) => Some(*hold),
-        Some((value, _)) => {
-            walk.mistyped("hold", value, "true or false");
-            None
-        }
-    };
+    let hold = flag(walk, table, "hold", false);
     let turning = turning(walk, files, table, span, "[spin]")?;
     Some(Spin { velocity: turning.velocity, axes: turning.axes, start: turning.start, hold: hold? })
 }

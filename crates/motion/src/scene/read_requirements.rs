@@ -193,7 +193,7 @@ impl Section<'_, '_> {
 }
 
 /// Reads `true` or `false`, or returns the `default` if the key is absent.
-fn flag(walk: &mut Walk<'_>, table: &TomlTable, key: &str, default: bool) -> Option<bool> {
+pub(super) fn flag(walk: &mut Walk<'_>, table: &TomlTable, key: &str, default: bool) -> Option<bool> {
     let Some(value) = table.get(key) else { return Some(default) };
     let DeValue::Boolean(flag) = value.get_ref() else {
         walk.mistyped(key, value, "true or false");

@@ -305,6 +305,10 @@ pub struct Setting {
     pub gravity_model: Option<Vector3<f64>>,
     /// Eigenvalues of the carried body; empty without a carrier. Unit: 1/time^2.
     pub eigenvalues: Vec<f64>,
+    /// Loads and motions for which the body has geometric stiffness in the frame, without their axes; each once.
+    pub stiffening: Vec<String>,
+    /// True if the scene leaves the geometric stiffness of the body out.
+    pub stiffening_is_off: bool,
 }
 
 impl Setting {
@@ -318,6 +322,8 @@ impl Setting {
             origin: body.frame().origin,
             gravity_model: scene.gravity.map(|gravity| start.tr_mul(&gravity)),
             eigenvalues: eigenvalues.unwrap_or_default(),
+            stiffening: stiffening_loads(body),
+            stiffening_is_off: !scene.run.terms.geometric_stiffness,
         }
     }
 
@@ -328,6 +334,23 @@ impl Setting {
             None => "centre of mass of the undeformed body".to_owned(),
         }
     }
+}
+
+/// Returns the loads and motions for which `body` has geometric stiffness, without their axes, each once.
+fn stiffening_loads(body: &FlexBody) -> Vec<String> {
+    let mut loads = Vec::new();
+    for one in body.geometric_stiffness() {
+        let kind = one.load.kind.name().replace('_', " ");
+        let words = match &one.load.kind {
+            LoadKind::Named(name) => format!("{kind} `{name}`"),
+            LoadKind::Force(at) | LoadKind::Moment(at) => format!("{kind} at `{at}`"),
+            _ => kind,
+        };
+        if !loads.contains(&words) {
+            loads.push(words);
+        }
+    }
+    loads
 }
 
 /// Smallest deformation that is compared: errors are relative to the largest deformation of the motion, but

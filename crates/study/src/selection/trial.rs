@@ -84,8 +84,13 @@ impl TrialRuns<'_> {
     /// The errors of [`trace`].
     pub fn motion(&self, kept: TermGroups) -> Result<(Trace, Vec<Diagnostic>)> {
         let mut scene = self.scene.clone();
-        scene.run.terms = Terms::ALL.held(kept);
+        scene.run.terms = self.terms(kept);
         trace(self.body, &scene, &self.context)
+    }
+
+    /// Returns the terms of a model with the groups `kept`: with geometric stiffness unless the scene switches it off.
+    fn terms(&self, kept: TermGroups) -> Terms {
+        Terms { geometric_stiffness: self.scene.run.terms.geometric_stiffness, ..Terms::ALL }.held(kept)
     }
 
     /// Simulates the body with the groups `kept` at evenly spaced instants. The spacing follows the fastest mode, the
@@ -104,7 +109,7 @@ impl TrialRuns<'_> {
             return Ok(None);
         }
         scene.run.outputs = (followed as usize).max(LEAST_INSTANTS);
-        scene.run.terms = Terms::ALL.held(kept);
+        scene.run.terms = self.terms(kept);
         let (motion, _) = simulate(self.body, &scene, &self.context)?;
         let is_followed = wanted(self.highest_excited_rate(&motion)) <= followed.max(LEAST_INSTANTS as f64);
         Ok(is_followed.then_some(motion))
@@ -168,7 +173,7 @@ impl TrialRuns<'_> {
         };
         let mut scene =
             if modes.len() == whole.n_modes() { self.scene.clone() } else { self.scene.of_modes(modes) };
-        scene.run.terms = Terms::ALL.held(kept);
+        scene.run.terms = self.terms(kept);
         // Use the steps of the reference, so that the errors come from the model alone.
         scene.run.scheme = measure.trace().scheme;
         let history = match trace_at(body, &scene, &measure.trace().time, &self.context) {
