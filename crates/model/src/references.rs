@@ -17,8 +17,10 @@ const WARNING_DISTANCE: f64 = 3.0;
 const MIN_RELATIVE_EXTENT: f64 = 0.05;
 
 /// Distance of the default point of an interface from the mean of its nodes, relative to the largest
-/// distance between two of them, above which a warning is given.
-const MEAN_POINT_DISTANCE: f64 = 0.01;
+/// distance between two of them, above which a warning is given. A smaller value warns of bores whose mesh is merely
+/// irregular: 1.4 % at the big end of the connecting rod of the fixtures, 2 % at bolt holes, with the centre of the faces on
+/// the axis.
+const MEAN_POINT_DISTANCE: f64 = 0.05;
 /// Length, relative to the body, below which a distance or a coordinate counts as rounding.
 const ROUNDING_LENGTH: f64 = 1e-9;
 

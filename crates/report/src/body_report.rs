@@ -5,7 +5,8 @@ use super::chart::{Axis, Bar, Bars};
 use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading, listed, quantity};
 use super::facts::{Facts, InterfaceFacts, ModelFacts, RunFacts};
 use super::lumped::{
-    ErrorNorm, Errors, LumpedFacts, LumpedModesFacts, NEGLIGIBLE, distinct, scheme_in_words,
+    ErrorNorm, Errors, LumpedFacts, LumpedModesFacts, NEGLIGIBLE, distinct, invariant_in_words, judgement,
+    scheme_in_words,
 };
 use super::numbers::{
     bytes, coordinates, counted, duration, frequency, frequency_range, percent, sentence, significant, times,
@@ -291,6 +292,7 @@ fn lumped<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
                 .into(),
         ));
         blocks.push(Block::List(lumped.iter().map(in_words).collect()));
+        blocks.extend(judgement(lumped).map(Block::Paragraph));
         blocks.extend(bars(lumped).map(Block::Bars));
         let norms = vec![Block::Table(schemes(lumped)), Block::Table(all_norms(lumped))];
         blocks.push(Block::Fold("All error norms", norms));
@@ -366,9 +368,14 @@ fn bars(lumped: &[LumpedFacts]) -> Option<Bars> {
             // The last of several norms of one name counts, as in a table by names.
             let norm =
                 own.errors.worst_by_invariant.iter().rev().find(|norm| norm.invariant == *invariant)?;
-            Some(Bar { style, value: norm.value, label: percent(norm.value), name: own.scheme.clone() })
+            Some(Bar {
+                style,
+                value: norm.value,
+                label: percent(norm.value),
+                name: scheme_in_words(&own.scheme).to_owned(),
+            })
         };
-        ((*invariant).to_owned(), lumped.iter().enumerate().filter_map(bar).collect())
+        (invariant_in_words(invariant), lumped.iter().enumerate().filter_map(bar).collect())
     };
     (!invariants.is_empty()).then(|| Bars {
         description: "Bar chart of the worst relative error of each invariant; the numbers are in the table below.".to_owned(),

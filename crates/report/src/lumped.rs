@@ -5,6 +5,7 @@ use super::numbers::{percent, significant};
 use super::run_data::LumpedModes;
 use flexbody_body::flex_body::LumpedBody;
 use flexbody_body::invariants::{ERROR_NORMS, Invariants, LumpedScheme};
+use flexbody_linalg::larger;
 use serde::{Serialize, Serializer};
 use std::collections::{HashMap, HashSet};
 
@@ -115,6 +116,13 @@ impl LumpedFacts {
         }
     }
 
+    /// Returns the invariant of the modes with the largest error; `None` if no error exceeds rounding.
+    fn worst_of_modes(&self) -> Option<(&str, f64)> {
+        let norms = self.errors.worst_by_invariant.iter().map(|norm| (norm.invariant.as_str(), norm.value));
+        let modal = norms.filter(|(invariant, _)| !meaning(invariant).is_empty());
+        modal.reduce(worse).filter(|(_, error)| is_error(*error))
+    }
+
     /// Returns the errors of the lumped mass in words; if `explained`, each invariant of the modes carries
     /// its meaning.
     pub(crate) fn in_words(&self, explained: bool) -> String {
@@ -205,6 +213,12 @@ impl LumpedEffect {
         }
     }
 
+    /// Returns the largest relative change of mass, centre or a principal moment; NaN if one is not known.
+    fn largest_inertia(&self) -> f64 {
+        let [a, b, c] = self.moments;
+        [self.mass, self.centre, a, b, c].into_iter().fold(0.0, |most, change| larger(most, change.abs()))
+    }
+
     /// Returns the largest change in words if it exceeds rounding: `smallest inertia +1.4 %` or, if
     /// `explained`, `smallest principal moment of inertia 1.4 % too large`.
     fn in_words(&self, explained: bool) -> Option<String> {
@@ -274,16 +288,71 @@ fn meaning(invariant: &str) -> &'static str {
     }
 }
 
+/// Returns the readable name of an invariant beside its bars.
+pub(super) fn invariant_in_words(invariant: &str) -> String {
+    match invariant {
+        "com_shift" => "centre of mass".to_owned(),
+        "I0" => "I0: inertia".to_owned(),
+        "W1" => "W1: inertia, deflected".to_owned(),
+        "W2" => "W2: centrifugal forces".to_owned(),
+        "W3" => "W3: Coriolis forces".to_owned(),
+        "C1" => "C1: translation".to_owned(),
+        "C2" => "C2: rotation".to_owned(),
+        other => other.replace('_', " "),
+    }
+}
+
+/// Error above which the choice between exact and lumped invariants matters.
+const MATTERS: f64 = 1e-3;
+
+/// Returns a sentence that judges whether the exact mass matrix matters for this body: by the scheme whose errors are
+/// smallest. Returns `None` if nothing was compared.
+pub(super) fn judgement(lumped: &[LumpedFacts]) -> Option<String> {
+    let compared = lumped.iter().filter(|own| own.errors.worst.is_some());
+    let largest = |own: &LumpedFacts| {
+        larger(own.effect.largest_inertia(), own.worst_of_modes().map_or(0.0, |(_, e)| e))
+    };
+    let best = compared.min_by(|a, b| largest(a).total_cmp(&largest(b)))?;
+    let which = if lumped.len() > 1 { "the better of these lumped masses" } else { "these lumped masses" };
+    let scheme = scheme_in_words(&best.scheme);
+    let negative = match best.negative_masses {
+        0 => String::new(),
+        1 => ", and 1 node would have a negative mass".to_owned(),
+        count => format!(", and {count} nodes would have negative masses"),
+    };
+    if largest(best) <= MATTERS && best.negative_masses == 0 {
+        return Some(format!(
+            "With {which} ({scheme}) no inertia and no invariant of the modes of the body would be off by more than 0.1 %: for this body the exact mass matrix makes no difference above that."
+        ));
+    }
+    let inertia = match best.effect.largest_inertia() {
+        change if is_error(change) => format!("off by up to {}", rough(change)),
+        _ => "right".to_owned(),
+    };
+    let of_modes = best.worst_of_modes().map_or_else(String::new, |(invariant, error)| {
+        let name = invariant.replace('_', " ");
+        format!(
+            ", the largest invariant of the modes off by {} ({name}: {})",
+            rough(error),
+            meaning(invariant)
+        )
+    });
+    Some(format!(
+        "With {which} ({scheme}) the inertia of the body would be {inertia}{of_modes}{negative}: for this body the exact mass matrix matters."
+    ))
+}
+
 /// Returns all defects of lumped masses in words, unphysical ones first: `NEGATIVE masses at 410 nodes, smallest
 /// inertia +1.4 %, W2 8 % off`. If `explained`, the invariant carries its meaning.
 ///
 /// `norms` are the worst norm of each invariant, by the name of the invariant.
 fn in_words(negative_masses: usize, effect: &LumpedEffect, norms: &[(&str, f64)], explained: bool) -> String {
     let mut found = Vec::new();
+    let whose = if explained { " (made by this scheme; the model has no such masses)" } else { "" };
     match negative_masses {
         0 => {}
-        1 => found.push("NEGATIVE masses at 1 node".to_owned()),
-        count => found.push(format!("NEGATIVE masses at {count} nodes")),
+        1 => found.push(format!("NEGATIVE masses at 1 node{whose}")),
+        count => found.push(format!("NEGATIVE masses at {count} nodes{whose}")),
     }
     found.extend(effect.in_words(explained));
     let modal = norms.iter().copied().filter(|(invariant, _)| !meaning(invariant).is_empty());
@@ -307,9 +376,31 @@ mod tests {
             in_words(410, &effect, &norms, false),
             "NEGATIVE masses at 410 nodes, smallest inertia +1.4 %, W2 8.2 % off"
         );
-        assert!(in_words(1, &effect, &norms, true).starts_with("NEGATIVE masses at 1 node, "));
+        let told = in_words(1, &effect, &norms, true);
+        assert!(told.starts_with("NEGATIVE masses at 1 node (made by this scheme; "), "{told}");
         let none = LumpedEffect { mass: 0.0, moments: [0.0; 3], centre: 0.0 };
         assert_eq!(in_words(0, &none, &[("W2", 1e-15)], true), "no error above 1e-9");
+    }
+
+    #[test]
+    fn the_judgement_is_that_of_the_better_scheme() {
+        let scheme = |name: &str, error: f64, negative_masses: usize| LumpedFacts {
+            scheme: name.to_owned(),
+            mass: 1.0,
+            negative_masses,
+            effect: LumpedEffect { mass: 0.0, moments: [0.1 * error; 3], centre: 0.0 },
+            errors: Errors::new(&[("W2_max".to_owned(), error)]),
+        };
+        let told = |all: &[LumpedFacts]| judgement(all).expect("a judgement");
+        let matters = told(&[scheme("row-sum", 0.08, 410), scheme("diagonal-scaling", 0.2, 0)]);
+        assert_eq!(
+            matters,
+            "With the better of these lumped masses (row sums) the inertia of the body would be off by up to 0.8 %, the largest invariant of the modes off by 8 % (W2: the centrifugal forces on the modes), and 410 nodes would have negative masses: for this body the exact mass matrix matters."
+        );
+        let none = told(&[scheme("row-sum", 9e-4, 0), scheme("diagonal-scaling", 0.2, 0)]);
+        assert!(none.contains("makes no difference"), "{none}");
+        assert!(told(&[scheme("row-sum", 9e-4, 3)]).contains("matters"));
+        assert_eq!(judgement(&[]), None);
     }
 
     #[test]

@@ -90,7 +90,9 @@ pub struct ConvertArguments {
     /// Lumped masses for comparison: row-sum, diagonal-scaling, user=FILE (node,mass), or none
     #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
     pub lumped: String,
-    /// Compute the modes of each lumped mass too, and compare them after aligning the subspaces
+    /// Compute the modes of each lumped mass too, as a program without the mass matrix would, and compare their
+    /// frequencies and invariants with the exact ones, after aligning the subspaces (free modes only; see
+    /// docs/reference/report.md)
     #[arg(long)]
     pub lumped_modes: bool,
     /// Write only the terms and modes that this scene needs (see docs/reference/select.md); its loads and band choose

@@ -285,7 +285,9 @@ fn terms_are_those_of_the_scene() {
 fn geometric_stiffness_can_be_switched_off_and_is_reported() {
     let folder = folder_with("turbine_blade", 4);
     let run = |setting: &str| -> Value {
-        let text = format!("[run]\nduration = 0.004\n{setting}\n[spin]\naxis = [0, 0, 1]\nrate = 1500\n[initial]\ndeformation = \"static\"\n");
+        let text = format!(
+            "[run]\nduration = 0.004\n{setting}\n[spin]\naxis = [0, 0, 1]\nrate = 1500\n[initial]\ndeformation = \"static\"\n"
+        );
         scene(folder.path(), &text);
         let run = done(folder.path(), &["simulate", "body.flex.h5", "--scene", "scene.toml", "--json"]);
         serde_json::from_slice::<Value>(&run.stdout).expect("JSON")["results"].take()

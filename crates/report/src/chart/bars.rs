@@ -7,12 +7,16 @@ use crate::numbers::significant;
 use maud::{Markup, Render, html};
 
 /// Layout of the drawing in its own units: names of the groups, bars, values at their ends.
-const NAMES: f64 = 112.0;
+const NAMES: f64 = 172.0;
 const PLOT: f64 = 560.0;
 const VALUES: f64 = 168.0;
 const BAR: f64 = 13.0;
 const GAP: f64 = 11.0;
 const TOP: f64 = 22.0;
+
+/// Largest number of characters of the name of a group, and of a bar; longer ones are cut.
+const LONGEST_GROUP: usize = 24;
+const LONGEST_BAR: usize = 16;
 
 /// Groups of bars.
 pub(crate) struct Bars {
@@ -50,7 +54,7 @@ impl Render for Bars {
                     }
                     @for ((name, bars), top) in self.groups.iter().zip(tops) {
                         "\n"
-                        (label("", "end", [NAMES - 8.0, top + 0.5 * BAR * bars.len() as f64 + 4.0], &shortened(name)))
+                        (label("", "end", [NAMES - 8.0, top + 0.5 * BAR * bars.len() as f64 + 4.0], &shortened(name, LONGEST_GROUP)))
                         @for (i, bar) in bars.iter().enumerate() { (self.bar(bar, top + BAR * i as f64)) }
                     }
                 }
@@ -67,19 +71,18 @@ impl Bars {
         html! {
             rect class={ "s" (bar.style % STYLES) } x=(NAMES) y=(At(y)) width=(At(width)) height=(BAR - 2.0) {}
             text x=(At(NAMES + width + 5.0)) y=(At(y + BAR - 3.0)) {
-                (Plain(&bar.label)) " " tspan class="tick" { (Plain(&shortened(&bar.name))) }
+                (Plain(&bar.label)) " " tspan class="tick" { (Plain(&shortened(&bar.name, LONGEST_BAR))) }
             }
         }
     }
 }
 
 /// Returns a name shortened to fit beside the bars.
-fn shortened(name: &str) -> String {
-    const LONGEST: usize = 16;
-    if name.chars().count() <= LONGEST {
+fn shortened(name: &str, longest: usize) -> String {
+    if name.chars().count() <= longest {
         return name.to_owned();
     }
-    name.chars().take(LONGEST - 1).chain(['…']).collect()
+    name.chars().take(longest - 1).chain(['…']).collect()
 }
 
 /// Number of decades of the scale below 1, and number of colour steps.

@@ -417,7 +417,9 @@ fn names_cannot_inject_markup_or_terminal_codes() {
     well_formed(&html);
     let (page, scripts) = without_scripts(&html);
     assert!(!html.contains("<script>alert") && !html.contains('\u{1b}') && page.contains("&lt;script&gt;"));
-    let escaped = page.matches("&lt;script&gt;alert('x')&lt;/script&gt;").count();
+    // Names beside bars are cut, so that the end of the element may be missing.
+    let escaped = page.matches("&lt;script&gt;alert('x')").count();
+    assert!(!page.contains("alert('x')</"), "ends of elements are escaped");
     assert_eq!(page.matches("alert('x')").count(), escaped, "texts are escaped");
     let data = scripts.iter().find(|script| script.starts_with('{')).expect("what the script is told");
     assert!(data.contains("\\u003cscript>alert") && !data.contains('<'), "{data}");
@@ -443,7 +445,7 @@ fn the_page_is_whole_without_scripts() {
         "<svg class=\"still\"",
         "812.5",
         "kg m\u{b2}",
-        "<span class=\"error\">NEGATIVE masses at 312 nodes</span>, smallest principal moment of inertia 100 % too large",
+        "<span class=\"error\">NEGATIVE masses at 312 nodes (made by this scheme; the model has no such masses)</span>, smallest principal moment of inertia 100 % too large",
         "the centrifugal forces on the modes (W2) 31 % off",
         "<summary>All error norms</summary>",
         "<abbr title=\"The invariant (3 n x 3 n)",
