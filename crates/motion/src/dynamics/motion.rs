@@ -394,14 +394,14 @@ impl System for Motion<'_> {
         &self.oscillators
     }
 
-    fn to_oscillators(&self, residual: &mut [f64]) {
+    fn enter_oscillators(&self, residual: &mut [f64]) {
         if let Some(natural) = &self.natural {
             let (q, pi) = self.layout().deformation(residual);
             natural.transform(q, pi);
         }
     }
 
-    fn from_oscillators(&self, residual: &mut [f64]) {
+    fn leave_oscillators(&self, residual: &mut [f64]) {
         if let Some(natural) = &self.natural {
             let (q, pi) = self.layout().deformation(residual);
             natural.transform_back(q, pi);

@@ -37,13 +37,12 @@ impl NaturalModes {
         }
         // T = L^-T U, with m = L L' and the eigenvectors U of L^-1 K L^-T.
         let factor = modal.clone().cholesky()?.l();
-        let of = |get: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(nf, nf, |i, j| get(i, j));
-        let stiffness = of(&|i, j| equations.stiffness.get(i, j));
+        let stiffness = DMatrix::from_fn(nf, nf, |i, j| equations.stiffness.get(i, j));
         let half = factor.solve_lower_triangular(&stiffness)?;
         let whitened = factor.solve_lower_triangular(&half.transpose())?;
         let eigen = (0.5 * (&whitened + whitened.transpose())).symmetric_eigen();
         let shapes = factor.tr_solve_lower_triangular(&eigen.eigenvectors)?;
-        let damping = of(&|i, j| equations.damping.get(i, j));
+        let damping = DMatrix::from_fn(nf, nf, |i, j| equations.damping.get(i, j));
         let rate = |j: usize| (shapes.column(j).transpose() * &damping * shapes.column(j))[0];
         let oscillators = (0..nf).map(|j| (eigen.eigenvalues[j].max(0.0), rate(j).max(0.0))).collect();
         Some(Self { inverse: shapes.tr_mul(&modal), shapes, oscillators })

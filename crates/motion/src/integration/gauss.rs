@@ -172,10 +172,10 @@ impl Gauss {
             self.find_residuals(h);
             let residuals = &mut self.rates[..self.tableau.stages];
             let own_size = system.correct_stages(h, &self.modes, &self.scales, residuals)?;
-            residuals.iter_mut().for_each(|residual| system.to_oscillators(residual));
+            residuals.iter_mut().for_each(|residual| system.enter_oscillators(residual));
             self.filter(h);
             let corrections = &mut self.rates[..self.tableau.stages];
-            corrections.iter_mut().for_each(|correction| system.from_oscillators(correction));
+            corrections.iter_mut().for_each(|correction| system.leave_oscillators(correction));
             let in_scales = self.correct();
             let size = own_size.unwrap_or(in_scales);
             // Contraction of the corrections; unknown at the first correction.

@@ -26,11 +26,11 @@ pub trait System {
 
     /// Replaces a residual of the state by that in the coordinates of the [`Oscillator`]s. The default does nothing: the
     /// oscillators are entries of the state.
-    fn to_oscillators(&self, _residual: &mut [f64]) {}
+    fn enter_oscillators(&self, _residual: &mut [f64]) {}
 
     /// Replaces a residual in the coordinates of the oscillators by that of the state; the inverse of
-    /// [`System::to_oscillators`].
-    fn from_oscillators(&self, _residual: &mut [f64]) {}
+    /// [`System::enter_oscillators`].
+    fn leave_oscillators(&self, _residual: &mut [f64]) {}
 
     /// Filters the `residuals` of the stages of an implicit step of length h by a stiff linear part J
     /// of the system that is solved as a whole: replaces them by (I - h A kron J)^-1 `residuals`, with the

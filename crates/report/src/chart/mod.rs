@@ -8,16 +8,19 @@ use maud::{Markup, Render, html};
 
 pub(crate) use bars::{Bar, Bars, Cells, DECADES, STEPS, colour_scale, step};
 
-/// Layout of the drawing in its own units: labels of the vertical axis, panels, names of the series.
+/// Layout of the drawing in its own units: labels of the vertical axis, panels, names of the series (at least).
 const LEFT: f64 = 92.0;
 const WIDTH: f64 = 600.0;
-const NAMES: f64 = 148.0;
+const NAMES: f64 = 196.0;
 const TOP: f64 = 24.0;
 const BOTTOM: f64 = 52.0;
 /// Distance between two panels.
 const GAP: f64 = 30.0;
 /// Distance between two names in the legend.
 const NAME: f64 = 18.0;
+/// Space before a name in the legend, for its line, and width of a character, somewhat more than that of most fonts.
+const BEFORE_NAME: f64 = 38.0;
+const CHARACTER: f64 = 7.0;
 /// Half the size of a mark.
 const MARK: f64 = 4.0;
 /// Number of columns that the points of a line are reduced to; a screen cannot resolve more.
@@ -99,7 +102,7 @@ pub(super) fn label(class: &str, anchor: &str, [x, y]: [f64; 2], text: &str) -> 
 impl Render for Chart {
     fn render(&self) -> Markup {
         let heights: f64 = self.panels.iter().map(|panel| panel.height + GAP).sum();
-        let size = format!("0 0 {} {}", LEFT + WIDTH + NAMES, TOP + heights - GAP + BOTTOM);
+        let size = format!("0 0 {} {}", LEFT + WIDTH + self.legend_width(), TOP + heights - GAP + BOTTOM);
         let mut top = TOP;
         let placed: Vec<Placed<'_>> = self
             .panels
@@ -119,6 +122,15 @@ impl Render for Chart {
                 }
             }
         }
+    }
+}
+
+impl Chart {
+    /// Returns the width of the legends, in which the longest name fits.
+    fn legend_width(&self) -> f64 {
+        let names =
+            self.panels.iter().flat_map(|panel| &panel.series).map(|series| series.name.chars().count());
+        NAMES.max(BEFORE_NAME + CHARACTER * names.max().unwrap_or(0) as f64)
     }
 }
 
@@ -205,7 +217,7 @@ impl Placed<'_> {
                 } @else {
                     (mark(series, [from + 11.0, y], None))
                 }
-                (label("", "start", [from + 28.0, y + 4.0], &series.name))
+                (label("", "start", [from + BEFORE_NAME - 10.0, y + 4.0], &series.name))
             }
         }
     }
@@ -421,6 +433,20 @@ mod tests {
             assert!(kept.iter().any(|point| point[1] == value));
         }
         assert!(kept.is_sorted_by(|a, b| a[0] <= b[0]));
+    }
+
+    #[test]
+    fn the_longest_name_of_the_legend_fits_the_drawing() {
+        let width = |name: &str| {
+            let series = Series::new(name, Mark::Line, 0, vec![[1.0, 1.0]]);
+            let y = Axis::around("", [0.1, 0.9].into_iter()).expect("a range");
+            let panel = Panel { caption: String::new(), y, height: 100.0, series: vec![series] };
+            let x = Axis::between("", Scale::Linear, [0.0, 2.0]).expect("a range");
+            Chart { title: String::new(), x, panels: vec![panel] }.legend_width()
+        };
+        assert_eq!(width("x"), NAMES);
+        assert!(width("kinetic without flight") >= BEFORE_NAME + 22.0 * CHARACTER);
+        assert!(width(&"long ".repeat(10)) > 300.0);
     }
 
     #[test]
