@@ -149,7 +149,7 @@ for shell in bash zsh fish; do
     "$static" completions "$shell" >"$work/$name/completions/flexbody.$shell"
 done
 "$static" man >"$work/$name/man/flexbody.1"
-for command in convert inspect check compare select simulate trade response view export audit recipe doctor; do
+for command in convert prepare assemble batch inspect check compare select simulate trade advise measure recover shapes reduce response view export recipe audit doctor completions man; do
     "$static" man "$command" >"$work/$name/man/flexbody-$command.1"
 done
 # Equal files give an equal archive.
