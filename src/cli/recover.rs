@@ -7,7 +7,9 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::{Carrier, FlexBody};
 use flexbody_input::read_steps;
-use flexbody_motion::scene::{Channels, Envelope, LoadedHistory, RecoveredMotion};
+use flexbody_motion::scene::{
+    Channels, Envelope, LoadedHistory, RecoveredMotion, stresses_at_rigid_interfaces,
+};
 use flexbody_report::{EnvelopeKind, Format, RecoveredFacts, RunData, channels_csv, recovered_csv};
 use std::path::{Path, PathBuf};
 
@@ -86,7 +88,7 @@ pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
     let mut history = LoadedHistory::read(&arguments.history, &body)?;
     history.carrier = arguments.carried_by.as_ref().map(|name| Carrier::named(&body, name));
     let diagnostics = diagnostics.into_iter().chain(history.left_out(&body, &arguments.only)).collect();
-    let run = RunData { diagnostics, ..RunData::default() };
+    let mut run = RunData { diagnostics, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
     let mut found = None;
     if let (Some(steps), Some(kind), Some(slot)) = (&arguments.shapes, of_channels, &channel_slot) {
@@ -111,6 +113,7 @@ pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
     {
         slot.fill(&kind.bytes(&body, &found)?)?;
     }
+    run.diagnostics.extend(stresses_at_rigid_interfaces(&body, &recovered));
     let facts = RecoveredFacts::new(&body, &history, &recovered, &run);
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(facts.render(format).as_bytes())?;

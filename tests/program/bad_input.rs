@@ -137,6 +137,7 @@ fn every_broken_input_gives_the_report_that_stands_in_it() {
 
 /// Codes that no file and no command line triggers, with the test that does.
 const ELSEWHERE: &[(&str, &str)] = &[
+    ("FB563", "tests/program/stress_colours.rs"),
     ("FB104", "crates/file/tests/file/store_output.rs"),
     ("FB105", "tests/program/command_line.rs"),
     ("FB107", "tests/program/odd_files.rs"),

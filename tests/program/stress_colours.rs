@@ -4,8 +4,8 @@ use crate::program::flexbody;
 use crate::view::{browse, browser};
 use faer::Mat;
 use flexbody::{LoadedHistory, Progress, RecordedMotion, Recovered, Scene};
-use flexbody_body::flex_body::{FlexBody, Recovery};
-use flexbody_model::{Quantity, RecoveryRow, StressPoint};
+use flexbody_body::flex_body::{FlexBody, Interface, Recovery};
+use flexbody_model::{Coupling, Quantity, RecoveryRow, StressPoint};
 use oracle::fixtures;
 use serde_json::Value;
 use std::fs;
@@ -143,6 +143,55 @@ fn modes_have_the_colours_of_their_equivalent_stress() {
             let value = f64::from(values[j * n + node]);
             let wanted = if node < n - 2 { expected(node) / largest * 32767.0 } else { -1.0 };
             assert!((value - wanted).abs() <= 0.5 + 1e-6, "mode {j}, node {node}: {value} {wanted}");
+        }
+    }
+}
+
+/// FB563: a largest stress at a node of a rigid interface is pointed out, with the largest one away from all interfaces.
+#[test]
+fn a_largest_stress_at_a_rigid_interface_is_pointed_out() {
+    let (folder, body) = block();
+    let place = folder.path();
+    let scene = "[run]\nduration = 0.002\noutputs = 10\n[initial]\nangular_velocity = [9, 0.5, 0]\n";
+    fs::write(place.join("spin.toml"), scene).expect("written");
+    let told = |file: &str, more: &str| -> Vec<String> {
+        let run = done(place, &format!("simulate {file} --scene spin.toml --json{more}"));
+        let run: Value = serde_json::from_str(&run).expect("JSON");
+        let all = run["results"]["diagnostics"].as_array().expect("diagnostics").clone();
+        let own = all.iter().filter(|one| one["code"] == "FB563");
+        own.map(|one| one["message"].as_str().expect("a message").to_owned()).collect()
+    };
+    assert!(told("body.flex.h5", " --envelope all.csv").is_empty(), "the body has no rigid interface");
+    // The nodes with the two largest stresses, in the recovery with nodes.
+    let rows = column(place, "all.csv", "von_mises").into_iter().zip(column(place, "all.csv", "node"));
+    let mut rows: Vec<(f64, i64)> = rows
+        .filter(|(_, node)| !node.is_empty())
+        .map(|(value, node)| (value.parse().expect("a number"), node.parse().expect("a node")))
+        .collect();
+    rows.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let index = |id: i64| body.nodes().ids.iter().position(|known| *known == id).expect("a node");
+    for (coupling, is_told) in [(Coupling::Rigid, true), (Coupling::Averaging, false)] {
+        let mut parts = body.clone().into_parts();
+        let nodes: Vec<usize> = rows[..3].iter().map(|(_, node)| index(*node)).collect();
+        let reference = Some(body.nodes().positions[nodes[0]]);
+        parts.interfaces =
+            vec![Interface { name: "bore".to_owned(), nodes, coupling: Some(coupling), reference }];
+        let body = FlexBody::new(parts).expect("a body");
+        flexbody_file::write(&body, place.join("held.flex.h5")).expect("written");
+        let found = told("held.flex.h5", " --envelope held.csv");
+        assert_eq!(found.len(), usize::from(is_told), "{found:?}");
+        if let [message] = &found[..] {
+            let [(_, top), away] = [rows[0], rows[3]];
+            assert!(message.contains(&format!("at node {top} of the rigid interface `bore`")), "{message}");
+            let value: f64 = format!("{:.4e}", away.0).parse().expect("a number");
+            assert!(
+                message.contains(&format!("away from interfaces is {value} kPa, p{}", away.1)),
+                "{message}"
+            );
+            assert!(
+                told("held.flex.h5", "")[0].contains("--envelope finds"),
+                "without the stresses of all points"
+            );
         }
     }
 }

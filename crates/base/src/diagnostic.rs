@@ -243,6 +243,7 @@ codes! {
     PreloadReleased = "FB562", Warning, Done, "body starts undeformed under a preload and vibrates", "start in the equilibrium of the preload: deformation = \"static\" in [initial]";
     RecoveryMotionUnknown = "FB564", Warning, Done, "run lacks columns that forces of motion in the recoveries depend on", "write the columns that the message names to the table of the run: `simulate --csv` writes all of them";
     InertiaIndefinite = "FB560", Warning, Done, "W3 is kept without W2, and deflections make the inertia indefinite", "keep W2 as well (--terms W2,W3 or all), unless joints prescribe the rotation or the deflections stay far below the value in the message";
+    StressAtInterface = "FB563", Note, Done, "largest stress is at a rigid interface", "judge the part by the largest value away from the interface, or model the joint: coupling = \"averaging\" lets the interface deform";
     CouplingEffect = "FB558", Note, Done, "effect of rigid interfaces that the body and its reference model share", "nothing to do where a stiff part is mounted at the interface; otherwise set coupling = \"averaging\", which lets the interface deform";
     // FB6xx: resources; FB603 stays unused (checkpoints of earlier versions)
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";

@@ -5,7 +5,7 @@ use super::framed_scene::{UNCOUPLED, is_uncoupled};
 use super::pace::Pace;
 use super::prepared::{PARTS, Prepared, damped};
 use super::recovered::SceneRows;
-use super::{Drift, Extremes, FramedScene, RecoveredMotion, Scene, Scheme};
+use super::{Drift, Extremes, FramedScene, RecoveredMotion, Scene, Scheme, stresses_at_rigid_interfaces};
 use crate::dynamics::{Balance, BodyPoint, Configuration, Evaluation, Motion, Orientation, RotationVector};
 use crate::integration::{Failure, ObserverEvent, Work};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -99,9 +99,18 @@ fn simulate_recording(
     recording.work = finished.work;
     recording.extremes = survey.extremes(finished.size, finished.least_energy);
     recording.recovered = rows.map(SceneRows::finish);
-    let found =
-        [framed.found, left_out, unseen.unwrap_or_default(), remarks(body, scene, &recording.extremes)]
-            .concat();
+    let at_interfaces = recording
+        .recovered
+        .as_ref()
+        .map_or_else(Vec::new, |motion| stresses_at_rigid_interfaces(body, motion));
+    let found = [
+        framed.found,
+        left_out,
+        unseen.unwrap_or_default(),
+        remarks(body, scene, &recording.extremes),
+        at_interfaces,
+    ]
+    .concat();
     Ok((recording, found))
 }
 
