@@ -141,7 +141,7 @@ pub mod dynamics {
 /// serialised, and sparse matrices.
 pub use {nalgebra, serde, sprs};
 
-pub use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
+pub use flexbody_base::diagnostic::{Code, Diagnostic, Explanation, Severity};
 pub use flexbody_base::error::{Error, ExitCode, Result};
 
 /// Entry points of `src/main.rs` and of the command of the Python package; not part of the public interface.

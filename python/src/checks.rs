@@ -211,6 +211,15 @@ pub fn recipe(py: Python<'_>, program: &Bound<'_, PyAny>) -> PyResult<String> {
     value(py, flexbody::Recipe::of(&program)).map(|recipe| recipe.to_string())
 }
 
+/// Returns what a message means, why it arises and what to do, like `flexbody explain`: by its code (`"FB408"`,
+/// `"408"`), or all codes in one line each without one. Errors and warnings of this package state their codes.
+#[pyfunction]
+#[pyo3(signature = (code=None))]
+pub fn explain(py: Python<'_>, code: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
+    let code = code.map(|code| text(code, "code")).transpose()?;
+    value(py, flexbody::Explanation::of(code.as_deref())).map(|explanation| explanation.to_string())
+}
+
 /// A page that shows a body in motion: one HTML file for any browser, which loads nothing from elsewhere. A notebook
 /// shows it.
 #[pyclass(frozen, module = "flexbody")]

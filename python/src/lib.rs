@@ -33,7 +33,7 @@ mod _flexbody {
     #[pymodule_export]
     use crate::channels::Channels;
     #[pymodule_export]
-    use crate::checks::{Audit, Check, Comparison, View, audit, recipe};
+    use crate::checks::{Audit, Check, Comparison, View, audit, explain, recipe};
     #[pymodule_export]
     use crate::choice::_choices;
     #[pymodule_export]

@@ -375,6 +375,7 @@ def test_wrong_paths_are_errors_of_the_package(cube: Given) -> None:
         lambda: flexbody.audit(None),
         lambda: flexbody.batch([]),
         lambda: flexbody.recipe(1),
+        lambda: flexbody.explain(1),
         lambda: flexbody.import_body("a", 1),
         lambda: body.write(1),
         lambda: body.simulate(1),

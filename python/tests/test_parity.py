@@ -40,6 +40,7 @@ FUNCTIONS = {
     "view": ("Body.view",),
     "export": ("Body.export",),
     "recipe": ("recipe",),
+    "explain": ("explain",),
     "audit": ("audit",),
 }
 """The functions that do what a command does."""
@@ -262,6 +263,12 @@ def test_small_commands(place: Path, body: flexbody.Body) -> None:
     with pytest.raises(flexbody.InputError) as caught:
         flexbody.recipe("patran")  # type: ignore[arg-type]
     assert caught.value.codes == ("FB801",)
+    assert flexbody.explain("FB408") == command("explain", "FB408")
+    assert flexbody.explain("408") == flexbody.explain("fb408")
+    assert flexbody.explain() == command("explain")
+    with pytest.raises(flexbody.InputError) as caught:
+        flexbody.explain("FB000")
+    assert caught.value.codes == ("FB801",) and "nearest codes are FB10" in str(caught.value)
     command("reduce", place / "body.flex.h5", "--keep-modes", "1,3", "--storage", "f32", "-o", place / "command.flex.h5", "--quiet")
     body.subset([1, 3], storage="f32").write(place / "python.flex.h5")
     assert (place / "command.flex.h5").read_bytes() == (place / "python.flex.h5").read_bytes()

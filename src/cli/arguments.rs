@@ -18,7 +18,9 @@ use std::path::PathBuf;
 
 pub(super) use cluster::{AssembleArguments, BatchArguments, EngineArguments, EngineName, PrepareArguments};
 pub(super) use convert::ConvertArguments;
-pub(super) use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
+pub(super) use guidance::{
+    CompletionsArguments, DoctorArguments, ExplainArguments, ManArguments, RecipeArguments,
+};
 pub(super) use judgement::{
     AdviseArguments, MeasureArguments, PlacesName, RecoverArguments, ShapeFormat, ShapesArguments,
 };
@@ -30,7 +32,7 @@ pub(super) use response::ResponseArguments;
 #[command(
     after_help = "Exit codes: 0 done; 1 a check or tolerance failed; 2 bad input or usage; 3 no trustworthy \
     numerical result; 4 not enough memory or disk, or an output that may not be written; 70 internal error; 130 interrupted (SIGINT, SIGTERM, SIGHUP). Other signals: 128 + number. \
-    With 0 all output files are written; with 2 to 130 and after signals none is, and no unfinished file is left. Codes of all messages: docs/reference/codes.md."
+    With 0 all output files are written; with 2 to 130 and after signals none is, and no unfinished file is left. Messages have codes: flexbody explain CODE tells more (all codes: flexbody explain, docs/reference/codes.md)."
 )]
 pub struct Arguments {
     /// Command to run.
@@ -124,6 +126,9 @@ pub enum Command {
     /// Print how an FE program writes its matrices: the lines of the deck, and the command that continues from there
     #[command(after_help = "Example:\n  flexbody recipe calculix")]
     Recipe(RecipeArguments),
+    /// Explain the code of a message: its meaning, why it arises, and what to do
+    #[command(after_help = "Examples:\n  flexbody explain FB408\n  flexbody explain")]
+    Explain(ExplainArguments),
     /// Check a flexible-body file of another program: dialect, identities, digits, units, in plain words
     #[command(after_help = "Example:\n  flexbody audit rod.SID_FEM")]
     Audit(AuditArguments),

@@ -14,6 +14,7 @@ mod convert_options;
 mod doctor;
 mod ending;
 mod exit;
+mod explain;
 mod export;
 mod inspect;
 mod measure;

@@ -5,8 +5,8 @@ use super::outcome::{Outcome, warnings};
 use super::resources::{memory_left, use_threads};
 use super::terminal::{colours_of_stderr, for_terminal};
 use super::{
-    advise, assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, measure,
-    prepare, recipe, recover, reduce, response, select, shapes, simulate, trade, view,
+    advise, assemble, audit, batch, check, compare, completions, convert, doctor, explain, export, inspect,
+    measure, prepare, recipe, recover, reduce, response, select, shapes, simulate, trade, view,
 };
 use clap::CommandFactory;
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
@@ -16,7 +16,7 @@ use flexbody_base::output::{begin_run, end_run, stand_by};
 use flexbody_base::read_files;
 use flexbody_report::output_json;
 use std::ffi::OsString;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 
 /// Parses a command line, whose first word is the name of the program. If there is nothing to run, prints help or an
 /// error and returns the exit code.
@@ -100,6 +100,7 @@ fn outcome_of(arguments: &Arguments) -> Result<Outcome> {
         Command::Export(arguments) => export::run(arguments),
         Command::Audit(arguments) => audit::run(arguments),
         Command::Recipe(arguments) => recipe::run(arguments),
+        Command::Explain(arguments) => explain::run(arguments),
         Command::Doctor(_) => doctor::run(),
         Command::Completions(arguments) => completions::completions(arguments),
         Command::Man(arguments) => completions::man(arguments),
@@ -128,6 +129,7 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
         Command::Export(arguments) => ("export", arguments.printing),
         Command::Audit(arguments) => ("audit", arguments.printing),
         Command::Recipe(arguments) => ("recipe", arguments.printing),
+        Command::Explain(arguments) => ("explain", arguments.printing),
         Command::Doctor(arguments) => ("doctor", arguments.printing),
         Command::Completions(arguments) => ("completions", arguments.printing),
         Command::Man(arguments) => ("man", arguments.printing),
@@ -169,7 +171,7 @@ fn finish(command: Option<&str>, printing: Printing, outcome: Result<Outcome>) -
 }
 
 /// Prints diagnostics to stderr: all of them, or errors only if quiet. Prints none with `--json`, whose output contains
-/// them.
+/// them. On a terminal, a last line names the command that explains the first error.
 fn print_diagnostics(printing: Printing, diagnostics: &[Diagnostic]) {
     if printing.json {
         return;
@@ -181,6 +183,14 @@ fn print_diagnostics(printing: Printing, diagnostics: &[Diagnostic]) {
         let text = if coloured { painted(diagnostic.severity(), &text) } else { text };
         // An error of a closed stderr cannot be reported.
         let _ = writeln!(stderr, "{text}");
+    }
+    if !printing.quiet
+        && stderr.is_terminal()
+        && let Some(error) = diagnostics.iter().find(|diagnostic| diagnostic.severity() == Severity::Error)
+    {
+        let more = format!("more: flexbody explain {}", error.code().id());
+        let more = if coloured { format!("\u{1b}[2m{more}\u{1b}[0m") } else { more };
+        let _ = writeln!(stderr, "{more}");
     }
 }
 

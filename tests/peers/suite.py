@@ -94,6 +94,7 @@ PLACES = {
 PEERS = [
     ("Exudyn", "exudyn_bodies.rows", False),
     ("Exudyn, frames of beams and shells", "exudyn_frames.rows", False),
+    ("Exudyn, the program beside the file", "exudyn_program.rows", True),
     ("MBDyn", "mbdyn.rows", False),
     ("Octave", "octave.simscape", True),
     ("FEMBeam in Octave", "octave.fembeam", True),

@@ -4,9 +4,9 @@ use crate::json_output::folder;
 use crate::program::{flexbody, program};
 use flexbody::program::Arguments;
 use flexbody::{
-    Audit, Batch, BatchOptions, ComparisonFormat, ConvertOptions, ExportOptions, FlexBody, LoadedHistory,
-    Model, MotionHistory, Progress, Ranges, Recipe, RecordedMotion, Recovered, ReportFormat, ResponseOptions,
-    Scene, Tolerances, TradeOptions,
+    Audit, Batch, BatchOptions, ComparisonFormat, ConvertOptions, Explanation, ExportOptions, FlexBody,
+    LoadedHistory, Model, MotionHistory, Progress, Ranges, Recipe, RecordedMotion, Recovered, ReportFormat,
+    ResponseOptions, Scene, Tolerances, TradeOptions,
 };
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -46,6 +46,7 @@ const COMMANDS: &[(&str, Counterpart)] = &[
     ("view", Function("FlexBody::view", view)),
     ("export", Function("FlexBody::export", export)),
     ("recipe", Function("Recipe::of", recipe)),
+    ("explain", Function("Explanation::of", explain)),
     ("audit", Function("Audit::of", audit)),
     ("doctor", Absent("describes the program and the machine that it runs on")),
     ("completions", Absent("is about the command line")),
@@ -404,6 +405,16 @@ fn recipe(place: &Place) {
     let text = Recipe::of("calculix").expect("a recipe").to_string();
     assert_eq!(String::from_utf8(run.stdout).expect("UTF-8"), text);
     assert!(Recipe::of("patran").is_err());
+}
+
+fn explain(place: &Place) {
+    for code in [None, Some("FB408"), Some("fb721")] {
+        let words: Vec<&str> = ["explain"].into_iter().chain(code).collect();
+        let run = flexbody(&place.0, &words);
+        let text = Explanation::of(code).expect("an explanation").to_string();
+        assert_eq!(String::from_utf8(run.stdout).expect("UTF-8"), text);
+    }
+    assert!(Explanation::of(Some("FB000")).is_err());
 }
 
 fn audit(place: &Place) {

@@ -1,6 +1,11 @@
 //! Table of diagnostics. Every message of the program has a code, a severity, an exit code, a title and a default help
 //! in this table. `docs/reference/codes.md` is generated from the table; `fixtures/cases/` triggers each code.
 
+mod causes;
+mod explanation;
+
+pub use explanation::Explanation;
+
 use crate::exit_code::ExitCode;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -263,8 +268,8 @@ codes! {
     BodyUntrustworthy = "FB714", Error, Untrustworthy, "body violates conditions that hold for every body; nothing was written", "ask for fewer modes, and look for weakly joined parts and implausible masses; if the error persists, report the model to the developers";
     WarningsDenied = "FB715", Error, CheckFailed, "warnings are treated as errors", "resolve the warnings, or leave out --deny-warnings";
     ForeignRounded = "FB716", Warning, Done, "inertia data in a file of another program have few digits", "write the file with 17 significant digits, and from one mass matrix; flexbody audit gives details";
-    ExportLoses = "FB720", Error, BadInput, "format cannot hold the whole body", "use --allow-loss to write the file without it";
-    ExportLost = "FB721", Warning, Done, "exported file does not hold all data of the body", "nothing to do if the simulation does not need it";
+    ExportLoses = "FB720", Error, BadInput, "format cannot hold the whole body", "export to a format that holds it (docs/reference/exports.md), or write the file without it by --allow-loss";
+    ExportLost = "FB721", Warning, Done, "exported file does not hold all data of the body", "give --scene SCENE to measure the effect in your motion; if it matters, export to a format that holds it (docs/reference/exports.md)";
     ExportNeeds = "FB722", Note, Done, "program uses a part of the file only with a setting", "make the setting named in the message in the input of the program";
     ExportPicture = "FB723", Note, Done, "file is a picture of the body", "use another format for multibody programs: docs/reference/exports.md lists them";
     ExportRecoveries = "FB724", Note, Done, "exported file has not all of the recoveries", "compute them from a run of the program: flexbody recover";
@@ -303,13 +308,27 @@ codes! {
     Internal = "FB999", Error, Bug, "internal error", "report this bug of flexbody with the input";
 }
 
+/// Subjects of the codes, by their first digit.
+const SUBJECTS: [(char, &str); 9] = [
+    ('1', "files, and input decks of FE programs"),
+    ('2', "manifest, tables, scene file"),
+    ('3', "matrices and arrays"),
+    ('4', "checks of the model: mass, stiffness, rigid motion, units, interfaces"),
+    ('5', "modes, bases, simulation, selection"),
+    ('6', "memory, disk, time, processes"),
+    ('7', "flex-body files, files of other programs, cluster, batches"),
+    ('8', "command line"),
+    ('9', "internal errors"),
+];
+
 /// Returns the content of `docs/reference/codes.md`: the table of codes and the exit codes.
 pub fn codes_markdown() -> String {
     let mut out = String::from(
         "<!-- Generated from the table in crates/base/src/diagnostic.rs: FLEXBODY_BLESS=1 cargo test --test program docs_generated -->\n\n\
          # Diagnostics and exit codes\n\n\
          A message begins with its severity and its code (`error[FB101]: ...`); its line `help:` says what to do next. The\n\
-         table of [codes](#codes) has the general help of each code; the message of a run may have a more precise one.\n\n\
+         table of [codes](#codes) has the cause and the general help of each code; the message of a run may have a more precise\n\
+         help. `flexbody explain FB408` prints the row of a code, `flexbody explain` lists all codes.\n\n\
          ## Exit codes\n\n\
          | exit code | meaning |\n|---|---|\n\
          | 0 | the work was done |\n\
@@ -328,17 +347,12 @@ pub fn codes_markdown() -> String {
          ## Codes\n\n\
          A **warning** means that the result may be wrong or incomplete for your purpose. A **note** states a fact or a\n\
          choice of the program; act on it only if its help says so.\n\n\
-         | codes | subject |\n|---|---|\n\
-         | FB1xx | files, and input decks of FE programs |\n\
-         | FB2xx | manifest, tables, scene file |\n\
-         | FB3xx | matrices and arrays |\n\
-         | FB4xx | checks of the model: mass, stiffness, rigid motion, units, interfaces |\n\
-         | FB5xx | modes, bases, simulation, selection |\n\
-         | FB6xx | memory, disk, time, processes |\n\
-         | FB7xx | flex-body files, files of other programs, cluster, batches |\n\
-         | FB8xx | command line |\n\n\
-         | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",
+         | codes | subject |\n|---|---|\n",
     );
+    for (hundred, subject) in SUBJECTS {
+        out.push_str(&format!("| FB{hundred}xx | {subject} |\n"));
+    }
+    out.push_str("\n| code | severity | exit code | meaning | cause | help |\n|---|---|---|---|---|---|\n");
     for code in Code::ALL {
         let severity = code.severity().name();
         let exit = if code.severity() == Severity::Error {
@@ -346,8 +360,8 @@ pub fn codes_markdown() -> String {
         } else {
             String::new()
         };
-        let (id, title, help) = (code.id(), code.title(), code.help());
-        out.push_str(&format!("| {id} | {severity} | {exit} | {title} | {help} |\n"));
+        let (id, title, cause, help) = (code.id(), code.title(), code.cause(), code.help());
+        out.push_str(&format!("| {id} | {severity} | {exit} | {title} | {cause} | {help} |\n"));
     }
     out
 }

@@ -87,7 +87,7 @@ pub fn export(
     let allowed = allowed.into();
     let told = |code: Code, loss: &Loss| {
         let message = format!("{} cannot hold {} ({})", format.name(), loss.text, loss.property);
-        Diagnostic::new(code, message)
+        Diagnostic::new(code, message).with_help(help_of_loss(body, format, options, code, loss.property))
     };
     let losses = checklist.losses();
     let refused: Vec<Diagnostic> =
@@ -102,6 +102,40 @@ pub fn export(
     let exported = format.write(body, options)?;
     Ok((exported, losses.into_iter().chain(needs).chain(left).chain(unread).chain(numbered).collect()))
 }
+
+/// Returns the advice for a property that `format` loses: the options that allow the loss or measure its effect, and the
+/// formats that hold the property.
+fn help_of_loss(
+    body: &FlexBody,
+    format: &dyn ExportFormat,
+    options: &ExportOptions,
+    code: Code,
+    property: &str,
+) -> String {
+    let holds = |other: &&&'static dyn ExportFormat| {
+        let checklist = || other.checklist(body, &ExportOptions::default());
+        other.name() != format.name()
+            && !other.is_picture()
+            && !COMPARISONS.contains(&other.name())
+            && checklist().losses().iter().all(|loss| loss.property != property)
+    };
+    let others: Vec<&str> = FORMATS.iter().filter(holds).map(|other| other.name()).collect();
+    let mut ways = Vec::new();
+    if code == Code::ExportLoses {
+        ways.push(format!("write the file without it by --allow-loss={property}"));
+    } else if options.in_scene.is_empty() {
+        ways.push("give --scene SCENE to measure the effect in your motion".to_owned());
+    } else {
+        ways.push("nothing to do if this effect is small enough for you".to_owned());
+    }
+    if !others.is_empty() {
+        ways.push(format!("or export to a format that holds it: {}", others.join(", ")));
+    }
+    ways.join(", ")
+}
+
+/// Formats that hold numbers for comparisons and no body to simulate.
+const COMPARISONS: [&str; 1] = ["adams-invariants"];
 
 /// Writes `body` in a format like [`export`], in other `units` if they are given. The findings include a warning about
 /// interfaces whose static compliance the modes do not contain, except for a picture.

@@ -1,4 +1,4 @@
-//! Arguments of the commands that guide: `doctor`, `completions`, `man`, `recipe`.
+//! Arguments of the commands that guide: `doctor`, `completions`, `man`, `recipe`, `explain`.
 
 use super::Printing;
 use clap::Args;
@@ -41,6 +41,17 @@ pub struct RecipeArguments {
     /// FE program
     #[arg(value_name = "PROGRAM", value_parser = recipes())]
     pub program: String,
+    /// Options of printing.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Arguments of `explain`.
+#[derive(Debug, Args)]
+pub struct ExplainArguments {
+    /// Code of a message: FB408, fb408 or 408 [default: all codes, in one line each]
+    #[arg(value_name = "CODE")]
+    pub code: Option<String>,
     /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,

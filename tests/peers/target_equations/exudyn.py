@@ -13,8 +13,6 @@ from .oracle import skew
 
 
 class Exudyn(Equations):
-    has_damping = False
-
     # The moment of `UFforceFFRFreducedOrder` is that of the undeformed centre of mass.
     gravity_order = "undeformed"
     ARRAYS = {"total": "m", "chi": "L", "chi_tilde": "L", "inertia": "mL2", "mff": "1", "kff": "own", "phi_psi": "s", "phi_psi_tilde": "s", "x_psi": "sL", "x_psi_tilde": "sL",
@@ -26,6 +24,8 @@ class Exudyn(Equations):
             self.total, self.chi, self.inertia = float(file["totalMass"][()]), get("chiU"), get("inertiaLocal")
             self.chi_tilde = get("chiUtilde")
             self.mff, self.kff = get("massMatrixReduced"), get("stiffnessMatrixReduced")
+            # Not read by `LoadFromFile`: the program beside the file gives it to the object.
+            self.dff = get("dampingMatrixReduced") if "dampingMatrixReduced" in file else np.zeros_like(self.kff)
             self.phi_psi, self.phi_psi_tilde = get("mPhitTPsi"), get("mPhitTPsiTilde")
             self.x_psi, self.x_psi_tilde = get("mXRefTildePsi"), get("mXRefTildePsiTilde")
             self.psi_psi, self.psi_tilde_psi_tilde = get("mPsiTildePsi"), get("mPsiTildePsiTilde")
@@ -87,7 +87,7 @@ class Exudyn(Equations):
         return -np.concatenate([force, moment, modal])
 
     def elastic(self, q, qd):
-        return self.kff @ q
+        return self.kff @ q + self.dff @ qd
 
     def gravity(self, q, g):
         return np.concatenate([self.total * g, skew(self.chi) @ (self.total * g), self.phi_psi.T @ g])

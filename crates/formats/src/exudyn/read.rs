@@ -2,7 +2,7 @@
 //! array belongs to axis a of mode j.
 
 use crate::import::hdf5_arrays::{Hdf5Arrays, surface};
-use crate::import::redundant::{ROUNDING, Redundant, has_no_w2, in_other_order, relative};
+use crate::import::redundant::{ROUNDING, Redundant, asymmetry, has_no_w2, in_other_order, relative};
 use crate::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use faer::Mat;
 use flexbody_base::diagnostic::Code;
@@ -38,6 +38,8 @@ const REQUIRED: [&str; 16] = [
 
 const NUMBERS: &str = "nodeNumbers";
 const TRIANGLES: &str = "trigList";
+/// Damping of the modes, in files of flexbody; the loader of Exudyn ignores it.
+const DAMPING: &str = "dampingMatrixReduced";
 const STRESSES: &str = "postProcessingModes";
 
 impl ImportFormat for Exudyn {
@@ -69,7 +71,9 @@ impl ImportFormat for Exudyn {
         let given = Given::read(&mut arrays, nf)?;
         let numbered = given.numbered();
         let general = arrays.attribute("massMatrixReduced", "mass_structure").as_deref() == Some("general");
-        let checks = given.checks(&numbered, general);
+        let damping = arrays.has(DAMPING).then(|| arrays.matrix(DAMPING, nf, nf)).transpose()?;
+        let mut checks = given.checks(&numbered, general);
+        checks.extend(damping.as_ref().map(damping_is_symmetric));
         let labels = labels(&mut arrays, n)?;
         let frame = |i: usize| ImportedFrame {
             label: labels[i].to_string(),
@@ -105,13 +109,24 @@ impl ImportFormat for Exudyn {
                 units: None,
                 inertia,
                 modal_stiffness: given.stiffness,
-                modal_damping: None,
+                modal_damping: damping,
                 geometric_stiffness: Vec::new(),
                 frames: (0..n).map(frame).collect(),
                 mesh,
                 omissions,
             },
         })
+    }
+}
+
+fn damping_is_symmetric(damping: &Mat<f64>) -> AuditCheck {
+    AuditCheck {
+        name: "damping_symmetric",
+        formula: "dampingMatrixReduced = its transpose",
+        value: asymmetry(damping),
+        limit: ROUNDING,
+        code: Code::AuditIdentity,
+        meaning: "the damping of mode j by mode k differs from that of mode k by mode j".to_owned(),
     }
 }
 

@@ -45,7 +45,8 @@ impl ExportFormat for Exudyn {
             separate_w2: Held,
             geometric_stiffness: losses::geometric_stiffness(body, options, |_| false),
             inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
-            damping: losses::damping(body, options, "the damping of the modes"),
+            // The accompanying program gives it to the object.
+            damping: Held,
             shapes: Held,
             // An interface written as a cross of nodes rotates exactly as in the body.
             rotations: if options.points.of_interfaces() { Held } else { rotations(body) },
@@ -65,11 +66,19 @@ impl ExportFormat for Exudyn {
         }
     }
 
+    fn needs(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
+        if !losses::is_damped(body) {
+            return Vec::new();
+        }
+        vec![
+            "LoadFromFile leaves out the damping of the file (`dampingMatrixReduced`): add the body by `add_body` of the program that is written beside the file (BODY_exudyn.py), which gives it to the object".to_owned(),
+        ]
+    }
+
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
         let mesh = Mesh::new(body, &options.points);
         let file = hdf5_bytes(&entries(body, &mesh))?;
-        let script = (!mesh.interfaces.is_empty()).then(|| (SCRIPT_NAME, SCRIPT.as_bytes().to_vec()));
-        Ok(Exported { file, beside: script.into_iter().map(|(name, text)| (name.into(), text)).collect() })
+        Ok(Exported { file, beside: vec![(SCRIPT_NAME.into(), SCRIPT.as_bytes().to_vec())] })
     }
 }
 
@@ -99,9 +108,21 @@ fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     ];
     all.extend(coupling(&numbered, nf));
     all.extend(interface_entries(body, mesh));
+    all.extend(additional_entries(body));
     all.push(Hdf5Contents::Integers(Vec::new(), version).named("fileVersion").with("datatype", "int"));
     all.push(text("ObjectFFRFreducedOrderInterface").named("type").with("datatype", "str"));
     all
+}
+
+/// Returns the arrays that the loader of Exudyn ignores and the accompanying program reads: the damping of a body that
+/// has some, and the body frame in the model (x_model = origin + axes x_body).
+fn additional_entries(body: &FlexBody) -> Vec<Hdf5Entry> {
+    let damping =
+        losses::is_damped(body).then(|| array("dampingMatrixReduced", Hdf5Contents::matrix(&body.damping())));
+    let frame = body.frame();
+    let axes = array("frameAxes", square(&frame.axes));
+    let origin = array("frameOrigin", Hdf5Contents::list(frame.origin.as_slice()));
+    damping.into_iter().chain([axes, origin]).collect()
 }
 
 /// Returns the triangles of the surface as indices of mesh nodes (k x 3) for drawing and contact; empty if
@@ -349,7 +370,7 @@ fn turns(body: &FlexBody, interface: &Interface) -> bool {
 // approach", the rotation that fits their displacements best. With equal weights this is the motion of an
 // interface of flexbody; `offset` is the vector from the mean to the reference point.
 
-/// Accompanying Python program: loads the body, puts a joint at each interface and drives one.
+/// Accompanying Python program: loads the body with its damping, puts a joint at each interface and drives one.
 const SCRIPT: &str = include_str!("run.py");
 
 /// Suffix that replaces the extension of the file in the name of the accompanying program.

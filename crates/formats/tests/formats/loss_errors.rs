@@ -2,6 +2,7 @@
 //! exported file: the stiffness of both under the same motions, from their equations of motion.
 
 use faer::Mat;
+use flexbody_base::diagnostic::Code;
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::InputFile;
 use flexbody_base::units::UnitSystem;
@@ -229,9 +230,9 @@ fn other_losses_are_judged_by_the_motion_without_them() {
         }];
         scene
     };
-    let (text, written) = in_scene(&body, "exudyn", &pushed(0.02 * first, 0.0), "damping");
+    let (text, written) = in_scene(&body, "openradioss", &pushed(0.02 * first, 0.0), "damping");
     assert!(written, "{text}");
-    let (text, written) = in_scene(&body, "exudyn", &pushed(first, 0.0), "damping");
+    let (text, written) = in_scene(&body, "openradioss", &pushed(first, 0.0), "damping");
     assert!(!written, "{text}");
     let (text, written) = in_scene(&body, "openradioss", &pushed(0.02 * first, 0.0), "deformed-inertia");
     assert!(written, "{text}");
@@ -240,10 +241,45 @@ fn other_losses_are_judged_by_the_motion_without_them() {
     assert!(!written, "{text}");
     // Without a scene the warning states the frequency from which the load would have to oscillate: 0.87 of the first.
     let losses =
-        find_format("exudyn").expect("a format").checklist(&body, &ExportOptions::default()).losses();
+        find_format("openradioss").expect("a format").checklist(&body, &ExportOptions::default()).losses();
     let loss = losses.iter().find(|loss| loss.property == "damping").expect("a loss");
     let hertz = loss.text.split("from ").nth(1).and_then(|rest| rest.split(' ').next()?.parse::<f64>().ok());
     let part = hertz.expect("a frequency") / (body.units().frequency_of(body.modes().eigenvalue[0]));
     let response = |damped: f64| ((1.0 - part * part).powi(2) + damped * (2.0 * 0.02 * part).powi(2)).sqrt();
     assert!(loss.is_slight && (response(1.0) / response(0.0) - 1.01).abs() < 1e-3, "{part}: {}", loss.text);
+}
+
+/// The loader of Exudyn ignores the damping of the file, so a note refers to the program beside it; the help of a loss names the
+/// formats that hold the property, and the option that measures its effect or allows it.
+#[test]
+fn advice_names_the_program_and_the_formats_that_hold_a_property() {
+    let mut parts = fixture("bracket_hex20", MODES, BodyFrame::Com).into_parts();
+    parts.modes.damping_ratio.fill(0.02);
+    let body = FlexBody::new(parts).expect("a body");
+    let to = |name: &str, allowed: bool| {
+        export(&body, find_format(name).expect("a format"), &ExportOptions::default(), allowed)
+    };
+    let (exported, found) = to("exudyn", true).expect("written");
+    let [need] = &found[..] else { panic!("{found:?}") };
+    assert!(need.code() == Code::ExportNeeds && need.message().contains("`add_body`"), "{need}");
+    let (name, program) = &exported.beside[0];
+    let program = String::from_utf8_lossy(program);
+    assert!(
+        name == "_exudyn.py" && program.contains("def add_body(") && program.contains("dampingMatrixReduced")
+    );
+    let (_, found) = to("openradioss", true).expect("written");
+    let lost = found.iter().find(|one| one.message().ends_with("(damping)")).expect("a loss");
+    let formats = "exudyn, sid, mbdyn, mbsim, chrono, simscape, npz, json, embedded";
+    assert_eq!(
+        lost.help(),
+        format!(
+            "give --scene SCENE to measure the effect in your motion, or export to a format that holds it: {formats}"
+        )
+    );
+    let refused = to("openradioss", false).expect_err("the inertia of the deformed body is lost");
+    let help = refused.diagnostics()[0].help();
+    assert!(
+        help.starts_with("write the file without it by --allow-loss=deformed-inertia, or export"),
+        "{help}"
+    );
 }

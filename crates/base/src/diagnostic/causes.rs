@@ -1,0 +1,245 @@
+//! Causes of the diagnostics: why a message of each code arises, for `flexbody explain` and `docs/reference/codes.md`.
+
+use super::Code;
+
+macro_rules! causes {
+    ($($variant:ident = $cause:literal;)*) => {
+        impl Code {
+            /// Returns why messages with this code arise.
+            pub fn cause(self) -> &'static str {
+                match self { $(Code::$variant => $cause,)* }
+            }
+        }
+    };
+}
+
+causes! {
+    // FB1xx: files
+    FileUnreadable = "The path does not exist, is a folder, may not be read by this user, or the library that reads this format fails on the content.";
+    FileFormatUnknown = "The first bytes and the extension of the file match none of the formats that this entry accepts.";
+    FileCompressionBroken = "The checksum or the end of the compressed stream is missing, as after a transfer that stopped or a full disk.";
+    OutputUnwritable = "The operating system refused a write: the disk is full, a quota is used up, or the device failed.";
+    OutputFolderMissing = "Outputs are written into folders that exist; folders are not made, so that a mistyped path is noticed.";
+    FileEmpty = "The file has no bytes, as after a program that stopped before it wrote.";
+    OutputNotFile = "The output path is a folder, a device, or ends without a file name.";
+    JobUnknown = "The file is neither a manifest nor recognised by its content as the input deck of a supported FE program.";
+    JobIncomplete = "The input deck names or implies a further file (matrices, nodes, includes) that is not beside it.";
+    DeckSyntax = "A line of the input deck does not have the form that the manual of the FE program prescribes.";
+    DeckUnsupported = "The deck has a keyword or an option that changes the matrices or the nodes in a way that this reader does not model.";
+    DeckRows = "The matrices have other rows than the deck describes, as when the deck was changed after the matrices were written.";
+    DeckRenumbered = "A model of assembled instances may repeat node numbers, so nodes get new numbers that are unique.";
+    JobStep = "The job wrote matrices in more than one step, and one body needs one pair of matrices.";
+    NodeFileSyntax = "A line of the node file does not have a node number and its coordinates in the form of its program.";
+    DeckSupports = "The deck holds boundary conditions. A body of a floating frame is free, so the matrices must not contain them.";
+    RowsEmpty = "FE programs number degrees of freedom that no element uses; such rows are zero in K and M.";
+    DeckLumps = "Nastran lumps the masses of many elements unless PARAM,COUPMASS asks for consistent ones.";
+    JobCondensed = "The matrices belong to a superelement: the inner nodes are already replaced by boundary nodes and modes, so the positions of the mass are lost.";
+    DeckReference = "The reference node of a distributing coupling has a position of its own, but the mean displacement belongs to the mean of the nodes.";
+    OutputForbidden = "The user has no permission to write the folder or the file, or the file system is read-only.";
+    MeshPartial = "Some elements have no faces (springs, connectors) or are of a type without known faces, so the drawn surface leaves them out.";
+    MeshForeign = "The elements of the mesh refer to nodes that the model does not have, or its nodes lie at other places.";
+    ModesDiffer = "The frequencies that the file states differ from those that K and M give its shapes, or the shapes differ from eigenvectors of K and M.";
+    ModeFileSyntax = "A line or a record of the mode file does not have the form of its format.";
+    ModesCompleted = "The mode file lacks rows of the matrices (rotations, midside nodes, multipliers); K and M determine them from the rows that are given.";
+    DeckConstrained = "The deck ties degrees of freedom together (multi-point constraints, rigid elements), so the dependent rows are combined with the independent ones.";
+    InputChanged = "Size, time or content of the file was different at the end of the reading: another program writes it.";
+    // FB2xx: tables and manifest
+    ManifestSyntax = "The text is not TOML, a key is misspelled or missing, or a value has another type than its key.";
+    ManifestUnit = "The unit is not in the list of names, or the number is not positive.";
+    TableHeader = "The first line of a table names its columns, and these are not the expected ones.";
+    TableRow = "A line has another number of columns than the header, or a field is not a number of the expected kind.";
+    NodeDuplicate = "Two lines of the node table have one number, so the position of the node is ambiguous.";
+    CoordinateNotFinite = "The coordinate is NaN, infinite or too large for double precision.";
+    DofDirection = "The column `dir` holds a number that is no direction.";
+    DofRowOrder = "The column `row` of dofs.csv does not count the rows of the matrices in their order.";
+    InterfaceNode = "The node list of the interface has a number that is not in the node table, or that the body has no rows for.";
+    InterfaceAcross = "The matrices hold several bodies, and the nodes of the interface belong to more than one of them.";
+    SceneSyntax = "The text is not TOML, a key is misspelled or missing, or a value has another type or range than its key.";
+    SceneBody = "The scene names modes, interfaces or amplitudes that the body does not have.";
+    SceneContradicts = "Two entries of the scene determine one quantity in different ways.";
+    CarrierImpossible = "The body can be carried only by a place with a position and a rotation, and the inertia terms must all be in the file.";
+    SeriesColumn = "The scene or the command asks for a column that the header of the history file does not have.";
+    SeriesRow = "A line of the history file has a wrong number of columns, a field that is no number, or a time that does not increase.";
+    SeriesRange = "The times of the history file begin after the start of the run or end before its end.";
+    PlaceUnknown = "The name is not an interface of the body, the number is not a node of it, or the place has no such direction.";
+    SceneCase = "A scene with several load cases needs the name of one, and the name must be one of them.";
+    NodeSetUnknown = "The set is not in the deck, or no node lies in the region that an interface, a cut or a recovery describes: its units or axes may differ from those of the nodes.";
+    RecoveryUnknown = "The body was converted without a recovery of this name.";
+    SceneDamping = "The body file holds modal damping and the scene defines damping too; the sum of both is rarely meant.";
+    // FB3xx: matrices
+    MatrixSyntax = "A line or a record of the matrix file does not have the form of its format.";
+    MatrixKind = "The matrix is complex, skew-symmetric, dense or has only a pattern; K and M are real sparse matrices.";
+    MatrixIndex = "An index is smaller than the first or larger than the last one of the declared size.";
+    MatrixCount = "The header of the file declares another number of entries than the file has.";
+    MatrixNotSquare = "The number of rows differs from the number of columns.";
+    MatrixNotFinite = "An entry is NaN or infinite, as from an element of zero volume or a division by zero in the FE program.";
+    MatrixAsymmetric = "Entries on both sides of the diagonal differ by more than rounding.";
+    MatrixSizesDiffer = "K and M come from different analyses, or one of them has constraints eliminated.";
+    MatrixTriangles = "A symmetric file stores one triangle. This one has entries in both, so it is unclear whether to add or to mirror them.";
+    Hdf5Layout = "The HDF5 file has no group with the arrays of a sparse matrix, or it has several and none is named.";
+    MatrixDigits = "The values were printed with few digits. Stiffness of a thin body is a difference of large numbers, and the lost digits become errors of its lowest frequencies.";
+    MatrixEmpty = "All entries are zero or the file has none.";
+    MatrixTooLarge = "Rows are numbered by 32 bits.";
+    ShapesSize = "The array has neither as many rows nor as many columns as the matrices have rows.";
+    ShapesZero = "A column has only zeros, so it defines no direction of motion.";
+    RecoverySize = "The operator has another number of columns than K, or the offset another number of values than the operator has rows.";
+    RecoveryRows = "The table has another number of lines than the operator has rows, or a word that is no known quantity, component or unit.";
+    RecoveryCut = "The nodes of one side of the cut are all nodes, none, or divide a rigid interface, so the section has no force.";
+    RecoveryShapes = "The number or the order of the steps in the results differs from the shapes that were written.";
+    FeResultsSyntax = "The result file has another form than its program writes, or lacks the stresses, the steps or the places that the recovery needs.";
+    NamedLoadMisfit = "The number of forces differs from the number of rows, or a force acts on a row that is not in the model.";
+    PreloadUnbalanced = "The forces of a preload are internal and must add up to zero force and zero moment; these have a resultant.";
+    // FB4xx: model
+    NodesMissing = "The table of degrees of freedom names node numbers that the node table does not have.";
+    DofCount = "The number of rows that the tables describe is not the size of the matrices.";
+    DofDuplicate = "Two matrix rows are labelled with the same direction of the same node.";
+    DofIncomplete = "Rows of held directions were removed from the matrices, so a rigid translation of the body cannot be written in them.";
+    NodesUnused = "The node table has nodes that no matrix row belongs to.";
+    MassNotPositive = "The sum of the mass matrix over a rigid translation is zero or negative.";
+    MassDirectional = "A rigid translation of a free body has the same mass in each direction. Supports, eliminated constraints or directional masses break this.";
+    MassBlockStructure = "The mass of a pair of nodes is not a number times the identity, as for condensed models and rotary inertia of sections; its change with rotation is then approximate.";
+    RigidMotionStrained = "A rigid motion R of the nodes must cause no force. K R is larger than rounding, so K contains supports or springs to ground, or its rows are labelled wrongly.";
+    PencilSingular = "There are directions in which K and M are both zero, so their frequency is 0/0.";
+    MassDiagonal = "The FE program lumped the mass to the nodes before it wrote the matrix.";
+    InertiaImplausible = "Mass divided by the volume that the nodes span is outside the densities of materials: units of length, mass and time do not belong together.";
+    BodiesSeveral = "The graph of the matrices falls into parts that nothing joins.";
+    DiagonalNegative = "A positive semidefinite matrix has no negative diagonal entry; an element with wrong orientation or a negative thickness causes one.";
+    BodyDegenerate = "All nodes lie on a point or a line and have no rotations, so the rotation about the line has no inertia.";
+    ModelTooSmall = "After the rigid motions nothing is left that can deform.";
+    DirectionOutOfPlane = "The model was declared plane, but a node has z other than 0 or a row has another direction than 1 and 2.";
+    DampingRigid = "The damping matrix gives a force for a rigid motion, as damping to ground or proportional to mass does.";
+    BodiesCoupled = "Damping or geometric stiffness has entries between nodes that neither K nor M joins.";
+    RowsUnheld = "Rows belong to no node with coordinates, and K leaves them free, so no rigid motion can be assigned to them.";
+    RowsWithoutPlace = "The matrices have rows of no position, such as bubble functions or multipliers.";
+    MagnitudeExtreme = "Products of the entries overflow or vanish in double precision.";
+    NodesRounded = "The rigid rotations that the coordinates give strain the stiffness a little: the coordinates were written with fewer digits than the matrix was computed with.";
+    RotationsFollow = "Rotations about the normal of a shell often have neither stiffness nor mass; they are determined from the displacements around them.";
+    InterfaceCoupling = "The nodes of the interface do not determine the motion that the coupling needs, such as a rotation about the line on which they lie.";
+    InterfaceShared = "Interface motions must be independent, and a shared node would belong to two of them.";
+    InterfaceFit = "The modes were computed without rigid interfaces, so the nodes of the interface move relative to each other in them.";
+    MassOrder = "Mass joins nodes of one element, and these are also joined by stiffness. Here many pairs have mass only.";
+    MassPairs = "A mass element, or a mass spread over several nodes, joins nodes in M that no element joins in K.";
+    MassesExchanged = "Neighbouring nodes have different masses where their stiffness is alike, and the masses fit only if the two nodes are exchanged: M was written in another order of nodes than K.";
+    SpeedImplausible = "The speed of sound that K, M and the node distances imply is that of no material.";
+    DensityImplausible = "Mass per volume or the speed of sound is far from all materials, as with coordinates in mm and matrices in m.";
+    MatricesExchanged = "The matrix given as mass vanishes for rigid motions as a stiffness does, and the other one does not.";
+    InterfaceFar = "The reference point lies far outside the nodes of the interface, as with coordinates in other units or axes.";
+    GeometricStiffnessMotion = "The stiffness of a stress has known products with rigid motions (docs/how_to/geometric_stiffness.md). This matrix does not have them.";
+    GeometricStiffnessLoad = "Equilibrium of the stressed body relates the matrix to its load; with the given load the relation does not hold.";
+    GeometricStiffnessRough = "The relations with rigid motions hold to a few digits only, as with reduced integration or few printed digits.";
+    RecoveryStrained = "A rigid motion of the body must not change stresses, strains and section forces, and the operator gives a change.";
+    RecoveryScale = "Stress times strain of the modes is far from their strain energy per volume.";
+    RecoveryUnanswered = "The FE program answered other shapes than those from which the modes of this body can be combined.";
+    RecoveryEnergy = "The strain energy that the FE program printed for each shape differs from v' K v / 2 by more than its digits.";
+    RecoveryEnergyDiffers = "Some shapes have another strain energy in the FE program than in K.";
+    RecoveryAveraged = "The FE program averages stresses at nodes over the elements around them, also where the material changes.";
+    RecoveryMapped = "The rows of the recovery are combinations of the answers of the FE program.";
+    InterfaceCentre = "A stated or read reference point lies away from the mean of the nodes; this is often meant, and sometimes a wrong unit or axis.";
+    GeometricStiffnessDifference = "The matrix was computed by subtraction, in which the common digits cancel.";
+    GeometricStiffnessUnstressed = "The two matrices agree to nearly all digits, so the stress did not enter the second one or is too small.";
+    RecoveryCorners = "The results list the corners of elements, and several elements share a node.";
+    // FB5xx: numerics
+    NotConverged = "The residuals of some modes stay above the accuracy after the largest number of restarts.";
+    Mechanism = "Parts move without strain: a missing connection, a hinge, or a node that no element holds.";
+    MassIndefinite = "Some motion has negative kinetic energy.";
+    StiffnessIndefinite = "Some motion has negative strain energy.";
+    FactorizationFailed = "The factor of K - sigma M does not reproduce the matrix to the needed digits.";
+    CompletenessFailed = "The number of negative pivots of K - sigma M counts the eigenvalues below sigma, and another number was found.";
+    CompletenessUnproved = "No factor was made, or it is too inaccurate to count eigenvalues.";
+    RepeatedSplit = "Symmetric bodies have several modes of one frequency, and the requested number ends among them.";
+    ModesClamped = "A model with n rows has fewer than n flexible modes; rigid motions and rows without mass have none.";
+    NoiseFloor = "Rounded entries of K give rigid motions a small stiffness; frequencies near it have few correct digits.";
+    MassMatrixSingular = "Some motions have no mass (reduced integration, multipliers), so their frequency is infinite.";
+    NoModes = "The lowest flexible frequency of the body is above the limit that was asked for.";
+    FactorPrecision = "Single precision needs half the memory; the program chooses it if its accuracy is enough for the modes.";
+    DampingIndefinite = "Some motion would gain energy from the damping, or a value is not finite.";
+    ModesOverdamped = "The damping ratio of some modes is above 1, so they do not oscillate.";
+    ShapesNone = "All given shapes are rigid motions or zero after these are removed.";
+    ShapesDependent = "A shape is a combination of the others up to rounding, so it adds no motion.";
+    ShapesRigid = "Given shapes contained translation or rotation of the whole body, which the body frame performs.";
+    ShapesSpan = "The given shapes span a subspace that K does not map into M times itself.";
+    LoadsCovered = "The static response to a load is a combination of modes that are already there.";
+    FreeFrequencies = "Fixed-interface and constraint modes approximate the modes of the free body; the highest ones have the largest errors.";
+    InterfaceCompliance = "A force at an interface also deforms the body in the modes that were left out.";
+    GeometricStiffnessNone = "Centrifugal forces stretch the body and so stiffen it; without this stiffness the equations keep the softening part only.";
+    GeometricStiffnessPartial = "A load has up to three directions, and each needs a matrix of its own.";
+    SimulationStopped = "The integration found no step that meets its tolerances, or the motion grew beyond what the model describes.";
+    LinearRangeLeft = "A node is deflected by a large part of the size of the body, and modes describe small deformations only.";
+    SpinSoftens = "At the spin of the scene the inertia forces remove a noticeable part of the stiffness, and the body has no geometric stiffness that a real one gains.";
+    PhaseDrifts = "A small error of the angular velocity adds up to a growing error of the angle.";
+    ResonanceDropped = "A load oscillates near the frequency of a mode that the selection drops; the run is too short to show its growth.";
+    LoadIdle = "A free body falls with gravity and moves with its base without deformation, or the load acts on a mode that is not there.";
+    CarrierUnresolved = "The motion of the carried interface is a combination of modes, and the modes leave out much of its compliance.";
+    CarriedGeometricStiffness = "A carrier that moves in the modes needs the geometric stiffness of rigid rotations, which the file lacks.";
+    ReferenceIncomplete = "The modes of the reference are themselves truncated, and their error is not small against the tolerances.";
+    LumpedWithoutBody = "The lumped mass is indefinite or has zero inertia, so no equations of motion exist.";
+    RunTooLong = "The highest frequency determines the step, and the duration asks for more steps than the limit.";
+    StepPassesOver = "The given step is so long that only few steps fall on an oscillation of a load or of the spin, which would then be seen as a slower one.";
+    MotionWithoutBasis = "The shapes that represent the simulated motion within the tolerances are not fewer than the modes, or the body from which they would be computed is itself too inaccurate.";
+    RecoveryLoadUnseen = "The modes leave out the static response next to a load, and the file has no static column for this place.";
+    RateUnsettled = "Halving the step changes the angular velocity by more than the tolerances allow.";
+    VariationStops = "The load of a standard variation (a turned load, another rate) leaves the range of the model.";
+    RecoveryLeftOut = "Displacements are relative to a frame, and the motion was computed in another one.";
+    SelectionUnjudged = "The largest error of the body in the scene is above a tolerance, or no reference could be computed.";
+    RecoveryUnjudged = "A recovery of answered shapes knows the stresses of these shapes only, not of what was truncated.";
+    VariationFails = "The body was selected for the scene as it is, and a variation of it excites what was dropped.";
+    PreloadReleased = "The run starts undeformed, so the preload acts as a sudden load.";
+    InertiaIndefinite = "W3 has a first-order term whose second-order partner W2 is missing; for large deflections the mass matrix is then no longer positive.";
+    CouplingEffect = "A rigid interface stiffens the body, and the reference has the same interface, so no comparison shows the effect.";
+    // FB6xx: resources
+    MemoryShort = "The factor, the modes or the matrices need more memory than the machine or the limit has.";
+    DiskShort = "The output is larger than the free space.";
+    WorkLong = "The estimated number of operations is far above what is usually meant, as for many pairs of modes.";
+    Stopped = "The caller (a callback of Python or of the library) asked to stop.";
+    Forked = "Threads do not survive a fork, so a forked child has no workers.";
+    // FB7xx: flex-body files
+    BodyUnreadable = "The file is not HDF5, or has no attribute that marks a flex-body file.";
+    BodyVersion = "The file states a format version that is newer than this program knows.";
+    BodySchema = "An entry is missing, or has another type or size than the schema states.";
+    BodyIdentity = "Numbers of the file contradict each other (theory section 10): one of them was changed or computed wrongly.";
+    BodySourceChanged = "The digest of an input file is not the one that the body file recorded.";
+    BodyIncomparable = "The bodies differ in dimension, units, numbers of modes, nodes or rows, or have no modes in common.";
+    BodyChanged = "The digest in the file is not that of its content: another program changed it, or the medium did.";
+    BodyWithoutDigest = "The file was written by an early version or by another program.";
+    BodyUntrustworthy = "The identities of theory section 10 fail for the new body by more than rounding, as for extreme stiffness contrasts.";
+    WarningsDenied = "--deny-warnings was given, and a warning arose.";
+    ForeignRounded = "The numbers agree with each other to few digits only.";
+    ExportLoses = "The body holds data that change its motion and that the file format has no place for.";
+    ExportLost = "The body holds data that the file format has no place for.";
+    ExportNeeds = "The program reads a part of the file only if its input asks for it.";
+    ExportPicture = "VTK and glTF hold shapes and surfaces, but no inertia.";
+    ExportRecoveries = "The format has no place for some rows of the recoveries.";
+    ExportNumbers = "The format names places by numbers only.";
+    ForeignUnreadable = "The content does not follow the layout of the format.";
+    ForeignIncomplete = "The format allows files without the arrays that the equations of motion need.";
+    ForeignChanged = "The equations need modes that are orthonormal in M and free of rigid motion.";
+    ForeignDropped = "The file has no arrays for these terms, or they are empty.";
+    MotionUnreadable = "The file has no recorded motion, or its arrays do not fit each other.";
+    MotionForeign = "The digest of the body in the simulation result is not that of this body.";
+    AuditIdentity = "Arrays of the file contradict a relation that holds for every body.";
+    AuditLumped = "The invariants are those of nodal masses, as programs compute them that do not know the consistent mass matrix.";
+    AuditLayout = "Programs of one format order rows and columns differently, and the file fits another order better.";
+    AuditDigits = "Numbers were printed with few digits or without exponents, so small ones became zero.";
+    AuditUnits = "Ratios of the numbers fit if one group of them is scaled by a factor between units.";
+    AuditCoupling = "The arrays that couple modes with translation and rotation are zero or absent.";
+    AuditImplausible = "A mass, an inertia or a frequency is negative, not finite or far outside every body.";
+    AuditSurplus = "Further numbers follow after the last one that the header announces.";
+    AuditFrame = "The three axes are not orthonormal or are left-handed.";
+    ForeignUnsound = "Mass, inertia or stiffness of the file cannot be those of a body.";
+    ClusterUnreadable = "A file of the prepared folder is missing or is not as `prepare` writes it.";
+    ClusterChanged = "The digest of a file is not the one recorded when it was written, as after an incomplete copy.";
+    ClusterForeign = "The digest of the matrices in the result is not that of the model.";
+    ClusterUnfinished = "The driver has not ended yet, or ended before it wrote its result.";
+    ClusterInaccurate = "The residuals of the modes, computed again with the matrices of the model, are too large.";
+    CompletenessElsewhere = "The count of eigenvalues was made by the program on the cluster and not again here.";
+    EngineMissing = "No MPI start program, or no Python with petsc4py and slepc4py, was found.";
+    EngineFailed = "The MPI processes ended with an error or were killed, often for memory.";
+    BatchSyntax = "The list is not TOML, or has an unknown, missing or mistyped key.";
+    BatchFailed = "At least one body of the list ended with an error.";
+    // FB8xx: usage
+    Usage = "A command, an option or a value is unknown or missing, or options exclude each other.";
+    LumpedScheme = "The name of the lumping scheme is not in the list.";
+    LumpedMassTable = "A node has no mass, two masses, or a mass that is not finite.";
+    Argument = "A function of the library was called with a value outside its range.";
+    Internal = "The program found its own data in a state that must not occur.";
+}
