@@ -118,9 +118,9 @@ pub use api::{
     Accuracy, Advice, AttachedMass, Audit, Basis, BodyFrame, Channels, Check, Comparison, ComparisonFormat,
     ComparisonRow, Conversion, ConvertOptions, Coupling, ExportOptions, FlexBody, FrameChoice,
     GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, LoadedHistory, Matrix,
-    MeasuredRun, Model, ModelBuilder, Motion, MotionHistory, PointPath, Progress, Quantity, Ranges, Recipe,
-    RecipeStep, Recovered, RecoveredRows, RecoveryRow, ReportFormat, Response, ResponseOptions, Scene,
-    Selection, SourceFile, SparseMatrix, Tolerances, TransferFunction, unit_names,
+    MeasuredRun, ModePair, Model, ModelBuilder, Motion, MotionHistory, PointPath, Progress, Quantity, Ranges,
+    Recipe, RecipeStep, Recovered, RecoveredRows, RecoveryRow, ReportFormat, Response, ResponseOptions,
+    Scene, Selection, SourceFile, SparseMatrix, Tolerances, TransferFunction, unit_names,
 };
 #[cfg(feature = "cli")]
 pub use api::{Batch, BatchOptions, BatchedBody};

@@ -2,7 +2,9 @@
 
 use super::FlexBody;
 use flexbody_base::error::Result;
-use flexbody_report::{BodyComparison, ComparisonFormat, ComparisonReport, ComparisonRow, Tolerances};
+use flexbody_report::{
+    BodyComparison, ComparisonFormat, ComparisonReport, ComparisonRow, ModePair, Tolerances,
+};
 
 /// Comparison of two bodies, independent of the signs and bases of their modes.
 #[derive(Debug, Clone)]
@@ -47,6 +49,11 @@ impl Comparison {
     /// Returns the compared quantities.
     pub fn rows(&self) -> &[ComparisonRow] {
         self.inner.rows()
+    }
+
+    /// Returns the pairs of modes with their frequencies, in the order of the modes of the reference.
+    pub fn modes(&self) -> &[ModePair] {
+        self.inner.modes()
     }
 
     /// Returns the report of `flexbody compare --report`.

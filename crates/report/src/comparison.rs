@@ -2,7 +2,11 @@
 //! eigenvalues, the order of the nodes or the body frame.
 
 mod entries;
+mod modes;
 mod named_loads;
+
+pub(super) use modes::signed_percent;
+pub use modes::{ModePair, Pairing};
 
 use super::common_modes::{CommonModes, clusters};
 use super::comparison_report::{ComparisonFormat, ComparisonReport};
@@ -73,6 +77,8 @@ pub struct BodyComparison {
     b: String,
     passed: bool,
     same_nodes: bool,
+    paired: Pairing,
+    modes: Vec<ModePair>,
     rows: Vec<ComparisonRow>,
     notes: Vec<String>,
     not_compared: Vec<String>,
@@ -96,6 +102,13 @@ pub struct BodyComparison {
 /// [`BodyIncomparable`](Code::BodyIncomparable) when dimensions or numbers of modes differ, or units of which only one
 /// body states its own; [`compare_common`] compares bodies with different numbers of modes.
 pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
+    let mut comparison = compared(a, b, tolerances)?;
+    comparison.say_of_modes();
+    Ok(comparison)
+}
+
+/// Returns the comparison of [`compare`] without the notes on modes.
+fn compared(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
     comparable(a, b)?;
     let b = &*in_units_of(a, b)?;
     let placed = is_placed(a) && is_placed(b);
@@ -112,6 +125,8 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
         b: b.source().name.clone(),
         passed: true,
         same_nodes: false,
+        paired: Pairing::Order,
+        modes: Vec::new(),
         rows: Vec::new(),
         notes: Vec::new(),
         not_compared: Vec::new(),
@@ -126,13 +141,15 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     // Mode by mode with common nodes, otherwise by norms over clusters of modes.
     let order = common_nodes(&a.nodes().ids, &b.nodes().ids);
     comparison.not_compared = entries::not_compared(a, b, order.is_some());
-    let basis = match order {
+    let common = match order {
         Some(order) => Some(comparison.mode_by_mode(&pair, &order, tolerances)),
         None => {
             comparison.norms_only(&pair, tolerances.invariants);
             None
         }
     };
+    let (basis, assurance) = common.map(|common| (common.basis, common.assurance)).unzip();
+    comparison.frequencies(a, b, assurance.as_ref(), tolerances.frequency);
     comparison.modal_matrices(&pair, basis.as_ref(), tolerances.invariants);
     comparison.recoveries(&pair, tolerances.invariants);
     comparison.named_loads(&pair, tolerances.invariants);
@@ -169,7 +186,9 @@ pub fn compare_common(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Re
     let b = &*in_units_of(a, b)?;
     let common = CommonModes::of(a, b)?;
     let some = |body: &FlexBody, modes: &[usize]| body.reduced(modes, body.groups(), Vec::new());
-    let mut comparison = compare(&some(a, &common.a)?, &some(b, &common.b)?, tolerances)?;
+    let mut comparison = compared(&some(a, &common.a)?, &some(b, &common.b)?, tolerances)?;
+    comparison.number_modes(&common.a, &common.b);
+    comparison.say_of_modes();
     comparison.notes.splice(0..0, common.notes);
     Ok(comparison)
 }
@@ -258,6 +277,14 @@ struct Pair<'a> {
     groups: Vec<Range<usize>>,
 }
 
+/// Modes of two bodies with common nodes.
+struct CommonShapes {
+    /// Basis change from the modes of `b` to those of `a`.
+    basis: Mat<f64>,
+    /// Modal assurance criterion of each mode of `a` with each mode of `b`, which is aligned inside clusters.
+    assurance: Mat<f64>,
+}
+
 /// Transformation from the frame of `b` to that of `a`: x_a = axes' (x_b - shift).
 struct FrameChange {
     shift: Vector3<f64>,
@@ -311,6 +338,16 @@ impl BodyComparison {
         self.same_nodes
     }
 
+    /// Returns the pairs of modes with their frequencies, in the order of the modes of the first body.
+    pub fn modes(&self) -> &[ModePair] {
+        &self.modes
+    }
+
+    /// Returns the way in which the modes are paired.
+    pub fn paired(&self) -> Pairing {
+        self.paired
+    }
+
     /// Returns the notes on the limits of the comparison.
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -328,7 +365,8 @@ impl BodyComparison {
         self.notes.iter().cloned().chain(left_out).collect()
     }
 
-    /// Returns the comparison as JSON: `a`, `b`, `passed`, `same_nodes`, `rows`, `notes`, `not_compared`.
+    /// Returns the comparison as JSON: `a`, `b`, `passed`, `same_nodes`, `paired`, `modes`, `rows`, `notes`,
+    /// `not_compared`.
     pub fn json(&self) -> serde_json::Value {
         serde_json::to_value(self).expect("plain data with text keys")
     }
@@ -381,7 +419,7 @@ impl BodyComparison {
         }
     }
 
-    /// Compares mass, centre of mass, inertia about it and frequencies.
+    /// Compares mass, centre of mass and inertia about it.
     fn rigid(&mut self, a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) {
         let (ia, ib) = (a.invariants(), b.invariants());
         self.row("mass", "relative", relative(ib.mass() - ia.mass(), ia.mass()), tolerances.mass);
@@ -407,14 +445,10 @@ impl BodyComparison {
         let offset = centre_of_mass(ia).norm().max(centre_of_mass(ib).norm());
         let lost = lost_by_shift(ia.mass(), offset, ja.diagonal().min());
         self.row("inertia", "largest entry / sqrt(I_kk I_ll)", largest, tolerances.inertia + lost);
-        let frequency = |(fa, fb): (&f64, &f64)| relative(fb - fa, *fa);
-        let largest = a.frequencies_hz().iter().zip(&b.frequencies_hz()).map(frequency).fold(0.0, larger);
-        self.row("frequency", "relative, largest of all modes", largest, tolerances.frequency);
     }
 
-    /// Compares positions, shapes and invariants. `order` gives the node of `b` for each node of `a`. Returns
-    /// the basis change from the modes of `b` to those of `a`.
-    fn mode_by_mode(&mut self, pair: &Pair<'_>, order: &[usize], tolerances: &Tolerances) -> Mat<f64> {
+    /// Compares positions, shapes and invariants. `order` gives the node of `b` for each node of `a`.
+    fn mode_by_mode(&mut self, pair: &Pair<'_>, order: &[usize], tolerances: &Tolerances) -> CommonShapes {
         let Pair { a, b, change, in_a, groups } = pair;
         self.same_nodes = true;
         let (pa, pb) = (&a.nodes().positions, &b.nodes().positions);
@@ -460,7 +494,7 @@ impl BodyComparison {
             }
         }
         self.nodal_rows(pair, order, alignment.basis.as_ref(), tolerances.invariants);
-        alignment.basis
+        CommonShapes { assurance: modes::assurance(shapes_a, aligned.as_ref()), basis: alignment.basis }
     }
 
     /// Compares norms of the invariants over groups of modes. No orthogonal change of basis inside a group

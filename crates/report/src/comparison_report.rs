@@ -1,7 +1,7 @@
 //! Report on the comparison of two bodies, for people, programs and automated checks.
 
-use super::comparison::{BodyComparison, ComparisonRow};
-use super::document::{Block, Document, Span, State, Table, Term, cells, heading};
+use super::comparison::{BodyComparison, ComparisonRow, ModePair, signed_percent};
+use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
 use super::html::{self, Plain};
 use super::numbers::{plain, significant};
 use super::render;
@@ -103,8 +103,11 @@ impl ComparisonReport<'_> {
             Block::Terms(compared),
             heading("Differences"),
             Block::Table(table.in_text(|head| head != "Relative to")),
+            heading("Frequencies"),
+            self.frequencies(),
             heading("Notes"),
         ];
+        blocks.extend(self.many_frequencies());
         blocks.extend(self.comparison.remarks().into_iter().map(Block::Paragraph));
         blocks.extend(self.comparison.notes().iter().map(|note| Block::Line(format!("note: {note}"))));
         let left_out = self.comparison.not_compared().iter();
@@ -117,12 +120,43 @@ impl ComparisonReport<'_> {
         blocks
     }
 
+    /// Returns the table of the frequencies, mode by mode.
+    fn frequencies<'b>(&self) -> Block<'b> {
+        let has_shapes = self.comparison.modes().iter().any(|pair| pair.assurance.is_some());
+        let mut heads = vec!["Mode", "of second", "First (Hz)", "Second (Hz)", "Difference"];
+        heads.extend(has_shapes.then_some("MAC"));
+        let rows = self
+            .comparison
+            .modes()
+            .iter()
+            .map(|pair| frequency_cells(pair).into_iter().map(Inline::from).collect())
+            .collect();
+        let caption = format!("Frequencies of the modes, {}", self.comparison.paired().in_words());
+        let is_short = self.comparison.modes().len() <= MAX_MODES_IN_TEXT;
+        Block::Table(Table::new(caption, heads, &[], rows).in_text(|_| is_short))
+    }
+
+    /// Returns the line about frequencies whose table is too long for a text.
+    fn many_frequencies<'b>(&self) -> Option<Block<'b>> {
+        let modes = self.comparison.modes();
+        let worst = self.comparison.worst_mode().filter(|_| modes.len() > MAX_MODES_IN_TEXT)?;
+        Some(Block::Line(format!(
+            "frequencies of {} modes, {}: the largest difference is {} (mode {}); --report FILE.html has all of them",
+            modes.len(),
+            self.comparison.paired().in_words(),
+            signed_percent(worst.difference),
+            worst.mode_a,
+        )))
+    }
+
     fn junit(&self) -> String {
         let (rows, title) = (self.comparison.rows(), self.title());
         let (tests, failures) = (rows.len(), self.failures());
         let failure = |row: &ComparisonRow| {
             let [difference, tolerance] = numbers(row);
-            let message = format!("difference {difference}, tolerance {tolerance}");
+            let of_mode = || self.comparison.worst_mode().map(|worst| format!(", {}", worst.in_words()));
+            let named = (row.quantity == "frequency").then(of_mode).flatten().unwrap_or_default();
+            let message = format!("difference {difference}, tolerance {tolerance}{named}");
             html! { failure message=(message) { (Plain(row.meaning)) } }
         };
         let suites = html! {
@@ -158,11 +192,36 @@ impl ComparisonReport<'_> {
                 row.quantity
             ));
         }
+        text.push_str(&format!("\nFrequencies, modes {}:\n\n", self.comparison.paired().in_words()));
+        text.push_str(
+            "| mode | of second | first (Hz) | second (Hz) | difference | MAC |\n|---|---|---|---|---|---|\n",
+        );
+        for pair in self.comparison.modes() {
+            let mut cells = frequency_cells(pair);
+            cells.resize(6, String::new());
+            text.push_str(&format!("| {} |\n", cells.join(" | ")));
+        }
         for note in self.comparison.remarks() {
             text.push_str(&format!("\n* {}\n", cell(&note)));
         }
         text
     }
+}
+
+/// Largest number of modes whose frequencies a text lists.
+const MAX_MODES_IN_TEXT: usize = 25;
+
+/// Returns the cells of a pair of modes: numbers, frequencies, difference and, if it is known, assurance.
+fn frequency_cells(pair: &ModePair) -> Vec<String> {
+    let mut cells = vec![
+        pair.mode_a.to_string(),
+        pair.mode_b.to_string(),
+        significant(pair.frequency_a_hz, 7),
+        significant(pair.frequency_b_hz, 7),
+        signed_percent(pair.difference),
+    ];
+    cells.extend(pair.assurance.map(|assurance| format!("{assurance:.4}")));
+    cells
 }
 
 fn numbers(row: &ComparisonRow) -> [String; 2] {

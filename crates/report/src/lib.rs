@@ -57,7 +57,7 @@ pub use batch::{BatchFacts, BatchRow};
 pub use checks::{
     audit_json, audit_text, checks_json, checks_text, diagnostics_json, identities_json, identities_text,
 };
-pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};
+pub use comparison::{BodyComparison, ComparisonRow, ModePair, Pairing, Tolerances, compare, compare_common};
 pub use comparison_report::{ComparisonFormat, ComparisonReport};
 pub use completeness::dropped_text;
 pub use envelope::{EnvelopeFacts, EnvelopeKind, read_envelope};

@@ -15,7 +15,7 @@ from .oracle import skew
 class Exudyn(Equations):
     # The moment of `UFforceFFRFreducedOrder` is that of the undeformed centre of mass.
     gravity_order = "undeformed"
-    ARRAYS = {"total": "m", "chi": "L", "chi_tilde": "L", "inertia": "mL2", "mff": "1", "kff": "own", "phi_psi": "s", "phi_psi_tilde": "s", "x_psi": "sL", "x_psi_tilde": "sL",
+    ARRAYS = {"total": "m", "chi": "L", "chi_tilde": "L", "inertia": "mL2", "mff": "1", "kff": "own", "dff": "own", "phi_psi": "s", "phi_psi_tilde": "s", "x_psi": "sL", "x_psi_tilde": "sL",
               "psi_psi": "1", "psi_tilde_psi_tilde": "1"}
 
     def __init__(self, path):

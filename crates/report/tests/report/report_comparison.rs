@@ -7,7 +7,7 @@ use flexbody_body::flex_body::{FlexBody, Parts};
 use flexbody_body::invariants::{BodyFrame, Frame, choose_frame};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use flexbody_report::{
-    BodyComparison, ComparisonFormat, ComparisonReport, Tolerances, compare, compare_common,
+    BodyComparison, ComparisonFormat, ComparisonReport, Pairing, Tolerances, compare, compare_common,
 };
 use nalgebra::Vector3;
 use oracle::random::Random;
@@ -228,6 +228,57 @@ fn bodies_with_different_numbers_of_modes_are_compared_in_what_they_have_in_comm
     assert_eq!(common(&body, &body).expect("comparable").notes(), compared(&body, &body).notes());
 }
 
+/// Frequencies are compared mode by mode: by shapes, also in another order, and in ascending order where nodes or shapes
+/// differ. The worst one is named.
+#[test]
+fn frequencies_are_compared_mode_by_mode() {
+    let body = block(BodyFrame::Principal);
+    let own = body.frequencies_hz();
+    let higher = changed(&body, |p| p.modes.eigenvalue[2] *= 1.02f64.powi(2));
+    let comparison = compared(&body, &higher);
+    assert_eq!((comparison.paired(), comparison.modes().len()), (Pairing::Shape, 6));
+    for (j, pair) in comparison.modes().iter().enumerate() {
+        assert_eq!((pair.mode_a, pair.mode_b), (j + 1, j + 1));
+        assert!((pair.assurance.expect("common nodes") - 1.0).abs() < 1e-12);
+        assert_eq!((pair.frequency_a_hz, pair.difference == 0.0), (own[j], j != 2));
+    }
+    assert!((comparison.modes()[2].difference - 0.02).abs() < 1e-12);
+    let notes = comparison.notes().join("; ");
+    assert!(notes.contains("that differs most is that of mode 3: ") && notes.ends_with("+2 %"), "{notes}");
+    assert!(comparison.text().contains("+2 %  1.0000"), "{}", comparison.text());
+    assert_eq!(comparison.json()["modes"][2]["mode_b"], 3);
+    // Modes 3 and 6 have exchanged shapes: the frequencies are those of the shapes.
+    let exchanged = changed(&body, |p| {
+        let shape = p.modes.shape.clone();
+        p.modes.shape = Mat::from_fn(shape.nrows(), 6, |i, j| shape[(i, [0, 1, 5, 3, 4, 2][j])]);
+    });
+    let comparison = compared(&body, &exchanged);
+    let partners: Vec<usize> = comparison.modes().iter().map(|pair| pair.mode_b).collect();
+    assert_eq!((comparison.paired(), &partners[..]), (Pairing::Shape, &[1, 2, 6, 4, 5, 3][..]));
+    assert!(failed(&comparison).contains(&"frequency"));
+    assert!(comparison.notes().iter().any(|note| note.contains("another order") && note.contains("3 is 6")));
+    // A shape of no mode of the other body, and bodies of other nodes.
+    let foreign = changed(&body, |p| {
+        let rows = p.modes.shape.nrows();
+        (0..rows).for_each(|i| p.modes.shape[(i, 2)] = if i % 7 == 0 { 1.0 } else { 0.0 });
+    });
+    let comparison = compared(&body, &foreign);
+    assert_eq!(comparison.paired(), Pairing::Order);
+    assert!(comparison.notes().iter().any(|note| note.contains("in ascending order")));
+    let renumbered = changed(&body, |p| p.nodes.ids.iter_mut().for_each(|id| *id += 1000));
+    let comparison = compared(&body, &renumbered);
+    assert_eq!((comparison.paired(), comparison.modes()[0].assurance), (Pairing::Order, None));
+    assert!(comparison.text().contains("Difference\n"), "{}", comparison.text());
+    // Modes keep their numbers where only common ones are compared.
+    let fewer = body.reduced(&[2, 5], body.groups(), Vec::new()).expect("two modes");
+    let fewer = changed(&fewer, |p| p.modes.eigenvalue[1] *= 0.98f64.powi(2));
+    let comparison = compare_common(&body, &fewer, &Tolerances::default()).expect("comparable");
+    let numbers: Vec<_> = comparison.modes().iter().map(|pair| (pair.mode_a, pair.mode_b)).collect();
+    assert_eq!(numbers, [(3, 1), (6, 2)]);
+    let notes = comparison.notes().join("; ");
+    assert!(notes.contains("that of mode 6: ") && notes.contains("(its mode 2), -2 %"), "{notes}");
+}
+
 #[test]
 fn assumed_units_and_other_mode_counts_cannot_be_compared() {
     let body = engine_mount();
@@ -306,6 +357,7 @@ fn reports_have_a_test_case_for_every_quantity_and_escape_names() {
     assert_eq!(junit.matches("<failure ").count(), failures.len());
     let counts = format!("tests=\"{}\" failures=\"{}\"", comparison.rows().len(), failures.len());
     assert_eq!(junit.matches(&counts).count(), 2, "{junit}");
+    assert!(junit.contains("tolerance 1e-9, mode 6: "), "{junit}");
     assert!(junit.contains("&lt;new&gt;.flex.h5 compared with a &amp; b.flex.h5"), "{junit}");
 
     let markdown = written("r.md");
