@@ -200,6 +200,7 @@ codes! {
     GeometricStiffnessDifference = "FB451", Note, Done, "geometric stiffness is the difference of two stiffness matrices", "nothing to do; with less than four digits give the stress of a larger load";
     GeometricStiffnessUnstressed = "FB452", Error, BadInput, "matrix with stress is the stiffness without it", "assemble the stiffness after the stress, with the stress of a larger load";
     RecoveryCorners = "FB453", Note, Done, "stresses at nodes are means over the corners of their elements", "nothing to do in a part of one material; where materials meet, request the elements of each material alone and give a recovery for each";
+    InterfacesUncompared = "FB454", Note, Done, "interfaces of the body are not stated like this by the model that it is checked against", "state them by --interface NAME=NODES,COUPLING, or by [[interface]] in the manifest, to compare them";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";

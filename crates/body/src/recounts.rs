@@ -6,6 +6,7 @@ use crate::convert::interfaces_in_frame;
 use crate::flex_body::{FixedInterface, FlexBody, Interface, InterfaceCoordinates, LumpedBody};
 use crate::invariants::{IdentityCheck, error_norms};
 use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{combine, gram, larger, largest};
 use flexbody_model::{Coupling, FeModel, centre_and_length, rigid_count};
 use std::collections::BTreeSet;
@@ -201,7 +202,8 @@ const MAX_POINT_DIFFERENCE: f64 = 1e-12;
 /// nodes as reference point if the model states none; this is accepted.
 pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<IdentityCheck> {
     let (stored, in_model) = (body.interfaces(), interfaces_in_frame(model, body.frame(), false));
-    if stored.is_empty() && in_model.is_empty() {
+    // A model that states no interfaces contradicts none; a note says so.
+    if in_model.is_empty() {
         return Vec::new();
     }
     let of = |name: &str| stored.iter().find(|interface| interface.name == name);
@@ -239,6 +241,41 @@ pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<Identity
             MAX_POINT_DIFFERENCE,
         ),
     ]
+}
+
+/// Returns a note about the interfaces of the body that the model does not state, or states differently, with the options
+/// that state them.
+pub(super) fn interface_note(body: &FlexBody, model: &FeModel) -> Option<Diagnostic> {
+    let in_model = interfaces_in_frame(model, body.frame(), false);
+    let differs = |stored: &&Interface| {
+        let same = in_model.iter().find(|other| other.name == stored.name);
+        !same.is_some_and(|same| is_same(stored, same, model))
+    };
+    let missed: Vec<&Interface> = body.interfaces().iter().filter(differs).collect();
+    let names: Vec<String> = missed.iter().map(|one| format!("`{}`", one.name)).collect();
+    let option = |one: &&Interface| match one.coupling {
+        Some(coupling) => format!("--interface {}=NODES,{}", one.name, coupling.name()),
+        None => format!("--interface {}=NODES", one.name),
+    };
+    let options: Vec<String> = missed.iter().map(option).collect();
+    let message = match (missed.is_empty(), in_model.is_empty()) {
+        (true, _) => return None,
+        (false, true) => format!(
+            "the model states no interfaces: {} with nodes, coupling and reference point are taken from the body and not compared",
+            names.join(", ")
+        ),
+        (false, false) => {
+            format!(
+                "{} are missing in the model, or have other nodes or another coupling there",
+                names.join(", ")
+            )
+        }
+    };
+    let help = format!(
+        "to compare them, give {} (NODES: a node set, a list or a region), or [[interface]] with these names in the manifest",
+        options.join(" ")
+    );
+    Some(Diagnostic::new(Code::InterfacesUncompared, message).with_help(help))
 }
 
 /// Returns true if `stored` has the nodes, the coupling and the kind of reference point of `in_model`. A basis

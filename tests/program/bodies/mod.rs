@@ -1,3 +1,4 @@
 //! Bodies converted by the program.
 
+mod checked_against;
 mod interface_frame;

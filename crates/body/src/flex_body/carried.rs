@@ -252,7 +252,7 @@ impl FlexBody {
 
     /// Returns true for a Craig-Bampton body with all of its modes, whose boundary holds the interface `name`. With the frame
     /// on an interface it has no interface coordinates that would tell.
-    fn is_whole_craig_bampton(&self, name: &str) -> bool {
+    pub(crate) fn is_whole_craig_bampton(&self, name: &str) -> bool {
         let settings = &self.source().settings;
         let at_boundary = |interface: &&Interface| interface.coupling != Some(Coupling::Free);
         let boundary: Vec<&Interface> = self.interfaces().iter().filter(at_boundary).collect();
