@@ -116,8 +116,12 @@ fn of_value(found: Diagnostic, text: &str, path: &Path) -> Diagnostic {
         let number = if header.starts_with("[[") { format!(" {number}") } else { String::new() };
         format!(" in {header}{number}")
     });
+    // The message may name the table already.
+    let named = header.map(|header| format!(" in {header}"));
+    let message = named.as_deref().and_then(|named| found.message().strip_suffix(named));
+    let message = message.unwrap_or(found.message());
     let value = if value.starts_with('[') { String::new() } else { format!(": `{value}`") };
-    Diagnostic::new(found.code(), format!("{}{place}{value}", found.message())).with_help(found.help())
+    Diagnostic::new(found.code(), format!("{message}{place}{value}")).with_help(found.help())
 }
 
 /// Terms and modes that a body needs in a scene.

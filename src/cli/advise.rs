@@ -1,6 +1,6 @@
 //! Command `flexbody advise`.
 
-use super::arguments::AdviseArguments;
+use super::arguments::{AdviseArguments, Deflection};
 use super::outcome::{Outcome, format_of, refuse_replacing, refuse_warnings};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -16,7 +16,10 @@ pub(super) fn run(arguments: &AdviseArguments) -> Result<Outcome> {
     let (body, diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     let ranges = Ranges {
         spin_hz: arguments.spin,
-        deflection: arguments.deflection,
+        deflection: arguments.deflection.map(|deflection| match deflection {
+            Deflection::Length(length) => length,
+            Deflection::PartOfExtent(part) => part * body.extent(),
+        }),
         attached,
         is_rotation_given: arguments.rotation_given,
         limit: arguments.limit,

@@ -10,6 +10,7 @@ mod response;
 
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand};
+use flexbody_base::numbers::parse_ratio;
 use flexbody_body::flex_body::Storage;
 use flexbody_formats::export::ExportFormat;
 use flexbody_formats::{FORMATS, IMPORT_FORMATS};
@@ -296,7 +297,7 @@ pub struct AuditArguments {
     #[arg(long, value_name = "FORMAT", value_parser = foreign_formats())]
     pub from: Option<String>,
     /// Tolerance of the identities, relative to the size of their terms
-    #[arg(long, value_name = "REL", default_value_t = 1e-6, value_parser = positive)]
+    #[arg(long, value_name = "REL", default_value_t = 1e-6, value_parser = ratio)]
     pub tolerance: f64,
     /// Options of printing.
     #[command(flatten)]
@@ -336,7 +337,7 @@ pub struct JobArguments {
     /// (repeatable) [default point: the centre of its faces, of a cylinder a point on its axis]
     #[arg(long, value_name = "NAME=NODES[,COUPLING][,POINT]")]
     pub interface: Vec<String>,
-    /// Damping of a model without a manifest: a ratio of every mode (2 % is 0.02), rayleigh=ALPHA,BETA,
+    /// Damping of a model without a manifest: a ratio of every mode (0.02 or 2%), rayleigh=ALPHA,BETA,
     /// bands=100:0.01,1000:0.1,1 (ends in hertz with ratios, the last without end) or matrix=FILE
     #[arg(long, value_name = "RATIO|NAME=VALUES", allow_hyphen_values = true)]
     pub damping: Option<String>,
@@ -511,19 +512,19 @@ pub struct CompareArguments {
     #[arg(long)]
     pub common: bool,
     /// Largest relative difference of a frequency
-    #[arg(long, value_name = "REL", value_parser = positive)]
+    #[arg(long, value_name = "REL", value_parser = ratio)]
     pub frequency: Option<f64>,
     /// Largest relative difference of the mass
-    #[arg(long, value_name = "REL", value_parser = positive)]
+    #[arg(long, value_name = "REL", value_parser = ratio)]
     pub mass: Option<f64>,
     /// Largest difference of the centre of mass relative to the radius of gyration
-    #[arg(long, value_name = "REL", value_parser = positive)]
+    #[arg(long, value_name = "REL", value_parser = ratio)]
     pub centre_of_mass: Option<f64>,
     /// Largest relative difference of the inertia
-    #[arg(long, value_name = "REL", value_parser = positive)]
+    #[arg(long, value_name = "REL", value_parser = ratio)]
     pub inertia: Option<f64>,
     /// Largest difference of an invariant relative to its Cauchy-Schwarz bound
-    #[arg(long, value_name = "REL", value_parser = positive)]
+    #[arg(long, value_name = "REL", value_parser = ratio)]
     pub invariants: Option<f64>,
     /// Report to write, whether the bodies agree or not; format by extension: .html, .json, .txt, .md (Markdown) or
     /// .xml (JUnit test cases) (repeatable)
@@ -560,6 +561,31 @@ fn memory_size(text: &str) -> Result<u64, String> {
     };
     let bytes = number.trim().parse::<f64>().map_err(|e| e.to_string())? * factor;
     if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err("not a size of memory".to_owned()) }
+}
+
+/// Parses a positive ratio: `0.01` or `1%`.
+fn ratio(text: &str) -> Result<f64, String> {
+    let ratio = parse_ratio(text).filter(|value| *value > 0.0 && value.is_finite());
+    ratio.ok_or_else(|| "expected a positive number or percentage (0.01 or 1%)".to_owned())
+}
+
+/// Parses a positive length, or a percentage of the largest extent of the body.
+fn deflection(text: &str) -> Result<Deflection, String> {
+    let deflection = match text.contains('%') {
+        true => ratio(text).map(Deflection::PartOfExtent),
+        false => positive(text).map(Deflection::Length),
+    };
+    deflection
+        .map_err(|_| "expected a positive length, or a percentage of the largest extent (1%)".to_owned())
+}
+
+/// Largest deflection of a node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Deflection {
+    /// In the unit of length of the body.
+    Length(f64),
+    /// Relative to the largest extent of the body.
+    PartOfExtent(f64),
 }
 
 fn positive(text: &str) -> Result<f64, String> {

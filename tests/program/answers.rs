@@ -41,10 +41,14 @@ fn answers_in_all_formats_give_the_same_stresses() {
     assert!(expected.modes.norm_max() > 1e3 && expected.rows.len() == 24);
     for name in ["answers.csv", "raw.vtu", "base64.vtu", "answers.e", "binary.vtk", "answers.pvd"]
         .into_iter()
-        .chain(["classic.e", "offset64.e", "data64.e"])
+        .chain(["classic.e", "offset64.e", "data64.e", "one_variable.e", "one_variable_classic.e"])
     {
         assert_eq!(read(name), expected, "{name}");
     }
+    // One of the pieces is text.
+    let pieces = read("pieces.pvtu");
+    let apart = (&pieces.modes - &expected.modes).norm_max() / expected.modes.norm_max();
+    assert!(pieces.rows == expected.rows && apart < 1e-8, "{apart:e}");
     // Text has fewer digits: nine, and the seven of a punch file.
     for (name, limit) in [("text.vtu", 1e-8), ("text.vtk", 1e-8), ("corners.pch", 1e-6), ("volume.pch", 1e-6)]
     {
@@ -103,6 +107,60 @@ fn answers_of_other_files_are_refused_by_name() {
         let said = converted(folder.path(), &folder.path().join(name)).expect_err(name);
         assert!(said.contains(code) && said.contains(part), "{name}: {said}");
     }
+}
+
+/// A parallel file has the points of all pieces, each once; pieces that do not fit each other are refused.
+#[test]
+fn pieces_are_refused_where_they_do_not_fit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = fixtures().join("small/answers");
+    let list = fs::read_to_string(place.join("pieces.pvtu")).expect("a list");
+    let text = fs::read_to_string(place.join("pieces_1.vtu")).expect("a piece");
+    fs::copy(place.join("pieces_0.vtu"), folder.path().join("pieces_0.vtu")).expect("copied");
+    let with = |name: &str, list: &str, second: &str| {
+        fs::write(folder.path().join("pieces_1.vtu"), second).expect("written");
+        fs::write(folder.path().join(name), list).expect("written");
+        converted(folder.path(), &folder.path().join(name))
+    };
+    let whole = with("whole.pvtu", &list, &text).unwrap_or_else(|said| panic!("{said}"));
+    assert_eq!(whole.rows.len(), 24);
+    let first = "pieces_0.vtu";
+    for (name, list, second, code, part) in [
+        ("other.txt", list.clone(), text.clone(), "FB327", "its own name does not end with .pvtu"),
+        ("missing.pvtu", list.replace("pieces_1.vtu", "gone.vtu"), text.clone(), "FB101", "gone.vtu"),
+        (
+            "arrays.pvtu",
+            list.clone(),
+            text.replace("\"stress 2\"", "\"other\""),
+            "FB327",
+            "piece has the arrays",
+        ),
+        ("numbers.pvtu", list.clone(), text.replace("\"node\"", "\"id\""), "FB327", "no array `node`"),
+        // Without the mark of the ghost both pieces own the point, with the same values.
+        ("source.pvtu", list.replace("Source=", "File="), text.clone(), "FB327", "piece 1 names no file"),
+        (
+            "alone.pvtu",
+            list.replace(first, "pieces_1.vtu"),
+            text.clone(),
+            "FB327",
+            "is a ghost in every piece",
+        ),
+        ("cut.pvtu", list[..list.len() / 2].to_owned(), text.clone(), "FB327", ""),
+        ("piece.pvtu", list.clone(), text[..text.len() / 2].to_owned(), "FB327", ""),
+    ] {
+        let said = with(name, &list, &second).expect_err(name);
+        assert!(said.contains(code) && said.contains(part), "{name}: {said}");
+    }
+    let unmarked = text.replace("\"vtkGhostType\"", "\"other_type\"");
+    with("unmarked.pvtu", &list, &unmarked).unwrap_or_else(|said| panic!("{said}"));
+    // Another displacement of the point that both pieces own.
+    let at = unmarked.find("\"displacement 1\"").expect("an array");
+    let begin = at + unmarked[at..].find('>').expect("its values") + 1;
+    let number = begin + unmarked[begin..].find(|c: char| !c.is_whitespace()).expect("a number");
+    let end = number + unmarked[number..].find(char::is_whitespace).expect("its end");
+    let changed = format!("{}1e3{}", &unmarked[..number], &unmarked[end..]);
+    let said = with("changed.pvtu", &list, &changed).expect_err("other values");
+    assert!(said.contains("FB327") && said.contains("in an earlier piece"), "{said}");
 }
 
 #[test]

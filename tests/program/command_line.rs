@@ -115,6 +115,12 @@ fn usage_errors_end_with_2_say_what_is_wrong_and_write_nothing() {
         ("convert absent.toml -o b.h5", "error[FB101]"),
         ("compare a.h5", "<B.flex.h5>"),
         ("compare a.h5 b.h5 --mass 0", "expected a positive number"),
+        ("compare a.h5 b.h5 --frequency 1%%", "expected a positive number or percentage (0.01 or 1%)"),
+        (
+            "advise b.h5 --deflection 1x",
+            "expected a positive length, or a percentage of the largest extent (1%)",
+        ),
+        ("advise b.h5 --limit=-5%", "expected a positive number or percentage"),
         ("inspect absent.h5", "error[FB101]"),
         ("check model.toml", "error[FB701]"),
     ] {
@@ -492,6 +498,19 @@ fn exports_tell_what_they_lose_in_a_scene() {
     // The share grows with the square of the spin.
     let (slow, fast) = (share(4e3), share(8e3));
     assert!(slow > 0.1 && (fast / slow - 4.0).abs() < 0.2, "{slow} {fast}");
+}
+
+/// Every option of a ratio takes a percentage; a deflection is then relative to the largest extent of the body.
+#[test]
+fn ratios_may_be_percentages() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = oracle::fixtures().join("small/brick/model.toml");
+    done(folder.path(), &format!("convert {} -o b.h5 --modes 4", model.display()));
+    let advice =
+        |options: &str| done(folder.path(), &format!("advise b.h5 --spin 10 {options} --json")).json();
+    assert_eq!(advice("--limit 2% --deflection 1%")["results"], advice("--limit 0.02")["results"]);
+    assert_ne!(advice("--deflection 2%")["results"], advice("")["results"]);
+    done(folder.path(), "compare b.h5 b.h5 --frequency 1% --mass 0.5%");
 }
 
 /// Returns the error norms of one scheme of a report.

@@ -211,6 +211,10 @@ fn scenes_come_from_text_and_from_values() {
     let error = Scene::parse("[run]\nduration = true\n", "").expect_err("no number");
     assert_eq!(error.diagnostics()[0].line(), Some(2));
     let loads = serde_json::json!({ "load": [{ "node": 1, "force": [0, 0, 1] }, { "node": 2, "force": 1 }] });
+    // The table is named once, whether the message names it or not.
+    let unknown = serde_json::json!({ "run": { "duration": 1.0, "durations": 2.0 } });
+    let told = Scene::from_values(&unknown, "").expect_err("an unknown key").to_string();
+    assert_eq!(told.matches("in [run]").count(), 1, "{told}");
     let error = Scene::from_values(&loads, "").expect_err("no vector");
     let said = error.diagnostics()[0].message();
     assert!(said.ends_with(" in [[load]] 2: `force = 1`"), "{said}");

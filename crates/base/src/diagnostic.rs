@@ -263,7 +263,7 @@ codes! {
     BodySchema = "FB703", Error, CheckFailed, "flex-body file breaks its schema", "convert the model again";
     BodyIdentity = "FB704", Error, CheckFailed, "identity violated", "convert the model again; if the error persists, report the file to the developers";
     BodySourceChanged = "FB706", Warning, Done, "input file differs from the one the body was made of", "convert the model again";
-    BodyIncomparable = "FB707", Error, BadInput, "flexible bodies cannot be compared", "compare bodies of the same model, dimension and units";
+    BodyIncomparable = "FB707", Error, BadInput, "flexible bodies cannot be compared", "give two bodies (or a body and its model) with the same nodes, dimension and units; compare --common takes bodies with different numbers of modes";
     BodyChanged = "FB712", Error, CheckFailed, "content of a flex-body file changed since it was written", "take the file as it was written, or convert the model again; docs/reference/file_format.md says how a program that changes files states new digests";
     BodyWithoutDigest = "FB713", Note, Done, "flex-body file has no digest, so changes since it was written cannot be detected", "convert the model again to get a digest";
     BodyUntrustworthy = "FB714", Error, Untrustworthy, "body violates conditions that hold for every body; nothing was written", "ask for fewer modes, and look for weakly joined parts and implausible masses; if the error persists, report the model to the developers";

@@ -17,6 +17,14 @@ pub fn significant(value: f64, digits: usize) -> String {
     if plain == "-0" { "0".to_owned() } else { plain }
 }
 
+/// Parses a ratio as users write it: `0.01`, `1%` or `1 %`. Returns `None` for another text.
+pub fn parse_ratio(text: &str) -> Option<f64> {
+    match text.trim().strip_suffix('%') {
+        Some(percent) => percent.trim_end().parse::<f64>().ok().map(|percent| percent / 100.0),
+        None => text.trim().parse().ok(),
+    }
+}
+
 /// Returns the first and last number of each run of consecutive numbers.
 pub fn runs(numbers: &[usize]) -> Vec<(usize, usize)> {
     let runs = numbers.chunk_by(|a, b| a + 1 == *b);
@@ -40,6 +48,18 @@ fn trimmed(number: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ratios_may_be_percentages() {
+        for (text, ratio) in
+            [("0.01", 0.01), ("1%", 0.01), (" 2.5 % ", 0.025), ("-1%", -0.01), ("1e-6", 1e-6)]
+        {
+            assert_eq!(parse_ratio(text), Some(ratio), "{text}");
+        }
+        for text in ["", "%", "1%%", "one", "% 1", "1 percent"] {
+            assert_eq!(parse_ratio(text), None, "{text}");
+        }
+    }
 
     #[test]
     fn numbers_keep_their_significant_digits() {

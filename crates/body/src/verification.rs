@@ -124,11 +124,25 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
     Ok(checks)
 }
 
+/// Returns the error about a model that the body was not made of, with the files that it was made of.
+fn of_other_model(body: &FlexBody, message: String) -> Error {
+    let files: Vec<&str> = body.source().files.iter().map(|file| file.name.as_str()).collect();
+    let made_of = match files.is_empty() {
+        true => String::new(),
+        false => format!(" ({})", files.join(", ")),
+    };
+    let help = format!(
+        "give the model that the body `{}` was made of{made_of}, or convert this model again",
+        body.source().name
+    );
+    Diagnostic::new(Code::BodyIncomparable, message).with_help(help).into()
+}
+
 /// Returns an error if the model has another dimension or other nodes than the body.
 fn check_comparable(body: &FlexBody, model: &FeModel) -> Result<()> {
     if body.dimension() != model.dimension() {
         let message = format!("the body has dimension {}, the model {}", body.dimension(), model.dimension());
-        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+        return Err(of_other_model(body, message));
     }
     if body.nodes().ids != model.nodes().ids {
         let message = format!(
@@ -136,7 +150,7 @@ fn check_comparable(body: &FlexBody, model: &FeModel) -> Result<()> {
             body.nodes().ids.len(),
             model.nodes().ids.len()
         );
-        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+        return Err(of_other_model(body, message));
     }
     Ok(())
 }
@@ -162,7 +176,7 @@ impl<'a> Recomputed<'a> {
         let place = NodesInFrame::new(model, *body.frame());
         let Some(modes) = BodyModes::of_body(model, body) else {
             let message = "the rows of the body's modes are not those of the model";
-            return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+            return Err(of_other_model(body, message.to_owned()));
         };
         let pencil = model.pencil();
         let kx = pencil.apply_stiffness(modes.vectors.as_ref());

@@ -32,6 +32,9 @@ pub(super) trait ExodusFile {
     /// Returns a variable with two extents.
     fn table(&self, name: &str) -> Found<NumberTable>;
 
+    /// Returns a variable with three extents, of which the second is `layers`, as a table: each row of each layer in turn.
+    fn stacked(&self, name: &str, layers: usize) -> Found<NumberTable>;
+
     /// Returns a list of texts.
     fn names(&self, name: &str) -> Found<Vec<String>>;
 
@@ -95,7 +98,8 @@ pub(super) fn has_nodal_variables(file: &InputFile) -> bool {
     with_file(file, |opened| Ok(opened.has("name_nod_var"))).unwrap_or(false)
 }
 
-/// Reads the variables of the nodes: `name_nod_var` and `vals_nod_var1`, `vals_nod_var2`, ... (times x nodes).
+/// Reads the variables of the nodes: `name_nod_var` and `vals_nod_var1`, `vals_nod_var2`, ... (times x nodes), or in
+/// older files one `vals_nod_var` (times x variables x nodes).
 ///
 /// # Errors
 /// FB101 for a file that cannot be opened, FB115 for variables that do not fit the nodes.
@@ -103,6 +107,9 @@ pub(super) fn read_nodal_variables(file: &InputFile) -> Found<NodalVariables> {
     with_file(file, |opened| {
         let ids = ids(opened, positions(opened)?.len())?;
         let names = opened.names("name_nod_var")?;
+        if !opened.has("vals_nod_var1") && opened.has("vals_nod_var") {
+            return of_one_variable(opened, ids, names);
+        }
         let (mut values, mut times, mut is_single) = (Vec::new(), None, false);
         for variable in 1..=names.len() {
             let name = format!("vals_nod_var{variable}");
@@ -117,6 +124,31 @@ pub(super) fn read_nodal_variables(file: &InputFile) -> Found<NodalVariables> {
         }
         Ok(NodalVariables { ids, names, values, times: times.unwrap_or(0), is_single })
     })
+}
+
+/// Returns the variables of the nodes of a file that has all of them in `vals_nod_var`.
+fn of_one_variable(opened: &dyn ExodusFile, ids: Vec<i64>, names: Vec<String>) -> Found<NodalVariables> {
+    let count = names.len();
+    let NumberTable { rows, columns: nodes, values: all, is_single_precision } =
+        opened.stacked("vals_nod_var", count)?;
+    if nodes != ids.len() || count == 0 {
+        let message = format!("`vals_nod_var` has {count} variables of {nodes} nodes");
+        return Err(wrong(format!("{message}, expected one or more of {} nodes", ids.len())));
+    }
+    let times = rows / count;
+    let row = |time: usize, variable: usize| {
+        let first = (time * count + variable) * nodes;
+        &all[first..first + nodes]
+    };
+    let of = |variable: usize| (0..times).flat_map(|time| row(time, variable).iter().copied()).collect();
+    let values = (0..count).map(of).collect();
+    Ok(NodalVariables { ids, names, values, times, is_single: is_single_precision })
+}
+
+/// Returns the error about a variable whose extents are not times, variables and nodes.
+pub(super) fn wrong_layers(name: &str, extents: &[impl ToString], layers: usize) -> String {
+    let extents: Vec<String> = extents.iter().map(ToString::to_string).collect();
+    format!("`{name}` has the extents {}, expected times x {layers} variables x nodes", extents.join(" x "))
 }
 
 fn wrong(message: String) -> Vec<Diagnostic> {
@@ -220,6 +252,19 @@ impl ExodusFile for ClassicNetcdf<'_> {
         };
         let values = self.numbers(variable).map_err(wrong)?;
         Ok(NumberTable { rows, columns, values, is_single_precision: variable.is_single_precision() })
+    }
+
+    fn stacked(&self, name: &str, layers: usize) -> Found<NumberTable> {
+        let variable = self.variable(name).ok_or_else(|| missing(name))?;
+        let &[times, own, columns] = variable.shape.as_slice() else {
+            return Err(wrong(wrong_layers(name, &variable.shape, layers)));
+        };
+        if own != layers {
+            return Err(wrong(wrong_layers(name, &variable.shape, layers)));
+        }
+        let values = self.numbers(variable).map_err(wrong)?;
+        let is_single_precision = variable.is_single_precision();
+        Ok(NumberTable { rows: times * layers, columns, values, is_single_precision })
     }
 
     fn names(&self, name: &str) -> Found<Vec<String>> {

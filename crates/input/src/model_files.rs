@@ -3,6 +3,7 @@
 use super::jobs::JobFile;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::significant;
 use flexbody_base::units::UnitSystem;
 use flexbody_model::{Coupling, Damping, GeometricStiffness, Reference};
 use nalgebra::Vector3;
@@ -473,6 +474,43 @@ impl Region {
             return all.into_iter().map(|(_, _, id)| id).collect();
         }
         nodes.filter(|(_, x)| self.holds(*x)).map(|(id, _)| id).collect()
+    }
+
+    /// Returns the sentence that none of `nodes` (number and position) lies in the region, with the distance of the nearest.
+    pub(super) fn empty(&self, nodes: impl Iterator<Item = (i64, [f64; 3])>) -> String {
+        let all = nodes.map(|(id, x)| (self.distance(x), id, x));
+        match all.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            None => {
+                "no node of the model lies in the region: the model has no nodes that can move".to_owned()
+            }
+            Some((away, id, x)) => {
+                let [away, x, y, z] = [away, x[0], x[1], x[2]].map(|value| significant(value, 5));
+                format!(
+                    "no node of the model lies in the region: the nearest, node {id} at {x}, {y}, {z}, is {away} away from it"
+                )
+            }
+        }
+    }
+
+    /// Returns the distance of a point from the region, zero inside. Unit: length.
+    fn distance(&self, x: [f64; 3]) -> f64 {
+        let beyond = |value: f64, low: f64, high: f64| (low - value).max(value - high).max(0.0);
+        match *self {
+            Self::Box { min, max } => Vector3::from_fn(|k, _| beyond(x[k], min[k], max[k])).norm(),
+            Self::Cylinder { from, to, radius } => {
+                let (from, to, x) = (Vector3::from(from), Vector3::from(to), Vector3::from(x));
+                let length = (to - from).norm();
+                let axis = (to - from) / length;
+                let along = (x - from).dot(&axis);
+                let away = (x - from - along * axis).norm();
+                beyond(along, 0.0, length).hypot(beyond(away, radius[0], radius[1]))
+            }
+            Self::Plane { point, normal, within } => {
+                let (point, normal) = (Vector3::from(point), Vector3::from(normal));
+                beyond((Vector3::from(x) - point).dot(&normal.normalize()).abs(), 0.0, within)
+            }
+            Self::Nearest { point, .. } => (Vector3::from(x) - Vector3::from(point)).norm(),
+        }
     }
 
     /// Returns the default reference point of an interface in the region: on the axis for a cylinder, at the centre for

@@ -8,7 +8,7 @@ mod vtk_legacy;
 mod vtk_xml;
 
 pub(super) use vtk_legacy::{NumberType, point_arrays as legacy_point_arrays};
-pub(super) use vtk_xml::{CollectionMember, PointArray, PointData, collection, point_arrays};
+pub(super) use vtk_xml::{CollectionMember, PointArray, PointData, collection, pieces, point_arrays};
 
 use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};

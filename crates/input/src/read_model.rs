@@ -247,9 +247,10 @@ pub fn interface_in_memory(interface: &InterfaceSource, raw: &RawModel) -> Resul
             let moving = moving(matrices, &raw.nodes.ids, raw.dofs.as_deref(), raw.dimension);
             let moves = |id: i64| moving.as_ref().is_none_or(|moving| moving.contains(&id));
             let all = raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied());
-            let nodes = region.nodes(all.filter(|(id, _)| moves(*id)));
+            let all = all.filter(|(id, _)| moves(*id));
+            let nodes = region.nodes(all.clone());
             if nodes.is_empty() {
-                return Err(about(Code::NodeSetUnknown, "no node of the model lies in the region"));
+                return Err(about(Code::NodeSetUnknown, &region.empty(all)));
             }
             nodes
         }
@@ -403,12 +404,13 @@ impl<'m> NodeLookup<'m> {
                 self.of_set(interface, name, files)?
             }
             InterfaceNodes::Region(region) => {
-                let nodes = self.matrices.map_or(Vec::new(), |matrices| {
-                    let all =
-                        matrices.nodes.ids.iter().copied().zip(matrices.nodes.positions.iter().copied());
-                    region.nodes(all.filter(|(id, _)| self.moves(*id)))
+                let all = self.matrices.iter().flat_map(|matrices| {
+                    matrices.nodes.ids.iter().copied().zip(matrices.nodes.positions.iter().copied())
                 });
-                self.refuse_empty(interface, nodes, "no node of the model lies in the region", files)?
+                let all = all.filter(|(id, _)| self.moves(*id));
+                let nodes = region.nodes(all.clone());
+                let why = if nodes.is_empty() { region.empty(all) } else { String::new() };
+                self.refuse_empty(interface, nodes, &why, files)?
             }
         };
         let (name, coupling, reference) = (interface.name.clone(), interface.coupling, interface.reference);

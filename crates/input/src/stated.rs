@@ -4,6 +4,7 @@
 use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, Region};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::numbers::parse_ratio;
 use flexbody_model::{Coupling, Damping, DampingBand, Reference};
 
 impl InterfaceSource {
@@ -193,14 +194,14 @@ pub fn parse_damping(text: &str) -> Result<Damping<MatrixLocation>> {
     let refused = |why: &str| {
         let message = format!("damping `{}`: {why}", text.escape_debug());
         Error::from(Diagnostic::new(Code::Usage, message).with_help(
-            "give the ratio of every mode as in 0.02, rayleigh=ALPHA,BETA, bands=100:0.01,1000:0.1,1 or matrix=FILE",
+            "give the ratio of every mode as in 0.02 or 2%, rayleigh=ALPHA,BETA, bands=100:0.01,1000:0.1,1 or matrix=FILE",
         ))
     };
     let numbers = |values: &str| {
         values.split(',').map(|number| number.trim().parse().ok()).collect::<Option<Vec<f64>>>()
     };
     let damping = match text.split_once('=') {
-        None => text.trim().parse().ok().map(Damping::Ratio),
+        None => parse_ratio(text).map(Damping::Ratio),
         Some(("rayleigh", values)) => match numbers(values).as_deref() {
             Some(&[alpha, beta]) => Some(Damping::Rayleigh { alpha, beta }),
             _ => None,
@@ -222,7 +223,7 @@ fn band(text: &str) -> Option<DampingBand> {
         Some((end, ratio)) => (end.trim().parse().ok()?, ratio),
         None => (f64::INFINITY, text),
     };
-    Some(DampingBand { to_hz, ratio: ratio.trim().parse().ok()? })
+    Some(DampingBand { to_hz, ratio: parse_ratio(ratio)? })
 }
 
 #[cfg(test)]
@@ -282,6 +283,11 @@ mod tests {
     fn texts_of_damping_are_read_as_their_tables_are() {
         let band = |to_hz, ratio| DampingBand { to_hz, ratio };
         assert_eq!(parse_damping("0.02").expect("a ratio"), Damping::Ratio(0.02));
+        assert_eq!(parse_damping("2%").expect("a ratio"), Damping::Ratio(0.02));
+        assert_eq!(
+            parse_damping("bands=100:1%,1").expect("bands"),
+            parse_damping("bands=100:0.01,1").expect("bands")
+        );
         let rayleigh = Damping::Rayleigh { alpha: 1.5, beta: 2e-6 };
         assert_eq!(parse_damping("rayleigh=1.5, 2e-6").expect("factors"), rayleigh);
         let bands = Damping::Bands(vec![band(100.0, 0.01), band(f64::INFINITY, 1.0)]);

@@ -2,6 +2,7 @@
 
 use super::rows::Rows;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::numbers::significant;
 use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
 use std::ops::Range;
 
@@ -46,13 +47,16 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
     let totals = &totals[..dimension];
     let mean = totals.iter().sum::<f64>() / dimension as f64;
     if mean.is_nan() || mean <= tolerance * magnitude {
-        let message = format!("total mass is {mean:e}");
+        let message = format!("total mass is {}", significant(mean, 6));
         return Err(Diagnostic::new(Code::MassNotPositive, message));
     }
     let spread = totals.iter().fold(0.0f64, |s, t| s.max((t - mean).abs())) / mean;
     if spread > tolerance.max(1e-9) {
-        let along: Vec<String> =
-            totals.iter().zip(["x", "y", "z"]).map(|(total, axis)| format!("{total} along {axis}")).collect();
+        let along: Vec<String> = totals
+            .iter()
+            .zip(["x", "y", "z"])
+            .map(|(total, axis)| format!("{} along {axis}", significant(*total, 12)))
+            .collect();
         let message = format!("total mass is {}", along.join(", "));
         return Err(Diagnostic::new(Code::MassDirectional, message));
     }

@@ -1,7 +1,7 @@
 //! Arguments of the commands that judge a body without a study, by ranges of motion and by a run of another program, and
 //! of the commands for stresses: `shapes`, which asks an FE program for them, and `recover`, over a run.
 
-use super::{JobArguments, Printing, positive};
+use super::{Deflection, JobArguments, Printing, deflection, ratio};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -14,9 +14,9 @@ pub struct AdviseArguments {
     /// Largest rotation rate of the body, in Hz
     #[arg(long, value_name = "HZ", default_value_t = 0.0)]
     pub spin: f64,
-    /// Largest deflection of a node, in the unit of length of the body [default: 1 % of its largest extent]
-    #[arg(long, value_name = "LENGTH", value_parser = positive)]
-    pub deflection: Option<f64>,
+    /// Largest deflection of a node, in the unit of length of the body, or as a percentage of its largest extent [default: 1%]
+    #[arg(long, value_name = "LENGTH|PERCENT%", value_parser = deflection)]
+    pub deflection: Option<Deflection>,
     /// Mass attached to the body, in its unit of mass, at an interface or at the farthest node: MASS or MASS@INTERFACE
     #[arg(long, value_name = "MASS[@INTERFACE]")]
     pub attached: Option<String>,
@@ -24,7 +24,7 @@ pub struct AdviseArguments {
     #[arg(long)]
     pub rotation_given: bool,
     /// Largest size of a term that may be left out, relative to what it is compared with
-    #[arg(long, value_name = "REL", value_parser = positive, default_value_t = 0.05)]
+    #[arg(long, value_name = "REL", value_parser = ratio, default_value_t = 0.05)]
     pub limit: f64,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]

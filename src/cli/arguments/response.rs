@@ -1,6 +1,6 @@
 //! Arguments of the command for frequency responses.
 
-use super::{JobArguments, Printing, names, positive};
+use super::{JobArguments, Printing, names, ratio};
 use clap::Args;
 use flexbody_body::basis::BasisKind;
 use flexbody_study::response::{Band, ResponseSettings};
@@ -42,7 +42,7 @@ pub struct ResponseArguments {
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
     /// Largest relative error; if it is exceeded the exit code is 1
-    #[arg(long, value_name = "REL", default_value_t = ResponseSettings::TOLERANCE, value_parser = positive)]
+    #[arg(long, value_name = "REL", default_value_t = ResponseSettings::TOLERANCE, value_parser = ratio)]
     pub tolerance: f64,
     /// Approximate number of frequencies of the curves
     #[arg(long, value_name = "N", default_value_t = ResponseSettings::POINTS as u32, value_parser = clap::value_parser!(u32).range(2..=100_000))]

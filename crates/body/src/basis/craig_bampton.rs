@@ -20,6 +20,7 @@ use super::{BasisKind, FixedInterface, ModeSettings};
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::significant;
 use flexbody_eigen::{
     Accuracy, Completeness, EigenFailure, EigenProblem, EigenSolution, Plan, Precision, Proof,
     ResponseAccuracy, Wanted, modes_of_span, solve, static_responses_twice,
@@ -318,7 +319,8 @@ impl<'a> Parts<'a> {
             let hertz =
                 self.fixed.eigenvalues.last().map_or(0.0, |&lambda| model.units().frequency_of(lambda));
             let message = format!(
-                "fixed-interface mode {given} ({hertz:.6} Hz) shares its eigenvalue with other modes that are left out (number: {more})"
+                "fixed-interface mode {given} ({} Hz) shares its eigenvalue with other modes that are left out (number: {more})",
+                significant(hertz, 6)
             );
             notes.push(
                 Diagnostic::new(Code::RepeatedSplit, message)
@@ -332,7 +334,7 @@ impl<'a> Parts<'a> {
     /// proof covers the fixed-interface modes.
     fn completeness(&self, model: &FeModel, solution: &EigenSolution) -> Completeness {
         let (fixed, held) = (self.fixed.eigenvalues.len(), &self.fixed.completeness);
-        let hertz = model.units().frequency_of(held.shift);
+        let hertz = significant(model.units().frequency_of(held.shift), 7);
         let more = held.modes_below.saturating_sub(fixed);
         let proved = match held.proof {
             Proof::NotProved => {
@@ -340,11 +342,11 @@ impl<'a> Parts<'a> {
             }
             Proof::InertiaCount if more == 0 => {
                 format!(
-                    "its {fixed} fixed-interface modes are all there are below {hertz:.6} Hz (inertia count)"
+                    "its {fixed} fixed-interface modes are all there are below {hertz} Hz (inertia count)"
                 )
             }
             Proof::InertiaCount => format!(
-                "of the {} fixed-interface modes below {hertz:.6} Hz (inertia count) it has {fixed}",
+                "of the {} fixed-interface modes below {hertz} Hz (inertia count) it has {fixed}",
                 held.modes_below
             ),
         };

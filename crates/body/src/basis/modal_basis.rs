@@ -8,6 +8,7 @@ use super::{
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::numbers::significant;
 use flexbody_base::provenance::SourceFile;
 use flexbody_eigen::{EigenProblem, EigenSolution, Wanted, energy_noise};
 use flexbody_linalg::context::Context;
@@ -150,8 +151,8 @@ fn no_modes(model: &FeModel, settings: &ModeSettings, solution: &EigenSolution) 
     }
     let message = match (settings.wanted, solution.next_eigenvalue) {
         (Wanted::Below(_), Some(next)) => {
-            let hertz = model.units().frequency_of(next);
-            format!("the first flexible mode has {hertz:.6} Hz, above the given limit")
+            let hertz = significant(model.units().frequency_of(next), 7);
+            format!("the first flexible mode has {hertz} Hz, above the given limit")
         }
         _ => "no flexible mode has a finite frequency".to_owned(),
     };

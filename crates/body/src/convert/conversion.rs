@@ -11,6 +11,7 @@ use crate::invariants::{FrameChoice, Invariants, MassProperties};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::significant;
 use flexbody_eigen::{Plan, Proof, energy_noise};
 use flexbody_linalg::context::{Context, Work};
 use flexbody_linalg::copied;
@@ -253,17 +254,17 @@ fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
     let holds = match holding {
         0 => format!("none is within 1 % of that of the free body{kept}"),
         count => format!(
-            "the lowest {count} (up to {:.6} Hz) are within 1 % of those of the free body{kept}",
-            hertz[count - 1]
+            "the lowest {count} (up to {} Hz) are within 1 % of those of the free body{kept}",
+            significant(hertz[count - 1], 5)
         ),
     };
     let percent = |part: f64| format!("{:.2} %", 100.0 * part);
     let most = fixed.largest_excess(holding, first).map(|most| format!(", {} at most", percent(most)));
     let message = format!(
-        "of the {} frequencies of the Craig-Bampton body {holds}; that of mode {}, {:.6} Hz, is too high by {}{}",
+        "of the {} frequencies of the Craig-Bampton body {holds}; that of mode {}, {} Hz, is too high by {}{}",
         theta.len(),
         holding + 1,
-        hertz[holding],
+        significant(hertz[holding], 5),
         percent(fixed.excess(holding, first)),
         most.unwrap_or_default(),
     );

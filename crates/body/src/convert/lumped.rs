@@ -10,6 +10,7 @@ use crate::invariants::{
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::significant;
 use flexbody_eigen::{Accuracy, EigenSolution, Wanted};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::gram;
@@ -143,7 +144,7 @@ fn caution(
     subspace_cosine: f64,
 ) -> String {
     let count = modal.n_modes();
-    let hertz = |lambda: f64| format!("{:.5} Hz", modal.model.units().frequency_of(lambda));
+    let hertz = |lambda: f64| format!("{} Hz", significant(modal.model.units().frequency_of(lambda), 5));
     let cut = cuts.iter().filter_map(|&(whose, last, next)| {
         let (last, next) = (last?, next?);
         (next - last <= SAME_EIGENVALUE_DIFFERENCE * next).then(|| {

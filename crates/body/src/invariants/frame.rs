@@ -7,6 +7,7 @@ use super::general::rigid_inertia;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::significant;
 use flexbody_linalg::{SymmetricMatrix, contiguous_mut, parallel};
 use nalgebra::{Matrix3, Vector3};
 
@@ -252,7 +253,7 @@ fn frame_of(
     let middle = bounding_box_middle(positions);
     let (m, c, _) = rigid(middle, Vector3::zeros());
     if !(m > 0.0 && m.is_finite()) {
-        let message = format!("the sum of the mass matrix over one direction is {m:e}");
+        let message = format!("the sum of the mass matrix over one direction is {}", significant(m, 6));
         return Err(Diagnostic::new(Code::MassNotPositive, message).into());
     }
     let offset = c / m;

@@ -6,6 +6,7 @@ use super::condense::condense_with;
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::significant;
 use flexbody_linalg::SymmetricMatrix;
 
 /// Masses below this part of the largest mass count as zero: cancelling row sums leave rounding of either
@@ -65,8 +66,10 @@ impl LumpedMasses {
         let total: f64 = Self::row_sum(mass).masses.iter().sum();
         let sum: f64 = diagonal.iter().sum();
         if !(sum > 0.0 && sum.is_finite()) {
-            let message =
-                format!("the diagonal of the mass matrix sums to {sum:e}: it cannot be scaled to the mass");
+            let message = format!(
+                "the diagonal of the mass matrix sums to {}: it cannot be scaled to the mass",
+                significant(sum, 6)
+            );
             return Err(Diagnostic::new(Code::MassNotPositive, message).into());
         }
         let masses = diagonal.iter().map(|d| d * (total / sum)).collect();
@@ -87,7 +90,7 @@ impl LumpedMasses {
         }
         let total: f64 = masses.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
-            return refuse(format!("nodal masses sum to {total:e}"));
+            return refuse(format!("nodal masses sum to {}", significant(total, 6)));
         }
         Ok(Self { scheme: LumpedScheme::User, masses })
     }

@@ -1,15 +1,16 @@
 //! Results in files of meshes: VTK in XML (.vtu) and in the legacy form (.vtk), with the arrays `displacement N` and
-//! `stress N` of each step at the points, collections of such files (.pvd), and Exodus, with variables of the
-//! nodes at every time.
+//! `stress N` of each step at the points, files of pieces (.pvtu), collections of such files (.pvd), and Exodus, with
+//! variables of the nodes at every time.
 
 use super::{Found, Place, Step, StepValues, unreadable};
 use crate::exodus::{NodalVariables, read_nodal_variables};
 use crate::node_files::{
-    self, CollectionMember, PointArray, PointData, collection, legacy_point_arrays, point_arrays,
+    self, CollectionMember, PointArray, PointData, collection, legacy_point_arrays, pieces, point_arrays,
 };
 use crate::reader::HEAD;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::text::InputFile;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Places of the stresses xx, yy, zz, xy, yz, xz in a tensor of nine numbers, row by row.
@@ -20,17 +21,34 @@ pub(super) fn is_vtk(head: &[u8]) -> bool {
     node_files::is_vtk_xml(head) || node_files::is_vtk_legacy(head)
 }
 
-/// Returns the paths of the files of a collection (.pvd); none if the file is no collection or cannot be read.
+/// Returns the paths of the files of a collection (.pvd), of its pieces, or of the pieces of a parallel file (.pvtu); none if
+/// the file is neither or cannot be read.
 pub(super) fn files_of(path: &Path) -> Vec<PathBuf> {
-    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("pvd")) {
+    let ends = |end: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(end));
+    let opened = || InputFile::open(path).ok();
+    if ends("pvtu") {
+        let sources = opened().and_then(|file| pieces(file.bytes()).ok()).flatten();
+        return sources.unwrap_or_default().iter().map(|source| beside(path, source)).collect();
+    }
+    if !ends("pvd") {
         return Vec::new();
     }
-    let members = InputFile::open(path).ok().and_then(|file| collection(file.bytes()).ok()).flatten();
-    members.unwrap_or_default().iter().map(|member| beside(path, member)).collect()
+    let members = opened().and_then(|file| collection(file.bytes()).ok()).flatten().unwrap_or_default();
+    let with_pieces = |member: &CollectionMember| {
+        let own = beside(path, &member.file);
+        // A collection does not list collections.
+        let inner = if own.extension().is_some_and(|end| end.eq_ignore_ascii_case("pvtu")) {
+            files_of(&own)
+        } else {
+            Vec::new()
+        };
+        std::iter::once(own).chain(inner).collect::<Vec<_>>()
+    };
+    members.iter().flat_map(with_pieces).collect()
 }
 
-fn beside(collection: &Path, member: &CollectionMember) -> PathBuf {
-    collection.parent().unwrap_or(Path::new("")).join(&member.file)
+fn beside(listing: &Path, member: &str) -> PathBuf {
+    listing.parent().unwrap_or(Path::new("")).join(member)
 }
 
 /// Reads meshes of VTK: a file with the arrays `displacement N` (3 numbers) and `stress N` (6 numbers xx, yy, zz, xy,
@@ -49,7 +67,7 @@ pub(super) fn read_vtk(file: &InputFile, members: &[&InputFile]) -> Found<StepVa
     if let Some(listed) = listed {
         return read_collection(file, &listed, members);
     }
-    let (ids, arrays) = point_data(file)?;
+    let (ids, arrays) = point_data(file, members)?;
     let of_step = |what: &str, step: usize| arrays.iter().find(|array| step_of(array, what) == Some(step));
     let (mut steps, mut digits) = (Vec::new(), 15);
     for number in 1.. {
@@ -75,14 +93,14 @@ fn read_collection(
 ) -> Found<StepValues> {
     let (mut steps, mut digits) = (Vec::new(), 15);
     for member in listed {
-        let path = beside(file.path(), member);
+        let path = beside(file.path(), &member.file);
         let Some(own) = members.iter().find(|own| own.path() == path) else {
             let message =
                 format!("the collection lists {} and its own name does not end with .pvd", member.file);
             return Err(unreadable(file, message));
         };
         own.load().map_err(|diagnostic| vec![diagnostic])?;
-        let (ids, arrays) = point_data(own)?;
+        let (ids, arrays) = point_data(own, members)?;
         let named = |what: &str| {
             let found = arrays.iter().find(|array| array.name.eq_ignore_ascii_case(what));
             found.ok_or_else(|| unreadable(own, format!("no array at the points is `{what}`")))
@@ -95,9 +113,117 @@ fn read_collection(
     StepValues::of(steps, digits, file)?.with_stresses(file)
 }
 
-/// Returns the numbers of the points of a mesh and the arrays at them.
-fn point_data(file: &InputFile) -> Found<(Vec<i64>, Vec<PointArray>)> {
-    let PointData { ids, arrays } = if node_files::is_vtk_legacy(&file.first_bytes(HEAD)) {
+/// Returns the numbers of the points of a mesh and the arrays at them; of a parallel file those of all pieces.
+fn point_data(file: &InputFile, members: &[&InputFile]) -> Found<(Vec<i64>, Vec<PointArray>)> {
+    let sources = match node_files::is_vtk_xml(&file.first_bytes(HEAD)) {
+        true => pieces(file.bytes()).map_err(|message| unreadable(file, message))?,
+        false => None,
+    };
+    match sources {
+        Some(sources) => data_of_pieces(file, &sources, members),
+        None => data_of_file(file).map(|(ids, arrays, _)| (ids, arrays)),
+    }
+}
+
+/// Largest difference of values that pieces state for one point, relative to the largest value of the array: rounding of
+/// text. A larger value would hide that a program computed nodal values piece by piece.
+const MAX_PIECE_DIFFERENCE: f64 = 1e-5;
+
+/// Returns the points of all pieces, each once: points that the pieces mark as ghosts are left to their owners, and a point of
+/// several pieces must have the same values in them.
+fn data_of_pieces(
+    file: &InputFile,
+    sources: &[String],
+    members: &[&InputFile],
+) -> Found<(Vec<i64>, Vec<PointArray>)> {
+    let mut whole: Option<(Vec<i64>, Vec<PointArray>)> = None;
+    let mut place: HashMap<i64, usize> = HashMap::new();
+    let mut left: HashSet<i64> = HashSet::new();
+    for source in sources {
+        let path = beside(file.path(), source);
+        let Some(own) = members.iter().find(|own| own.path() == path) else {
+            let message =
+                format!("the file lists the piece {source} and its own name does not end with .pvtu");
+            return Err(unreadable(file, message));
+        };
+        own.load().map_err(|diagnostic| vec![diagnostic])?;
+        let (ids, arrays, ghosts) = data_of_file(own)?;
+        let (all, joined) = whole.get_or_insert_with(|| {
+            let empty = |array: &PointArray| PointArray { values: Vec::new(), ..array.clone() };
+            (Vec::new(), arrays.iter().map(empty).collect())
+        });
+        let kinds = |arrays: &[PointArray]| -> Vec<String> {
+            arrays.iter().map(|array| format!("`{}` of {}", array.name, array.components)).collect()
+        };
+        if kinds(&arrays) != kinds(joined) {
+            let message = format!(
+                "piece has the arrays {}, the first piece has {}",
+                kinds(&arrays).join(", "),
+                kinds(joined).join(", ")
+            );
+            return Err(unreadable(own, message));
+        }
+        for (at, id) in ids.iter().enumerate() {
+            if ghosts.get(at).copied().unwrap_or(false) {
+                left.insert(*id);
+                continue;
+            }
+            match place.get(id) {
+                Some(&first) => refuse_difference(own, *id, joined, first, &arrays, at)?,
+                None => {
+                    place.insert(*id, all.len());
+                    all.push(*id);
+                    for (whole, array) in joined.iter_mut().zip(&arrays) {
+                        let n = array.components;
+                        whole.values.extend_from_slice(&array.values[n * at..n * (at + 1)]);
+                        whole.digits = whole.digits.min(array.digits);
+                    }
+                }
+            }
+        }
+    }
+    if let Some(id) = left.iter().filter(|id| !place.contains_key(id)).min() {
+        let message =
+            format!("node {id} is a ghost in every piece that has it: the piece that owns it is missing");
+        return Err(unreadable(file, message));
+    }
+    Ok(whole.unwrap_or_default())
+}
+
+/// Refuses other values of a node than those of an earlier piece.
+fn refuse_difference(
+    file: &InputFile,
+    id: i64,
+    joined: &[PointArray],
+    first: usize,
+    arrays: &[PointArray],
+    at: usize,
+) -> Found<()> {
+    for (whole, array) in joined.iter().zip(arrays) {
+        let n = array.components;
+        let size = array.values.iter().filter(|value| value.is_finite()).fold(0.0f64, |m, v| m.max(v.abs()));
+        for k in 0..n {
+            let (stated, here) = (whole.values[n * first + k], array.values[n * at + k]);
+            let differ =
+                (stated - here).abs() > MAX_PIECE_DIFFERENCE * size || stated.is_nan() != here.is_nan();
+            if differ {
+                let message = format!(
+                    "node {id} has {here} in array `{}`, and {stated} in an earlier piece: values at shared nodes must be those of the whole mesh",
+                    array.name
+                );
+                return Err(unreadable(file, message));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Points, their arrays and their marks as ghosts.
+type FileData = (Vec<i64>, Vec<PointArray>, Vec<bool>);
+
+/// Returns the numbers of the points of one file, the arrays at them and the marks of ghosts.
+fn data_of_file(file: &InputFile) -> Found<FileData> {
+    let PointData { ids, arrays, ghosts } = if node_files::is_vtk_legacy(&file.first_bytes(HEAD)) {
         legacy_point_arrays(file.bytes()).map_err(|(line, message)| {
             unreadable(file, message).into_iter().map(|found| found.at_line(line)).collect::<Vec<_>>()
         })?
@@ -105,7 +231,7 @@ fn point_data(file: &InputFile) -> Found<(Vec<i64>, Vec<PointArray>)> {
         point_arrays(file.bytes()).map_err(|message| unreadable(file, message))?
     };
     match ids {
-        Some(ids) => Ok((ids, arrays)),
+        Some(ids) => Ok((ids, arrays, ghosts)),
         None => Err(unreadable(file, "no array `node` of whole numbers numbers the points")),
     }
 }

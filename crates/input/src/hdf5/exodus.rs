@@ -2,7 +2,7 @@
 
 use super::values::{Found, Heaps, Numbers, Vector, names_of, refuse_beyond_memory, text_of};
 use super::{Members, layout, opened};
-use crate::exodus::{ExodusFile, NumberTable};
+use crate::exodus::{ExodusFile, NumberTable, wrong_layers};
 use flexbody_base::text::InputFile;
 use hdf5_metno::Group;
 
@@ -48,16 +48,21 @@ impl ExodusFile for Datasets<'_> {
         vector.integers(0..vector.len)
     }
 
+    fn stacked(&self, name: &str, layers: usize) -> Found<NumberTable> {
+        let numbers = self.numbers(name)?;
+        let shape = numbers.dataset.shape();
+        match shape.as_slice() {
+            &[times, own, columns] if own == layers => read_rows(&numbers, times * layers, columns),
+            _ => Err(vec![layout(wrong_layers(name, &shape, layers))]),
+        }
+    }
+
     fn table(&self, name: &str) -> Found<NumberTable> {
         let numbers = self.numbers(name)?;
         let &[rows, columns] = numbers.dataset.shape().as_slice() else {
             return Err(vec![layout(format!("dataset {} is not a table of numbers", numbers.name))]);
         };
-        refuse_beyond_memory(numbers.dataset.size(), &numbers.name)?;
-        let values = numbers.dataset.read_raw::<f64>();
-        let failed = |e| vec![layout(format!("dataset {} cannot be read: {e}", numbers.name))];
-        let values = values.map_err(failed)?;
-        Ok(NumberTable { rows, columns, values, is_single_precision: numbers.is_single_precision() })
+        read_rows(&numbers, rows, columns)
     }
 
     fn names(&self, name: &str) -> Found<Vec<String>> {
@@ -68,4 +73,13 @@ impl ExodusFile for Datasets<'_> {
         let kind = self.numbers(name).ok().and_then(|numbers| numbers.dataset.attr("elem_type").ok());
         kind.and_then(|kind| text_of(&kind, &self.heaps)).unwrap_or_default()
     }
+}
+
+/// Returns the values of a dataset as a table.
+fn read_rows(numbers: &Numbers, rows: usize, columns: usize) -> Found<NumberTable> {
+    refuse_beyond_memory(numbers.dataset.size(), &numbers.name)?;
+    let values = numbers.dataset.read_raw::<f64>();
+    let failed = |e| vec![layout(format!("dataset {} cannot be read: {e}", numbers.name))];
+    let values = values.map_err(failed)?;
+    Ok(NumberTable { rows, columns, values, is_single_precision: numbers.is_single_precision() })
 }

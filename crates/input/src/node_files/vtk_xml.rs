@@ -35,6 +35,7 @@ fn points_and_sets(bytes: &[u8]) -> Unpacked<NodeFile> {
 }
 
 /// Array of numbers at the points of a mesh.
+#[derive(Clone)]
 pub(crate) struct PointArray {
     pub name: String,
     /// Number of values for each point.
@@ -51,6 +52,8 @@ pub(crate) struct PointData {
     pub ids: Option<Vec<i64>>,
     /// Arrays of real numbers.
     pub arrays: Vec<PointArray>,
+    /// True for each point that another piece owns (`vtkGhostType` or `vtkGhostLevels`); empty without ghosts.
+    pub ghosts: Vec<bool>,
 }
 
 /// Significant decimal digits that an array in text is assumed to have.
@@ -83,7 +86,30 @@ pub(crate) fn point_arrays(bytes: &[u8]) -> Unpacked<PointData> {
         };
         arrays.push(PointArray { name, components: components as usize, values, digits });
     }
-    Ok(PointData { ids, arrays })
+    let is_ghost = |array: &&Element<'_>| {
+        array.attribute("Name").is_some_and(|name| ["vtkGhostType", "vtkGhostLevels"].contains(&name))
+    };
+    let levels = mesh.lists().find(is_ghost).map(|array| mesh.list(array)).transpose()?;
+    let ghosts = levels.map_or(Vec::new(), |levels| levels.iter().map(|level| *level != 0.0).collect());
+    Ok(PointData { ids, arrays, ghosts })
+}
+
+/// Returns the files of the pieces of a parallel file (.pvtu), in their order; `None` for another file.
+///
+/// # Errors
+/// A clause about a piece without a file, or a file without pieces.
+pub(crate) fn pieces(bytes: &[u8]) -> Unpacked<Option<Vec<String>>> {
+    let elements = elements(bytes, "AppendedData")?;
+    if elements.first().and_then(|head| head.attribute("type")) != Some("PUnstructuredGrid") {
+        return Ok(None);
+    }
+    let pieces = elements.iter().filter(|element| element.name == "Piece");
+    let source = |(at, piece): (usize, &Element<'_>)| {
+        let source = piece.attribute("Source").filter(|source| !source.is_empty());
+        source.map(str::to_owned).ok_or_else(|| format!("piece {} names no file (`Source`)", at + 1))
+    };
+    let found = pieces.enumerate().map(source).collect::<Unpacked<Vec<String>>>()?;
+    if found.is_empty() { Err("file has no pieces".to_owned()) } else { Ok(Some(found)) }
 }
 
 /// File of a collection.

@@ -1,6 +1,7 @@
 //! Systems of differential equations, and reasons for an integration to end early.
 
 use super::StageMode;
+use flexbody_base::numbers::significant;
 
 /// System of ordinary differential equations y' = f(t, y).
 pub trait System {
@@ -112,15 +113,19 @@ impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Rates { reason } => f.write_str(reason),
-            Self::NotFinite { time } => write!(f, "the state is no longer finite after t = {time:e}"),
+            Self::NotFinite { time } => {
+                write!(f, "the state is no longer finite after t = {}", significant(*time, 6))
+            }
             Self::StepTooSmall { time } => {
                 write!(
                     f,
-                    "the step that meets the tolerance at t = {time:e} is too small for the resolution of time"
+                    "the step that meets the tolerance at t = {} is too small for the resolution of time",
+                    significant(*time, 6)
                 )
             }
             Self::NotConverged { time, step } => {
-                write!(f, "the equations of the implicit step of {step:e} from t = {time:e} did not converge")
+                let [step, time] = [*step, *time].map(|value| significant(value, 6));
+                write!(f, "the equations of the implicit step of {step} from t = {time} did not converge")
             }
         }
     }

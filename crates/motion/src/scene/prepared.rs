@@ -10,6 +10,7 @@ use crate::dynamics::{
 use crate::integration::{Explicit, Failure, Gauss, Method, ObserverEvent, System, Work, integrate_closely};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_model::FeModel;
 use nalgebra::Vector3;
@@ -211,8 +212,9 @@ fn stopped(scene: &Scene, method: &Method, stop: Stop) -> Error {
     match stop {
         Stop::Memory { time } => {
             let message = format!(
-                "the recorded motion of `{}` exceeds the memory after {steps} steps, at t = {time:e}",
-                scene.name
+                "the recorded motion of `{}` exceeds the memory after {steps} steps, at t = {}",
+                scene.name,
+                significant(time, 6)
             );
             Diagnostic::new(Code::MemoryShort, message)
                 .with_help("simulate a shorter `duration` or fewer modes")
@@ -220,8 +222,9 @@ fn stopped(scene: &Scene, method: &Method, stop: Stop) -> Error {
         }
         Stop::Steps { time } => {
             let message = format!(
-                "the run of `{}` reached only t = {time:e} within the {steps} steps that are allowed",
-                scene.name
+                "the run of `{}` reached only t = {} within the {steps} steps that are allowed",
+                scene.name,
+                significant(time, 6)
             );
             Diagnostic::new(Code::RunTooLong, message).into()
         }
@@ -280,8 +283,10 @@ impl Effort {
     fn plan(body: &FlexBody, scene: &Scene, duration: f64) -> Result<(Scheme, Self)> {
         let fastest_mode = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt() / TAU;
         let fastest_load = fastest_history(scene, duration);
-        let load_in_words = format!("a load or spin oscillates {fastest_load:.3e} times per unit of time");
-        let mode_in_words = format!("the fastest mode oscillates {fastest_mode:.3e} times per unit of time");
+        let load_in_words =
+            format!("a load or spin oscillates {} times per unit of time", significant(fastest_load, 4));
+        let mode_in_words =
+            format!("the fastest mode oscillates {} times per unit of time", significant(fastest_mode, 4));
         match scene.run.scheme {
             Scheme::Adaptive { .. } => {
                 let for_modes = duration * fastest_mode * TAU / STABLE;
@@ -296,12 +301,14 @@ impl Effort {
             Scheme::Conserving { order, step: Some(step) } => {
                 let step = step.min(duration);
                 if step * fastest_load * STEPS_PER_OSCILLATION > 1.0 {
-                    let message = format!("{load_in_words}: steps of {step:e} cannot resolve it");
+                    let message =
+                        format!("{load_in_words}: steps of {} cannot resolve it", significant(step, 6));
                     let longest = 1.0 / (STEPS_PER_PERIOD * fastest_load);
-                    let help = format!("give a `step` of {longest:.3e} or less, or omit `step`");
+                    let help =
+                        format!("give a `step` of {} or less, or omit `step`", significant(longest, 3));
                     return Err(Diagnostic::new(Code::StepPassesOver, message).with_help(help).into());
                 }
-                let because = format!("steps of {step:e}");
+                let because = format!("steps of {}", significant(step, 6));
                 Ok((Scheme::Conserving { order, step: Some(step) }, Self { steps: duration / step, because }))
             }
             Scheme::Conserving { order, step: None } => {

@@ -219,7 +219,7 @@ fn sorted(found: Vec<Found>) -> Unpacked<PointData> {
     let ids = lists().find(|found| found.is_ids).or_else(|| lists().find(|found| found.array.name == "node"));
     let ids = ids.map(|found| exact_ids(&found.array.name, &found.array.values)).transpose()?;
     let arrays = found.into_iter().filter(|found| !is_list(found)).map(|found| found.array).collect();
-    Ok(PointData { ids, arrays })
+    Ok(PointData { ids, arrays, ghosts: Vec::new() })
 }
 
 #[cfg(test)]
