@@ -249,7 +249,8 @@ impl FlexBody {
         history.refuse_foreign(self)?;
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
         let motion = history.0.recover(&self.0, &names)?;
-        let diagnostics = history.0.left_out(&self.0, &names).into_iter().collect();
+        let mut diagnostics = Vec::from_iter(history.0.left_out(&self.0, &names));
+        diagnostics.extend(scene::stresses_at_rigid_interfaces(&self.0, &motion));
         Ok(Recovered { motion, source: RowSource::History(history.clone()), diagnostics })
     }
 
@@ -323,7 +324,8 @@ impl Channels {
 }
 
 impl Recovered {
-    /// Returns warnings: forces of motion that the rows leave out, since the history does not have what they depend on.
+    /// Returns warnings and notes of a history: forces of motion that the rows leave out, since the history does not have what
+    /// they depend on, and largest stresses at rigid interfaces. Those of a simulation are with its motion.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
     }

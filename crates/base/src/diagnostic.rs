@@ -228,7 +228,7 @@ codes! {
     GeometricStiffnessPartial = "FB531", Note, Done, "geometric stiffness is given for some directions of a load only", "nothing to do if the load does not act in the other directions";
     SimulationStopped = "FB540", Error, Untrustworthy, "simulation stopped", "check spin, loads and dropped terms: the motion leaves the range of the model";
     LinearRangeLeft = "FB541", Warning, Done, "deflections beyond the range of linear elasticity", "trust the result as a trend only; a body of several flexible parts carries larger deflections";
-    SpinSoftens = "FB542", Warning, Done, "body without geometric stiffness is too soft at this spin", "convert the model with [[geometric_stiffness]] for spin";
+    SpinSoftens = "FB542", Warning, Done, "body without geometric stiffness is too soft at this spin", "convert the model with [[geometric_stiffness]] for spin, and do not switch it off in [run]";
     PhaseDrifts = "FB543", Warning, Done, "errors grow with time although amplitudes are bounded", "check a run of the longest duration that the model is meant for: phases drift apart with angular velocity times duration";
     ResonanceDropped = "FB544", Warning, Done, "dropped mode is near the frequency of a load", "keep the mode, or lengthen the run until the resonance would show";
     LoadIdle = "FB545", Warning, Done, "load has no effect", "let an interface carry the body to see gravity and inertia bend it: [carried] in docs/reference/scenes.md";

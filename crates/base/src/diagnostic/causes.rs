@@ -185,6 +185,8 @@ causes! {
     RecoveryUnjudged = "A recovery of answered shapes knows the stresses of these shapes only, not of what was truncated.";
     VariationFails = "The body was selected for the scene as it is, and a variation of it excites what was dropped.";
     PreloadReleased = "The run starts undeformed, so the preload acts as a sudden load.";
+    RecoveryMotionUnknown = "Rows with static columns of damping forces or of the inertia of the deformation depend on rates of the motion, which a run may not have; the rows are then those of modes, loads and spin.";
+    StressAtInterface = "A rigid interface does not deform, so that stresses concentrate at its edge: their size depends on the coupling and the mesh, not on the part.";
     InertiaIndefinite = "W3 has a first-order term whose second-order partner W2 is missing; for large deflections the mass matrix is then no longer positive.";
     CouplingEffect = "A rigid interface stiffens the body, and the reference has the same interface, so no comparison shows the effect.";
     // FB6xx: resources
