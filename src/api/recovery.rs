@@ -213,7 +213,7 @@ pub struct Recovered {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum RowSource {
     /// Run of any program.
-    History(LoadedHistory),
+    History(Box<LoadedHistory>),
     /// Simulation of the scene with this name.
     Scene(String),
 }
@@ -251,7 +251,7 @@ impl FlexBody {
         let motion = history.0.recover(&self.0, &names)?;
         let mut diagnostics = Vec::from_iter(history.0.left_out(&self.0, &names));
         diagnostics.extend(scene::stresses_at_rigid_interfaces(&self.0, &motion));
-        Ok(Recovered { motion, source: RowSource::History(history.clone()), diagnostics })
+        Ok(Recovered { motion, source: RowSource::History(Box::new(history.clone())), diagnostics })
     }
 
     /// Returns the factor of each FE step over a history, like `flexbody recover --channels`, for a program that

@@ -43,7 +43,7 @@ class Case:
         positions = np.genfromtxt(model / "nodes.csv", delimiter=",", skip_header=1)[:, 1:4]
         low, high = positions.min(axis=0) - 1, positions.max(axis=0) + 1
         high[0] = positions[:, 0].mean()
-        text += f'\n[[recovery]]\nname = "section"\nbox = {{ min = {low.tolist()}, max = {high.tolist()} }}\n{damping}'
+        text += f'\n[[recovery]]\nname = "section"\nbox = {{ min = {low.tolist()}, max = {high.tolist()} }}\ndeformed_inertia = true\n{damping}'
         (self.folder / "model.toml").write_text(text)
         self.body = self.folder / "b.flex.h5"
         run(flexbody, "convert", self.folder / "model.toml", "--lumped", "none", "--quiet", "-o", self.body, *options)

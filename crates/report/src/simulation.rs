@@ -471,10 +471,9 @@ fn line_chart(title: &str, time: &[f64], time_unit: &str, lines: Vec<Line>, unit
     Some(Chart { title: title.to_owned(), x, panels: vec![panel] })
 }
 
-/// Returns a recording as comma-separated values with one row per output time; numbers round-trip.
-pub fn simulation_csv(recording: &Recording) -> String {
-    let Recording { time, states, balances, paths, reactions, conditions, recovered, accelerations, .. } =
-        recording;
+/// Returns the names of the columns of [`simulation_csv`].
+fn csv_columns(recording: &Recording) -> Vec<String> {
+    let Recording { states, paths, reactions, conditions, recovered, accelerations, .. } = recording;
     let loads = recovered.as_ref().map(|recovered| &recovered.states);
     let nf = states.first().map_or(0, |state| state.q.len());
     let mut head = vec!["time".to_owned()];
@@ -507,8 +506,16 @@ pub fn simulation_csv(recording: &Recording) -> String {
         head.extend(xyz("angular_acceleration"));
         head.extend((1..=nf).map(|j| format!("qdd_{j}")));
     }
+    head
+}
+
+/// Returns a recording as comma-separated values with one row per output time; numbers round-trip.
+pub fn simulation_csv(recording: &Recording) -> String {
+    let Recording { time, states, balances, paths, reactions, conditions, recovered, accelerations, .. } =
+        recording;
+    let loads = recovered.as_ref().map(|recovered| &recovered.states);
     let mut table = String::new();
-    csv::push_row(&mut table, head.iter().map(|cell| csv::text(cell)));
+    csv::push_row(&mut table, csv_columns(recording).iter().map(|cell| csv::text(cell)));
     for (i, (time, (state, balance))) in time.iter().zip(states.iter().zip(balances)).enumerate() {
         let mut row = vec![*time];
         row.extend(&state.origin);

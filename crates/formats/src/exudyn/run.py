@@ -169,6 +169,7 @@ def add_sensors(mbs, body, joints, kinds):
     sensors = {
         "origin": of_node(rigid, what.Position), "turn": of_node(rigid, what.RotationMatrix),
         "velocity": of_node(rigid, what.Velocity), "omega": of_node(rigid, what.AngularVelocityLocal),
+        "alpha": of_node(rigid, what.AngularAccelerationLocal), "qdd": of_node(modal, what.Coordinates_tt),
         "q": of_node(modal, what.Coordinates), "qd": of_node(modal, what.Coordinates_t), "loads": {},
         "bushings": [name for name, kind in kinds.items() if kind == "bushing"]}
     for name, joint in joints.items():
@@ -195,8 +196,9 @@ def table_of(mbs, sensors):
     attitude = np.array([np.ravel(RotationMatrix2EulerParameters(turn @ axes.T)) for turn in turns])
     parts = [
         (["time"], time), (xyz("origin"), stored(sensors["origin"])), ([f"attitude_{k}" for k in range(4)], attitude),
-        (xyz("velocity"), stored(sensors["velocity"])), (xyz("angular_velocity"), stored(sensors["omega"]) @ axes.T)]
-    for name in ("q", "qd"):
+        (xyz("velocity"), stored(sensors["velocity"])), (xyz("angular_velocity"), stored(sensors["omega"]) @ axes.T),
+        (xyz("angular_acceleration"), stored(sensors["alpha"]) @ axes.T)]
+    for name in ("q", "qd", "qdd"):
         values = stored(sensors[name])
         parts.append(([f"{name}_{j + 1}" for j in range(values.shape[1])], values))
     for name, found in sensors["loads"].items():

@@ -6,7 +6,6 @@ use flexbody_base::diagnostic::Code;
 use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
-use toml::de::DeValue;
 
 pub(super) const NAMED_LOAD: &[&str] = &["name", "vector", "preload"];
 
@@ -35,14 +34,7 @@ impl ManifestWalk<'_, '_> {
             }
         }
         let (name, vector) = (self.string(table, "name"), self.string(table, "vector"));
-        let preload = match table.get("preload").map(|value| (value, value.get_ref())) {
-            None => false,
-            Some((_, DeValue::Boolean(preload))) => *preload,
-            Some((value, _)) => {
-                self.mistyped("preload", value, "true or false");
-                return None;
-            }
-        };
+        let preload = self.switch(table, "preload")?;
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let vector = MatrixLocation::parse(vector?).relative_to(folder);
         Some(NamedLoadSource { name: name?, vector, preload })

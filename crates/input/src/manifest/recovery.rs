@@ -74,10 +74,7 @@ impl ManifestWalk<'_, '_> {
         }
         let folder = self.path.parent().unwrap_or(Path::new("")).to_path_buf();
         let operator = if key == "operator" {
-            if !table.contains_key("rows") {
-                let message = format!("key `rows` is missing in recovery `{name}`");
-                self.complain(Code::ManifestSyntax, span, message);
-            }
+            self.require_rows(table, span, &name);
             let operator = MatrixLocation::parse(self.string(table, "operator")?).relative_to(&folder);
             let rows = folder.join(self.string(table, "rows")?);
             let offset = match table.contains_key("offset") {
@@ -113,14 +110,26 @@ impl ManifestWalk<'_, '_> {
             };
             OperatorSource::Cut { nodes, about }
         };
-        let deformed_inertia = match table.get("deformed_inertia").map(|value| (value, value.get_ref())) {
-            None => false,
-            Some((_, DeValue::Boolean(given))) => *given,
+        Some(RecoverySource { name, operator, deformed_inertia: self.switch(table, "deformed_inertia")? })
+    }
+
+    /// Complains about an operator without the table of its rows.
+    fn require_rows(&mut self, table: &TomlTable, span: Range<usize>, name: &str) {
+        if !table.contains_key("rows") {
+            let message = format!("key `rows` is missing in recovery `{name}`");
+            self.complain(Code::ManifestSyntax, span, message);
+        }
+    }
+
+    /// Returns a key that is true or false; false if it is absent.
+    pub(super) fn switch(&mut self, table: &TomlTable, key: &str) -> Option<bool> {
+        match table.get(key).map(|value| (value, value.get_ref())) {
+            None => Some(false),
+            Some((_, DeValue::Boolean(given))) => Some(*given),
             Some((value, _)) => {
-                self.mistyped("deformed_inertia", value, "true or false");
-                return None;
+                self.mistyped(key, value, "true or false");
+                None
             }
-        };
-        Some(RecoverySource { name, operator, deformed_inertia })
+        }
     }
 }

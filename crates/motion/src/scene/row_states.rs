@@ -405,7 +405,7 @@ impl RowMap {
     pub fn depends_on_spin(&self, layout: &RowLayout) -> bool {
         let of_motion = [MotionLoad::Turning, MotionLoad::Centrifugal];
         let of_motion = of_motion.iter().filter_map(|load| layout.amplitudes(*load));
-        let mut places = of_motion.chain([layout.spin()..layout.first_motion()]);
+        let mut places = of_motion.chain(std::iter::once(layout.spin()..layout.first_motion()));
         places.any(|places| self.matrix.as_ref().subcols(places.start, places.len()).norm_max() > 0.0)
     }
 }
