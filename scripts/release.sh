@@ -149,7 +149,9 @@ for shell in bash zsh fish; do
     "$static" completions "$shell" >"$work/$name/completions/flexbody.$shell"
 done
 "$static" man >"$work/$name/man/flexbody.1"
-for command in convert prepare assemble batch inspect check compare select simulate trade advise measure recover shapes reduce response view export recipe audit doctor completions man; do
+commands="$("$static" --help | sed -n '/^Commands:/,/^Options:/s/^  \([a-z]\{1,\}\) .*/\1/p' | grep -v '^help$')"
+[ "$(wc -w <<<"$commands")" -gt 20 ] || fail "the help of the program lists only: $commands" "look at how scripts/release.sh reads it"
+for command in $commands; do
     "$static" man "$command" >"$work/$name/man/flexbody-$command.1"
 done
 # Equal files give an equal archive.
