@@ -3,7 +3,7 @@
 
 use crate::basis::FREE_MODE;
 use crate::convert::interfaces_in_frame;
-use crate::flex_body::{FixedInterface, FlexBody, Interface, InterfaceCoordinates, LumpedBody};
+use crate::flex_body::{FixedInterface, FlexBody, Interface, LumpedBody};
 use crate::invariants::{IdentityCheck, error_norms};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -50,33 +50,25 @@ fn counted_modes(body: &FlexBody) -> Option<IdentityCheck> {
     Some(IdentityCheck::new("counted_modes", formula, value, 0.0))
 }
 
-/// Compares the statements of a Craig-Bampton body about its basis with its interface coordinates.
+/// Compares the statements of a Craig-Bampton body about its basis with its interface coordinates or, without
+/// these, with the eigenvalues of its fixed-interface modes.
 fn fixed_interface_modes(body: &FlexBody) -> Option<IdentityCheck> {
     let fixed = body.certificate().fixed_interface.as_ref()?;
-    let coordinates = body.coordinates()?;
     let FixedInterface { modes, interface_motions, counted, shift, next, .. } = fixed;
-    let lambda = fixed_eigenvalues(coordinates);
+    let lambda = body.fixed_interface_eigenvalues()?;
+    let all = modes.saturating_add(*interface_motions);
+    // Without interface coordinates the modes of the body must fit into the span of the basis.
+    let missing = match body.coordinates() {
+        Some(coordinates) => apart(coordinates.names.len(), all),
+        None => (body.n_modes() + rigid_count(body.dimension())).saturating_sub(all) as f64,
+    };
     let below = lambda.iter().filter(|lambda| **lambda < *shift).count();
     let count = counted.map_or(0.0, |counted| apart(below, counted.min(*modes)));
     let order =
         next.is_some_and(|next| lambda.iter().any(|lambda| *lambda > next * (1.0 + MAX_RIGID_ROUNDING)));
-    let value = apart(lambda.len(), *modes)
-        + apart(coordinates.names.len(), modes.saturating_add(*interface_motions))
-        + count
-        + f64::from(order);
+    let value = apart(lambda.len(), *modes) + missing + count + f64::from(order);
     let formula = "coordinates = interface motions + fixed-interface modes; those below sigma are counted";
     Some(IdentityCheck::new("fixed_interface_modes", formula, value, 0.0))
-}
-
-/// True if the coordinate of this name is the amplitude of a fixed-interface mode.
-fn is_amplitude(name: &str) -> bool {
-    name.starts_with("fixed-interface mode ")
-}
-
-/// Returns the eigenvalues of the fixed-interface modes, K_jj / M_jj.
-fn fixed_eigenvalues(coordinates: &InterfaceCoordinates) -> Vec<f64> {
-    let amplitudes = coordinates.names.iter().enumerate().filter(|(_, name)| is_amplitude(name));
-    amplitudes.map(|(j, _)| coordinates.stiffness[(j, j)] / coordinates.mass[(j, j)]).collect()
 }
 
 /// Measures the deformation of interfaces that the basis couples rigidly. Free modes do not consider

@@ -42,7 +42,9 @@ psi = h5read('body.flex.h5', '/modes/shape', [1 1 1], [3 Inf 1])';  % first mode
 const RULES: &str = "\
 A reader refuses a newer `format_major` and names the `generator`; a newer `format_minor` only adds entries, which older
 readers ignore. A body without some groups of the kinetic energy (`/terms`, since 1.3) has no datasets for them, which readers up to 1.2 require: these
-readers reject the file and name the datasets. Names that are data (lumping schemes, interfaces, loads) are percent-encoded where they hold `/`, `%`, control
+readers reject the file and name the datasets. A Craig-Bampton body whose frame is on an interface has no
+`/modes/free_eigenvalue` and `/modes/free_eigenvalue_lower`, which readers up to 1.10 require of a body with `/certificate@fixed_interface_modes`: its file
+states version 1.11, and these readers reject it and name the datasets. Names that are data (lumping schemes, interfaces, loads) are percent-encoded where they hold `/`, `%`, control
 characters or a leading dot, and keep their order by HDF5 creation order. Nothing in the file depends on the clock, on the
 number of threads or on its path: equal bodies are equal bytes.
 ";
@@ -181,6 +183,7 @@ fn symbol(extent: Extent) -> String {
         Extent::RecoveryRows => "r".to_owned(),
         Extent::LoadedInterfaces => "ni".to_owned(),
         Extent::NamedLoads => "nl".to_owned(),
+        Extent::FixedInterfaceModes => "ny".to_owned(),
     }
 }
 

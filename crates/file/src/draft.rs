@@ -7,10 +7,10 @@ use super::value::ReadValue;
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
-    Certificate, FixedInterface, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
-    InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, NamedLoad, Parts, Recovery,
-    ReferenceConditions, RotatedStiffness, Source, Storage, SurfaceMesh, TermDecision, TermGroup, TermGroups,
-    UnitLoad,
+    Certificate, FixedInterface, Frame, FreeEstimate, GeometricStiffness, Guarantee, Interface,
+    InterfaceCoordinates, InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes, NamedLoad,
+    Parts, Recovery, ReferenceConditions, RotatedStiffness, Source, Storage, SurfaceMesh, TermDecision,
+    TermGroup, TermGroups, UnitLoad,
 };
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass,
@@ -153,9 +153,13 @@ impl Draft {
             shift: 0.0,
             next: None,
             residual: 0.0,
-            free_estimate: Vec::new(),
-            free_lower: Vec::new(),
+            eigenvalues: Vec::new(),
+            free: None,
         })
+    }
+
+    pub(super) fn free_estimate(&mut self) -> &mut FreeEstimate {
+        self.fixed_interface().free.get_or_insert_default()
     }
 
     pub(super) fn coordinates(&mut self) -> &mut InterfaceCoordinates {

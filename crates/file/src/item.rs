@@ -34,10 +34,12 @@ pub(super) enum Extent {
     LoadedInterfaces,
     /// Number nl of named loads in the group's recovery.
     NamedLoads,
+    /// Number ny of fixed-interface modes of a Craig-Bampton basis.
+    FixedInterfaceModes,
 }
 use Extent::{
-    Coordinates, Edges, Fixed, InterfaceNodes, InternalRows, LoadedInterfaces, Modes, NamedLoads, Nodes,
-    RecoveryRows, SixModes, ThreeModes, Triangles,
+    Coordinates, Edges, Fixed, FixedInterfaceModes, InterfaceNodes, InternalRows, LoadedInterfaces, Modes,
+    NamedLoads, Nodes, RecoveryRows, SixModes, ThreeModes, Triangles,
 };
 
 /// Storage of an entry in the file.
@@ -294,6 +296,7 @@ impl Item {
             RecoveryRows => view.recovery.map_or(0, |one| one.rows.len()),
             LoadedInterfaces => view.recovery.map_or(0, |one| one.loads.len()),
             NamedLoads => view.recovery.map_or(0, |one| one.named.ncols()),
+            FixedInterfaceModes => view.fixed_interface().map_or(0, |fixed| fixed.eigenvalues.len()),
             InternalRows => view.body.modes.internal.as_ref().map_or(0, |internal| internal.dofs.len()),
         };
         self.shape().unwrap_or(&[]).iter().map(size).collect()

@@ -398,6 +398,7 @@ pub(super) struct Sizes {
     pub recovery_rows: Option<usize>,
     pub named_loads: Option<usize>,
     pub loaded_interfaces: Option<usize>,
+    fixed_interface_modes: Option<usize>,
 }
 
 /// Reads a dataset of the stated shape, with its extents. Returns `None` if there is no such dataset.
@@ -441,6 +442,7 @@ impl Sizes {
             Extent::RecoveryRows => size == *self.recovery_rows.get_or_insert(size),
             Extent::LoadedInterfaces => size == *self.loaded_interfaces.get_or_insert(size),
             Extent::NamedLoads => size == *self.named_loads.get_or_insert(size),
+            Extent::FixedInterfaceModes => size == *self.fixed_interface_modes.get_or_insert(size),
         }
     }
 
@@ -460,6 +462,7 @@ impl Sizes {
             Extent::RecoveryRows => self.recovery_rows,
             Extent::LoadedInterfaces => self.loaded_interfaces,
             Extent::NamedLoads => self.named_loads,
+            Extent::FixedInterfaceModes => self.fixed_interface_modes,
         };
         known.unwrap_or(0)
     }
@@ -483,6 +486,7 @@ impl Sizes {
             Extent::RecoveryRows => known("r", self.recovery_rows),
             Extent::LoadedInterfaces => known("ni", self.loaded_interfaces),
             Extent::NamedLoads => known("nl", self.named_loads),
+            Extent::FixedInterfaceModes => known("ny", self.fixed_interface_modes),
         }
     }
 }

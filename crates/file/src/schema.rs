@@ -13,7 +13,7 @@ use super::item::ItemKind::{self, Floats, Indices, Int, Ints, Text};
 use super::item::Origin::{self, ConstantInt, ConstantText, Primary};
 use super::item::{Access, EntrySet, Item, Per, SchemaGroup, both, field, put, written};
 use super::value::{Stored, Units, Value, indices, json_list, shape_rows, text};
-use certificate::{CERTIFICATE, CERTIFIED, CRAIG_BAMPTON, INVARIANT_DIGITS, TERMS};
+use certificate::{CERTIFICATE, CERTIFIED, FREE_EIGENVALUE, FREE_EIGENVALUE_LOWER, INVARIANT_DIGITS, TERMS};
 use flexbody_base::provenance;
 use flexbody_body::flex_body::{MassStructure, Parts, ReferenceConditions, Storage};
 use flexbody_model::NodeMoments;
@@ -134,8 +134,12 @@ const ROOT: &[Item] = &[
         "additions within the major version; a reader ignores what it does not know",
         written(|v| {
             let Parts { conditions, inertia_stiffness, mesh, recoveries, named_loads, .. } = v.body;
+            let fixed = &v.body.certificate.fixed_interface;
             Some(Value::Int(match (conditions.is_mean(), inertia_stiffness, mesh) {
                 _ if recoveries.iter().any(|one| !one.motion.is_empty()) => MINOR,
+                // Readers of earlier versions require the estimates of every Craig-Bampton body.
+                _ if fixed.as_ref().is_some_and(|fixed| fixed.free.is_none()) => MINOR,
+                _ if fixed.as_ref().is_some_and(|fixed| !fixed.eigenvalues.is_empty()) => MINOR,
                 _ if !v.body.rotated_stiffness.is_empty() => WITHOUT_MOTION_COLUMNS,
                 _ if !named_loads.is_empty() => WITHOUT_ROTATED_STIFFNESS,
                 _ if !recoveries.is_empty() => WITHOUT_NAMED_LOADS,
@@ -514,26 +518,8 @@ const MODES: &[Item] = &[
     )
     .with(&CERTIFIED)
     .added(1),
-    dataset(
-        "free_eigenvalue",
-        Floats(&[Modes]),
-        PER_TIME2,
-        "lambda~",
-        "eigenvalues of the free body as estimated, upper bounds of them; Craig-Bampton bodies only, whose own are larger",
-        field!(fixed_interface: free_estimate),
-    )
-    .with(&CRAIG_BAMPTON)
-    .added(4),
-    dataset(
-        "free_eigenvalue_lower",
-        Floats(&[Modes]),
-        PER_TIME2,
-        "lambda~-",
-        "lower bounds of the eigenvalues of the free body, to rounding; 0: none; Craig-Bampton bodies only",
-        field!(fixed_interface: free_lower),
-    )
-    .with(&CRAIG_BAMPTON)
-    .added(4),
+    FREE_EIGENVALUE,
+    FREE_EIGENVALUE_LOWER,
     dataset(
         "shape",
         Floats(&[Modes, Nodes, Fixed(3)]),

@@ -5,7 +5,7 @@ use faer::Mat;
 use flexbody_base::provenance::{SourceFile, sha256_hex};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
-    Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
+    Certificate, FixedInterface, FlexBody, Frame, FreeEstimate, GeometricStiffness, Guarantee, Interface,
     InterfaceCoordinates, InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, Modes,
     MotionColumns, MotionLoad, NamedLoad, Parts, Quantity, Recovery, RecoveryRow, ReferenceConditions,
     RotatedStiffness, Source, Storage, SurfaceMesh, Truncation, UnitLoad,
@@ -310,8 +310,15 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
                 shift: 2.5,
                 next: Some(3.5),
                 residual: 1e-12,
-                free_estimate: bounded.iter().map(|lambda| 0.75 * lambda).collect(),
-                free_lower: bounded.iter().map(|lambda| 0.5 * lambda).collect(),
+                // With and without a list of eigenvalues, with and without estimates of the free body.
+                eigenvalues: (1..=nf)
+                    .filter(|_| nf % 4 == 3 || nf % 8 == 5)
+                    .map(|j| 0.5 * j as f64)
+                    .collect(),
+                free: (nf % 4 == 3 || nf == 1).then(|| FreeEstimate {
+                    estimate: bounded.iter().map(|lambda| 0.75 * lambda).collect(),
+                    lower: bounded.iter().map(|lambda| 0.5 * lambda).collect(),
+                }),
             }),
         },
         interfaces: (0..interfaces)

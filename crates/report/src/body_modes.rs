@@ -82,7 +82,10 @@ fn in_short(facts: &Facts<'_>) -> Vec<Term> {
 /// Returns the table of the modes.
 fn frequencies(facts: &Facts<'_>) -> Table {
     let modes = &facts.modes;
-    let caption = match modes.craig_bampton {
+    let caption = match &modes.craig_bampton {
+        Some(own) if own.free.is_none() => {
+            "Modes of the reduced body, held at the interface of the frame, ascending"
+        }
         Some(_) => "Modes of the reduced body, ascending, with the estimated frequencies of the free body",
         None => "Flexible modes, ascending",
     };
@@ -91,7 +94,9 @@ fn frequencies(facts: &Facts<'_>) -> Table {
     let has_origins = !modes.origins().is_empty();
     let mut heads: Vec<Inline> = vec!["Mode".into(), "Frequency (Hz)".into()];
     heads.push(quantity(format!("Eigenvalue (1/{}^2)", facts.model.units.time)));
-    match modes.craig_bampton {
+    match &modes.craig_bampton {
+        // The modes are no eigenvectors of the FE model, of which a residual would tell.
+        Some(own) if own.free.is_none() => {}
         Some(_) => heads.extend(["Free body (Hz)", "Too high by about", "At most"].map(Inline::from)),
         None => heads.push(word_as("residual", "Residual").into()),
     }
@@ -120,12 +125,13 @@ fn frequencies(facts: &Facts<'_>) -> Table {
 /// Returns the cells of the residual of a mode or, for a Craig-Bampton body, of its frequency error relative
 /// to the free body.
 fn accuracy_of_mode(modes: &ModeFacts, j: usize) -> Vec<Inline> {
-    match &modes.craig_bampton {
-        Some(own) => cells([
-            significant(own.free_hz[j], 8),
-            percent(own.too_high[j]),
-            own.too_high_at_most[j].map_or_else(|| "no bound".to_owned(), percent),
+    match modes.craig_bampton.as_ref().map(|own| &own.free) {
+        Some(Some(free)) => cells([
+            significant(free.free_hz[j], 8),
+            percent(free.too_high[j]),
+            free.too_high_at_most[j].map_or_else(|| "no bound".to_owned(), percent),
         ]),
+        Some(None) => Vec::new(),
         None => cells([modes.residual_in_words(j)]),
     }
 }
@@ -192,7 +198,7 @@ fn completeness(facts: &Facts<'_>) -> Vec<Term> {
     items.extend(listed("terms", &decided, |term| term.in_words()));
     items.push(Term::text("complete", completeness.sentence.as_str()));
     items.extend(remark(completeness));
-    let free = modes.craig_bampton.as_ref().map(|own| own.holds(&modes.frequency_hz));
+    let free = modes.craig_bampton.as_ref().and_then(|own| own.holds(&modes.frequency_hz));
     items.extend(free.map(|holds| Term::new("Free body", holds).short("free body")));
     if let Some(guarantee) = &facts.guarantee {
         items.push(Term::new("Eigenvalues", guarantee.eigenvalues()).short("guaranteed"));

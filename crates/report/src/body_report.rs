@@ -57,8 +57,8 @@ fn verdict<'a>(facts: &Facts<'_>) -> Block<'a> {
         [first, .., last] => format!(", {}", frequency_range([*first, *last], 5)),
     };
     let mass = facts.model.units.mass_of(facts.body.mass, 4);
-    let free =
-        modes.craig_bampton.as_ref().map(|own| format!(" {}.", sentence(&own.holds(&modes.frequency_hz))));
+    let free = modes.craig_bampton.as_ref().and_then(|own| own.holds(&modes.frequency_hz));
+    let free = free.map(|holds| format!(" {}.", sentence(&holds)));
     let rest = format!(
         "{mass}; {}{range}. {}.{}",
         counted(modes.count, "flexible mode"),

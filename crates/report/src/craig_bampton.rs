@@ -2,8 +2,9 @@
 //! it represents the free body.
 
 use super::numbers::{counted, frequency, percent};
-use flexbody_body::flex_body::{FixedInterface, FlexBody};
-use serde::Serialize;
+use flexbody_body::flex_body::{FixedInterface, FlexBody, FreeEstimate, ReferenceConditions};
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
 
 /// Largest relative error of a frequency that counts as accurate.
 const ACCURATE_FREQUENCY_ERROR: f64 = 0.01;
@@ -17,7 +18,7 @@ pub(super) struct CraigBamptonFacts {
     /// Frequency below which all fixed-interface modes were requested. Unit: Hz.
     pub fixed_interface_asked_below_hz: Option<f64>,
     /// Frequencies of the fixed-interface modes; `None` if the body keeps only some of its modes, or comes
-    /// from an older file.
+    /// from an older file. Unit: Hz.
     pub fixed_interface_hz: Option<Vec<f64>>,
     pub interface_motions: usize,
     pub rigid_modes: usize,
@@ -29,6 +30,16 @@ pub(super) struct CraigBamptonFacts {
     pub next_hz: Option<f64>,
     /// Worst residual of the fixed-interface modes.
     pub worst_residual: f64,
+    /// Frequencies beside those of the free body; `None` if the modes are held at an interface.
+    #[serde(flatten, serialize_with = "or_nulls")]
+    pub free: Option<FreeBodyFacts>,
+    /// True if the free body of the comparison keeps some interfaces rigid, like the basis.
+    pub rigid_interfaces: bool,
+}
+
+/// Frequencies of a Craig-Bampton body beside those of the free body.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct FreeBodyFacts {
     /// Estimated frequencies of the free body (nf); upper bounds. Unit: Hz.
     pub free_hz: Vec<f64>,
     /// Lower bounds of the frequencies of the free body; `None` without a bound. Unit: Hz.
@@ -39,21 +50,30 @@ pub(super) struct CraigBamptonFacts {
     pub too_high_at_most: Vec<Option<f64>>,
     /// Number of lowest frequencies that are at most 1 % too high.
     pub within_one_percent: usize,
-    /// True if the free body of the comparison keeps some interfaces rigid, like the basis.
-    pub rigid_interfaces: bool,
+}
+
+/// Writes the facts with their names; absent facts are written as `null` under the same names.
+fn or_nulls<S: Serializer>(free: &Option<FreeBodyFacts>, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut map = serializer.serialize_map(None)?;
+    map.serialize_entry("free_hz", &free.as_ref().map(|free| &free.free_hz))?;
+    map.serialize_entry("free_lower_hz", &free.as_ref().map(|free| &free.free_lower_hz))?;
+    map.serialize_entry("too_high", &free.as_ref().map(|free| &free.too_high))?;
+    map.serialize_entry("too_high_at_most", &free.as_ref().map(|free| &free.too_high_at_most))?;
+    map.serialize_entry("within_one_percent", &free.as_ref().map(|free| free.within_one_percent))?;
+    map.end()
 }
 
 impl CraigBamptonFacts {
     pub(crate) fn of(body: &FlexBody) -> Option<Self> {
         let fixed = body.certificate().fixed_interface.as_ref()?;
-        let (theta, nf) = (&body.modes().eigenvalue, body.n_modes());
         let hertz = |lambda: f64| body.units().frequency_of(lambda);
         let asked = &body.source().settings;
         Some(Self {
             fixed_interface_modes: fixed.modes,
             fixed_interface_asked: asked["modes"].as_u64().and_then(|count| usize::try_from(count).ok()),
             fixed_interface_asked_below_hz: asked["max_eigenvalue"].as_f64().map(hertz),
-            fixed_interface_hz: fixed_interface_eigenvalues(body)
+            fixed_interface_hz: body
+                .fixed_interface_eigenvalues()
                 .map(|all| all.into_iter().map(hertz).collect()),
             interface_motions: fixed.interface_motions,
             rigid_modes: body.certificate().rigid_modes,
@@ -61,11 +81,7 @@ impl CraigBamptonFacts {
             shift_hz: (fixed.shift >= 0.0).then(|| hertz(fixed.shift)),
             next_hz: fixed.next.map(hertz),
             worst_residual: fixed.residual,
-            free_hz: fixed.free_estimate.iter().copied().map(hertz).collect(),
-            free_lower_hz: fixed.free_lower.iter().map(|l| (*l > 0.0).then(|| hertz(*l))).collect(),
-            too_high: (0..nf).map(|j| fixed.excess(j, theta[j])).collect(),
-            too_high_at_most: (0..nf).map(|j| fixed.largest_excess(j, theta[j])).collect(),
-            within_one_percent: fixed.holding(theta, ACCURATE_FREQUENCY_ERROR),
+            free: fixed.free.as_ref().map(|free| FreeBodyFacts::of(free, body)),
             rigid_interfaces: body.has_rigid_interfaces(),
         })
     }
@@ -92,9 +108,11 @@ impl CraigBamptonFacts {
     }
 
     /// Returns in words up to which frequency the reduced body represents the free body, and the error of the
-    /// first frequency beyond. `hertz` are the frequencies of the reduced body.
-    pub(crate) fn holds(&self, hertz: &[f64]) -> String {
-        let good = self.within_one_percent;
+    /// first frequency beyond. `hertz` are the frequencies of the reduced body. Returns `None` without estimates
+    /// of the free body.
+    pub(crate) fn holds(&self, hertz: &[f64]) -> Option<String> {
+        let free = self.free.as_ref()?;
+        let good = free.within_one_percent;
         let kept = if self.rigid_interfaces { " (with the same rigid interfaces)" } else { "" };
         let holds = match good {
             0 => format!("no frequency is within 1 % of that of the free body{kept}"),
@@ -104,24 +122,30 @@ impl CraigBamptonFacts {
                 frequency(hertz[good - 1], 5)
             ),
         };
-        let Some(own) = hertz.get(good) else { return holds };
-        let most = self.too_high_at_most[good]
+        let Some(own) = hertz.get(good) else { return Some(holds) };
+        let most = free.too_high_at_most[good]
             .map_or_else(String::new, |most| format!(", at most {}", percent(most)));
-        format!(
+        Some(format!(
             "{holds}; mode {} ({}) is too high by about {}{most}",
             good + 1,
             frequency(*own, 5),
-            percent(self.too_high[good])
-        )
+            percent(free.too_high[good])
+        ))
     }
 }
 
-/// Returns the eigenvalues of the fixed-interface modes, the last diagonal entries of the stiffness matrix of
-/// the interface coordinates.
-fn fixed_interface_eigenvalues(body: &FlexBody) -> Option<Vec<f64>> {
-    let coordinates = body.coordinates()?;
-    let first = body.certificate().fixed_interface.as_ref()?.interface_motions;
-    Some((first..coordinates.names.len()).map(|i| coordinates.stiffness[(i, i)]).collect())
+impl FreeBodyFacts {
+    fn of(free: &FreeEstimate, body: &FlexBody) -> Self {
+        let (theta, nf) = (&body.modes().eigenvalue, body.n_modes());
+        let hertz = |lambda: f64| body.units().frequency_of(lambda);
+        Self {
+            free_hz: free.estimate.iter().copied().map(hertz).collect(),
+            free_lower_hz: free.lower.iter().map(|l| (*l > 0.0).then(|| hertz(*l))).collect(),
+            too_high: (0..nf).map(|j| free.excess(j, theta[j])).collect(),
+            too_high_at_most: (0..nf).map(|j| free.largest_excess(j, theta[j])).collect(),
+            within_one_percent: free.holding(theta, ACCURATE_FREQUENCY_ERROR),
+        }
+    }
 }
 
 /// Judges the proof of completeness of the fixed-interface modes of a body.
@@ -149,5 +173,12 @@ pub(super) fn judge(fixed: &FixedInterface, body: &FlexBody) -> (bool, String) {
     } else {
         String::new()
     };
-    (true, format!("proved: {proof}{kept}"))
+    // The count holds for the basis, whose span does not depend on the frame.
+    let held = match body.conditions() {
+        ReferenceConditions::Interface(name) => {
+            format!("; the modes of the body held at `{name}` follow from them and the interface motions")
+        }
+        ReferenceConditions::MeanAxes | ReferenceConditions::Unstated => String::new(),
+    };
+    (true, format!("proved: {proof}{kept}{held}"))
 }

@@ -122,7 +122,8 @@ fn modes(facts: &Facts<'_>) -> Vec<Term> {
         _ => entry(Tone::Bad, "complete", sentence, 4),
     });
     items.extend(facts.guarantee.as_ref().map(|own| entry(Tone::Good, "guaranteed", own.eigenvalues(), 3)));
-    items.extend(reduced.map(|own| entry(Tone::Plain, "free body", own.holds(&modes.frequency_hz), 3)));
+    let free = reduced.and_then(|own| own.holds(&modes.frequency_hz));
+    items.extend(free.map(|holds| entry(Tone::Plain, "free body", holds, 3)));
     items.extend(modes.damping.as_ref().map(|own| entry(Tone::Plain, "damping", own.in_words(), 2)));
     items.extend(
         modes.inertia_stiffness.as_ref().map(|own| entry(Tone::Plain, "inertia K", own.in_words(), 3)),

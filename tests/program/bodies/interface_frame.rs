@@ -145,6 +145,59 @@ fn what_no_frame_can_stand_on_is_refused() {
     assert!(convert(&model, &settings, &Context::QUIET).expect_err("bounds").has(Code::Usage));
 }
 
+/// The count of the fixed-interface modes proves the basis in any frame, which the terminal, the report and the file
+/// state. With the basis as a fact, a motion of the carried interface needs no warning about truncated modes, also if
+/// the modes were requested by a frequency.
+#[test]
+fn a_body_on_an_interface_states_its_fixed_interface_modes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |words: &[&str]| {
+        let run = flexbody(folder.path(), words);
+        let [out, err] = [&run.stdout, &run.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
+        assert_eq!(run.status.code(), Some(0), "{out}{err}");
+        out + &err
+    };
+    let model = fixtures().join("models/bracket_hex20/model.toml");
+    let basis = ["--basis", "craig-bampton", "--max-frequency", "30000", "--frame", "interface=bolt_base"];
+    let convert = |more: &[&str]| {
+        let model = model.to_str().expect("a path");
+        run(&[&["convert", model], &basis[..], more].concat())
+    };
+    let said = convert(&["-o", "held.flex.h5", "--report", "report.html"]);
+    let report = std::fs::read_to_string(folder.path().join("report.html")).expect("a report");
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let follows = "the modes of the body held at `bolt_base` follow from them and the interface motions";
+    for text in [&said, &report, &run(&["inspect", "held.flex.h5"])] {
+        let text = words(text);
+        assert!(text.contains(follows) && text.contains("17 fixed-interface modes below 30 kHz"), "{text}");
+        assert!(!text.to_lowercase().contains("not proved"), "{text}");
+    }
+    assert!(words(&said).contains("Hz (fixed-interface modes)") && !said.contains("free body"), "{said}");
+    assert!(report.contains("No fixed-interface mode is missing.") && report.contains("held, "), "{report}");
+    assert!(!report.contains("Too high by about"), "{report}");
+    let said: serde_json::Value =
+        serde_json::from_str(&run(&["inspect", "held.flex.h5", "--json"])).expect("JSON");
+    let json = &said["results"];
+    let schema: serde_json::Value =
+        serde_json::from_str(include_str!("../../../schemas/report.schema.json")).expect("a schema");
+    let problems: Vec<String> = jsonschema::validator_for(&schema)
+        .expect("a schema")
+        .iter_errors(json)
+        .map(|problem| problem.to_string())
+        .collect();
+    assert_eq!(problems, Vec::<String>::new());
+    let own = &json["modes"]["craig_bampton"];
+    let hertz = own["fixed_interface_hz"].as_array().expect("a list");
+    assert!(hertz.len() == 17 && hertz.iter().all(|hz| hz.as_f64().is_some_and(|hz| hz < 30000.0)), "{own}");
+    assert!(own["free_hz"].is_null() && own["within_one_percent"].is_null(), "{own}");
+    assert_eq!(json["completeness"]["verdict"], "proved");
+
+    let scene = "gravity = [0, 0, -9810]\n[run]\nduration = 0.0002\n[carried]\ninterface = \"bolt_base\"\n";
+    std::fs::write(folder.path().join("scene.toml"), scene).expect("written");
+    let said = run(&["simulate", "held.flex.h5", "--scene", "scene.toml"]);
+    assert!(!said.contains("FB546"), "{said}");
+}
+
 /// Collects all numbers of a JSON value in order.
 fn numbers(value: &serde_json::Value, into: &mut Vec<f64>) {
     match value {

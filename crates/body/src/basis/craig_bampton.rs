@@ -8,7 +8,7 @@
 //! search, proof of completeness and residuals of any other eigenproblem.
 
 use super::failure::explain;
-use super::fixed_interface::{FreeEstimate, MissingResponses, free_estimate};
+use super::fixed_interface::{MissingResponses, free_estimate};
 use super::free_surface::{polynomial_estimate, single_precision_note};
 use super::held_interfaces::{check_prescribable, hold, unit_motions};
 use super::interface_rows::{
@@ -275,7 +275,7 @@ impl<'a> Parts<'a> {
         let cut = counted.and(next.map(|next| next * (1.0 - MAX_FIXED_EIGENVALUE_ERROR)).or(Some(shift)));
         let (of_rigid, of_modes) =
             (coordinates_of(self.joints, rigid), coordinates_of(self.joints, solution.vectors.as_ref()));
-        let FreeEstimate { estimate, lower } = free_estimate(
+        let free = free_estimate(
             &solution.eigenvalues,
             of_rigid.as_ref(),
             of_modes.as_ref(),
@@ -289,8 +289,9 @@ impl<'a> Parts<'a> {
             shift,
             next,
             residual: self.fixed.residuals.iter().copied().fold(0.0, f64::max),
-            free_estimate: estimate,
-            free_lower: lower,
+            // The stiffness in interface coordinates holds the eigenvalues.
+            eigenvalues: Vec::new(),
+            free: Some(free),
         })
     }
 

@@ -1,5 +1,6 @@
 //! Composition of a Craig-Bampton body, its proof of completeness, and its range of frequency.
 
+use super::InterfaceCoordinates;
 use faer::{Mat, MatRef};
 use flexbody_linalg::{combine, gram, symmetric_eigen};
 use nalgebra::DMatrix;
@@ -20,21 +21,51 @@ pub struct FixedInterface {
     pub next: Option<f64>,
     /// Largest relative residual of a fixed-interface mode; 0 without any.
     pub residual: f64,
-    /// Estimated eigenvalue of the free body for each mode of the reduced body, an upper bound of the exact
-    /// one. Unit: 1/time^2.
-    pub free_estimate: Vec<f64>,
-    /// Lower bounds of the eigenvalues of the free body, up to rounding; 0: none. Unit: 1/time^2.
-    pub free_lower: Vec<f64>,
+    /// Eigenvalues of the fixed-interface modes, ascending, for a body without interface coordinates. Empty
+    /// if the stiffness in interface coordinates holds the eigenvalues, and for files up to 1.10. Unit:
+    /// 1/time^2.
+    pub eigenvalues: Vec<f64>,
+    /// Estimates of the free body; `None` if the modes are held at an interface or combined anew, so that
+    /// they do not belong to the modes of the free body.
+    pub free: Option<FreeEstimate>,
+}
+
+/// Estimates and bounds of the eigenvalues of the free body, one for each mode of the reduced body.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FreeEstimate {
+    /// Estimated eigenvalues of the free body (nf), upper bounds of the exact ones. Unit: 1/time^2.
+    pub estimate: Vec<f64>,
+    /// Lower bounds of the eigenvalues of the free body (nf), up to rounding; 0 above the cut, or if the
+    /// truncated modes have no proved lower bound. Unit: 1/time^2.
+    pub lower: Vec<f64>,
 }
 
 impl FixedInterface {
+    /// Returns true if the inertia count proves that no fixed-interface mode is missing below the highest
+    /// one in the basis.
+    pub fn is_proved(&self) -> bool {
+        self.counted.is_some_and(|counted| counted >= self.modes)
+    }
+
+    /// Returns the facts for other modes of the same span, of a body without interface coordinates: the
+    /// composition of the basis with its proof, the eigenvalues of the fixed-interface modes from the former
+    /// `coordinates`, and no estimates of the free body.
+    #[must_use]
+    pub fn with_other_modes(&self, coordinates: Option<&InterfaceCoordinates>) -> Self {
+        let eigenvalues = coordinates
+            .map_or_else(|| self.eigenvalues.clone(), InterfaceCoordinates::fixed_interface_eigenvalues);
+        Self { eigenvalues, free: None, ..*self }
+    }
+}
+
+impl FreeEstimate {
     /// Returns the estimated relative error by which the frequency of mode `j`, with eigenvalue `theta` in
     /// the reduced body, is too high.
     ///
     /// # Panics
     /// When `j` is not below the number of modes.
     pub fn excess(&self, j: usize, theta: f64) -> f64 {
-        ((theta / self.free_estimate[j]).sqrt() - 1.0).max(0.0)
+        ((theta / self.estimate[j]).sqrt() - 1.0).max(0.0)
     }
 
     /// Returns the upper bound of the relative error by which the frequency of mode `j`, with eigenvalue
@@ -43,7 +74,7 @@ impl FixedInterface {
     /// # Panics
     /// When `j` is not below the number of modes.
     pub fn largest_excess(&self, j: usize, theta: f64) -> Option<f64> {
-        let lower = self.free_lower[j];
+        let lower = self.lower[j];
         (lower > 0.0).then(|| ((theta / lower).sqrt() - 1.0).max(0.0))
     }
 
@@ -52,12 +83,6 @@ impl FixedInterface {
     pub fn holding(&self, theta: &[f64], within: f64) -> usize {
         let excess = |j: usize| self.largest_excess(j, theta[j]).unwrap_or_else(|| self.excess(j, theta[j]));
         (0..theta.len()).take_while(|&j| excess(j) <= within).count()
-    }
-
-    /// Returns true if the inertia count proves that no fixed-interface mode is missing below the highest
-    /// one in the basis.
-    pub fn is_proved(&self) -> bool {
-        self.counted.is_some_and(|counted| counted >= self.modes)
     }
 }
 
@@ -91,16 +116,6 @@ pub(super) struct MissingResponses {
     pub stiffness: Mat<f64>,
     /// H = y'M y (c x c).
     pub mass: Mat<f64>,
-}
-
-/// Estimates and bounds of the eigenvalues of the free body from a Craig-Bampton basis.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct FreeEstimate {
-    /// Estimates, each an upper bound (nf).
-    pub estimate: Vec<f64>,
-    /// Lower bounds (nf), up to rounding; 0 above the cut, or if the truncated modes have no proved lower
-    /// bound.
-    pub lower: Vec<f64>,
 }
 
 /// Computes estimates and bounds for the eigenvalues `theta` (nf, ascending) of a reduced body whose modes

@@ -262,6 +262,19 @@ pub struct InterfaceCoordinates {
     pub of_modes: Mat<f64>,
 }
 
+impl InterfaceCoordinates {
+    /// Returns the eigenvalues of the fixed-interface modes, K_jj / M_jj of their amplitudes. Unit: 1/time^2.
+    pub fn fixed_interface_eigenvalues(&self) -> Vec<f64> {
+        let amplitudes = self.names.iter().enumerate().filter(|(_, name)| Self::is_amplitude(name));
+        amplitudes.map(|(j, _)| self.stiffness[(j, j)] / self.mass[(j, j)]).collect()
+    }
+
+    /// Returns true if the coordinate of this name is the amplitude of a fixed-interface mode.
+    pub(crate) fn is_amplitude(name: &str) -> bool {
+        name.starts_with("fixed-interface mode ")
+    }
+}
+
 /// Interface coordinates along the axes of the model, and the positions of vectors among them for a change
 /// of axes.
 #[derive(Debug, Clone, PartialEq)]

@@ -18,7 +18,7 @@ mod solved;
 pub use coupled_model::{CoupledModel, oscillating_responses};
 pub use craig_bampton::CraigBampton;
 pub use craig_chang::CraigChang;
-pub use fixed_interface::FixedInterface;
+pub use fixed_interface::{FixedInterface, FreeEstimate};
 /// Settings of a mode computation: number and accuracy of the modes, and the factor to use.
 pub use flexbody_eigen::EigenSettings as ModeSettings;
 pub use free_surface::{FreeSurface, first_eigenvalue_estimate, free_surface, search_plan};

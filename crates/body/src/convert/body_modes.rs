@@ -354,7 +354,9 @@ pub(super) fn constrain(
     (solution.eigenvalues, solution.vectors) = (eigenvalues, modes);
     (solution.rounding_floors, solution.bounds, solution.next_eigenvalue) = (Vec::new(), None, None);
     found.provenance = vec![format!("constrained mode: held at {name}"); nf];
-    (found.coordinates, found.fixed_interface) = (None, None);
+    let coordinates = found.coordinates.take().map(|all| all.coordinates);
+    found.fixed_interface =
+        found.fixed_interface.take().map(|fixed| fixed.with_other_modes(coordinates.as_ref()));
     Ok(())
 }
 

@@ -246,9 +246,9 @@ const REPORTED_FREQUENCY_ERROR: f64 = 0.01;
 
 /// Returns a note about the frequencies of the free body that a Craig-Bampton body does not reproduce.
 fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
-    let fixed = body.certificate().fixed_interface.as_ref()?;
+    let free = body.certificate().fixed_interface.as_ref()?.free.as_ref()?;
     let (theta, hertz) = (&body.modes().eigenvalue, body.frequencies_hz());
-    let holding = fixed.holding(theta, REPORTED_FREQUENCY_ERROR);
+    let holding = free.holding(theta, REPORTED_FREQUENCY_ERROR);
     let first = *theta.get(holding)?;
     let kept = if body.has_rigid_interfaces() { " with the same rigid interfaces" } else { "" };
     let holds = match holding {
@@ -259,13 +259,13 @@ fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
         ),
     };
     let percent = |part: f64| format!("{:.2} %", 100.0 * part);
-    let most = fixed.largest_excess(holding, first).map(|most| format!(", {} at most", percent(most)));
+    let most = free.largest_excess(holding, first).map(|most| format!(", {} at most", percent(most)));
     let message = format!(
         "of the {} frequencies of the Craig-Bampton body {holds}; that of mode {}, {} Hz, is too high by {}{}",
         theta.len(),
         holding + 1,
         significant(hertz[holding], 5),
-        percent(fixed.excess(holding, first)),
+        percent(free.excess(holding, first)),
         most.unwrap_or_default(),
     );
     Some(Diagnostic::new(Code::FreeFrequencies, message))

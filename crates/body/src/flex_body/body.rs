@@ -272,6 +272,17 @@ impl FlexBody {
         self.parts.coordinates.as_ref()
     }
 
+    /// Returns the eigenvalues of the fixed-interface modes of a Craig-Bampton body; `None` if the body has neither
+    /// interface coordinates nor a list of these eigenvalues. Unit: 1/time^2.
+    pub fn fixed_interface_eigenvalues(&self) -> Option<Vec<f64>> {
+        let fixed = self.certificate().fixed_interface.as_ref()?;
+        match self.coordinates() {
+            Some(coordinates) => Some(coordinates.fixed_interface_eigenvalues()),
+            // Without fixed-interface modes the empty list is complete.
+            None => (fixed.eigenvalues.len() == fixed.modes).then(|| fixed.eigenvalues.clone()),
+        }
+    }
+
     /// Returns the decisions about the groups of the kinetic energy; empty if no selection was made.
     pub fn terms(&self) -> &[TermDecision] {
         &self.parts.terms

@@ -250,19 +250,23 @@ impl FlexBody {
             || self.is_whole_craig_bampton(name)
     }
 
-    /// Returns true for a Craig-Bampton body with all of its modes, whose boundary holds the interface `name`. With the frame
-    /// on an interface it has no interface coordinates that would tell.
+    /// Returns true for a Craig-Bampton body with all modes of its basis, whose boundary holds the interface `name`, as the
+    /// certificate states. Bodies of files up to 1.10 with the frame on an interface have no such statement; the settings of
+    /// their conversion state the basis.
     pub(crate) fn is_whole_craig_bampton(&self, name: &str) -> bool {
         let settings = &self.source().settings;
         let at_boundary = |interface: &&Interface| interface.coupling != Some(Coupling::Free);
         let boundary: Vec<&Interface> = self.interfaces().iter().filter(at_boundary).collect();
         let rigid = rigid_count(self.dimension());
-        let whole = settings["modes"]
-            .as_u64()
-            .is_some_and(|fixed| self.n_modes() + rigid >= fixed as usize + rigid * boundary.len());
-        settings["basis"] == BasisKind::CraigBampton.name()
-            && whole
-            && boundary.iter().any(|one| one.name == name)
+        let whole = match &self.certificate().fixed_interface {
+            Some(fixed) => self.n_modes() + rigid >= fixed.modes.saturating_add(fixed.interface_motions),
+            None => {
+                let all = |fixed: u64| self.n_modes() + rigid >= fixed as usize + rigid * boundary.len();
+                settings["basis"] == BasisKind::CraigBampton.name()
+                    && settings["modes"].as_u64().is_some_and(all)
+            }
+        };
+        whole && boundary.iter().any(|one| one.name == name)
     }
 
     /// Returns eigenvalues and m_ff-orthonormal eigenvectors of (K_ff, m_ff).

@@ -1,8 +1,8 @@
 //! Conversion of a body to other units.
 
 use super::{
-    Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LoadColumns,
-    LumpedBody, Modes, MotionColumns, NamedLoad, Parts, Recovery, RotatedStiffness, UnitLoad,
+    Certificate, FixedInterface, FlexBody, FreeEstimate, Guarantee, InterfaceCoordinates, InternalRows,
+    LoadColumns, LumpedBody, Modes, MotionColumns, NamedLoad, Parts, Recovery, RotatedStiffness, UnitLoad,
 };
 use crate::invariants::{InertiaStiffness, Invariants, UnitFactors};
 use faer::Mat;
@@ -112,8 +112,11 @@ impl Change {
             fixed_interface: given.fixed_interface.as_ref().map(|fixed| FixedInterface {
                 shift: fixed.shift * self.eigenvalue(),
                 next: fixed.next.map(|next| next * self.eigenvalue()),
-                free_estimate: eigenvalues(&fixed.free_estimate),
-                free_lower: eigenvalues(&fixed.free_lower),
+                eigenvalues: eigenvalues(&fixed.eigenvalues),
+                free: fixed.free.as_ref().map(|free| FreeEstimate {
+                    estimate: eigenvalues(&free.estimate),
+                    lower: eigenvalues(&free.lower),
+                }),
                 ..*fixed
             }),
             ..given.clone()
@@ -167,7 +170,7 @@ impl Change {
     /// displacement.
     fn coordinate(self, name: &str) -> f64 {
         let last = name.rsplit(' ').next().unwrap_or(name);
-        if name.starts_with("fixed-interface mode ") {
+        if InterfaceCoordinates::is_amplitude(name) {
             self.modal()
         } else if last.starts_with('r') {
             1.0

@@ -20,7 +20,7 @@ mod storage;
 mod terms;
 mod validate;
 
-pub use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
+pub use crate::basis::{FixedInterface, FreeEstimate, InterfaceCoordinates, Truncation};
 pub use crate::invariants::{Frame, TermGroup, TermGroups};
 pub use body::FlexBody;
 pub use carried::Carrier;

@@ -3,7 +3,7 @@
 
 use super::modal_change::{ModalChange, diagonal_eigenvalues, reduced_residuals};
 use super::rotated_stiffness::{split, transformed};
-use super::{Carrier, Certificate, FlexBody, LoadKind, LumpedBody, Modes, Parts, Recovery};
+use super::{Carrier, Certificate, FixedInterface, FlexBody, LoadKind, LumpedBody, Modes, Parts, Recovery};
 use crate::invariants::{BodyFrame, FrameChoice, Invariants, TermGroups, error_norms, principal_axes};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -122,6 +122,8 @@ impl FlexBody {
             .map_err(|reason| impossible(format!("no frame can stand on interface `{name}`: {reason}")))?;
         let mut parts = carried.changed(&change, conditions)?.into_parts();
         parts.source.settings["frame"] = FrameChoice::Interface(name.to_owned()).text().into();
+        // The carried body has no interface coordinates, which hold the eigenvalues of the fixed-interface modes.
+        parts.certificate.fixed_interface = self.parts().fixed_interface_of_other_modes();
         Self::new(parts)
     }
 
@@ -216,6 +218,15 @@ impl FlexBody {
     }
 }
 
+impl Parts {
+    /// Returns the facts about the fixed-interface modes for other modes of the same span, without interface
+    /// coordinates.
+    fn fixed_interface_of_other_modes(&self) -> Option<FixedInterface> {
+        let fixed = self.certificate.fixed_interface.as_ref()?;
+        Some(fixed.with_other_modes(self.coordinates.as_ref()))
+    }
+}
+
 fn impossible(message: String) -> Error {
     Diagnostic::new(Code::CarrierImpossible, message).into()
 }
@@ -226,8 +237,8 @@ fn changed_lumped(lumped: &LumpedBody, change: &ModalChange, exact: &Invariants)
     LumpedBody { comparison: error_norms(exact, &invariants), invariants, ..lumped.clone() }
 }
 
-/// Returns the certificate of a body whose modes are combinations of modes with a proof: the proof does not
-/// carry over.
+/// Returns the certificate of a body whose modes are combinations of modes with a proof. The proof about the modes
+/// does not carry over; the facts about the fixed-interface modes do, since they state the span of the modes.
 fn unproved(parts: &Parts) -> Certificate {
     let certificate = &parts.certificate;
     let about = "combinations of the modes of a body with other reference conditions";
@@ -240,7 +251,7 @@ fn unproved(parts: &Parts) -> Certificate {
         proved_modes: None,
         negative_pivots: None,
         guarantee: None,
-        fixed_interface: None,
+        fixed_interface: parts.fixed_interface_of_other_modes(),
         remark,
         ..certificate.clone()
     }

@@ -2,7 +2,7 @@
 //! selection for a scene, and the reduction of the body to some of them.
 
 use super::{
-    Certificate, FixedInterface, FlexBody, Guarantee, InternalRows, LumpedBody, Modes, Parts,
+    Certificate, FixedInterface, FlexBody, FreeEstimate, Guarantee, InternalRows, LumpedBody, Modes, Parts,
     RotatedStiffness, Storage, TermGroup, TermGroups,
 };
 use crate::invariants::{InertiaStiffness, error_norms};
@@ -138,8 +138,11 @@ impl Certificate {
             remark: if complete { self.remark.clone() } else { left_out() },
             guarantee: self.guarantee.as_ref().map(guarantee),
             fixed_interface: self.fixed_interface.as_ref().map(|fixed| FixedInterface {
-                free_estimate: entries(&fixed.free_estimate, modes),
-                free_lower: entries(&fixed.free_lower, modes),
+                eigenvalues: fixed.eigenvalues.clone(),
+                free: fixed.free.as_ref().map(|free| FreeEstimate {
+                    estimate: entries(&free.estimate, modes),
+                    lower: entries(&free.lower, modes),
+                }),
                 ..*fixed
             }),
             ..*self

@@ -260,14 +260,23 @@ impl Problems {
     fn fixed_interface(&mut self, parts: &Parts, nf: usize) {
         let Some(fixed) = &parts.certificate.fixed_interface else { return };
         self.finite("fixed_interface", [fixed.shift, fixed.residual, fixed.next.unwrap_or(0.0)]);
-        for (name, column) in [
-            ("fixed_interface.free_estimate", &fixed.free_estimate),
-            ("fixed_interface.free_lower", &fixed.free_lower),
-        ] {
+        if !fixed.eigenvalues.is_empty() {
+            self.length(
+                "fixed_interface.eigenvalues",
+                fixed.eigenvalues.len(),
+                fixed.modes,
+                "fixed-interface mode",
+            );
+            self.finite("fixed_interface.eigenvalues", fixed.eigenvalues.iter().copied());
+        }
+        let Some(free) = &fixed.free else { return };
+        for (name, column) in
+            [("fixed_interface.free.estimate", &free.estimate), ("fixed_interface.free.lower", &free.lower)]
+        {
             self.length(name, column.len(), nf, "mode");
             self.finite(name, column.iter().copied());
         }
-        let free = fixed.free_estimate.iter().zip(&fixed.free_lower);
+        let free = free.estimate.iter().zip(&free.lower);
         for (j, (value, (estimate, lower))) in parts.modes.eigenvalue.iter().zip(free).enumerate() {
             if !(0.0 <= *lower && lower <= estimate && *estimate > 0.0 && estimate <= value) {
                 self.add(format!(

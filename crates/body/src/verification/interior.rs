@@ -80,7 +80,7 @@ impl Recomputed<'_> {
         let sizes = rounding_sizes(self.model, columns.as_ref());
         let (mut constraint, mut fixed, mut allowed) = (0.0f64, 0.0f64, 0.0f64);
         for (j, name) in coordinates.names.iter().enumerate() {
-            if name.starts_with("fixed-interface mode ") {
+            if InterfaceCoordinates::is_amplitude(name) {
                 let lambda = coordinates.stiffness[(j, j)] / coordinates.mass[(j, j)];
                 let left = norm_on(interior, |i| kx[(i, j)] - lambda * mx[(i, j)]);
                 let scale = residual_scale(kx.col(j), mx.col(j), lambda);
@@ -98,7 +98,7 @@ impl Recomputed<'_> {
             constraint,
             MAX_INTERIOR_RESIDUAL + 4.0 * self.body.storage().rounding(),
         )];
-        if coordinates.names.iter().any(|name| name.starts_with("fixed-interface mode ")) {
+        if coordinates.names.iter().any(|name| InterfaceCoordinates::is_amplitude(name)) {
             checks.push(IdentityCheck::new(
                 "fixed_modes_recomputed",
                 "|K phi - lambda M phi| of the fixed-interface modes on rows outside the interfaces / (|K phi| + |lambda M phi|)",

@@ -1,9 +1,10 @@
 //! The rows of `/certificate`, proofs about a body, and of `/terms`, decisions about the groups of the kinetic energy.
 
-use super::super::item::ItemKind::{Float, Int, Text};
+use super::super::item::Extent::{FixedInterfaceModes, Modes};
+use super::super::item::ItemKind::{Float, Floats, Int, Text};
 use super::super::item::{EntrySet, Item, both, field, put, written};
 use super::super::value::{Stored, Value, View, text};
-use super::{ONE, PER_TIME2, attribute};
+use super::{ONE, PER_TIME2, attribute, dataset};
 use flexbody_body::flex_body::{TermDecision, TermGroup};
 
 /// Entries that accuracy `certified` adds.
@@ -34,6 +35,40 @@ macro_rules! beside_fixed_interface {
         )
     };
 }
+
+/// Makes both directions of an estimate of the free body, which a Craig-Bampton body in mean axes has.
+macro_rules! estimate_of_free_body {
+    ($field:ident) => {
+        both(
+            |v| v.fixed_interface()?.free.as_ref()?.$field.value(),
+            put!(|d, read| d.free_estimate().$field = Stored::take(read)?),
+        )
+    };
+}
+
+/// Estimated eigenvalues of the free body, an entry of `/modes`. Files up to 1.10 have them for every Craig-Bampton body.
+pub(super) const FREE_EIGENVALUE: Item = dataset(
+    "free_eigenvalue",
+    Floats(&[Modes]),
+    PER_TIME2,
+    "lambda~",
+    "eigenvalues of the free body as estimated, upper bounds of them; Craig-Bampton bodies only, whose own are larger",
+    estimate_of_free_body!(estimate),
+)
+.beside(&CRAIG_BAMPTON)
+.added(4);
+
+/// Lower bounds of the eigenvalues of the free body, an entry of `/modes` beside [`FREE_EIGENVALUE`].
+pub(super) const FREE_EIGENVALUE_LOWER: Item = dataset(
+    "free_eigenvalue_lower",
+    Floats(&[Modes]),
+    PER_TIME2,
+    "lambda~-",
+    "lower bounds of the eigenvalues of the free body, to rounding; 0: none; Craig-Bampton bodies only",
+    estimate_of_free_body!(lower),
+)
+.beside(&CRAIG_BAMPTON)
+.added(4);
 
 pub(super) const CERTIFICATE: &[Item] = &[
     attribute(
@@ -169,6 +204,19 @@ pub(super) const CERTIFICATE: &[Item] = &[
     )
     .with(&CRAIG_BAMPTON)
     .added(4),
+    dataset(
+        "fixed_interface_eigenvalue",
+        Floats(&[FixedInterfaceModes]),
+        PER_TIME2,
+        "mu",
+        "eigenvalues of the fixed-interface modes, ascending, of a Craig-Bampton body whose frame is on an interface; absent: `/interface_coordinates/stiffness` holds them, or they are not known",
+        both(
+            |v| Some(v.fixed_interface()?.eigenvalues.clone()).filter(|all| !all.is_empty())?.value(),
+            put!(|d, read| d.fixed_interface().eigenvalues = Stored::take(read)?),
+        ),
+    )
+    .beside(&CRAIG_BAMPTON)
+    .added(11),
 ];
 
 /// Makes one attribute per invariant, in the order of [`flexbody_body::invariants::DIGITS`].

@@ -2,9 +2,11 @@
 //! contradicting statement is named, whatever the digests of the file.
 
 use flexbody_base::diagnostic::Code;
+use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{BasisChoice, CraigBampton};
 use flexbody_body::convert::{ConvertSettings, convert, poor_fits};
 use flexbody_body::flex_body::{Certificate, FixedInterface, FlexBody, InterfaceCoordinates, Parts};
+use flexbody_body::invariants::FrameChoice;
 use flexbody_body::verification::{body_identities, verify};
 use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
@@ -26,6 +28,17 @@ fn link(coupling: Coupling) -> FeModel {
     let mut raw = raw_fixture("robot_link");
     raw.interfaces.iter_mut().for_each(|set| set.coupling = Some(coupling));
     model_of(raw)
+}
+
+/// Returns the link with the interface `name` as the place of its frame.
+fn held_link(name: &str, modes: usize) -> FlexBody {
+    let mut settings = ConvertSettings {
+        basis: BasisChoice::CraigBampton(CraigBampton),
+        frame: FrameChoice::Interface(name.to_owned()),
+        ..ConvertSettings::default()
+    };
+    settings.modes.wanted = Wanted::Lowest(modes);
+    convert(&link(Coupling::Rigid), &settings, &Context::QUIET).expect("converts").body
 }
 
 /// Returns the body after `change`, written to a file and read again, so that its digests are valid.
@@ -85,6 +98,75 @@ fn the_proof_and_the_lumped_errors_of_free_modes_are_held_to_their_numbers() {
     }
     let without = changed(&body, &|p| p.certificate.proved_modes = None);
     assert_eq!(failing(&without), Vec::<&str>::new(), "nothing is claimed");
+}
+
+/// A frame on an interface changes the modes and not their span: the count of the fixed-interface modes holds for the
+/// body, in its file of version 1.11 and in mean axes again.
+#[test]
+fn a_body_held_at_an_interface_knows_its_fixed_interface_modes() {
+    let mean = converted(&link(Coupling::Rigid), BasisChoice::CraigBampton(CraigBampton), 6);
+    let of_mean = mean.certificate().fixed_interface.clone().expect("Craig-Bampton");
+    let name = mean.interfaces()[0].name.as_str();
+    let held = held_link(name, 6);
+    let record = held.certificate().fixed_interface.as_ref().expect("kept");
+    assert!(record.is_proved() && record.free.is_none() && of_mean.free.is_some(), "{record:?}");
+    let expected = FixedInterface {
+        eigenvalues: mean.coordinates().expect("coordinates").fixed_interface_eigenvalues(),
+        free: None,
+        ..of_mean.clone()
+    };
+    assert_eq!(*record, expected);
+    assert_eq!(record.eigenvalues.len(), 6);
+    assert_each_is_named(
+        &held,
+        &[
+            ("fixed_interface_modes", &|p| fixed(p).interface_motions = 6),
+            ("fixed_interface_modes", &|p| fixed(p).counted = Some(3)),
+            ("fixed_interface_modes", &|p| fixed(p).shift *= 0.1),
+            ("fixed_interface_modes", &|p| fixed(p).next = Some(1.0)),
+        ],
+    );
+    // Changes of the frame of a finished body keep the facts as well.
+    for other in [mean.on_interface(name).expect("held"), held.in_mean_axes().expect("mean").into_owned()] {
+        let record = other.certificate().fixed_interface.as_ref().expect("kept");
+        assert_eq!(*record, expected);
+        assert_eq!(failing(&other), Vec::<&str>::new());
+    }
+    let milliseconds = UnitSystem::parse("mm", "t", "ms").expect("units");
+    let other = held.in_units(&milliseconds).expect("in other units");
+    for (own, lambda) in fixed(&mut other.into_parts()).eigenvalues.iter().zip(&record.eigenvalues) {
+        assert!((own / lambda - 1e-6).abs() < 1e-18, "{own:e}, {lambda:e}");
+    }
+    let mut short = held.clone().into_parts();
+    fixed(&mut short).eigenvalues.pop();
+    let error = FlexBody::new(short).expect_err("five of six").to_string();
+    assert!(error.contains("fixed_interface.eigenvalues"), "{error}");
+}
+
+/// Files of bodies in mean axes are those of earlier versions; only a body held at an interface needs version 1.11.
+#[test]
+fn files_of_craig_bampton_bodies_state_the_version_that_their_entries_need() {
+    let mean = converted(&link(Coupling::Rigid), BasisChoice::CraigBampton(CraigBampton), 6);
+    let held = held_link(&mean.interfaces()[0].name, 6);
+    // Versions up to 1.10 have no facts about the fixed-interface modes of a body held at an interface.
+    let mut earlier = held.clone().into_parts();
+    earlier.certificate.fixed_interface = None;
+    let earlier = FlexBody::new(earlier).expect("a body");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("body.flex.h5");
+    for (body, is_newest, has_estimates) in
+        [(&mean, false, true), (&held, true, false), (&earlier, false, false)]
+    {
+        flexbody_file::write(body, &path).expect("written");
+        assert_eq!(flexbody_file::read(&path).expect("read"), *body);
+        let file = hdf5_metno::File::open(&path).expect("a file");
+        let minor: i64 = file.attr("format_minor").expect("stated").read_scalar().expect("a number");
+        assert_eq!(minor >= 11, is_newest, "version 1.{minor}");
+        for name in ["free_eigenvalue", "free_eigenvalue_lower"] {
+            assert_eq!(file.link_exists(&format!("modes/{name}")), has_estimates, "{name}");
+        }
+        assert_eq!(file.link_exists("certificate/fixed_interface_eigenvalue"), is_newest);
+    }
 }
 
 #[test]

@@ -133,6 +133,29 @@ fn guarantees_that_contradict_the_modes_or_themselves_are_refused() {
 }
 
 #[test]
+fn estimates_of_the_free_body_are_complete_and_belong_to_a_craig_bampton_body() {
+    let reduced = |damage: &dyn Fn(&hdf5::File)| refused(stored(&body(5, 5, 3, 1, 1)), damage);
+    let error = reduced(&|f| f.unlink("modes/free_eigenvalue_lower").unwrap());
+    assert_says(&error, Code::BodySchema, &["`fixed_interface.free.lower` has 0 values, expected 3"]);
+    let error = reduced(&|f| {
+        let names = [
+            "fixed_interface_modes",
+            "interface_motions",
+            "fixed_interface_shift",
+            "fixed_interface_residual",
+        ];
+        names.iter().for_each(|name| f.group("certificate").unwrap().delete_attr(name).unwrap());
+    });
+    let expected =
+        "/certificate@fixed_interface_modes: expected with the other entries of a Craig-Bampton body";
+    assert!(error.to_string().contains(expected), "{error}");
+    let error = reduced(&|f| {
+        replace(f, "certificate/fixed_interface_eigenvalue", &[2], &[0.5, 1.0]);
+    });
+    assert_says(&error, Code::BodySchema, &["`fixed_interface.eigenvalues` has 2 values, expected 3"]);
+}
+
+#[test]
 fn a_newer_format_is_refused_by_naming_the_program_that_wrote_it() {
     let error = damaged(|f| {
         set_int(f, "/", "format_major", 2);

@@ -555,7 +555,7 @@ const NEVER_COMPARED: &[Entries] = &[
     Entries {
         name: "estimates of the free body",
         paths: "/modes/free_eigenvalue, /modes/free_eigenvalue_lower",
-        has: |body| body.certificate().fixed_interface.is_some(),
+        has: |body| body.certificate().fixed_interface.as_ref().is_some_and(|fixed| fixed.free.is_some()),
     },
     Entries {
         name: "reasons of kept and dropped terms",

@@ -4,10 +4,10 @@
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
-    FixedInterface, FlexBody, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
-    LoadColumns, LoadKind, LumpedBody, MassStructure, MotionColumns, MotionLoad, NamedLoad, Parts, Quantity,
-    Recovery, RecoveryRow, ReferenceConditions, RotatedStiffness, Storage, SurfaceMesh, TermDecision,
-    TermGroup, UnitLoad,
+    FixedInterface, FlexBody, FreeEstimate, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
+    InternalRows, LoadColumns, LoadKind, LumpedBody, MassStructure, MotionColumns, MotionLoad, NamedLoad,
+    Parts, Quantity, Recovery, RecoveryRow, ReferenceConditions, RotatedStiffness, Storage, SurfaceMesh,
+    TermDecision, TermGroup, UnitLoad,
 };
 use flexbody_body::invariants::{BodyFrame, DIGITS, Frame, GeneralTerms, InertiaStiffness};
 use flexbody_file::contents;
@@ -93,8 +93,11 @@ fn complete() -> FlexBody {
         shift: 1.0,
         next: Some(2.0),
         residual: 0.0,
-        free_estimate: lambda.clone(),
-        free_lower: lambda.iter().map(|l| 0.9 * l).collect(),
+        eigenvalues: Vec::new(),
+        free: Some(FreeEstimate {
+            estimate: lambda.clone(),
+            lower: lambda.iter().map(|l| 0.9 * l).collect(),
+        }),
     });
     parts.terms = vec![TermDecision {
         group: TermGroup::W1,

@@ -13,11 +13,12 @@ const FAR_BELOW: f64 = 0.25;
 fn check_against(exact: &[f64], basis: &ModalBasis, held: &[f64], what: &str) -> [f64; 2] {
     let theta = &basis.solution.eigenvalues;
     let fixed = basis.fixed_interface.as_ref().expect("recorded");
+    let free = fixed.free.as_ref().expect("estimates");
     assert_eq!(fixed.counted.map(|counted| counted >= fixed.modes), Some(true), "{what}");
     let cut = held.get(fixed.modes).copied().unwrap_or(f64::INFINITY);
     let (mut least, mut most) = (1.0f64, 1.0f64);
     for (j, theta) in theta.iter().enumerate() {
-        let (lambda, estimate, lower) = (exact[j], fixed.free_estimate[j], fixed.free_lower[j]);
+        let (lambda, estimate, lower) = (exact[j], free.estimate[j], free.lower[j]);
         // Difference between eigenvalues of dense and sparse solutions.
         let rounding = 1e-9 * theta;
         let all = format!("{what}, mode {j}: {lower:e} <= {lambda:e} <= {estimate:e} <= {theta:e}");
@@ -63,10 +64,11 @@ fn the_frequencies_of_fixtures_are_told_as_well_as_free_modes_know_them() {
         let exact = &free.modes().eigenvalue;
         let body = body(&model, 10);
         let fixed = record(&body);
+        let free = fixed.free.as_ref().expect("estimates");
         assert_eq!((fixed.modes, fixed.counted, fixed.next), (10, Some(10), None));
         let mut high = 0;
         for (j, theta) in body.modes().eigenvalue.iter().enumerate().take(exact.len()) {
-            let (lambda, estimate, lower) = (exact[j], fixed.free_estimate[j], fixed.free_lower[j]);
+            let (lambda, estimate, lower) = (exact[j], free.estimate[j], free.lower[j]);
             assert!(lower <= lambda * (1.0 + 1e-9) && lambda <= estimate * (1.0 + 1e-9), "{name}, mode {j}");
             if *theta < FAR_BELOW * fixed.shift {
                 assert!(theta - estimate > 0.95 * (theta - lambda) - 1e-9 * theta, "{name}, mode {j}");
