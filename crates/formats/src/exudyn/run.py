@@ -169,7 +169,7 @@ def add_sensors(mbs, body, joints, kinds):
     sensors = {
         "origin": of_node(rigid, what.Position), "turn": of_node(rigid, what.RotationMatrix),
         "velocity": of_node(rigid, what.Velocity), "omega": of_node(rigid, what.AngularVelocityLocal),
-        "alpha": of_node(rigid, what.AngularAccelerationLocal), "qdd": of_node(modal, what.Coordinates_tt),
+        "alpha": of_node(rigid, what.AngularAcceleration), "qdd": of_node(modal, what.Coordinates_tt),
         "q": of_node(modal, what.Coordinates), "qd": of_node(modal, what.Coordinates_t), "loads": {},
         "bushings": [name for name, kind in kinds.items() if kind == "bushing"]}
     for name, joint in joints.items():
@@ -197,7 +197,7 @@ def table_of(mbs, sensors):
     parts = [
         (["time"], time), (xyz("origin"), stored(sensors["origin"])), ([f"attitude_{k}" for k in range(4)], attitude),
         (xyz("velocity"), stored(sensors["velocity"])), (xyz("angular_velocity"), stored(sensors["omega"]) @ axes.T),
-        (xyz("angular_acceleration"), stored(sensors["alpha"]) @ axes.T)]
+        (xyz("angular_acceleration"), np.einsum("tji,tj->ti", turns, stored(sensors["alpha"])) @ axes.T)]
     for name in ("q", "qd", "qdd"):
         values = stored(sensors[name])
         parts.append(([f"{name}_{j + 1}" for j in range(values.shape[1])], values))
