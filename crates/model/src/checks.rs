@@ -15,6 +15,7 @@ use super::wording::{in_words, name_some};
 use super::{Damping, DofLabel, FeModel, Nodes, RawModel, Rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
+use flexbody_base::numbers::significant;
 use flexbody_linalg::{SymmetricMatrix, largest};
 
 /// Model that passed the checks, with the warnings and notes found.
@@ -248,8 +249,9 @@ fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, fou
     }
     let density = total / volume;
     if !(PLAUSIBLE_DENSITY.0..=PLAUSIBLE_DENSITY.1).contains(&density) {
+        let [mass, x, y, z] = [total, x, y, z].map(|value| significant(value, 4));
         let message =
-            format!("{total:.3e} kg in a box of {x:.3e} x {y:.3e} x {z:.3e} m is {density:.1e} kg/m^3");
+            format!("{mass} kg in a box of {x} x {y} x {z} m is {} kg/m^3", significant(density, 2));
         found.push(Diagnostic::new(Code::InertiaImplausible, message));
     }
 }

@@ -11,6 +11,7 @@ use super::assemble::Assembled;
 use super::node_pairs::neighbours;
 use super::wording::name_some;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::numbers::significant;
 use flexbody_linalg::{SymmetricMatrix, parallel};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -228,7 +229,10 @@ pub(super) fn check_density(
     }
     let assumption = if units.stated { "" } else { ", assumed since no units are given" };
     let message = format!(
-        "the elements have a density of {median:.3e} kg/m^3 (median of {nodes} nodes; half of them between {lower:.3e} and {upper:.3e}), with length in {}, mass in {}{assumption}",
+        "the elements have a density of {} kg/m^3 (median of {nodes} nodes; half of them between {} and {}), with length in {}, mass in {}{assumption}",
+        significant(median, 4),
+        significant(lower, 4),
+        significant(upper, 4),
         units.length.name(),
         units.mass.name()
     );

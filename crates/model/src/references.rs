@@ -131,7 +131,10 @@ fn far_reference(name: &str, reference: [f64; 3], nodes: &[[f64; 3]], size: f64)
     let reach = radius.max(MIN_RELATIVE_EXTENT * size);
     (away > WARNING_DISTANCE * reach).then(|| {
         let message = format!(
-            "reference point of interface `{name}` is {away:.3e} away from the middle of its nodes, which reach {radius:.3e} from there, in a body of {size:.3e}"
+            "reference point of interface `{name}` is {} away from the middle of its nodes, which reach {} from there, in a body whose nodes reach {} from its middle",
+            significant(away, 4),
+            significant(radius, 4),
+            significant(size, 4)
         );
         Diagnostic::new(Code::InterfaceFar, message)
     })

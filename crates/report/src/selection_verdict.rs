@@ -183,7 +183,8 @@ fn error(selection: &Selection) -> String {
                 ReferenceErrorFacts::new(last_error).parts()
             )
         }
-        None => String::new(),
+        None => "; beside the body with all its modes, whose error relative to the FE model is not known"
+            .to_owned(),
     };
     match selection.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
         Some(errors) => {

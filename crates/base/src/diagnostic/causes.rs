@@ -134,7 +134,7 @@ causes! {
     RecoveryEnergyDiffers = "Some shapes have another strain energy in the FE program than in K.";
     RecoveryAveraged = "The FE program averages stresses at nodes over the elements around them, also where the material changes.";
     RecoveryMapped = "The rows of the recovery are combinations of the answers of the FE program.";
-    InterfaceCentre = "A stated or read reference point lies away from the mean of the nodes; this is often meant, and sometimes a wrong unit or axis.";
+    InterfaceCentre = "The middle of the hole, edge or face that the nodes lie on is the reference point, and the mean of the nodes is another: the mesh is denser on one side, or the nodes are a part of the whole.";
     GeometricStiffnessDifference = "The matrix was computed by subtraction, in which the common digits cancel.";
     GeometricStiffnessUnstressed = "The two matrices agree to nearly all digits, so the stress did not enter the second one or is too small.";
     RecoveryCorners = "The results list the corners of elements, and several elements share a node.";

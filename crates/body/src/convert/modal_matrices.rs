@@ -10,6 +10,7 @@ use crate::invariants::Invariants;
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::significant;
 use flexbody_eigen::energy_noise;
 use flexbody_linalg::{SymmetricMatrix, side_by_side, symmetric_eigen};
 use flexbody_model::{Damping, FeModel, GeometricStiffness, LoadKind, ratio_at};
@@ -76,10 +77,10 @@ pub fn modal_damping(
     let warning = (over > 0).then(|| {
         let worst = (0..ratio.len()).fold(0, |w, j| if ratio[j] > ratio[w] { j } else { w });
         let message = format!(
-            "{over} of {} modes are overdamped, mode {} most: its damping ratio is {:.3e}",
+            "{over} of {} modes are overdamped, mode {} most: its damping ratio is {}",
             ratio.len(),
             worst + 1,
-            ratio[worst]
+            significant(ratio[worst], 4)
         );
         Diagnostic::new(Code::ModesOverdamped, message)
     });

@@ -4,6 +4,7 @@ use super::import_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia, bes
 use super::{AuditCheck, ImportedBody, ImportedFile, ImportedFrame};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::rigid_motions;
 use flexbody_body::invariants::{IdentityCheck, Invariants, identities};
 use flexbody_linalg::{dense_cholesky, symmetric_eigen};
@@ -260,7 +261,9 @@ fn size(body: &ImportedBody) -> Vec<AuditCheck> {
             "radius of gyration / extent of the frames, factor outside 0.02 to 5",
             times,
             format!(
-                "the radius of gyration is {gyration:.3e}, the frames extend over {extent:.3e}{}",
+                "the radius of gyration is {}, the frames extend over {}{}",
+                significant(gyration, 4),
+                significant(extent, 4),
                 guess(ratio / 0.3)
             ),
         ),
@@ -269,8 +272,9 @@ fn size(body: &ImportedBody) -> Vec<AuditCheck> {
             "distance of the centre of mass from the frames / 10 extents",
             positions.iter().map(|x| (x - centre).norm()).fold(f64::INFINITY, f64::min) / (10.0 * extent),
             format!(
-                "the centre of mass is {:.3e} from the origin, the frames extend over {extent:.3e}{}",
-                centre.norm(),
+                "the centre of mass is {} from the origin, the frames extend over {}{}",
+                significant(centre.norm(), 4),
+                significant(extent, 4),
                 guess(centre.norm() / extent)
             ),
         ),

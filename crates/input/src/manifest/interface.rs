@@ -136,7 +136,10 @@ impl ManifestWalk<'_, '_> {
         let coupling = Coupling::from_name(name);
         if coupling.is_none() {
             let expected = Coupling::ALL.map(|coupling| format!("`{}`", coupling.name())).join(", ");
-            let message = format!("`coupling` is none of {expected}");
+            let message = match name {
+                "" => format!("`coupling` is no text, expected one of {expected}"),
+                name => format!("`coupling` is `{name}`, expected one of {expected}"),
+            };
             self.complain(Code::ManifestSyntax, value.span(), message);
         }
         coupling

@@ -31,6 +31,11 @@ pub struct ModePair {
 }
 
 impl ModePair {
+    /// Returns true if the shapes of the two modes are known and are not one.
+    fn is_of_strangers(&self) -> bool {
+        self.assurance.is_some_and(|assurance| assurance < MIN_ASSURANCE)
+    }
+
     /// Returns the numbers of the modes, their frequencies and the difference in words.
     pub(crate) fn in_words(&self) -> String {
         let [a, b] = [self.frequency_a_hz, self.frequency_b_hz].map(|hertz| frequency(hertz, 7));
@@ -61,7 +66,7 @@ impl Pairing {
     pub(crate) fn in_words(self) -> &'static str {
         match self {
             Pairing::Shape => "paired by their shapes",
-            Pairing::Order => "paired in ascending order",
+            Pairing::Order => "paired by their frequencies",
         }
     }
 }
@@ -121,10 +126,23 @@ impl BodyComparison {
                 some.join(", ")
             ));
         }
+        let strangers: Vec<String> = self
+            .modes
+            .iter()
+            .filter(|pair| pair.is_of_strangers())
+            .map(|pair| pair.mode_a.to_string())
+            .collect();
         if self.paired == Pairing::Order && self.same_nodes {
-            self.notes.push(
-                "the modes are paired in ascending order: some shapes of the first body are those of no mode of the second".to_owned(),
-            );
+            let (some, rest) = strangers.split_at(strangers.len().min(MAX_NAMED));
+            let more = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
+            let whose = if some.is_empty() {
+                "some modes".to_owned()
+            } else {
+                format!("modes {}{more}", some.join(", "))
+            };
+            self.notes.push(format!(
+                "the modes are paired by their frequencies: {whose} of the first body have the shape of none of their partners, and their differences are not those of one mode"
+            ));
         }
         let failed = self.rows.iter().any(|row| row.quantity == "frequency" && !row.passed);
         if let Some(worst) = self.worst_mode().filter(|_| failed) {
@@ -132,9 +150,10 @@ impl BodyComparison {
         }
     }
 
-    /// Returns the pair of modes whose frequencies differ most.
+    /// Returns the pair of modes whose frequencies differ most, among those with one shape as far as the shapes are known.
     pub fn worst_mode(&self) -> Option<&ModePair> {
-        self.modes.iter().max_by(|a, b| a.difference.abs().total_cmp(&b.difference.abs()))
+        let alike = self.modes.iter().filter(|pair| !pair.is_of_strangers());
+        alike.max_by(|a, b| a.difference.abs().total_cmp(&b.difference.abs()))
     }
 }
 
