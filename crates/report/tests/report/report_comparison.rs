@@ -261,10 +261,19 @@ fn frequencies_are_compared_mode_by_mode() {
     let foreign = changed(&body, |p| {
         let rows = p.modes.shape.nrows();
         (0..rows).for_each(|i| p.modes.shape[(i, 2)] = if i % 7 == 0 { 1.0 } else { 0.0 });
+        // Its frequency differs most, but no mode of the other body is the same mode; mode 5 is.
+        p.modes.eigenvalue[2] *= 1.001f64.powi(2);
+        p.modes.eigenvalue[4] *= 1.0005f64.powi(2);
     });
     let comparison = compared(&body, &foreign);
     assert_eq!(comparison.paired(), Pairing::Order);
-    assert!(comparison.notes().iter().any(|note| note.contains("in ascending order")));
+    assert_eq!(comparison.worst_mode().map(|pair| pair.mode_a), Some(5));
+    assert!(
+        comparison
+            .notes()
+            .iter()
+            .any(|note| note.contains("by their frequencies: modes 3 of the first body"))
+    );
     let renumbered = changed(&body, |p| p.nodes.ids.iter_mut().for_each(|id| *id += 1000));
     let comparison = compared(&body, &renumbered);
     assert_eq!((comparison.paired(), comparison.modes()[0].assurance), (Pairing::Order, None));
