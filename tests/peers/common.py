@@ -1,9 +1,12 @@
 """What the scripts of this folder share: running flexbody, finding other programs, and the rows of the table of agreement."""
 
+import argparse
 import json
 import os
 import shutil
 import subprocess
+import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +29,18 @@ class Row:
 
     def good(self):
         return self.found <= self.limit
+
+
+def compare_alone(doc, rows):
+    """The comparisons `rows(flexbody, scratch)` of one script, from the command line; exits with 1 when a number is worse than its limit."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--flexbody", type=Path, default=ROOT / "target/release/flexbody")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        found = rows(args.flexbody, Path(scratch))
+    for row in found:
+        print(f"{row.what:90} {row.found:.1e} (limit {row.limit:.0e})")
+    sys.exit(not all(row.good() for row in found))
 
 
 def run(*words):

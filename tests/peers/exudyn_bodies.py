@@ -20,9 +20,7 @@ largest. `flexbody simulate` runs at a tolerance of 1e-12. With half the step th
 error of the integration in Exudyn. Exits with 1 when a number is worse than its limit.
 """
 
-import argparse
 import sys
-import tempfile
 import warnings
 from pathlib import Path
 
@@ -33,7 +31,7 @@ from scipy.spatial.transform import Rotation
 
 sys.path += [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parents[2] / "benches/peers")]
 import common  # noqa: E402
-from common import ROOT, Row, run  # noqa: E402
+from common import ROOT, Row, compare_alone, run  # noqa: E402
 from measure import node_order, read_model  # noqa: E402
 
 warnings.filterwarnings("ignore", category=DeprecationWarning)
@@ -253,16 +251,5 @@ def rows(flexbody, scratch):
     return found
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--flexbody", type=Path, default=ROOT / "target/release/flexbody")
-    args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch:
-        found = rows(args.flexbody, Path(scratch))
-    for row in found:
-        print(f"{row.what:90} {row.found:.1e} (limit {row.limit:.0e})")
-    sys.exit(not all(row.good() for row in found))
-
-
 if __name__ == "__main__":
-    main()
+    compare_alone(__doc__, rows)

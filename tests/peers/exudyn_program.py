@@ -13,14 +13,11 @@ Optional, seconds: needs Python with exudyn, h5py and numpy; not part of `cargo 
 * loads: impulse and angular impulse of the joints in the table are the changes of the momenta of the driven body.
 """
 
-import argparse
 import sys
-import tempfile
-from pathlib import Path
 
 import h5py
 import numpy as np
-from common import ROOT, Row, run
+from common import ROOT, Row, compare_alone, run
 
 # Relative to the largest value of each quantity over the run: errors of the integration at STEPS steps, and of the sums of the impulses, which
 # nearly cancel between two fixed ends.
@@ -155,16 +152,5 @@ def rows(flexbody, scratch):
     return found
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--flexbody", type=Path, default=ROOT / "target/release/flexbody")
-    args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch:
-        found = rows(args.flexbody, Path(scratch))
-    for row in found:
-        print(f"{row.what:90} {row.found:.1e} (limit {row.limit:.0e})")
-    sys.exit(not all(row.good() for row in found))
-
-
 if __name__ == "__main__":
-    main()
+    compare_alone(__doc__, rows)

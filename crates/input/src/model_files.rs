@@ -498,11 +498,7 @@ impl Region {
         match *self {
             Self::Box { min, max } => Vector3::from_fn(|k, _| beyond(x[k], min[k], max[k])).norm(),
             Self::Cylinder { from, to, radius } => {
-                let (from, to, x) = (Vector3::from(from), Vector3::from(to), Vector3::from(x));
-                let length = (to - from).norm();
-                let axis = (to - from) / length;
-                let along = (x - from).dot(&axis);
-                let away = (x - from - along * axis).norm();
+                let [along, away, length] = beside_axis(from, to, x);
                 beyond(along, 0.0, length).hypot(beyond(away, radius[0], radius[1]))
             }
             Self::Plane { point, normal, within } => {
@@ -540,11 +536,7 @@ impl Region {
         match *self {
             Self::Box { min, max } => (0..3).all(|k| (min[k]..=max[k]).contains(&x[k])),
             Self::Cylinder { from, to, radius } => {
-                let (from, to, x) = (Vector3::from(from), Vector3::from(to), Vector3::from(x));
-                let length = (to - from).norm();
-                let axis = (to - from) / length;
-                let along = (x - from).dot(&axis);
-                let away = (x - from - along * axis).norm();
+                let [along, away, length] = beside_axis(from, to, x);
                 // Ends and surfaces belong to the region, whatever the rounding of the coordinates.
                 let slack = 1e-9 * (length + radius[1]);
                 (-slack..=length + slack).contains(&along)
@@ -557,6 +549,16 @@ impl Region {
             Self::Nearest { .. } => false,
         }
     }
+}
+
+/// Returns the distance of the point `x` from `from` along the axis that ends at `to`, its distance from the axis, and the
+/// length of the axis.
+fn beside_axis(from: [f64; 3], to: [f64; 3], x: [f64; 3]) -> [f64; 3] {
+    let (from, to, x) = (Vector3::from(from), Vector3::from(to), Vector3::from(x));
+    let length = (to - from).norm();
+    let axis = (to - from) / length;
+    let along = (x - from).dot(&axis);
+    [along, (x - from - along * axis).norm(), length]
 }
 
 #[cfg(test)]

@@ -248,8 +248,9 @@ fn rows_of_a_simulation_are_those_of_its_table() {
     assert_rows_of_tables(place);
 }
 
-/// The same of a body with columns of damping forces and of the inertia of the deformation. A table without the rates that
-/// these depend on gives the rows without them, with a warning; one of a carried body needs its carrier.
+/// The rows of `simulate` are those of its table also for a body with columns of damping forces and of the inertia of the
+/// deformation. A table without the rates gives the rows without these forces, with a warning; the table of a carried body
+/// needs its carrier.
 #[test]
 fn rows_with_forces_of_motion_are_those_of_the_table() {
     let (folder, _) = folder();

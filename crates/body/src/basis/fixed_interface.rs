@@ -25,8 +25,8 @@ pub struct FixedInterface {
     /// if the stiffness in interface coordinates holds the eigenvalues, and for files up to 1.10. Unit:
     /// 1/time^2.
     pub eigenvalues: Vec<f64>,
-    /// Estimates of the free body; `None` if the modes are held at an interface or combined anew, so that
-    /// they do not belong to the modes of the free body.
+    /// Estimated eigenvalues of the free body; the field is `None` if the modes are held at an interface or
+    /// combined anew, and are no modes of the free body.
     pub free: Option<FreeEstimate>,
 }
 

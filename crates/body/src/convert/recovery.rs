@@ -227,15 +227,20 @@ impl<'m> FreeBasis<'m> {
             (pencil.apply_mass(self.modes.as_ref()), pencil.apply_stiffness(self.modes.as_ref()));
         let mass = gram(self.modes.as_ref(), inertial.as_ref());
         let modal = gram(self.modes.as_ref(), forces.as_ref());
-        let resultants = gram(self.rigid.as_ref(), forces.as_ref());
-        let beside_rigid =
-            forces - combine(pencil.apply_mass(self.rigid.as_ref()).as_ref(), resultants.as_ref());
+        let beside_rigid = self.beside_rigid(forces);
         [(inertial, &mass), (elastic, &self.stiffness)].map(|(balanced, matrix)| {
             let amplitudes =
                 solve(matrix, &modal).expect("mass and stiffness of modes are positive definite");
             // Inner forces of rigid interfaces do not deform the body.
             self.coupled.restrict(&beside_rigid - combine(balanced.as_ref(), amplitudes.as_ref()))
         })
+    }
+
+    /// Returns F - M R R'F: nodal forces (N x m) less those that accelerate the body rigidly.
+    fn beside_rigid(&self, forces: &Mat<f64>) -> Mat<f64> {
+        let resultants = gram(self.rigid.as_ref(), forces.as_ref());
+        let inertial = self.coupled.model().pencil().apply_mass(self.rigid.as_ref());
+        forces - combine(inertial.as_ref(), resultants.as_ref())
     }
 
     /// Removes rigid motion from fields (N x m): the part that rounding leaves.
@@ -289,10 +294,7 @@ impl<'m> FreeBasis<'m> {
         let accelerations = |modal: &Mat<f64>| {
             solve(&mass, modal).expect("the mass of independent modes is positive definite")
         };
-        let mut forces = loads.forces.clone();
-        let resultants = gram(self.rigid.as_ref(), forces.as_ref());
-        let of_rigid = combine(pencil.apply_mass(self.rigid.as_ref()).as_ref(), resultants.as_ref());
-        forces -= of_rigid;
+        let forces = self.beside_rigid(&loads.forces);
         let modal = accelerations(&loads.modal(&self.modes, groups));
         let columns = gram(side.as_ref(), forces.as_ref()) - combine(of_inertia.as_ref(), modal.as_ref());
         (combine(of_inertia.as_ref(), accelerations(&self.stiffness).as_ref()), columns)

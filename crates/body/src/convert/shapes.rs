@@ -65,9 +65,9 @@ pub fn recovery_shapes(
     deformed_inertia: bool,
     context: &Context<'_>,
 ) -> Result<RecoveryShapes> {
-    let basis = basis_of(body, model)?;
-    context.phase("static responses");
     let (groups, vectors) = (body.groups(), vectors_of(body, model)?);
+    let basis = basis_of(body, model, &vectors)?;
+    context.phase("static responses");
     let loads = StaticLoads::new(model, &basis, &vectors, deformed_inertia)?;
     let mut responses = basis.responses(&loads, body.modes().eigenvalue[0], groups, context)?;
     let sizes = basis.sizes_of_responses(&responses, &loads, groups);
@@ -93,7 +93,7 @@ pub fn recovery_shapes(
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) if the body is not of `model`; failures of the factor.
 pub fn load_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) -> Result<RecoveryShapes> {
-    let basis = basis_of(body, model)?;
+    let basis = basis_of(body, model, &vectors_of(body, model)?)?;
     context.phase("static responses");
     let loads = StaticLoads::of_model(model)?;
     let mut responses = basis.whole_responses(&loads, body.modes().eigenvalue[0], context)?;
@@ -116,12 +116,11 @@ pub fn load_shapes(body: &FlexBody, model: &FeModel, context: &Context<'_>) -> R
     Ok(scaled(model, &columns, &responses, &kept))
 }
 
-/// Returns the modes of `body` as fields of `model`.
+/// Returns the modes `vectors` of `body` as fields of `model`.
 ///
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) if the body is not of `model`.
-fn basis_of<'m>(body: &FlexBody, model: &'m FeModel) -> Result<FreeBasis<'m>> {
-    let vectors = vectors_of(body, model)?;
+fn basis_of<'m>(body: &FlexBody, model: &'m FeModel, vectors: &Mat<f64>) -> Result<FreeBasis<'m>> {
     let stored = body.invariants().modal_stiffness();
     let computed = gram(vectors.as_ref(), model.pencil().apply_stiffness(vectors.as_ref()).as_ref());
     let apart = largest_entry((&computed - stored).as_ref());
@@ -129,10 +128,13 @@ fn basis_of<'m>(body: &FlexBody, model: &'m FeModel) -> Result<FreeBasis<'m>> {
     if apart.is_nan() || apart > allowed {
         return Err(incomparable("the stiffness of the body's modes is not that of the model"));
     }
-    FreeBasis::new(model, &vectors, stored.clone())
+    FreeBasis::new(model, vectors, stored.clone())
 }
 
 /// Returns the modes of `body` by the rows of `model` (N x nf), in the frame of the body and along the axes of the model.
+///
+/// # Errors
+/// [`BodyIncomparable`](Code::BodyIncomparable) if the body has other nodes or rows than `model`.
 fn vectors_of(body: &FlexBody, model: &FeModel) -> Result<Mat<f64>> {
     let vectors = (body.nodes().ids == model.nodes().ids).then(|| body.vectors_of(model)).flatten();
     vectors.ok_or_else(|| incomparable("the nodes and rows of the body are not those of the model"))

@@ -10,7 +10,7 @@
 //! with the angular acceleration alpha, C_kk = S_k S_k and C_kl = S_k S_l + S_l S_k. The rows of a recovery in their static
 //! responses outside the modes are columns beside those of loads and spin.
 
-use super::{LoadKind, Recovery};
+use super::{LoadKind, Recovery, UnitLoad};
 use crate::invariants::{Invariants, TermGroups};
 use faer::Mat;
 use flexbody_linalg::side_by_side;
@@ -119,20 +119,33 @@ impl MotionLoad {
 
     /// Writes the amplitudes of the forces to `to` (components x nf): those of all modes for each component.
     pub fn write_amplitudes(self, motion: &ModalMotion<'_>, to: &mut [f64]) {
+        let nf = motion.q.len();
+        for (at, to) in to.iter_mut().enumerate() {
+            *to = self.amplitude(motion, at / nf, at % nf);
+        }
+    }
+
+    /// Returns the amplitude of the force of one mode (counted from 0).
+    pub fn amplitude(self, motion: &ModalMotion<'_>, component: usize, mode: usize) -> f64 {
         let ModalMotion { q, rate, acceleration, angular_velocity: w, angular_acceleration: alpha } = *motion;
-        let nf = q.len();
-        let of_mode = |all: &[f64], j: usize| all.get(j).copied().unwrap_or(0.0);
-        let amplitude = |component: usize, j: usize| match self {
-            Self::Damping => of_mode(rate, j),
-            Self::Acceleration => of_mode(acceleration, j),
-            Self::Turning => alpha[component] * q[j] + 2.0 * w[component] * of_mode(rate, j),
+        let of_mode = |all: &[f64]| all.get(mode).copied().unwrap_or(0.0);
+        match self {
+            Self::Damping => of_mode(rate),
+            Self::Acceleration => of_mode(acceleration),
+            Self::Turning => alpha[component] * q[mode] + 2.0 * w[component] * of_mode(rate),
             Self::Centrifugal => {
                 let (k, l) = LoadKind::SPIN[component];
-                w[k] * w[l] * q[j]
+                w[k] * w[l] * q[mode]
             }
-        };
-        for (at, to) in to.iter_mut().enumerate() {
-            *to = amplitude(at / nf, at % nf);
+        }
+    }
+
+    /// Returns the coefficients of each old component in all new ones, for vectors along the columns of `axes`.
+    fn along(self, axes: &Matrix3<f64>) -> Vec<Vec<f64>> {
+        match self {
+            Self::Damping | Self::Acceleration => vec![vec![1.0]],
+            Self::Turning => axes.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            Self::Centrifugal => spin_along(axes),
         }
     }
 }
@@ -152,17 +165,10 @@ impl MotionColumns {
     /// Returns the columns for vectors along the columns of `axes`.
     pub(super) fn in_axes(&self, axes: &Matrix3<f64>) -> Self {
         let (components, nf) = (self.load.components(), self.modes());
-        // Coefficients of the old components in each new one.
-        let coefficient = |from: usize, to: usize| match self.load {
-            MotionLoad::Damping | MotionLoad::Acceleration => 1.0,
-            MotionLoad::Turning => axes[(from, to)],
-            MotionLoad::Centrifugal => {
-                super::UnitLoad { kind: LoadKind::Spin, component: from }.along(axes)[to]
-            }
-        };
+        let coefficients = self.load.along(axes);
         let entry = |i: usize, at: usize| -> f64 {
             let (to, j) = (at / nf, at % nf);
-            (0..components).map(|from| coefficient(from, to) * self.columns[(i, from * nf + j)]).sum()
+            (0..components).map(|from| coefficients[from][to] * self.columns[(i, from * nf + j)]).sum()
         };
         Self { columns: Mat::from_fn(self.columns.nrows(), components * nf, entry), ..*self }
     }
@@ -215,20 +221,31 @@ impl MotionLoad {
     /// rotation about axis `l` in place of a mode consist of, beside forces M B x of rigid motions, which have no static
     /// response; `None` where there is nothing else.
     fn of_rotation(self, component: usize, l: usize) -> Option<[f64; 6]> {
-        let s = |k: usize| Vector3::<f64>::ith(k, 1.0).cross_matrix();
         match self {
             Self::Damping | Self::Acceleration => None,
-            Self::Turning => Some(spin_amplitudes(&(s(component) * s(l)))),
-            Self::Centrifugal => Some(spin_amplitudes(&(spin_matrix(component) * s(l)))),
+            Self::Turning => Some(spin_amplitudes(&(turning(component) * turning(l)))),
+            Self::Centrifugal => Some(spin_amplitudes(&(spin_matrix(component) * turning(l)))),
         }
     }
 }
 
+/// Returns the coefficients of each product of the angular velocity, in the order of [`LoadKind::SPIN`], in the products of
+/// its components along the columns of `axes`.
+pub(super) fn spin_along(axes: &Matrix3<f64>) -> Vec<Vec<f64>> {
+    let product = |component| UnitLoad { kind: LoadKind::Spin, component }.along(axes);
+    (0..LoadKind::SPIN.len()).map(product).collect()
+}
+
+/// Returns S_k, the matrix of the cross product with e_k.
+fn turning(k: usize) -> Matrix3<f64> {
+    Vector3::ith(k, 1.0).cross_matrix()
+}
+
 /// Returns C_kl of the component (k, l) of the spin.
 fn spin_matrix(component: usize) -> Matrix3<f64> {
-    let s = |k: usize| Vector3::<f64>::ith(k, 1.0).cross_matrix();
     let (k, l) = LoadKind::SPIN[component];
-    if k == l { s(k) * s(k) } else { s(k) * s(l) + s(l) * s(k) }
+    let product = turning(k) * turning(l);
+    if k == l { product } else { product + turning(l) * turning(k) }
 }
 
 /// Returns the factors a_kl of the symmetric part of B = sum_{k <= l} a_kl C_kl: a_kl = B_kl + B_lk over two, and a_kk =
@@ -253,7 +270,6 @@ pub(super) fn modal_forces(
     taken: &Mat<f64>,
 ) -> Option<Mat<f64>> {
     let nf = invariants.n_modes();
-    let s = |k: usize| Vector3::<f64>::ith(k, 1.0).cross_matrix();
     match load {
         MotionLoad::Damping => Some(Mat::from_fn(nf, nf, |i, j| -damping[(i, j)])),
         MotionLoad::Acceleration => {
@@ -266,7 +282,7 @@ pub(super) fn modal_forces(
         MotionLoad::Turning => {
             let w3 = invariants.w3()?;
             let entry = |i: usize, at: usize| {
-                let rigid = rigid_products(invariants, &s(at / nf), at % nf);
+                let rigid = rigid_products(invariants, &turning(at / nf), at % nf);
                 -w3[(at, i)] + (0..6).map(|a| taken[(a, i)] * rigid[a]).sum::<f64>()
             };
             Some(Mat::from_fn(nf, 3 * nf, entry))
@@ -297,7 +313,7 @@ fn rigid_products(invariants: &Invariants, b: &Matrix3<f64>, j: usize) -> [f64; 
     let shift = b * c1;
     std::array::from_fn(|a| match a.checked_sub(3) {
         None => shift[a],
-        Some(k) => weighed(&(Vector3::<f64>::ith(k, 1.0).cross_matrix().transpose() * b)),
+        Some(k) => weighed(&(turning(k).transpose() * b)),
     })
 }
 

@@ -9,8 +9,8 @@
 //! terms: G M (rigid motion) = 0. Damping forces and the inertia of the deformation have the columns of [`MotionLoad`].
 
 use super::modal_change::{ModalChange, RigidCoupling};
-use super::motion_columns::{modal_forces, modes_respond};
-use super::{FlexBody, LoadKind, ModalMotion, MotionColumns, MotionLoad, NamedLoad, TermGroups, UnitLoad};
+use super::motion_columns::{modal_forces, modes_respond, spin_along};
+use super::{FlexBody, LoadKind, ModalMotion, MotionColumns, MotionLoad, NamedLoad, TermGroups};
 use crate::invariants::Invariants;
 use faer::Mat;
 use flexbody_model::RecoveryRow;
@@ -110,9 +110,9 @@ impl Recovery {
 
     /// Returns the recovery for loads and angular velocities along the columns of `axes` (given in the present axes).
     pub(crate) fn in_axes(&self, axes: &Matrix3<f64>) -> Self {
+        let coefficients = spin_along(axes);
         let spin = |i: usize, to: usize| -> f64 {
-            let coefficient = |component: usize| UnitLoad { kind: LoadKind::Spin, component }.along(axes)[to];
-            (0..LoadKind::SPIN.len()).map(|from| self.spin[(i, from)] * coefficient(from)).sum()
+            (0..LoadKind::SPIN.len()).map(|from| self.spin[(i, from)] * coefficients[from][to]).sum()
         };
         let turned = |columns: &Mat<f64>| {
             Mat::from_fn(columns.nrows(), LOAD_COMPONENTS, |i, a| {

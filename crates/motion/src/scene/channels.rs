@@ -14,7 +14,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, MotionLoad};
 use flexbody_model::{LoadKind, ShapeSteps, UnitLoad};
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Name of the channel of the values at rest.
 const AT_REST: &str = "constant";
@@ -43,8 +43,8 @@ enum Source {
     /// Index of the named load of the history.
     Amplitude(usize),
     Preload,
-    /// Force of motion: its place among the amplitudes of its kind.
-    Motion(MotionLoad, usize),
+    /// Force of motion of a kind: its component and its mode.
+    Motion(MotionLoad, usize, usize),
     /// Load that the history does not have.
     Unloaded,
 }
@@ -66,7 +66,9 @@ impl LoadedHistory {
             Source::Load(at, component) => self.loads[at].values[i][component / 3][component % 3],
             Source::Amplitude(at) => self.named[at].values[i],
             Source::Preload => 1.0,
-            Source::Motion(load, place) => self.amplitude_of_motion(body, load, place, i),
+            Source::Motion(load, component, mode) => {
+                load.amplitude(&self.motion(i, &Matrix3::identity()), component, mode)
+            }
             Source::Unloaded => 0.0,
         };
         let at = |i: usize| {
@@ -115,10 +117,7 @@ impl LoadedHistory {
                 let message =
                     format!("step `{name}` depends on the angular velocity, whose columns are missing");
                 let help = "write angular_velocity_x, _y, _z along the axes of the model, or zeros for a body that does not turn";
-                return Err(Diagnostic::new(Code::SeriesColumn, message)
-                    .in_file(&self.path)
-                    .with_help(help)
-                    .into());
+                return Err(self.lacks_columns(message, help));
             }
             return Ok(Source::Spin(k, l));
         }
@@ -134,30 +133,27 @@ impl LoadedHistory {
             let acting = own.map_or(Source::Unloaded, Source::Amplitude);
             return Ok(if load.preload { Source::Preload } else { acting });
         }
-        if let Some((load, place)) = motion_step(name, body.n_modes()) {
+        if let Some((load, component, mode)) = motion_step(name, body.n_modes()) {
             let lacking = self.missing_for(load);
             if !lacking.is_empty() {
                 let message =
                     format!("step `{name}` depends on the columns {}, which are missing", lacking.join(", "));
                 let help = "write these columns to the table of the run, as `simulate --csv` does";
-                return Err(Diagnostic::new(Code::SeriesColumn, message)
-                    .in_file(&self.path)
-                    .with_help(help)
-                    .into());
+                return Err(self.lacks_columns(message, help));
             }
-            return Ok(Source::Motion(load, place));
+            return Ok(Source::Motion(load, component, mode));
         }
         Err(foreign(format!("step `{name}` is no mode and no load of the body")).into())
     }
 }
 
-/// Returns the kind of force of motion that a step is, and its place among the amplitudes of its kind.
-fn motion_step(name: &str, n_modes: usize) -> Option<(MotionLoad, usize)> {
+/// Returns the kind of force of motion that a step is, its component and its mode.
+fn motion_step(name: &str, n_modes: usize) -> Option<(MotionLoad, usize, usize)> {
     let mode =
         name.rsplit_once(" of mode ")?.1.parse::<usize>().ok()?.checked_sub(1).filter(|j| *j < n_modes)?;
     let component =
         |load: MotionLoad| (0..load.components()).find(|&component| load.step(component, mode) == name);
-    MotionLoad::ALL.into_iter().find_map(|load| Some((load, component(load)? * n_modes + mode)))
+    MotionLoad::ALL.into_iter().find_map(|load| Some((load, component(load)?, mode)))
 }
 
 /// Refuses steps of another body.

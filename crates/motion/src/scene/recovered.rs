@@ -277,7 +277,7 @@ impl LoadedHistory {
 
     /// Returns the motion at the instant `i`, along the rows of `axes` (given in the axes of the model). Rates that the
     /// history does not have are zero.
-    fn motion(&self, i: usize, axes: &Matrix3<f64>) -> ModalMotion<'_> {
+    pub(super) fn motion(&self, i: usize, axes: &Matrix3<f64>) -> ModalMotion<'_> {
         let vector =
             |all: &Option<Vec<Vector3<f64>>>| all.as_ref().map_or_else(Vector3::zeros, |all| axes * all[i]);
         ModalMotion {
@@ -287,19 +287,6 @@ impl LoadedHistory {
             angular_velocity: vector(&self.angular_velocity),
             angular_acceleration: vector(&self.angular_acceleration),
         }
-    }
-
-    /// Returns an amplitude of the forces of motion of one kind at the instant `i`, along the axes of the model.
-    pub(super) fn amplitude_of_motion(
-        &self,
-        body: &FlexBody,
-        load: MotionLoad,
-        place: usize,
-        i: usize,
-    ) -> f64 {
-        let mut amplitudes = vec![0.0; load.components() * body.n_modes()];
-        load.write_amplitudes(&self.motion(i, &Matrix3::identity()), &mut amplitudes);
-        amplitudes[place]
     }
 
     /// Returns the columns that forces of motion depend on and that the history does not have.
@@ -350,7 +337,12 @@ impl LoadedHistory {
             SPIN_COLUMNS.join(", ")
         );
         let help = "write the angular velocity of the body along the axes of the model, or zeros for a body that does not turn";
-        Err(Diagnostic::new(Code::SeriesColumn, message).in_file(&self.path).with_help(help).into())
+        Err(self.lacks_columns(message, help))
+    }
+
+    /// Returns an error about columns that the history lacks.
+    pub(super) fn lacks_columns(&self, message: String, help: &str) -> Error {
+        Diagnostic::new(Code::SeriesColumn, message).in_file(&self.path).with_help(help).into()
     }
 
     /// Refuses torques at interfaces whose nodes do not determine a rotation.

@@ -119,11 +119,9 @@ impl BodyComparison {
             .map(|pair| format!("{} is {}", pair.mode_a, pair.mode_b))
             .collect();
         if self.paired == Pairing::Shape && !moved.is_empty() {
-            let (some, rest) = moved.split_at(moved.len().min(MAX_NAMED));
-            let more = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
             self.notes.push(format!(
-                "by their shapes, modes of the first body have another order in the second: {}{more}",
-                some.join(", ")
+                "by their shapes, modes of the first body have another order in the second: {}",
+                first_of(&moved)
             ));
         }
         let strangers: Vec<String> = self
@@ -133,12 +131,9 @@ impl BodyComparison {
             .map(|pair| pair.mode_a.to_string())
             .collect();
         if self.paired == Pairing::Order && self.same_nodes {
-            let (some, rest) = strangers.split_at(strangers.len().min(MAX_NAMED));
-            let more = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
-            let whose = if some.is_empty() {
-                "some modes".to_owned()
-            } else {
-                format!("modes {}{more}", some.join(", "))
+            let whose = match strangers.is_empty() {
+                true => "some modes".to_owned(),
+                false => format!("modes {}", first_of(&strangers)),
             };
             self.notes.push(format!(
                 "the modes are paired by their frequencies: {whose} of the first body have the shape of none of their partners, and their differences are not those of one mode"
@@ -160,6 +155,13 @@ impl BodyComparison {
 /// Returns true if two pairs have opposite orders in the two bodies.
 fn crosses(one: &ModePair, other: &ModePair) -> bool {
     (one.mode_a < other.mode_a) != (one.mode_b < other.mode_b) && one.mode_a != other.mode_a
+}
+
+/// Returns the first entries, as many as a note names, and the number of the others.
+fn first_of(all: &[String]) -> String {
+    let (some, rest) = all.split_at(all.len().min(MAX_NAMED));
+    let more = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
+    some.join(", ") + &more
 }
 
 /// Number of modes that a note names.
