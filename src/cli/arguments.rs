@@ -275,16 +275,19 @@ pub struct ExportArguments {
     pub printing: Printing,
 }
 
-/// Returns the names of the formats, each with the programs that read it and its dialects.
+/// Returns the names of the formats, each with the programs that read it and its dialects. Adams passes, so that the message about its
+/// format is that of [`find_format`](flexbody_formats::find_format).
 fn export_formats() -> clap::builder::PossibleValuesParser {
     let value = |format: &&dyn ExportFormat| {
         let dialects = match format.dialects() {
             [] => String::new(),
             dialects => format!(" (dialects: {})", dialects.join(", ")),
         };
-        PossibleValue::new(format.name()).help(format!("{}{dialects}", format.reader()))
+        let named = PossibleValue::new(format.name()).aliases(format.other_names());
+        named.help(format!("{}{dialects}", format.reader()))
     };
-    FORMATS.iter().map(value).collect::<Vec<_>>().into()
+    let adams = PossibleValue::new("adams").alias("mnf").hide(true);
+    FORMATS.iter().map(value).chain([adams]).collect::<Vec<_>>().into()
 }
 
 /// Arguments of `audit`.

@@ -178,7 +178,7 @@ codes! {
     RotationsFollow = "FB427", Note, Done, "rotations without stiffness and mass follow the nodes around them", "nothing to do for shells without drilling stiffness: no frequency and no displacement depends on these rotations";
     InterfaceCoupling = "FB430", Error, BadInput, "interface cannot be coupled to its reference point", "give the interface three nodes that do not lie on one line (two in the plane), or another coupling";
     InterfaceShared = "FB431", Error, BadInput, "interfaces share nodes", "assign each shared node to one interface";
-    InterfaceFit = "FB432", Warning, Done, "interface declared rigid deforms in the modes", "use --basis craig-bampton, or declare the interface averaging";
+    InterfaceFit = "FB432", Warning, Done, "interface declared rigid deforms in the modes", "convert with --basis craig-bampton (select, trade and simulate take the body file), or declare the interface averaging";
     MassOrder = "FB433", Error, BadInput, "mass matrix couples nodes that the stiffness matrix does not: its rows are in another order, or it belongs to another mesh", "write K and M from the same analysis in the same order; --allow-implausible (or allow_implausible in [model]) if the model is meant so";
     MassPairs = "FB434", Warning, Done, "mass matrix couples nodes that the stiffness matrix does not", "nothing to do if the model is meant so; else write K and M in the same order";
     MassesExchanged = "FB435", Warning, Done, "masses of nodes seem to be exchanged", "write K and M in the same order of nodes";
@@ -201,6 +201,7 @@ codes! {
     GeometricStiffnessUnstressed = "FB452", Error, BadInput, "matrix with stress is the stiffness without it", "assemble the stiffness after the stress, with the stress of a larger load";
     RecoveryCorners = "FB453", Note, Done, "stresses at nodes are means over the corners of their elements", "nothing to do in a part of one material; where materials meet, request the elements of each material alone and give a recovery for each";
     InterfacesUncompared = "FB454", Note, Done, "interfaces of the body are not stated like this by the model that it is checked against", "state them by --interface NAME=NODES,COUPLING, or by [[interface]] in the manifest, to compare them";
+    SectionAbout = "FB455", Note, Done, "moments of a section are about the origin of the model", "state the point: about = [x, y, z] in its [[recovery]], in model axes";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";

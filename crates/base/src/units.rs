@@ -18,6 +18,11 @@ impl Unit {
         self.to_si
     }
 
+    /// Returns the name, or the size in brackets, such as `[0.2 m]`, if that is the name.
+    fn name_or_size(&self, si: &str) -> String {
+        if self.name.parse::<f64>().is_ok() { format!("[{} {si}]", self.name) } else { self.name.clone() }
+    }
+
     fn parse(text: &str, table: &[(&str, f64)]) -> Option<Self> {
         let to_si = table
             .iter()
@@ -27,6 +32,10 @@ impl Unit {
         Some(Self { name: text.to_owned(), to_si })
     }
 }
+
+/// SI prefixes by power of ten.
+const PREFIXES: [(i32, &str); 8] =
+    [(-12, "p"), (-9, "n"), (-6, "\u{b5}"), (-3, "m"), (0, ""), (3, "k"), (6, "M"), (9, "G")];
 
 const LENGTH: &[(&str, f64)] =
     &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("km", 1e3), ("in", 0.0254), ("ft", 0.3048)];
@@ -87,6 +96,57 @@ impl UnitSystem {
     pub fn eigenvalue_of(&self, frequency_hz: f64) -> f64 {
         (std::f64::consts::TAU * frequency_hz / self.hertz()).powi(2)
     }
+}
+
+// Names of derived units in common notation: mJ, N mm and mm/s^2 instead of powers of the units of a model.
+impl UnitSystem {
+    /// Returns the unit of mass: `t`, or `[0.2 kg]` for a unit that is given by its size.
+    pub fn mass_name(&self) -> String {
+        if self.mass.name == "tonne" { "t".to_owned() } else { self.mass.name_or_size("kg") }
+    }
+
+    /// Returns the unit of length: `mm`, or `[0.2 m]` for a unit that is given by its size.
+    pub fn length_name(&self) -> String {
+        self.length.name_or_size("m")
+    }
+
+    /// Returns the unit of time: `s`, or `[0.2 s]` for a unit that is given by its size.
+    pub fn time_name(&self) -> String {
+        self.time.name_or_size("s")
+    }
+
+    /// Returns the unit of energy: `mJ`, or `lb in^2/s^2` if no prefix fits.
+    pub fn energy_name(&self) -> String {
+        let named = prefix(self.in_si(2)).map(|prefix| format!("{prefix}J"));
+        named.unwrap_or_else(|| {
+            format!("{} {}^2/{}^2", self.mass_name(), self.length_name(), self.time_name())
+        })
+    }
+
+    /// Returns the unit of force: `N`, or `lb in/s^2` if no prefix fits.
+    pub fn force_name(&self) -> String {
+        let named = prefix(self.in_si(1)).map(|prefix| format!("{prefix}N"));
+        named.unwrap_or_else(|| format!("{} {}/{}^2", self.mass_name(), self.length_name(), self.time_name()))
+    }
+
+    /// Returns the unit of moments of forces: `N mm`, or `lb in^2/s^2` if no prefix fits.
+    pub fn moment_name(&self) -> String {
+        match prefix(self.in_si(1)) {
+            Some(prefix) => format!("{prefix}N {}", self.length_name()),
+            None => format!("{} {}^2/{}^2", self.mass_name(), self.length_name(), self.time_name()),
+        }
+    }
+
+    /// Returns mass length^power / time^2 in kg m^power / s^2.
+    fn in_si(&self, power: i32) -> f64 {
+        self.mass.to_si * self.length.to_si.powi(power) / self.time.to_si.powi(2)
+    }
+}
+
+/// Returns the SI prefix of a factor.
+fn prefix(factor: f64) -> Option<&'static str> {
+    let fits = |power: i32| (factor / 10f64.powi(power) - 1.0).abs() < 1e-9;
+    PREFIXES.iter().find(|(power, _)| fits(*power)).map(|(_, prefix)| *prefix)
 }
 
 impl Default for UnitSystem {

@@ -15,6 +15,7 @@ use crate::invariants::{
 use faer::{Mat, Scale};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::numbers::significant;
 use flexbody_eigen::{relative_residual, residual_scale, rounding_residual};
 use flexbody_linalg::{SymmetricMatrix, gram, larger, largest, largest_entry, side_by_side};
 use flexbody_model::{CheckedModel, Damping, FeModel, GeometricStiffness, RawModel, UnitLoad};
@@ -493,9 +494,19 @@ fn rigid_inertia_error(body: &FlexBody, found: &Mat<f64>) -> f64 {
 }
 
 /// Returns a warning for every file in the provenance of `body` whose fingerprint differs from that of the
-/// model.
-pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
+/// model; that of a mass file states both masses if they differ.
+fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
     let files = &body.source().files;
+    let masses = || {
+        let (now, before) = (rigid_mass(model, body.frame())[(0, 0)], body.invariants().mass());
+        let unit = body.units().mass_name();
+        let both = format!(
+            ": mass {} {unit} now, {} {unit} in the body",
+            significant(now, 6),
+            significant(before, 6)
+        );
+        if (now - before).abs() > MAX_RECOMPUTED_DIFFERENCE * before { both } else { String::new() }
+    };
     files
         .iter()
         .enumerate()
@@ -504,9 +515,11 @@ pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
             let before = files[..i].iter().filter(|other| other.role == file.role).count();
             let now = model.sources().iter().filter(|other| other.role == file.role).nth(before)?;
             (now.sha256 != file.sha256).then(|| {
+                let renamed = if now.name == file.name { String::new() } else { format!(" {}", file.name) };
+                let masses = if file.role == "mass" { masses() } else { String::new() };
                 let message = format!(
-                    "{} file {} differs from {}, of which the body was made",
-                    file.role, now.name, file.name
+                    "{} file {} differs from the file{renamed} that the body was made of{masses}",
+                    file.role, now.name
                 );
                 Diagnostic::new(Code::BodySourceChanged, message)
             })

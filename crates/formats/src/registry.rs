@@ -40,15 +40,27 @@ pub const FORMATS: &[&dyn ExportFormat] = &[
     &Gltf,
 ];
 
-/// Returns the export format with this name.
+/// Names under which the format of Adams may be asked for.
+const ADAMS: [&str; 2] = ["adams", "mnf"];
+
+/// Returns the export format with this name, or that of a program with this name.
 ///
 /// # Errors
-/// [`Usage`](Code::Usage) for an unknown name, with the known names.
+/// [`Usage`](Code::Usage) for an unknown name, with the known names, and for Adams, whose format is not written.
 pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
-    FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
-        let names: Vec<&str> = FORMATS.iter().map(|format| format.name()).collect();
-        let message = format!("`{name}` is not an export format");
-        Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
+    let called = |format: &&dyn ExportFormat| format.name() == name || format.other_names().contains(&name);
+    FORMATS.iter().copied().find(called).ok_or_else(|| {
+        let (message, help) = if ADAMS.contains(&name) {
+            (
+                "modal neutral files (MNF) of Adams are proprietary and are not written".to_owned(),
+                "export to adams-invariants to compare the nine invariants of an MNF with those of the body"
+                    .to_owned(),
+            )
+        } else {
+            let names: Vec<&str> = FORMATS.iter().map(|format| format.name()).collect();
+            (format!("`{name}` is not an export format"), names.join(", "))
+        };
+        Diagnostic::new(Code::Usage, message).with_help(help).into()
     })
 }
 

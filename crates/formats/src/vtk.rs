@@ -29,6 +29,10 @@ impl ExportFormat for Vtk {
         "ParaView, PyVista, VisIt: modes to warp by (.vtu), or a motion (.pvd)"
     }
 
+    fn other_names(&self) -> &'static [&'static str] {
+        &["paraview", "pyvista", "visit"]
+    }
+
     fn has_points(&self) -> bool {
         true
     }

@@ -144,8 +144,8 @@ pub enum OperatorSource {
     Cut {
         /// Nodes on this side.
         nodes: InterfaceNodes,
-        /// Point that the moments are about.
-        about: [f64; 3],
+        /// Point that the moments are about; `None` if none is stated, which means the origin.
+        about: Option<[f64; 3]>,
     },
 }
 

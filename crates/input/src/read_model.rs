@@ -502,8 +502,14 @@ impl<'m> NodeLookup<'m> {
                     InterfaceNodes::File(path) => path.clone(),
                     _ => files.manifest.clone().unwrap_or_default(),
                 };
-                let operator = RecoveryOperator::Cut { nodes, about: *about };
-                Ok((ModelRecovery { name, operator, path, deformed_inertia }, Vec::new()))
+                let operator = RecoveryOperator::Cut { nodes, about: about.unwrap_or_default() };
+                let assumed = about.is_none().then(|| {
+                    let message = format!(
+                        "recovery `{name}`: moments of the section are about the origin of the model"
+                    );
+                    Diagnostic::new(Code::SectionAbout, message).in_file(&path)
+                });
+                Ok((ModelRecovery { name, operator, path, deformed_inertia }, assumed.into_iter().collect()))
             }
         }
     }

@@ -38,7 +38,8 @@ impl std::fmt::Display for Recipe {
     /// Writes every step with its place, then the requirements of the model.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.steps.iter().try_for_each(|step| write!(f, "{}:\n\n{}\n\n", step.place, step.lines))?;
-        writeln!(f, "Mind: {}.", self.mind)
+        writeln!(f, "Mind: {}.\n", self.mind)?;
+        writeln!(f, "Joints: {JOINTS}.")
     }
 }
 
@@ -50,6 +51,9 @@ pub struct Step {
     /// Lines, without a newline after the last.
     pub lines: &'static str,
 }
+
+/// Options for the places where joints act, after any recipe.
+const JOINTS: &str = "for each set of nodes where a joint or a load acts add --interface NAME=SET,rigid to the last command, and --basis craig-bampton";
 
 /// Recipes of all FE programs.
 pub const RECIPES: &[Recipe] = &[CALCULIX, ABAQUS, ANSYS, NASTRAN];
@@ -64,7 +68,7 @@ const CALCULIX: Recipe = Recipe {
         Step { place: "Run, which writes job.sti, job.mas and job.dof", lines: "ccx -i job" },
         Step { place: "Convert", lines: "flexbody convert job.inp --units mm,t,s -o body.flex.h5" },
     ],
-    mind: "solid elements, no *BOUNDARY and no contact; --interface NAME=SET,rigid for the node sets where joints act",
+    mind: "solid elements, no *BOUNDARY and no contact",
 };
 
 const ABAQUS: Recipe = Recipe {

@@ -77,6 +77,25 @@ pub struct RecoveryRow {
     pub element: Option<i64>,
 }
 
+impl RecoveryRow {
+    /// Returns the rows of each quantity and unit, in the order of the first row of each. Values of rows of different units have
+    /// no common size.
+    pub fn by_unit(rows: &[Self]) -> Vec<Vec<usize>> {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for (at, row) in rows.iter().enumerate() {
+            let is_alike = |group: &&mut Vec<usize>| {
+                let first = &rows[group[0]];
+                (first.quantity, &first.unit) == (row.quantity, &row.unit)
+            };
+            match groups.iter_mut().find(is_alike) {
+                Some(group) => group.push(at),
+                None => groups.push(vec![at]),
+            }
+        }
+        groups
+    }
+}
+
 /// Shapes whose stresses an FE program has computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnsweredShapes {

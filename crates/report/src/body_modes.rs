@@ -14,9 +14,6 @@ use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::{FlexBody, Truncation};
 use flexbody_body::invariants::{CauchySchwarz, Invariants};
 
-/// Number of frequencies shown before the last.
-const FIRST_FREQUENCIES: usize = 6;
-
 /// Returns the section about the modes.
 pub(super) fn modes<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     let modes = &facts.modes;
@@ -45,13 +42,10 @@ pub(super) fn modes<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     blocks
 }
 
-/// Returns the first frequencies and the last: `812.5 812.5 1204 1890.2 2411 3020 ... 4412.5 Hz`.
-pub(super) fn first_and_last(hz: &[f64]) -> String {
+/// Returns all frequencies: `812.5 812.5 1204 1890.2 Hz`.
+fn all_of(hz: &[f64]) -> String {
     let (all, unit) = frequencies_of(hz, 5);
-    let last = all.last().filter(|_| hz.len() > FIRST_FREQUENCIES);
-    let dots = if hz.len() > FIRST_FREQUENCIES + 1 { " ..." } else { "" };
-    let last = last.map_or(String::new(), |last| format!("{dots} {last}"));
-    format!("{}{last} {unit}", all[..all.len().min(FIRST_FREQUENCIES)].join(" "))
+    format!("{} {unit}", all.join(" "))
 }
 
 /// Returns the terms about the modes in a text.
@@ -62,7 +56,7 @@ fn in_short(facts: &Facts<'_>) -> Vec<Term> {
     let residual = significant(modes.worst_residual, 2) + modes.residual_remark();
     let mut items = vec![
         Term::text("modes", format!("{} flexible, worst residual {residual}{accuracy}", modes.count)),
-        Term::text("frequency", first_and_last(&modes.frequency_hz)),
+        Term::text("frequency", all_of(&modes.frequency_hz)),
     ];
     let (body, reduced) = (facts.flex_body, modes.craig_bampton.as_ref());
     if let Some(basis) = body.basis_name().filter(|_| body.basis() != Some(BasisKind::Free)) {
@@ -70,7 +64,7 @@ fn in_short(facts: &Facts<'_>) -> Vec<Term> {
         items.push(Term::text("basis", format!("{basis}{made_of}")));
     }
     let held = reduced.and_then(CraigBamptonFacts::held_hz);
-    items.extend(held.map(|hz| Term::text("held", first_and_last(hz) + " (fixed-interface modes)")));
+    items.extend(held.map(|hz| Term::text("held", all_of(hz) + " (fixed-interface modes)")));
     // The modes of a Craig-Bampton body are combinations of several kinds of shapes.
     let share = if reduced.is_some() { " with the largest share of a " } else { ": " };
     items.extend(listed("origin", &modes.origins(), |(origin, count)| {

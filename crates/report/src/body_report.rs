@@ -105,7 +105,7 @@ fn properties(facts: &Facts<'_>) -> Vec<Term> {
         Term::new(
             "Inertia tensor",
             quantity(format!(
-                "{} {} (about the centre of mass, model axes)",
+                "{} {} (about the centre of mass, model axes; xy is -\u{222b}xy dm)",
                 tensor(&body.inertia_model),
                 units.inertia()
             )),
@@ -116,7 +116,11 @@ fn properties(facts: &Facts<'_>) -> Vec<Term> {
     ]);
     items.extend(extent(facts.flex_body).map(|extent| {
         let sides = extent.map(|x| significant(x, 4)).join(" × ");
-        Term::page("Extent of the nodes", format!("{sides} {length} (model axes)"))
+        let largest = significant(facts.flex_body.extent(), 4);
+        Term::page(
+            "Extent of the nodes",
+            format!("{sides} {length} (model axes); largest distance of two nodes {largest} {length}"),
+        )
     }));
     let origin = triple(&body.frame_origin, &length);
     items.push(

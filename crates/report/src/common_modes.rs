@@ -1,6 +1,7 @@
 //! Modes that two bodies have in common if one has fewer modes than the other.
 
 use super::numbers::{counted, frequency, frequency_range};
+use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::numbers::runs;
@@ -18,16 +19,22 @@ pub(super) struct CommonModes {
 
 impl CommonModes {
     /// Pairs every mode of the body with fewer modes with a mode of the other body, in ascending order, so
-    /// that the ratios of the frequencies deviate least. A mode that differs is thus compared with its
+    /// that frequencies and shapes deviate least. A mode that differs is thus compared with its
     /// neighbour and not reported as missing. For a repeated eigenvalue all modes are compared or none,
     /// because a part of its eigenspace is not determined.
     ///
+    /// * `assurance`: modal assurance criterion of each mode of `a` with each mode of `b`; `None` if shapes cannot be compared.
+    ///
     /// # Errors
     /// [`BodyIncomparable`](Code::BodyIncomparable) when no mode is left.
-    pub(crate) fn of(a: &FlexBody, b: &FlexBody) -> Result<Self> {
+    pub(crate) fn of(a: &FlexBody, b: &FlexBody, assurance: Option<&Mat<f64>>) -> Result<Self> {
         let (of_a, of_b) = (&a.modes().eigenvalue, &b.modes().eigenvalue);
-        let (fewer, more) = if of_a.len() <= of_b.len() { (of_a, of_b) } else { (of_b, of_a) };
-        let partners = partners(fewer, more);
+        let is_first = of_a.len() <= of_b.len();
+        let (fewer, more) = if is_first { (of_a, of_b) } else { (of_b, of_a) };
+        let partners = partners(fewer.len(), more.len(), |i, j| {
+            let shapes = assurance.map_or(1.0, |all| if is_first { all[(i, j)] } else { all[(j, i)] });
+            (fewer[i] / more[j]).ln().abs() + (1.0 - shapes)
+        });
         // Modes whose cluster in the larger body is complete among the partners.
         let (kept, split): (Vec<usize>, Vec<usize>) =
             (0..fewer.len()).partition(|&i| is_whole(more, &partners, partners[i]));
@@ -59,12 +66,10 @@ impl CommonModes {
     }
 }
 
-/// Returns for each of the `fewer` eigenvalues the index of its partner among `more` (both ascending): the
-/// ascending choice with the smallest sum of |ln(lambda_i / lambda_j)|, found by dynamic programming.
-fn partners(fewer: &[f64], more: &[f64]) -> Vec<usize> {
-    let (n, m) = (fewer.len(), more.len());
-    let distance = |i: usize, j: usize| (fewer[i] / more[j]).ln().abs();
-    // sums[i][j] is the smallest sum of the first i eigenvalues with partners among the first j.
+/// Returns for each of `n` modes the index of its partner among `m >= n` modes: the ascending choice with the smallest sum of
+/// distances, found by dynamic programming.
+fn partners(n: usize, m: usize, distance: impl Fn(usize, usize) -> f64) -> Vec<usize> {
+    // sums[i][j] is the smallest sum of the first i modes with partners among the first j.
     let mut sums = vec![vec![f64::INFINITY; m + 1]; n + 1];
     sums[0].fill(0.0);
     for i in 1..=n {
@@ -72,7 +77,7 @@ fn partners(fewer: &[f64], more: &[f64]) -> Vec<usize> {
             sums[i][j] = sums[i][j - 1].min(sums[i - 1][j - 1] + distance(i - 1, j - 1));
         }
     }
-    // Trace the choice back from the last eigenvalue.
+    // Trace the choice back from the last mode.
     let (mut found, mut j) = (vec![0; n], m);
     for i in (1..=n).rev() {
         while j > i && sums[i][j] == sums[i][j - 1] {
@@ -150,6 +155,9 @@ mod tests {
 
     #[test]
     fn partners_are_nearest_in_ascending_order() {
+        let partners = |fewer: &[f64], more: &[f64]| {
+            super::partners(fewer.len(), more.len(), |i, j| (fewer[i] / more[j]).ln().abs())
+        };
         assert_eq!(partners(&[1.0, 2.0], &[1.0, 2.0, 3.0]), [0, 1]);
         assert_eq!(partners(&[2.0, 9.0], &[1.0, 2.0, 3.0, 4.0, 9.0]), [1, 4]);
         assert_eq!(
@@ -159,6 +167,11 @@ mod tests {
         );
         assert_eq!(partners(&[5.0, 5.0], &[5.0, 5.0, 5.0]).len(), 2);
         assert!(partners(&[], &[1.0]).is_empty());
+        // The mode at 2 has the shape of the one at 2.3, beside which another mode is nearer in frequency.
+        let (fewer, more): ([f64; 2], [f64; 3]) = ([1.0, 2.0], [1.0, 2.05, 2.3]);
+        let shapes = [[0, 1, 1], [1, 1, 0]];
+        let distance = |i: usize, j: usize| (fewer[i] / more[j]).ln().abs() + f64::from(shapes[i][j]);
+        assert_eq!(super::partners(2, 3, distance), [0, 2]);
     }
 
     #[test]

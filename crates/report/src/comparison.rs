@@ -173,8 +173,8 @@ fn compared(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyC
 }
 
 /// Compares two bodies of which one may have fewer modes. Each mode of the smaller body is paired with a mode
-/// of the larger one, in ascending order, so that the frequencies deviate least. The notes list the modes
-/// that were compared and the modes that were left out.
+/// of the larger one, in ascending order, so that frequencies and, with common nodes, shapes deviate least. The notes list the
+/// modes that were compared and the modes that were left out.
 ///
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) when units or dimensions differ, or when the bodies have no
@@ -184,7 +184,7 @@ pub fn compare_common(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Re
         return compare(a, b, tolerances);
     }
     let b = &*in_units_of(a, b)?;
-    let common = CommonModes::of(a, b)?;
+    let common = CommonModes::of(a, b, assurance_of_all(a, b).as_ref())?;
     let some = |body: &FlexBody, modes: &[usize]| body.reduced(modes, body.groups(), Vec::new());
     let mut comparison = compared(&some(a, &common.a)?, &some(b, &common.b)?, tolerances)?;
     comparison.number_modes(&common.a, &common.b);
@@ -572,6 +572,14 @@ fn turned(shapes: MatRef<'_, f64>, axes: &Matrix3<f64>, order: &[usize]) -> Mat<
         let (node, k) = (order[row / 3], row % 3);
         (0..3).map(|l| axes[(l, k)] * shapes[(3 * node + l, p)]).sum()
     })
+}
+
+/// Returns the modal assurance criterion of each mode of `a` with each mode of `b`; `None` if the node numbers differ.
+fn assurance_of_all(a: &FlexBody, b: &FlexBody) -> Option<Mat<f64>> {
+    let order = common_nodes(&a.nodes().ids, &b.nodes().ids)?;
+    let axes = if is_placed(a) && is_placed(b) { FrameChange::new(a, b).axes } else { Matrix3::identity() };
+    let shapes = turned(b.modes().shape.as_ref(), &axes, &order);
+    Some(modes::assurance(a.modes().shape.as_ref(), shapes.as_ref()))
 }
 
 /// Returns |A - B|_F / |A|_F of a group of columns.

@@ -18,7 +18,7 @@ pub(super) struct Completeness {
     #[serde(skip)]
     pub head: &'static str,
     pub sentence: String,
-    /// Counted number of flexible modes below the shift.
+    /// Counted number of flexible modes below the shift; of a Craig-Bampton body, of fixed-interface modes.
     pub proved_modes: Option<usize>,
     pub rigid_modes: usize,
     pub negative_pivots: Option<usize>,
@@ -35,7 +35,12 @@ impl Completeness {
     pub(crate) fn of(body: &FlexBody) -> Self {
         let c = body.certificate();
         let hertz = body.units().hertz() / std::f64::consts::TAU;
-        let shift_hz = (c.shift >= 0.0).then(|| c.shift.sqrt() * hertz);
+        // The proof of a Craig-Bampton body is a count with the interfaces held.
+        let (shift, proved_modes, negative_pivots) = match &c.fixed_interface {
+            Some(fixed) => (fixed.shift, fixed.counted, fixed.counted),
+            None => (c.shift, c.proved_modes, c.negative_pivots),
+        };
+        let shift_hz = (shift >= 0.0).then(|| shift.sqrt() * hertz);
         let (proved, sentence) = judge(body, shift_hz);
         let (verdict, head) = head(body, proved);
         Self {
@@ -43,10 +48,10 @@ impl Completeness {
             verdict,
             head,
             sentence,
-            proved_modes: c.proved_modes,
+            proved_modes,
             rigid_modes: c.rigid_modes,
-            negative_pivots: c.negative_pivots,
-            shift: c.shift,
+            negative_pivots,
+            shift,
             shift_hz,
             remark: c.remark.clone(),
             rigid_noise: c.rigid_noise,

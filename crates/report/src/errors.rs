@@ -194,7 +194,7 @@ pub(super) fn in_words(variations: &[VariationFacts<'_>]) -> Option<String> {
         format!("{}: {part}", one.name)
     };
     let list = |some: &[&VariationFacts<'_>]| some.iter().map(|one| size(one)).collect::<Vec<_>>().join(", ");
-    let mut words = format!("{} ({kind}) that did not choose the body", counted(count, "variation"));
+    let mut words = format!("{} of the scene ({kind})", counted(count, "variation"));
     let worst = variations.iter().filter(|one| one.holds).filter_map(|one| one.worst).fold(0.0, f64::max);
     if failing.is_empty() && unjudged.is_empty() {
         let worst = significant(100.0 * worst, 2);

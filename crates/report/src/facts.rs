@@ -114,6 +114,8 @@ pub(super) struct UnitFacts {
     pub mass: String,
     pub time: String,
     pub stated: bool,
+    #[serde(skip)]
+    pub system: UnitSystem,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -228,7 +230,8 @@ pub(super) struct ModeFacts {
     pub frequency_hz: Vec<f64>,
     /// Eigenvalue of each mode. Unit: 1/time^2.
     pub eigenvalue: Vec<f64>,
-    pub residual: Vec<f64>,
+    /// Residual of each mode; `None` for shapes that are no eigenvectors.
+    pub residual: Vec<Option<f64>>,
     /// Origin of each mode; empty if unknown.
     pub provenance: Vec<String>,
     /// Truncation errors of the static responses to the loads of the residual vectors.
@@ -341,7 +344,7 @@ impl<'b> Facts<'b> {
                 count: body.n_modes(),
                 frequency_hz,
                 eigenvalue: body.modes().eigenvalue.clone(),
-                residual: body.modes().residual.clone(),
+                residual: (0..body.n_modes()).map(|j| residual(body, j)).collect(),
                 provenance: body.modes().provenance.clone(),
                 truncation: body.modes().truncation.clone(),
                 damping_ratio: body.modes().damping_ratio.clone(),
@@ -369,9 +372,16 @@ fn worst_residual(body: &FlexBody) -> f64 {
     if let Some(fixed) = &body.certificate().fixed_interface {
         return fixed.residual;
     }
+    (0..body.n_modes()).filter_map(|j| residual(body, j)).fold(0.0, f64::max)
+}
+
+/// Returns the residual of a mode; `None` for shapes that are no eigenvectors: static shapes, and all modes of a
+/// Craig-Bampton body.
+fn residual(body: &FlexBody, j: usize) -> Option<f64> {
     let modes = body.modes();
-    let claimed = |j: &usize| !modes.provenance.get(*j).is_some_and(|origin| is_static(origin));
-    (0..body.n_modes()).filter(claimed).map(|j| modes.residual[j]).fold(0.0, f64::max)
+    let is_shape = body.certificate().fixed_interface.is_some()
+        || modes.provenance.get(j).is_some_and(|origin| is_static(origin));
+    (!is_shape).then(|| modes.residual[j])
 }
 
 impl ModelFacts {
@@ -435,11 +445,7 @@ impl ModelFacts {
 impl ModeFacts {
     /// Returns the residual of a mode, or `static shape` for a static shape, which is no eigenvector.
     pub(crate) fn residual_in_words(&self, j: usize) -> String {
-        if self.provenance.get(j).is_some_and(|origin| is_static(origin)) {
-            "static shape".to_owned()
-        } else {
-            significant(self.residual[j], 2)
-        }
+        self.residual[j].map_or_else(|| "static shape".to_owned(), |value| significant(value, 2))
     }
 
     /// Returns the kind of modes that the worst residual refers to; empty for all modes.
@@ -475,19 +481,32 @@ impl UnitFacts {
             mass: units.mass.name().to_owned(),
             time: units.time.name().to_owned(),
             stated: units.stated,
+            system: units.clone(),
         }
     }
 
     pub(crate) fn mass(&self) -> String {
-        if self.mass == "tonne" { "t".to_owned() } else { named(&self.mass, "kg") }
+        self.system.mass_name()
     }
 
     pub(crate) fn length(&self) -> String {
-        named(&self.length, "m")
+        self.system.length_name()
     }
 
     pub(crate) fn time(&self) -> String {
-        named(&self.time, "s")
+        self.system.time_name()
+    }
+
+    pub(crate) fn energy(&self) -> String {
+        self.system.energy_name()
+    }
+
+    pub(crate) fn force(&self) -> String {
+        self.system.force_name()
+    }
+
+    pub(crate) fn torque(&self) -> String {
+        self.system.moment_name()
     }
 
     pub(crate) fn inertia(&self) -> String {
@@ -499,11 +518,6 @@ impl UnitFacts {
         let assumed = if self.stated { "" } else { " assumed, none stated" };
         format!("{}, {}, {}{assumed}", self.length(), self.mass(), self.time())
     }
-}
-
-/// Returns the name of a unit; a unit given by its size in SI units is written as that size.
-fn named(unit: &str, si: &str) -> String {
-    if unit.parse::<f64>().is_ok() { format!("[{unit} {si}]") } else { unit.to_owned() }
 }
 
 impl RunFacts {

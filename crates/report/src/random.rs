@@ -37,7 +37,10 @@ struct RecoveryFacts {
     name: String,
     rows: usize,
     points: usize,
+    /// Largest row of the quantity and unit of the first row.
     largest_row: Option<ValueFacts>,
+    /// Largest row of every further quantity and unit.
+    other_largest_rows: Vec<ValueFacts>,
     largest_von_mises: Option<ValueFacts>,
     /// Estimated errors; `None` if they are not known.
     errors: Option<ErrorFacts>,
@@ -88,12 +91,11 @@ impl RandomFacts {
         let heads = ["Recovery", "Largest", "RMS", "3 sigma", "Unit", "Error"];
         let mut rows: Vec<Vec<Inline>> = Vec::new();
         for one in &self.recoveries {
-            let kinds = [
-                (&one.largest_von_mises, "von Mises", one.errors.and_then(|errors| errors.von_mises)),
-                (&one.largest_row, "row", one.errors.map(|errors| errors.rows)),
-            ];
-            for (value, kind, error) in kinds {
-                let Some(value) = value else { continue };
+            let point = one.largest_von_mises.iter();
+            let point = point.map(|own| (own, "von Mises", one.errors.and_then(|errors| errors.von_mises)));
+            let of_units = one.largest_row.iter().chain(&one.other_largest_rows);
+            let of_units = of_units.map(|own| (own, "row", one.errors.map(|errors| errors.rows)));
+            for (value, kind, error) in point.chain(of_units) {
                 rows.push(vec![
                     one.name.clone().into(),
                     format!("{kind} {}", value.name).into(),
@@ -111,15 +113,20 @@ impl RandomFacts {
 
 impl RecoveryFacts {
     fn new(one: &RandomRecovery) -> Self {
-        let most = |values: &[f64]| {
-            (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b]).then(b.cmp(&a)))
+        let most = |values: &[f64], places: &[usize]| {
+            places.iter().copied().max_by(|&a, &b| values[a].total_cmp(&values[b]).then(b.cmp(&a)))
         };
-        let row = most(&one.rms).map(|at| ValueFacts {
-            name: one.rows[at].name.clone(),
-            rms: one.rms[at],
-            unit: Some(one.rows[at].unit.clone()),
-        });
-        let point = most(&one.von_mises).map(|at| ValueFacts {
+        let of_unit = |alike: &Vec<usize>| {
+            most(&one.rms, alike).map(|at| ValueFacts {
+                name: one.rows[at].name.clone(),
+                rms: one.rms[at],
+                unit: Some(one.rows[at].unit.clone()),
+            })
+        };
+        let groups = RecoveryRow::by_unit(&one.rows);
+        let mut of_units = groups.iter().filter_map(of_unit);
+        let points: Vec<usize> = (0..one.points.len()).collect();
+        let point = most(&one.von_mises, &points).map(|at| ValueFacts {
             name: one.points[at].name.clone(),
             rms: one.von_mises[at],
             unit: Some(one.points[at].unit.clone()),
@@ -128,7 +135,8 @@ impl RecoveryFacts {
             name: one.name.clone(),
             rows: one.rows.len(),
             points: one.points.len(),
-            largest_row: row,
+            largest_row: of_units.next(),
+            other_largest_rows: of_units.collect(),
             largest_von_mises: point,
             errors: one.errors.map(|RandomErrors { rows, von_mises }| ErrorFacts { rows, von_mises }),
         }

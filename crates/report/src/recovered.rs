@@ -7,7 +7,7 @@ use super::numbers::{counted, significant};
 use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
-use flexbody_body::flex_body::FlexBody;
+use flexbody_body::flex_body::{FlexBody, Quantity, RecoveryRow};
 use flexbody_motion::scene::{
     Channels, LoadedHistory, RecoveredMotion, RowExtreme, RowExtremes, RowMap, StressPoint,
 };
@@ -38,8 +38,24 @@ pub struct RecoveredFacts<'a> {
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct RecoveryFacts<'a> {
     name: &'a str,
+    /// Number of all rows.
     rows: usize,
-    /// Row of the largest magnitude.
+    /// Largest row of the quantity and unit of the first row.
+    #[serde(flatten)]
+    first: LargestRow<'a>,
+    /// Largest row of every further quantity and unit.
+    others: Vec<LargestRow<'a>>,
+    /// Largest equivalent stress; `None` without points that have all six stresses.
+    von_mises: Option<PointFacts<'a>>,
+    /// Largest principal stress; `None` if none is positive.
+    tension: Option<PointFacts<'a>>,
+    /// Smallest principal stress; `None` if none is negative.
+    compression: Option<PointFacts<'a>>,
+}
+
+/// Row of the largest magnitude among the rows of one quantity and unit.
+#[derive(Debug, Clone, Serialize)]
+struct LargestRow<'a> {
     row: &'a str,
     quantity: &'static str,
     component: &'a str,
@@ -49,12 +65,9 @@ pub(super) struct RecoveryFacts<'a> {
     unit: &'a str,
     /// Instant of the largest magnitude.
     time: f64,
-    /// Largest equivalent stress; `None` without points that have all six stresses.
-    von_mises: Option<PointFacts<'a>>,
-    /// Largest principal stress; `None` if none is positive.
-    tension: Option<PointFacts<'a>>,
-    /// Smallest principal stress; `None` if none is negative.
-    compression: Option<PointFacts<'a>>,
+    /// Number of rows of this quantity and unit.
+    #[serde(skip)]
+    among: usize,
 }
 
 /// Largest stress measure of a recovery.
@@ -76,8 +89,21 @@ impl<'a> RecoveryFacts<'a> {
     }
 
     fn new(map: &'a RowMap, extremes: &RowExtremes) -> Option<Self> {
-        let RowExtreme { place, time, value } = extremes.row?;
-        let label = &map.rows[place];
+        let largest = |(RowExtreme { place, time, value }, alike): (&RowExtreme, Vec<usize>)| {
+            let label = &map.rows[*place];
+            LargestRow {
+                row: &label.name,
+                quantity: label.quantity.name(),
+                component: &label.component,
+                node: label.node,
+                element: label.element,
+                value: *value,
+                unit: &label.unit,
+                time: *time,
+                among: alike.len(),
+            }
+        };
+        let mut of_units = extremes.rows.iter().zip(RecoveryRow::by_unit(&map.rows)).map(largest);
         let at_point = |extreme: RowExtreme| PointFacts {
             points: map.points.len(),
             point: &map.points[extreme.place].name,
@@ -88,14 +114,8 @@ impl<'a> RecoveryFacts<'a> {
         Some(Self {
             name: &map.name,
             rows: map.rows.len(),
-            row: &label.name,
-            quantity: label.quantity.name(),
-            component: &label.component,
-            node: label.node,
-            element: label.element,
-            value,
-            unit: &label.unit,
-            time,
+            first: of_units.next()?,
+            others: of_units.collect(),
             von_mises: extremes.von_mises.map(at_point),
             tension: extremes.tension.map(at_point),
             compression: extremes.compression.map(at_point),
@@ -109,10 +129,14 @@ impl<'a> RecoveryFacts<'a> {
             let (value, time) = (significant(value, 5), significant(time, 6));
             format!("{value}{unit}, {place}, at {time} {time_unit}")
         };
-        let row = format!("row {} ({} {})", self.row, self.quantity, self.component);
-        let of_rows = largest(self.value, self.unit, &row, self.time);
-        let words = format!("{}: {}, largest {of_rows}", self.name, counted(self.rows, "row"));
-        let mut terms = vec![Term::new("Recovery", words)];
+        let of_unit = |own: &LargestRow<'_>| {
+            let row = format!("row {} (component {})", own.row, own.component);
+            let quantity = if own.quantity == Quantity::Other.name() { "value" } else { own.quantity };
+            let words = largest(own.value, own.unit, &row, own.time);
+            let of = counted(own.among, "row");
+            Term::new("Recovery", format!("{}: largest {quantity} of {of}: {words}", self.name))
+        };
+        let mut terms: Vec<Term> = std::iter::once(&self.first).chain(&self.others).map(of_unit).collect();
         let measures = [
             ("von Mises largest", &self.von_mises),
             ("principal stress largest", &self.tension),
@@ -140,7 +164,7 @@ impl<'a> RecoveredFacts<'a> {
         Self {
             format: "flexbody-recovered",
             format_major: 1,
-            format_minor: 1,
+            format_minor: 2,
             generator: generator(),
             body: &body.source().name,
             history: history.path.display().to_string(),

@@ -211,7 +211,7 @@ impl<'a> ResponseFacts<'a> {
         Self {
             format: "flexbody-response",
             format_major: 1,
-            format_minor: 0,
+            format_minor: 1,
             generator: generator(),
             body: &response.name,
             units: UnitFacts::new(&response.units),

@@ -1,20 +1,24 @@
 //! Summary of a body on one screen: properties, completeness of the modes, errors of lumped masses. Warnings and notes
 //! are printed apart.
 
-use super::body_modes::first_and_last;
 use super::craig_bampton::CraigBamptonFacts;
 use super::document::{Block, Term, Tone, listed_to};
 use super::facts::{InterfaceFacts, RecoveryFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
 use super::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
 use super::named_loads::NamedLoadFacts;
-use super::numbers::{bytes, coordinates, counted, duration, frequency, frequency_range, triple};
+use super::numbers::{
+    bytes, coordinates, counted, duration, frequencies, frequency, frequency_range, triple,
+};
 use super::text::{self, Screen};
 use super::{Facts, html};
 use flexbody_body::flex_body::MassStructure;
 
 /// Number of list entries that are shown.
 const MAX_LISTED: usize = 4;
+
+/// Number of frequencies shown before the last.
+const FIRST_FREQUENCIES: usize = 6;
 
 /// Renders the summary for a screen.
 pub fn summary(facts: &Facts<'_>, screen: Screen) -> String {
@@ -165,4 +169,13 @@ fn output(facts: &Facts<'_>) -> Vec<Term> {
         }
     };
     facts.run.iter().map(written).collect()
+}
+
+/// Returns the first frequencies and the last: `812.5 812.5 1204 1890.2 2411 3020 ... 4412.5 Hz`.
+fn first_and_last(hz: &[f64]) -> String {
+    let (all, unit) = frequencies(hz, 5);
+    let last = all.last().filter(|_| hz.len() > FIRST_FREQUENCIES);
+    let dots = if hz.len() > FIRST_FREQUENCIES + 1 { " ..." } else { "" };
+    let last = last.map_or(String::new(), |last| format!("{dots} {last}"));
+    format!("{}{last} {unit}", all[..all.len().min(FIRST_FREQUENCIES)].join(" "))
 }

@@ -97,9 +97,17 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
 ];
 
 impl Arguments {
-    /// Returns the definition of the command line, with the options of large commands in groups.
+    /// Returns the definition of the command line, with the options of large commands in groups. A negative number is a value of
+    /// every option, so that its own parser refuses it.
     pub fn grouped() -> Command {
-        GROUPED.iter().fold(Self::command(), |program, name| {
+        let signed = |command: Command| {
+            command.mut_args(|argument| {
+                let takes_values = argument.get_action().takes_values() && !argument.is_positional();
+                if takes_values { argument.allow_negative_numbers(true) } else { argument }
+            })
+        };
+        let program = Self::command().mut_subcommands(signed);
+        GROUPED.iter().fold(program, |program, name| {
             program.mut_subcommand(name, |command| {
                 let help = Arg::new("help").short('h').long("help").action(ArgAction::Help);
                 let command =

@@ -176,7 +176,8 @@ fn recovered(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
                     let output = vectors(named, Along::Model, [0; 3], Vec::new(), strain);
                     outputs.all.push(Output { values, ..output });
                 }
-                let largest = extremes.row.map_or(0.0, |row| row.value.abs());
+                // All gauges are strains: one quantity and unit.
+                let largest = extremes.rows.first().map_or(0.0, |row| row.value.abs());
                 outputs.all.push(peak(&format!("largest of {name}"), [0; 3], largest, strain));
             }
         }

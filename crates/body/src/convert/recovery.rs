@@ -532,23 +532,13 @@ fn one_side(model: &FeModel, side: &[i64], about: [f64; 3]) -> Mat<f64> {
 /// Returns the labels of section forces: forces, then moments, along the axes of the model.
 fn section_labels(model: &FeModel) -> Vec<RecoveryRow> {
     let units = model.units();
-    let named = |name: &str, si: &str| match name.parse::<f64>() {
-        Ok(_) => format!("({name} {si})"),
-        Err(_) => name.to_owned(),
-    };
-    let [mass, length, time] = [(&units.mass, "kg"), (&units.length, "m"), (&units.time, "s")]
-        .map(|(unit, si)| named(unit.name(), si));
     let row = |&component: &usize| {
         let is_force = component < 3;
         RecoveryRow {
             name: COMPONENTS[component].to_owned(),
             quantity: if is_force { Quantity::Force } else { Quantity::Moment },
             component: (component + 1).to_string(),
-            unit: if is_force {
-                format!("{mass} {length}/{time}^2")
-            } else {
-                format!("{mass} {length}^2/{time}^2")
-            },
+            unit: if is_force { units.force_name() } else { units.moment_name() },
             node: None,
             element: None,
         }

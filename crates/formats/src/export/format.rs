@@ -19,6 +19,11 @@ pub trait ExportFormat: Sync {
     /// Returns the programs that read the format, in a few words.
     fn reader(&self) -> &'static str;
 
+    /// Returns further names of the format: programs that read no other format of this registry, in lowercase.
+    fn other_names(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// Returns the dialects of the format, the default first; empty for a format with a single form.
     fn dialects(&self) -> &'static [&'static str] {
         &[]

@@ -296,7 +296,7 @@ def parsed():
         "free": "interface without a joint; with --spin all interfaces that no option names"}
     for kind, text in texts.items():
         parser.add_argument(f"--{kind}", action="append", default=[], metavar="NAME", choices=names, help=f"{text}; can be given several times")
-    parser.add_argument("--size", type=float, metavar="LENGTH", help="way of the driven interface [default: a thousandth of the largest extent of the body]")
+    parser.add_argument("--size", type=float, metavar="LENGTH", help="way of the driven interface [default: a thousandth of the longest side of the box around the exported nodes]")
     parser.add_argument("--spin", type=float, nargs=3, metavar=("X", "Y", "Z"), help="angular velocity at the start, in radians per unit of time; no interface is driven then")
     parser.add_argument("--damping", type=ratio, metavar="RATIO", help="damping ratio of all modes, 0.02 or 2%%, instead of the damping of the file")
     parser.add_argument("--periods", type=float, default=10, metavar="NUMBER", help="length of the run in periods of the first mode [default: 10]")

@@ -30,6 +30,10 @@ impl ExportFormat for Sid {
         "Simpack, Neweul-M2, EMBSlib (Modelica), matflex, FEMBeam"
     }
 
+    fn other_names(&self) -> &'static [&'static str] {
+        &["simpack", "modelica", "dymola", "neweul-m2"]
+    }
+
     fn dialects(&self) -> &'static [&'static str] {
         &NAMES
     }

@@ -105,8 +105,8 @@ impl ManifestWalk<'_, '_> {
                 _ => InterfaceNodes::Region(self.region(key, table.get(key)?, dimension)?),
             };
             let about = match table.get("about") {
-                Some(value) => self.point("about", value, dimension)?,
-                None => [0.0; 3],
+                Some(value) => Some(self.point("about", value, dimension)?),
+                None => None,
             };
             OperatorSource::Cut { nodes, about }
         };

@@ -10,7 +10,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Recovery};
 use flexbody_linalg::larger;
-use flexbody_model::{Quantity, pascals};
+use flexbody_model::{RecoveryRow, pascals};
 
 /// Recoveries with a limit along a motion, in the order of the limits of the scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -372,16 +372,10 @@ impl RecoveryMeasure {
 fn groups_of(map: &RowMap) -> Vec<(Magnitude, Vec<usize>)> {
     let mut of_points = vec![false; map.rows.len()];
     map.points.iter().flat_map(|point| point.rows).for_each(|row| of_points[row] = true);
-    let mut groups: Vec<((Quantity, &str), Vec<usize>)> = Vec::new();
-    for (at, row) in map.rows.iter().enumerate().filter(|(at, _)| !of_points[*at]) {
-        let key = (row.quantity, row.unit.as_str());
-        match groups.iter_mut().find(|(known, _)| *known == key) {
-            Some((_, rows)) => rows.push(at),
-            None => groups.push((key, vec![at])),
-        }
-    }
+    let apart = |group: Vec<usize>| group.into_iter().filter(|row| !of_points[*row]).collect::<Vec<usize>>();
+    let groups = RecoveryRow::by_unit(&map.rows).into_iter().map(apart).filter(|rows| !rows.is_empty());
     let points = (!map.points.is_empty()).then(|| (Magnitude::VonMises, (0..map.points.len()).collect()));
-    points.into_iter().chain(groups.into_iter().map(|(_, rows)| (Magnitude::Row, rows))).collect()
+    points.into_iter().chain(groups.map(|rows| (Magnitude::Row, rows))).collect()
 }
 
 /// Returns a row of a place.

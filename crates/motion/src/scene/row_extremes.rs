@@ -15,6 +15,7 @@ use super::row_states::SampledStates;
 use super::{Peak, RowLayout, RowMap, RowStates, StressPoint};
 use faer::{Mat, MatRef};
 use flexbody_linalg::{SymmetricEigen, parallel, symmetric_eigen};
+use flexbody_model::RecoveryRow;
 
 /// Directions with a smaller part of the largest eigenvalue of the history are rounding: their part is bounded by
 /// amplitudes alone.
@@ -37,8 +38,8 @@ pub struct RowExtreme {
 /// Largest values of a recovery over a motion.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RowExtremes {
-    /// Row of the largest magnitude.
-    pub row: Option<RowExtreme>,
+    /// Row of the largest magnitude of each quantity and unit, in the order of [`RecoveryRow::by_unit`].
+    pub rows: Vec<RowExtreme>,
     /// Point of the largest equivalent stress of von Mises; `None` without points.
     pub von_mises: Option<RowExtreme>,
     /// Point of the largest principal stress, if any is positive.
@@ -99,10 +100,6 @@ impl Magnitude {
                 weight * row([xx, yy, zz, xy, yz, xz][form], c)
             }),
         }
-    }
-
-    fn places(self, rows: &LinearRows<'_>) -> usize {
-        if self == Self::Row { rows.matrix.nrows() } else { rows.points.len() }
     }
 
     /// Returns the measure of the values of all forms of a place; not negative.
@@ -229,12 +226,6 @@ impl ExtremeSearch {
         for (map, found) in maps.iter().zip(&mut self.found) {
             let rows = LinearRows::of(map);
             for magnitude in Magnitude::ALL {
-                let best = match magnitude {
-                    Magnitude::Row => &mut found.row,
-                    Magnitude::VonMises => &mut found.von_mises,
-                    Magnitude::Tension => &mut found.tension,
-                    Magnitude::Compression => &mut found.compression,
-                };
                 let search = LargestSearch {
                     magnitude,
                     rows,
@@ -242,8 +233,25 @@ impl ExtremeSearch {
                     directions: directions.as_ref(),
                     between: self.between,
                 };
-                let evaluated = search.raise(0..magnitude.places(&rows), best, |_| {});
-                found.evaluated = found.evaluated.max(evaluated);
+                let mut raise = |places: &[usize], best: &mut Option<RowExtreme>| {
+                    let evaluated = search.raise(places.iter().copied(), best, |_| {});
+                    found.evaluated = found.evaluated.max(evaluated);
+                };
+                let points: Vec<usize> = (0..map.points.len()).collect();
+                match magnitude {
+                    Magnitude::Row => {
+                        let of_unit = |(at, places): (usize, Vec<usize>)| {
+                            let mut best = found.rows.get(at).copied();
+                            raise(&places, &mut best);
+                            best
+                        };
+                        let groups = RecoveryRow::by_unit(&map.rows).into_iter().enumerate();
+                        found.rows = groups.filter_map(of_unit).collect();
+                    }
+                    Magnitude::VonMises => raise(&points, &mut found.von_mises),
+                    Magnitude::Tension => raise(&points, &mut found.tension),
+                    Magnitude::Compression => raise(&points, &mut found.compression),
+                }
             }
         }
     }

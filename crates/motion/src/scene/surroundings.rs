@@ -44,9 +44,16 @@ impl<'a> SceneForces<'a> {
             });
         }
         let terms = scene.run.terms;
-        let mut points = |place: &Point| body_point(body, terms, place).map_err(&mut wrong).ok();
-        let watched = scene.watched.iter().map(&mut points).collect();
-        let loads: Option<Vec<_>> = scene.loads.iter().map(|load| Some((points(&load.at)?, load))).collect();
+        let mut point = |entry: &str, number: usize, place: &Point| {
+            let found = body_point(body, terms, place);
+            found.map_err(|why| wrong(format!("[[{entry}]] {number}: {why}"))).ok()
+        };
+        let watched =
+            (1..).zip(&scene.watched).map(|(number, place)| point("watch", number, place)).collect();
+        let loads: Option<Vec<_>> = (1..)
+            .zip(&scene.loads)
+            .map(|(number, load)| Some((point("load", number, &load.at)?, load)))
+            .collect();
         for (point, load) in loads.iter().flatten() {
             if !load.torque.is_nothing() && !point.turns() {
                 wrong(format!("a torque cannot act at {}: the place has no orientation", load.at));

@@ -5,7 +5,8 @@ use super::{BodyComparison, Pair, is_placed, product, relative, turned};
 use crate::mass_properties::gyration_radius;
 use faer::{Mat, MatRef};
 use flexbody_body::flex_body::{
-    FlexBody, GeometricStiffness, Interface, InternalRows, LoadKind, MotionLoad, Recovery, UnitLoad,
+    FlexBody, GeometricStiffness, Interface, InternalRows, LoadKind, MotionLoad, Recovery, RecoveryRow,
+    UnitLoad,
 };
 use flexbody_body::invariants::InertiaStiffness;
 use flexbody_linalg::{gram, larger, largest_entry};
@@ -296,19 +297,26 @@ impl BodyComparison {
                 differing += 1;
                 continue;
             };
-            in_modes = larger(in_modes, difference_in_modes(own, other, &pair.groups));
-            for load in own.motion.iter().map(|one| one.load) {
-                match difference_in_motion(pair, own, other, load) {
-                    Some(difference) => in_motion = Some(larger(in_motion.unwrap_or(0.0), difference)),
-                    None => {
-                        let what = "forces of motion are not compared in different frames";
-                        self.notes.push(format!("recovery `{}`: {what}", own.name));
-                        break;
-                    }
+            let units = RecoveryRow::by_unit(&own.rows);
+            let of_modes = units.iter().map(|rows| difference_in_modes(own, other, rows, &pair.groups));
+            in_modes = of_modes.fold(in_modes, larger);
+            let loads = own.motion.iter().flat_map(|one| units.iter().map(|rows| (one.load, rows)));
+            let of_motion: Option<Vec<f64>> =
+                loads.map(|(load, rows)| difference_in_motion(pair, own, other, load, rows)).collect();
+            match of_motion {
+                Some(all) => {
+                    in_motion = all
+                        .into_iter()
+                        .reduce(larger)
+                        .map_or(in_motion, |difference| Some(larger(in_motion.unwrap_or(0.0), difference)))
+                }
+                None => {
+                    let what = "forces of motion are not compared in different frames";
+                    self.notes.push(format!("recovery `{}`: {what}", own.name));
                 }
             }
             let (own, other) = (pair.a.static_rows(own), pair.b.static_rows(other));
-            at_rest = larger(at_rest, difference_at_rest(&own, &other));
+            at_rest = units.iter().map(|rows| difference_at_rest(&own, &other, rows)).fold(at_rest, larger);
         }
         for other in b.iter().filter(|other| a.iter().all(|own| own.name != other.name)) {
             self.notes.push(format!("recovery `{}` is in the second body only", other.name));
@@ -316,13 +324,12 @@ impl BodyComparison {
         }
         let meaning = "number of recoveries that differ in name, rows or loads";
         self.row("recoveries", meaning, differing as f64, 0.0);
-        let meaning = "norm of a row over a group of modes / largest norm";
+        let meaning = "norm of a row over a group of modes / largest norm of rows of its unit";
         self.row("rows in the modes", meaning, in_modes, tolerance);
-        let meaning = "under constant unit loads and undeformed / largest row of the load";
+        let meaning = "under constant unit loads and undeformed / largest row of its unit under the load";
         self.row("rows at rest", meaning, at_rest, tolerance);
         if let Some(in_motion) = in_motion {
-            let meaning =
-                "static rows of damping and inertia of the deformation over a group of modes / largest";
+            let meaning = "static rows of damping and inertia of the deformation over a group of modes / largest of their unit";
             self.row("rows of forces of motion", meaning, in_motion, tolerance);
         }
     }
@@ -350,19 +357,25 @@ fn are_alike(a: &Recovery, b: &Recovery) -> bool {
 
 /// Returns the largest difference of the norms of a row over a group of modes, relative to the largest norm. Norms are the
 /// same in every basis of a repeated eigenvalue.
-fn difference_in_modes(a: &Recovery, b: &Recovery, groups: &[Range<usize>]) -> f64 {
+fn difference_in_modes(a: &Recovery, b: &Recovery, rows: &[usize], groups: &[Range<usize>]) -> f64 {
     let norm = |of: &Recovery, i: usize, g: &Range<usize>| {
         g.clone().map(|j| of.modes[(i, j)].powi(2)).sum::<f64>().sqrt()
     };
-    let pairs = || (0..a.rows.len()).flat_map(|i| groups.iter().map(move |g| (i, g)));
+    let pairs = || rows.iter().flat_map(|&i| groups.iter().map(move |g| (i, g)));
     let size = pairs().map(|(i, g)| larger(norm(a, i, g), norm(b, i, g))).fold(0.0, larger);
     let difference = pairs().map(|(i, g)| (norm(a, i, g) - norm(b, i, g)).abs()).fold(0.0, larger);
     relative(difference, size)
 }
 
 /// Returns the largest difference of the norms of the rows under forces of motion of one kind, over a group of modes, relative
-/// to the largest; `None` for bodies in different frames, to whose motion the forces belong.
-fn difference_in_motion(pair: &Pair<'_>, own: &Recovery, other: &Recovery, load: MotionLoad) -> Option<f64> {
+/// to the largest of `rows`; `None` for bodies in different frames, to whose motion the forces belong.
+fn difference_in_motion(
+    pair: &Pair<'_>,
+    own: &Recovery,
+    other: &Recovery,
+    load: MotionLoad,
+    rows: &[usize],
+) -> Option<f64> {
     let (a, b) = (pair.a, pair.b);
     if a.conditions() != b.conditions() || (a.frame().axes - b.frame().axes).norm() > SAME_AXES {
         return None;
@@ -373,7 +386,7 @@ fn difference_in_motion(pair: &Pair<'_>, own: &Recovery, other: &Recovery, load:
         g.clone().map(|j| rows[(i, component * modes + j)].powi(2)).sum::<f64>().sqrt()
     };
     let (mut difference, mut size) = (0.0, 0.0);
-    for (i, component) in (0..rows_a.nrows()).flat_map(|i| (0..load.components()).map(move |c| (i, c))) {
+    for (i, component) in rows.iter().flat_map(|&i| (0..load.components()).map(move |c| (i, c))) {
         for g in &pair.groups {
             let (of_a, of_b) = (norm(&rows_a, i, component, g), norm(&rows_b, i, component, g));
             difference = larger(difference, (of_a - of_b).abs());
@@ -383,13 +396,16 @@ fn difference_in_motion(pair: &Pair<'_>, own: &Recovery, other: &Recovery, load:
     Some(relative(difference, size))
 }
 
-/// Returns the largest difference of static rows, relative to the largest of the same kind of load.
-fn difference_at_rest(a: &Recovery, b: &Recovery) -> f64 {
+/// Returns the largest difference of the static `rows`, relative to the largest of them under the same kind of load.
+fn difference_at_rest(a: &Recovery, b: &Recovery, rows: &[usize]) -> f64 {
     let mut worst = relative(
-        a.offset.iter().zip(&b.offset).map(|(a, b)| (a - b).abs()).fold(0.0, larger),
-        a.offset.iter().map(|v| v.abs()).fold(0.0, larger),
+        rows.iter().map(|&i| (a.offset[i] - b.offset[i]).abs()).fold(0.0, larger),
+        rows.iter().map(|&i| a.offset[i].abs()).fold(0.0, larger),
     );
+    let chosen = |all: MatRef<'_, f64>| Mat::from_fn(rows.len(), all.ncols(), |i, c| all[(rows[i], c)]);
     let mut see = |a: MatRef<'_, f64>, b: MatRef<'_, f64>| {
+        let (a, b) = (chosen(a), chosen(b));
+        let (a, b) = (a.as_ref(), b.as_ref());
         let size = larger(largest_entry(a), largest_entry(b));
         worst = larger(worst, relative(largest_entry((a - b).as_ref()), size));
     };

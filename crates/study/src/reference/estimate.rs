@@ -93,7 +93,15 @@ impl CouplingEffect {
             },
             parts.join(", ")
         );
-        Diagnostic::new(Code::CouplingEffect, message)
+        let remark = Diagnostic::new(Code::CouplingEffect, message);
+        if self.worst <= 1.0 {
+            return remark;
+        }
+        // Beyond the tolerances the coupling decides about the result, most of all near a resonance that it shifts.
+        remark.with_help(
+            "decide what is mounted there: a stiff part keeps the interface rigid, and the body fits; otherwise convert with coupling = \"averaging\". \
+             A scene near a resonance shows large errors, since a rigid interface raises the frequency",
+        )
     }
 }
 

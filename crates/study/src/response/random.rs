@@ -281,28 +281,13 @@ impl RandomStudy<'_> {
             let of_points = covariance.von_mises(&difference, &points);
             let most = |values: &[f64]| values.iter().copied().fold(0.0, larger);
             let relative = |error: f64, size: f64| if error == 0.0 { 0.0 } else { error / size };
-            let of_unit = |(row, error): (usize, &f64)| {
-                let label = &recovery.rows[row];
-                let alike = (0..rms.len()).filter(|&at| {
-                    (recovery.rows[at].quantity, &recovery.rows[at].unit) == (label.quantity, &label.unit)
-                });
-                relative(*error, alike.map(|at| rms[at]).fold(0.0, larger))
+            let of_unit = |alike: Vec<usize>| {
+                let most = |values: &[f64]| alike.iter().map(|row| values[*row]).fold(0.0, larger);
+                relative(most(&of_rows), most(&rms))
             };
-            // The largest error of each unit decides; errors of all rows would compare each with all others.
-            let mut largest: Vec<(usize, f64)> = Vec::new();
-            for (row, error) in of_rows.iter().enumerate() {
-                let label = &recovery.rows[row];
-                let known = largest.iter_mut().find(|(at, _)| {
-                    (recovery.rows[*at].quantity, &recovery.rows[*at].unit) == (label.quantity, &label.unit)
-                });
-                match known {
-                    Some(known) if *error > known.1 => *known = (row, *error),
-                    Some(_) => {}
-                    None => largest.push((row, *error)),
-                }
-            }
+            let of_units = RecoveryRow::by_unit(&recovery.rows).into_iter().map(of_unit);
             RandomErrors {
-                rows: largest.iter().map(|(row, error)| of_unit((*row, error))).fold(0.0, larger),
+                rows: of_units.fold(0.0, larger),
                 von_mises: (!points.is_empty()).then(|| relative(most(&of_points), most(&von_mises))),
             }
         });

@@ -197,7 +197,7 @@ impl<'s> SelectionState<'s> {
             return Ok(reason);
         }
         Ok(format!(
-            "{reason}; with {} more, so that variations of the scene hold",
+            "{reason}; with {} more, without which the errors exceed the tolerances in variations of the scene",
             self.choice.modes.len() - modes.len()
         ))
     }

@@ -346,9 +346,14 @@ impl DecisionInput<'_> {
                 let rotation = &demand_of(trial, self.demands).situation.spin;
                 (decision(group, kept, trial, self.demands, rotation), decisive_error(trial, self.demands))
             }
-            None if self.demands.iter().any(|demand| demand.scene.carried.is_some()) => {
-                (undecided(group, kept, "a body that is carried keeps all groups"), None)
-            }
+            None if self.demands.iter().any(|demand| demand.scene.carried.is_some()) => (
+                undecided(
+                    group,
+                    kept,
+                    "not judged: a carried body keeps all groups, since its modes are not those of the file (advise judges them by the rate)",
+                ),
+                None,
+            ),
             None => (undecided(group, kept, "no bound or run shows that it can be dropped"), None),
         };
         // A run slower than the allowed rotation cannot decide about a kept group.
