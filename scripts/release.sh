@@ -7,7 +7,7 @@
 #                                           Dockerfile for an image of it
 #   flexbody_VERSION_amd64.deb              the same program as a package of Debian (packaging/debian.sh)
 #   flexbody-VERSION-*.conda                the same program as a package of conda (packaging/conda)
-#   flexbody-VERSION-*.whl                  the Python package (scripts/wheel.sh --zig)
+#   flexbody-VERSION-*.whl                  the Python package (scripts/wheel.sh --zig), also for aarch64, where it is not tested
 #   flexbody-VERSION.cdx.json               bill of materials (CycloneDX); -python: that of the wheel
 #   SHA256SUMS
 #
@@ -208,6 +208,14 @@ if [ "$wheel" = yes ]; then
     [ "${glibc:-99}" -le 17 ] || fail "auditwheel finds that the wheel needs glibc 2.${glibc:-?}" "look for what scripts/wheel.sh --zig has not built by zig"
     echo "   for glibc 2.$glibc and newer"
     python3 scripts/sbom.py --manifest python/Cargo.toml --target x86_64-unknown-linux-gnu --sbom "$out/flexbody-$version-python.cdx.json"
+
+    step "wheel of aarch64, built here and not tested"
+    other=aarch64-unknown-linux-gnu
+    if [ -d "$(rustc --print sysroot)/lib/rustlib/$other" ] || { command -v rustup >/dev/null && rustup target add "$other"; }; then
+        FLEXBODY_WHEELS="$(realpath "$out")" ./scripts/wheel.sh --zig --target "$other"
+    else
+        echo "   left out: the Rust target $other is not installed"
+    fi
 fi
 
 step "sums"
