@@ -4,6 +4,7 @@
 mod entries;
 mod modes;
 mod named_loads;
+mod recoveries;
 
 pub(super) use modes::signed_percent;
 pub use modes::{ModePair, Pairing};

@@ -437,3 +437,64 @@ fn frames_signs_and_node_numbers_make_no_difference_to_what_is_beside_the_invari
         assert!(found.not_compared().iter().any(|entry| entry.contains("/interfaces/<name>/node_id")));
     }
 }
+
+/// Returns the complete body with two rows of the given quantities and units in its recovery; the second row has `factor` times the
+/// numbers of the first.
+fn with_two_rows(labels: [(Quantity, &str); 2], factor: f64) -> FlexBody {
+    let mut parts = complete().into_parts();
+    let recovery = &mut parts.recoveries[0];
+    let first = recovery.rows[0].clone();
+    let row = |(quantity, unit): (Quantity, &str)| RecoveryRow {
+        name: quantity.name().to_owned(),
+        quantity,
+        unit: unit.to_owned(),
+        ..first.clone()
+    };
+    recovery.rows = labels.map(row).to_vec();
+    let twice = |columns: &Mat<f64>| {
+        Mat::from_fn(
+            2,
+            columns.ncols(),
+            |i, c| if i == 0 { columns[(0, c)] } else { factor * columns[(0, c)] },
+        )
+    };
+    recovery.offset.push(factor * recovery.offset[0]);
+    recovery.modes = twice(&recovery.modes);
+    recovery.spin = twice(&recovery.spin);
+    recovery.named = twice(&recovery.named);
+    recovery.loads.iter_mut().for_each(|load| load.columns = twice(&load.columns));
+    recovery.motion.iter_mut().for_each(|own| own.columns = twice(&own.columns));
+    FlexBody::new(parts).expect("valid")
+}
+
+/// A row of small numbers in one unit is not hidden by large numbers in another.
+#[test]
+fn rows_of_different_units_are_compared_apart() {
+    let body = with_two_rows([(Quantity::Stress, "MPa"), (Quantity::Displacement, "mm")], 1e-12);
+    let changes: [fn(&mut Recovery); 4] = [
+        |own| own.modes[(1, 2)] *= 1.01,
+        |own| own.spin[(1, 2)] *= 1.01,
+        |own| own.loads[0].columns[(1, 2)] *= 1.01,
+        |own| own.motion[0].columns[(1, 2)] *= 1.01,
+    ];
+    for (number, change) in changes.into_iter().enumerate() {
+        let mut parts = body.clone().into_parts();
+        change(&mut parts.recoveries[0]);
+        let other = FlexBody::new(parts).expect("valid");
+        let found = compare(&body, &other, &Tolerances::default()).expect("comparable");
+        assert!(!found.passed(), "change {number}: {}", found.text());
+    }
+}
+
+/// Moments of a section that vanish beside its forces may differ by rounding.
+#[test]
+fn moments_are_compared_with_the_forces_of_their_section() {
+    let length = complete().units().length_name();
+    let moment = format!("N {length}");
+    let body = with_two_rows([(Quantity::Force, "N"), (Quantity::Moment, &moment)], 1e-16);
+    let mut parts = body.clone().into_parts();
+    parts.recoveries[0].loads[0].columns[(1, 2)] *= -1.0;
+    let other = FlexBody::new(parts).expect("valid");
+    let found = compare(&body, &other, &Tolerances::default()).expect("comparable");
+    assert!(found.passed(), "{}", found.text());
+}
