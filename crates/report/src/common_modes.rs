@@ -1,5 +1,6 @@
 //! Modes that two bodies have in common if one has fewer modes than the other.
 
+use super::comparison::by_shape;
 use super::numbers::{counted, frequency, frequency_range};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -18,8 +19,8 @@ pub(super) struct CommonModes {
 }
 
 impl CommonModes {
-    /// Pairs every mode of the body with fewer modes with a mode of the other body, in ascending order, so
-    /// that frequencies and shapes deviate least. A mode that differs is thus compared with its
+    /// Pairs every mode of the body with fewer modes with a mode of the other body: with that of its shape, others in ascending
+    /// order, so that the ratios of the frequencies deviate least. A mode that differs is thus compared with its
     /// neighbour and not reported as missing. For a repeated eigenvalue all modes are compared or none,
     /// because a part of its eigenspace is not determined.
     ///
@@ -31,21 +32,26 @@ impl CommonModes {
         let (of_a, of_b) = (&a.modes().eigenvalue, &b.modes().eigenvalue);
         let is_first = of_a.len() <= of_b.len();
         let (fewer, more) = if is_first { (of_a, of_b) } else { (of_b, of_a) };
-        let partners = partners(fewer.len(), more.len(), |i, j| {
-            let shapes = assurance.map_or(1.0, |all| if is_first { all[(i, j)] } else { all[(j, i)] });
-            (fewer[i] / more[j]).ln().abs() + (1.0 - shapes)
-        });
+        let by_shape = match assurance {
+            Some(all) if is_first => by_shape(all),
+            Some(all) => by_shape(&all.transpose().to_owned()),
+            None => vec![None; fewer.len()],
+        };
+        let partners = partners(fewer, more, &by_shape);
+        let mut taken = partners.clone();
+        taken.sort_unstable();
         // Modes whose cluster in the larger body is complete among the partners.
         let (kept, split): (Vec<usize>, Vec<usize>) =
-            (0..fewer.len()).partition(|&i| is_whole(more, &partners, partners[i]));
+            (0..fewer.len()).partition(|&i| is_whole(more, &taken, partners[i]));
         if kept.is_empty() {
             let message = "the bodies have no mode in common except parts of a repeated eigenvalue";
             return Err(Diagnostic::new(Code::BodyIncomparable, message)
                 .with_help("convert both with all modes of the repeated eigenvalue")
                 .into());
         }
-        let of_more: Vec<usize> = kept.iter().map(|&i| partners[i]).collect();
-        let (a_modes, b_modes) = if of_a.len() <= of_b.len() { (kept, of_more) } else { (of_more, kept) };
+        let mut of_more: Vec<usize> = kept.iter().map(|&i| partners[i]).collect();
+        of_more.sort_unstable();
+        let (a_modes, b_modes) = if is_first { (kept, of_more) } else { (of_more, kept) };
         // Notes on compared, omitted and undetermined modes.
         let mut notes = vec![format!(
             "{} in common {} compared: {} of the first body with {} of the second",
@@ -66,10 +72,23 @@ impl CommonModes {
     }
 }
 
-/// Returns for each of `n` modes the index of its partner among `m >= n` modes: the ascending choice with the smallest sum of
-/// distances, found by dynamic programming.
-fn partners(n: usize, m: usize, distance: impl Fn(usize, usize) -> f64) -> Vec<usize> {
-    // sums[i][j] is the smallest sum of the first i modes with partners among the first j.
+/// Returns for each of the `fewer` eigenvalues the index of its partner among `more`: that of its shape if there is one, else the
+/// nearest of those that are left.
+fn partners(fewer: &[f64], more: &[f64], by_shape: &[Option<usize>]) -> Vec<usize> {
+    let left: Vec<usize> = (0..fewer.len()).filter(|&i| by_shape[i].is_none()).collect();
+    let free: Vec<usize> = (0..more.len()).filter(|&j| !by_shape.contains(&Some(j))).collect();
+    let [of_left, of_free] = [(fewer, &left), (more, &free)]
+        .map(|(values, places)| places.iter().map(|&i| values[i]).collect::<Vec<f64>>());
+    let mut nearest = nearest(&of_left, &of_free).into_iter().map(|j| free[j]);
+    by_shape.iter().filter_map(|partner| partner.or_else(|| nearest.next())).collect()
+}
+
+/// Returns for each of the `fewer` eigenvalues the index of its partner among `more` (both ascending): the
+/// ascending choice with the smallest sum of |ln(lambda_i / lambda_j)|, found by dynamic programming.
+fn nearest(fewer: &[f64], more: &[f64]) -> Vec<usize> {
+    let (n, m) = (fewer.len(), more.len());
+    let distance = |i: usize, j: usize| (fewer[i] / more[j]).ln().abs();
+    // sums[i][j] is the smallest sum of the first i eigenvalues with partners among the first j.
     let mut sums = vec![vec![f64::INFINITY; m + 1]; n + 1];
     sums[0].fill(0.0);
     for i in 1..=n {
@@ -77,7 +96,7 @@ fn partners(n: usize, m: usize, distance: impl Fn(usize, usize) -> f64) -> Vec<u
             sums[i][j] = sums[i][j - 1].min(sums[i - 1][j - 1] + distance(i - 1, j - 1));
         }
     }
-    // Trace the choice back from the last mode.
+    // Trace the choice back from the last eigenvalue.
     let (mut found, mut j) = (vec![0; n], m);
     for i in (1..=n).rev() {
         while j > i && sums[i][j] == sums[i][j - 1] {
@@ -155,23 +174,23 @@ mod tests {
 
     #[test]
     fn partners_are_nearest_in_ascending_order() {
-        let partners = |fewer: &[f64], more: &[f64]| {
-            super::partners(fewer.len(), more.len(), |i, j| (fewer[i] / more[j]).ln().abs())
-        };
-        assert_eq!(partners(&[1.0, 2.0], &[1.0, 2.0, 3.0]), [0, 1]);
-        assert_eq!(partners(&[2.0, 9.0], &[1.0, 2.0, 3.0, 4.0, 9.0]), [1, 4]);
+        assert_eq!(nearest(&[1.0, 2.0], &[1.0, 2.0, 3.0]), [0, 1]);
+        assert_eq!(nearest(&[2.0, 9.0], &[1.0, 2.0, 3.0, 4.0, 9.0]), [1, 4]);
         assert_eq!(
-            partners(&[1.0, 2.2, 3.0], &[1.0, 2.0, 3.0, 4.0]),
+            nearest(&[1.0, 2.2, 3.0], &[1.0, 2.0, 3.0, 4.0]),
             [0, 1, 2],
             "a mode that differs keeps its place"
         );
-        assert_eq!(partners(&[5.0, 5.0], &[5.0, 5.0, 5.0]).len(), 2);
-        assert!(partners(&[], &[1.0]).is_empty());
-        // The mode at 2 has the shape of the one at 2.3, beside which another mode is nearer in frequency.
-        let (fewer, more): ([f64; 2], [f64; 3]) = ([1.0, 2.0], [1.0, 2.05, 2.3]);
-        let shapes = [[0, 1, 1], [1, 1, 0]];
-        let distance = |i: usize, j: usize| (fewer[i] / more[j]).ln().abs() + f64::from(shapes[i][j]);
-        assert_eq!(super::partners(2, 3, distance), [0, 2]);
+        assert_eq!(nearest(&[5.0, 5.0], &[5.0, 5.0, 5.0]).len(), 2);
+        assert!(nearest(&[], &[1.0]).is_empty());
+    }
+
+    #[test]
+    fn partners_have_one_shape_where_one_has_it() {
+        // The mode at 2 has the shape of the one at 2.3, beside which another mode is nearer; two modes have exchanged their order.
+        assert_eq!(partners(&[1.0, 2.0], &[1.0, 2.05, 2.3], &[Some(0), Some(2)]), [0, 2]);
+        assert_eq!(partners(&[1.0, 2.0, 3.0], &[1.0, 2.1, 2.9, 3.1], &[None, Some(2), Some(1)]), [0, 2, 1]);
+        assert_eq!(partners(&[1.0, 2.0, 3.0], &[1.0, 2.1, 2.9], &[None, None, Some(0)]), [1, 2, 0]);
     }
 
     #[test]

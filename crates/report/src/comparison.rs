@@ -6,6 +6,7 @@ mod modes;
 mod named_loads;
 mod recoveries;
 
+pub(super) use modes::by_shape;
 pub(super) use modes::signed_percent;
 pub use modes::{ModePair, Pairing};
 
@@ -174,7 +175,7 @@ fn compared(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyC
 }
 
 /// Compares two bodies of which one may have fewer modes. Each mode of the smaller body is paired with a mode
-/// of the larger one, in ascending order, so that frequencies and, with common nodes, shapes deviate least. The notes list the
+/// of the larger one: with that of its shape, others in ascending order, so that the frequencies deviate least. The notes list the
 /// modes that were compared and the modes that were left out.
 ///
 /// # Errors

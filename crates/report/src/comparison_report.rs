@@ -123,7 +123,7 @@ impl ComparisonReport<'_> {
     /// Returns the table of the frequencies, mode by mode.
     fn frequencies<'b>(&self) -> Block<'b> {
         let has_shapes = self.comparison.modes().iter().any(|pair| pair.assurance.is_some());
-        let mut heads = vec!["Mode", "of second", "First (Hz)", "Second (Hz)", "Difference"];
+        let mut heads = vec!["Mode", "Mode of second", "First (Hz)", "Second (Hz)", "Difference"];
         heads.extend(has_shapes.then_some("MAC"));
         let rows = self
             .comparison
@@ -194,7 +194,7 @@ impl ComparisonReport<'_> {
         }
         text.push_str(&format!("\nFrequencies, modes {}:\n\n", self.comparison.paired().in_words()));
         text.push_str(
-            "| mode | of second | first (Hz) | second (Hz) | difference | MAC |\n|---|---|---|---|---|---|\n",
+            "| mode | mode of second | first (Hz) | second (Hz) | difference | MAC |\n|---|---|---|---|---|---|\n",
         );
         for pair in self.comparison.modes() {
             let mut cells = frequency_cells(pair);

@@ -8,8 +8,8 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::larger;
 use serde::Serialize;
 
-/// Least assurance of every pair for which modes are paired by their shapes. Below it, a shape is that of no mode of the
-/// other body, and a pair of shapes would have no meaning.
+/// Least assurance of a pair of modes with one shape. Modes without such a partner are paired in ascending order, and their
+/// frequencies are not those of one mode.
 const MIN_ASSURANCE: f64 = 0.5;
 
 /// Two modes that are compared, numbered from 1.
@@ -55,7 +55,7 @@ impl ModePair {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Pairing {
-    /// By the displacements of their common nodes.
+    /// By the displacements of their common nodes; modes whose shape is that of no mode of the other body in ascending order.
     Shape,
     /// In ascending order of the frequencies.
     Order,
@@ -81,9 +81,12 @@ impl BodyComparison {
         assurance: Option<&Mat<f64>>,
         tolerance: f64,
     ) {
-        let by_shape = assurance.and_then(partners);
-        self.paired = if by_shape.is_some() { Pairing::Shape } else { Pairing::Order };
-        let partners = by_shape.unwrap_or_else(|| (0..a.n_modes()).collect());
+        let by_shape = assurance.map_or_else(|| vec![None; a.n_modes()], by_shape);
+        let has_shapes = by_shape.iter().any(Option::is_some);
+        self.paired = if has_shapes { Pairing::Shape } else { Pairing::Order };
+        // Modes without a partner of their shape take the others in ascending order.
+        let mut others = (0..b.n_modes()).filter(|j| !by_shape.contains(&Some(*j)));
+        let partners: Vec<usize> = by_shape.iter().filter_map(|one| one.or_else(|| others.next())).collect();
         let (of_a, of_b) = (a.frequencies_hz(), b.frequencies_hz());
         let pair = |(i, j): (usize, usize)| ModePair {
             mode_a: i + 1,
@@ -94,11 +97,23 @@ impl BodyComparison {
             assurance: assurance.map(|values| values[(i, j)]),
         };
         self.modes = partners.into_iter().enumerate().map(pair).collect();
-        let largest = self.modes.iter().map(|pair| pair.difference.abs()).fold(0.0, larger);
-        self.row("frequency", "relative, largest of all modes", largest, tolerance);
-        // In reports the row stands among the quantities that need no common node.
+        let alike = self.modes.iter().filter(|pair| !has_shapes || !pair.is_of_strangers());
+        let largest = alike.map(|pair| pair.difference.abs()).fold(0.0, larger);
+        let meaning = if has_shapes {
+            "relative, largest of all modes of one shape"
+        } else {
+            "relative, largest of all modes"
+        };
+        self.row("frequency", meaning, largest, tolerance);
+        // In reports the rows stand among the quantities that need no common node.
         let place = self.rows.iter().position(|row| row.quantity == "inertia").map_or(0, |at| at + 1);
         self.rows[place..].rotate_right(1);
+        if assurance.is_some() {
+            let strangers = self.modes.iter().filter(|pair| pair.is_of_strangers()).count();
+            let meaning = "number of modes whose shape is that of no mode of the other body";
+            self.row("modes without partner", meaning, strangers as f64, 0.0);
+            self.rows[place + 1..].rotate_right(1);
+        }
     }
 
     /// Numbers the modes as in bodies of which only the modes `of_a` and `of_b` (from 0) were compared.
@@ -130,13 +145,11 @@ impl BodyComparison {
             .filter(|pair| pair.is_of_strangers())
             .map(|pair| pair.mode_a.to_string())
             .collect();
-        if self.paired == Pairing::Order && self.same_nodes {
-            let whose = match strangers.is_empty() {
-                true => "some modes".to_owned(),
-                false => format!("modes {}", first_of(&strangers)),
-            };
+        if self.same_nodes && !strangers.is_empty() {
+            let (modes, have) = if strangers.len() == 1 { ("mode", "has") } else { ("modes", "have") };
             self.notes.push(format!(
-                "the modes are paired by their frequencies: {whose} of the first body have the shape of none of their partners, and their differences are not those of one mode"
+                "{modes} {} of the first body {have} the shape of no mode of the second: the table shows the next frequency beside each, which is not that of the same mode",
+                first_of(&strangers)
             ));
         }
         let failed = self.rows.iter().any(|row| row.quantity == "frequency" && !row.passed);
@@ -187,21 +200,21 @@ pub(super) fn assurance(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     })
 }
 
-/// Returns for each mode of the first body the mode of the second with its shape: the pairs of the largest assurance first.
-/// Returns `None` if a mode has no partner of its shape.
-fn partners(assurance: &Mat<f64>) -> Option<Vec<usize>> {
-    let n = assurance.nrows();
-    let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).collect();
+/// Returns for each mode of the first body the mode of the second with its shape, the pairs of the largest assurance first; `None`
+/// for a mode without a partner of its shape.
+pub(crate) fn by_shape(assurance: &Mat<f64>) -> Vec<Option<usize>> {
+    let (n, m) = (assurance.nrows(), assurance.ncols());
+    let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (0..m).map(move |j| (i, j))).collect();
     pairs.retain(|&(i, j)| assurance[(i, j)] >= MIN_ASSURANCE);
     // The sort keeps the order of equal pairs.
     pairs.sort_by(|x, y| assurance[(y.0, y.1)].total_cmp(&assurance[(x.0, x.1)]));
-    let (mut found, mut taken) = (vec![None; n], vec![false; n]);
+    let (mut found, mut taken) = (vec![None; n], vec![false; m]);
     for (i, j) in pairs {
         if found[i].is_none() && !taken[j] {
             (found[i], taken[j]) = (Some(j), true);
         }
     }
-    found.into_iter().collect()
+    found
 }
 
 #[cfg(test)]
@@ -209,14 +222,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn modes_are_paired_by_their_shapes_or_not_at_all() {
+    fn modes_are_paired_by_their_shapes() {
+        let of = |a: &Mat<f64>, b: &Mat<f64>| by_shape(&assurance(a.as_ref(), b.as_ref()));
         let identity = Mat::<f64>::identity(3, 3);
         let exchanged = Mat::from_fn(3, 3, |i, j| identity[([1, 0, 2][i], j)]);
-        assert_eq!(partners(&assurance(identity.as_ref(), exchanged.as_ref())), Some(vec![1, 0, 2]));
+        assert_eq!(of(&identity, &exchanged), [Some(1), Some(0), Some(2)]);
         let mixed = Mat::from_fn(3, 3, |_, j| if j == 0 { 1.0 } else { 0.1 });
-        assert_eq!(partners(&assurance(identity.as_ref(), mixed.as_ref())), None);
+        assert_eq!(of(&identity, &mixed), [None; 3]);
         let scaled = Mat::from_fn(3, 3, |i, j| -2.0 * identity[(i, j)]);
-        assert_eq!(partners(&assurance(identity.as_ref(), scaled.as_ref())), Some(vec![0, 1, 2]));
+        assert_eq!(of(&identity, &scaled), [Some(0), Some(1), Some(2)]);
+        let fewer = Mat::from_fn(3, 2, |i, j| identity[(i, [2, 1][j])]);
+        assert_eq!(of(&fewer, &identity), [Some(2), Some(1)]);
+        assert_eq!(of(&identity, &fewer), [None, Some(1), Some(0)]);
         assert_eq!(assurance(identity.as_ref(), Mat::zeros(3, 3).as_ref())[(0, 0)], 0.0);
     }
 
