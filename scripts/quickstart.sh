@@ -11,7 +11,7 @@ fi
 # shellcheck source=scripts/cmake.sh
 source scripts/cmake.sh
 
-echo "building the program: some ten minutes of the processor the first time"
+echo "building the program: 10 to 20 minutes of the processor the first time"
 cargo build --release --locked --package flexbody
 mkdir -p target/quickstart
 cargo run --release --locked --quiet --package flexbody -- convert fixtures/models/connecting_rod/model.toml \

@@ -2,7 +2,8 @@
 
 use super::document::{Block, Inline, Table, cells};
 use super::numbers::{counted, significant};
-use flexbody_body::flex_body::{Carrier, FlexBody, HeldMode};
+use flexbody_body::basis::BasisKind;
+use flexbody_body::flex_body::{Carrier, FlexBody, HeldMode, is_static};
 use serde::Serialize;
 
 /// Number of modes that are listed. More make the report longer.
@@ -17,6 +18,9 @@ pub(super) struct HeldFacts {
     effective_mass: [f64; 3],
     /// Number of modes of the body.
     count: usize,
+    /// True if the body has free modes alone, without static shapes, which hold an interface poorly.
+    #[serde(skip)]
+    is_poor: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -43,6 +47,8 @@ impl HeldFacts {
                 interface: name.clone(),
                 effective_mass: [sum(0), sum(1), sum(2)],
                 count: modes.len(),
+                is_poor: body.basis() == Some(BasisKind::Free)
+                    && !body.modes().provenance.iter().any(|origin| is_static(origin)),
                 modes: modes.iter().take(MODES_SHOWN).map(facts).collect(),
             })
         };
@@ -58,8 +64,13 @@ impl HeldFacts {
         };
         let heads = ["Mode", "Frequency (Hz)", "x, %", "y, %", "z, %"];
         let [x, y, z] = percents(&self.effective_mass);
+        let estimate = if self.is_poor {
+            ". Estimates, too high by some per cent: free modes lack a part of the static compliance here, which --residual-vectors interfaces or --basis craig-bampton add"
+        } else {
+            ""
+        };
         let caption = format!(
-            "Modes of the body held at `{}`, and their effective masses along the model axes: how strongly an acceleration of this interface drives each. All {} together have {x}, {y} and {z} % of the mass; the rest follows the interface",
+            "Modes of the body held at `{}`, and their effective masses along the model axes: how strongly an acceleration of this interface drives each. All {} together have {x}, {y} and {z} % of the mass; the rest follows the interface{estimate}",
             self.interface,
             counted(self.count, "mode")
         );

@@ -6,7 +6,7 @@ use super::errors::{
     ReferenceErrorFacts, VariationFacts, errors_in_words, in_words, part_in_words, ranges,
     reference_in_words, tolerances_in_words,
 };
-use super::numbers::significant;
+use super::numbers::{percent, significant};
 use super::run_data::RunData;
 use super::selection_verdict::SelectionVerdict;
 use super::text::{self, Screen};
@@ -259,8 +259,8 @@ impl<'a> SelectionFacts<'a> {
             let budget = match term.budget {
                 budget if budget < 1.0 => {
                     format!(
-                        " ({} % of the tolerance; the rest is reserved for dropped modes and the error of the body)",
-                        significant(100.0 * budget, 2)
+                        " ({} of the stated tolerance; the rest is reserved for dropped modes and the error of the body)",
+                        percent(budget)
                     )
                 }
                 _ => String::new(),

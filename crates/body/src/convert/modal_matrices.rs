@@ -189,7 +189,8 @@ pub(super) fn softening_warning(model: &FeModel, basis: &BasisChoice, body: &Fle
     let axis = axis_in_words(&axis);
     let hertz = model.units().frequency_of(SOFTENING / part);
     let message = format!(
-        "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {hertz:.4e} Hz about axis {axis} of the model"
+        "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {} Hz about axis {axis} of the model",
+        significant(hertz, 4)
     );
     Some(Diagnostic::new(Code::GeometricStiffnessNone, message))
 }

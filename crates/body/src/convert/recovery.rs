@@ -14,6 +14,7 @@ use crate::flex_body::{
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::significant;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     CscMatrix, column_products, combine, dense_cholesky, gram, side_by_side, solve_lower, solve_upper,
@@ -96,7 +97,7 @@ impl ModalModel<'_> {
                 self.refuse_divided_interface(one, nodes, &basis.coupled)?;
                 let side = one_side(self.model, nodes, *about);
                 let (modes, columns) = basis.section_forces(self.model, &side, &loads, groups);
-                let labels = section_labels(self.model);
+                let labels = section_labels(self.model, *about);
                 let offset = vec![0.0; labels.len()];
                 Ok(loads.recovery(one, labels, offset, modes, &columns))
             }
@@ -529,15 +530,23 @@ fn one_side(model: &FeModel, side: &[i64], about: [f64; 3]) -> Mat<f64> {
     Mat::from_fn(fields.nrows(), fields.ncols(), |row, c| if inside[row] { fields[(row, c)] } else { 0.0 })
 }
 
-/// Returns the labels of section forces: forces, then moments, along the axes of the model.
-fn section_labels(model: &FeModel) -> Vec<RecoveryRow> {
+/// Names of the axes of the model.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Returns the labels of section forces: forces, then moments about a point, along the axes of the model.
+fn section_labels(model: &FeModel, about: [f64; 3]) -> Vec<RecoveryRow> {
     let units = model.units();
+    let point = format!("about {} {}", about.map(|x| significant(x, 6)).join(", "), units.length_name());
     let row = |&component: &usize| {
         let is_force = component < 3;
         RecoveryRow {
             name: COMPONENTS[component].to_owned(),
             quantity: if is_force { Quantity::Force } else { Quantity::Moment },
-            component: (component + 1).to_string(),
+            component: if is_force {
+                AXES[component].to_owned()
+            } else {
+                format!("{} {point}", AXES[component - 3])
+            },
             unit: if is_force { units.force_name() } else { units.moment_name() },
             node: None,
             element: None,

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Simulates the flexible body beside this file in Exudyn: a joint at each interface, one of them driven.
 
-Written by flexbody beside BODY.hdf5 as BODY_exudyn.py; change it as you like. Needs exudyn, h5py and numpy.
+Written by flexbody beside BODY.hdf5 as BODY_exudyn.py; change it as you like. Needs exudyn, h5py, scipy and numpy.
 
     python BODY_exudyn.py                                 # drives the first interface, bushings at the others
     python BODY_exudyn.py --drive crank --fix bearing     # by name; --bushing, --free as well
@@ -42,7 +42,10 @@ def contents():
     """Content of the file."""
     if not FILE.exists():
         raise SystemExit(f"{FILE} is not there: keep this program beside the file that flexbody export wrote, named BODY.hdf5")
-    return LoadDictFromHDF5(str(FILE))
+    try:
+        return LoadDictFromHDF5(str(FILE))
+    except ImportError:
+        raise SystemExit(f"h5py and scipy are needed to read {FILE.name}: pip install h5py scipy") from None
 
 
 def interfaces():

@@ -31,7 +31,7 @@ impl ExportFormat for Sid {
     }
 
     fn other_names(&self) -> &'static [&'static str] {
-        &["simpack", "modelica", "dymola", "neweul-m2"]
+        &["simpack"]
     }
 
     fn dialects(&self) -> &'static [&'static str] {

@@ -307,8 +307,14 @@ impl MotionHistory {
             let message = format!(
                 "the history covers the times {first} to {last}, but the scene those from 0 to {duration}"
             );
-            let help =
-                "write the whole run, from 0 to `duration` of [run], with the time in the unit of the body";
+            let help = if last > duration && first.abs() <= rounding {
+                format!(
+                    "set duration = {last} in [run] of the scene if its loads go on until then, or cut the table after {duration}"
+                )
+            } else {
+                "write the whole run, from 0 to `duration` of [run], with the time in the unit of the body"
+                    .to_owned()
+            };
             let uncovered = Diagnostic::new(Code::SeriesRange, message).in_file(&self.path);
             return Err(uncovered.with_help(help).into());
         }
