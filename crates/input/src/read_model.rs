@@ -104,7 +104,12 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     let interfaces: Vec<NodeSet> = files
         .interfaces
         .iter()
-        .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, opened, files)))
+        .filter_map(|interface| {
+            take(
+                &mut diagnostics,
+                places.node_set(&format!("interface `{}`", interface.name), interface, opened, files),
+            )
+        })
         .collect();
     let recoveries = places.recoveries(opened, files, &mut diagnostics);
     let named_loads = read_loads(opened, files, &mut diagnostics);
@@ -387,10 +392,13 @@ impl<'m> NodeLookup<'m> {
         Self { matrices, moving: matrices.and_then(|matrices| matrices.moving(dimension)) }
     }
 
-    /// Returns the nodes of an interface. Regions and sets of a model that could not be read are empty; its files
-    /// report the reason.
+    /// Returns the nodes of an interface, or of one side of a cut. Regions and sets of a model that could not be read are empty; its
+    /// files report the reason.
+    ///
+    /// * `owner`: entry of the manifest that messages name.
     fn node_set(
         &self,
+        owner: &str,
         interface: &InterfaceSource,
         opened: &OpenFiles,
         files: &ModelFiles,
@@ -401,7 +409,7 @@ impl<'m> NodeLookup<'m> {
             InterfaceNodes::File(path) => read_node_list(opened.get(path)?)?,
             InterfaceNodes::Set(name) => {
                 outline = self.members(name).map(<[i64]>::to_vec).unwrap_or_default();
-                self.of_set(interface, name, files)?
+                self.of_set(owner, name, files)?
             }
             InterfaceNodes::Region(region) => {
                 let all = self.matrices.iter().flat_map(|matrices| {
@@ -410,7 +418,7 @@ impl<'m> NodeLookup<'m> {
                 let all = all.filter(|(id, _)| self.moves(*id));
                 let nodes = region.nodes(all.clone());
                 let why = if nodes.is_empty() { region.empty(all) } else { String::new() };
-                self.refuse_empty(interface, nodes, &why, files)?
+                self.refuse_empty(owner, nodes, &why, files)?
             }
         };
         let (name, coupling, reference) = (interface.name.clone(), interface.coupling, interface.reference);
@@ -497,7 +505,7 @@ impl<'m> NodeLookup<'m> {
                 let (coupling, reference) = (None, Reference::Centre);
                 let as_set =
                     InterfaceSource { name: name.clone(), nodes: nodes.clone(), coupling, reference };
-                let nodes = self.node_set(&as_set, opened, files)?.nodes;
+                let nodes = self.node_set(&format!("recovery `{name}`"), &as_set, opened, files)?.nodes;
                 let path = match &as_set.nodes {
                     InterfaceNodes::File(path) => path.clone(),
                     _ => files.manifest.clone().unwrap_or_default(),
@@ -526,15 +534,15 @@ impl<'m> NodeLookup<'m> {
         known.map(|(_, nodes)| nodes.as_slice())
     }
 
-    fn of_set(&self, interface: &InterfaceSource, name: &str, files: &ModelFiles) -> Found<Vec<i64>> {
+    fn of_set(&self, owner: &str, name: &str, files: &ModelFiles) -> Found<Vec<i64>> {
         let Some(matrices) = self.matrices else { return Ok(Vec::new()) };
         let refused = matrices.unresolved.iter().find(|(key, _)| comparable(key) == comparable(name));
         if let Some((_, refused)) = refused {
-            return Err(vec![refused.clone().about(format!("interface `{}`", interface.name))]);
+            return Err(vec![refused.clone().about(owner)]);
         }
         let Some(nodes) = self.members(name) else {
             let names: Vec<&str> = matrices.sets.iter().map(|(key, _)| key.as_str()).take(20).collect();
-            let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
+            let message = format!("{owner}: the model has no node set `{name}`");
             let help = if names.is_empty() {
                 "list the nodes, or give a region: the files of the model have no node sets".to_owned()
             } else {
@@ -545,23 +553,12 @@ impl<'m> NodeLookup<'m> {
         // A set may list nodes without degrees of freedom, and some nodes twice.
         let mut seen = HashSet::new();
         let nodes = nodes.iter().copied().filter(|id| self.moves(*id) && seen.insert(*id)).collect();
-        self.refuse_empty(
-            interface,
-            nodes,
-            &format!("no node of the set `{name}` has degrees of freedom"),
-            files,
-        )
+        self.refuse_empty(owner, nodes, &format!("no node of the set `{name}` has degrees of freedom"), files)
     }
 
-    fn refuse_empty(
-        &self,
-        interface: &InterfaceSource,
-        nodes: Vec<i64>,
-        why: &str,
-        files: &ModelFiles,
-    ) -> Found<Vec<i64>> {
+    fn refuse_empty(&self, owner: &str, nodes: Vec<i64>, why: &str, files: &ModelFiles) -> Found<Vec<i64>> {
         if nodes.is_empty() && self.matrices.is_some() {
-            let message = format!("interface `{}`: {why}", interface.name);
+            let message = format!("{owner}: {why}");
             return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message))]);
         }
         Ok(nodes)
