@@ -218,7 +218,7 @@ fn frequency_cells(pair: &ModePair) -> Vec<String> {
         pair.mode_b.to_string(),
         significant(pair.frequency_a_hz, 7),
         significant(pair.frequency_b_hz, 7),
-        signed_percent(pair.difference),
+        if pair.is_of_strangers() { "no partner".to_owned() } else { signed_percent(pair.difference) },
     ];
     cells.extend(pair.assurance.map(|assurance| format!("{assurance:.4}")));
     cells

@@ -32,7 +32,7 @@ pub struct ModePair {
 
 impl ModePair {
     /// Returns true if the shapes of the two modes are known and are not one.
-    fn is_of_strangers(&self) -> bool {
+    pub(crate) fn is_of_strangers(&self) -> bool {
         self.assurance.is_some_and(|assurance| assurance < MIN_ASSURANCE)
     }
 
@@ -126,13 +126,10 @@ impl BodyComparison {
 
     /// Adds notes about the modes: other orders, shapes without a partner, and the worst frequency beyond its tolerance.
     pub(super) fn say_of_modes(&mut self) {
-        let is_moved = |pair: &&ModePair| self.modes.iter().any(|other| crosses(pair, other));
-        let moved: Vec<String> = self
-            .modes
-            .iter()
-            .filter(is_moved)
-            .map(|pair| format!("{} is {}", pair.mode_a, pair.mode_b))
-            .collect();
+        let alike = || self.modes.iter().filter(|pair| !pair.is_of_strangers());
+        let is_moved = |pair: &&ModePair| alike().any(|other| crosses(pair, other));
+        let moved: Vec<String> =
+            alike().filter(is_moved).map(|pair| format!("{} is {}", pair.mode_a, pair.mode_b)).collect();
         if self.paired == Pairing::Shape && !moved.is_empty() {
             self.notes.push(format!(
                 "by their shapes, modes of the first body have another order in the second: {}",
