@@ -104,12 +104,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     let interfaces: Vec<NodeSet> = files
         .interfaces
         .iter()
-        .filter_map(|interface| {
-            take(
-                &mut diagnostics,
-                places.node_set(&format!("interface `{}`", interface.name), interface, opened, files),
-            )
-        })
+        .filter_map(|interface| take(&mut diagnostics, places.interface(interface, opened, files)))
         .collect();
     let recoveries = places.recoveries(opened, files, &mut diagnostics);
     let named_loads = read_loads(opened, files, &mut diagnostics);
@@ -390,6 +385,16 @@ struct NodeLookup<'m> {
 impl<'m> NodeLookup<'m> {
     fn of(matrices: Option<&'m ModelMatrices>, dimension: u8) -> Self {
         Self { matrices, moving: matrices.and_then(|matrices| matrices.moving(dimension)) }
+    }
+
+    /// Returns the nodes of an interface, as [`node_set`](Self::node_set).
+    fn interface(
+        &self,
+        interface: &InterfaceSource,
+        opened: &OpenFiles,
+        files: &ModelFiles,
+    ) -> Found<NodeSet> {
+        self.node_set(&format!("interface `{}`", interface.name), interface, opened, files)
     }
 
     /// Returns the nodes of an interface, or of one side of a cut. Regions and sets of a model that could not be read are empty; its

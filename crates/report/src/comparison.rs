@@ -424,7 +424,12 @@ impl BodyComparison {
     /// Compares mass, centre of mass and inertia about it.
     fn rigid(&mut self, a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) {
         let (ia, ib) = (a.invariants(), b.invariants());
-        self.row("mass", "mass of the first body", relative(ib.mass() - ia.mass(), ia.mass()), tolerances.mass);
+        self.row(
+            "mass",
+            "mass of the first body",
+            relative(ib.mass() - ia.mass(), ia.mass()),
+            tolerances.mass,
+        );
         let radius = gyration_radius(ia);
         let com =
             |body: &FlexBody| body.frame().origin + body.frame().axes * centre_of_mass(body.invariants());
