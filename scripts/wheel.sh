@@ -15,9 +15,11 @@ processor="$(uname -m)"
 [[ " $* " != *" --target aarch64"* ]] || processor=aarch64
 rm -f "$wheels"/flexbody-*_"$processor".whl
 
-"$python" -m venv "$work/build"
-"$work/build/bin/pip" install --quiet --disable-pip-version-check 'maturin[zig]>=1.9,<2'
-(cd python && PATH="$work/build/bin:$PATH" maturin build --release --locked --out "$wheels" "$@")
+# In a place that stays: the build of HDF5 remembers the compiler, which is a part of maturin with --zig.
+build="$PWD/.tools/maturin"
+"$python" -m venv "$build"
+"$build/bin/pip" install --quiet --disable-pip-version-check 'maturin[zig]>=1.9,<2'
+(cd python && PATH="$build/bin:$PATH" maturin build --release --locked --out "$wheels" "$@")
 wheel="$(ls "$wheels"/flexbody-*_"$processor".whl)"
 echo "wheel: $wheel, $(du -h "$wheel" | cut -f1)"
 if [ "$processor" != "$(uname -m)" ]; then
