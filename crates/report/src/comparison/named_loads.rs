@@ -1,6 +1,6 @@
 //! Comparison of the named loads of two bodies.
 
-use super::{BodyComparison, Pair, relative};
+use super::{BodyComparison, Pair, relative, relative_difference};
 use faer::Mat;
 use flexbody_body::flex_body::{FlexBody, NamedLoad};
 use flexbody_linalg::larger;
@@ -55,10 +55,8 @@ fn difference_in_modes(a: &NamedLoad, b: &NamedLoad, groups: &[Range<usize>]) ->
         let norm = |x: &Mat<f64>, k: usize, g: &Range<usize>| {
             g.clone().map(|j| x[(k, j)].powi(2)).sum::<f64>().sqrt()
         };
-        let pairs = || (0..a.nrows()).flat_map(|k| groups.iter().map(move |g| (k, g)));
-        let size = pairs().map(|(k, g)| larger(norm(a, k, g), norm(b, k, g))).fold(0.0, larger);
-        let difference = pairs().map(|(k, g)| (norm(a, k, g) - norm(b, k, g)).abs()).fold(0.0, larger);
-        relative(difference, size)
+        let pairs = (0..a.nrows()).flat_map(|k| groups.iter().map(move |g| (k, g)));
+        relative_difference(pairs.map(|(k, g)| (1.0, norm(a, k, g), norm(b, k, g))))
     };
     larger(worst(&modal(a), &modal(b)), worst(&a.turning, &b.turning))
 }
@@ -70,12 +68,10 @@ fn difference_of_resultants(a: &NamedLoad, b: &NamedLoad, extent: f64) -> f64 {
         let moments = of.torque.iter().chain(&of.moments).map(|moment| moment / extent);
         of.force.iter().copied().chain(moments).collect()
     };
-    let (own, other) = (all(a), all(b));
-    let size = own.iter().chain(&other).map(|value| value.abs()).fold(0.0, larger);
-    let apart = own.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, larger);
+    let resultants = all(a).into_iter().zip(all(b)).map(|(a, b)| (1.0, a, b));
     let compliances = match (a.compliance, b.compliance) {
         (Some(a), Some(b)) => relative((a - b).abs(), larger(a.abs(), b.abs())),
         _ => 0.0,
     };
-    larger(relative(apart, size), compliances)
+    larger(relative_difference(resultants), compliances)
 }

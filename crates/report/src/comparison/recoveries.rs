@@ -1,6 +1,6 @@
 //! Comparison of the recoveries of two bodies: their rows in the modes, under constant unit loads and under forces of motion.
 
-use super::{BodyComparison, Pair, relative};
+use super::{BodyComparison, Pair, relative_difference};
 use faer::{Mat, MatRef};
 use flexbody_body::flex_body::{FlexBody, MotionLoad, Quantity, Recovery, RecoveryRow};
 use flexbody_linalg::larger;
@@ -193,14 +193,4 @@ impl RowGroup {
         }
         worst
     }
-}
-
-/// Returns the largest difference of pairs of numbers, relative to the largest number; each pair has a factor.
-fn relative_difference(pairs: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
-    let (mut difference, mut size) = (0.0, 0.0);
-    for (factor, a, b) in pairs {
-        difference = larger(difference, factor * (a - b).abs());
-        size = larger(size, factor * larger(a.abs(), b.abs()));
-    }
-    relative(difference, size)
 }
