@@ -23,6 +23,7 @@ use flexbody_input::{
     ImportedColumns, LoadSource, MatrixLocation, ModelFiles, read_imported, read_model, read_nodal_masses,
 };
 use flexbody_linalg::context::{Context, Event};
+use flexbody_linalg::instruction_set;
 use flexbody_model::{CheckedModel, FeModel};
 use flexbody_motion::dynamics::indefinite_inertia;
 use flexbody_motion::scene::LoadCases;
@@ -595,6 +596,7 @@ fn run_data(
         peak_memory_bytes: peak_memory_bytes(),
         memory_estimate_bytes: None,
         threads,
+        instructions: instruction_set().to_owned(),
         diagnostics,
         attempts: conversion.plan.iter().flat_map(|plan| plan.attempts.iter().map(search_attempt)).collect(),
         counters: counters.iter().map(|&(name, count)| (name.to_owned(), count)).collect(),

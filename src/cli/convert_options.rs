@@ -99,11 +99,16 @@ pub(super) fn refuse_unjudged(
         return Ok(());
     }
     let message = match selection.reference_errors.last().filter(|own| !ReferenceError::is_reference(own)) {
-        Some(own) => format!(
-            "no file was written: the error of the reference body of {} modes is {:.0} % of the tolerances, more than half, so that the selection cannot be judged",
-            own.modes,
-            100.0 * own.worst
-        ),
+        Some(own) => {
+            let error = match own.unknown {
+                Some(reason) => format!("not known ({reason})"),
+                None => format!("about {} of the tolerances, more than half", own.part_of_tolerances()),
+            };
+            format!(
+                "no file was written: the error of the reference body of {} modes is {error}, so that the selection cannot be judged",
+                own.modes
+            )
+        }
         None => "no file was written: the selected modes and terms do not meet the tolerances of the scene"
             .to_owned(),
     };

@@ -16,7 +16,7 @@ struct Findings {
     built_for: String,
     hdf5: String,
     hdf5_from: &'static str,
-    /// Instructions of sums and products on this machine; results do not depend on them.
+    /// Instructions of sums and products on this machine; the last bits of results depend on them.
     instructions: &'static str,
     processors: usize,
     threads: usize,

@@ -45,6 +45,19 @@ fn unfinished(folder: &Path) -> usize {
     members(folder).iter().filter(|name| name.starts_with(".flexbody-")).count()
 }
 
+/// Processor time, in hundredths of a second, after which a run has reserved its outputs, whatever else the machine does.
+#[cfg(target_os = "linux")]
+const TICKS_OF_RESERVATION: u64 = 20;
+
+/// Returns the processor time of a process in hundredths of a second; zero if the process has ended.
+#[cfg(target_os = "linux")]
+fn processor_ticks(process: u32) -> u64 {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // The fields after the name in parentheses begin with the third one; times of user and system are the 14th and 15th.
+    let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace();
+    fields.skip(11).take(2).filter_map(|ticks| ticks.parse::<u64>().ok()).sum()
+}
+
 /// Writes a model whose hundred modes take seconds.
 fn long_model(folder: &Path) -> PathBuf {
     let place = folder.join("model");
@@ -119,6 +132,9 @@ fn every_signal_that_ends_a_run_leaves_the_folder_as_it_was() {
         ]);
         let mut child = command.spawn().expect("the program");
         wait_for(&mut child, "its temporary files", || unfinished(&out) == 2);
+        // A crash while the second file is being reserved cannot remove it: the thread that crashes holds the list.
+        let process = child.id();
+        wait_for(&mut child, "its work", || processor_ticks(process) > TICKS_OF_RESERVATION);
         send(&number.map_or(name.to_owned(), |number| number.to_string()), &child);
         let Output { status, stdout, stderr } = child.wait_with_output().expect("a child");
         let said = String::from_utf8_lossy(&stderr);

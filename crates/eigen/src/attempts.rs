@@ -22,6 +22,7 @@ use super::refine::{FoundModes, refine};
 use faer::Mat;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::multigrid::{can_have_levels, levels};
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{Analysis, Cholesky, Indefinite, Real, Solve, largest, largest_entry};
 
 /// Largest number of modes that are searched for without a factor. With more, the products of all pairs of vectors take
@@ -353,7 +354,7 @@ fn second_shift_at(eigenvalues: &[f64], wanted: usize) -> Option<f64> {
     let (middle, window) = (count_at(SECOND_SHIFT_POSITION), count_at(SECOND_SHIFT_WINDOW).max(1));
     // Widest gap in the window around the best position.
     let near = eigenvalues.get(middle.checked_sub(window)?..=middle + window)?;
-    let widest = near.windows(2).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
+    let widest = first_largest(near.windows(2), |pair| pair[1] - pair[0])?;
     let sigma = 0.5 * (widest[0] + widest[1]);
     (widest[0] > 0.0 && sigma > widest[0] && sigma < widest[1]).then_some(sigma)
 }

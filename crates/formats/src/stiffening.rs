@@ -7,6 +7,7 @@
 
 use super::shapes::NodalShapes;
 use flexbody_body::convert::ShapeColumn;
+use flexbody_linalg::ties::first_largest;
 use flexbody_model::{LoadKind, UnitLoad};
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -47,7 +48,7 @@ impl StiffeningDecks<'_> {
             return Some(format!("the results have {steps} steps, expected those of {count} unit loads"));
         }
         let apart = |step: usize| self.shapes.difference(step, nodes, &displacements[step]);
-        let worst = (0..count).max_by(|a, b| apart(*a).total_cmp(&apart(*b)))?;
+        let worst = first_largest(0..count, |step| apart(*step))?;
         if nodes.is_empty() || apart(worst) > tolerance {
             return Some(format!(
                 "displacements of step {} differ from those of its unit load by {:.1e} of the largest, expected at most {tolerance:.0e}",

@@ -22,6 +22,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Error;
 use flexbody_base::text::InputFile;
 use flexbody_base::units::UnitSystem;
+use flexbody_linalg::ties::TIE_MARGIN;
 use flexbody_model::{AnsweredShapes, DofLabel, Quantity, RecoveryOperator, RecoveryRow, ShapeSteps};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -190,7 +191,7 @@ fn refuse_other_displacements(
                     return refuse(format!("node {node} of the results is not among the shapes"));
                 };
                 let apart = (value - shapes.displacements[(row, step)]).abs();
-                if apart > worst {
+                if apart > worst * (1.0 + TIE_MARGIN) {
                     (worst, at) = (apart, node);
                 }
             }

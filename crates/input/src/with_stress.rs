@@ -5,6 +5,7 @@ use super::model_files::{MatrixLocation, StressStiffnessSource};
 use super::rows_of_model::by_rows_of_model;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::InputFile;
+use flexbody_linalg::ties::first_smallest;
 use flexbody_linalg::{CscMatrix, parallel};
 use flexbody_model::{DofLabel, GivenRows, RawMatrix, UnitLoad};
 use std::borrow::Cow;
@@ -184,7 +185,7 @@ fn column_difference(a: &CscMatrix, b: &CscMatrix, j: usize, rounded: f64) -> Ve
 
 /// Returns a note with the digits of geometric stiffness that is a difference; `None` if none is.
 pub(super) fn difference_note(differences: &[(f64, UnitLoad)]) -> Option<Diagnostic> {
-    let (digits, load) = differences.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (digits, load) = first_smallest(differences, |one| one.0)?;
     let count = differences.len();
     let message = format!(
         "geometric stiffness of {count} load{} is the difference of two stiffness matrices; {digits:.1} digits are left, the fewest for {load}",

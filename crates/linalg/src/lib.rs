@@ -25,6 +25,7 @@ mod product;
 mod sparse;
 mod substitution;
 mod tall;
+pub mod ties;
 
 pub use compensated::{
     CompensatedBlock, DoubleDouble, LANES, SmallEigen, accumulate, accumulate_pair, gram_compensated,

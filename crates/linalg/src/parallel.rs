@@ -156,7 +156,8 @@ impl<T> Slot<T> {
 
 // Vector instructions of this machine.
 
-/// Returns the name of the widest vector instructions that the kernels use. The order of sums does not depend on them.
+/// Returns the name of the widest vector instructions that the kernels use. Sparse sums have one order on all of them;
+/// dense products of `faer` have an order for each, so that last bits of results depend on them.
 pub fn instruction_set() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     {

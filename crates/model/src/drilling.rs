@@ -19,6 +19,7 @@ use super::node_pairs::neighbours;
 use super::wording::name_some;
 use super::{Nodes, RawModel, Rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::ties::TIE_MARGIN;
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -203,7 +204,7 @@ impl Shell<'_> {
                 let (x, y) = (arm(a), arm(b));
                 let longest = x.norm_squared().max(y.norm_squared());
                 let area = x.cross(&y).dot(normal).abs();
-                if area > MIN_TRIANGLE_AREA * longest && best.is_none_or(|(largest, _)| area > largest) {
+                if area > MIN_TRIANGLE_AREA * longest && best.is_none_or(|(largest, _)| area > largest * (1.0 + TIE_MARGIN)) {
                     best = Some((area, [node, a, b]));
                 }
             }

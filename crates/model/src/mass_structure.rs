@@ -3,6 +3,7 @@
 use super::rows::Rows;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::numbers::significant;
+use flexbody_linalg::ties::TIE_MARGIN;
 use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
 use std::ops::Range;
 
@@ -82,7 +83,7 @@ fn joined(n: usize, parts: Vec<Partial>) -> MassForm {
     for part in parts {
         columns.push(part.columns);
         exact &= !part.differs;
-        if part.worst > deviation {
+        if part.worst > deviation * (1.0 + TIE_MARGIN) {
             (deviation, worst) = (part.worst, part.worst_at);
         }
     }
@@ -184,7 +185,7 @@ fn mean(values: &[f64]) -> f64 {
 
 impl Partial {
     fn deviates(&mut self, by: f64, row: usize, column: usize) {
-        if by > self.worst {
+        if by > self.worst * (1.0 + TIE_MARGIN) {
             (self.worst, self.worst_at) = (by, (row, column));
         }
     }

@@ -5,6 +5,7 @@ use super::wording::name_some;
 use super::{DofLabel, GivenRows, LostRow, Nodes, Rows};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{CscMatrix, larger};
 use nalgebra::Vector3;
 use std::collections::HashSet;
@@ -406,7 +407,7 @@ fn strained(recovery: &ModelRecovery, fields: &Mat<f64>, rows: &Rows) -> Option<
     let checked = (0..labels.len()).filter(|&j| labels[j].quantity.ignores_rigid_motion());
     let wrong: Vec<(usize, f64)> =
         checked.map(|j| (j, response(j))).filter(|(_, part)| *part > MAX_RIGID_RESPONSE).collect();
-    let &(worst, part) = wrong.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let &(worst, part) = first_largest(&wrong, |one| one.1)?;
     let row = &labels[worst];
     let message = format!(
         "recovery `{}`: a rigid motion of the body gives {} of {} rows a value, most of all the {} `{}`: {part:.1e} of the sum of its terms, expected below {MAX_RIGID_RESPONSE:e}",

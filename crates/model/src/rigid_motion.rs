@@ -7,6 +7,8 @@ use super::wording::name_some;
 use super::{DofLabel, Nodes};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::numbers::significant;
+use flexbody_linalg::ties::sort_descending;
 use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix, gram, largest};
 
 /// Returns max |K R|_i / sum_j |K_ij| over the rows. Adds an error if rigid motion strains the body, above
@@ -26,7 +28,7 @@ pub(super) fn check_rigid_motion(
     if worst.is_nan() || worst > limit {
         let mut strained: Vec<usize> =
             (0..residuals.len()).filter(|&i| residuals[i].is_nan() || residuals[i] > limit).collect();
-        strained.sort_by(|&a, &b| residuals[b].total_cmp(&residuals[a]).then(a.cmp(&b)));
+        sort_descending(&mut strained, |&i| residuals[i]);
         let named: Vec<String> =
             strained.iter().map(|&i| format!("{} ({:.1e})", rows.label(nodes, i), residuals[i])).collect();
         let message = format!(
@@ -190,7 +192,7 @@ pub(super) fn check_inertia(body: &Assembled, tolerance: f64, found: &mut Vec<Di
         directional.fold(0.0f64, |s, (k, l)| s.max((g[(k, l)] - if k == l { m } else { 0.0 }).abs()));
     if spread > tolerance * m {
         let along: Vec<String> =
-            (0..d).map(|k| format!("{} along {}", g[(k, k)], ["x", "y", "z"][k])).collect();
+            (0..d).map(|k| format!("{} along {}", significant(g[(k, k)], 12), ["x", "y", "z"][k])).collect();
         return refuse(format!("total mass is {}, coupled by up to {:.1e}", along.join(", "), spread));
     }
     if d == 3 {
@@ -355,7 +357,7 @@ impl Restricted {
         }
         let largest = x.norm_max();
         let mut free: Vec<usize> = (0..n).filter(|&i| x[(i, 0)].abs() > 0.01 * largest).collect();
-        free.sort_by(|&a, &b| x[(b, 0)].abs().total_cmp(&x[(a, 0)].abs()).then(a.cmp(&b)));
+        sort_descending(&mut free, |&i| x[(i, 0)].abs());
         Err(free)
     }
 

@@ -7,6 +7,7 @@ use crate::wording::name_some;
 use crate::{FeModel, GeometricStiffness, RawMatrix, UnitLoad};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{SymmetricMatrix, gram, larger, parallel, subtract_combination};
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
@@ -121,7 +122,7 @@ impl Judged<'_> {
             ("direction", relations.blocks),
             ("the load", if other > MIN_REPORTED_LOAD_ERROR { other } else { 0.0 }),
         ];
-        let (what, worst) = errors.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (what, worst) = first_largest(errors, |error| error.1)?;
         (worst > MIN_REPORTED_ERROR.max(relations.rounding)).then(|| {
             let message = format!(
                 "geometric stiffness for {name} fulfils its relations with rigid motion to {worst:.1e} (worst: {what})"

@@ -157,6 +157,7 @@ pub fn run_data() -> RunData {
         peak_memory_bytes: Some(512_345_678),
         memory_estimate_bytes: Some(498_000_000),
         threads: 2,
+        instructions: "AVX2, FMA".to_owned(),
         diagnostics: vec![
             Diagnostic::new(Code::NoiseFloor, "rigid modes reach 3.2e-9 of the first eigenvalue")
                 .in_file("K.mtx.gz"),

@@ -13,6 +13,7 @@ use faer::Mat;
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::{FlexBody, Truncation};
 use flexbody_body::invariants::{CauchySchwarz, Invariants};
+use flexbody_linalg::ties::sort_descending;
 
 /// Returns the section about the modes.
 pub(super) fn modes<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
@@ -368,7 +369,7 @@ fn strongest(values: &[Vec<f64>], is_by_moments: bool) -> String {
     let cells = rows.flat_map(|(i, row)| row.iter().enumerate().map(move |(j, &value)| (i, j, value)));
     let mut cells: Vec<(usize, usize, f64)> =
         cells.filter(|(i, j, value)| (is_by_moments || i < j) && step(*value).is_some()).collect();
-    cells.sort_by(|a, b| b.2.total_cmp(&a.2));
+    sort_descending(&mut cells, |cell| cell.2);
     cells.truncate(NAMED);
     if cells.is_empty() {
         return format!("No entry of two modes reaches 1e-{DECADES}.");

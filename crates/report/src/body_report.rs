@@ -215,6 +215,7 @@ fn run<'a>(run: &RunFacts) -> Vec<Block<'a>> {
     items.extend([
         Term::new("Time", times.as_str()).in_text("total", format!("{times}, {threads}{memory}")),
         Term::page("Threads", run.threads.to_string()),
+        Term::page("Instructions", run.instructions.as_str()),
         Term::page("Peak memory", known(run.peak_memory_bytes)),
         Term::page("Memory expected", known(run.memory_estimate_bytes)),
         Term::page("Accuracy", run.accuracy.as_str()),

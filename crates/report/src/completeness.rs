@@ -5,6 +5,7 @@ use super::numbers::{counted, frequency, plain, significant};
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::{FlexBody, TermGroup, is_static};
 use flexbody_body::invariants::DIGITS;
+use flexbody_linalg::ties::first_smallest;
 use serde::{Serialize, Serializer};
 
 /// Judged certificate of a body.
@@ -233,7 +234,7 @@ pub(super) fn cut(digits: f64) -> String {
 /// Returns the smallest number of digits and its name.
 fn least<T>(digits: impl Iterator<Item = (f64, T)>) -> (String, T) {
     let (digits, whose) =
-        digits.min_by(|a, b| a.0.total_cmp(&b.0)).expect("bodies have modes and invariants");
+        first_smallest(digits, |one| one.0).expect("bodies have modes and invariants");
     (cut(digits), whose)
 }
 

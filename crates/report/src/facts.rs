@@ -20,7 +20,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major version breaks readers, a newer minor version only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 11;
+const MINOR: u32 = 12;
 
 /// All facts of a report. The JSON form follows the schema `schemas/report.schema.json`.
 ///
@@ -304,6 +304,7 @@ const UNCOUPLED: f64 = 1e-6;
 pub(super) struct RunFacts {
     pub accuracy: String,
     pub threads: usize,
+    pub instructions: String,
     pub wall_seconds: f64,
     pub cpu_seconds: f64,
     pub phases: Vec<Phase>,
@@ -525,6 +526,7 @@ impl RunFacts {
         Self {
             accuracy: run.accuracy.clone(),
             threads: run.threads,
+            instructions: run.instructions.clone(),
             wall_seconds: run.wall_seconds(),
             cpu_seconds: run.cpu_seconds(),
             phases: run.phases.clone(),

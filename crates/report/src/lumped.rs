@@ -6,6 +6,7 @@ use super::run_data::LumpedModes;
 use flexbody_body::flex_body::LumpedBody;
 use flexbody_body::invariants::{ERROR_NORMS, Invariants, LumpedScheme};
 use flexbody_linalg::larger;
+use flexbody_linalg::ties::first_smallest;
 use serde::{Serialize, Serializer};
 use std::collections::{HashMap, HashSet};
 
@@ -312,7 +313,7 @@ pub(super) fn judgement(lumped: &[LumpedFacts]) -> Option<String> {
     let largest = |own: &LumpedFacts| {
         larger(own.effect.largest_inertia(), own.worst_of_modes().map_or(0.0, |(_, e)| e))
     };
-    let best = compared.min_by(|a, b| largest(a).total_cmp(&largest(b)))?;
+    let best = first_smallest(compared, |own| largest(own))?;
     let which = if lumped.len() > 1 { "the better of these lumped masses" } else { "these lumped masses" };
     let scheme = scheme_in_words(&best.scheme);
     let negative = match best.negative_masses {

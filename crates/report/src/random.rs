@@ -8,6 +8,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, RecoveryRow};
 use flexbody_formats::{PointValues, stresses_vtu};
+use flexbody_linalg::ties::first_largest;
 use flexbody_motion::scene::StressPoint;
 use flexbody_study::response::{RandomErrors, RandomRecovery, RandomResponse};
 use serde::Serialize;
@@ -114,7 +115,7 @@ impl RandomFacts {
 impl RecoveryFacts {
     fn new(one: &RandomRecovery) -> Self {
         let most = |values: &[f64], places: &[usize]| {
-            places.iter().copied().max_by(|&a, &b| values[a].total_cmp(&values[b]).then(b.cmp(&a)))
+            first_largest(places.iter().copied(), |&at| values[at])
         };
         let of_unit = |alike: &Vec<usize>| {
             most(&one.rms, alike).map(|at| ValueFacts {

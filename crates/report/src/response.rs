@@ -11,6 +11,7 @@ use super::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;
+use flexbody_linalg::ties::descending;
 use flexbody_study::response::{
     At, Complex, Direction, Effectivity, Function, Output, Pair, Response, ResponseSettings, Spacing,
 };
@@ -164,9 +165,8 @@ impl PairFacts {
             let accelerances = function.reduced.iter().zip(hertz).map(|(z, f)| f * f * z[0].hypot(z[1]));
             accelerances.filter(|a| a.is_finite()).fold(0.0, f64::max)
         };
-        let mut by_peak: Vec<(usize, f64)> = self.functions.iter().map(peak).enumerate().collect();
-        by_peak.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let mut shown: Vec<usize> = by_peak.into_iter().take(PLOTS).map(|(i, _)| i).collect();
+        let peaks: Vec<f64> = self.functions.iter().map(peak).collect();
+        let mut shown: Vec<usize> = descending(&peaks).into_iter().take(PLOTS).collect();
         shown.sort_unstable();
         shown.into_iter().map(|i| &self.functions[i]).collect()
     }

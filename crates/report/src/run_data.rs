@@ -43,6 +43,8 @@ pub struct RunData {
     pub memory_estimate_bytes: Option<u64>,
     /// Number of threads.
     pub threads: usize,
+    /// Name of the vector instructions of the kernels, on which last bits depend.
+    pub instructions: String,
     /// All diagnostics in the order in which they were found.
     pub diagnostics: Vec<Diagnostic>,
     /// Work counts by name.

@@ -13,6 +13,7 @@ use super::text::{self, Screen};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{TermDecision, TermGroup};
+use flexbody_linalg::ties::sort_descending;
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::selection::{CaseSelection, DecisiveError, Participation, Selection, Trial};
 use serde::Serialize;
@@ -412,7 +413,7 @@ impl<'a> SelectionFacts<'a> {
     fn shares(&self) -> Table {
         let mut shares = self.modes.shares.clone();
         let size = |one: &ShareFacts| one.recovery.unwrap_or_else(|| one.stress.max(one.deflection));
-        shares.sort_by(|a, b| size(b).total_cmp(&size(a)));
+        sort_descending(&mut shares, size);
         let with_recoveries = shares.iter().any(|share| share.recovery.is_some());
         shares.truncate(MODES_SHOWN);
         let row = |share: &ShareFacts| {

@@ -14,6 +14,7 @@ use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::larger;
+use flexbody_linalg::ties::sort_descending;
 use flexbody_motion::dynamics::Balance;
 use flexbody_motion::integration::Work;
 use flexbody_motion::scene::{Drift, Envelope, Path, Recording, Scheme};
@@ -435,7 +436,7 @@ impl<'a> SimulationFacts<'a> {
         let nf = states.first().map_or(0, |state| state.q.len());
         let peak = |j: usize| states.iter().map(|state| state.q[j].abs()).fold(0.0, f64::max);
         let mut modes: Vec<(usize, f64)> = (0..nf).map(|j| (j, peak(j))).collect();
-        modes.sort_by(|a, b| b.1.total_cmp(&a.1));
+        sort_descending(&mut modes, |mode| mode.1);
         let line = |&(j, _): &(usize, f64)| Line {
             name: format!("mode {}", j + 1),
             values: states.iter().map(|state| state.q[j]).collect(),

@@ -10,6 +10,7 @@ use super::{Format, csv};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::Storage;
+use flexbody_linalg::ties::first_largest;
 use flexbody_motion::scene::{ModeStart, OutputErrors, Scheme, Tolerance};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
@@ -569,8 +570,7 @@ impl<'a> TradeFacts<'a> {
 /// Returns the errors of the reference in the load case with the largest last error.
 fn worst_reference_errors(reference_errors: &[Vec<ReferenceError>]) -> &[ReferenceError] {
     let last = |rounds: &&Vec<ReferenceError>| rounds.last().map_or(-1.0, |own| own.worst);
-    // `max_by` returns the last of equal elements, so that the reversed order selects the first.
-    let worst = reference_errors.iter().rev().max_by(|a, b| last(a).total_cmp(&last(b)));
+    let worst = first_largest(reference_errors, |rounds| last(rounds));
     worst.map_or(&[], Vec::as_slice)
 }
 

@@ -7,6 +7,7 @@ use crate::selection::{Significance, Situation, significances};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
+use flexbody_linalg::ties::first_largest;
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
     Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Run, Scene, Scheme,
@@ -166,7 +167,7 @@ fn guideline(
         let term = &terms[*at];
         term.counts && !labels.contains(&term.significance.guideline)
     };
-    let largest = (0..terms.len()).filter(left_out).max_by(|a, b| terms[*a].size.total_cmp(&terms[*b].size));
+    let largest = first_largest((0..terms.len()).filter(left_out), |at| terms[*at].size);
     GuidelineAdvice {
         name,
         keeps,

@@ -4,6 +4,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Interface};
 use flexbody_linalg::symmetric_eigen;
+use flexbody_linalg::ties::first_largest;
 use flexbody_motion::dynamics::{BodyPoint, Terms};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -128,5 +129,5 @@ fn node_place(body: &FlexBody, node: usize) -> Vector3<f64> {
 /// Returns the index of the node farthest from `centre`.
 fn farthest_node(body: &FlexBody, centre: &Vector3<f64>) -> usize {
     let distance = |node: &usize| (node_place(body, *node) - centre).norm_squared();
-    (0..body.n_nodes()).max_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    first_largest(0..body.n_nodes(), distance).unwrap_or(0)
 }

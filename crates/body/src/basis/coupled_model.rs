@@ -8,6 +8,7 @@ use faer::{Mat, MatRef};
 use flexbody_base::error::Result;
 use flexbody_eigen::{EigenFailure, EigenProblem, dynamic_responses_twice};
 use flexbody_linalg::context::Context;
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{
     Dependents, Elimination, Pencil, ReducedPencil, combine, gram, larger, side_by_side, subtract_combination,
 };
@@ -250,7 +251,7 @@ impl Echelon {
             // Largest entry among the remaining rows and columns.
             let places = (step..r).flat_map(|i| (0..columns).map(move |j| (i, j)));
             let open = places.filter(|(_, j)| !pivots.contains(j));
-            let Some((i, j)) = open.max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs())) else { break };
+            let Some((i, j)) = first_largest(open, |&place| a[place].abs()) else { break };
             if step == 0 {
                 first = a[(i, j)].abs();
             }

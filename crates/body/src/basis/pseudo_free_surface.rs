@@ -4,6 +4,7 @@
 
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{
     Pencil, column_products, combine, gram, side_by_side, subtract_combination, symmetric_eigen,
 };
@@ -306,6 +307,6 @@ fn scale(a: &mut Mat<f64>, j: usize, factor: f64) {
 /// amplitude in `parts` (shapes x modes) for M-orthonormal shapes and modes.
 pub(super) fn largest_shares(parts: MatRef<'_, f64>) -> Vec<(usize, f64)> {
     let shares = |p: usize| parts.col(p).iter().map(|a| a * a).enumerate();
-    let largest = |p: usize| shares(p).fold((0, 0.0), |most, one| if one.1 > most.1 { one } else { most });
+    let largest = |p: usize| first_largest(shares(p), |one| one.1).unwrap_or((0, 0.0));
     (0..parts.ncols()).map(largest).collect()
 }

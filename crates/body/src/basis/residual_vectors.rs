@@ -18,6 +18,7 @@ use flexbody_eigen::{
     dynamic_responses, modes_of_span, static_responses, static_responses_twice,
 };
 use flexbody_linalg::context::Context;
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{add_combination, column_products, gram, side_by_side};
 use flexbody_model::{Coupling, FeModel, InertialRows, NodeSet, RawShapes};
 use nalgebra::Vector3;
@@ -561,7 +562,7 @@ impl Added {
             if (0..free).map(share).sum::<f64>() > 0.5 {
                 return super::FREE_MODE.to_owned();
             }
-            let largest = (free..parts.nrows()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
+            let largest = first_largest(free..parts.nrows(), |&c| share(c));
             let largest = largest.expect("the span is more than the free modes");
             let name = &loads.names[self.retained[largest - free]];
             format!("{}: {:.0} % {name}", loads.what, 100.0 * share(largest))

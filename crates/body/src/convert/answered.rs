@@ -5,6 +5,7 @@ use crate::basis::rigid_modes;
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{column_products, combine, gram, side_by_side, subtract_combination, symmetric_eigen};
 use flexbody_model::{AnsweredShapes, DofLabel, FeModel, ModelRecovery};
 use std::collections::HashMap;
@@ -270,7 +271,7 @@ impl Misfits {
             return Err(Diagnostic::new(Code::RecoveryUnanswered, message).in_file(&recovery.path).into());
         }
         let worst = |range: std::ops::Range<usize>| {
-            let worst = range.max_by(|i, j| self.all[*i].total_cmp(&self.all[*j]));
+            let worst = first_largest(range, |j| self.all[*j]);
             worst.map_or("none".to_owned(), |j| format!("{:.1e} ({})", self.all[j], name(j)))
         };
         let energies = match shapes.energies {

@@ -15,6 +15,7 @@ use flexbody_base::numbers::significant;
 use flexbody_eigen::{Plan, Proof, energy_noise};
 use flexbody_linalg::context::{Context, Work};
 use flexbody_linalg::copied;
+use flexbody_linalg::ties::first_largest;
 use flexbody_model::{Coupling, FeModel, rigid_count};
 
 /// A finished conversion.
@@ -285,7 +286,7 @@ pub fn interface_compliance(body: &FlexBody) -> Option<Diagnostic> {
             let direction = one.load.strip_prefix(interface.name.as_str())?.strip_prefix(' ')?;
             Some((one.after.powi(2), direction))
         });
-        let (missing, direction) = of_interface.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
+        let (missing, direction) = first_largest(of_interface, |one| one.0)?;
         let named = || format!("`{}` {:.0} % ({direction})", interface.name, 100.0 * missing);
         (missing > REPORTED_COMPLIANCE).then(named)
     };

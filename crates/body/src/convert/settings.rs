@@ -3,6 +3,7 @@
 use crate::basis::{BasisChoice, Loads, ModeSettings};
 use crate::invariants::{FrameChoice, LumpedScheme};
 use flexbody_eigen::Wanted;
+use flexbody_linalg::instruction_set;
 use flexbody_model::{Damping, FeModel, SurfaceMesh};
 
 /// Kind of lumped comparator.
@@ -83,6 +84,7 @@ impl ConvertSettings {
             "accuracy": self.modes.accuracy.name(),
             "basis": self.basis.basis().kind().name(),
             "frame": self.frame.text(),
+            "instructions": instruction_set(),
             "lumped": schemes,
             "max_eigenvalue": below,
             "modes": modes,

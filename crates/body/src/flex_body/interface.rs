@@ -3,6 +3,7 @@
 use super::modal_change::{has_rotations, stacked};
 use faer::{Mat, MatRef};
 use flexbody_linalg::combine;
+use flexbody_linalg::ties::first_largest;
 use flexbody_model::{Coupling, InterfaceMotion, Nodes};
 
 /// Named interface of the body.
@@ -48,8 +49,8 @@ impl InterfaceRows {
     /// Returns the mode in which the interface deforms most, and this deformation relative to the largest
     /// motion of the interface in any mode.
     pub fn deformation(&self) -> (usize, f64) {
-        let worst = |most: (usize, f64), (j, &e): (usize, &f64)| if e > most.1 { (j, e) } else { most };
-        let (mode, misfit) = self.misfit.iter().enumerate().fold((0, 0.0), worst);
+        let by_mode = self.misfit.iter().copied().enumerate();
+        let (mode, misfit) = first_largest(by_mode, |one| one.1).unwrap_or((0, 0.0));
         (mode, if self.largest > 0.0 { misfit / self.largest } else { 0.0 })
     }
 }

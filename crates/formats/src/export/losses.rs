@@ -6,6 +6,7 @@ use faer::Mat;
 use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{CauchySchwarz, InertiaShares, relative_norm};
+use flexbody_linalg::ties::first_largest;
 use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
 use flexbody_motion::scene::{FrameMotion, Omission};
 
@@ -169,10 +170,8 @@ fn in_scene(options: &ExportOptions, omission: &Omission, what: &str) -> Option<
         Some((errors.deflection.unwrap_or(0.0), errors.attitude.unwrap_or(0.0), case.scene.clone()))
     };
     let all = options.in_scene.iter().map(change).collect::<Option<Vec<_>>>()?;
-    let (deflection, attitude, scene) = all.into_iter().max_by(|a, b| {
-        let size = |(deflection, attitude, _): &(f64, f64, String)| deflection.max(*attitude);
-        size(a).total_cmp(&size(b))
-    })?;
+    let (deflection, attitude, scene) =
+        first_largest(all, |(deflection, attitude, _)| deflection.max(*attitude))?;
     if !deflection.is_finite() || !attitude.is_finite() {
         return Some(Lost(format!("{what}: the scene `{scene}` cannot be simulated without it")));
     }
@@ -221,7 +220,7 @@ pub(crate) fn in_motion(
         let share = lost(&case.body).map_or(Some(0.0), |lost| case.largest_share(&lost));
         (share.unwrap_or(f64::INFINITY), &case.scene)
     });
-    if let Some((share, scene)) = shares.max_by(|a, b| a.0.total_cmp(&b.0)) {
+    if let Some((share, scene)) = first_largest(shares, |one| one.0) {
         let error = if share < 1.0 { share / (1.0 - share) } else { f64::INFINITY };
         let percent = |error: f64| format!("{} %", significant(100.0 * error, 2));
         let size = match error.is_finite() {

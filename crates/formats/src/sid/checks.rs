@@ -7,6 +7,7 @@ use crate::sid::body::{Blocks, Declared, Layout};
 use crate::sid::parse::Listed;
 use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
+use flexbody_linalg::ties::first_largest;
 
 /// Checks of a file, and their conclusion about Oe1.
 pub(crate) struct RedundancyChecks {
@@ -318,7 +319,7 @@ fn trace(arrays: &Arrays, scale: f64) -> AuditCheck {
     let sum = |k: usize, l: usize| (0..3).map(|c| arrays.oe.linear(l, k, c)).sum::<f64>();
     let by = largest_entry(nq, nq, |k, l| sum(k, l) + 2.0 * arrays.me.m0[(k, l)]);
     let ratio = |k: usize| -0.5 * sum(k, k) / arrays.me.m0[(k, k)];
-    let worst_mode = (0..nq).max_by(|&a, &b| (ratio(a) - 1.0).abs().total_cmp(&(ratio(b) - 1.0).abs()));
+    let worst_mode = first_largest(0..nq, |&k| (ratio(k) - 1.0).abs());
     let facts = worst_mode.map_or_else(String::new, |k| {
         format!(" (for mode {} Oe1 gives {:.4} of the modal mass)", k + 1, ratio(k))
     });
@@ -359,7 +360,7 @@ fn digits(listed: &Listed<'_>, arrays: &Arrays, frames: &[FrameArrays]) -> Audit
     let mut parts = parts_of_body(arrays);
     parts.extend(parts_of_frames(frames));
     parts.push(Part { array: "mass", order: 0, rounding: arrays.mass_rounding, size: arrays.mass.abs() });
-    let most = parts.iter().max_by(|a, b| a.lost().total_cmp(&b.lost()));
+    let most = first_largest(&parts, |part| part.lost());
     let (value, place) = most.map_or((0.0, String::new()), |most| {
         let Part { array, order, size, .. } = most;
         (most.lost(), format!("{array} (m{order}), whose largest is {size:.1e}"))

@@ -6,6 +6,7 @@ use crate::sid::body::{Declared, Layout};
 use crate::sid::parse::Listed;
 use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
+use flexbody_linalg::ties::first_largest;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::TAU;
 
@@ -353,7 +354,7 @@ pub(crate) fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditC
         Some((mode, said / computed, if lambda > 0.0 { apart } else { f64::NAN }))
     };
     let all: Vec<(usize, f64, f64)> = listed.mode_texts.iter().filter_map(compared).collect();
-    let &(mode, ratio, value) = all.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let &(mode, ratio, value) = first_largest(&all, |one| one.2)?;
     let known = [
         (TAU, "2 pi, as if radians per second were meant"),
         (1.0 / TAU, "1 / (2 pi), as if radians per second were meant"),

@@ -1,5 +1,6 @@
 //! Construction of the next coarser level: smoothed motions P of the groups, and P'AP.
 
+use crate::ties::first_largest;
 use super::blocks::{BlockMatrix, Entries};
 use crate::parallel;
 
@@ -352,7 +353,7 @@ fn aggregates(strong: &Strong) -> (Vec<u32>, usize) {
     let first = group.clone();
     for (node, assigned) in group.iter_mut().enumerate().filter(|(_, assigned)| **assigned == UNASSIGNED) {
         let grouped = strong.around(node).iter().filter(|(other, _)| first[*other as usize] != UNASSIGNED);
-        if let Some(&(other, _)) = grouped.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0))) {
+        if let Some(&(other, _)) = first_largest(grouped, |(_, strength)| (*strength).into()) {
             *assigned = first[other as usize];
         }
     }

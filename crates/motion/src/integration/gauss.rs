@@ -1,6 +1,7 @@
 //! Implicit conserving steps: collocation at Gauss points.
 
 use super::{Failure, Oscillator, System, Work};
+use flexbody_linalg::ties::first_largest;
 use nalgebra::{Complex, DMatrix};
 
 type Square = [[f64; STAGES]; STAGES];
@@ -340,8 +341,7 @@ fn stage_modes(a: &[[f64; STAGES]; STAGES], stages: usize) -> Vec<StageMode> {
 /// Returns the position of the entry of largest magnitude.
 fn largest_entry(matrix: &DMatrix<Complex<f64>>) -> (usize, usize) {
     let places = (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| (i, j)));
-    let size = |at: &(usize, usize)| matrix[*at].norm_sqr();
-    places.max_by(|a, b| size(a).total_cmp(&size(b))).expect("a matrix with entries")
+    first_largest(places, |at| matrix[*at].norm_sqr()).expect("a matrix with entries")
 }
 
 /// Imaginary part relative to the real part that counts as rounding.

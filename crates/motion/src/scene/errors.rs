@@ -6,6 +6,7 @@ use super::{Extremes, PerQuantity, RecoveryMeasure, Scene, Tolerance, Trace};
 use crate::dynamics::EulerParameters;
 use faer::MatRef;
 use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{larger, not_negative};
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -47,9 +48,7 @@ impl OutputErrors {
     pub fn decisive(&self, tolerance: &Tolerance) -> (&'static str, f64, f64) {
         let all = self.zip(tolerance.errors).named().into_iter();
         let there = all.filter_map(|(name, (error, allowed))| Some((name, error?, allowed)));
-        // total_cmp orders NaN above all numbers.
-        let ratio = |(_, error, allowed): &(&str, f64, f64)| error / allowed;
-        there.max_by(|a, b| ratio(a).total_cmp(&ratio(b))).expect("an attitude is always there")
+        first_largest(there, |(_, error, allowed)| error / allowed).expect("an attitude is always there")
     }
 
     /// Returns the larger error of two motions for each quantity.

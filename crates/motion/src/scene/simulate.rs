@@ -13,6 +13,7 @@ use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
 use flexbody_body::flex_body::{FlexBody, MotionLoad, Recovery, SOFTENING, axis_in_words};
 use flexbody_linalg::context::Context;
+use flexbody_linalg::ties::first_largest;
 use flexbody_model::LoadKind;
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -245,7 +246,7 @@ fn softening(body: &FlexBody, extremes: &Extremes) -> Option<Diagnostic> {
     }
     // The exact softening about each of the axes that occurred.
     let part = |omega: &Vector3<f64>| Some((body.softening(omega)?, *omega));
-    let (part, omega) = extremes.spins.iter().filter_map(part).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (part, omega) = first_largest(extremes.spins.iter().filter_map(part), |one| one.0)?;
     (part > SOFTENING).then(|| {
         let message = format!(
             "the spin about {} reaches {} rad/{}: without geometric stiffness it removes {:.2} % of the stiffness of some motion",

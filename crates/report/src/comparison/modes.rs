@@ -6,6 +6,7 @@ use faer::{Mat, MatRef};
 use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::larger;
+use flexbody_linalg::ties::{first_largest, sort_descending};
 use serde::Serialize;
 
 /// Least assurance of a pair of modes with one shape. Modes without such a partner are paired in ascending order, and their
@@ -158,7 +159,7 @@ impl BodyComparison {
     /// Returns the pair of modes whose frequencies differ most, among those with one shape as far as the shapes are known.
     pub fn worst_mode(&self) -> Option<&ModePair> {
         let alike = self.modes.iter().filter(|pair| !pair.is_of_strangers());
-        alike.max_by(|a, b| a.difference.abs().total_cmp(&b.difference.abs()))
+        first_largest(alike, |pair| pair.difference.abs())
     }
 }
 
@@ -203,8 +204,7 @@ pub(crate) fn by_shape(assurance: &Mat<f64>) -> Vec<Option<usize>> {
     let (n, m) = (assurance.nrows(), assurance.ncols());
     let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (0..m).map(move |j| (i, j))).collect();
     pairs.retain(|&(i, j)| assurance[(i, j)] >= MIN_ASSURANCE);
-    // The sort keeps the order of equal pairs.
-    pairs.sort_by(|x, y| assurance[(y.0, y.1)].total_cmp(&assurance[(x.0, x.1)]));
+    sort_descending(&mut pairs, |pair| assurance[*pair]);
     let (mut found, mut taken) = (vec![None; n], vec![false; m]);
     for (i, j) in pairs {
         if found[i].is_none() && !taken[j] {

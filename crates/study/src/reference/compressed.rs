@@ -4,7 +4,7 @@
 use super::residual::NodalView;
 use super::turning_products::TurningProducts;
 use faer::Mat;
-use flexbody_linalg::{combine, gram, side_by_side, symmetric_eigen};
+use flexbody_linalg::{combine, gram, side_by_side, subtract_combination, symmetric_eigen};
 use flexbody_model::{FeModel, RigidAcceleration};
 use flexbody_motion::scene::Instant;
 use nalgebra::{Matrix3, Vector3};
@@ -198,20 +198,73 @@ impl Compressed {
         let weigh = |forces: &Mat<f64>| {
             Mat::from_fn(forces.nrows(), forces.ncols(), |i, j| weights[i] * forces[(i, j)])
         };
-        let weighted = weigh(forces);
-        let (directions, values) =
-            principal(gram(weighted.as_ref(), weighted.as_ref()), LEFT_OUT, MOST_FORCES)?;
-        let scaled =
-            Mat::from_fn(directions.nrows(), directions.ncols(), |i, j| directions[(i, j)] / values[j]);
-        let basis = combine(forces.as_ref(), scaled.as_ref());
+        let (mut rest, mut weighted_rest) = (forces.clone(), weigh(forces));
+        let stages = Stages::new(&weighted_rest, LEFT_OUT);
+        let mut basis = Mat::zeros(forces.nrows(), 0);
+        while let Some(left_out) = stages.next(&weighted_rest, MOST_FORCES - basis.ncols()) {
+            let squares = gram(weighted_rest.as_ref(), weighted_rest.as_ref());
+            let most = MOST_FORCES - basis.ncols();
+            let Some((directions, values)) = principal(squares, left_out, most) else { break };
+            let unit =
+                Mat::from_fn(directions.nrows(), directions.ncols(), |i, j| directions[(i, j)] / values[j]);
+            let own = combine(rest.as_ref(), unit.as_ref());
+            let weighted = weigh(&own);
+            let shared = gram(weighted.as_ref(), weighted_rest.as_ref());
+            subtract_combination(rest.as_mut(), own.as_ref(), shared.as_ref());
+            subtract_combination(weighted_rest.as_mut(), weighted.as_ref(), shared.as_ref());
+            basis = side_by_side(&[basis.as_ref(), own.as_ref()]);
+        }
         let weighted = weigh(&basis);
-        Some(Self { basis, weights, weighted })
+        (basis.ncols() > 0).then_some(Self { basis, weights, weighted })
     }
 
     /// Returns C (k x m) such that B C is the best approximation of `forces` F (N x m) in the weighted norm.
     pub(super) fn amplitudes(&self, forces: &Mat<f64>) -> Mat<f64> {
         let weighted = Mat::from_fn(forces.nrows(), forces.ncols(), |i, j| self.weights[i] * forces[(i, j)]);
         gram(self.weighted.as_ref(), weighted.as_ref())
+    }
+}
+
+/// Returns an orthonormal basis (k x p) of the principal directions of the columns of `columns` (k x m), in descending
+/// order of their size. It stops when the rest of the sum of squares is at most `left_out` of the whole, or after `most`
+/// directions. Returns `None` if the columns are zero or not finite.
+pub(super) fn principal_directions(columns: &Mat<f64>, left_out: f64, most: usize) -> Option<Mat<f64>> {
+    let mut rest = columns.clone();
+    let stages = Stages::new(columns, left_out);
+    let mut basis = Mat::zeros(columns.nrows(), 0);
+    while let Some(left_out) = stages.next(&rest, most - basis.ncols()) {
+        let covariance = combine(rest.as_ref(), rest.transpose().to_owned().as_ref());
+        let Some((own, _)) = principal(covariance, left_out, most - basis.ncols()) else { break };
+        let along = gram(own.as_ref(), rest.as_ref());
+        subtract_combination(rest.as_mut(), own.as_ref(), along.as_ref());
+        basis = side_by_side(&[basis.as_ref(), own.as_ref()]);
+    }
+    (basis.ncols() > 0).then_some(basis)
+}
+
+/// Stages of a search for principal directions. An eigenvector of a Gram matrix has as many wrong digits as its
+/// eigenvalue is smaller than the largest: small directions are looked for after the large ones have been subtracted.
+struct Stages {
+    whole: f64,
+    left_out: f64,
+}
+
+impl Stages {
+    /// Part of the sum of squares that one stage leaves to the next. The directions of a stage are accurate to rounding
+    /// over this part; a larger value takes more stages.
+    const LEFT_OUT_OF_ONE: f64 = 1e-5;
+
+    fn new(columns: &Mat<f64>, left_out: f64) -> Self {
+        // Subtractions leave the square of rounding.
+        Self { whole: columns.squared_norm_l2(), left_out: left_out.max(f64::EPSILON.powi(2) * 1e4) }
+    }
+
+    /// Returns the part of the sum of squares that the next stage leaves out; `None` if the `rest` is small enough or no
+    /// direction is left to find.
+    fn next(&self, rest: &Mat<f64>, most: usize) -> Option<f64> {
+        let left = rest.squared_norm_l2();
+        let enough = self.left_out * self.whole;
+        (most > 0 && left > enough).then(|| Self::LEFT_OUT_OF_ONE.max(enough / left))
     }
 }
 

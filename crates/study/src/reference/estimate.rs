@@ -7,10 +7,12 @@ use super::truncated_responses::{ResonanceCriteria, TruncatedResponses};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::significant;
 use flexbody_body::basis::CoupledModel;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::not_negative;
+use flexbody_linalg::{largest, not_negative};
+use flexbody_linalg::ties::first_largest;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{
     FramedScene, Instant, Load, OutputErrors, Point, Scene, Trace, damped_once, fastest_history,
@@ -38,6 +40,10 @@ const TOO_MANY_INSTANTS: &str = "its motion has too many periods or breakpoints 
 /// Part of the tolerances, as a root of the elastic energy, below which a resonance of a truncated mode is ignored.
 const PART_OF_RESONANCE: f64 = 0.05;
 
+/// Part of the largest value from which a value counts as large. Several peaks of a vibration are nearly as large as the
+/// largest; the first of them does not depend on rounding.
+pub(super) const LARGE: f64 = 0.8;
+
 /// Estimated truncation error of a body in a scene, relative to the model that it was made of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReferenceError {
@@ -49,7 +55,7 @@ pub struct ReferenceError {
     pub errors: OutputErrors,
     /// Largest error over its tolerance.
     pub worst: f64,
-    /// Time of the largest estimated elastic energy.
+    /// First time at which the root of the estimated elastic energy reaches [`LARGE`] of its largest value.
     pub time: f64,
     /// Reason why the errors are unknown; `None` if they are known.
     pub unknown: Option<&'static str>,
@@ -118,6 +124,13 @@ impl ReferenceError {
         self.worst <= MAX_REFERENCE_ERROR
     }
 
+    /// Returns the error as a part of the tolerances in words, with the one digit that an estimate has: beside the motion
+    /// of all nodes it is 0.5 to 3 times the true error, and after a shock rounding alone changes the second digit.
+    pub fn part_of_tolerances(&self) -> String {
+        let digit = format!("{:.0e}", 100.0 * self.worst).parse().unwrap_or(f64::NAN);
+        format!("{} %", significant(digit, 6))
+    }
+
     /// Returns the part of the tolerances that the last error of `rounds` leaves to others: all of it if no error is
     /// known, or if the body is no reference.
     pub(crate) fn left(rounds: &[Self]) -> f64 {
@@ -155,9 +168,9 @@ impl ReferenceError {
             );
         }
         let message = format!(
-            "the error of the reference body of {} modes relative to the model is itself {:.0} % of the tolerances, largest at t = {:.2e}",
+            "the error of the reference body of {} modes relative to the model is itself about {} of the tolerances, first large at t = {:.1e}",
             self.modes,
-            100.0 * self.worst,
+            self.part_of_tolerances(),
             self.time
         );
         let warning = Diagnostic::new(Code::ReferenceIncomplete, message);
@@ -308,6 +321,10 @@ const MIN_INTERVALS_PER_PIECE: usize = 3;
 /// Modes count if the root of their elastic energy is at least this part of the tolerances.
 const MIN_MODE_SHARE: f64 = 0.1;
 
+/// Size of a history, relative to the largest one in its unit, up to which it is rounding, whose largest instant is
+/// arbitrary: components that are zero by symmetry are 1e-16 to 1e-12.
+const ROUNDING_HISTORY: f64 = 1e-9;
+
 /// Stretches between breaks are ignored if they are shorter than this part of the run.
 const SHORTEST: f64 = 1e-9;
 
@@ -351,24 +368,26 @@ impl Grid {
     }
 
     /// Returns indices of about [`MIN_INTERVALS`] evenly spaced instants, and of the instants where one of the `histories` (one
-    /// value per instant) is largest. Short shocks are therefore included.
-    pub(super) fn few(&self, histories: impl Iterator<Item = Vec<f64>>) -> Vec<usize> {
-        self.significant_instants(MIN_INTERVALS + 1, histories)
+    /// value per instant, all in one unit) is largest. Short shocks are therefore included.
+    pub(super) fn few(&self, histories: Vec<Vec<f64>>) -> Vec<usize> {
+        self.significant_instants(MIN_INTERVALS + 1, &[histories])
     }
 
-    /// Returns indices of about `count` evenly spaced instants, and of the instants where one of the `histories` is
-    /// largest.
-    pub(super) fn significant_instants(
-        &self,
-        count: usize,
-        histories: impl Iterator<Item = Vec<f64>>,
-    ) -> Vec<usize> {
+    /// Returns indices of about `count` evenly spaced instants, and of the instants where a history is largest. Each group
+    /// holds histories in one unit; those that stay below [`ROUNDING_HISTORY`] of the largest of their group do not count.
+    pub(super) fn significant_instants(&self, count: usize, groups: &[Vec<Vec<f64>>]) -> Vec<usize> {
         let stride = self.times.len().div_ceil(count);
         let mut all: Vec<usize> = (0..self.times.len()).step_by(stride).collect();
         all.extend(self.times.len().checked_sub(1));
-        all.extend(histories.filter_map(|history| {
-            (0..history.len()).max_by(|&a, &b| history[a].abs().total_cmp(&history[b].abs()))
-        }));
+        for histories in groups {
+            let size = |history: &Vec<f64>| largest(history.iter().map(|value| value.abs()));
+            let sizes: Vec<f64> = histories.iter().map(size).collect();
+            let least = ROUNDING_HISTORY * largest(sizes.iter().copied());
+            let counted = histories.iter().zip(&sizes).filter(|(_, size)| **size > least);
+            all.extend(counted.filter_map(|(history, _)| {
+                first_largest(0..history.len(), |&at| history[at].abs())
+            }));
+        }
         all.sort_unstable();
         all.dedup();
         all

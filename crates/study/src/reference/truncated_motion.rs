@@ -1,6 +1,6 @@
 //! Truncated part of a motion, and the errors that it causes in the outputs.
 
-use super::estimate::Grid;
+use super::estimate::{Grid, LARGE};
 use super::residual::{BLOCK, NodalView, SceneLoad};
 use super::truncated_equations::{TruncatedAmplitudes, TruncatedDamping, TruncatedEquations};
 use super::truncated_responses::TruncatedResponses;
@@ -8,7 +8,7 @@ use faer::{Mat, MatRef};
 use flexbody_body::convert::recovered_rows;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::symmetric_part;
-use flexbody_linalg::{combine, gram, larger, not_negative, side_by_side};
+use flexbody_linalg::{combine, gram, larger, largest, not_negative, side_by_side};
 use flexbody_motion::scene::{Instant, OutputErrors, Peak, RecoveryMeasure, Scene, Trace, reaction_errors};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -33,7 +33,7 @@ pub(super) struct TruncatedMotion<'a> {
     energy: Mat<f64>,
 }
 
-/// Largest errors over the instants, and the time of the largest elastic energy.
+/// Largest errors over the instants, and the first time of a large elastic energy.
 pub(super) struct TruncationErrors {
     pub errors: OutputErrors,
     pub time: f64,
@@ -54,6 +54,7 @@ impl<'a> TruncatedMotion<'a> {
         let weighted = weigh(missed.responses.as_ref());
         let modal_stiffness = symmetric_part(body.invariants().modal_stiffness());
         let columns = side_by_side(&[view.vectors.as_ref(), missed.responses.as_ref()]);
+        let mass = symmetric_part(&gram(missed.responses.as_ref(), weighted.as_ref()));
         // Assemble the equations of modes and responses.
         let system = TruncatedEquations {
             modal_stiffness: modal_stiffness.clone(),
@@ -64,7 +65,7 @@ impl<'a> TruncatedMotion<'a> {
             },
             shared_mass: gram(view.vectors.as_ref(), weighted.as_ref()),
             stiffness: missed.energy.clone(),
-            mass: symmetric_part(&gram(missed.responses.as_ref(), weighted.as_ref())),
+            mass: mass.clone(),
         };
         // Without truncated part the answer is zero. If the equations have no solution, the answer is NaN, so that no
         // error appears small.
@@ -76,11 +77,19 @@ impl<'a> TruncatedMotion<'a> {
             rate: unknown(),
             acceleration: unknown(),
         });
-        // Evaluate outputs where any amplitude or acceleration is largest, besides even steps.
-        let histories = [&answer.value, &answer.acceleration].into_iter().flat_map(|all| {
-            (0..all.nrows()).map(move |row| (0..all.ncols()).map(|i| all[(row, i)]).collect::<Vec<f64>>())
-        });
-        let shown = grid.significant_instants(EVALUATED_INSTANTS, histories);
+        // Evaluate outputs where any amplitude or acceleration is largest, besides even steps. Amplitudes count by
+        // their energy, accelerations by their inertia.
+        let histories = |all: &Mat<f64>, [of_modes, of_responses]: [&Mat<f64>; 2]| -> Vec<Vec<f64>> {
+            let weight = |row: usize| if row < nf { of_modes[(row, row)] } else { of_responses[(row - nf, row - nf)] };
+            let history = |row: usize| {
+                let root = not_negative(weight(row)).sqrt();
+                (0..all.ncols()).map(|i| root * all[(row, i)]).collect()
+            };
+            (0..all.nrows()).map(history).collect()
+        };
+        let energies = histories(&answer.value, [&modal_stiffness, &missed.energy]);
+        let inertias = histories(&answer.acceleration, [&view.modal_mass, &mass]);
+        let shown = grid.significant_instants(EVALUATED_INSTANTS, &[energies, inertias]);
         Self { view, grid, sampled, columns, answer, shown, modal_stiffness, energy: missed.energy.clone() }
     }
 
@@ -110,7 +119,7 @@ impl<'a> TruncatedMotion<'a> {
         TruncationErrors { errors, time }
     }
 
-    /// Returns the largest sqrt(V(X y) / max V), with the elastic energy V, and its time. The responses are
+    /// Returns the largest sqrt(V(X y) / max V), with the elastic energy V, and the first time of [`LARGE`] of it. The responses are
     /// K-orthogonal to the modes, so that their energy adds to that of the modes.
     fn stress(&self, motion: &Trace) -> (f64, f64) {
         let nf = self.view.vectors.ncols();
@@ -120,12 +129,16 @@ impl<'a> TruncatedMotion<'a> {
         let of_modes = quadratics(&self.modal_stiffness, &in_modes);
         let whole = Mat::from_fn(nf, y.ncols(), |j, i| in_modes[(j, i)] + self.sampled[i].q[j]);
         let root = |energy: f64| not_negative(0.5 * energy).sqrt();
-        let truncated = of_modes.iter().zip(&of_responses).map(|(a, b)| root(a + b));
-        let truncated = Peak::of(&self.grid.times, truncated);
+        let truncated: Vec<f64> = of_modes.iter().zip(&of_responses).map(|(a, b)| root(a + b)).collect();
+        let first_large = {
+            let most = largest(truncated.iter().copied());
+            truncated.iter().position(|value| *value >= LARGE * most).unwrap_or(0)
+        };
+        let truncated = Peak::of(&self.grid.times, truncated).value;
         let all = quadratics(&self.modal_stiffness, &whole);
         let roots = all.iter().zip(&of_responses).map(|(a, b)| root(a + b));
-        let largest = Peak::of(&self.grid.times, roots).value;
-        (truncated.value / largest.max(motion.resolution.root_energy), truncated.time)
+        let size = Peak::of(&self.grid.times, roots).value;
+        (truncated / size.max(motion.resolution.root_energy), self.grid.times[first_large])
     }
 
     /// Returns the largest displacement X y of the watched points over the largest of Psi q + X y. All nodes count if

@@ -1,6 +1,6 @@
 //! Static responses that the body does not contain along its motion, and the selection of the most important ones.
 
-use super::compressed::{Compressed, Projected, UnbalancedAmplitudes, principal};
+use super::compressed::{Compressed, Projected, UnbalancedAmplitudes, principal, principal_directions};
 use super::estimate::Grid;
 use super::residual::{Held, NodalView};
 use super::truncated_equations::ROUNDING;
@@ -9,9 +9,9 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::{free_static_responses_twice, oscillating_responses};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::symmetric_part;
+use flexbody_linalg::ties::sort_descending;
 use flexbody_linalg::{combine, gram, larger, not_negative, side_by_side, subtract_combination};
 use flexbody_motion::scene::Instant;
-use nalgebra::Vector3;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
@@ -63,7 +63,7 @@ impl TruncatedResponses {
     ) -> Result<Self> {
         let model = view.model;
         // Compress the unbalanced forces of a few instants, then get amplitudes at all instants.
-        let few: Vec<Instant> = grid.few(histories(motion)).into_iter().map(|i| motion[i].clone()).collect();
+        let few: Vec<Instant> = grid.few(histories(motion, body)).into_iter().map(|i| motion[i].clone()).collect();
         let compressed = Compressed::new(model, &view.residual(&few));
         let UnbalancedAmplitudes { in_modes, compressed: amplitudes } =
             Projected::new(view, compressed.as_ref(), motion).amplitudes(motion);
@@ -136,9 +136,8 @@ impl TruncatedResponses {
             roots[k] * (0..turned.nrows()).map(|row| turned[(row, k)] * moving[(row, i)]).sum::<f64>()
         };
         let w = Mat::from_fn(roots.len(), moving.ncols(), w);
-        let covariance = combine(w.as_ref(), w.transpose().to_owned().as_ref());
         // Principal directions of w over time; find the smallest number that leaves a small enough rest.
-        let Some((directions, _)) = principal(covariance, 0.0, MOST_RESPONSES) else { return none() };
+        let Some(directions) = principal_directions(&w, 0.0, MOST_RESPONSES) else { return none() };
         let along = gram(directions.as_ref(), w.as_ref());
         let left = |count: usize, i: usize| -> f64 {
             let whole: f64 = (0..w.nrows()).map(|k| w[(k, i)].powi(2)).sum();
@@ -156,22 +155,21 @@ impl TruncatedResponses {
 }
 
 /// Returns the histories whose largest values must be among the evaluated instants: loads, accelerations and spin of
-/// the frame, and accelerations of the modes.
-fn histories(motion: &[Instant]) -> impl Iterator<Item = Vec<f64>> + '_ {
-    let history = |value: &dyn Fn(&Instant) -> f64| motion.iter().map(value).collect::<Vec<f64>>();
+/// the frame, and accelerations of the modes. All are accelerations of a point of the body: F / m, T / (m L), v', L w',
+/// L w^2, q'' / sqrt(m) with the mass m and the extent L.
+fn histories(motion: &[Instant], body: &FlexBody) -> Vec<Vec<f64>> {
+    let (mass, extent) = (body.invariants().mass(), body.extent());
     let (loads, modes) = motion.first().map_or((0, 0), |first| (first.loads.len(), first.qdd.len()));
-    let of_loads = (0..6 * loads).map(move |at| {
-        let component = |now: &Instant| {
-            let (force, torque) = &now.loads[at / 6];
-            if at % 6 < 3 { force[at % 6] } else { torque[at % 6 - 3] }
-        };
-        history(&component)
-    });
-    let frame: [fn(&Instant) -> &Vector3<f64>; 3] =
-        [|now| &now.velocity_rate, |now| &now.omega_rate, |now| &now.omega];
-    let of_frame = (0..9).map(move |at| history(&|now: &Instant| frame[at / 3](now)[at % 3]));
-    let of_modes = (0..modes).map(move |mode| history(&|now: &Instant| now.qdd[mode]));
-    of_loads.chain(of_frame).chain(of_modes)
+    let accelerations = |now: &Instant| -> Vec<f64> {
+        let of_loads = now.loads.iter().flat_map(|(force, torque)| [force / mass, torque / (mass * extent)]);
+        let spin = now.omega.map(|rate| extent * rate * rate);
+        let of_frame = [now.velocity_rate, extent * now.omega_rate, spin];
+        let components = of_loads.chain(of_frame).flat_map(<[f64; 3]>::from);
+        components.chain(now.qdd.iter().map(|qdd| qdd / mass.sqrt())).collect()
+    };
+    let instants: Vec<Vec<f64>> = motion.iter().map(accelerations).collect();
+    let history = |at: usize| instants.iter().map(|now| now[at]).collect();
+    (0..6 * loads + 9 + modes).map(history).collect()
 }
 
 /// Projection of displacements to the complement of the modes of a body.
@@ -217,8 +215,7 @@ impl<'v> ModalProjection<'v> {
         // Amplitudes scaled to the root of the elastic energy; their principal directions over time.
         let moving = gram(turned.as_ref(), amplitudes.as_ref());
         let moving = Mat::from_fn(roots.len(), moving.ncols(), |k, i| roots[k] * moving[(k, i)]);
-        let covariance = combine(moving.as_ref(), moving.transpose().to_owned().as_ref());
-        let Some((directions, _)) = principal(covariance, INERTIA_LEFT_OUT, MAX_INERTIA_RESPONSES) else {
+        let Some(directions) = principal_directions(&moving, INERTIA_LEFT_OUT, MAX_INERTIA_RESPONSES) else {
             return Mat::zeros(responses.nrows(), 0);
         };
         let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);
@@ -329,7 +326,7 @@ fn resonances(
     let mut peaks: Vec<usize> = (first.max(1)..count / 2)
         .filter(|&line| level[line] > negligible && level[line] >= level[line - 1].max(level[line + 1]))
         .collect();
-    peaks.sort_by(|&a, &b| level[b].total_cmp(&level[a]));
+    sort_descending(&mut peaks, |&line| level[line]);
     // Keep maxima that are apart from each other and well above their neighbourhood.
     let mut chosen: Vec<usize> = Vec::new();
     for line in peaks {
@@ -355,9 +352,8 @@ fn combinations(amplitudes: &Mat<f64>, energy: &Mat<f64>) -> Mat<f64> {
     let Some((turned, roots)) = principal(energy.clone(), 0.0, usize::MAX) else { return none() };
     let along = gram(turned.as_ref(), amplitudes.as_ref());
     let along = Mat::from_fn(roots.len(), along.ncols(), |k, i| roots[k] * along[(k, i)]);
-    let covariance = combine(along.as_ref(), along.transpose().to_owned().as_ref());
-    match principal(covariance, LEFT_OUT, MOST_COMBINATIONS) {
-        Some((directions, _)) => gram(directions.as_ref(), along.as_ref()),
+    match principal_directions(&along, LEFT_OUT, MOST_COMBINATIONS) {
+        Some(directions) => gram(directions.as_ref(), along.as_ref()),
         None => none(),
     }
 }

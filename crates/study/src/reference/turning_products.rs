@@ -1,10 +1,10 @@
 //! Forces of second order of nodes whose rotations carry mass: fixed nodal vectors times products of the amplitudes of the
 //! modes.
 
-use super::compressed::principal;
+use super::compressed::principal_directions;
 use super::residual::NodalView;
 use faer::Mat;
-use flexbody_linalg::{combine, gram};
+use flexbody_linalg::{combine, side_by_side};
 use flexbody_motion::scene::Instant;
 use nalgebra::Vector3;
 
@@ -132,19 +132,18 @@ fn combinations(modes: usize, motion: &[Instant]) -> Mat<f64> {
     if modes <= MOST_COMBINATIONS {
         return Mat::identity(modes, modes);
     }
-    let mut covariance = Mat::<f64>::zeros(modes, modes);
+    let mut columns = Mat::<f64>::zeros(modes, 0);
     for of in [|now: &Instant| &now.q, |now: &Instant| &now.qd, |now: &Instant| &now.qdd]
         as [fn(&Instant) -> &Vec<f64>; 3]
     {
-        let amplitudes = Mat::from_fn(motion.len(), modes, |i, j| of(&motion[i])[j]);
-        let own = gram(amplitudes.as_ref(), amplitudes.as_ref());
-        let size: f64 = (0..modes).map(|j| own[(j, j)]).sum();
+        let amplitudes = Mat::from_fn(modes, motion.len(), |j, i| of(&motion[i])[j]);
+        let size = amplitudes.norm_l2();
         if size > 0.0 {
-            covariance += own * faer::Scale(size.recip());
+            let own = amplitudes * faer::Scale(size.recip());
+            columns = side_by_side(&[columns.as_ref(), own.as_ref()]);
         }
     }
-    principal(covariance, LEFT_OUT, MOST_COMBINATIONS)
-        .map_or_else(|| Mat::zeros(modes, 0), |(directions, _)| directions)
+    principal_directions(&columns, LEFT_OUT, MOST_COMBINATIONS).unwrap_or_else(|| Mat::zeros(modes, 0))
 }
 
 /// Returns A'x.

@@ -17,6 +17,7 @@ use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{CoupledModel, rigid_modes};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{gram, largest, parallel, side_by_side};
 use flexbody_model::{DampingRatios, FeModel};
 use nalgebra::DMatrix;
@@ -379,7 +380,7 @@ impl Curves {
             let estimated = &errors.estimated;
             let first = estimated.iter().position(|error| *error > tolerance);
             let largest = (0..estimated.len()).filter(|&i| estimated[i].is_finite());
-            found.extend(largest.max_by(|&a, &b| estimated[a].total_cmp(&estimated[b])));
+            found.extend(first_largest(largest, |&i| estimated[i]));
             found.extend(first);
         }
         let mut marked = 0;
@@ -475,7 +476,7 @@ impl Curves {
                 .collect();
             PairErrors::new(&compared, tolerance).largest
         };
-        let largest = blocks.iter().filter_map(of_block).max_by(|a, b| a.value.total_cmp(&b.value));
+        let largest = first_largest(blocks.iter().filter_map(of_block), |one| one.value);
         Some(CouplingEffect { interfaces, largest })
     }
 

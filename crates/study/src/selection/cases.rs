@@ -13,6 +13,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
 use flexbody_linalg::context::Context;
+use flexbody_linalg::ties::first_largest;
 use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{
     LoadCases, Measure, OutputErrors, Range, Scene, SceneVariation, Tolerance, Trace, ends_a_run, points_of,
@@ -160,21 +161,18 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
 pub(super) fn worst(trials: impl Iterator<Item = Trial>) -> Trial {
     let trials: Vec<Trial> = trials.collect();
     let errors = trials.iter().filter_map(|trial| trial.errors).reduce(OutputErrors::larger_of);
-    let worst = trials.into_iter().max_by(|a, b| a.worst.total_cmp(&b.worst)).expect("a scene to try it in");
+    let worst = first_largest(trials, |trial| trial.worst).expect("a scene to try it in");
     Trial { errors: worst.errors.and(errors), ..worst }
 }
 
 /// Returns the trial of a model in all load cases: that of the case in which the errors take the largest part of the
 /// remaining tolerances. The trial of a single scene is returned unchanged.
 pub(super) fn together(trials: Vec<Trial>) -> Trial {
-    let part = |trial: &Trial| (!trial.passed(), trial.worst / trial.budget);
-    let larger = |a: &Trial, b: &Trial| {
-        let (a, b) = (part(a), part(b));
-        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-    };
+    let has_failed = trials.iter().any(|trial| !trial.passed());
     let by_case: Vec<f64> = trials.iter().map(|trial| trial.worst).collect();
     let several = trials.len() > 1;
-    let largest = trials.into_iter().enumerate().max_by(|a, b| larger(&a.1, &b.1).then(b.0.cmp(&a.0)));
+    let decisive = trials.into_iter().enumerate().filter(|(_, trial)| trial.passed() != has_failed);
+    let largest = first_largest(decisive, |(_, trial)| trial.worst / trial.budget);
     let (at, mut trial) = largest.expect("a load case to try it in");
     if several {
         (trial.case, trial.by_case) = (Some(at), by_case);
@@ -238,8 +236,7 @@ pub(super) fn by_case(
 /// Returns the truncation errors in the load case whose last error is largest.
 pub(super) fn worst_reference_errors(demands: &[Demand<'_>]) -> Vec<ReferenceError> {
     let last = |demand: &&Demand<'_>| demand.reference_errors.last().map_or(-1.0, |own| own.worst);
-    // The reversed order returns the first of equal cases.
-    let worst = demands.iter().rev().max_by(|a, b| last(a).total_cmp(&last(b)));
+    let worst = first_largest(demands, |demand| last(demand));
     worst.map_or_else(Vec::new, |demand| demand.reference_errors.to_vec())
 }
 
@@ -280,8 +277,8 @@ impl VariedSelection {
         }
         let message = match self.reference_errors.last().filter(|own| !own.is_reference()) {
             Some(own) => format!(
-                "the selection cannot be judged in this variation: the body with all its modes differs from the FE model by {:.0} % of the tolerances (estimated)",
-                100.0 * own.worst
+                "the selection cannot be judged in this variation: the body with all its modes differs from the FE model by about {} of the tolerances (estimated)",
+                own.part_of_tolerances()
             ),
             None => format!(
                 "the selected modes and terms are off by {:.3} times the tolerances in this variation",

@@ -11,6 +11,7 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::FREE_MODE;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
+use flexbody_linalg::ties::{TIE_MARGIN, descending};
 use flexbody_motion::scene::{Axes, History, LoadCases, Measure, Scene, Tolerance, Trace, VectorHistory};
 use std::f64::consts::TAU;
 
@@ -263,11 +264,15 @@ fn weights(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<f64> {
     shares.iter().map(weight).collect()
 }
 
-/// Returns the modes by descending weight.
+/// Contribution of a mode relative to the tolerances up to which it counts as zero: the error of the integration, not
+/// the motion, ranks such modes. A larger value ranks small contributions by frequency.
+const NEGLIGIBLE_WEIGHT: f64 = 1e-4;
+
+/// Returns the modes by descending weight, modes of equal or negligible weight by frequency.
 fn by_weight(weights: &[f64]) -> Vec<usize> {
-    let mut ranked: Vec<usize> = (0..weights.len()).collect();
-    ranked.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]).then(a.cmp(b)));
-    ranked
+    let counted: Vec<f64> =
+        weights.iter().map(|&weight| if weight < NEGLIGIBLE_WEIGHT { 0.0 } else { weight }).collect();
+    descending(&counted)
 }
 
 /// Returns the modes of a body by their contribution to its motion, largest first. [`select`](super::select) keeps
@@ -428,7 +433,7 @@ impl SelectionSearch<'_> {
             modes.sort_unstable();
             // Measure the set with these modes, and keep the most accurate.
             let trial = self.measured(&modes, groups, 1.0)?;
-            if best.as_ref().is_none_or(|(worst, ..)| trial.worst < *worst) {
+            if best.as_ref().is_none_or(|(worst, ..)| trial.worst < *worst * (1.0 - TIE_MARGIN)) {
                 best = Some((trial.worst, groups, modes));
             }
             trials.push(trial);

@@ -13,6 +13,7 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroup, TermGroups};
 use flexbody_linalg::context::Context;
+use flexbody_linalg::ties::first_largest;
 use flexbody_motion::scene::{LoadCases, PerQuantity};
 
 /// Result of a selection, with the reasons.
@@ -100,7 +101,7 @@ pub fn rule_out(body: &FlexBody, cases: &LoadCases, context: &Context<'_>) -> Re
     let passed: Option<Vec<Trial>> = demands.iter().enumerate().map(passed).collect();
     let Some(trials) = passed else { return Ok(Vec::new()) };
     let kept = trials.iter().fold(TermGroups::NONE, |kept, trial| kept.or(trial.kept));
-    let largest = trials.iter().max_by(|a, b| a.worst.total_cmp(&b.worst)).expect("one scene at least");
+    let largest = first_largest(&trials, |trial| trial.worst).expect("one scene at least");
     let rotation = &demands[largest.case.unwrap_or(0)].cases[0].situation.spin;
     Ok(kept.dropped().map(|group| decision(group, false, largest, &demands, rotation)).collect())
 }
@@ -241,7 +242,7 @@ fn needed_by_variations(
 ) -> (TermDecision, Option<DecisiveError>) {
     let without =
         |one: &VariedSelection| Some((one.name.clone(), one.case.clone(), one.with_all_modes.clone()?));
-    let worst = varied.iter().filter_map(without).max_by(|a, b| a.2.worst.total_cmp(&b.2.worst));
+    let worst = first_largest(varied.iter().filter_map(without), |one| one.2.worst);
     let error = worst.as_ref().and_then(|(_, case, trial)| {
         let at = (0..cases.len()).find(|at| cases.case_name(*at) == case.as_deref());
         let tolerance = &cases[at.unwrap_or(0)].requirements.tolerance;
@@ -387,7 +388,7 @@ impl DecisionInput<'_> {
         let passed = || self.trials.iter().filter(|trial| trial.passed());
         let of_all = passed().find(|trial| trial.kept == kept && self.is_of_all(trial));
         let bounds = passed().filter(|trial| !trial.kept.has(group));
-        of_all.or(self.choice.chosen.as_ref()).or(bounds.max_by(|a, b| a.worst.total_cmp(&b.worst)))
+        of_all.or(self.choice.chosen.as_ref()).or_else(|| first_largest(bounds, |trial| trial.worst))
     }
 }
 

@@ -14,6 +14,7 @@ use flexbody_base::memory::refuse_beyond;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::parallel;
+use flexbody_linalg::ties::first_largest;
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
@@ -380,7 +381,7 @@ impl<'j> Judge<'j> {
         let by_variation = parallel::try_map(self.cases.iter().zip(measures), measured)?;
         let worst = |at: usize| by_variation[at].map_or(f64::INFINITY, |own| own.worst);
         let count = by_variation.len();
-        let largest = (0..count).rev().max_by(|a, b| worst(*a).total_cmp(&worst(*b))).unwrap_or(0);
+        let largest = first_largest(0..count, |at| worst(*at)).unwrap_or(0);
         let both = self.variations.iter().zip(&by_variation);
         let beyond = both.filter(|(variation, errors)| !variation.accepts(errors.as_ref())).count();
         Ok(InVariations { worst: worst(largest), variation: largest, beyond, by_variation })

@@ -2,6 +2,7 @@
 
 use super::{Candidate, InVariations, TimedRun};
 use flexbody_base::diagnostic::Diagnostic;
+use flexbody_linalg::ties::{TIE_MARGIN, first_largest, first_smallest, sort_ascending};
 use flexbody_motion::integration::Work;
 use flexbody_motion::scene::OutputErrors;
 
@@ -36,8 +37,7 @@ impl Timed {
 
     /// Returns the run with the largest ratio of error to tolerance, the first of equal ones.
     pub fn decisive(&self) -> &TimedRun {
-        let all = self.runs.iter().rev();
-        all.max_by(|a, b| a.errors.worst.total_cmp(&b.errors.worst)).expect("a load case")
+        first_largest(&self.runs, |run| run.errors.worst).expect("a load case")
     }
 }
 
@@ -135,8 +135,7 @@ impl Recommendation {
         match allowed {
             Some(allowed) => {
                 let within = points.iter().filter(|point| point.0 <= allowed);
-                let best =
-                    within.min_by(|a, b| (a.1.total_cmp(&b.1)).then(a.0.cmp(&b.0)).then(a.2.cmp(&b.2)));
+                let best = first_smallest(within, |point| point.1);
                 best.map_or(Self::None, |point| Self::MostAccurate(point.2))
             }
             None => Self::cheapest(rows, |measured| measured.holds()),
@@ -163,7 +162,7 @@ pub(super) fn holding(rows: &[TradeRow]) -> Vec<usize> {
 pub fn front(rows: &[TradeRow]) -> Vec<usize> {
     let mut best = f64::INFINITY;
     let better = |point: &(usize, f64, usize)| {
-        let better = point.1 < best;
+        let better = point.1 < best * (1.0 - TIE_MARGIN);
         if better {
             best = point.1;
         }
@@ -180,6 +179,9 @@ fn points(rows: &[TradeRow]) -> Vec<(usize, f64, usize)> {
         Some((measured.multiplications, measured.worst(), at))
     };
     let mut points: Vec<_> = rows.iter().enumerate().filter_map(point).collect();
-    points.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+    points.sort_by_key(|point| (point.0, point.2));
+    for of_one_cost in points.chunk_by_mut(|a, b| a.0 == b.0) {
+        sort_ascending(of_one_cost, |point| point.1);
+    }
     points
 }

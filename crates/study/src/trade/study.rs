@@ -14,6 +14,7 @@ use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::{FlexBody, Storage, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::parallel;
+use flexbody_linalg::ties::first_largest;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{LoadCases, Measure, Scene, Tolerance, ends_a_run};
 
@@ -376,8 +377,7 @@ impl Job<'_> {
             by_case.push(own);
         }
         let worst = |at: &usize| by_case[*at].worst;
-        // The first of equal cases; NaN counts as the largest.
-        let largest = (0..by_case.len()).rev().max_by(|a, b| worst(a).total_cmp(&worst(b)));
+        let largest = first_largest(0..by_case.len(), worst);
         let within = |(own, case): (&InCase, &StudyCase<'_>)| own.worst <= case.most();
         let beyond = by_case.iter().zip(self.cases).filter(|pair| !within(*pair)).count();
         Ok(Measured {
