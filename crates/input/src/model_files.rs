@@ -5,6 +5,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
 use flexbody_base::units::UnitSystem;
+use flexbody_linalg::ties::{first_smallest, sort_ascending};
 use flexbody_model::{Coupling, Damping, GeometricStiffness, Reference};
 use nalgebra::Vector3;
 use std::ffi::OsStr;
@@ -468,7 +469,7 @@ impl Region {
             let away = |x: [f64; 3]| (Vector3::from(x) - Vector3::from(point)).norm();
             let mut all: Vec<(f64, usize, i64)> =
                 nodes.enumerate().map(|(at, (id, x))| (away(x), at, id)).collect();
-            all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            sort_ascending(&mut all, |node| node.0);
             all.truncate(count);
             all.sort_by_key(|(_, at, _)| *at);
             return all.into_iter().map(|(_, _, id)| id).collect();
@@ -479,7 +480,7 @@ impl Region {
     /// Returns the sentence that none of `nodes` (number and position) lies in the region, with the distance of the nearest.
     pub(super) fn empty(&self, nodes: impl Iterator<Item = (i64, [f64; 3])>) -> String {
         let all = nodes.map(|(id, x)| (self.distance(x), id, x));
-        match all.min_by(|a, b| a.0.total_cmp(&b.0)) {
+        match first_smallest(all, |node| node.0) {
             None => {
                 "no node of the model lies in the region: the model has no nodes that can move".to_owned()
             }

@@ -204,7 +204,9 @@ impl Shell<'_> {
                 let (x, y) = (arm(a), arm(b));
                 let longest = x.norm_squared().max(y.norm_squared());
                 let area = x.cross(&y).dot(normal).abs();
-                if area > MIN_TRIANGLE_AREA * longest && best.is_none_or(|(largest, _)| area > largest * (1.0 + TIE_MARGIN)) {
+                if area > MIN_TRIANGLE_AREA * longest
+                    && best.is_none_or(|(largest, _)| area > largest * (1.0 + TIE_MARGIN))
+                {
                     best = Some((area, [node, a, b]));
                 }
             }

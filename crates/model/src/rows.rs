@@ -6,6 +6,7 @@
 
 use super::{DofLabel, Nodes};
 use faer::Mat;
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{SymmetricMatrix, connected_components, largest, parallel};
 use std::ops::Range;
 
@@ -333,8 +334,9 @@ pub fn extents(positions: &[[f64; 3]]) -> [f64; 3] {
 /// result is equal in all axes, and for most bodies it is the largest distance; zero without positions.
 pub fn span(positions: &[[f64; 3]]) -> f64 {
     let distance = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
-    let farthest =
-        |from: &[f64; 3]| positions.iter().map(|x| (distance(x, from), x)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let farthest = |from: &[f64; 3]| {
+        first_largest(positions.iter().map(|x| (distance(x, from), x)), |(distance, _)| *distance)
+    };
     let mut mean = [0.0; 3];
     for x in positions {
         (0..3).for_each(|k| mean[k] += x[k] / positions.len() as f64);

@@ -13,7 +13,8 @@ const CHANGE: f64 = 1e-15;
 /// If the value of the variable is no whole number: no test runs without the rounding that it asks for.
 pub(super) fn rounded(matrices: [SymmetricMatrix; 2]) -> [SymmetricMatrix; 2] {
     let Some(seed) = std::env::var_os("FLEXBODY_TEST_ROUNDING") else { return matrices };
-    let seed: u64 = seed.to_str().and_then(|seed| seed.parse().ok()).expect("FLEXBODY_TEST_ROUNDING is a whole number");
+    let seed: u64 =
+        seed.to_str().and_then(|seed| seed.parse().ok()).expect("FLEXBODY_TEST_ROUNDING is a whole number");
     let [stiffness, mass] = matrices;
     [changed(stiffness.as_csc(), 2 * seed), changed(mass.as_csc(), 2 * seed + 1)]
 }

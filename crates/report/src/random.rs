@@ -114,9 +114,7 @@ impl RandomFacts {
 
 impl RecoveryFacts {
     fn new(one: &RandomRecovery) -> Self {
-        let most = |values: &[f64], places: &[usize]| {
-            first_largest(places.iter().copied(), |&at| values[at])
-        };
+        let most = |values: &[f64], places: &[usize]| first_largest(places.iter().copied(), |&at| values[at]);
         let of_unit = |alike: &Vec<usize>| {
             most(&one.rms, alike).map(|at| ValueFacts {
                 name: one.rows[at].name.clone(),

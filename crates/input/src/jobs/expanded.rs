@@ -13,6 +13,7 @@ use super::{Found, NodeSets};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::scanner::real;
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix};
 use flexbody_model::{DofLabel, RawMatrix};
 use nalgebra::Vector3;
@@ -293,7 +294,7 @@ fn are_on_one_line(points: &[[f64; 3]]) -> bool {
     let [first, _, ..] = points else { return false };
     let first = Vector3::from(*first);
     let away = points.iter().map(|point| Vector3::from(*point) - first);
-    let farthest = away.clone().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or_default();
+    let farthest = first_largest(away.clone(), |vector| vector.norm()).unwrap_or_default();
     let length = farthest.norm();
     away.map(|vector| vector.cross(&farthest).norm()).all(|area| area <= POINT * length * length)
 }

@@ -1,8 +1,8 @@
 //! Construction of the next coarser level: smoothed motions P of the groups, and P'AP.
 
-use crate::ties::first_largest;
 use super::blocks::{BlockMatrix, Entries};
 use crate::parallel;
+use crate::ties::first_largest;
 
 /// Number of nodes per parallel task.
 const NODES_PER_TASK: usize = 256;

@@ -11,8 +11,8 @@ use flexbody_base::numbers::significant;
 use flexbody_body::basis::CoupledModel;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::{largest, not_negative};
 use flexbody_linalg::ties::first_largest;
+use flexbody_linalg::{largest, not_negative};
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{
     FramedScene, Instant, Load, OutputErrors, Point, Scene, Trace, damped_once, fastest_history,
@@ -384,9 +384,9 @@ impl Grid {
             let sizes: Vec<f64> = histories.iter().map(size).collect();
             let least = ROUNDING_HISTORY * largest(sizes.iter().copied());
             let counted = histories.iter().zip(&sizes).filter(|(_, size)| **size > least);
-            all.extend(counted.filter_map(|(history, _)| {
-                first_largest(0..history.len(), |&at| history[at].abs())
-            }));
+            all.extend(
+                counted.filter_map(|(history, _)| first_largest(0..history.len(), |&at| history[at].abs())),
+            );
         }
         all.sort_unstable();
         all.dedup();

@@ -80,7 +80,8 @@ impl<'a> TruncatedMotion<'a> {
         // Evaluate outputs where any amplitude or acceleration is largest, besides even steps. Amplitudes count by
         // their energy, accelerations by their inertia.
         let histories = |all: &Mat<f64>, [of_modes, of_responses]: [&Mat<f64>; 2]| -> Vec<Vec<f64>> {
-            let weight = |row: usize| if row < nf { of_modes[(row, row)] } else { of_responses[(row - nf, row - nf)] };
+            let weight =
+                |row: usize| if row < nf { of_modes[(row, row)] } else { of_responses[(row - nf, row - nf)] };
             let history = |row: usize| {
                 let root = not_negative(weight(row)).sqrt();
                 (0..all.ncols()).map(|i| root * all[(row, i)]).collect()

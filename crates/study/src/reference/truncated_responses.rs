@@ -63,7 +63,8 @@ impl TruncatedResponses {
     ) -> Result<Self> {
         let model = view.model;
         // Compress the unbalanced forces of a few instants, then get amplitudes at all instants.
-        let few: Vec<Instant> = grid.few(histories(motion, body)).into_iter().map(|i| motion[i].clone()).collect();
+        let few: Vec<Instant> =
+            grid.few(histories(motion, body)).into_iter().map(|i| motion[i].clone()).collect();
         let compressed = Compressed::new(model, &view.residual(&few));
         let UnbalancedAmplitudes { in_modes, compressed: amplitudes } =
             Projected::new(view, compressed.as_ref(), motion).amplitudes(motion);

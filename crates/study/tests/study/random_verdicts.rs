@@ -670,5 +670,11 @@ fn rounding_decides_nothing() {
         changed.map(|after| format!("{} {}:\n  {before}\n  {after}", case.seed, case.what)).collect()
     };
     let changed: Vec<String> = cases.par_iter().flat_map(changes).collect();
-    assert!(changed.is_empty(), "{} of {} decisions:\n{}", changed.len(), 4 * cases.len(), changed.join("\n"));
+    assert!(
+        changed.is_empty(),
+        "{} of {} decisions:\n{}",
+        changed.len(),
+        4 * cases.len(),
+        changed.join("\n")
+    );
 }
