@@ -6,7 +6,7 @@ use super::run_data::LumpedModes;
 use flexbody_body::flex_body::LumpedBody;
 use flexbody_body::invariants::{ERROR_NORMS, Invariants, LumpedScheme};
 use flexbody_linalg::larger;
-use flexbody_linalg::ties::first_smallest;
+use flexbody_linalg::ties::{TIE_MARGIN, first_smallest};
 use serde::{Serialize, Serializer};
 use std::collections::{HashMap, HashSet};
 
@@ -89,9 +89,9 @@ impl Errors {
     }
 }
 
-/// Returns true if error `a` exceeds error `b`. NaN, an unknown error, exceeds every number.
+/// Returns true if error `a` exceeds error `b` by more than rounding. NaN, an unknown error, exceeds every number.
 fn exceeds(a: f64, b: f64) -> bool {
-    (a.is_nan() && !b.is_nan()) || a > b
+    (a.is_nan() && !b.is_nan()) || (is_error(a) && a > b * (1.0 + TIE_MARGIN))
 }
 
 /// Facts for question (a) of theory section 9: the exact modes with the invariants from lumped masses.
@@ -245,7 +245,7 @@ impl LumpedEffect {
 
 /// Returns the larger of two errors; an unknown error counts as the largest.
 fn worse<'a>(a: (&'a str, f64), b: (&'a str, f64)) -> (&'a str, f64) {
-    if !a.1.is_nan() && (b.1.is_nan() || b.1.abs() > a.1.abs()) { b } else { a }
+    if !a.1.is_nan() && (b.1.is_nan() || b.1.abs() > a.1.abs() * (1.0 + TIE_MARGIN)) { b } else { a }
 }
 
 fn is_error(change: f64) -> bool {
