@@ -109,7 +109,8 @@ impl Explicit {
             Some(length) => length,
             None => {
                 let first = self.first_length(system, time, end - time)?;
-                self.on_grid(first)
+                // A step to the end has any length: breaks may be a few roundings apart.
+                if first >= end - time { first } else { self.on_grid(first) }
             }
         };
         let mut grow = MAX_STEP_FACTOR;
