@@ -55,7 +55,7 @@ pub struct ReferenceError {
     pub errors: OutputErrors,
     /// Largest error over its tolerance.
     pub worst: f64,
-    /// First time at which the root of the estimated elastic energy reaches [`LARGE`] of its largest value.
+    /// First time at which the root of the estimated elastic energy reaches 0.8 of its largest value.
     pub time: f64,
     /// Reason why the errors are unknown; `None` if they are known.
     pub unknown: Option<&'static str>,
