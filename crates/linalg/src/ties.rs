@@ -69,8 +69,9 @@ fn is_below(value: f64, largest: f64) -> bool {
     match (value.is_nan(), largest.is_nan()) {
         (true, _) => false,
         (false, true) => true,
-        // Equal infinities have no difference.
-        _ => value < largest && largest - value > TIE_MARGIN * largest.abs().max(value.abs()),
+        // The difference from infinity is not finite, whatever the other value.
+        _ if value.is_infinite() || largest.is_infinite() => value < largest,
+        _ => largest - value > TIE_MARGIN * largest.abs().max(value.abs()),
     }
 }
 
