@@ -50,6 +50,49 @@ fn sound(block: *mut u8, size: usize) -> *mut u8 {
     block
 }
 
+/// Allocations of C code, HDF5 first of all: some of it uses a null pointer on the way out of a failed allocation
+/// (`H5AC_create` of HDF5), which ends the process by a signal. `build.rs` has the linker replace the functions of the C
+/// library by these, which end the program as [`Allocator`] does.
+#[cfg(target_os = "linux")]
+mod of_c {
+    use super::out_of_memory;
+    use libc::{c_void, size_t};
+
+    /// Blocks up to this size in bytes end the program where memory is short: C code needs them for itself. Larger
+    /// ones hold data, whose size may be that of a damaged file, and their absence is handled.
+    const NEEDED: size_t = 4 << 20;
+
+    unsafe extern "C" {
+        fn __real_malloc(size: size_t) -> *mut c_void;
+        fn __real_calloc(count: size_t, size: size_t) -> *mut c_void;
+        fn __real_realloc(block: *mut c_void, size: size_t) -> *mut c_void;
+    }
+
+    fn sound(block: *mut c_void, size: size_t) -> *mut c_void {
+        if block.is_null() && 0 < size && size <= NEEDED {
+            out_of_memory(size);
+        }
+        block
+    }
+
+    // SAFETY of all three: every call is passed on unchanged to the function of the C library.
+
+    #[unsafe(no_mangle)]
+    unsafe extern "C" fn __wrap_malloc(size: size_t) -> *mut c_void {
+        sound(unsafe { __real_malloc(size) }, size)
+    }
+
+    #[unsafe(no_mangle)]
+    unsafe extern "C" fn __wrap_calloc(count: size_t, size: size_t) -> *mut c_void {
+        sound(unsafe { __real_calloc(count, size) }, count.saturating_mul(size))
+    }
+
+    #[unsafe(no_mangle)]
+    unsafe extern "C" fn __wrap_realloc(block: *mut c_void, size: size_t) -> *mut c_void {
+        sound(unsafe { __real_realloc(block, size) }, size)
+    }
+}
+
 thread_local! {
     static ENDING: Cell<bool> = const { Cell::new(false) };
 }
