@@ -1,5 +1,11 @@
 //! Numbers for human readers. Files do not use these functions: their floats round-trip.
 
+/// Returns a part in percent with the one digit that an estimate has; its second digit may hang on rounding.
+pub fn about_percent(part: f64) -> String {
+    let digit = format!("{:.0e}", 100.0 * part).parse().unwrap_or(f64::NAN);
+    format!("{} %", significant(digit, 6))
+}
+
 /// Returns `value` with `digits` significant digits: plain between 1e-4 and 1e7, otherwise with an exponent; without
 /// trailing zeros.
 pub fn significant(value: f64, digits: usize) -> String {

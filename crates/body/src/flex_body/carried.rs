@@ -18,6 +18,7 @@ use crate::basis::BasisKind;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::numbers::about_percent;
 use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
 use flexbody_model::{Coupling, DampingRatios, rigid_count};
 use nalgebra::{Matrix3, Vector3};
@@ -206,8 +207,8 @@ impl FlexBody {
         let worst = missing(c1).max(missing(&c2));
         (worst > MAX_TRUNCATION).then(|| {
             let message = format!(
-                "the {nf} modes resolve {carrier} poorly: when it is accelerated, up to about {:.0} % of the elastic energy is missing, depending on the direction",
-                100.0 * worst
+                "the {nf} modes resolve {carrier} poorly: when it is accelerated, up to about {} of the elastic energy is missing, depending on the direction",
+                about_percent(worst)
             );
             Diagnostic::new(Code::CarrierUnresolved, message)
         })

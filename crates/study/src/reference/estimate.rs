@@ -7,7 +7,7 @@ use super::truncated_responses::{ResonanceCriteria, TruncatedResponses};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::numbers::significant;
+use flexbody_base::numbers::about_percent;
 use flexbody_body::basis::CoupledModel;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
@@ -127,8 +127,7 @@ impl ReferenceError {
     /// Returns the error as a part of the tolerances in words, with the one digit that an estimate has: beside the motion
     /// of all nodes it is 0.5 to 3 times the true error, and after a shock rounding alone changes the second digit.
     pub fn part_of_tolerances(&self) -> String {
-        let digit = format!("{:.0e}", 100.0 * self.worst).parse().unwrap_or(f64::NAN);
-        format!("{} %", significant(digit, 6))
+        about_percent(self.worst)
     }
 
     /// Returns the part of the tolerances that the last error of `rounds` leaves to others: all of it if no error is

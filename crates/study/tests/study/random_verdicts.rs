@@ -634,7 +634,7 @@ fn estimates_and_verdicts_hold_against_the_motion_of_all_nodes() {
 }
 
 /// Returns what is decided about a case: the modes of the body in every round of its enrichment, the choice of the
-/// selection, and the codes of its diagnostics.
+/// selection, and its texts.
 fn decisions(case: &Case, model: &FeModel) -> Result<String> {
     let tailoring = Tailoring { settings: settings(case.modes), by_band: false, of_motion: false };
     let cases = case.scene.clone().into();
@@ -642,11 +642,10 @@ fn decisions(case: &Case, model: &FeModel) -> Result<String> {
     let rounds: Vec<usize> = enriched.rounds[0].iter().map(|round| round.modes).collect();
     let one = select(&enriched.made.body, &enriched.rounds, &cases, &Context::QUIET)?;
     let variations: Vec<_> = one.varied.iter().map(|one| (&one.name, one.holds())).collect();
-    // After a shock rounding moves the second digit of estimates, which some texts print.
-    let codes: Vec<&str> = one.diagnostics.iter().map(|one| one.code().id()).collect();
+    let said: Vec<String> = one.diagnostics.iter().map(ToString::to_string).collect();
     let reasons: Vec<_> = one.terms.iter().map(|term| (term.group, term.kept, term.tier)).collect();
     Ok(format!(
-        "rounds of {rounds:?} modes; modes {:?}, {:?}, holds {}, {}, {reasons:?}; {variations:?}; {codes:?}",
+        "rounds of {rounds:?} modes; modes {:?}, {:?}, holds {}, {}, {reasons:?}; {variations:?}; {said:?}",
         one.modes,
         one.groups,
         one.holds(),
