@@ -151,6 +151,7 @@ pub mod program {
     pub use crate::cli::{
         Arguments, end, end_without_unfinished_files, parse, run, set_program, use_threads,
     };
+    pub use flexbody_base::hdf5_file::take_variables as take_hdf5_variables;
     pub use flexbody_base::memory::accepts_failure;
     pub use flexbody_base::output::abandon_unfinished_soon;
     pub use flexbody_base::provenance::state_command;

@@ -3,7 +3,7 @@
 #![allow(unsafe_code)] // an allocator, and calls of the C library that set limits of a process
 
 use flexbody::ExitCode;
-use flexbody::program::{abandon_unfinished_soon, accepts_failure, end};
+use flexbody::program::{abandon_unfinished_soon, accepts_failure, end, take_hdf5_variables};
 use mimalloc::MiMalloc;
 use std::alloc::{GlobalAlloc, Layout};
 use std::cell::Cell;
@@ -149,8 +149,9 @@ fn write_stderr(text: &[u8]) {
 
 /// Before anything else: a file that becomes too large is an error of the write, not a signal; as many files
 /// may be open as the system allows, since every output holds one; the C library keeps one pool of memory for
-/// all threads, not 64 MiB of address space for each.
+/// all threads, not 64 MiB of address space for each; no variable of the environment changes how HDF5 writes.
 pub(crate) fn prepare() {
+    drop(take_hdf5_variables());
     #[cfg(unix)]
     // SAFETY: sets limits of this process, before any thread is started; what fails leaves things as they
     // are.

@@ -10,6 +10,7 @@ mod cluster;
 mod command_line;
 mod docs_generated;
 mod ends;
+mod faults;
 mod formats;
 mod front_door;
 mod hostile_files;

@@ -11,7 +11,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, ExitCode, Result};
 use crate::read_files::{followed, refuse_read};
 use std::fs::{File, Metadata, OpenOptions};
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
@@ -316,7 +316,7 @@ impl OutputSlot {
         self.commit()
     }
 
-    /// Writes `bytes` to the temporary file. They appear at the target with [`OutputSlot::commit`].
+    /// Writes `bytes` to the temporary file, and reads them back. They appear at the target with [`OutputSlot::commit`].
     ///
     /// # Errors
     /// The errors of [`OutputSlot::write`].
@@ -325,7 +325,8 @@ impl OutputSlot {
             .write(true)
             .truncate(true)
             .open(self.temporary())
-            .and_then(|mut file| file.write_all(bytes));
+            .and_then(|mut file| file.write_all(bytes))
+            .and_then(|()| holds(self.temporary(), bytes));
         written.map_err(|e| self.failure(&e))
     }
 
@@ -348,7 +349,7 @@ impl OutputSlot {
 
     /// Puts all files in place, or none. Every file is on the disk before the first is renamed, and a signal that ends
     /// the program waits until all are renamed. If one cannot be put in place, the files that the others replaced are
-    /// restored, on file systems with hard links. They are also restored if the run later ends without results.
+    /// restored. They are also restored if the run later ends without results.
     ///
     /// # Errors
     /// The errors of [`OutputSlot::write`]; [`Usage`](Code::Usage) if an output would replace a file that the run has
@@ -381,15 +382,26 @@ impl OutputSlot {
         placed
     }
 
-    /// Creates another name for the file at the target, from which it can be restored.
-    fn keep_old(&self) -> Option<Old> {
-        let mut name = self.temporary.path().file_name()?.to_os_string();
+    /// Creates another name for the file at the target, from which it can be restored; where the file system has no hard
+    /// links, a copy of it. `None` if there is no file.
+    fn keep_old(&self) -> std::io::Result<Option<Old>> {
+        let mut name = self.temporary.path().file_name().unwrap_or_default().to_os_string();
         name.push(TEMPORARY_SUFFIX);
         let path = self.temporary.path().with_file_name(name);
-        std::fs::hard_link(&self.target, &path).ok()?;
+        if std::fs::hard_link(&self.target, &path).is_err() {
+            match std::fs::copy(&self.target, &path) {
+                Ok(_) => File::open(&path)?.sync_all()?,
+                Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+                Err(e) => {
+                    // What was copied is of no use; a file that remains is removed by the next run.
+                    let _ = std::fs::remove_file(&path);
+                    return Err(e);
+                }
+            }
+        }
         // A shared lock keeps other runs from removing the file as abandoned, without blocking readers.
         let lock = File::open(&path).ok().filter(|file| file.try_lock_shared().is_ok());
-        Some(Old { path, _lock: lock })
+        Ok(Some(Old { path, _lock: lock }))
     }
 }
 
@@ -426,17 +438,25 @@ fn place_all(slots: &mut [OutputSlot], lasting: Lasting) -> Result<()> {
     let mut placed: Vec<Placed> = Vec::with_capacity(slots.len());
     for slot in slots {
         let replaced = slot.target.exists();
-        let old = is_undoable.then(|| slot.keep_old()).flatten();
-        let (path, file) = slot.temporary.take();
-        book.forget(&path);
-        let renamed = path.persist(&slot.target);
-        let done = Placed { target: slot.target.clone(), file, old, replaced };
-        if let Err(e) = renamed {
-            done.forget_old();
-            placed.iter().rev().for_each(Placed::put_back);
-            return Err(slot.failure(&e.error));
+        let renamed = if is_undoable { slot.keep_old() } else { Ok(None) }.and_then(|old| {
+            let (path, file) = slot.temporary.take();
+            book.forget(&path);
+            let done = Placed { target: slot.target.clone(), file, old, replaced };
+            match path.persist(&slot.target) {
+                Ok(()) => Ok(done),
+                Err(e) => {
+                    done.forget_old();
+                    Err(e.error)
+                }
+            }
+        });
+        match renamed {
+            Ok(done) => placed.push(done),
+            Err(e) => {
+                placed.iter().rev().for_each(Placed::put_back);
+                return Err(slot.failure(&e));
+            }
         }
-        placed.push(done);
     }
     if is_final {
         placed.iter().for_each(Placed::forget_old);
@@ -463,6 +483,20 @@ impl Placed {
             None => Ok(()),
         };
     }
+}
+
+/// Refuses a file at `path` that holds other bytes than `bytes`.
+fn holds(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = File::open(path)?;
+    let mut block = vec![0; 1 << 16];
+    let is_whole = file.metadata()?.len() == bytes.len() as u64;
+    for part in bytes.chunks(block.len()) {
+        let found = &mut block[..part.len()];
+        if !is_whole || file.read_exact(found).is_err() || found != part {
+            return Err(std::io::Error::other("it was written, but it does not hold what was written"));
+        }
+    }
+    Ok(())
 }
 
 /// Returns the file that `asked` refers to: one that exists and can be replaced, or one that does not exist.

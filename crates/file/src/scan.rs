@@ -1,14 +1,16 @@
 //! Reads the entries of the table from a file and collects every violation. Nothing that the file declares is trusted
 //! before it is checked against the rest.
 
-use super::digest::{self, Numbers, digests_of, of_numbers};
+use super::digest;
 use super::item::{Extent, Item, ItemKind, Origin, Per, SchemaGroup};
 use super::names::{self, place};
 use super::schema::certificate::{DROPPED, KEPT};
 use super::schema::{DIGESTS_SINCE, LIST, TABLE, WHOLE};
 use super::value::Value;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::hdf5_file::{self, Array, Element, Stored, elements};
+use flexbody_base::hdf5_file::{
+    self, Array, Element, Number, Numbers, Stored, digests_of, elements, of_numbers,
+};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{Storage, TermGroup, TermGroups};
 use hdf5_metno as hdf5;
@@ -230,7 +232,7 @@ impl Scan {
     }
 
     /// Stores the fingerprint of numbers that were read, so that they need not be read again.
-    fn hash<T: digest::Number>(&mut self, name: &str, (values, dims): &Array<T>) {
+    fn hash<T: Number>(&mut self, name: &str, (values, dims): &Array<T>) {
         if self.stated_digests().is_some() {
             self.numbers.insert(name.to_owned(), of_numbers(dims, values));
         }
@@ -257,7 +259,7 @@ impl Scan {
             return;
         };
         let (list, whole) = (list.to_owned(), whole.to_owned());
-        let found = digests_of(file, &mut self.numbers, &mut self.stored);
+        let found = digests_of(file, &self.numbers, &mut self.stored, &[LIST, WHOLE]);
         let differs = match found {
             Ok(found) => digest::difference(&found, &list, &whole),
             Err(problem) => Some(problem),

@@ -8,7 +8,8 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::hdf5_file;
 use flexbody_base::hdf5_file::{
-    Stored, create, dataset, elements, make, open_group, open_with_checked_texts, put_text,
+    Numbers, Stored, create, dataset, elements, finish, make, open_group, open_with_checked_texts,
+    put_numbers, put_text,
 };
 use flexbody_base::output::OutputSlot;
 use flexbody_base::provenance::generator;
@@ -18,6 +19,7 @@ use flexbody_motion::dynamics::Balance;
 use flexbody_motion::scene::{Recording, Scheme};
 use hdf5_metno as hdf5;
 use nalgebra::Vector3;
+use std::cell::RefCell;
 use std::path::Path;
 
 /// Value of the root attribute `format`.
@@ -43,6 +45,7 @@ pub fn fill_simulation(recording: &Recording, units: &UnitSystem, slot: &OutputS
 struct DescribedGroup<'a> {
     group: hdf5::Group,
     units: &'a UnitSystem,
+    numbers: &'a RefCell<Numbers>,
 }
 
 impl DescribedGroup<'_> {
@@ -71,9 +74,7 @@ impl DescribedGroup<'_> {
         shape: &[usize],
         values: &[f64],
     ) -> hdf5::Result<()> {
-        let builder = self.group.new_dataset::<f64>().obj_track_times(false);
-        let dataset = builder.shape(shape.to_vec()).create(name)?;
-        dataset.write_raw(values)?;
+        let dataset = put_numbers(&self.group, name, shape, values, &mut self.numbers.borrow_mut())?;
         put_text(&dataset, "units", &units.concrete(self.units))?;
         put_text(&dataset, "description", description)
     }
@@ -91,12 +92,11 @@ impl DescribedGroup<'_> {
 }
 
 fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<()> {
-    let writer = Writer { recording, units, file: create(path)? };
+    let writer = Writer { recording, units, file: create(path)?, numbers: RefCell::default() };
     writer.origin()?;
     writer.method()?;
     writer.summary()?;
-    let top = DescribedGroup { group: writer.file.as_group()?, units };
-    top.put("time", unit(0, 0, 1), "instants", &recording.time)?;
+    writer.described(writer.file.as_group()?).put("time", unit(0, 0, 1), "instants", &recording.time)?;
     writer.frame()?;
     writer.modes()?;
     writer.energy()?;
@@ -104,8 +104,7 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
     writer.reaction()?;
     writer.conditions()?;
     writer.points()?;
-    writer.file.flush()?;
-    writer.file.close()
+    finish(writer.file, path, &writer.numbers.into_inner())
 }
 
 /// The file with its content. Everything is written in a fixed order, so that equal recordings give equal bytes.
@@ -113,11 +112,16 @@ struct Writer<'a> {
     recording: &'a Recording,
     units: &'a UnitSystem,
     file: hdf5::File,
+    numbers: RefCell<Numbers>,
 }
 
 impl Writer<'_> {
     fn group(&self, name: &str) -> hdf5::Result<DescribedGroup<'_>> {
-        Ok(DescribedGroup { group: make(&self.file, name)?, units: self.units })
+        Ok(self.described(make(&self.file, name)?))
+    }
+
+    fn described(&self, group: hdf5::Group) -> DescribedGroup<'_> {
+        DescribedGroup { group, units: self.units, numbers: &self.numbers }
     }
 
     fn instants(&self) -> usize {
@@ -251,8 +255,7 @@ impl Writer<'_> {
         }
         let points = self.group("points")?;
         for path in &self.recording.paths {
-            let point =
-                DescribedGroup { group: make(&points.group, &names::encode(&path.name))?, units: self.units };
+            let point = self.described(make(&points.group, &names::encode(&path.name))?);
             point.vectors("place", unit(0, 1, 0), "place, world axes", path.place.iter())?;
             let description = "deflection from the undeformed body, axes of the model, turning with the body";
             point.vectors("deflection", unit(0, 1, 0), description, path.deflection.iter())?;

@@ -1,6 +1,6 @@
 //! Writes a body by the rows of the table.
 
-use super::digest::{Number, Numbers, digests_of, of_numbers, sealed};
+use super::digest::sealed;
 use super::item::{Item, ItemKind, Per};
 use super::names;
 use super::names::place;
@@ -10,7 +10,9 @@ use super::schema::{LIST, WHOLE};
 use super::value::{Value, View};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::hdf5_file::{Stored, create, make, put_text};
+use flexbody_base::hdf5_file::{
+    Number, Numbers, Stored, create, digests_of, finish, make, of_numbers, put_text,
+};
 use flexbody_base::output::OutputSlot;
 use flexbody_base::provenance::Fingerprint;
 use flexbody_body::flex_body::FlexBody;
@@ -94,12 +96,11 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
         }
     }
     // Every dataset has its fingerprint already: only attributes are read back.
-    let digests = digests_of(&file, &mut numbers, &mut Stored::new(0))?;
+    let digests = digests_of(&file, &numbers, &mut Stored::new(0), &[LIST, WHOLE])?;
     let (list, whole) = sealed(&digests);
     put_text(&file, LIST, &list)?;
     put_text(&file, WHOLE, &whole)?;
-    file.flush()?;
-    file.close()
+    finish(file, path, &numbers)
 }
 
 /// Writes an entry. Returns the fingerprint of its numbers if it is a dataset.

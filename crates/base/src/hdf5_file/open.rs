@@ -10,6 +10,7 @@ use hdf5::plist::group_create::{AttrCreationOrder, LinkCreationOrder};
 use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;
 use hdf5_metno_sys::h5pl::{H5PLremove, H5PLset_loading_state, H5PLsize};
+use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::path::Path;
 use std::sync::Once;
@@ -57,23 +58,30 @@ pub fn open_unrecorded(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::
 
 /// Returns the version of the HDF5 library.
 pub fn library_version() -> String {
+    without_plugins();
     let (major, minor, release) = hdf5::library_version();
     format!("{major}.{minor}.{release}")
 }
 
-/// Creates an empty file at a temporary `path`.
+/// Creates an empty file at a temporary `path`. It ends by [`finish`](super::finish).
 pub fn create(path: &Path) -> hdf5::Result<hdf5::File> {
     without_plugins();
-    by_utf8_name(path, |path| {
-        hdf5::File::with_options()
-            // HDF5 1.8 is readable for the oldest readers in use; its metadata blocks have checksums. No lock: no other
-            // program knows the temporary file, and a process started meanwhile would inherit the lock and hold it on
-            // the finished file.
-            .with_fapl(|p| p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18).file_locking(false))
-            // Time stamps would make equal bodies differ.
-            .with_fcpl(|p| p.obj_track_times(false))
-            .create(path)
-    })
+    by_utf8_name(path, |path| creation().create(path))
+}
+
+/// Returns the properties of files that this program creates.
+pub(super) fn creation() -> hdf5::FileBuilder {
+    let mut builder = hdf5::File::with_options();
+    builder
+        // HDF5 1.8 is readable for the oldest readers in use; its metadata blocks have checksums. No lock: no other
+        // program knows the temporary file, and a process started meanwhile would inherit the lock and hold it on
+        // the finished file. No sieve buffer: it would be written when a dataset is dropped, where an error is lost.
+        .with_fapl(|p| {
+            p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18).file_locking(false).sieve_buf_size(0)
+        })
+        // Time stamps would make equal bodies differ.
+        .with_fcpl(|p| p.obj_track_times(false));
+    builder
 }
 
 /// Creates a group that tracks the order of its members and attributes, without time stamps.
@@ -118,15 +126,38 @@ fn by_descriptor<T>(path: &Path, open: impl FnOnce(&Path) -> hdf5::Result<T>) ->
     open(path)
 }
 
-// Plugins of the HDF5 library, which a file requests by the number of a filter. They are never loaded.
+// Plugins of the HDF5 library, which a file requests by the number of a filter, and the environment by name. They are
+// never loaded.
 
-/// Prevents the HDF5 library of this process from loading plugins. Only its built-in filters remain; plugin folders
-/// that it was built with, or that HDF5_PLUGIN_PATH names, are removed.
-// Exception to `unsafe_code = "deny"`: the bindings have no safe form of these three functions.
+/// Start of the names of variables that the HDF5 library obeys: HDF5_DRIVER and HDF5_VOL_CONNECTOR replace the way in
+/// which files are written, HDF5_PLUGIN_PATH and HDF5_PLUGIN_PRELOAD name code to load.
+const VARIABLES: &str = "HDF5_";
+/// Variable that stays: file systems of clusters without locks need it.
+const LOCKING: &str = "HDF5_USE_FILE_LOCKING";
+
+/// Takes the variables that the HDF5 library obeys out of the environment of this process, and returns them.
+// Exception to `unsafe_code = "deny"`: the environment is shared with other threads.
+#[allow(unsafe_code)]
+pub fn take_variables() -> Vec<(OsString, OsString)> {
+    let is_obeyed =
+        |name: &OsStr| name.to_str().is_some_and(|name| name.starts_with(VARIABLES) && name != LOCKING);
+    let taken: Vec<_> = std::env::vars_os().filter(|(name, _)| is_obeyed(name)).collect();
+    // SAFETY: the standard library locks the environment against its own readers. The program calls this before it starts
+    // threads; a library does only where such a variable is set, once.
+    taken.iter().for_each(|(name, _)| unsafe { std::env::remove_var(name) });
+    taken
+}
+
+/// Prevents the HDF5 library of this process from loading plugins, and from obeying the environment. Only its built-in
+/// filters remain; plugin folders that it was built with are removed. To be called before any other use of the library,
+/// which reads the environment once: for that time the variables are not there.
+// Exception to `unsafe_code = "deny"`: the bindings have no safe form of these three functions, and the environment is
+// shared with other threads.
 #[allow(unsafe_code)]
 pub fn without_plugins() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
+        let variables = take_variables();
         hdf5_metno::sync::sync(|| {
             let (mut nothing, mut folders) = (0, 0);
             // SAFETY: `sync` holds the lock of the library, and both pointers are those of variables that outlive the
@@ -138,5 +169,7 @@ pub fn without_plugins() {
                 }
             }
         });
+        // SAFETY: as in `take_variables`.
+        variables.iter().for_each(|(name, value)| unsafe { std::env::set_var(name, value) });
     });
 }

@@ -3,8 +3,7 @@
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::hdf5_file::{create, make, put_text};
-use flexbody_base::output::OutputSlot;
+use flexbody_base::hdf5_file::{bytes_of, make, put_text};
 use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor};
 use hdf5_metno as hdf5;
 
@@ -115,29 +114,17 @@ fn array<T: hdf5::H5Type>(
     Ok(dataset)
 }
 
-/// Returns the bytes of a file with these entries. HDF5 writes a temporary file, which is deleted afterwards.
+/// Returns the bytes of a file with these entries, which HDF5 makes in memory.
 ///
 /// # Errors
-/// [`OutputUnwritable`](Code::OutputUnwritable) if the temporary file cannot be written.
+/// [`OutputUnwritable`](Code::OutputUnwritable) if HDF5 fails.
 pub(crate) fn hdf5_bytes(root: &[Hdf5Entry]) -> Result<Vec<u8>> {
-    let make_bytes = || -> std::result::Result<Vec<u8>, String> {
-        let name = format!("flexbody-export-{}.h5", std::process::id());
-        // The slot is never committed: its temporary file is removed with it, even if a signal ends the
-        // program.
-        let slot = OutputSlot::prepare(std::env::temp_dir().join(name)).map_err(|e| e.to_string())?;
-        fill(root, slot.temporary()).map_err(|e| e.to_string())?;
-        std::fs::read(slot.temporary()).map_err(|e| e.to_string())
-    };
-    make_bytes().map_err(|why| {
-        let message = format!("an HDF5 file could not be made in the folder for temporary files: {why}");
+    let made = bytes_of(|file| {
+        let place = file.as_group()?;
+        root.iter().try_for_each(|entry| entry.put(&place))
+    });
+    made.map_err(|why| {
+        let message = format!("an HDF5 file could not be made in memory: {why}");
         Diagnostic::new(Code::OutputUnwritable, message).into()
     })
-}
-
-fn fill(root: &[Hdf5Entry], path: &std::path::Path) -> hdf5::Result<()> {
-    let file = create(path)?;
-    let place = file.as_group()?;
-    root.iter().try_for_each(|entry| entry.put(&place))?;
-    file.flush()?;
-    file.close()
 }
