@@ -2,6 +2,7 @@
 //! matrices.
 
 mod interior;
+mod recoveries;
 
 use super::recounts::{interface_checks, interface_note, recounts};
 use crate::basis::BasisKind;
@@ -20,6 +21,7 @@ use flexbody_eigen::{relative_residual, residual_scale, rounding_residual};
 use flexbody_linalg::{SymmetricMatrix, gram, larger, largest, largest_entry, side_by_side};
 use flexbody_model::{CheckedModel, Damping, FeModel, GeometricStiffness, RawModel, UnitLoad};
 use nalgebra::Vector3;
+use recoveries::recovery_checks;
 
 /// Limit for recomputed invariants, relative to their Cauchy-Schwarz bounds: the rounding of their sums.
 const MAX_RECOMPUTED_DIFFERENCE: f64 = 1e-12;
@@ -122,6 +124,7 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
     checks.extend(against.inertia_stiffness());
     checks.extend(against.guarantee());
     checks.extend(interface_checks(body, model));
+    checks.extend(against.recoveries()?);
     Ok(checks)
 }
 
@@ -312,6 +315,11 @@ impl<'a> Recomputed<'a> {
             // The body was made by a version without stiffness of inertia, or from another model.
             (None, Some(_)) | (Some(_), None) => check(f64::INFINITY),
         }
+    }
+
+    fn recoveries(&self) -> Result<Vec<IdentityCheck>> {
+        let modal_stiffness = gram(self.modes.vectors.as_ref(), self.kx.as_ref());
+        recovery_checks(self.body, self.model, &self.modes, &self.place, &modal_stiffness)
     }
 
     /// Checks the bounds that accuracy `certified` guarantees, if the body has them.

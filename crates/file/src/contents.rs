@@ -2,7 +2,7 @@
 
 use super::names;
 use super::names::place;
-use super::schema::TABLE;
+use super::schema::{ORDER, TABLE};
 use super::value::Value;
 use flexbody_body::flex_body::FlexBody;
 
@@ -49,7 +49,12 @@ pub struct NamedAttributes {
 pub fn contents(body: &FlexBody) -> (Vec<NamedAttributes>, Vec<NamedArray>) {
     let (mut attributes, mut arrays) = (Vec::new(), Vec::new());
     for group in TABLE {
-        for (name, view) in group.instances(body.parts()) {
+        let instances = group.instances(body.parts());
+        if let Some(order) = group.order(&instances) {
+            let path = group.parent().trim_start_matches('/').to_owned();
+            attributes.push(NamedAttributes { path, values: vec![(ORDER.to_owned(), order.into())] });
+        }
+        for (name, view) in instances {
             let path = place(group, name.as_deref().map(names::encode).as_deref());
             let path = path.trim_start_matches('/');
             let mut texts = Vec::new();

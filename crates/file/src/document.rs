@@ -45,7 +45,8 @@ readers ignore. A body without some groups of the kinetic energy (`/terms`, sinc
 readers reject the file and name the datasets. A Craig-Bampton body whose frame is on an interface has no
 `/modes/free_eigenvalue` and `/modes/free_eigenvalue_lower`, which readers up to 1.10 require of a body with `/certificate@fixed_interface_modes`: its file
 states version 1.11, and these readers reject it and name the datasets. Names that are data (lumping schemes, interfaces, loads) are percent-encoded where they hold `/`, `%`, control
-characters or a leading dot, and keep their order by HDF5 creation order. Nothing in the file depends on the clock, on the
+characters or a leading dot, and keep their order by HDF5 creation order; since 1.12 the attribute `order` of `/interfaces`, `/recovery` and `/named_loads` states the
+order of two or more members as a JSON array of their encoded names, which goes before. Nothing in the file depends on the clock, on the
 number of threads or on its path: equal bodies are equal bytes.
 ";
 

@@ -1,6 +1,7 @@
 //! The building blocks of the table of the flex-body file: entries, their shapes, and the sources of their values.
 
 use super::draft::Draft;
+use super::names;
 use super::value::{ReadValue, Units, Value, View, text};
 #[cfg(feature = "hdf5")]
 use flexbody_body::flex_body::Storage;
@@ -174,6 +175,13 @@ pub(super) enum Per {
     NamedLoad,
 }
 
+impl Per {
+    /// Returns true if the order of the objects is data: rows and coordinates elsewhere follow it.
+    pub(crate) fn is_ordered(self) -> bool {
+        matches!(self, Self::Interface | Self::Recovery | Self::NamedLoad)
+    }
+}
+
 /// A row of the table: a dataset or attribute.
 pub(super) struct Item {
     pub name: &'static str,
@@ -317,6 +325,14 @@ impl SchemaGroup {
     /// Returns the path without the last name.
     pub(crate) fn parent(&self) -> &'static str {
         self.path.rfind('/').map_or(self.path, |i| &self.path[..i])
+    }
+
+    /// Returns the link names of `instances` as a JSON array, if there are several and their order is data.
+    pub(crate) fn order(&self, instances: &[(Option<String>, View<'_>)]) -> Option<String> {
+        let links: Vec<String> =
+            instances.iter().filter_map(|(name, _)| name.as_deref().map(names::encode)).collect();
+        let is_data = self.per.is_ordered() && links.len() > 1;
+        is_data.then(|| serde_json::to_string(&links).expect("strings are valid JSON"))
     }
 
     /// Returns the instances of this group in a body, with their names if these are data.

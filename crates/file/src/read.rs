@@ -80,11 +80,8 @@ fn examine(path: &Path) -> Result<Examined> {
 }
 
 fn without_digest(scan: &Scan) -> Diagnostic {
-    let minor = match scan.values.get("/@format_minor") {
-        Some(Value::Int(minor)) => *minor,
-        _ => 0,
-    };
-    let message = format!("the file has no digest: it was written in format version {MAJOR}.{minor}");
+    let message =
+        format!("the file has no digest: it was written in format version {MAJOR}.{}", scan.minor());
     Diagnostic::new(Code::BodyWithoutDigest, message)
 }
 

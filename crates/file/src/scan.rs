@@ -5,7 +5,7 @@ use super::digest;
 use super::item::{Extent, Item, ItemKind, Origin, Per, SchemaGroup};
 use super::names::{self, place};
 use super::schema::certificate::{DROPPED, KEPT};
-use super::schema::{DIGESTS_SINCE, LIST, TABLE, WHOLE};
+use super::schema::{DIGESTS_SINCE, LIST, MAJOR, ORDER, TABLE, WHOLE};
 use super::value::Value;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::hdf5_file::{
@@ -38,8 +38,26 @@ pub(super) struct Scan {
     units: Option<UnitSystem>,
     /// Precision of the large arrays, from the root attribute `storage`.
     pub storage: Storage,
+    /// Entries that the file holds and that later minor versions added, with that version.
+    newer: Vec<(String, i64)>,
     /// Entries of groups of the kinetic energy; true for each that the file holds.
     of_groups: Vec<(String, &'static Item, bool)>,
+}
+
+/// Returns the members `links` of `parent` in the order that the file states, if it does.
+fn in_order(parent: &hdf5::Group, per: Per, links: Vec<String>) -> Result<Vec<String>, String> {
+    let Some(text) = hdf5_file::text(parent, ORDER)?.filter(|_| per.is_ordered()) else { return Ok(links) };
+    let order: Vec<String> = serde_json::from_str(&text).unwrap_or_default();
+    let sorted = |names: &[String]| {
+        let mut names = names.to_vec();
+        names.sort_unstable();
+        names
+    };
+    if sorted(&order) == sorted(&links) {
+        Ok(order)
+    } else {
+        Err(format!("one whose attribute `{ORDER}` lists other members than it has"))
+    }
 }
 
 /// Returns the key of an entry in [`Scan::values`].
@@ -67,6 +85,7 @@ impl Scan {
             numbers: Numbers::default(),
             units: None,
             storage: Storage::F64,
+            newer: Vec::new(),
             of_groups: Vec::new(),
         };
         for group in TABLE {
@@ -117,7 +136,8 @@ impl Scan {
     /// Reads the instances of a group that occurs several times. Groups of one kind must have the same instances.
     fn list(&mut self, file: &hdf5::File, group: &SchemaGroup) {
         let parent = group.parent();
-        let links = match hdf5_file::open_group(file, parent).and_then(|g| hdf5_file::members(&g)) {
+        let opened = hdf5_file::open_group(file, parent);
+        let links = match opened.and_then(|own| in_order(&own, group.per, hdf5_file::members(&own)?)) {
             Ok(links) => links,
             // The file has an older minor version.
             Err(found) if group.since() > 0 && found == hdf5_file::NOTHING => Vec::new(),
@@ -158,6 +178,9 @@ impl Scan {
             match entry {
                 Ok(Some(value)) => {
                     self.constant(&name, item, &value);
+                    if item.since > 0 {
+                        self.newer.push((name.clone(), item.since));
+                    }
                     self.values.insert(name, value);
                 }
                 Ok(None) if item.required && item.of.is_none() => {
@@ -238,6 +261,14 @@ impl Scan {
         }
     }
 
+    /// Returns the minor version that the file states; 0 without.
+    pub(crate) fn minor(&self) -> i64 {
+        match self.values.get("/@format_minor") {
+            Some(Value::Int(minor)) => *minor,
+            _ => 0,
+        }
+    }
+
     /// Returns the list of digests in the file, and the SHA-256 of the list; `None` without them.
     pub(crate) fn stated_digests(&self) -> Option<(&str, &str)> {
         match [LIST, WHOLE].map(|name| self.values.get(&format!("/@{name}"))) {
@@ -249,12 +280,18 @@ impl Scan {
     /// Checks all content of the file, unknown entries included, against the digests that it states.
     pub(crate) fn check_digests(&mut self, file: &hdf5::File) {
         let Some((list, whole)) = self.stated_digests() else {
-            let minor = self.values.get("/@format_minor");
-            if matches!(minor, Some(Value::Int(minor)) if *minor >= DIGESTS_SINCE) {
+            let minor = self.minor();
+            let newer = self.newer.iter().find(|(_, since)| *since > minor);
+            if minor >= DIGESTS_SINCE {
                 self.add_as(
                     Code::BodyChanged,
                     format!("the attributes `{LIST}` and `{WHOLE}` were removed from the file"),
                 );
+            } else if let Some((name, since)) = newer {
+                let message = format!(
+                    "the file states version {MAJOR}.{minor} and has no digests, but holds {name}, which files have since {MAJOR}.{since}: the version was changed and digests were removed"
+                );
+                self.add_as(Code::BodyChanged, message);
             }
             return;
         };

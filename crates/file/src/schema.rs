@@ -33,10 +33,16 @@ pub(super) const LIST: &str = "digests";
 /// Name of the root attribute with the SHA-256 of the list.
 pub(super) const WHOLE: &str = "sha256";
 
+/// Name of the attribute of `/interfaces`, `/recovery` and `/named_loads` with the order of two or more members: their link
+/// names as a JSON array.
+pub(super) const ORDER: &str = "order";
+
 /// Major version of the format. Readers refuse a newer major version; a newer minor version only adds entries.
 pub(super) const MAJOR: i64 = 1;
 /// Minor version with all entries, see [`MAJOR`]. A file states the lowest version that has all entries which it holds.
-pub(super) const MINOR: i64 = 11;
+pub(super) const MINOR: i64 = 12;
+/// Minor version of files of bodies with at most one interface, recovery and named load each.
+const WITHOUT_ORDER: i64 = 11;
 /// Minor version of files of bodies whose recoveries have no columns of forces of motion.
 const WITHOUT_MOTION_COLUMNS: i64 = 10;
 /// Minor version of files of bodies without geometric stiffness of rotations.
@@ -136,10 +142,11 @@ const ROOT: &[Item] = &[
             let Parts { conditions, inertia_stiffness, mesh, recoveries, named_loads, .. } = v.body;
             let fixed = &v.body.certificate.fixed_interface;
             Some(Value::Int(match (conditions.is_mean(), inertia_stiffness, mesh) {
-                _ if recoveries.iter().any(|one| !one.motion.is_empty()) => MINOR,
+                _ if [v.body.interfaces.len(), recoveries.len(), named_loads.len()].iter().any(|&n| n > 1) => MINOR,
+                _ if recoveries.iter().any(|one| !one.motion.is_empty()) => WITHOUT_ORDER,
                 // Readers of earlier versions require the estimates of every Craig-Bampton body.
-                _ if fixed.as_ref().is_some_and(|fixed| fixed.free.is_none()) => MINOR,
-                _ if fixed.as_ref().is_some_and(|fixed| !fixed.eigenvalues.is_empty()) => MINOR,
+                _ if fixed.as_ref().is_some_and(|fixed| fixed.free.is_none()) => WITHOUT_ORDER,
+                _ if fixed.as_ref().is_some_and(|fixed| !fixed.eigenvalues.is_empty()) => WITHOUT_ORDER,
                 _ if !v.body.rotated_stiffness.is_empty() => WITHOUT_MOTION_COLUMNS,
                 _ if !named_loads.is_empty() => WITHOUT_ROTATED_STIFFNESS,
                 _ if !recoveries.is_empty() => WITHOUT_NAMED_LOADS,

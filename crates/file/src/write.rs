@@ -6,7 +6,7 @@ use super::names;
 use super::names::place;
 use super::scan::key;
 use super::schema::TABLE;
-use super::schema::{LIST, WHOLE};
+use super::schema::{LIST, ORDER, WHOLE};
 use super::value::{Value, View};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -76,7 +76,10 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
         // Groups since 1.8 are there only if they have members, so that other files keep their bytes.
         let is_new = matches!(group.per, Per::Recovery | Per::NamedLoad | Per::RotatedLoad);
         if group.per != Per::Body && !(is_new && instances.is_empty()) {
-            make(&file, group.parent())?;
+            let parent = make(&file, group.parent())?;
+            if let Some(order) = group.order(&instances) {
+                put_text(&parent, ORDER, &order)?;
+            }
         }
         for (name, view) in instances {
             if group.per == Per::Body

@@ -152,6 +152,15 @@ pub(super) fn assemble_distinct(
     }
 }
 
+/// Returns the diagnostic for an entry that a list of a program gives twice: such lists have every entry once and no count,
+/// so that a file written twice into one, or a line too many, shows in nothing else.
+pub(super) fn given_twice(row: &str, column: &str, path: &Path) -> Diagnostic {
+    let message = format!("the entry of {row} and {column} is given twice");
+    Diagnostic::new(Code::MatrixTriangles, message)
+        .in_file(path)
+        .with_help("write the file again: it has every entry once")
+}
+
 /// Builds the matrix like [`assemble`] from complete columns, in place.
 ///
 /// # Errors

@@ -52,7 +52,7 @@ impl Coordinates {
     }
 
     /// Reads the rest of a file: the bytes of the block `first` after the first `skip`, and all further `blocks`.
-    /// Returns true when the file ends with a line end, or reading stopped at too many entries.
+    /// Returns how the file ends; by a line if reading stopped at too many entries.
     ///
     /// # Errors
     /// FB103 for a damaged compressed file.
@@ -62,7 +62,7 @@ impl Coordinates {
         mut blocks: Blocks<'_>,
         first: Vec<u8>,
         skip: usize,
-    ) -> Result<bool, Vec<Diagnostic>> {
+    ) -> Result<TextEnd, Vec<Diagnostic>> {
         let (mut block, mut skip) = (first, skip);
         loop {
             // The next block is read and unpacked while this one is parsed.
@@ -70,11 +70,11 @@ impl Coordinates {
             let following = following.map_err(|e| vec![broken(path, &e)]);
             if self.is_too_much()? && !matches!(following, Ok(None)) {
                 self.stopped = true;
-                return Ok(true);
+                return Ok(TextEnd::Line);
             }
             match following? {
                 Some(following) => blocks.take_back(std::mem::replace(&mut block, following)),
-                None => return Ok(blocks.ends_with_newline()),
+                None => return Ok(blocks.end()),
             }
             skip = 0;
         }
@@ -126,9 +126,9 @@ impl Coordinates {
     }
 
     /// Returns diagnostics of the bad lines, the first few one by one.
-    pub(super) fn bad_lines(&self, ends_with_newline: bool) -> Vec<Diagnostic> {
+    pub(super) fn bad_lines(&self, end: TextEnd) -> Vec<Diagnostic> {
         let located = |bad: Diagnostic| {
-            if ends_with_newline || bad.line() != Some(self.lines) {
+            if end == TextEnd::Line || bad.line() != Some(self.lines) {
                 return bad;
             }
             let message = format!(
@@ -138,8 +138,22 @@ impl Coordinates {
             Diagnostic::new(bad.code(), message).at_line(self.lines).with_help(bad.help())
         };
         let bad = self.bad.clone().into_diagnostics(Code::MatrixSyntax, "line");
+        // A count that does not fit says more.
+        let is_counted = self.announced.is_none_or(|announced| announced == self.count);
+        if bad.is_empty() && is_counted && end == TextEnd::Number && self.lines > 1 {
+            return vec![cut_off(self.lines)];
+        }
         bad.into_iter().map(located).collect()
     }
+}
+
+/// Returns the diagnostic for a file whose last line has no line end, while the others have: digits may be missing, which
+/// no later check sees.
+pub(super) fn cut_off(line: usize) -> Diagnostic {
+    let message = "the file ends within its last number: unlike the others, the last line has no line end";
+    Diagnostic::new(Code::MatrixSyntax, message)
+        .at_line(line)
+        .with_help("write or transfer the file again; if it is whole, end the last line")
 }
 
 // Text in blocks that end at line ends, so that at most two blocks of a file are in memory.
@@ -157,6 +171,16 @@ const GROWTH: usize = 16;
 /// Bytes per piece that one thread parses.
 const PIECE: usize = 1 << 20;
 
+/// End of a text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TextEnd {
+    /// A line end.
+    Line,
+    /// A digit or a point: further digits may be missing.
+    Number,
+    Other,
+}
+
 /// Source of a text, block by block.
 pub(crate) struct Blocks<'a> {
     stream: Box<dyn Read + Send + 'a>,
@@ -164,7 +188,8 @@ pub(crate) struct Blocks<'a> {
     carry: Vec<u8>,
     /// Memory of a block that is no longer used.
     spare: Vec<u8>,
-    newline: bool,
+    /// Last byte of the text so far.
+    last: u8,
 }
 
 impl<'a> Blocks<'a> {
@@ -174,7 +199,7 @@ impl<'a> Blocks<'a> {
     }
 
     fn new(stream: Box<dyn Read + Send + 'a>) -> Self {
-        Self { stream, carry: Vec::new(), spare: Vec::new(), newline: true }
+        Self { stream, carry: Vec::new(), spare: Vec::new(), last: b'\n' }
     }
 
     /// Returns the next block. It ends at a line end, at the end of the file, or anywhere within a line longer than a
@@ -197,7 +222,7 @@ impl<'a> Blocks<'a> {
         self.carry.extend_from_slice(&block[end..filled]);
         block.truncate(end);
         let Some(&last) = block.last() else { return Ok(None) };
-        self.newline = last == b'\n';
+        self.last = last;
         Ok(Some(block))
     }
 
@@ -206,9 +231,13 @@ impl<'a> Blocks<'a> {
         self.spare = block;
     }
 
-    /// Returns true when the text so far ends with a line end.
-    fn ends_with_newline(&self) -> bool {
-        self.newline
+    /// Returns how the text so far ends.
+    pub(crate) fn end(&self) -> TextEnd {
+        match self.last {
+            b'\n' => TextEnd::Line,
+            b'0'..=b'9' | b'.' => TextEnd::Number,
+            _ => TextEnd::Other,
+        }
     }
 }
 
@@ -407,7 +436,7 @@ mod tests {
                 blocks.take_back(block);
             }
             assert_eq!(at, text.len());
-            assert!(!blocks.ends_with_newline());
+            assert!(blocks.end() != TextEnd::Line);
         }
     }
 

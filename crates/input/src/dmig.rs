@@ -1,7 +1,7 @@
 //! DMIG cards of Nastran: matrices whose entries name the grids and components of their rows and columns.
 
 use super::assemble::{
-    Entry, Sides, StoredEntries, assemble_distinct, check_size, push, undeclared_triangle,
+    Entry, Sides, StoredEntries, assemble_distinct, check_size, given_twice, push, undeclared_triangle,
 };
 use super::bulk_cards::{Card, Item, MatrixLines, is_bulk_data, read_cards, read_deck};
 use super::named_matrices::{choose, named_or_only};
@@ -197,6 +197,13 @@ impl Dmigs {
         points
     }
 
+    /// Returns the points, ascending, of a matrix and of all that may be K or M.
+    fn points_beside(&self, at: usize) -> Vec<Point> {
+        let mut every = self.candidates();
+        every.push(at);
+        self.points(&every)
+    }
+
     /// Returns a matrix with its rows in the order of `points`, which ascend and contain every point that its entries
     /// name. Its entries are moved out: the matrix can be taken once.
     ///
@@ -246,7 +253,9 @@ impl Dmigs {
     /// are moved out.
     ///
     /// # Errors
-    /// FB302 for complex matrices and for other forms, FB303 for columns beyond those of the header.
+    /// FB302 for complex matrices and for other forms, FB303 for columns beyond those of the header, FB304 for
+    /// fewer than the header announces, FB309 for an entry
+    /// given twice.
     fn take_numbered(&mut self, k: usize) -> Result<NumberedColumns, Diagnostic> {
         let pieces = std::mem::take(&mut self.matrices[k].pieces);
         let dmig = &self.matrices[k];
@@ -272,8 +281,22 @@ impl Dmigs {
             }
             entries.push((label(self.points[entry.row as usize]), column as u32 - 1, entry.value));
         }
+        let mut places: Vec<(DofLabel, u32)> =
+            entries.iter().map(|&(row, column, _)| (row, column)).collect();
+        places.sort_unstable();
+        if let Some(&[(row, column), ..]) = places.windows(2).find(|pair| pair[0] == pair[1]) {
+            let (row, column) = (named((row.node, row.direction)), format!("column {}", column + 1));
+            let twice = given_twice(&row, &column, &dmig.path);
+            return Err(twice.about(format!("DMIG {}", dmig.name)).at_line(dmig.line));
+        }
         let last = entries.iter().map(|(_, column, _)| column + 1).max().unwrap_or(0);
         let columns = dmig.columns.and_then(|columns| u32::try_from(columns).ok()).unwrap_or(last);
+        if last < columns {
+            let message = format!("the header announces {columns} columns, the last with entries is {last}");
+            let help =
+                "write the file again, it may be cut off; leave out rows of the operator that read nothing";
+            return refuse(Code::MatrixCount, message, help);
+        }
         Ok(NumberedColumns { name: dmig.name.clone(), columns, entries })
     }
 
@@ -387,10 +410,15 @@ impl Reader for DmigPunch {
         }
         let mut all = Dmigs::of(&[path.to_path_buf()]).map_err(Error::new)?;
         let at = choose(&all.names(), source.role, source.group).map_err(|d| d.in_file(path))?;
-        let mut every = all.candidates();
-        every.push(at);
-        let points = all.points(&every);
+        let points = all.points_beside(at);
         Ok(all.take_matrix(at, &points)?)
+    }
+
+    fn labels(&self, source: &MatrixSource<'_>) -> Outcome<Option<Vec<DofLabel>>> {
+        let path = source.file.path();
+        let all = Dmigs::of(&[path.to_path_buf()]).map_err(Error::new)?;
+        let at = choose(&all.names(), source.role, source.group).map_err(|d| d.in_file(path))?;
+        Ok(Some(all.points_beside(at).into_iter().map(label).collect()))
     }
 }
 

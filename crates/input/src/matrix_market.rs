@@ -3,7 +3,7 @@
 use super::assemble::{
     Entry, StoredEntries, assemble, check_extents, check_size, refuse_beyond_memory, undeclared_triangle,
 };
-use super::coordinates::{Blocks, Coordinates, Limits};
+use super::coordinates::{Blocks, Coordinates, Limits, TextEnd, cut_off};
 use super::reader::{MatrixSource, Reader};
 use super::recovery_files::Rectangular;
 use crate::array::Array;
@@ -59,8 +59,8 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnos
     refuse_beyond_memory(header.entries.min(possible_entries(source))).map_err(|d| vec![d])?;
     let limits = Limits { n: header.rows as u32, integer: header.integer };
     let mut body = Coordinates::new(limits, Some(header.entries), lines);
-    let newline = body.read(path, blocks, first, length)?;
-    let mut found = body.bad_lines(newline);
+    let end = body.read(path, blocks, first, length)?;
+    let mut found = body.bad_lines(end);
     found.extend(wrong_count(&header, &body));
     found.extend(wrong_triangles(&header, &body));
     if !found.is_empty() {
@@ -103,8 +103,8 @@ pub(super) fn read_rectangular(
         check_extents(header.rows, header.cols, header.entries).map_err(|d| vec![d.at_line(lines)])?;
     let limits = Limits { n: rows.max(columns) as u32, integer: header.integer };
     let mut body = Coordinates::new(limits, Some(header.entries), lines);
-    let newline = body.read(path, blocks, first, length)?;
-    let mut found = body.bad_lines(newline);
+    let end = body.read(path, blocks, first, length)?;
+    let mut found = body.bad_lines(end);
     found.extend(wrong_count(&header, &body));
     if !found.is_empty() {
         return Err(found);
@@ -310,7 +310,9 @@ pub(super) fn read_array(file: &InputFile, compression: Compression) -> Found<Ar
             }
         }
     }
-    reading.finish().map_err(|diagnostic| vec![diagnostic])
+    let line = reading.line;
+    let array = reading.finish().map_err(|diagnostic| vec![diagnostic])?;
+    if blocks.end() == TextEnd::Number { Err(vec![cut_off(line)]) } else { Ok(array) }
 }
 
 fn check_array_banner(line: &[u8]) -> Found<()> {

@@ -4,11 +4,13 @@
 mod binary;
 mod text;
 
-use super::assemble::{check_extents, check_size, undeclared_triangle};
+use super::assemble::{check_extents, check_size, given_twice, undeclared_triangle};
 use super::named_matrices::{choose, named_or_only};
 use super::reader::{MatrixSource, Reader};
 use super::recovery_files::Rectangular;
-use crate::assemble::{ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, push};
+use crate::assemble::{
+    ColumnEntries, Entry, Sides, StoredEntries, assemble_columns, assemble_distinct, push,
+};
 use binary::Binary;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -441,7 +443,7 @@ impl Columns {
     /// Returns the matrix of `n` rows and columns.
     ///
     /// # Errors
-    /// FB306 if a sum of duplicates is not finite, FB312 if there is no nonzero entry.
+    /// FB309 for an entry given twice, FB312 if there is no nonzero entry.
     fn into_matrix(
         self,
         n: usize,
@@ -457,7 +459,9 @@ impl Columns {
         for ((col, row), value) in columns.zip(self.rows).zip(self.values) {
             push(&mut pieces, Entry { row, col, value });
         }
-        assemble(n, pieces, StoredEntries::Full, self.written, path)
+        assemble_distinct(n, pieces, StoredEntries::Full, self.written, path, |row, column| {
+            given_twice(&format!("row {}", row + 1), &format!("column {}", column + 1), path)
+        })
     }
 }
 

@@ -24,7 +24,7 @@ use flexbody_base::text::quotes::without_foreign_quotes;
 use flexbody_linalg::{CscMatrix, parallel};
 use flexbody_model::{
     Damping, DofLabel, Elements, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes,
-    RawMatrix, RawModel, RecoveryOperator, Reference, filled_rows,
+    RawMatrix, RawModel, RecoveryOperator, Reference, UnitLoad, filled_rows,
 };
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -83,6 +83,10 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         Matrices::Tables(tables) => tables.taken(files, &mut diagnostics),
         Matrices::Job(job) => take(&mut diagnostics, *job),
     };
+    if let Some(matrices) = &matrices {
+        let rows = matrices.plain(files.dimension).labels;
+        diagnostics.extend(parsed.labels.iter().filter_map(|one| one.misfit(&rows)));
+    }
     // Damping and geometric stiffness follow K and M to the rows of the model.
     let no_rows = GivenRows::default();
     let rows = matrices.as_ref().map_or(&no_rows, |matrices| &matrices.given_rows);
@@ -90,15 +94,8 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         let damping = take(&mut diagnostics, damping)?;
         take(&mut diagnostics, damping.try_map(|raw| by_rows_of_model(raw, rows)))
     });
-    let mut geometric_stiffness = Vec::new();
-    let mut differences = Vec::new();
-    for one in parsed.geometric_stiffness {
-        let Some(GeometricStiffness { load, matrix }) = take(&mut diagnostics, one) else { continue };
-        let found = matrices.as_ref().map(|matrices| matrix.of_stress(matrices.plain(files.dimension), rows));
-        let Some(found) = found.and_then(|found| take(&mut diagnostics, found)) else { continue };
-        differences.extend(found.digits_left.map(|digits| (digits, load.clone())));
-        geometric_stiffness.push(GeometricStiffness { load, matrix: found.matrix });
-    }
+    let (geometric_stiffness, differences) =
+        of_stress(parsed.geometric_stiffness, matrices.as_ref(), files.dimension, &mut diagnostics);
     // Interfaces and surface refer to the nodes.
     let places = NodeLookup::of(matrices.as_ref(), files.dimension);
     let interfaces: Vec<NodeSet> = files
@@ -149,6 +146,26 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     Ok((model, matrices.files))
 }
 
+/// Returns the geometric stiffness of every load that could be read; adds errors. Also returns the number of digits that
+/// are left of each that is a difference of matrices, with its load.
+fn of_stress(
+    read: Vec<Found<GeometricStiffness<StressMatrix>>>,
+    matrices: Option<&ModelMatrices>,
+    dimension: u8,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> (Vec<GeometricStiffness<RawMatrix>>, Vec<(f64, UnitLoad)>) {
+    let (mut geometric_stiffness, mut differences) = (Vec::new(), Vec::new());
+    for one in read {
+        let (Some(one), Some(matrices)) = (take(diagnostics, one), matrices) else { continue };
+        let GeometricStiffness { load, matrix } = one;
+        let found = matrix.of_stress(matrices.plain(dimension), &matrices.given_rows);
+        let Some(found) = take(diagnostics, found) else { continue };
+        differences.extend(found.digits_left.map(|digits| (digits, load.clone())));
+        geometric_stiffness.push(GeometricStiffness { load, matrix: found.matrix });
+    }
+    (geometric_stiffness, differences)
+}
+
 /// Reads nodal masses `node,mass`, as a multibody program would have imported them.
 ///
 /// # Errors
@@ -173,6 +190,41 @@ struct Parsed {
     mesh: Option<Found<NodeFile>>,
     damping: Option<Found<Damping<RawMatrix>>>,
     geometric_stiffness: Vec<Found<GeometricStiffness<StressMatrix>>>,
+    /// Labels of the rows of the matrices beside K, which come with tables.
+    labels: Vec<LabelsOfFile>,
+}
+
+/// Labels of the rows in the file of a matrix.
+struct LabelsOfFile {
+    role: MatrixRole,
+    path: PathBuf,
+    labels: Vec<DofLabel>,
+}
+
+impl LabelsOfFile {
+    /// Returns the labels if the file of a matrix can be read and names its rows.
+    fn of(location: &MatrixLocation, role: MatrixRole, opened: &OpenFiles) -> Option<Self> {
+        let file = opened.unread(&location.path).ok()?;
+        let compression = Compression::of(file.bytes());
+        let group = location.group.as_deref();
+        let source = MatrixSource { file, compression, group, role, keep_in: None };
+        let labels = reader_for(file, compression).ok()?.labels(&source).ok()??;
+        Some(Self { role, path: location.path.clone(), labels })
+    }
+
+    /// Returns an error if the model has other `rows`.
+    fn misfit(&self, rows: &[DofLabel]) -> Option<Diagnostic> {
+        let row = self.labels.iter().zip(rows).position(|(named, row)| named != row)?;
+        let message = format!(
+            "row {} of the {} matrix is that of {} in its file, and that of {} in the model",
+            row + 1,
+            self.role.name(),
+            self.labels[row],
+            rows[row]
+        );
+        let help = "give matrices with the same rows, without a table of rows: the files name them";
+        Some(Diagnostic::new(Code::DofCount, message).in_file(&self.path).with_help(help))
+    }
 }
 
 enum Matrices {
@@ -292,6 +344,8 @@ struct ParsedTables {
     mass: Found<RawMatrix>,
     nodes: Found<NodeFile>,
     dofs: Option<Found<Mapping>>,
+    /// Labels of the rows in the file of the stiffness matrix, if it names them.
+    labels: Option<LabelsOfFile>,
 }
 
 impl ParsedTables {
@@ -312,6 +366,9 @@ impl ParsedTables {
             Some(mapping) => Some(take(diagnostics, mapping.labels(stiffness.matrix.n_rows(), &dofs_path))?),
             None => None,
         };
+        let named = self.labels.as_ref();
+        diagnostics.extend(named.zip(dofs.as_ref()).and_then(|(named, stated)| named.misfit(stated)));
+        let dofs = dofs.or(self.labels.map(|named| named.labels));
         let (mut stiffness, mut mass, mut given_rows) = (stiffness, mass, GivenRows::default());
         if !followers.is_empty() || !axes.is_empty() {
             let labels = dofs.clone().unwrap_or_else(|| in_order_of_nodes(&nodes, files.dimension));
@@ -359,9 +416,15 @@ impl Parsed {
                         )
                     },
                 );
-                Matrices::Tables(Box::new(ParsedTables { stiffness, mass, nodes, dofs }))
+                let labels = LabelsOfFile::of(&tables.stiffness, MatrixRole::Stiffness, opened);
+                Matrices::Tables(Box::new(ParsedTables { stiffness, mass, nodes, dofs, labels }))
             }
         };
+        let others = files.tables().into_iter().flat_map(|tables| {
+            let damping = files.damping.as_ref().and_then(Damping::matrix);
+            [(MatrixRole::Mass, Some(&tables.mass)), (MatrixRole::Damping, damping)]
+        });
+        let labels = others.filter_map(|(role, at)| LabelsOfFile::of(at?, role, opened)).collect();
         let mesh = files.mesh.as_ref().map(|path| read_node_file(opened.get(path)?, files.dimension));
         let damping = files.damping.as_ref();
         let damping = damping.map(|d| d.borrowed().try_map(|place| matrix(place, MatrixRole::Damping)));
@@ -371,7 +434,7 @@ impl Parsed {
             Ok(GeometricStiffness { load: one.load.clone(), matrix })
         });
         let geometric_stiffness = geometric_stiffness.collect();
-        Self { matrices, mesh, damping, geometric_stiffness }
+        Self { matrices, mesh, damping, geometric_stiffness, labels }
     }
 }
 

@@ -11,7 +11,7 @@ use super::scipy_npz::ScipyNpz;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::text::{Compression, InputFile};
-use flexbody_model::RawMatrix;
+use flexbody_model::{DofLabel, RawMatrix};
 use std::path::Path;
 
 /// Role of a matrix in the model. It selects among several matrices of a file.
@@ -115,6 +115,15 @@ pub trait Reader: Sync {
     /// # Errors
     /// FB101, FB103 for a file that cannot be read, FB301 to FB313 for an invalid matrix, all that are found.
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix>;
+
+    /// Returns the labels of the rows if the file names them; `None` for formats that number them.
+    ///
+    /// # Errors
+    /// The errors of [`Reader::read`].
+    fn labels(&self, source: &MatrixSource<'_>) -> Result<Option<Vec<DofLabel>>> {
+        let _ = source;
+        Ok(None)
+    }
 }
 
 /// Number of bytes that [`Reader::recognises`] receives. HDF5 files may begin with a user block of this size.

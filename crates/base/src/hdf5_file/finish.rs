@@ -9,6 +9,7 @@ use super::value::Stored;
 use hdf5_metno as hdf5;
 use hdf5_metno_sys::h5f::H5Fget_file_image;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Closes `file`, which was created at `path`, reads it back, and compares the digests of its content with those of
 /// what was written: `numbers`, the fingerprints of all datasets by path, and the attributes as they are in memory.
@@ -41,7 +42,10 @@ pub fn finish(file: hdf5::File, path: &Path, numbers: &Numbers) -> hdf5::Result<
 #[allow(unsafe_code)]
 pub fn bytes_of(fill: impl FnOnce(&hdf5::File) -> hdf5::Result<()>) -> hdf5::Result<Vec<u8>> {
     without_plugins();
-    let file = creation().with_fapl(|p| p.core_filebacked(false)).create("in memory")?;
+    // HDF5 knows open files by their names.
+    static MADE: AtomicU64 = AtomicU64::new(0);
+    let name = format!("flexbody in memory {}", MADE.fetch_add(1, Ordering::Relaxed));
+    let file = creation().with_fapl(|p| p.core_filebacked(false)).create(name)?;
     fill(&file)?;
     file.flush()?;
     let copy = |to: &mut [u8]| {

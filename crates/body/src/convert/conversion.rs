@@ -54,7 +54,7 @@ impl ModalModel<'_> {
     /// # Errors
     /// An error for damping that adds energy to the modes.
     pub fn body(&self, condensed: &Condensation) -> Result<FlexBody> {
-        let recovered = Recovered { named_loads: self.named_loads(), ..Recovered::default() };
+        let recovered = Recovered { named_loads: self.of_model().named_loads(), ..Recovered::default() };
         FlexBody::new(self.parts(condensed, Vec::new(), recovered)?.0)
     }
 
@@ -72,7 +72,7 @@ impl ModalModel<'_> {
             .iter()
             .map(|masses| lumped::pipeline(&self, masses, exact, &without_counter))
             .collect::<Result<_>>()?;
-        let mut recovered = self.recoveries(condensed.invariants.groups(), &without_counter)?;
+        let mut recovered = self.of_model().recoveries(condensed.invariants.groups(), &without_counter)?;
         let of_recoveries = std::mem::take(&mut recovered.diagnostics);
         let (parts, overdamped) = self.parts(&condensed, lumped, recovered)?;
         let body = FlexBody::new(parts)?;

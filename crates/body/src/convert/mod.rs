@@ -24,6 +24,7 @@ pub use conversion::{Conversion, convert, interface_compliance, poor_fits};
 pub use lumped::LumpedPipeline;
 pub use modal_matrices::{modal_damping, modal_geometric_stiffness, unit_rotations};
 pub use modal_model::{Condensation, ModalModel};
+pub(crate) use recovery::{BodyOfModel, Recovered};
 pub use recovery::{recovered_rows, recovery_loads};
 pub use settings::{ConvertSettings, Lumping, MeshChoice};
 pub use shapes::{RecoveryShapes, ShapeColumn, load_shapes, recovery_shapes};

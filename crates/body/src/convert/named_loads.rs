@@ -1,15 +1,15 @@
 //! Named loads of a body: modal loads, resultants and moments of the nodal forces of its model.
 
-use super::ModalModel;
+use super::recovery::BodyOfModel;
 use crate::flex_body::NamedLoad;
 use faer::Mat;
 use flexbody_linalg::gram;
 use flexbody_model::{ModelLoad, rigid_axes};
 use nalgebra::{Matrix3, Vector3};
 
-impl ModalModel<'_> {
+impl BodyOfModel<'_> {
     /// Returns the named loads of the model in the modes and in the frame of the body, without their compliances.
-    pub(super) fn named_loads(&self) -> Vec<NamedLoad> {
+    pub(crate) fn named_loads(&self) -> Vec<NamedLoad> {
         self.model.named_loads().iter().map(|load| self.named_load(load)).collect()
     }
 
@@ -28,7 +28,7 @@ impl ModalModel<'_> {
         let [force, torque] =
             [0, 3].map(|first| axes.tr_mul(&Vector3::from_fn(|k, _| along_model[first + k])));
         // First moments and their change with the modes.
-        let (d, nf) = (model.dimension(), self.n_modes());
+        let (d, nf) = (model.dimension(), self.modes.vectors.ncols());
         let (mut moments, mut turning) = (Matrix3::zeros(), Mat::zeros(3, nf));
         for (node, position) in self.place.positions.iter().enumerate() {
             let at = |k: usize| if k < d { load.forces[d * node + k] } else { 0.0 };

@@ -1,9 +1,9 @@
 //! Recoveries of a body: the rows of its model in the modes, and their static columns outside the modes (theory
 //! section 12).
 
-use super::ModalModel;
 use super::answered::{Targets, mapped_answers};
 use super::motion_forces::{MotionForces, motion_forces};
+use super::{BodyModes, ModalModel, NodesInFrame};
 use crate::basis::{
     CoupledModel, accurate_static_responses, centrifugal_loads, interface_loads, rigid_modes,
 };
@@ -28,11 +28,26 @@ const COMPONENTS: [&str; LOAD_COMPONENTS] = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"]
 
 /// Recoveries and named loads of a body.
 #[derive(Debug, Default)]
-pub(super) struct Recovered {
+pub(crate) struct Recovered {
     pub recoveries: Vec<Recovery>,
     pub named_loads: Vec<NamedLoad>,
     /// Notes and warnings.
     pub diagnostics: Vec<Diagnostic>,
+    /// Columns of the modes in place of the static columns of each recovery: their static responses to the same loads.
+    pub of_modes: Vec<Recovery>,
+}
+
+/// A model and the modes of a body in it, from which recoveries and named loads follow.
+pub(crate) struct BodyOfModel<'a> {
+    pub model: &'a FeModel,
+    pub modes: &'a BodyModes,
+    pub place: &'a NodesInFrame,
+    /// Psi' K Psi.
+    pub modal_stiffness: &'a Mat<f64>,
+    /// About the first flexible eigenvalue.
+    pub lowest: f64,
+    /// Interface that the frame follows.
+    pub held_at: Option<&'a str>,
 }
 
 /// Static responses of the free body.
@@ -44,6 +59,20 @@ struct Responses {
 }
 
 impl ModalModel<'_> {
+    /// Returns the model and the modes, from which recoveries and named loads follow.
+    pub(super) fn of_model(&self) -> BodyOfModel<'_> {
+        BodyOfModel {
+            model: self.model,
+            modes: &self.modes,
+            place: &self.place,
+            modal_stiffness: &self.modal_stiffness,
+            lowest: self.found.solution.eigenvalues[0],
+            held_at: self.settings.frame.interface(),
+        }
+    }
+}
+
+impl BodyOfModel<'_> {
     /// Returns the recoveries and named loads that the model asks for, with notes and warnings. Their static responses need one factor of
     /// K + tau M; cuts need none.
     ///
@@ -52,7 +81,7 @@ impl ModalModel<'_> {
     /// # Errors
     /// [`RecoveryCut`](Code::RecoveryCut) for a cut through a rigid interface; failures of the factor, and responses
     /// that are not accurate.
-    pub(super) fn recoveries(&self, groups: TermGroups, context: &Context<'_>) -> Result<Recovered> {
+    pub(crate) fn recoveries(&self, groups: TermGroups, context: &Context<'_>) -> Result<Recovered> {
         let (asked, mut named_loads) = (self.model.recoveries(), self.named_loads());
         if asked.is_empty() && named_loads.is_empty() {
             return Ok(Recovered::default());
@@ -103,8 +132,15 @@ impl ModalModel<'_> {
             }
         };
         let along_model = asked.iter().map(one).collect::<Result<Vec<Recovery>>>()?;
-        let recoveries = along_model.iter().map(|one| one.in_axes(&self.place.frame.axes)).collect();
-        Ok(Recovered { recoveries, named_loads, diagnostics })
+        let amplitudes = basis.static_amplitudes(&loads, groups);
+        let of_modes = along_model.iter().zip(asked).map(|(own, one)| {
+            let columns = combine(own.modes.as_ref(), amplitudes.as_ref());
+            loads.recovery(one, own.rows.clone(), own.offset.clone(), own.modes.clone(), &columns)
+        });
+        let turned = |one: Recovery| one.in_axes(&self.place.frame.axes);
+        let of_modes = of_modes.map(turned).collect();
+        let recoveries = along_model.into_iter().map(turned).collect();
+        Ok(Recovered { recoveries, named_loads, diagnostics, of_modes })
     }
 
     /// Returns the static responses G_r F to all loads (N x m), relative to the frame of the body, and the compliances of the
@@ -116,11 +152,10 @@ impl ModalModel<'_> {
         groups: TermGroups,
         context: &Context<'_>,
     ) -> Result<Responses> {
-        let first = self.found.solution.eigenvalues[0];
-        let mut responses = basis.responses(loads, first, groups, context)?;
+        let mut responses = basis.responses(loads, self.lowest, groups, context)?;
         let compliances = basis.compliances(loads, &responses);
         // A frame on an interface follows its motion.
-        if let Some(name) = self.settings.frame.interface()
+        if let Some(name) = self.held_at
             && let Some(measure) = interface_loads(self.model, name)?
         {
             let motion = gram(measure.as_ref(), responses.as_ref());

@@ -1,13 +1,15 @@
 //! Recoveries held to the model: stresses against its stiffness, rows under constant loads in any basis and frame.
 
 use crate::recovery::{body, bracket, mesh};
-use faer::Mat;
+use faer::{Mat, Scale};
 use flexbody_base::diagnostic::Code;
 use flexbody_base::units::UnitSystem;
-use flexbody_body::basis::{BasisChoice, FreeSurface, Loads};
+use flexbody_body::basis::{BasisChoice, CraigBampton, FreeSurface, Loads};
+use flexbody_body::flex_body::{FlexBody, Parts};
 use flexbody_body::invariants::BodyFrame;
+use flexbody_body::verification::verify;
 use flexbody_linalg::CscMatrix;
-use flexbody_model::{Coupling, FeModel, RecoveryOperator};
+use flexbody_model::{Coupling, FeModel, ModelLoad, RecoveryOperator};
 
 /// Stresses in another unit than their rows say, or of another material, are noticed: of the right operator the root mean
 /// square stress under shear is that of the stiffness, so that a factor of 100 decides.
@@ -69,4 +71,60 @@ fn static_rows_depend_neither_on_the_modes_nor_on_the_frame() {
     };
     let (many, few) = (part(12), part(3));
     assert!(few > 1.05 * many && many > 0.01, "{few} {many}");
+}
+
+/// What is changed, and the change.
+type Change = (&'static str, fn(&mut Parts));
+
+/// `check --against` computes recoveries and named loads again: they hold for any basis, frame, reduction and storage, and
+/// a change of any of their numbers is found.
+#[test]
+fn every_number_of_recoveries_and_named_loads_is_computed_again() {
+    let raw = || {
+        let mut raw = bracket(&mesh(), Coupling::Averaging);
+        let n = raw.stiffness.matrix.n_rows();
+        let forces = (0..n).map(|i| ((7 * i + 3) % 11) as f64 - 5.0).collect();
+        let (name, path) = ("wind".to_owned(), "f.npy".into());
+        raw.named_loads = vec![ModelLoad { name, forces, preload: false, path }];
+        raw
+    };
+    let model = FeModel::from_raw(raw()).expect("a model").model;
+    let failed = |body: &FlexBody| -> Vec<&'static str> {
+        let checks = verify(body, &model).expect("the same model");
+        assert!(checks.iter().any(|check| check.name == "recoveries_recomputed"));
+        assert!(checks.iter().any(|check| check.name == "named_loads_recomputed"));
+        checks.iter().filter(|check| !check.passed).map(|check| check.name).collect()
+    };
+    let free = |residual_vectors| BasisChoice::Free(FreeSurface { residual_vectors });
+    for (basis, frame) in [
+        (free(Vec::new()), BodyFrame::Com),
+        (free(vec![Loads::Centrifugal]), BodyFrame::Principal),
+        (BasisChoice::CraigBampton(CraigBampton), BodyFrame::Model),
+    ] {
+        let made = body(raw(), basis, 6, frame);
+        assert_eq!(failed(&made), [""; 0], "{frame:?}");
+        let short = made.rounded_to_f32().expect("in range");
+        assert_eq!(failed(&short), [""; 0], "{frame:?} short");
+    }
+    let whole = body(raw(), free(Vec::new()), 6, BodyFrame::Principal);
+    let fewer = whole.reduced(&[0, 2, 3], whole.groups(), Vec::new()).expect("fewer modes");
+    assert_eq!(failed(&fewer), [""; 0]);
+    let changes: [Change; 11] = [
+        ("modes", |p| p.recoveries[0].modes *= Scale(2.0)),
+        ("spin", |p| p.recoveries[0].spin *= Scale(-1.0)),
+        ("loads", |p| p.recoveries[0].loads[1].columns *= Scale(0.0)),
+        ("named", |p| p.recoveries[0].named *= Scale(1.0001)),
+        ("offset", |p| p.recoveries[0].offset[0] += 1.0),
+        ("rows", |p| p.recoveries[0].rows.swap(0, 1)),
+        ("force", |p| p.named_loads[0].force *= 2.0),
+        ("modal", |p| p.named_loads[0].modal.swap(0, 1)),
+        ("torque", |p| p.named_loads[0].torque *= -1.0),
+        ("moments", |p| p.named_loads[0].moments *= 1.0001),
+        ("turning", |p| p.named_loads[0].turning *= Scale(0.0)),
+    ];
+    for (what, change) in changes {
+        let mut parts = whole.clone().into_parts();
+        change(&mut parts);
+        assert!(!failed(&FlexBody::new(parts).expect("a body")).is_empty(), "{what}");
+    }
 }

@@ -172,16 +172,76 @@ fn the_layout_of_the_file_does_not_matter() {
     assert_eq!(fingerprint(&read), fingerprint(&sample()));
 }
 
+/// Makes a file of version 1.3 of `case`: without digests and without what later versions added, which the reader names.
+fn aged(case: &Case) {
+    let file = hdf5::File::open_rw(&case.path).unwrap();
+    file.delete_attr("sha256").unwrap();
+    file.delete_attr("digests").unwrap();
+    file.attr("format_minor").unwrap().write_scalar(&3i64).unwrap();
+    // These come together.
+    for name in ["nodes/rotational_first_moment", "nodes/rotational_second_moment", "inertia_stiffness"] {
+        file.unlink(name).unwrap();
+    }
+    file.close().unwrap();
+    while let Err(error) = flexbody_file::read(&case.path) {
+        let message = error.diagnostics()[0].message().to_owned();
+        assert_eq!(error.diagnostics()[0].code(), Code::BodyChanged, "{message}");
+        let newer = message.split_once("holds ").and_then(|(_, rest)| rest.split_once(", which"));
+        let (newer, _) = newer.expect("an entry of a later version is named");
+        let file = hdf5::File::open_rw(&case.path).unwrap();
+        match newer.split_once('@') {
+            Some((group, name)) => file.group(group).unwrap().delete_attr(name).unwrap(),
+            None => file.unlink(newer).unwrap(),
+        }
+        file.close().unwrap();
+    }
+}
+
 #[test]
-fn files_of_older_versions_are_read_with_a_note() {
-    let case = changed(|f| {
+fn a_file_without_digests_that_states_an_older_version_than_its_entries_is_refused() {
+    let message = refusal(|f| {
         f.delete_attr("sha256").unwrap();
         f.delete_attr("digests").unwrap();
         f.attr("format_minor").unwrap().write_scalar(&3i64).unwrap();
-        for name in ["eigenvalue_rounding", "inertia_rounding"] {
-            f.group("/certificate").unwrap().delete_attr(name).unwrap();
-        }
     });
+    assert!(message.contains("states version 1.3 and has no digests, but holds"), "{message}");
+}
+
+#[test]
+fn the_order_of_interfaces_is_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("body.flex.h5");
+    let mut parts = body(5, 4, 3, 1, 2).into_parts();
+    parts.interfaces[0].name = "zbase".to_owned();
+    parts.interfaces[1].name = "arm".to_owned();
+    let body = FlexBody::new(parts).unwrap();
+    flexbody_file::write(&body, &path).unwrap();
+    let names = |body: &FlexBody| -> Vec<String> {
+        body.interfaces().iter().map(|interface| interface.name.clone()).collect()
+    };
+    // A copy by a tool that does not track the order of members lists them by name.
+    let file = hdf5::File::open_rw(&path).unwrap();
+    let group = file.group("interfaces").unwrap();
+    group.relink("zbase", "kept").unwrap();
+    group.relink("kept", "zbase").unwrap();
+    drop(group);
+    file.close().unwrap();
+    assert_eq!(names(&flexbody_file::read(&path).unwrap()), names(&body));
+    // The attribute has the digest of its group.
+    let file = hdf5::File::open_rw(&path).unwrap();
+    let group = file.group("interfaces").unwrap();
+    group.delete_attr("order").unwrap();
+    put(&group, "order", "[\"arm\",\"zbase\"]");
+    drop(group);
+    file.close().unwrap();
+    let error = flexbody_file::read(&path).expect_err("another order");
+    assert!(error.has(Code::BodyChanged), "{error}");
+}
+
+#[test]
+fn files_of_older_versions_are_read_with_a_note() {
+    let case = valid();
+    aged(&case);
     let (body, notes) = flexbody_file::read_with_notes(&case.path).expect("an older file");
     assert_eq!((body.certificate().eigenvalue_rounding, body.certificate().inertia_rounding), (0.0, 0.0));
     assert_eq!(notes.iter().map(|note| note.code()).collect::<Vec<_>>(), [Code::BodyWithoutDigest]);

@@ -8,7 +8,7 @@ use super::element_kinds::{family, has_internal_nodes};
 use super::matrix_files::{CoordinateFile, has_labels, labelled};
 use super::{Found, FromFile, JobFile, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
 use crate::assemble::{Entry, StoredEntries, assemble, check_size};
-use crate::coordinates::line_aligned;
+use crate::coordinates::{cut_off, line_aligned};
 use crate::digits::{COUNTED, written_digits};
 use crate::reader::MatrixRole;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -460,6 +460,9 @@ impl SubstructureFile<'_> {
                 ]);
             }
             above += piece.lines;
+        }
+        if text.last().is_some_and(|byte| byte.is_ascii_digit() || *byte == b'.') {
+            return Err(vec![cut_off(above).in_file(self.path)]);
         }
         Ok(pieces)
     }

@@ -6,8 +6,8 @@
 
 use super::deck::fields;
 use super::{Found, FromFile, both};
-use crate::assemble::{Entry, Sides, StoredEntries, assemble, check_size};
-use crate::coordinates::{Blocks, Coordinates, Limits, line_aligned, most_entries};
+use crate::assemble::{Entry, Sides, StoredEntries, assemble_distinct, check_size, given_twice};
+use crate::coordinates::{Blocks, Coordinates, Limits, TextEnd, cut_off, line_aligned, most_entries};
 use crate::digits::{COUNTED, written_digits};
 use crate::mapping::Recent;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -22,7 +22,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// FB101 for files that cannot be read, FB132 for files that changed, FB301 for bad lines, and the errors of
-/// [`assemble`].
+/// [`assemble_distinct`], FB309 for an entry given twice.
 pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
     let ((k, k_file), (m, m_file)) = both(LabelledLines::read(paths[0]), LabelledLines::read(paths[1]))?;
     let all = [&k, &m].into_iter().flat_map(|lines| &lines.pieces).flat_map(|piece| &piece.labels);
@@ -69,6 +69,10 @@ impl LabelledLines {
         bad_lines(&mut pieces)
             .finish(Code::MatrixSyntax, "line")
             .map_err(|bad| bad.into_iter().map(|diagnostic| diagnostic.in_file(path)).collect::<Vec<_>>())?;
+        let lines = pieces.iter().map(|piece| piece.lines).sum();
+        if blocks.end() == TextEnd::Number && lines > 1 {
+            return Err(one(cut_off(lines).in_file(path)));
+        }
         Ok((Self { pieces }, file.seen().map_err(one)?))
     }
 
@@ -84,8 +88,14 @@ impl LabelledLines {
             lower: some(|entry| entry.row > entry.col && entry.value != 0.0),
             upper: some(|entry| entry.row < entry.col && entry.value != 0.0),
         };
-        assemble(labels.len(), numbered, StoredEntries::of(sides), written, path)
-            .map_err(|diagnostic| vec![diagnostic])
+        let named = |row: u32| {
+            let DofLabel { node, direction } = labels[row as usize];
+            format!("node {node}, direction {direction}")
+        };
+        assemble_distinct(labels.len(), numbered, StoredEntries::of(sides), written, path, |row, column| {
+            given_twice(&named(row), &named(column), path)
+        })
+        .map_err(|diagnostic| vec![diagnostic])
     }
 }
 
@@ -205,8 +215,8 @@ impl CoordinateFile {
                 Diagnostic::new(Code::FileEmpty, "compressed file holds no bytes").in_file(path),
             ]);
         };
-        let newline = body.read(path, blocks, first, 0).map_err(in_file)?;
-        let found = body.bad_lines(newline);
+        let end = body.read(path, blocks, first, 0).map_err(in_file)?;
+        let found = body.bad_lines(end);
         if !found.is_empty() {
             return Err(in_file(found));
         }
@@ -224,12 +234,15 @@ impl CoordinateFile {
     /// Returns the matrix of `n` rows. A single triangle represents both.
     ///
     /// # Errors
-    /// FB301 for more rows than the entries can fill, FB306, FB312.
+    /// FB301 for more rows than the entries can fill, FB306, FB309 for an entry given twice, FB312.
     pub(super) fn into_matrix(self, n: usize) -> Found<FromFile> {
         let path = &self.seen.path;
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(path)];
         check_size(n as u64, n as u64, self.count).map_err(in_file)?;
-        let raw = assemble(n, self.pieces, StoredEntries::of(self.sides), self.written, path);
+        let stored = StoredEntries::of(self.sides);
+        let raw = assemble_distinct(n, self.pieces, stored, self.written, path, |row, column| {
+            given_twice(&format!("row {}", row + 1), &format!("column {}", column + 1), path)
+        });
         Ok((raw.map_err(|diagnostic| vec![diagnostic])?, self.seen))
     }
 }

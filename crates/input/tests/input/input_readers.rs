@@ -168,8 +168,8 @@ fn dialects_of_matrix_market_mean_the_same() {
     let expected = CscMatrix::from_triplets(3, 3, &[(0, 0, 2e5), (1, 0, -1.5), (0, 1, -1.5), (2, 2, 4.0)]);
     for text in [
         "%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 2e5\n2 1 -1.5\n3 3 4\n",
-        // Upper triangle, any case, comments and blank lines anywhere, CRLF, tabs, no line end at the end.
-        "%%MATRIXMARKET Matrix COORDINATE Real SYMMETRIC\r\n% c\r\n\r\n 3\t3  3\r\n%\r\n1 2 -1.5\r\n\r\n  3 3 4.0 \r\n% c\r\n1 1 200000.",
+        // Upper triangle, any case, comments and blank lines anywhere, CRLF, tabs, a blank for the last line end.
+        "%%MATRIXMARKET Matrix COORDINATE Real SYMMETRIC\r\n% c\r\n\r\n 3\t3  3\r\n%\r\n1 2 -1.5\r\n\r\n  3 3 4.0 \r\n% c\r\n1 1 200000. ",
         // Fortran exponents.
         "%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n 1 1 0.2D+06\n 2 1 -.15d1\n 3 3 +4.0D+00\n",
         // General matrix, explicit zeros, duplicates, any order.
@@ -185,6 +185,19 @@ fn dialects_of_matrix_market_mean_the_same() {
             expected.clone()
         };
         assert_eq!(read_text(text).unwrap_or_else(|e| panic!("{text}\n{e}")).matrix, expected, "{text}");
+    }
+}
+
+#[test]
+fn a_last_number_without_a_line_end_is_cut_off() {
+    let text = "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 0.5\n2 2 0.25";
+    for cut in [text, &text[..text.len() - 1]] {
+        let error = read_text(cut).unwrap_err();
+        assert!(error.has(Code::MatrixSyntax), "{error}");
+        assert!(error.to_string().contains("ends within its last number"), "{error}");
+    }
+    for whole in [format!("{text}\n"), format!("{text}\n% seven"), format!("{text} ")] {
+        assert_eq!(read_text(&whole).unwrap().matrix.values(), [0.5, 0.25]);
     }
 }
 
@@ -322,9 +335,8 @@ fn write(n: usize, entries: &[(usize, usize, f64)], dialect: &Dialect) -> (Strin
     lines.push(format!("{n} {n} {count}"));
     lines.extend(data);
     let mut text = lines.join(end);
-    if dialect.final_newline {
-        text += end;
-    }
+    // A text that ends in a number may be cut off.
+    text += if dialect.final_newline { end } else { " " };
     let bytes = text.as_bytes();
     let (head, tail) = bytes.split_at(bytes.len() / 2);
     match dialect.packing {
