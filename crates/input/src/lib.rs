@@ -26,6 +26,7 @@ mod hdf5;
 mod hdf5;
 mod jobs;
 #[cfg(feature = "hdf5")]
+mod labels_of_file;
 mod lent;
 mod manifest;
 mod mapping;
@@ -59,8 +60,9 @@ pub use model_files::{
     InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
     OperatorSource, RecoverySource, Region, StressStiffnessSource, TableFiles, WithStress, parse_units,
 };
-pub use read_model::{interface_in_memory, read_matrix, read_model, read_nodal_masses, read_nodes_of_table};
+pub use read_model::{interface_in_memory, read_matrix, read_model};
 pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use recipes::{RECIPES, Recipe, Step};
 pub use shapes::{ImportedColumns, read_imported, read_shapes};
 pub use stated::parse_damping;
+pub use tables::{read_nodal_masses, read_nodes_of_table};

@@ -2,6 +2,7 @@
 
 use super::fe_results::{AnswerFiles, read_answers};
 use super::jobs::{JobModel, comparable, read_job};
+use super::labels_of_file::LabelsOfFile;
 use super::mapping::Mapping;
 use super::mesh::MeshReading;
 use super::model_files::{
@@ -13,7 +14,7 @@ use super::open_files::OpenFiles;
 use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::recovery_files::{OperatorColumns, read_forces, read_offset, read_operator};
 use super::rows_of_model::{by_rows_of_model, in_order_of_nodes, refuse_followers, turned};
-use super::tables::{read_masses, read_node_list, read_recovery_rows};
+use super::tables::{read_node_list, read_recovery_rows};
 use super::with_stress::{PlainStiffness, StressMatrix, difference_note, read_stress_matrix};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
@@ -166,22 +167,6 @@ fn of_stress(
     (geometric_stiffness, differences)
 }
 
-/// Reads nodal masses `node,mass`, as a multibody program would have imported them.
-///
-/// # Errors
-/// FB101 to FB106 for a file that cannot be read, FB203 to FB205 for an invalid table, FB803 for invalid masses.
-pub fn read_nodal_masses(path: &Path) -> Result<Vec<(i64, f64)>> {
-    read_masses(&InputFile::open(path)?).map_err(Error::new)
-}
-
-/// Reads the column `node` of a table.
-///
-/// # Errors
-/// FB101 to FB106 for a file that cannot be read, FB203 to FB205 for an invalid table.
-pub fn read_nodes_of_table(path: &Path) -> Result<Vec<i64>> {
-    read_node_list(&InputFile::open(path)?).map_err(Error::new)
-}
-
 type Found<T> = std::result::Result<T, Vec<Diagnostic>>;
 
 /// Parsed content of the files, each with its problems.
@@ -192,39 +177,6 @@ struct Parsed {
     geometric_stiffness: Vec<Found<GeometricStiffness<StressMatrix>>>,
     /// Labels of the rows of the matrices beside K, which come with tables.
     labels: Vec<LabelsOfFile>,
-}
-
-/// Labels of the rows in the file of a matrix.
-struct LabelsOfFile {
-    role: MatrixRole,
-    path: PathBuf,
-    labels: Vec<DofLabel>,
-}
-
-impl LabelsOfFile {
-    /// Returns the labels if the file of a matrix can be read and names its rows.
-    fn of(location: &MatrixLocation, role: MatrixRole, opened: &OpenFiles) -> Option<Self> {
-        let file = opened.unread(&location.path).ok()?;
-        let compression = Compression::of(file.bytes());
-        let group = location.group.as_deref();
-        let source = MatrixSource { file, compression, group, role, keep_in: None };
-        let labels = reader_for(file, compression).ok()?.labels(&source).ok()??;
-        Some(Self { role, path: location.path.clone(), labels })
-    }
-
-    /// Returns an error if the model has other `rows`.
-    fn misfit(&self, rows: &[DofLabel]) -> Option<Diagnostic> {
-        let row = self.labels.iter().zip(rows).position(|(named, row)| named != row)?;
-        let message = format!(
-            "row {} of the {} matrix is that of {} in its file, and that of {} in the model",
-            row + 1,
-            self.role.name(),
-            self.labels[row],
-            rows[row]
-        );
-        let help = "give matrices with the same rows, without a table of rows: the files name them";
-        Some(Diagnostic::new(Code::DofCount, message).in_file(&self.path).with_help(help))
-    }
 }
 
 enum Matrices {

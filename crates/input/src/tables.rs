@@ -1,11 +1,13 @@
 //! The three tables: nodes, labels of the matrix rows, nodes of an interface.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{BadLines, excerpt, integer, number};
 use flexbody_base::text::table::{Column, Table};
 use flexbody_model::{DofLabel, Nodes, Quantity, RecoveryRow};
 use std::collections::HashMap;
+use std::path::Path;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
@@ -222,4 +224,20 @@ fn no_duplicates(file: &InputFile, nodes: impl Iterator<Item = (i64, usize)>) ->
         }
     }
     bad.finish(Code::TableRow, "row")
+}
+
+/// Reads nodal masses `node,mass`, as a multibody program would have imported them.
+///
+/// # Errors
+/// FB101 to FB106 for a file that cannot be read, FB203 to FB205 for an invalid table, FB803 for invalid masses.
+pub fn read_nodal_masses(path: &Path) -> error::Result<Vec<(i64, f64)>> {
+    read_masses(&InputFile::open(path)?).map_err(error::Error::new)
+}
+
+/// Reads the column `node` of a table.
+///
+/// # Errors
+/// FB101 to FB106 for a file that cannot be read, FB203 to FB205 for an invalid table.
+pub fn read_nodes_of_table(path: &Path) -> error::Result<Vec<i64>> {
+    read_node_list(&InputFile::open(path)?).map_err(error::Error::new)
 }

@@ -3,13 +3,12 @@
 use super::assemble::{Assembled, assemble, block_tolerance, rounding};
 use super::density::{Densities, LocalMass, SoundSpeed, check_density, check_exchanged, check_speed};
 use super::geometric_stiffness::missing_components;
+use super::internal_rows::refuse_turned_internals;
 use super::mass_structure::{MassForm, mass_form};
 use super::named_load::{check_preloads, refuse_stiff_preloads};
 use super::node_pairs::check_mass_pairs;
 use super::recovery::check_rigid_responses;
-use super::rigid_motion::{
-    check_inertia, check_massless, check_rigid_motion, misplaced, recover, refuse_turned_internals,
-};
+use super::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
 use super::rows::{centre_and_length, extents, rigid_residuals};
 use super::stress::check_stress;
 use super::stress_points::check_stress_scale;
@@ -118,10 +117,6 @@ fn form_of_mass(body: &Assembled, found: &mut Vec<Diagnostic>) -> Option<MassFor
     form.map_err(|diagnostic| found.push(diagnostic.in_file(&body.raw.mass.path))).ok()
 }
 
-/// Deviation of the mass blocks of an internal vector from multiples of the identity that is rounding of a program which
-/// computes in single precision.
-const MAX_INTERNAL_DEVIATION: f64 = 1e-5;
-
 /// Finds the rigid motion of every row, and checks that K and the other matrices leave it free. Returns the
 /// residual of K.
 ///
@@ -133,10 +128,9 @@ fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Res
         stop_on_error(found)?;
     }
     let label = |row: usize| body.rows.label(&body.nodes, row);
-    let tolerance = block_tolerance(body.raw.mass.digits).max(MAX_INTERNAL_DEVIATION);
     if let Some(diagnostic) = misplaced(&body.rows) {
         found.push(diagnostic.in_file(&body.raw.nodes_path));
-    } else if let Some(diagnostic) = refuse_turned_internals(&body.mass, &body.rows, &body.nodes, tolerance) {
+    } else if let Some(diagnostic) = refuse_turned_internals(&body.mass, &body.rows, &body.nodes) {
         found.push(diagnostic.in_file(&body.raw.mass.path));
     }
     if let Err(diagnostic) = check_massless(&body.stiffness, &body.mass, label) {

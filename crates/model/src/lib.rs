@@ -21,6 +21,7 @@ mod geometric_stiffness;
 mod given_rows;
 mod inertial_rows;
 mod interface;
+mod internal_rows;
 mod layout;
 mod mass_structure;
 mod named_load;

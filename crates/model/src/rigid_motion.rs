@@ -8,10 +8,9 @@ use super::{DofLabel, Nodes};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::numbers::significant;
-use flexbody_linalg::ties::{first_largest, sort_descending};
+use flexbody_linalg::ties::sort_descending;
 use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix, gram, largest};
 use nalgebra::Matrix3;
-use std::collections::BTreeMap;
 
 /// Returns max |K R|_i / sum_j |K_ij| over the rows. Adds an error if rigid motion strains the body, above
 /// `limit`: node tables with few digits leave up to 1e-6, supports 0.01 to 1. Above `rounded` a note
@@ -298,58 +297,6 @@ pub(super) fn misplaced(rows: &Rows) -> Option<Diagnostic> {
         rows.vectors[first],
         place[..d].join(", ")
     )))
-}
-
-/// Returns an error for a vector without a position that does not turn with the body as displacements do: one of its mass
-/// blocks, with itself or with a node, is no multiple of the identity. Vectors of internal displacements (bubbles) have
-/// such blocks; amplitudes of a condensed model (Craig-Bampton) have not, and W2 and W3 would be wrong.
-pub(super) fn refuse_turned_internals(
-    mass: &SymmetricMatrix,
-    rows: &Rows,
-    nodes: &Nodes,
-    tolerance: f64,
-) -> Option<Diagnostic> {
-    let vectors = rows.nodes..rows.displacements() / rows.dimension;
-    let deviations = vectors.map(|vertex| (vertex, block_deviation(mass, rows, vertex)));
-    let (vertex, deviation) = first_largest(deviations, |(_, deviation)| *deviation)?;
-    (deviation > tolerance).then(|| {
-        let message = format!(
-            "rows of {} have no coordinates, and their mass blocks deviate by {deviation:.0e} from multiples of the identity: they do not turn with the body as displacements of bubbles do, and the invariants would be wrong",
-            rows.number(nodes, vertex)
-        );
-        Diagnostic::new(Code::MassDirectional, message).with_help(
-            "give the matrices of all nodes; amplitudes of a condensed model (Craig-Bampton, superelement) are no rows of nodes: keep more nodes and no amplitudes, or import the shapes",
-        )
-    })
-}
-
-/// Returns the largest deviation of the mass blocks of a vector, with itself and with all others, from multiples of the
-/// identity, relative to the root of the product of the masses of both. Mass that it shares with rotations deviates too.
-fn block_deviation(mass: &SymmetricMatrix, rows: &Rows, vertex: usize) -> f64 {
-    let (d, displacements) = (rows.dimension, rows.displacements());
-    let diagonal = mass.diagonal();
-    let size = |first: usize, count: usize| {
-        diagonal[first..first + count].iter().fold(f64::MIN_POSITIVE, |size, entry| size.max(entry.abs()))
-    };
-    let mut blocks: BTreeMap<usize, Matrix3<f64>> = BTreeMap::new();
-    let mut worst = 0.0f64;
-    for k in 0..d {
-        let (columns, values) = mass.row(d * vertex + k);
-        for (&column, &value) in columns.iter().zip(values) {
-            let column = column as usize;
-            if column < displacements {
-                blocks.entry(column / d).or_default()[(k, column % d)] = value;
-            } else {
-                worst = worst.max(value.abs() / (size(d * vertex, d) * size(column, 1)).sqrt());
-            }
-        }
-    }
-    for (other, mut block) in blocks {
-        let mean = block.trace() / d as f64;
-        (0..d).for_each(|k| block[(k, k)] -= mean);
-        worst = worst.max(block.amax() / (size(d * vertex, d) * size(d * other, d)).sqrt());
-    }
-    worst
 }
 
 /// Returns an error for massless rows that the stiffness does not hold: K and M then have a common null

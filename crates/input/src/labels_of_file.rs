@@ -1,0 +1,42 @@
+//! Rows of matrices whose files name them, beside tables of nodes that list the nodes in any order.
+
+use super::model_files::MatrixLocation;
+use super::open_files::OpenFiles;
+use super::reader::{MatrixRole, MatrixSource, reader_for};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::Compression;
+use flexbody_model::DofLabel;
+use std::path::PathBuf;
+
+/// Labels of the rows in the file of a matrix.
+pub(super) struct LabelsOfFile {
+    role: MatrixRole,
+    path: PathBuf,
+    pub labels: Vec<DofLabel>,
+}
+
+impl LabelsOfFile {
+    /// Returns the labels if the file of a matrix can be read and names its rows.
+    pub(super) fn of(location: &MatrixLocation, role: MatrixRole, opened: &OpenFiles) -> Option<Self> {
+        let file = opened.unread(&location.path).ok()?;
+        let compression = Compression::of(file.bytes());
+        let group = location.group.as_deref();
+        let source = MatrixSource { file, compression, group, role, keep_in: None };
+        let labels = reader_for(file, compression).ok()?.labels(&source).ok()??;
+        Some(Self { role, path: location.path.clone(), labels })
+    }
+
+    /// Returns an error if the model has other `rows`.
+    pub(super) fn misfit(&self, rows: &[DofLabel]) -> Option<Diagnostic> {
+        let row = self.labels.iter().zip(rows).position(|(named, row)| named != row)?;
+        let message = format!(
+            "row {} of the {} matrix is that of {} in its file, and that of {} in the model",
+            row + 1,
+            self.role.name(),
+            self.labels[row],
+            rows[row]
+        );
+        let help = "give matrices with the same rows, without a table of rows: the files name them";
+        Some(Diagnostic::new(Code::DofCount, message).in_file(&self.path).with_help(help))
+    }
+}
