@@ -18,6 +18,7 @@ use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// SplitMix64: a small seeded generator with the same numbers on every machine.
 pub struct Random {
@@ -461,6 +462,34 @@ pub fn seal(file: &hdf5::File) {
         let _ = file.delete_attr(name);
         let text: VarLenUnicode = text.parse().unwrap();
         file.new_attr::<VarLenUnicode>().create(name).unwrap().write_scalar(&text).unwrap();
+    }
+}
+
+/// Makes the file at `path` one of version 1.`minor`, which had no digests: without what later versions added, which
+/// `refusal` names, the first message of the reader if it refuses the file.
+///
+/// # Panics
+/// When the file cannot be changed, or is refused for another reason.
+pub fn age(path: &Path, minor: i64, refusal: impl Fn() -> Option<String>) {
+    let changed = |change: &dyn Fn(&hdf5::File)| {
+        let file = hdf5::File::open_rw(path).unwrap();
+        change(&file);
+        file.close().unwrap();
+    };
+    changed(&|file| {
+        ["digests", "sha256"].iter().for_each(|name| file.delete_attr(name).unwrap());
+        file.attr("format_minor").unwrap().write_scalar(&minor).unwrap();
+        // These come together.
+        let names = ["nodes/rotational_first_moment", "nodes/rotational_second_moment", "inertia_stiffness"];
+        names.iter().filter(|name| file.link_exists(name)).for_each(|name| file.unlink(name).unwrap());
+    });
+    while let Some(message) = refusal() {
+        let newer = message.split_once("holds ").and_then(|(_, rest)| rest.split_once(", which"));
+        let (newer, _) = newer.unwrap_or_else(|| panic!("{message}"));
+        changed(&|file| match newer.split_once('@') {
+            Some((group, name)) => file.group(group).unwrap().delete_attr(name).unwrap(),
+            None => file.unlink(newer).unwrap(),
+        });
     }
 }
 

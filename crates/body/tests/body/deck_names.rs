@@ -7,6 +7,7 @@ use flexbody_input::{InterfaceSource, ModelFiles, read_model};
 use flexbody_model::RawModel;
 use oracle::fixtures;
 use oracle::jobs::{body, job, set};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -222,13 +223,20 @@ fn internal_nodes_of_beams_are_named_and_read_with_labels() {
     let text = fs::read_to_string(&place).expect("a matrix");
     // A row of the internal node -3 that follows the extension from node 11 to node 23 along y.
     let (terms, k) = ([(-3, 1, 1.0), (11, 1, -1.0), (23, 1, 1.0)], 1e9);
-    let mut more = String::new();
+    // The file has every entry once.
+    let mut entries: BTreeMap<[i64; 4], f64> = BTreeMap::new();
+    for line in text.lines().filter(|line| !line.starts_with('*')) {
+        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+        let label = [0, 1, 2, 3].map(|k| fields[k].parse().expect("a label"));
+        entries.insert(label, fields[4].parse().expect("a value"));
+    }
     for (a, i, x) in terms {
         for (b, j, y) in terms {
-            more += &format!("{a},{i}, {b},{j}, {:?}\n", k * x * y);
+            *entries.entry([a, i, b, j]).or_default() += k * x * y;
         }
     }
-    fs::write(&place, text.trim_end().to_owned() + "\n" + &more).expect("written");
+    let lines = entries.iter().map(|([a, i, b, j], value)| format!("{a},{i}, {b},{j}, {value:?}\n"));
+    fs::write(&place, lines.collect::<String>()).expect("written");
     let raw = read(&path, Vec::new()).expect("read");
     assert!(raw.dofs.expect("labels").iter().any(|label| (label.node, label.direction) == (-3, 1)));
 }

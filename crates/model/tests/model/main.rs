@@ -3,4 +3,5 @@
 #![allow(unreachable_pub)] // tests export nothing
 
 mod assembler;
+mod internal_rows;
 mod stress_relations;
