@@ -6,8 +6,8 @@ use flexbody_model::{DofLabel, FeModel, RawModel};
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Mesh, entries};
 
-/// Returns a block with three rows of a node 900 without coordinates: its stiffness is that of springs to nothing, and
-/// `shared` gives the entry of M for the row k of the internal vector and the direction l of a node.
+/// Returns a block with three rows of a node 900 without coordinates, which follow the difference of the displacements of
+/// two nodes by a stiffness, as an amplitude of incompatible displacements does. `shared` gives the entry of M for the row k of the internal vector and the direction l of a node.
 fn block(shared: impl Fn(usize, usize, usize) -> f64) -> RawModel {
     let plain = Mesh::block(ElementKind::Hex8, [2, 1, 1], [0.2, 0.1, 0.1])
         .assemble(&Material::STEEL, MassRule::Consistent)
@@ -20,7 +20,15 @@ fn block(shared: impl Fn(usize, usize, usize) -> f64) -> RawModel {
         all.extend((0..3).map(|axis| ((n + axis) as u32, (n + axis) as u32, size)));
         all
     };
-    let stiffness = CscMatrix::from_triplets(n + 3, n + 3, &own(&plain.stiffness.matrix, k));
+    let mut stiffness = own(&plain.stiffness.matrix, k);
+    for axis in 0..3 {
+        let terms = [(n + axis, 1.0), (axis, -1.0), (3 + axis, 1.0)];
+        for (i, (row, x)) in terms.iter().enumerate() {
+            let others = terms.iter().enumerate().filter(|(j, _)| (i, *j) != (0, 0));
+            stiffness.extend(others.map(|(_, (column, y))| (*row as u32, *column as u32, k * x * y)));
+        }
+    }
+    let stiffness = CscMatrix::from_triplets(n + 3, n + 3, &stiffness);
     let mut mass = own(&plain.mass.matrix, m);
     for axis in 0..3 {
         for column in 0..n {
