@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// what was written: `numbers`, the fingerprints of all datasets by path, and the attributes as they are in memory.
 ///
 /// # Errors
-/// Those of HDF5; the first entry whose content is another one.
+/// The errors of HDF5; an error that names the first entry whose content is another one.
 pub fn finish(file: hdf5::File, path: &Path, numbers: &Numbers) -> hdf5::Result<()> {
     let meant = digests_of(&file, numbers, &mut Stored::new(0), &[])?;
     file.flush()?;
@@ -37,7 +37,7 @@ pub fn finish(file: hdf5::File, path: &Path, numbers: &Numbers) -> hdf5::Result<
 /// Returns the bytes of a file with what `fill` writes. The file is made in memory, where no write can fail.
 ///
 /// # Errors
-/// Those of `fill` and of HDF5.
+/// The errors of `fill` and of HDF5.
 // Exception to `unsafe_code = "deny"`: the bindings have no safe form of this function.
 #[allow(unsafe_code)]
 pub fn bytes_of(fill: impl FnOnce(&hdf5::File) -> hdf5::Result<()>) -> hdf5::Result<Vec<u8>> {

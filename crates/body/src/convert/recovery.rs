@@ -34,6 +34,7 @@ pub(crate) struct Recovered {
     /// Notes and warnings.
     pub diagnostics: Vec<Diagnostic>,
     /// Columns of the modes in place of the static columns of each recovery: their static responses to the same loads.
+    /// Only for a check, which needs their sizes.
     pub of_modes: Vec<Recovery>,
 }
 
@@ -48,6 +49,8 @@ pub(crate) struct BodyOfModel<'a> {
     pub lowest: f64,
     /// Interface that the frame follows.
     pub held_at: Option<&'a str>,
+    /// True if a body is checked, not made.
+    pub is_check: bool,
 }
 
 /// Static responses of the free body.
@@ -68,6 +71,7 @@ impl ModalModel<'_> {
             modal_stiffness: &self.modal_stiffness,
             lowest: self.found.solution.eigenvalues[0],
             held_at: self.settings.frame.interface(),
+            is_check: false,
         }
     }
 }
@@ -132,14 +136,22 @@ impl BodyOfModel<'_> {
             }
         };
         let along_model = asked.iter().map(one).collect::<Result<Vec<Recovery>>>()?;
-        let amplitudes = basis.static_amplitudes(&loads, groups);
-        let of_modes = along_model.iter().zip(asked).map(|(own, one)| {
-            let columns = combine(own.modes.as_ref(), amplitudes.as_ref());
-            loads.recovery(one, own.rows.clone(), own.offset.clone(), own.modes.clone(), &columns)
-        });
-        let turned = |one: Recovery| one.in_axes(&self.place.frame.axes);
-        let of_modes = of_modes.map(turned).collect();
-        let recoveries = along_model.into_iter().map(turned).collect();
+        let turned = |one: &Recovery| one.in_axes(&self.place.frame.axes);
+        let mut of_modes = Vec::new();
+        if self.is_check {
+            let amplitudes = basis.static_amplitudes(&loads, groups);
+            of_modes.extend(along_model.iter().zip(asked).map(|(own, one)| {
+                let columns = combine(own.modes.as_ref(), amplitudes.as_ref());
+                turned(&loads.recovery(
+                    one,
+                    own.rows.clone(),
+                    own.offset.clone(),
+                    own.modes.clone(),
+                    &columns,
+                ))
+            }));
+        }
+        let recoveries = along_model.iter().map(turned).collect();
         Ok(Recovered { recoveries, named_loads, diagnostics, of_modes })
     }
 

@@ -18,7 +18,7 @@ const ROUNDINGS: f64 = 100.0;
 /// Compares the recoveries and named loads that both `body` and `model` have. Empty if they share none.
 ///
 /// # Errors
-/// Those of the static responses of the model.
+/// The errors of the static responses of the model.
 pub(super) fn recovery_checks(
     body: &FlexBody,
     model: &FeModel,
@@ -36,7 +36,7 @@ pub(super) fn recovery_checks(
         _ => None,
     };
     let lowest = body.modes().eigenvalue.iter().copied().fold(f64::INFINITY, f64::min);
-    let of_model = BodyOfModel { model, modes, place, modal_stiffness, lowest, held_at };
+    let of_model = BodyOfModel { model, modes, place, modal_stiffness, lowest, held_at, is_check: true };
     let found = of_model.recoveries(body.groups(), &Context::QUIET)?;
     let limit = MAX_ROW_DIFFERENCE + ROUNDINGS * body.storage().rounding();
     let rows = row_differences(body.recoveries(), &found);

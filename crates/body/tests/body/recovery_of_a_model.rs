@@ -73,7 +73,7 @@ fn static_rows_depend_neither_on_the_modes_nor_on_the_frame() {
     assert!(few > 1.05 * many && many > 0.01, "{few} {many}");
 }
 
-/// What is changed, and the change.
+/// Name of a part, and a change of it.
 type Change = (&'static str, fn(&mut Parts));
 
 /// `check --against` computes recoveries and named loads again: they hold for any basis, frame, reduction and storage, and
