@@ -25,8 +25,8 @@ mod hdf5;
 #[path = "without_hdf5.rs"]
 mod hdf5;
 mod jobs;
-#[cfg(feature = "hdf5")]
 mod labels_of_file;
+#[cfg(feature = "hdf5")]
 mod lent;
 mod manifest;
 mod mapping;
