@@ -59,6 +59,7 @@ impl LoadedHistory {
             named: Vec::new(),
             carrier: None,
             is_of_carried: false,
+            is_in_mean_axes: false,
         }))
     }
 

@@ -202,6 +202,7 @@ codes! {
     RecoveryCorners = "FB453", Note, Done, "stresses at nodes are means over the corners of their elements", "nothing to do in a part of one material; where materials meet, request the elements of each material alone and give a recovery for each";
     InterfacesUncompared = "FB454", Note, Done, "interfaces of the body are not stated like this by the model that it is checked against", "state them by --interface NAME=NODES,COUPLING, or by [[interface]] in the manifest, to compare them";
     SectionAbout = "FB455", Note, Done, "moments of a section are about the origin of the model", "state the point: about = [x, y, z] in its [[recovery]], in model axes";
+    NodeInertia = "FB456", Warning, Done, "rotary inertia of a node is that of no rigid mass", "nothing to do for a disc of which only the inertia about its axis is meant; else give all moments of inertia (a thin disc has half of that about its axis about each diameter): none is larger than the sum of the other two";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";

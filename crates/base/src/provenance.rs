@@ -9,6 +9,12 @@ use std::path::Path;
 use std::sync::{Arc, LazyLock, OnceLock};
 use std::time::SystemTime;
 
+/// Name of the root attribute of an HDF5 file with the list of digests: a line `SHA-256  path` for each group and
+/// dataset, by path.
+pub const LIST_OF_DIGESTS: &str = "digests";
+/// Name of the root attribute of an HDF5 file with the SHA-256 of that list.
+pub const DIGEST_OF_LIST: &str = "sha256";
+
 /// Input file of a model.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SourceFile {

@@ -8,6 +8,7 @@ use super::recounts::{interface_checks, interface_note, recounts};
 use crate::basis::BasisKind;
 use crate::convert::{
     BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, poor_fits, rigid_mass, unit_rotations,
+    unusual_node_inertia,
 };
 use crate::flex_body::{FlexBody, Guarantee, ReferenceConditions, Storage, joined};
 use crate::invariants::{
@@ -46,7 +47,8 @@ pub fn body_identities(body: &FlexBody) -> Vec<IdentityCheck> {
 pub struct Checks {
     /// All identities and comparisons.
     pub identities: Vec<IdentityCheck>,
-    /// Warnings about interfaces that the modes deform although they are rigid, and about changed source files.
+    /// Warnings about interfaces that the modes deform although they are rigid, about unusual inertia of nodes,
+    /// and about changed source files.
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -57,6 +59,7 @@ impl Checks {
     /// The errors of [`verify`].
     pub fn of(body: &FlexBody, model: Option<&FeModel>) -> Result<Self> {
         let mut checks = Self { identities: body_identities(body), diagnostics: poor_fits(body) };
+        checks.diagnostics.extend(unusual_node_inertia(body, model));
         if let Some(model) = model {
             checks.diagnostics.extend(changed_sources(body, model));
             checks.diagnostics.extend(interface_note(body, model));

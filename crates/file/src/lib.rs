@@ -9,8 +9,6 @@
 )]
 
 mod contents;
-#[cfg(feature = "hdf5")]
-mod digest;
 mod document;
 mod draft;
 mod item;

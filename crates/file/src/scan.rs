@@ -1,7 +1,6 @@
 //! Reads the entries of the table from a file and collects every violation. Nothing that the file declares is trusted
 //! before it is checked against the rest.
 
-use super::digest;
 use super::item::{Extent, Item, ItemKind, Origin, Per, SchemaGroup};
 use super::names::{self, place};
 use super::schema::certificate::{DROPPED, KEPT};
@@ -9,7 +8,7 @@ use super::schema::{DIGESTS_SINCE, LIST, MAJOR, ORDER, TABLE, WHOLE};
 use super::value::Value;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::hdf5_file::{
-    self, Array, Element, Number, Numbers, Stored, digests_of, elements, of_numbers,
+    self, Array, Element, Number, Numbers, Stored, difference, digests_of, elements, of_numbers,
 };
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{Storage, TermGroup, TermGroups};
@@ -298,7 +297,7 @@ impl Scan {
         let (list, whole) = (list.to_owned(), whole.to_owned());
         let found = digests_of(file, &self.numbers, &mut self.stored, &[LIST, WHOLE]);
         let differs = match found {
-            Ok(found) => digest::difference(&found, &list, &whole),
+            Ok(found) => difference(&found, &list, &whole),
             Err(problem) => Some(problem),
         };
         if let Some(differs) = differs {

@@ -28,10 +28,7 @@ use recovery::RECOVERY;
 #[cfg(feature = "hdf5")]
 pub(super) use recovery::labels_json;
 
-/// Name of the root attribute with the list of digests: a line `SHA-256  path` for each group and dataset, by path.
-pub(super) const LIST: &str = "digests";
-/// Name of the root attribute with the SHA-256 of the list.
-pub(super) const WHOLE: &str = "sha256";
+pub(super) use flexbody_base::provenance::{DIGEST_OF_LIST as WHOLE, LIST_OF_DIGESTS as LIST};
 
 /// Name of the attribute of `/interfaces`, `/recovery` and `/named_loads` with the order of two or more members: their link
 /// names as a JSON array.

@@ -8,8 +8,8 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::hdf5_file;
 use flexbody_base::hdf5_file::{
-    Numbers, Stored, create, dataset, elements, finish, make, open_group, open_with_checked_texts,
-    put_numbers, put_text,
+    Numbers, Stored, broken_seal, create, dataset, elements, finish, make, open_group,
+    open_with_checked_texts, put_numbers, put_text,
 };
 use flexbody_base::output::OutputSlot;
 use flexbody_base::provenance::generator;
@@ -25,7 +25,9 @@ use std::path::Path;
 /// Value of the root attribute `format`.
 const FORMAT: &str = "flexbody-simulation";
 /// Version of the format.
-const VERSION: i64 = 2;
+const VERSION: i64 = 3;
+/// Version of files without digests, which are read as well.
+const WITHOUT_DIGESTS: i64 = 2;
 
 /// Returns the unit with these exponents of mass^(1/2), length and time.
 const fn unit(mass_halves: i8, length: i8, time: i8) -> Units {
@@ -199,7 +201,11 @@ impl Writer<'_> {
         let states = &self.recording.states;
         let modes = self.group("modes")?;
         let q: Vec<f64> = states.iter().flat_map(|s| s.q.iter().copied()).collect();
-        modes.put_rows("q", unit(1, 1, 0), "modal coordinates", self.instants(), &q)?;
+        let description = match self.recording.setting.is_in_mean_axes {
+            true => "modal coordinates of the body in mean axes, which has other modes than its file",
+            false => "modal coordinates",
+        };
+        modes.put_rows("q", unit(1, 1, 0), description, self.instants(), &q)?;
         let qd: Vec<f64> = states.iter().flat_map(|s| s.qd.iter().copied()).collect();
         modes.put_rows("qd", unit(1, 1, -1), "their rates", self.instants(), &qd)
     }
@@ -280,7 +286,7 @@ impl Writer<'_> {
 pub fn read_simulation(path: impl AsRef<Path>) -> Result<RecordedMotion> {
     let path = path.as_ref();
     let (file, bytes) = open_with_checked_texts(path, "motion", Code::MotionUnreadable)?;
-    let mut reading = RecordingReader { file, stored: Stored::new(bytes) };
+    let mut reading = RecordingReader { file, bytes, stored: Stored::new(bytes) };
     reading
         .motion()
         .map_err(|problem| Error::from(Diagnostic::new(Code::MotionUnreadable, problem).in_file(path)))
@@ -288,6 +294,8 @@ pub fn read_simulation(path: impl AsRef<Path>) -> Result<RecordedMotion> {
 
 struct RecordingReader {
     file: hdf5::File,
+    /// Size of the file.
+    bytes: u64,
     stored: Stored,
 }
 
@@ -298,9 +306,13 @@ impl RecordingReader {
             Some(format) if format == FORMAT => {}
             found => return Err(format!("the attribute `format` is {found:?}, expected `{FORMAT}`")),
         }
-        match hdf5_file::int(&root, "format_version")? {
-            Some(VERSION) => {}
+        let sealed = match hdf5_file::int(&root, "format_version")? {
+            Some(VERSION) => true,
+            Some(WITHOUT_DIGESTS) => false,
             found => return Err(format!("format version {found:?}, expected {VERSION}")),
+        };
+        if let Some(difference) = broken_seal(&self.file, &mut Stored::new(self.bytes), sealed)? {
+            return Err(format!("the motion was changed after it was written; {difference}"));
         }
         let (time, _) = self.rows("/", "time", None)?;
         let instants = time.len();

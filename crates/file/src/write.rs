@@ -1,18 +1,15 @@
 //! Writes a body by the rows of the table.
 
-use super::digest::sealed;
 use super::item::{Item, ItemKind, Per};
 use super::names;
 use super::names::place;
 use super::scan::key;
+use super::schema::ORDER;
 use super::schema::TABLE;
-use super::schema::{LIST, ORDER, WHOLE};
 use super::value::{Value, View};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::hdf5_file::{
-    Number, Numbers, Stored, create, digests_of, finish, make, of_numbers, put_text,
-};
+use flexbody_base::hdf5_file::{Number, Numbers, create, finish, make, of_numbers, put_text};
 use flexbody_base::output::OutputSlot;
 use flexbody_base::provenance::Fingerprint;
 use flexbody_body::flex_body::FlexBody;
@@ -67,7 +64,7 @@ pub(super) fn system_error(text: &str) -> std::io::Error {
     number.map_or_else(|| std::io::Error::other(text), std::io::Error::from_raw_os_error)
 }
 
-/// Writes all groups and entries of the body, then the digests.
+/// Writes all groups and entries of the body.
 fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
     let file = create(path)?;
     let mut numbers = Numbers::default();
@@ -98,11 +95,6 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
             }
         }
     }
-    // Every dataset has its fingerprint already: only attributes are read back.
-    let digests = digests_of(&file, &numbers, &mut Stored::new(0), &[LIST, WHOLE])?;
-    let (list, whole) = sealed(&digests);
-    put_text(&file, LIST, &list)?;
-    put_text(&file, WHOLE, &whole)?;
     finish(file, path, &numbers)
 }
 

@@ -26,6 +26,19 @@ impl LabelsOfFile {
         Some(Self { role, path: location.path.clone(), labels })
     }
 
+    /// Returns an error if the file does not name all `rows` of the model of a job, in their order. Between them it may name
+    /// rows that the job eliminates.
+    pub(super) fn misfit_of_job(&self, rows: &[DofLabel]) -> Option<Diagnostic> {
+        let mut named = self.labels.iter();
+        let missing = rows.iter().find(|&row| !named.any(|one| one == row))?;
+        let message = format!(
+            "the file of the {} matrix does not name the row of {missing} where the rows of the job have it",
+            self.role.name()
+        );
+        let help = "write the matrix by the rows of K and M of the job, in their order";
+        Some(Diagnostic::new(Code::DofCount, message).in_file(&self.path).with_help(help))
+    }
+
     /// Returns an error if the model has other `rows`.
     pub(super) fn misfit(&self, rows: &[DofLabel]) -> Option<Diagnostic> {
         let row = self.labels.iter().zip(rows).position(|(named, row)| named != row)?;

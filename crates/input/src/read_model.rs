@@ -7,7 +7,7 @@ use super::mapping::Mapping;
 use super::mesh::MeshReading;
 use super::model_files::{
     InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
-    OperatorSource, RecoverySource,
+    OperatorSource, RecoverySource, StressStiffnessSource,
 };
 use super::node_files::{NodeFile, NodeSets, Unresolved, read_node_file};
 use super::open_files::OpenFiles;
@@ -86,7 +86,11 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     };
     if let Some(matrices) = &matrices {
         let rows = matrices.plain(files.dimension).labels;
-        diagnostics.extend(parsed.labels.iter().filter_map(|one| one.misfit(&rows)));
+        let misfit = |one: &LabelsOfFile| match files.source {
+            ModelSource::Job(_) => one.misfit_of_job(&rows),
+            ModelSource::Tables(_) => one.misfit(&rows),
+        };
+        diagnostics.extend(parsed.labels.iter().filter_map(misfit));
     }
     // Damping and geometric stiffness follow K and M to the rows of the model.
     let no_rows = GivenRows::default();
@@ -372,10 +376,16 @@ impl Parsed {
                 Matrices::Tables(Box::new(ParsedTables { stiffness, mass, nodes, dofs, labels }))
             }
         };
-        let others = files.tables().into_iter().flat_map(|tables| {
-            let damping = files.damping.as_ref().and_then(Damping::matrix);
-            [(MatrixRole::Mass, Some(&tables.mass)), (MatrixRole::Damping, damping)]
-        });
+        let damping = files.damping.as_ref().and_then(Damping::matrix);
+        let others =
+            [(MatrixRole::Mass, files.tables().map(|tables| &tables.mass)), (MatrixRole::Damping, damping)];
+        // Rows of CalculiX have their labels in a file beside the matrix.
+        let of_stress = files.geometric_stiffness.iter().map(|one| &one.matrix);
+        let unlabelled =
+            |one: &&StressStiffnessSource| one.with_stress.as_ref().is_none_or(|with| with.dofs.is_none());
+        let of_stress =
+            of_stress.filter(unlabelled).map(|one| (MatrixRole::GeometricStiffness, Some(&one.location)));
+        let others = others.into_iter().chain(of_stress);
         let labels = others.filter_map(|(role, at)| LabelsOfFile::of(at?, role, opened)).collect();
         let mesh = files.mesh.as_ref().map(|path| read_node_file(opened.get(path)?, files.dimension));
         let damping = files.damping.as_ref();

@@ -18,10 +18,14 @@
 use super::director_blocks::{Blocks, ROUNDING_ENTRY};
 use super::rows::Rows;
 use faer::{Mat, MatMut, MatRef};
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{
     SymmetricMatrix, contiguous, contiguous_mut, multiply, multiply_vector, parallel, zeros,
 };
 use nalgebra::{Matrix3, Vector3};
+
+/// Part of the size of a second moment below which a negative eigenvalue is rounding.
+const NEGATIVE_MOMENT: f64 = 1e-12;
 
 /// M as a mass of points and directors, and the rest of M.
 ///
@@ -98,6 +102,37 @@ impl DirectorMass {
     /// Returns N and D on extended rows; `None` if E_s is all of M.
     pub fn rest(&self) -> Option<&SymmetricMatrix> {
         self.rest.as_ref()
+    }
+
+    /// Returns the node with the most negative second moment of its own mass (index among all nodes), this
+    /// moment (mass length^2), and the number of such nodes; `None` if the moments of all nodes are positive
+    /// semidefinite up to rounding.
+    pub fn negative_moments(&self) -> Option<(u32, f64, usize)> {
+        let smallest = |place: usize| {
+            let moment = self.own_moment(place);
+            let size = moment.diagonal().abs().sum();
+            let value = moment.symmetric_eigenvalues().min();
+            (value < -NEGATIVE_MOMENT * size).then_some((self.nodes[place], value))
+        };
+        let negative: Vec<_> = (0..self.nodes.len()).filter_map(smallest).collect();
+        let (node, value) = first_largest(negative.iter().copied(), |one| -one.1)?;
+        Some((node, value, negative.len()))
+    }
+
+    /// Returns P_ii of the node at `place`; the third axis of a plane node is zero.
+    fn own_moment(&self, place: usize) -> Matrix3<f64> {
+        let first = self.points + self.dimension * place;
+        let mut moment = Matrix3::zeros();
+        for a in 0..self.dimension {
+            let (columns, values) = self.scalar.row(first + a);
+            for (&column, value) in columns.iter().zip(values) {
+                let b = (column as usize).wrapping_sub(first);
+                if b < self.dimension {
+                    moment[(a, b)] = *value;
+                }
+            }
+        }
+        moment
     }
 
     /// Returns the number of extended rows.

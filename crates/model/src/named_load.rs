@@ -25,9 +25,13 @@ pub struct ModelLoad {
 const OTHER_COLUMNS: [&str; 4] = ["time", "kinetic", "elastic", "work"];
 
 /// Beginnings of the names of such columns, before a number or an axis.
-const OTHER_VECTORS: [&str; 11] = [
+const OTHER_VECTORS: [&str; 15] = [
     "q_",
     "qd_",
+    "qdd_",
+    "mean_axes_q_",
+    "mean_axes_qd_",
+    "mean_axes_qdd_",
     "origin_",
     "attitude_",
     "velocity_",

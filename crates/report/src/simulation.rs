@@ -17,7 +17,7 @@ use flexbody_linalg::larger;
 use flexbody_linalg::ties::sort_descending;
 use flexbody_motion::dynamics::Balance;
 use flexbody_motion::integration::Work;
-use flexbody_motion::scene::{Drift, Envelope, Path, Recording, Scheme};
+use flexbody_motion::scene::{Drift, Envelope, MEAN_AXES, Path, Recording, Scheme};
 use nalgebra::Vector3;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -483,8 +483,9 @@ fn csv_columns(recording: &Recording) -> Vec<String> {
     head.extend((0..4).map(|k| format!("attitude_{k}")));
     head.extend(xyz("velocity"));
     head.extend(xyz("angular_velocity"));
-    head.extend((1..=nf).map(|j| format!("q_{j}")));
-    head.extend((1..=nf).map(|j| format!("qd_{j}")));
+    let modes = if recording.setting.is_in_mean_axes { MEAN_AXES } else { "" };
+    head.extend((1..=nf).map(|j| format!("{modes}q_{j}")));
+    head.extend((1..=nf).map(|j| format!("{modes}qd_{j}")));
     head.extend(["kinetic", "elastic", "work"].map(str::to_owned));
     head.extend(["linear_momentum", "angular_momentum"].iter().flat_map(|name| xyz(name)));
     if reactions.is_some() {
@@ -505,7 +506,7 @@ fn csv_columns(recording: &Recording) -> Vec<String> {
     head.extend(loads.iter().flat_map(|states| states.layout.named_loads()).cloned());
     if accelerations.is_some() {
         head.extend(xyz("angular_acceleration"));
-        head.extend((1..=nf).map(|j| format!("qdd_{j}")));
+        head.extend((1..=nf).map(|j| format!("{modes}qdd_{j}")));
     }
     head
 }

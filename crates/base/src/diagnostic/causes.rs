@@ -139,6 +139,7 @@ causes! {
     GeometricStiffnessUnstressed = "The two matrices agree to nearly all digits, so the stress did not enter the second one or is too small.";
     RecoveryCorners = "The results list the corners of elements, and several elements share a node.";
     SectionAbout = "The moment of the forces across a section depends on the point that it is about. Without a stated point this is the origin of the model, which need not be near the section.";
+    NodeInertia = "A moment of inertia at a node is larger than the sum of the other two, or negative. The mass is carried as it is, and the bounds that points of mass fulfil do not hold.";
     InterfacesUncompared = "The matrices say nothing of interfaces: they are stated beside the model, and were left out or stated differently when the body was checked.";
     // FB5xx: numerics
     NotConverged = "The residuals of some modes stay above the accuracy after the largest number of restarts.";

@@ -5,18 +5,21 @@
 
 use super::digest::{Numbers, digests_of};
 use super::open::{by_utf8_name, creation, without_plugins};
+use super::seal::seal;
 use super::value::Stored;
 use hdf5_metno as hdf5;
 use hdf5_metno_sys::h5f::H5Fget_file_image;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Closes `file`, which was created at `path`, reads it back, and compares the digests of its content with those of
-/// what was written: `numbers`, the fingerprints of all datasets by path, and the attributes as they are in memory.
+/// Writes the digests of all content to `file`, which was created at `path`, closes it, reads it back, and compares the
+/// digests of what it holds with those of what was meant: `numbers`, the fingerprints of all datasets by path, and the
+/// attributes as they are in memory.
 ///
 /// # Errors
 /// The errors of HDF5; an error that names the first entry whose content is another one.
 pub fn finish(file: hdf5::File, path: &Path, numbers: &Numbers) -> hdf5::Result<()> {
+    seal(&file, numbers)?;
     let meant = digests_of(&file, numbers, &mut Stored::new(0), &[])?;
     file.flush()?;
     file.close()?;

@@ -1,6 +1,7 @@
 //! Last stage of a conversion: the body, the lumped comparators, and diagnostics.
 
 use super::modal_matrices::softening_warning;
+use super::node_inertia::unusual_node_inertia;
 use super::recovery::Recovered;
 use super::{Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping};
 use crate::flex_body::{
@@ -192,6 +193,7 @@ impl ModalModel<'_> {
             .chain(overdamped)
             .chain(softening)
             .chain(poor_fits(body))
+            .chain(unusual_node_inertia(body, Some(self.model)))
             .chain(free_frequencies(body))
             .chain(interface_compliance(body))
             .collect()

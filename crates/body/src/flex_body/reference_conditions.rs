@@ -199,10 +199,21 @@ impl FlexBody {
     fn changed_modes(&self, change: &ModalChange, invariants: &Invariants) -> Modes {
         let (old, positions) = (self.modes(), &self.nodes().positions);
         let eigenvalue = diagonal_eigenvalues(invariants);
-        let damping = self.damping();
-        let modal_damping = (damping.norm_max() > 0.0).then(|| change.congruent(&damping));
+        let (damping, stated) = (self.damping(), self.stated_ratios());
+        let stated_at = |lambda: f64| Some(stated.as_ref()?.at(self.units().frequency_of(lambda)));
+        let diagonal = |i: usize, j: usize| match stated_at(eigenvalue[j]) {
+            Some(ratio) if i == j => 2.0 * ratio * eigenvalue[j].sqrt(),
+            _ => 0.0,
+        };
+        let n = eigenvalue.len();
+        let modal_damping = (damping.norm_max() > 0.0).then(|| match stated {
+            // Ratios that the model states are those of the modes of every frame.
+            Some(_) => Mat::from_fn(n, n, diagonal),
+            None => change.congruent(&damping),
+        });
         let ratio = |j: usize, lambda: f64| {
-            modal_damping.as_ref().map_or(0.0, |d| (0.5 * d[(j, j)] / lambda.sqrt()).max(0.0))
+            let of_matrix = |d: &Mat<f64>| (0.5 * d[(j, j)] / lambda.sqrt()).max(0.0);
+            stated_at(lambda).unwrap_or_else(|| modal_damping.as_ref().map_or(0.0, of_matrix))
         };
         Modes {
             residual: reduced_residuals(invariants, &eigenvalue),

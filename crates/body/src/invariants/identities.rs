@@ -254,6 +254,24 @@ fn scalar_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCh
     checks
 }
 
+/// Excess of a body over the bounds of points of mass, relative to |m_ff|_2; zero for groups it does not hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoundsBroken {
+    /// Magnitude of the smallest eigenvalue of the blocks S_kk if it is negative.
+    pub s_negative: f64,
+    /// Largest |block of W3|_2 less 1, at least 0.
+    pub w3_excess: f64,
+}
+
+/// Returns the excess of `body` over the bounds S_kk >= 0 and |block of W3|_2 <= |m_ff|_2. They are
+/// identities of points of mass; masses that turn with nodes fulfil them if every node and its neighbours
+/// have a positive semidefinite second moment.
+pub fn bounds_broken(body: &Invariants) -> BoundsBroken {
+    let s_negative = if body.0.groups.w2 { terms::s_negative(body) } else { 0.0 };
+    let w3_excess = body.w3().map_or(0.0, |w3| terms::w3_excess(&w3, &body.modal_mass()));
+    BoundsBroken { s_negative, w3_excess: w3_excess.max(0.0) }
+}
+
 /// Checks that stored invariants follow from the primary data, and W3 from the stored W2.
 ///
 /// The blocks of W3 are W2(2,3) - W2(3,2), W2(3,1) - W2(1,3), W2(1,2) - W2(2,1) (theory section 2), unless

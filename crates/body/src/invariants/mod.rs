@@ -25,7 +25,9 @@ pub use frame::{
     principal_axes,
 };
 pub use general::{MassProduct, RigidMotion, condense_general, condense_general_linear, rigid_first_moment};
-pub use identities::{Expected, IdentityCheck, Turning, derived_identities, identities};
+pub use identities::{
+    BoundsBroken, Expected, IdentityCheck, Turning, bounds_broken, derived_identities, identities,
+};
 pub use inertia_stiffness::{InertiaShares, InertiaStiffness, relative_norm};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
 pub use primary::{GeneralTerms, Invariants, MassKind, PrimaryData, TermGroup, TermGroups};

@@ -24,6 +24,7 @@ mod motion_columns;
 mod multigrid;
 mod nastran;
 mod nastran_rows;
+mod node_inertia;
 mod partial_conversion;
 mod plans;
 mod precision;

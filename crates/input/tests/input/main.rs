@@ -7,6 +7,7 @@ mod input_fuzz;
 mod input_hdf5;
 mod input_readers;
 mod input_tables;
+mod labels_of_files;
 mod mesh_files;
 mod model_files;
 mod node_files;

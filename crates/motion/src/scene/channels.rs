@@ -57,6 +57,7 @@ impl LoadedHistory {
     /// and there are steps of spin.
     pub fn channels(&self, body: &FlexBody, steps: &ShapeSteps) -> Result<Channels> {
         refuse_foreign(steps, body)?;
+        self.refuse_mean_axes(body)?;
         self.refuse_torque_without_rotation(body)?;
         self.refuse_load_without_step(body, steps)?;
         let sources = steps.columns.iter().map(|name| self.source(body, name)).collect::<Result<Vec<_>>>()?;
@@ -80,6 +81,19 @@ impl LoadedHistory {
             times: self.time.clone(),
             values: (0..self.time.len()).map(at).collect(),
         })
+    }
+
+    /// Refuses modal coordinates of other modes than those of the steps.
+    fn refuse_mean_axes(&self, body: &FlexBody) -> Result<()> {
+        if !self.is_in_mean_axes {
+            return Ok(());
+        }
+        let message = format!(
+            "{}: the modal coordinates of the run are those of the body in mean axes, and the steps have the modes of the file",
+            body.conditions()
+        );
+        let help = "convert with --frame com, write the shapes of that body, and simulate it again";
+        Err(Diagnostic::new(Code::SceneBody, message).in_file(&self.path).with_help(help).into())
     }
 
     /// Refuses a load at an interface of which neither a step nor a recovery has columns: no step has its stresses.

@@ -46,7 +46,7 @@ pub use instants::{Instant, highest_excited_rate, instants, unsettled_rate};
 pub use interface_stresses::stresses_at_rigid_interfaces;
 pub use load_cases::LoadCases;
 pub use prepared::{damped, damped_once, ends_a_run, fastest_history, find_nodal_point, nodal_point};
-pub use recovered::{AmplitudeHistory, LoadHistory, LoadedHistory, RecoveredMotion};
+pub use recovered::{AmplitudeHistory, LoadHistory, LoadedHistory, MEAN_AXES, RecoveredMotion};
 pub use recovery_errors::{RecoveryMeasure, TracedRecoveries};
 pub use requirements::{
     Attachment, AttachmentKind, Limits, MotionRange, PerQuantity, Range, RecoveryLimit, RecoveryTolerance,

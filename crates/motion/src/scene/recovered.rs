@@ -11,6 +11,7 @@ use flexbody_base::text::InputFile;
 use flexbody_base::text::series::{ColumnKey, has_column, read_series};
 use flexbody_body::flex_body::{Carrier, FlexBody, ModalMotion, MotionLoad, Recovery};
 use nalgebra::{Matrix3, Vector3};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Names of the columns of force and torque after the name of their interface.
@@ -23,6 +24,10 @@ const SPIN_COLUMNS: [&str; 3] = ["angular_velocity_x", "angular_velocity_y", "an
 /// Names of the columns of the angular acceleration.
 const SPIN_RATE_COLUMNS: [&str; 3] =
     ["angular_acceleration_x", "angular_acceleration_y", "angular_acceleration_z"];
+
+/// Beginning of the names of modal coordinates, their rates and accelerations in the table of `simulate`, where the frame
+/// of the body's file is on an interface and the motion is in mean axes, in which the body has other modes.
+pub const MEAN_AXES: &str = "mean_axes_";
 
 /// Columns of a table of `simulate` that tell a body with a prescribed motion, and one in mean axes.
 const REACTION: &str = "reaction_force_x";
@@ -54,6 +59,8 @@ pub struct LoadedHistory {
     pub carrier: Option<Carrier>,
     /// True for the table that `simulate` writes of a carried body.
     pub is_of_carried: bool,
+    /// True if the modal coordinates are those of the body in mean axes, and the body's file has another frame.
+    pub is_in_mean_axes: bool,
 }
 
 /// Amplitude of a named load over time.
@@ -98,7 +105,8 @@ impl RecoveredMotion {
 }
 
 impl LoadedHistory {
-    /// Reads the columns `time`, `q_1` to `q_n`, `angular_velocity_x` to `_z`; `qd_1` to `qd_n`, `qdd_1` to `qdd_n` and
+    /// Reads the columns `time`, `q_1` to `q_n` (or, for a body whose frame is on an interface, `mean_axes_q_1` to
+    /// `mean_axes_q_n`, so the rates and accelerations too), `angular_velocity_x` to `_z`; `qd_1` to `qd_n`, `qdd_1` to `qdd_n` and
     /// `angular_acceleration_x` to `_z` if recoveries of the body have columns of forces of motion; for every interface of the body with
     /// a reference point `NAME force_x` to `_z` and `NAME torque_x` to `_z`, and for every named load but preloads `NAME`.
     /// Columns of an interface without load, and of a named load that does not act, may be absent. Other columns are
@@ -109,8 +117,11 @@ impl LoadedHistory {
     /// times that do not ascend; the errors of [`InputFile::open`].
     pub fn read(path: &Path, body: &FlexBody) -> Result<Self> {
         let file = InputFile::open(path)?;
-        let modal =
-            |prefix: &str| -> Vec<String> { (1..=body.n_modes()).map(|j| format!("{prefix}_{j}")).collect() };
+        let is_in_mean_axes = !body.conditions().is_mean() && has_column(&file, &format!("{MEAN_AXES}q_1"));
+        let modes = if is_in_mean_axes { MEAN_AXES } else { "" };
+        let modal = |prefix: &str| -> Vec<String> {
+            (1..=body.n_modes()).map(|j| format!("{modes}{prefix}_{j}")).collect()
+        };
         let mut wanted: Vec<String> = modal("q");
         // A vector is in the file if any of its columns is; then all must be. Returns the place of its first column.
         let mut all_of = |names: Vec<String>| {
@@ -178,6 +189,7 @@ impl LoadedHistory {
             carrier: None,
             // A body with a prescribed motion in mean axes has the torque of these too.
             is_of_carried: has_column(&file, REACTION) && !has_column(&file, CONDITIONS),
+            is_in_mean_axes,
         })
     }
 
@@ -204,8 +216,7 @@ impl LoadedHistory {
     /// for loads at an interface without static columns, and for the run of a carried body without its carrier, if rows
     /// depend on the frame; the errors of [`FlexBody::carried`].
     pub fn recover(&self, body: &FlexBody, names: &[String]) -> Result<RecoveredMotion> {
-        let carried = self.carrier.as_ref().map(|carrier| body.carried(carrier)).transpose()?;
-        let body = carried.as_ref().unwrap_or(body);
+        let body = &*self.in_own_frame(body)?;
         let chosen = chosen(body, names)?;
         self.refuse_other_frame(body, &chosen)?;
         self.refuse_torque_without_rotation(body)?;
@@ -216,6 +227,15 @@ impl LoadedHistory {
         let mut search = ExtremeSearch::new(recoveries.len(), false);
         search.see(&recoveries, &states);
         Ok(RecoveredMotion { recoveries, states, extremes: search.finish(), envelopes: None })
+    }
+
+    /// Returns the body in the frame that the modal coordinates belong to.
+    fn in_own_frame<'b>(&self, body: &'b FlexBody) -> Result<Cow<'b, FlexBody>> {
+        match &self.carrier {
+            Some(carrier) => Ok(Cow::Owned(body.carried(carrier)?)),
+            None if self.is_in_mean_axes => body.in_mean_axes(),
+            None => Ok(Cow::Borrowed(body)),
+        }
     }
 
     /// Returns the states that rows depend on, along the axes of the body.

@@ -65,6 +65,7 @@ fn simulate_recording(
     context: &Context<'_>,
 ) -> Result<(Recording, Vec<Diagnostic>)> {
     // Body and scene in one frame, with the damping of the scene, ready to integrate.
+    let is_in_mean_axes = scene.carried.is_none() && !body.conditions().is_mean();
     let framed = FramedScene::new(body, scene)?;
     let left_out = left_out(body, &framed.body);
     let body = &*damped(&framed.body, &framed.scene)?;
@@ -98,6 +99,7 @@ fn simulate_recording(
     // Add the work and the extremes, and warn of motions beyond the range of the model.
     let mut recording = recorder.recording;
     recording.work = finished.work;
+    recording.setting.is_in_mean_axes = is_in_mean_axes;
     recording.extremes = survey.extremes(finished.size, finished.least_energy);
     recording.recovered = rows.map(SceneRows::finish);
     let at_interfaces = recording
@@ -319,6 +321,8 @@ pub struct Setting {
     pub stiffening: Vec<String>,
     /// True if the scene leaves the geometric stiffness of the body out.
     pub stiffening_is_off: bool,
+    /// True if the modal coordinates are those of the body in mean axes, and the body's file has another frame.
+    pub is_in_mean_axes: bool,
 }
 
 impl Setting {
@@ -333,6 +337,7 @@ impl Setting {
             gravity_model: scene.gravity.map(|gravity| start.tr_mul(&gravity)),
             eigenvalues: eigenvalues.unwrap_or_default(),
             stiffening: stiffening_loads(body),
+            is_in_mean_axes: false,
             stiffening_is_off: !scene.run.terms.geometric_stiffness,
         }
     }

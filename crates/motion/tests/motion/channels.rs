@@ -63,6 +63,7 @@ fn history() -> LoadedHistory {
         q: (0..count).map(|i| (0..MODES).map(|j| 1e-3 * wave(j as f64)(i)).collect()).collect(),
         carrier: None,
         is_of_carried: false,
+        is_in_mean_axes: false,
         rate: None,
         acceleration: None,
         angular_acceleration: None,

@@ -22,9 +22,21 @@ pub(super) struct FramedBody {
 }
 
 impl FramedBody {
-    pub(super) fn new(body: &FlexBody, settings: &ResponseSettings) -> Result<Self> {
+    pub(super) fn new(body: &FlexBody, settings: &ResponseSettings, excitation: &Excitation) -> Result<Self> {
         let mean = body.in_mean_axes()?;
-        let damped = damped(&mean, settings)?.into_owned();
+        let damped = match excitation {
+            // Damping ratios are those of the modes of the body as it is held.
+            Excitation::Base(Place { point: Point::Interface(name), .. }) => {
+                let held = mean.carried(&Carrier::Interface(name.clone()))?;
+                let damped = damped(&held, settings)?;
+                if damped.damping() == mean.damping() {
+                    mean.into_owned()
+                } else {
+                    mean.with_damping_of(&damped)?
+                }
+            }
+            _ => damped(&mean, settings)?.into_owned(),
+        };
         let centre = damped.invariants().first_moment() / damped.invariants().mass();
         let at_centre = damped.in_model_axes(centre)?;
         Ok(Self { damped, at_centre })

@@ -192,7 +192,7 @@ pub fn respond(
     settings: &ResponseSettings,
     context: &Context<'_>,
 ) -> Result<Response> {
-    let framed = FramedBody::new(body, settings)?;
+    let framed = FramedBody::new(body, settings, ends.from)?;
     let (body, dimension) = (&framed.damped, body.dimension());
     let read = Read::new(&framed.at_centre, ends)?;
     let damping = framed.damping();
