@@ -13,7 +13,7 @@
 
 use super::modal_change::{rotations_without, shapes_without, stacked};
 use super::rotated_stiffness::{SplitStiffness, split, transformed, without_rotation};
-use super::{FlexBody, Interface, Recovery, ReferenceConditions, TermGroups};
+use super::{FlexBody, Interface, Modes, Recovery, ReferenceConditions, TermGroups};
 use crate::basis::BasisKind;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -118,8 +118,10 @@ impl FlexBody {
             Carrier::Interface(name) => ReferenceConditions::Interface(name.clone()),
             Carrier::Node(_) => ReferenceConditions::Unstated,
         };
-        parts.modes.shape = shapes_without(&motion, &parts.modes.shape, &parts.nodes.positions);
-        parts.modes.rotation = parts.modes.rotation.map(|rotation| rotations_without(&motion, &rotation));
+        let Modes { shape, rotation, .. } = &parts.modes;
+        let rotation = rotation.as_ref().map(|rotation| rotations_without(&motion, rotation, shape));
+        parts.modes.shape = shapes_without(&motion, shape, &parts.nodes.positions);
+        parts.modes.rotation = rotation;
         parts.invariants = parts.invariants.without_rigid_motion(motion.as_ref());
         for lumped in &mut parts.lumped {
             lumped.invariants = lumped.invariants.without_rigid_motion(motion.as_ref());

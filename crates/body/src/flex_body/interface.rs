@@ -1,6 +1,6 @@
 //! Interfaces of a body with the data that a joint needs.
 
-use super::modal_change::{has_rotations, stacked};
+use super::modal_change::{NodesWithRotations, stacked};
 use faer::{Mat, MatRef};
 use flexbody_linalg::combine;
 use flexbody_linalg::ties::first_largest;
@@ -67,8 +67,10 @@ impl Interface {
     ) -> Option<InterfaceRows> {
         let (d, k, nf) = (dimension, self.nodes.len(), shape.ncols());
         let positions: Vec<[f64; 3]> = self.nodes.iter().map(|&i| nodes.positions[i]).collect();
-        let rotation =
-            rotation.filter(|rotation| self.nodes.iter().all(|&node| has_rotations(*rotation, node)));
+        let rotation = rotation.filter(|rotation| {
+            let known = NodesWithRotations::new(shape, *rotation);
+            self.nodes.iter().all(|&node| known.has(node))
+        });
         let motion = InterfaceMotion::new(&positions, rotation.is_some(), d, Some(self.reference?));
         let all =
             Mat::from_fn(motion.rigid().nrows(), nf, |row, j| match (row.checked_sub(d * k), rotation) {

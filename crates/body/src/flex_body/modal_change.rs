@@ -213,9 +213,11 @@ impl ModalChange {
     }
 
     /// Returns the rotations of nodes (3n x nf) in the new modes. Nodes without rotations have zero rows.
-    pub fn rotations(&self, rotation: &Mat<f64>) -> Mat<f64> {
+    ///
+    /// * `shape`: displacements of the nodes in the old modes.
+    pub fn rotations(&self, rotation: &Mat<f64>, shape: &Mat<f64>) -> Mat<f64> {
         match &self.taken {
-            Some(taken) => rotations_without(taken, rotation) * &self.modes,
+            Some(taken) => rotations_without(taken, rotation, shape) * &self.modes,
             None => rotation * &self.modes,
         }
     }
@@ -283,18 +285,37 @@ pub(super) fn shapes_without(taken: &Mat<f64>, shape: &Mat<f64>, positions: &[[f
 }
 
 /// Returns the rotations of nodes (3n x nf) without those of `taken` (6 x nf); nodes without rotations keep
-/// their zeros.
-pub(super) fn rotations_without(taken: &Mat<f64>, rotation: &Mat<f64>) -> Mat<f64> {
-    let turns: Vec<bool> =
-        (0..rotation.nrows() / 3).map(|node| has_rotations(rotation.as_ref(), node)).collect();
+/// their zeros. `shape` has the displacements in the same modes.
+pub(super) fn rotations_without(taken: &Mat<f64>, rotation: &Mat<f64>, shape: &Mat<f64>) -> Mat<f64> {
+    let known = NodesWithRotations::new(shape.as_ref(), rotation.as_ref());
+    let turns: Vec<bool> = (0..rotation.nrows() / 3).map(|node| known.has(node)).collect();
     Mat::from_fn(rotation.nrows(), rotation.ncols(), |row, j| {
         if turns[row / 3] { rotation[(row, j)] - taken[(3 + row % 3, j)] } else { 0.0 }
     })
 }
 
-/// Returns true if `node` has rotations; nodes without have zeros in their rows (3n x nf).
-pub(super) fn has_rotations(rotation: MatRef<'_, f64>, node: usize) -> bool {
-    (0..rotation.ncols()).any(|j| (0..3).any(|k| rotation[(3 * node + k, j)] != 0.0))
+/// Displacement relative to the largest of the modes below which a node counts as at rest in all modes: what rounding
+/// leaves of the motion that was taken from them.
+const MAX_REST: f64 = 1e-10;
+
+/// Nodes whose rotations are known, by the displacements and rotations of all nodes in the modes (3n x nf each). Nodes
+/// without rotations have zeros. So has the node to which the frame is fixed, at rest in every mode; it has rotations.
+pub(super) struct NodesWithRotations<'m> {
+    shape: MatRef<'m, f64>,
+    rotation: MatRef<'m, f64>,
+    rest: f64,
+}
+
+impl<'m> NodesWithRotations<'m> {
+    pub(super) fn new(shape: MatRef<'m, f64>, rotation: MatRef<'m, f64>) -> Self {
+        Self { shape, rotation, rest: MAX_REST * shape.norm_max() }
+    }
+
+    /// Returns true if the rotations of `node` are known.
+    pub(super) fn has(&self, node: usize) -> bool {
+        let largest = |of: MatRef<'_, f64>| of.subrows(3 * node, 3).norm_max();
+        largest(self.rotation) != 0.0 || largest(self.shape) <= self.rest
+    }
 }
 
 /// Returns the translations stacked over the rotations (6 x nf).

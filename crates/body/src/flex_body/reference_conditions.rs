@@ -222,7 +222,7 @@ impl FlexBody {
             damping_ratio: eigenvalue.iter().enumerate().map(|(j, &lambda)| ratio(j, lambda)).collect(),
             modal_damping,
             shape: change.shapes(&old.shape, positions),
-            rotation: old.rotation.as_ref().map(|rotation| change.rotations(rotation)),
+            rotation: old.rotation.as_ref().map(|rotation| change.rotations(rotation, &old.shape)),
             internal: None,
             eigenvalue,
         }

@@ -166,7 +166,7 @@ impl ModalCoordinates {
         Self {
             invariants: change.invariants(&self.invariants),
             shape: change.shapes(&self.shape, &positions),
-            rotation: self.rotation.map(|rotation| change.rotations(&rotation)),
+            rotation: self.rotation.map(|rotation| change.rotations(&rotation, &self.shape)),
             damping: self.damping.map(|damping| change.congruent(&damping)),
             geometric_stiffness: self
                 .geometric_stiffness
