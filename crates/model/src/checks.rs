@@ -221,6 +221,13 @@ fn unrotated_mass_note(model: &FeModel, rounding: f64, worst: [DofLabel; 2]) -> 
 fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     /// Residual due to node tables with few digits.
     const MAX_RIGID_DAMPING: f64 = 1e-6;
+    if let Some(Damping::Rayleigh { alpha, .. }) = &body.damping {
+        if *alpha > 0.0 {
+            let message = "alpha M resists rigid motion; only the damping of the deformation is kept: that of motion relative to mean axes or, of a carried body, to its carrier";
+            found.push(Diagnostic::new(Code::DampingRigid, message.to_owned()));
+        }
+        return;
+    }
     let Some(damping) = body.damping.as_ref().and_then(Damping::matrix) else { return };
     let (centre, length) = centre_and_length(&body.nodes.positions);
     let fields = body.rows.rigid_fields(&body.nodes.positions, centre, length);

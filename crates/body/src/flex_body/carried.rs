@@ -20,9 +20,8 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::numbers::about_percent;
 use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
-use flexbody_model::{Coupling, DampingBand, DampingRatios, rigid_count};
+use flexbody_model::{Coupling, DampingRatios, rigid_count};
 use nalgebra::{Matrix3, Vector3};
-use serde_json::Value;
 
 /// Largest truncation error of the static response of a carried body that passes without a warning.
 const MAX_TRUNCATION: f64 = 0.01;
@@ -89,7 +88,7 @@ impl FlexBody {
     /// Geometric stiffness includes that of the reaction at the carrier, where it is given (theory 7.6). If the carrier
     /// moves in the modes of this body, it is reduced to the modes without that motion, or dropped if that of rotations is
     /// not known. The stiffness of inertia follows from the moments of the nodes and their rotations relative to the carrier.
-    /// Damping ratios that the model states are those of the modes of the held body.
+    /// Ratios and proportional damping that the model states are those of the held body.
     ///
     /// # Errors
     /// FB212 if the body has no interface or node of this name; FB214 if `carrier` has no reference point
@@ -106,7 +105,7 @@ impl FlexBody {
         if along_model && self.has_carrier_at_rest(carrier)? {
             let mut parts = self.clone().into_parts();
             (parts.geometric_stiffness, parts.rotated_stiffness) = self.carried_stiffness(carrier, None);
-            return Self::new(parts)?.with_ratios_of_these_modes(self.stated_ratios());
+            return Self::new(parts)?.with_stated_damping(self.stated_damping());
         }
         let at = self.place_of(carrier)?;
         let body = self.in_model_axes(at.reference)?;
@@ -136,7 +135,7 @@ impl FlexBody {
             }
             _ => None,
         };
-        Self::new(parts)?.with_ratios_of_these_modes(self.stated_ratios())
+        Self::new(parts)?.with_stated_damping(self.stated_damping())
     }
 
     /// Returns the geometric stiffness of this body, whose origin is the carrier, in the modes in which the carrier is at
@@ -162,45 +161,6 @@ impl FlexBody {
     /// carried body those of the body held at its interface. Unit: 1/time^2.
     pub fn eigenvalues_in_frame(&self) -> Option<Vec<f64>> {
         Some(self.eigenpairs_in_frame()?.0)
-    }
-
-    /// Returns the damping ratios that the settings of the conversion state (one ratio, or bands of frequency), if the
-    /// modes of this body have them; `None` for other damping, such as a matrix or the ratios of a scene.
-    pub(crate) fn stated_ratios(&self) -> Option<DampingRatios> {
-        let stated = &self.source().settings["damping"];
-        let of_band = |band: &Value| {
-            let to_hz = if band["to_hz"].is_null() { f64::INFINITY } else { band["to_hz"].as_f64()? };
-            Some(DampingBand { to_hz, ratio: band["ratio"].as_f64()? })
-        };
-        let ratios = match (stated["ratio"].as_f64(), stated["bands"].as_array()) {
-            (Some(ratio), _) => DampingRatios::from(ratio),
-            (None, bands) => DampingRatios::new(bands?.iter().map(of_band).collect::<Option<_>>()?).ok()?,
-        };
-        let modes = self.modes();
-        let at = |lambda: f64| ratios.at(self.units().frequency_of(lambda));
-        let has = modes.eigenvalue.iter().zip(&modes.damping_ratio).all(|(&lambda, &own)| at(lambda) == own);
-        has.then_some(ratios)
-    }
-
-    /// Returns this body with these ratios in its frame; itself without any.
-    fn with_ratios_of_these_modes(self, ratios: Option<DampingRatios>) -> Result<Self> {
-        match ratios {
-            Some(ratios) => self.with_damping_ratios(&ratios),
-            None => Ok(self),
-        }
-    }
-
-    /// Returns this body with the damping of `held`, the same body in the frame of a carrier: the modal coordinates are
-    /// those of both, and so are the forces of D on them.
-    ///
-    /// # Errors
-    /// The errors of [`FlexBody::new`].
-    pub fn with_damping_of(&self, held: &Self) -> Result<Self> {
-        let mut parts = self.clone().into_parts();
-        parts.modes.damping_ratio.clone_from(&held.modes().damping_ratio);
-        parts.modes.modal_damping.clone_from(&held.modes().modal_damping);
-        parts.recoveries.iter_mut().for_each(Recovery::remove_damping);
-        Self::new(parts)
     }
 
     /// Sets modal damping: each eigenpair in the frame of the body gets the ratio of `ratios` at its

@@ -16,6 +16,7 @@ mod recovery;
 mod reference_conditions;
 mod rotated_stiffness;
 mod softening;
+mod stated_damping;
 mod storage;
 mod terms;
 mod validate;

@@ -199,27 +199,25 @@ impl FlexBody {
     fn changed_modes(&self, change: &ModalChange, invariants: &Invariants) -> Modes {
         let (old, positions) = (self.modes(), &self.nodes().positions);
         let eigenvalue = diagonal_eigenvalues(invariants);
-        let (damping, stated) = (self.damping(), self.stated_ratios());
-        let stated_at = |lambda: f64| Some(stated.as_ref()?.at(self.units().frequency_of(lambda)));
-        let diagonal = |i: usize, j: usize| match stated_at(eigenvalue[j]) {
-            Some(ratio) if i == j => 2.0 * ratio * eigenvalue[j].sqrt(),
-            _ => 0.0,
-        };
-        let n = eigenvalue.len();
-        let modal_damping = (damping.norm_max() > 0.0).then(|| match stated {
-            // Ratios that the model states are those of the modes of every frame.
-            Some(_) => Mat::from_fn(n, n, diagonal),
-            None => change.congruent(&damping),
-        });
-        let ratio = |j: usize, lambda: f64| {
-            let of_matrix = |d: &Mat<f64>| (0.5 * d[(j, j)] / lambda.sqrt()).max(0.0);
-            stated_at(lambda).unwrap_or_else(|| modal_damping.as_ref().map_or(0.0, of_matrix))
+        let damping = self.damping();
+        let (modal_damping, damping_ratio) = match self.stated_damping() {
+            _ if damping.norm_max() == 0.0 => (None, vec![0.0; eigenvalue.len()]),
+            Some(law) => {
+                let (damping, ratios) = law.of_modes(&eigenvalue, |lambda| self.units().frequency_of(lambda));
+                (Some(damping), ratios)
+            }
+            None => {
+                let damping = change.congruent(&damping);
+                let ratio = |(j, lambda): (usize, &f64)| (0.5 * damping[(j, j)] / lambda.sqrt()).max(0.0);
+                let ratios = eigenvalue.iter().enumerate().map(ratio).collect();
+                (Some(damping), ratios)
+            }
         };
         Modes {
             residual: reduced_residuals(invariants, &eigenvalue),
             provenance: vec!["combination of modes".to_owned(); eigenvalue.len()],
             truncation: old.truncation.clone(),
-            damping_ratio: eigenvalue.iter().enumerate().map(|(j, &lambda)| ratio(j, lambda)).collect(),
+            damping_ratio,
             modal_damping,
             shape: change.shapes(&old.shape, positions),
             rotation: old.rotation.as_ref().map(|rotation| change.rotations(rotation, &old.shape)),

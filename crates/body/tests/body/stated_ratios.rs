@@ -52,6 +52,23 @@ fn ratios(body: &FlexBody) -> Vec<(f64, f64)> {
     found
 }
 
+/// Compares the ratios of the modes in every frame of an analysis, for bodies of both frames of the file.
+fn holds_in_every_frame(damping: &Damping<RawMatrix>, right: impl Fn(f64) -> f64) {
+    for frame in [FrameChoice::from(BodyFrame::Com), FrameChoice::Interface(ROOT.to_owned())] {
+        let own = body(damping, frame);
+        let carried = own.carried(&Carrier::Interface(ROOT.to_owned())).expect("an interface");
+        let again = carried.carried(&Carrier::Interface(ROOT.to_owned())).expect("an interface");
+        let free = own.in_mean_axes().expect("mean axes");
+        let held = own.on_interface(ROOT).expect("a frame");
+        for one in [&carried, &again, &free, &held, &held.in_mean_axes().expect("mean axes")] {
+            for (hertz, ratio) in ratios(one) {
+                let right = right(hertz);
+                assert!((ratio - right).abs() < 1e-7 * right, "{hertz} Hz: {ratio}, not {right}");
+            }
+        }
+    }
+}
+
 #[test]
 fn ratios_are_those_of_the_modes_of_the_analysis() {
     let bands = vec![
@@ -59,32 +76,15 @@ fn ratios_are_those_of_the_modes_of_the_analysis() {
         DampingBand { to_hz: 0.8, ratio: 0.03 },
         DampingBand { to_hz: f64::INFINITY, ratio: 0.1 },
     ];
-    let constant = vec![DampingBand { to_hz: f64::INFINITY, ratio: 0.03 }];
-    for (damping, law) in [(Damping::Ratio(0.03), constant), (Damping::Bands(bands.clone()), bands)] {
-        for frame in [FrameChoice::from(BodyFrame::Com), FrameChoice::Interface(ROOT.to_owned())] {
-            let own = body(&damping, frame);
-            let carried = own.carried(&Carrier::Interface(ROOT.to_owned())).expect("an interface");
-            let again = carried.carried(&Carrier::Interface(ROOT.to_owned())).expect("an interface");
-            let free = own.in_mean_axes().expect("mean axes");
-            let held = own.on_interface(ROOT).expect("a frame");
-            for one in [&carried, &again, &free, &held, &held.in_mean_axes().expect("mean axes")] {
-                for (hertz, ratio) in ratios(one) {
-                    let right = ratio_at(&law, hertz);
-                    assert!((ratio - right).abs() < 1e-7 * right, "{hertz} Hz: {ratio}, not {right}");
-                }
-            }
-        }
-    }
+    holds_in_every_frame(&Damping::Ratio(0.03), |_| 0.03);
+    holds_in_every_frame(&Damping::Bands(bands.clone()), |hertz| ratio_at(&bands, hertz));
 }
 
-/// Damping in proportion to the stiffness is a matrix, which no frame changes.
 #[test]
-fn a_matrix_stays_what_it_is() {
-    let beta = 0.02;
-    let own = body(&Damping::Rayleigh { alpha: 0.0, beta }, FrameChoice::from(BodyFrame::Com));
-    let carried = own.carried(&Carrier::Interface(ROOT.to_owned())).expect("an interface");
-    for (hertz, ratio) in ratios(&carried) {
-        let right = 0.5 * beta * std::f64::consts::TAU * hertz;
-        assert!((ratio - right).abs() < 1e-7 * right, "{hertz} Hz: {ratio}, not {right}");
-    }
+fn damping_in_proportion_to_the_mass_is_that_of_the_motion_in_the_frame() {
+    let (alpha, beta) = (0.3, 0.02);
+    holds_in_every_frame(&Damping::Rayleigh { alpha, beta }, |hertz| {
+        let omega = std::f64::consts::TAU * hertz;
+        0.5 * (alpha / omega + beta * omega)
+    });
 }
