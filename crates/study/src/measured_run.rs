@@ -3,6 +3,7 @@
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::numbers::{about_percent, significant};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
@@ -44,7 +45,7 @@ impl MeasuredRun {
 ///
 /// # Errors
 /// The errors of [`trace`] for the reference; those of [`MotionHistory::covering`] and [`Trace::of_history`] for the
-/// history; FB707 for bodies of different models.
+/// history, FB217 also for instants too far apart; FB707 for bodies of different models.
 pub fn measured_run(
     body: &FlexBody,
     history: MotionHistory,
@@ -67,9 +68,10 @@ pub fn measured_run(
     // The extremes belong to the continuous motion, the comparison to the instants of the history.
     let (continuous, diagnostics) = trace(whole, scene, context)?;
     let sampled = trace_at(whole, scene, &history.time, context)?;
+    let framed_whole = FramedScene::new(whole, scene)?;
+    let unseen = between_instants(whole, scene, &framed_whole, (&continuous, &sampled))?;
     let motion = Trace { extremes: continuous.extremes, ..sampled };
     let own = Trace::of_history(body, scene, &history, &motion)?;
-    let framed_whole = FramedScene::new(whole, scene)?;
     let framed_body = FramedScene::new(body, scene)?.body;
     let measure = Measure::new(&framed_whole.body, &framed_whole.scene, &motion);
     let errors = match &shared {
@@ -93,7 +95,46 @@ pub fn measured_run(
         tolerance,
         growth: errors.growth(&motion, &tolerance),
     };
+    if run.holds() {
+        refuse_sparse(&history, unseen, &tolerance)?;
+    }
     Ok((run, diagnostics))
+}
+
+/// Returns the errors of parabolas through the instants of the reference, `sampled` as the history is, relative to its
+/// continuous motion.
+fn between_instants(
+    whole: &FlexBody,
+    scene: &Scene,
+    framed: &FramedScene<'_>,
+    (continuous, sampled): (&Trace, &Trace),
+) -> Result<OutputErrors> {
+    let parabolas = sampled.through_parabolas(&continuous.time);
+    let told = Trace::of_history(whole, scene, &parabolas, continuous)?;
+    let measure = Measure::new(&framed.body, &framed.scene, continuous);
+    Ok(measure.of_subset(&told, &(0..whole.n_modes()).collect::<Vec<_>>()).largest())
+}
+
+/// Refuses a history whose instants are too far apart to tell whether the run is within the tolerances: the reference
+/// itself, known at these instants alone, would not be.
+fn refuse_sparse(history: &MotionHistory, mut unseen: OutputErrors, tolerance: &Tolerance) -> Result<()> {
+    unseen.attitude = unseen.attitude.filter(|_| history.attitude.is_some());
+    if unseen.worst(tolerance) <= 1.0 {
+        return Ok(());
+    }
+    let (name, error, allowed) = unseen.decisive(tolerance);
+    let size = |value: f64| match name {
+        "attitude" => format!("{} rad", significant(value, 2)),
+        _ => about_percent(value),
+    };
+    let message = format!(
+        "the {} instants are too far apart to judge the run: parabolas through those of the reference miss its {name} between them by {}, and {} is allowed",
+        history.time.len(),
+        size(error),
+        size(allowed)
+    );
+    let help = "write at least twelve instants for each period of a vibration that matters, more for tolerances below 1 %";
+    Err(Diagnostic::new(Code::SeriesRange, message).in_file(&history.path).with_help(help).into())
 }
 
 /// Returns Psi'K Psi_r of the modes of `body` and of those of `whole`.

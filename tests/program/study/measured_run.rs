@@ -1,6 +1,7 @@
 //! Errors of runs of another program: those that were put into a run are found, and wrong runs are refused.
 
 use crate::program::flexbody;
+use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
@@ -74,6 +75,22 @@ fn an_error_that_was_put_into_a_run_is_found() {
     assert!(!run.holds() && (run.worst - 2.0).abs() < 1e-6);
     // A run without attitudes has no error of the attitude.
     assert_eq!(measured(&body, &scene, MotionHistory { attitude: None, ..exact }).errors.attitude, None);
+}
+
+/// A run without any error, of which only three instants are written, says nothing about the motion between them.
+#[test]
+fn instants_too_far_apart_are_refused() {
+    let body = soft_block(5);
+    let scene = tumble(&body);
+    let mut sparse = history(&body, &scene);
+    let last = sparse.time.len() - 1;
+    let few = [0, last / 2, last];
+    sparse.time = few.map(|i| sparse.time[i]).to_vec();
+    sparse.q = few.map(|i| sparse.q[i].clone()).to_vec();
+    sparse.attitude = sparse.attitude.map(|all| few.map(|i| all[i]).to_vec());
+    let refused = measured_run(&body, sparse, &scene, None, &Context::QUIET).expect_err("too few instants");
+    assert!(refused.has(Code::SeriesRange), "{refused}");
+    assert!(refused.to_string().contains("the 3 instants are too far apart"), "{refused}");
 }
 
 #[test]

@@ -85,6 +85,40 @@ impl Trace {
         Ok(trace)
     }
 
+    /// Returns the motion of parabolas through the instants of this one, three at a time, at other `times`: what a table of
+    /// these instants tells of the motion between them.
+    pub fn through_parabolas(&self, times: &[f64]) -> MotionHistory {
+        let interpolated = |time: f64| {
+            let nodes = self.nearest(time);
+            let weights = lagrange(&self.time[nodes.clone()], time);
+            let sum = |value: &dyn Fn(usize) -> f64| -> f64 {
+                nodes.clone().zip(&weights).map(|(i, weight)| weight * value(i)).sum()
+            };
+            let q = (0..self.q.first().map_or(0, Vec::len)).map(|j| sum(&|i| self.q[i][j])).collect();
+            let turn: [f64; 4] = std::array::from_fn(|k| sum(&|i| self.attitude[i].0[k]));
+            let length = turn.iter().map(|v| v * v).sum::<f64>().sqrt();
+            (EulerParameters(turn.map(|v| v / length)), q)
+        };
+        let (attitude, q) = times.iter().map(|&time| interpolated(time)).unzip();
+        MotionHistory { path: PathBuf::new(), time: times.to_vec(), attitude: Some(attitude), q }
+    }
+
+    /// Returns the instants, at most three, whose parabola stands for the motion at `time`.
+    fn nearest(&self, time: f64) -> std::ops::Range<usize> {
+        let count = self.time.len();
+        let after = self.time.partition_point(|own| *own <= time).clamp(1, count.saturating_sub(1).max(1));
+        // The third instant is the nearer one of those beside the interval.
+        let distance = |at: Option<usize>| match at.and_then(|at| self.time.get(at)) {
+            Some(own) => (own - time).abs(),
+            None => f64::INFINITY,
+        };
+        let first = match distance(after.checked_sub(2)) < distance(Some(after + 1)) {
+            true => after - 2,
+            false => after - 1,
+        };
+        first..(first + 3).min(count)
+    }
+
     /// Returns the number of bytes of this motion for a body with `modes` modes.
     pub fn bytes(&self, modes: usize) -> f64 {
         self.time.len() as f64 * self.bytes_of_instant(modes)
@@ -243,6 +277,12 @@ impl<'r> Tracer<'r> {
     fn finish(self, finished: Finished, extremes: Extremes) -> Trace {
         Trace { extremes, work: finished.work, size: finished.size, ..self.trace }
     }
+}
+
+/// Returns the weights of Lagrange's polynomial through `nodes` at `time`.
+fn lagrange(nodes: &[f64], time: f64) -> Vec<f64> {
+    let factor = |i: usize, j: usize| if i == j { 1.0 } else { (time - nodes[j]) / (nodes[i] - nodes[j]) };
+    (0..nodes.len()).map(|i| (0..nodes.len()).map(|j| factor(i, j)).product()).collect()
 }
 
 // Motions that another program computed.
