@@ -188,7 +188,8 @@ impl FlexBody {
         let scene = scene.map(|scene| scene.0.single()).transpose()?;
         heard(listener, |context| {
             let (inner, settings) = request.respond(None, &self.0, scene, context)?;
-            Ok(Response { inner, settings, diagnostics: Vec::new() })
+            let diagnostics = inner.diagnostics.clone();
+            Ok(Response { inner, settings, diagnostics })
         })
     }
 }

@@ -51,6 +51,7 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     let context = context(None, arguments.allow_long, &watch);
     let (response, settings) =
         request(arguments, damping.ratio).respond(model.as_ref(), &body, scene.as_ref(), &context)?;
+    let diagnostics = [diagnostics, response.diagnostics.clone()].concat();
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
     let facts = ResponseFacts::new(&response, &settings, &run);

@@ -6,6 +6,7 @@ use super::modal_sum::ModalSum;
 use super::place::{Direction, Place, PlaceRows};
 use super::study::{ResponseEnds, ResponseSettings};
 use faer::Mat;
+use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{Carrier, FlexBody};
@@ -19,15 +20,20 @@ use std::borrow::Cow;
 pub(super) struct FramedBody {
     pub damped: FlexBody,
     pub at_centre: FlexBody,
+    /// Warning about modes that leave out much of the deformation which the acceleration of the base causes.
+    pub unresolved: Option<Diagnostic>,
 }
 
 impl FramedBody {
     pub(super) fn new(body: &FlexBody, settings: &ResponseSettings, excitation: &Excitation) -> Result<Self> {
         let mean = body.in_mean_axes()?;
+        let mut unresolved = None;
         let damped = match excitation {
             // Damping ratios are those of the modes of the body as it is held.
             Excitation::Base(Place { point: Point::Interface(name), .. }) => {
-                let held = mean.carried(&Carrier::Interface(name.clone()))?;
+                let carrier = Carrier::Interface(name.clone());
+                let held = mean.carried(&carrier)?;
+                unresolved = held.unresolved(&carrier, &mean);
                 let damped = damped(&held, settings)?;
                 if damped.damping() == mean.damping() {
                     mean.into_owned()
@@ -39,7 +45,7 @@ impl FramedBody {
         };
         let centre = damped.invariants().first_moment() / damped.invariants().mass();
         let at_centre = damped.in_model_axes(centre)?;
-        Ok(Self { damped, at_centre })
+        Ok(Self { damped, at_centre, unresolved })
     }
 
     /// Returns the modal damping; `None` without damping.

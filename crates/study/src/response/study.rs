@@ -82,6 +82,9 @@ pub struct Response {
     pub coupling: Option<CouplingEffect>,
     /// Root mean squares under random excitation; `None` without spectral densities.
     pub random: Option<RandomResponse>,
+    /// Warning about the modes of a body alone that leave out much of the deformation which the acceleration of its base
+    /// causes; with a model the error is measured.
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 /// Effect of rigid interfaces on a frequency response.
@@ -228,8 +231,10 @@ pub fn respond(
     };
     let [low, high] = settings.band.ends();
     let in_band = |f: &f64| *f >= low && *f <= high;
+    let diagnostics = if model.is_none() { framed.unresolved.clone().into_iter().collect() } else { Vec::new() };
     Ok(Response {
         random,
+        diagnostics,
         name: body.source().name.clone(),
         units: body.units().clone(),
         modes: body.n_modes(),
