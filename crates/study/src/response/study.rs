@@ -231,7 +231,8 @@ pub fn respond(
     };
     let [low, high] = settings.band.ends();
     let in_band = |f: &f64| *f >= low && *f <= high;
-    let diagnostics = if model.is_none() { framed.unresolved.clone().into_iter().collect() } else { Vec::new() };
+    let diagnostics =
+        if model.is_none() { framed.unresolved.clone().into_iter().collect() } else { Vec::new() };
     Ok(Response {
         random,
         diagnostics,

@@ -32,11 +32,13 @@ fn body(model: &FeModel, modes: usize) -> FlexBody {
     convert(model, &settings, &Context::QUIET).expect("a body").body
 }
 
-/// Dense equations of all nodes with the damping of the modes of a body.
+/// Dense equations of all nodes with the damping of all modes.
 struct Dense {
     stiffness: DMatrix<f64>,
     mass: DMatrix<f64>,
-    damping: DMatrix<f64>,
+    /// Damping of the free modes, and of those of the body held at its root.
+    free_damping: DMatrix<f64>,
+    held_damping: DMatrix<f64>,
     /// Unit loads of each interface (N x 6).
     root: DMatrix<f64>,
     tip: DMatrix<f64>,
@@ -46,6 +48,32 @@ struct Dense {
 
 fn plain(a: &Mat<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
+}
+
+/// Returns the damping of all modes of the body whose root has no mean motion, D = P' M Phi diag(2 zeta omega) Phi' M P. P
+/// takes the rigid motion of the root from a motion, so that D damps the deformation alone.
+fn damping_held_at(stiffness: &DMatrix<f64>, mass: &DMatrix<f64>, root: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = mass.nrows();
+    let unit = DMatrix::<f64>::identity(n, n);
+    // Motions without mean motion of the root, and their modes.
+    let loads = root.clone().qr().q();
+    let eigen = (&unit - &loads * loads.transpose()).symmetric_eigen();
+    let held: Vec<usize> = (0..n).filter(|&j| eigen.eigenvalues[j] > 0.5).collect();
+    let motions = eigen.eigenvectors.select_columns(&held);
+    let reduced = |a: &DMatrix<f64>| motions.transpose() * a * &motions;
+    let inverse = reduced(mass).cholesky().expect("positive definite").l().try_inverse().expect("regular");
+    let modes = (&inverse * reduced(stiffness) * inverse.transpose()).symmetric_eigen();
+    let shapes = &motions * inverse.transpose() * &modes.eigenvectors;
+    // Rigid motions: the null space of K.
+    let all = stiffness.clone().symmetric_eigen();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|a, b| all.eigenvalues[*a].abs().total_cmp(&all.eigenvalues[*b].abs()));
+    let rigid = all.eigenvectors.select_columns(&order[..6]);
+    let of_root = (root.transpose() * &rigid).try_inverse().expect("six motions of the root");
+    let relative = &unit - rigid * of_root * root.transpose();
+    let rates = shapes.transpose() * mass * relative;
+    let c = modes.eigenvalues.map(|lambda| 2.0 * RATIO * lambda.sqrt());
+    rates.transpose() * DMatrix::from_diagonal(&c) * rates
 }
 
 impl Dense {
@@ -59,7 +87,7 @@ impl Dense {
         let c: Vec<f64> =
             damped.modes().eigenvalue.iter().map(|lambda| 2.0 * RATIO * lambda.sqrt()).collect();
         let weighted = &mass * vectors;
-        let damping = &weighted * DMatrix::from_diagonal(&c.into()) * weighted.transpose();
+        let free_damping = &weighted * DMatrix::from_diagonal(&c.into()) * weighted.transpose();
         let loads = |name: &str| {
             plain(&NodalPoint::interface(model, name).expect("sound").expect("known").unit_loads(model))
         };
@@ -67,28 +95,30 @@ impl Dense {
             panic!("rows")
         };
         let operator = DMatrix::from_fn(transposed.n_cols(), n, |i, j| transposed.get(j, i));
-        Self { stiffness, mass, damping, root: loads("root"), tip: loads("tip"), operator }
+        let root = loads("root");
+        let held_damping = damping_held_at(&stiffness, &mass, &root);
+        Self { stiffness, mass, free_damping, held_damping, root, tip: loads("tip"), operator }
     }
 
-    fn dynamic(&self, omega: f64) -> DMatrix<Complex<f64>> {
+    fn dynamic(&self, omega: f64, damping: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
         let n = self.mass.nrows();
         DMatrix::from_fn(n, n, |i, j| {
             let real = self.stiffness[(i, j)] - omega * omega * self.mass[(i, j)];
-            Complex::new(real, omega * self.damping[(i, j)])
+            Complex::new(real, omega * damping[(i, j)])
         })
     }
 
     /// Returns the stresses for unit forces and torques at the tip (rows x 6).
     fn forced(&self, hertz: f64) -> DMatrix<Complex<f64>> {
         let loads = self.tip.map(|value| Complex::new(value, 0.0));
-        let u = self.dynamic(TAU * hertz).lu().solve(&loads).expect("regular");
+        let u = self.dynamic(TAU * hertz, &self.free_damping).lu().solve(&loads).expect("regular");
         self.operator.map(|value| Complex::new(value, 0.0)) * u
     }
 
     /// Returns the stresses for unit accelerations of the root (rows x 6), whose motion is a condition with multipliers.
     fn driven(&self, hertz: f64) -> DMatrix<Complex<f64>> {
         let (n, omega) = (self.mass.nrows(), TAU * hertz);
-        let dynamic = self.dynamic(omega);
+        let dynamic = self.dynamic(omega, &self.held_damping);
         let matrix = DMatrix::from_fn(n + 6, n + 6, |i, j| match (i < n, j < n) {
             (true, true) => dynamic[(i, j)],
             (true, false) => Complex::new(self.root[(i, j - n)], 0.0),
