@@ -19,6 +19,7 @@ mod drilling;
 mod fe_model;
 mod geometric_stiffness;
 mod given_rows;
+mod ground;
 mod inertial_rows;
 mod interface;
 mod internal_rows;
