@@ -25,6 +25,7 @@ mod interface;
 mod internal_rows;
 mod layout;
 mod mass_structure;
+mod materials;
 mod named_load;
 mod node_pairs;
 mod nodes;
