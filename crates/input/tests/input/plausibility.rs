@@ -455,6 +455,19 @@ fn stiffness_in_another_unit_of_stress_is_refused() {
     assert_eq!(told(with_stiffness_times(&light, 4e-4)), [Code::SpeedImplausible]);
 }
 
+/// Mass between nodes that stiffness does not join may be that of points that the deck makes follow others.
+#[test]
+fn mass_of_points_that_follow_others_has_advice_of_its_own() {
+    let mut raw = exchanged(&raw_fixture("cube_hex8"), 0, 5);
+    let help = |raw: RawModel| {
+        let found = refused(raw).into_diagnostics();
+        found.into_iter().find(|d| d.code() == Code::MassOrder).expect("told").help().to_owned()
+    };
+    assert!(!help(raw.clone()).contains("RBE3"));
+    raw.diagnostics.push(Diagnostic::new(Code::DeckConstrained, "6 rows depend on others"));
+    assert!(help(raw).contains("RBE3"));
+}
+
 #[test]
 fn exchanged_matrices_are_named_as_such() {
     for name in [
