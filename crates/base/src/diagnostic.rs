@@ -128,6 +128,7 @@ codes! {
     NodeSetUnknown = "FB220", Error, BadInput, "node set or region contains no node of the model", "name a node set of the deck, or correct the region";
     RecoveryUnknown = "FB221", Error, BadInput, "body has no recovery of this name", "run flexbody inspect, which lists the recoveries; give [[recovery]] in the manifest to convert with one";
     SceneDamping = "FB225", Error, BadInput, "scene and body both define damping", "remove [damping] from the scene (--damping from the command), or write `replace = true` in it to ignore the damping of the body";
+    GravityUnits = "FB226", Warning, Done, "gravity of a scene is that of the earth in other units than those of the body", "write gravity in the units of the body: 9.81 m/s^2 is 9810 mm/s^2";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
     MatrixKind = "FB302", Error, BadInput, "kind of matrix is not supported", "write a real (or integer) sparse matrix";

@@ -101,7 +101,8 @@ pub(super) fn check_body(
     let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
     model.find_fixed_mass(mass_rounding);
     let kept = unrotated_mass_note(&model, mass_rounding, [first, second]);
-    found.extend(kept.map(|note| note.in_file(&mass_path)));
+    let follows = found.iter().any(|note| note.code() == Code::DeckConstrained);
+    found.extend(kept.map(|note| with_help_for_dependents(note, follows).in_file(&mass_path)));
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
     let density = plausibility.densities.map(|densities| densities.quartiles[1]);
     check_stress_scale(&model, density, &mut found);
@@ -215,6 +216,17 @@ fn unrotated_mass_note(model: &FeModel, rounding: f64, worst: [DofLabel; 2]) -> 
         let message = format!("part of the mass matrix does not rotate with the nodes: {why}");
         Diagnostic::new(Code::MassBlockStructure, message)
     })
+}
+
+/// Returns the note about mass that does not rotate with the nodes, with advice on dependent points if the deck has
+/// some: the error of their mass does not fall with the size of the elements.
+fn with_help_for_dependents(note: Diagnostic, follows: bool) -> Diagnostic {
+    if !follows {
+        return note;
+    }
+    note.with_help(
+        "if a point that follows others (RBE3, MPC) carries mass, give it rows of its own, tied by RBE2 or stiff beams: the mass of a dependent point turns with the body and not with the points that it follows, by which W2 and W3 are wrong; nothing to do for beams and shells without such points",
+    )
 }
 
 /// Adds a warning if D damps rigid motion: forces on the motion of the whole body are not in the modes.

@@ -8,6 +8,9 @@
 //! percent.
 
 use super::assemble::Assembled;
+use super::materials::{
+    MetalIn, Solid, StiffnessUnit, fitting_units, metal_in_metric_units, stiffness_unit, units_of_speed,
+};
 use super::node_pairs::neighbours;
 use super::wording::name_some;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -242,7 +245,7 @@ pub(super) fn check_density(
     }
     let mut diagnostic = Diagnostic::new(Code::DensityImplausible, message);
     let speed = local.sound_speed(3).map_or(0.0, |speed| speed.median);
-    let fitting = fitting_units(quartiles[1], speed).join(", or in ");
+    let fitting = fitting_units(Solid { density: quartiles[1], speed }).join(", or in ");
     if !units.stated {
         diagnostic = diagnostic.with_help(state_units(&fitting));
     } else if !fitting.is_empty() {
@@ -423,8 +426,8 @@ pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut V
 }
 
 /// Adds a warning if the speed of sound is implausible; `density` is in SI units, if known. Adds an error
-/// if units are not stated and the speed is plausible in other common units: K and M of beams and shells
-/// determine no density.
+/// if units are not stated and the speed is plausible in other common units, since K and M of beams and shells
+/// determine no density, and if density and speed are those of a metal in other units.
 pub(super) fn check_speed(
     body: &Assembled,
     local: &LocalMass,
@@ -439,12 +442,20 @@ pub(super) fn check_speed(
     let (whole, median) = (speeds.whole * to_si, speeds.median * to_si);
     let heavy = density.filter(|density| *density > MIN_HEAVY_DENSITY);
     let slowest = if heavy.is_some() { MIN_HEAVY_SPEED } else { PLAUSIBLE_SPEEDS.0 };
-    if whole.min(median) > PLAUSIBLE_SPEEDS.1 || whole.max(median) < slowest {
+    let is_implausible = whole.min(median) > PLAUSIBLE_SPEEDS.1 || whole.max(median) < slowest;
+    let metal =
+        density.and_then(|density| metal_in_other_units(body, density, speeds.median, is_implausible));
+    if let Some(diagnostic) = metal {
+        found.push(diagnostic);
+    } else if is_implausible {
         let matter = heavy.map_or(String::new(), |density| format!(" in a material of {density:.0} kg/m^3"));
         let message = format!(
             "stiffness, mass and coordinates give a speed of sound of {median:.3e} m/s{matter} (median of the nodes; {whole:.3e} m/s of the whole body)"
         );
-        let fitting = units_of_speed(speeds.median).join(", or in ");
+        let fitting = match density {
+            Some(density) => fitting_units(solid(body, density, speeds.median)).join(", or in "),
+            None => units_of_speed(speeds.median).join(", or in "),
+        };
         let unstated = !units.stated && !body.raw.allow_implausible && !fitting.is_empty();
         found.push(
             if unstated && !found.iter().any(|diagnostic| diagnostic.code() == Code::DensityImplausible) {
@@ -460,6 +471,49 @@ pub(super) fn check_speed(
     }
 }
 
+/// Returns a finding if density (kg/m^3) and speed of sound (in the units of the model) are those of a metal in
+/// other units than the stated ones: an error, or a warning if implausible numbers are allowed.
+fn metal_in_other_units(
+    body: &Assembled,
+    density: f64,
+    speed: f64,
+    is_implausible: bool,
+) -> Option<Diagnostic> {
+    let units = &body.raw.units;
+    let names = format!("{}, {}, {}", units.length.name(), units.mass.name(), units.time.name());
+    let speed_si = speed * units.length.to_si() / units.time.to_si();
+    let assumed = if units.stated { "" } else { " (assumed since no units are given)" };
+    let told = format!(
+        "in {names}{assumed} the elements have a density of {} kg/m^3 and a speed of sound of {} m/s",
+        significant(density, 4),
+        significant(speed_si, 4)
+    );
+    let solid = solid(body, density, speed);
+    let (message, help) = if let Some(MetalIn { metal, units }) =
+        metal_in_metric_units(solid, units, is_implausible)
+    {
+        let help = format!(
+            "state the units {units}, or write coordinates and matrices in one system of units; use --allow-implausible (or allow_implausible in [model]) to confirm {names}"
+        );
+        (format!("{told}, which no known metal has; in {units} the same numbers are those of {metal}"), help)
+    } else {
+        let StiffnessUnit { metal, factor } = stiffness_unit(density, speed_si)?;
+        let (factor, ratio) = (significant(factor, 6), significant(factor.sqrt(), 4));
+        let help = format!(
+            "write stiffness and mass in one system of units: K times {factor} fits {names} (MPa are N/mm^2: with lengths in mm they belong to mass in t, density in t/mm^3); use --allow-implausible (or allow_implausible in [model]) if the stiffness is intended"
+        );
+        (format!("{told}: the density is that of {metal}, and so is {ratio} times the speed"), help)
+    };
+    let code = if body.raw.allow_implausible { Code::SpeedImplausible } else { Code::DensityImplausible };
+    Some(Diagnostic::new(code, message).with_help(help))
+}
+
+/// Returns the numbers of the model for a density in kg/m^3 and a speed in the units of the model.
+fn solid(body: &Assembled, density: f64, speed: f64) -> Solid {
+    let units = &body.raw.units;
+    Solid { density: density * units.length.to_si().powi(3) / units.mass.to_si(), speed }
+}
+
 /// Returns advice on numbers without stated units, with the units in which they are plausible.
 fn state_units(fitting: &str) -> String {
     let reason =
@@ -467,28 +521,4 @@ fn state_units(fitting: &str) -> String {
     format!(
         "state the units with --units LENGTH,MASS,TIME, or [model.units] in the manifest{reason}; use --allow-implausible (or allow_implausible in [model]) if m, kg, s are intended"
     )
-}
-
-/// Common units: their names, length in m and mass in kg; time is in s.
-const COMMON_UNITS: [(&str, f64, f64); 5] = [
-    ("m, kg, s", 1.0, 1.0),
-    ("mm, t, s", 1e-3, 1e3),
-    ("cm, g, s", 1e-2, 1e-3),
-    ("in, slinch, s", 0.0254, 175.126_835_246_476_36),
-    ("ft, slug, s", 0.3048, 14.593_902_937_206_364),
-];
-
-/// Returns the common units in which a density and a speed of sound are plausible.
-fn fitting_units(density: f64, speed: f64) -> Vec<&'static str> {
-    let of_speed = units_of_speed(speed);
-    let fits = |&&(name, length, mass): &&(&str, f64, f64)| {
-        (500.0..20_000.0).contains(&(density * mass / length.powi(3))) && of_speed.contains(&name)
-    };
-    COMMON_UNITS.iter().filter(fits).map(|&(name, ..)| name).collect()
-}
-
-/// Returns the common units in which a speed of sound is plausible.
-fn units_of_speed(speed: f64) -> Vec<&'static str> {
-    let fits = |&&(_, length, _): &&(&str, f64, f64)| (500.0..20_000.0).contains(&(speed * length));
-    COMMON_UNITS.iter().filter(fits).map(|&(name, ..)| name).collect()
 }

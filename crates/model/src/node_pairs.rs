@@ -113,6 +113,9 @@ pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) ->
     } else if are_mass_elements(mass, rows, count, &foreign) {
         let help = "nothing to do if the model has a mass element or a mass spread over nodes: each of these nodes shares mass with each other";
         found.push(report(Code::MassPairs).with_help(help));
+    } else if found.iter().any(|note| note.code() == Code::DeckConstrained) {
+        let help = "give the points with mass that follow others (RBE3, MPC) rows of their own, tied by RBE2 or stiff beams: the mass of a dependent point lies on all points that it follows, and the part of it that rotations of the point move does not turn with these points; --allow-implausible (or allow_implausible in [model]) accepts errors of W2 and W3 by it";
+        found.push(report(Code::MassOrder).with_help(help));
     } else {
         found.push(report(Code::MassOrder));
     }

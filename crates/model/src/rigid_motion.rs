@@ -2,6 +2,7 @@
 //! labels if not.
 
 use super::assemble::Assembled;
+use super::ground::ground_springs;
 use super::rows::{Recovered, Rows, centre_and_length, rigid_count, rigid_fields, rigid_residuals};
 use super::wording::name_some;
 use super::{DofLabel, Nodes};
@@ -13,8 +14,9 @@ use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMat
 use nalgebra::Matrix3;
 
 /// Returns max |K R|_i / sum_j |K_ij| over the rows. Adds an error if rigid motion strains the body, above
-/// `limit`: node tables with few digits leave up to 1e-6, supports 0.01 to 1. Above `rounded` a note
-/// reports the accuracy of the positions, since the invariants have no more digits.
+/// `limit`: node tables with few digits leave up to 1e-6, supports 0.01 to 1. Springs to ground are an error
+/// below the limit as well. Above `rounded` a warning reports the accuracy of the positions, since the
+/// invariants have no more digits.
 pub(super) fn check_rigid_motion(
     body: &Assembled,
     rounded: f64,
@@ -26,6 +28,7 @@ pub(super) fn check_rigid_motion(
     let fields = rows.rigid_fields(&nodes.positions, centre, length);
     let residuals = rigid_residuals(stiffness, &fields, &rows.field_sizes(length));
     let worst = largest(residuals.iter().copied());
+    let ground = ground_springs(body);
     if worst.is_nan() || worst > limit {
         let mut strained: Vec<usize> =
             (0..residuals.len()).filter(|&i| residuals[i].is_nan() || residuals[i] > limit).collect();
@@ -38,20 +41,26 @@ pub(super) fn check_rigid_motion(
             residuals.len(),
             name_some(&named)
         );
-        let help = match mislabelled(body, limit) {
-            Some(help) => help,
-            None if is_stressed(body, &fields, &strained, limit) => {
+        let help = match (mislabelled(body, limit), ground) {
+            (Some(help), _) => help,
+            (None, _) if is_stressed(body, &fields, &strained, limit) => {
                 "write K of the unloaded body, and give the stress stiffness as [[geometric_stiffness]]: at these nodes K resists rotations but not translations, so that it contains the stress of a preload (pretension of a member, contact, pressure)"
             }
-            None if strained.len() * 2 < residuals.len() => {
+            (None, Some(ground)) if strained.len() * 2 < residuals.len() => {
+                found.push(ground);
+                return worst;
+            }
+            (None, None) if strained.len() * 2 < residuals.len() => {
                 "export the free body: these degrees of freedom are supported or tied to ground"
             }
-            None => {
+            (None, _) => {
                 "check units and order of the coordinates, and the labels of rotations: nearly all rows fail"
             }
         };
         let diagnostic = Diagnostic::new(Code::RigidMotionStrained, message);
         found.push(diagnostic.in_file(&raw.stiffness.path).with_help(help));
+    } else if ground.is_some() {
+        found.extend(ground);
     } else if worst > rounded {
         let message = format!(
             "|K R| reaches {worst:.1e} of the row sum of |K|: node positions fit the stiffness to about this part of the size of the body"

@@ -4,7 +4,7 @@ use super::craig_bampton;
 use super::numbers::{counted, frequency, plain, significant};
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::{FlexBody, TermGroup, is_static};
-use flexbody_body::invariants::DIGITS;
+use flexbody_body::invariants::{DIGITS, digits_of_error};
 use flexbody_linalg::ties::first_smallest;
 use serde::{Serialize, Serializer};
 
@@ -189,7 +189,7 @@ impl GuaranteeFacts {
         let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
         let digits = |(value, (lower, upper)): (&f64, (&f64, &f64))| {
             let error = (value - lower).max(upper - value) / value;
-            (-error.log10()).clamp(0.0, 16.0)
+            digits_of_error(error)
         };
         Some(Self {
             eigenvalue_digits: body.modes().eigenvalue.iter().zip(bounds).map(digits).collect(),

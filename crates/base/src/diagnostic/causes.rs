@@ -66,6 +66,7 @@ causes! {
     NodeSetUnknown = "The set is not in the deck, or no node lies in the region that an interface, a cut or a recovery describes: its units or axes may differ from those of the nodes.";
     RecoveryUnknown = "The body was converted without a recovery of this name.";
     SceneDamping = "The body file holds modal damping and the scene defines damping too; the sum of both is rarely meant.";
+    GravityUnits = "The number of the gravity in a scene is 9.81 (or 9810, 386.1, 32.2) although the body has another unit of length, so that the weight is wrong by the ratio of the units.";
     // FB3xx: matrices
     MatrixSyntax = "A line or a record of the matrix file does not have the form of its format.";
     MatrixKind = "The matrix is complex, skew-symmetric, dense or has only a pattern; K and M are real sparse matrices.";
@@ -121,7 +122,7 @@ causes! {
     MassPairs = "A mass element, or a mass spread over several nodes, joins nodes in M that no element joins in K.";
     MassesExchanged = "Neighbouring nodes have different masses where their stiffness is alike, and the masses fit only if the two nodes are exchanged: M was written in another order of nodes than K.";
     SpeedImplausible = "The speed of sound that K, M and the node distances imply is that of no material.";
-    DensityImplausible = "Mass per volume or the speed of sound is far from all materials, as with coordinates in mm and matrices in m.";
+    DensityImplausible = "Mass per volume or the speed of sound is far from all materials, as with coordinates in mm and matrices in m, or both are those of a metal in other units than the stated ones.";
     MatricesExchanged = "The matrix given as mass vanishes for rigid motions as a stiffness does, and the other one does not.";
     InterfaceFar = "The reference point lies far outside the nodes of the interface, as with coordinates in other units or axes.";
     GeometricStiffnessMotion = "The stiffness of a stress has known products with rigid motions (docs/how_to/geometric_stiffness.md). This matrix does not have them.";

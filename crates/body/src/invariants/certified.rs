@@ -25,6 +25,12 @@ const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
 /// Factor that covers the rounding of the bounds themselves.
 const ROUNDING_MARGIN: f64 = 1.0 + 1e-6;
 
+/// Returns the digits that a relative error leaves: -log10 of the error, between zero (also for NaN) and
+/// -log10(2^-53) = 15.95, the digits of a number that is stored as f64.
+pub fn digits_of_error(error: f64) -> f64 {
+    (-larger(error, UNIT_ROUNDOFF).log10()).max(0.0)
+}
+
 /// Invariants with guaranteed digits, by their names in the file.
 pub const DIGITS: [&str; 13] = [
     "mass",
@@ -252,8 +258,7 @@ fn digits(value: &Invariants, errors: &Invariants) -> [f64; DIGITS.len()] {
         worst_ratio(3, nf, |k, p| entries.c2(k, p)),
         worst_ratio(nf, nf, |p, q| (entries.s(&[(0, 0), (1, 1), (2, 2)], p, q), bound.s(p, q))),
     ];
-    // An f64 carries at most sixteen digits, also if the bound of a zero suggests more.
-    ratios.map(|ratio| if ratio.is_nan() { 0.0 } else { (-ratio.log10()).clamp(0.0, 16.0) })
+    ratios.map(digits_of_error)
 }
 
 /// Returns the largest error of the entries of a matrix relative to their scales; an error of zero counts

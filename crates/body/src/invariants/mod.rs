@@ -14,7 +14,7 @@ mod lumped;
 mod primary;
 mod transform;
 
-pub use certified::{CertifiedInvariants, DIGITS, condense_certified};
+pub use certified::{CertifiedInvariants, DIGITS, condense_certified, digits_of_error};
 pub use comparison::{
     Alignment, CauchySchwarz, ERROR_NORMS, align, compare_invariants, error_norms, primary_differences,
 };

@@ -174,6 +174,11 @@ fn every_invariant_has_its_guaranteed_digits_and_not_many_more() {
             assert!(error <= promised, "seed {seed}: {name} is off by {error:e}, promised {promised:e}");
             // Rounding the exact number to f64 costs 1e-16; derived entries add a few such errors.
             assert!(digits > 14.5, "seed {seed}: {name} has {digits} digits, its error is {error:e}");
+            // A stored number is rounded by 2^-53 of itself.
+            assert!(
+                10f64.powf(-digits) >= 0.999 * 0.5f64.powi(53),
+                "seed {seed}: {name} claims {digits} digits"
+            );
         }
     }
 }

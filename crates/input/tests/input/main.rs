@@ -3,6 +3,7 @@
 #![allow(unreachable_pub)] // tests export nothing
 
 mod bombs;
+mod ground;
 mod input_fuzz;
 mod input_hdf5;
 mod input_readers;

@@ -1,7 +1,7 @@
 //! Plausibility of mass, stiffness and positions: M in another order or from another mesh, contradictory
 //! units, exchanged matrices. Every mistake is made in a valid model that gives no message.
 
-use flexbody_base::diagnostic::Code;
+use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, ExitCode};
 use flexbody_base::units::UnitSystem;
 use flexbody_linalg::CscMatrix;
@@ -371,21 +371,101 @@ fn numbers_without_units_are_those_of_matter() {
 
 #[test]
 fn speeds_of_sound_of_no_matter_are_told() {
-    let (bracket, bar) = (raw_fixture("bracket_hex20"), raw_fixture("bar_c3d8r"));
     let cases = [
-        ("Young's modulus in MPa beside metres and kilograms", with_stiffness_times(&bar, 1e-6)),
-        ("the same of beams", with_stiffness_times(&raw_fixture("frame_beams"), 1e-6)),
+        ("a rubber of the density of steel", with_stiffness_times(&raw_fixture("bar_c3d8r"), 1e-5)),
+        (
+            "Young's modulus in MPa beside metres and kilograms, of beams",
+            with_stiffness_times(&raw_fixture("frame_beams"), 1e-6),
+        ),
         ("the same of shells", with_stiffness_times(&raw_fixture("shell_folded"), 1e-6)),
         ("the same of a plane frame", with_stiffness_times(&raw_fixture("plane_frame"), 1e-6)),
-        (
-            "newtons beside kilograms and millimetres",
-            in_units(&with_mass_times(&bracket, 1e3), ["mm", "kg", "s"]),
-        ),
         ("frame of 7.85 for 7850", with_mass_times(&raw_fixture("frame_beams"), 1e-3)),
     ];
     for (case, raw) in cases {
         assert!(told(raw).contains(&Code::SpeedImplausible), "{case}");
     }
+}
+
+fn implausible(raw: &RawModel) -> Diagnostic {
+    let found = refused(raw.clone()).into_diagnostics();
+    found.into_iter().find(|d| d.code() == Code::DensityImplausible).expect("told")
+}
+
+/// Coordinates in metres beside matrices in mm, t, s: the numbers are consistent in m, t, s.
+#[test]
+fn mixtures_of_metric_units_are_advised_first() {
+    let mixed = with_nodes_times(&raw_fixture("bracket_hex20"), 1e-3);
+    let unstated = RawModel { units: UnitSystem::default(), ..mixed.clone() };
+    for raw in [&mixed, &unstated, &in_units(&mixed, ["m", "kg", "s"]), &in_units(&mixed, ["cm", "kg", "s"])]
+    {
+        let help = implausible(raw).help().to_owned();
+        assert!(help.contains("the numbers fit materials in m, t, s;") && !help.contains("slug"), "{help}");
+    }
+    assert_eq!(told(in_units(&mixed, ["m", "t", "s"])), []);
+}
+
+#[test]
+fn other_units_in_which_metric_numbers_are_no_metal_are_confirmed() {
+    let mixed = with_nodes_times(&raw_fixture("bracket_hex20"), 1e-3);
+    for units in [["ft", "slug", "s"], ["cm", "g", "s"]] {
+        let raw = in_units(&mixed, units);
+        let found = implausible(&raw);
+        assert!(found.message().contains("in m, t, s the same numbers are those of steel"), "{found}");
+        assert!(found.help().contains("--allow-implausible"), "{found}");
+        assert_eq!(told(RawModel { allow_implausible: true, ..raw }), [Code::SpeedImplausible], "{units:?}");
+    }
+    // Steel and aluminium in inches and feet.
+    for (name, metre, kilogram) in [("bracket_hex20", 1e3, 1e-3), ("cube_hex8", 1.0, 1.0)] {
+        for (units, length, mass) in [
+            (["in", "slinch", "s"], 0.0254, 175.126_835_246_476_36),
+            (["ft", "slug", "s"], 0.3048, 14.593_902_937_206_364),
+        ] {
+            let raw = with_nodes_times(&raw_fixture(name), 1.0 / metre / length);
+            let raw = with_mass_times(&raw, 1.0 / kilogram / mass);
+            let raw = in_units(&with_stiffness_times(&raw, 1.0 / kilogram / mass), units);
+            assert_eq!(told(raw.clone()), [], "{name} in {units:?}");
+            let help = implausible(&RawModel { units: UnitSystem::default(), ..raw }).help().to_owned();
+            assert!(help.contains(&format!("materials in {};", units.join(", "))), "{help}");
+        }
+    }
+}
+
+/// The density of a metal, and a speed of sound that is off by the root of a ratio of units of stress.
+#[test]
+fn stiffness_in_another_unit_of_stress_is_refused() {
+    let bracket = in_units(&with_mass_times(&raw_fixture("bracket_hex20"), 1e3), ["mm", "kg", "s"]);
+    let bar = raw_fixture("bar_c3d8r");
+    let [kilopascals, megapascals, pascals] =
+        [1e-3, 1e-6, 1e3].map(|factor| with_stiffness_times(&bar, factor));
+    for (raw, metal, ratio) in [
+        (bracket, "steel", "31.62"),
+        (kilopascals, "steel", "31.62"),
+        (megapascals, "steel", "1000"),
+        (pascals, "steel", "0.03162"),
+        (with_stiffness_times(&raw_fixture("cube_hex8"), 1e-3), "aluminium", "31.62"),
+    ] {
+        let found = implausible(&raw);
+        let said = format!("the density is that of {metal}, and so is {ratio} times the speed");
+        assert!(found.message().ends_with(&said), "{found}");
+        assert_eq!(told(RawModel { allow_implausible: true, ..raw }), [Code::SpeedImplausible]);
+    }
+    // No metal has this density and this speed.
+    assert_eq!(told(with_stiffness_times(&bar, 1e-3 / 5.0)), [Code::SpeedImplausible]);
+    let light = with_mass_times(&bar, 0.4);
+    assert_eq!(told(with_stiffness_times(&light, 4e-4)), [Code::SpeedImplausible]);
+}
+
+/// Mass between nodes that stiffness does not join may be that of points that the deck makes follow others.
+#[test]
+fn mass_of_points_that_follow_others_has_advice_of_its_own() {
+    let mut raw = exchanged(&raw_fixture("cube_hex8"), 0, 5);
+    let help = |raw: RawModel| {
+        let found = refused(raw).into_diagnostics();
+        found.into_iter().find(|d| d.code() == Code::MassOrder).expect("told").help().to_owned()
+    };
+    assert!(!help(raw.clone()).contains("RBE3"));
+    raw.diagnostics.push(Diagnostic::new(Code::DeckConstrained, "6 rows depend on others"));
+    assert!(help(raw).contains("RBE3"));
 }
 
 #[test]

@@ -8,6 +8,8 @@ use super::{Axes, Carried, History, Load, Point, Range, Scene, VectorHistory};
 use crate::dynamics::{Orientation, RotationVector};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
+use flexbody_base::numbers::significant;
+use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{Carrier, FlexBody};
 use nalgebra::{Matrix3, Vector3};
 use std::borrow::Cow;
@@ -68,12 +70,43 @@ impl<'a> FramedScene<'a> {
         };
         let mut resolved = resolved(scene, &body.frame().axes, &framed_body.frame().origin);
         found.extend(idle(&framed_body, &resolved));
+        found.extend(gravity_in_other_units(body.units(), scene));
         found.extend(released_preloads(body, scene));
         let preloads = body.named_loads().iter().filter(|load| load.preload);
         let acting = preloads.map(|load| Load::named(&load.name, History::Constant(1.0)));
         resolved.loads.extend(acting);
         Ok(Self { body: framed_body, scene: Cow::Owned(resolved), found })
     }
+}
+
+/// Standard acceleration of gravity in m/s^2.
+const STANDARD_GRAVITY: f64 = 9.80665;
+
+/// Returns a warning if the size of gravity is the number of the standard gravity in another unit of length.
+fn gravity_in_other_units(units: &UnitSystem, scene: &Scene) -> Option<Diagnostic> {
+    /// Largest relative difference from the standard gravity: 10 m/s^2 counts as it.
+    const TOLERANCE: f64 = 0.03;
+    /// Units of acceleration, with their sizes in m/s^2.
+    const UNITS: [(&str, f64); 5] =
+        [("m/s^2", 1.0), ("mm/s^2", 1e-3), ("cm/s^2", 1e-2), ("in/s^2", 0.0254), ("ft/s^2", 0.3048)];
+    let is_standard = |si: f64| (si / STANDARD_GRAVITY - 1.0).abs() <= TOLERANCE;
+    let size = scene.gravity?.norm();
+    let unit = units.length.to_si() / units.time.to_si().powi(2);
+    let (meant, _) =
+        UNITS.iter().find(|(_, si)| is_standard(size * si)).filter(|_| !is_standard(size * unit))?;
+    let named = format!("{}/{}^2", units.length_name(), units.time_name());
+    let message = format!(
+        "`gravity` of {} {named} is {} m/s^2: the number is that of gravity in {meant}, and the body has lengths in {} and times in {}",
+        significant(size, 6),
+        significant(size * unit, 4),
+        units.length_name(),
+        units.time_name()
+    );
+    let help = format!(
+        "write gravity in the units of the body: {} {named}; nothing to do if another gravity is meant",
+        significant(STANDARD_GRAVITY / unit, 6)
+    );
+    Some(Diagnostic::new(Code::GravityUnits, message).with_help(help))
 }
 
 /// Returns an error for a scene that gives a preload an amplitude.
