@@ -43,6 +43,38 @@ fn a_matrix_market_file_is_read_up_to_its_first_entry_too_many() {
     assert_refused(&path, Code::MatrixCount, "header announces 78 entries, the file has more");
 }
 
+/// Returns a file of the tetrahedron with `times` times 65536 lines behind its text.
+fn with_tail(folder: &Path, name: &str, text: &str, line: &str, times: usize) -> std::path::PathBuf {
+    let path = folder.join(name);
+    gzip(&path, text, line, times);
+    path
+}
+
+/// Blank lines and comments behind the entries, which a small file may unpack to without end. Few of them are no error.
+#[test]
+fn a_text_is_read_up_to_16_mib_of_blank_lines_and_comments() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = fs::read_to_string(fixtures().join("small/tet4/K.mtx")).expect("a matrix");
+    let blanks = format!("{}\n", " ".repeat(63));
+    for (line, times) in [("\n", 400), ("% of a comment, of many\n", 20), (&blanks, 8)] {
+        let path = with_tail(folder.path(), "K.mtx.gz", &text, line, times);
+        assert_refused(&path, Code::MatrixCount, "bytes with 42 values among them");
+        let path = with_tail(folder.path(), "K.mtx.gz", &text, line, 1);
+        let location = MatrixLocation { path, group: None };
+        let read = read_matrix(&location, MatrixRole::Stiffness).expect("a matrix with a short tail");
+        assert_eq!(read.matrix.n_rows(), 12);
+    }
+    let text = "%%MatrixMarket matrix array real general\n12 1\n".to_owned() + &"1\n".repeat(12);
+    let path = with_tail(folder.path(), "shapes.mtx.gz", &text, &blanks, 8);
+    let location = MatrixLocation { path, group: None };
+    let error = flexbody_input::read_shapes(&location, &[12], "shapes").expect_err("refused");
+    assert!(error.to_string().contains("bytes with 12 values among them"), "{error}");
+    // Lines that cannot be read are named as well.
+    let line = format!("no entry{blanks}");
+    let path = with_tail(folder.path(), "K.mtx.gz", &format!("{BANNER}12 12 900000\n"), &line, 5);
+    assert_refused(&path, Code::MatrixSyntax, "no entry");
+}
+
 /// Matrices without a header have the rows of their job.
 #[test]
 fn lines_without_a_head_are_no_more_than_their_rows_can_have() {
@@ -57,6 +89,9 @@ fn lines_without_a_head_are_no_more_than_their_rows_can_have() {
     gzip(&folder.path().join("job.sti"), "", "1 1 1\n", 40);
     let error = read_model(&files).expect_err("refused");
     assert!(error.to_string().contains("declares") && error.has(Code::MatrixCount), "{error}");
+    gzip(&folder.path().join("job.sti"), "1 1 1\n", "\n", 400);
+    let error = read_model(&files).expect_err("refused");
+    assert!(error.to_string().contains("bytes with 1 values among them"), "{error}");
 }
 
 /// Returns a NumPy array with this header and data.
@@ -135,6 +170,44 @@ fn a_variable_of_matlab_has_no_more_bytes_than_its_extents_leave() {
         Code::MatrixCount,
         "a variable has 32000000 bytes, but its extents allow at most 4000000",
     );
+}
+
+/// Zeros behind the numbers of a packed variable.
+#[test]
+fn a_variable_of_matlab_ends_with_its_numbers() {
+    let element = |kind: u32, bytes: &[u8]| {
+        let mut own = [kind.to_le_bytes(), (bytes.len() as u32).to_le_bytes()].concat();
+        own.extend(bytes);
+        own.resize(own.len().next_multiple_of(8), 0);
+        own
+    };
+    let value = |count: usize| {
+        let head = [element(6, &[6, 0, 0, 0, 0, 0, 0, 0]), element(5, &[2, 0, 0, 0, 2, 0, 0, 0])];
+        let numbers = [element(1, b"K"), element(9, &[2.0f64, 1.0, 1.0, 2.0].map(f64::to_le_bytes).concat())];
+        let mut variable = [head.concat(), numbers.concat()].concat();
+        variable.resize(variable.len() + count, 0);
+        let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
+        let tag = [14u32.to_le_bytes(), (variable.len() as u32).to_le_bytes()].concat();
+        packed.write_all(&[tag, variable].concat()).expect("memory");
+        let packed = packed.finish().expect("memory");
+        let mut file = b"MATLAB 5.0 MAT-file".to_vec();
+        file.resize(124, b' ');
+        file.extend(b"\x00\x01IM");
+        file.extend([15u32.to_le_bytes(), (packed.len() as u32).to_le_bytes()].concat());
+        file.extend(packed);
+        file
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("K.mat");
+    fs::write(&path, value(1 << 20)).expect("written");
+    assert_refused(
+        &path,
+        Code::MatrixCount,
+        "a compressed variable has more than 65536 bytes after its numbers",
+    );
+    fs::write(&path, value(8)).expect("written");
+    let location = MatrixLocation { path, group: None };
+    assert_eq!(read_matrix(&location, MatrixRole::Stiffness).expect("a matrix").matrix.get(0, 0), 2.0);
 }
 
 #[test]
