@@ -266,3 +266,33 @@ fn written(path: &Path, fill: impl Fn(&hdf5_metno::Group)) {
     group.new_dataset_builder().with_data(&[0_i32]).create("indices").expect("indices");
     fill(&group);
 }
+
+/// Several names of one dataset, each of which would be read.
+#[test]
+fn datasets_of_exodus_store_no_more_than_their_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("nodes.exo");
+    let write = |sets: usize| {
+        let file = hdf5_metno::File::create(&path).expect("a file");
+        for (name, values) in [
+            ("coordx", [0.0, 0.1, 0.0, 0.0]),
+            ("coordy", [0.0, 0.0, 0.2, 0.0]),
+            ("coordz", [0.0, 0.0, 0.0, 0.3]),
+        ] {
+            file.new_dataset_builder().with_data(&values).create(name).expect("coordinates");
+        }
+        file.new_dataset_builder().with_data(&[10, 20, 30, 40]).create("node_num_map").expect("numbers");
+        file.new_dataset_builder().with_data(&[1; 20_000]).create("node_ns1").expect("a set");
+        (2..=sets).for_each(|k| file.link_hard("node_ns1", &format!("node_ns{k}")).expect("a name"));
+    };
+    let small = |name: &str| fixtures().join("small/tet4").join(name);
+    let dofs = Some(small("dofs.csv"));
+    let files = ModelFiles::from_arguments(small("K.mtx"), small("M.mtx"), &path, dofs, Some("m,kg,s"))
+        .expect("units");
+    write(1);
+    read_model(&files).expect("a set with a node many times");
+    write(200);
+    let error = read_model(&files).expect_err("refused");
+    assert_eq!(error.first_error().code(), Code::NodeFileSyntax, "{error}");
+    assert!(error.to_string().contains("node_ns2` has several names"), "{error}");
+}
