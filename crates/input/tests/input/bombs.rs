@@ -267,6 +267,33 @@ fn written(path: &Path, fill: impl Fn(&hdf5_metno::Group)) {
     fill(&group);
 }
 
+/// Short lines of a deck of Nastran that stand for a million grids each.
+#[test]
+fn lines_of_nastran_stand_for_a_million_grids_in_all() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("nodes.bdf");
+    let small = |name: &str| fixtures().join("small/tet4").join(name);
+    let dofs = Some(small("dofs.csv"));
+    let files = ModelFiles::from_arguments(small("K.mtx"), small("M.mtx"), &path, dofs, Some("m,kg,s"))
+        .expect("units");
+    let head = "SOL 103\nCEND\nBEGIN BULK\nGRID,10,,0.,0.,0.\nGRID,20,,.1,0.,0.\nGRID,30,,0.,.2,0.\nGRID,40,,0.,0.,.3\n";
+    let ranges =
+        |last: u32| format!("RBE2,1,10,123,100,THRU,{last}\nRBE2,2,10,123,100,THRU,{last}\nENDDATA\n");
+    let repeated = |count: u32| format!("GRID,100,,0.,0.,0.\n=,*1,==\n=({count}),\n=({count}),\nENDDATA\n");
+    for (lines, part) in [(ranges(600_000), "RBE2"), (repeated(600_000), "more than 1000000 cards")] {
+        fs::write(&path, format!("{head}{lines}")).expect("written");
+        let error = read_model(&files).expect_err("refused");
+        assert_eq!(error.first_error().code(), Code::DeckSyntax, "{error}");
+        assert!(error.to_string().contains(part), "{error}");
+    }
+    for lines in [ranges(60_000), repeated(60_000)] {
+        fs::write(&path, format!("{head}{lines}")).expect("written");
+        if let Err(error) = read_model(&files) {
+            assert!(!error.has(Code::DeckSyntax), "{error}");
+        }
+    }
+}
+
 /// Several names of one dataset, each of which would be read.
 #[test]
 fn datasets_of_exodus_store_no_more_than_their_file() {
