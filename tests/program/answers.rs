@@ -189,6 +189,12 @@ fn collections_are_refused_where_a_step_is_not_a_mesh_with_answers() {
         ),
         ("itself.pvd", list.replace("step4.vtu", "itself.pvd"), "FB327", "`Collection`"),
         ("twice.pvd", list.replace("\"3.5\"", "\"4.5\""), "FB327", "time 4.5 has several files"),
+        (
+            "same.pvd",
+            list.replace("step4.vtu", "step3.vtu"),
+            "FB327",
+            "step3.vtu is the file of several times",
+        ),
         ("time.pvd", list.replace("\"3.5\"", "\"later\""), "FB327", "no time or no file"),
         ("order.pvd", list.replace("\"3.5\"", "\"10\""), "FB326", "displacements of step 4 differ"),
         ("fewer.pvd", list.replace("<DataSet timestep=\"3.5\"", "<Other"), "FB326", "8 steps"),

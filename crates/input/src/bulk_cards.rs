@@ -6,7 +6,7 @@ mod lines;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{self, Lines, excerpt, field, line_number, real, whole};
-use lines::{Apart, Replication, ReplicationRequest};
+use lines::{Apart, MAX_REPEATED_CARDS, Replication, ReplicationRequest};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -206,6 +206,8 @@ struct BulkReader<'t> {
     apart: Apart,
     /// Changes from card to card by the last line of replication.
     replication: Replication,
+    /// Number of cards that lines `=(n)` have represented.
+    repeated: i64,
     take: &'t mut dyn FnMut(Item<'_>) -> Taken,
 }
 
@@ -213,7 +215,8 @@ impl<'t> BulkReader<'t> {
     fn new(in_bulk: bool, take: &'t mut dyn FnMut(Item<'_>) -> Taken) -> Self {
         let (files, card, card_path) = (Vec::new(), Card::default(), PathBuf::new());
         let (apart, replication) = (Apart::default(), Replication::default());
-        Self { files, in_bulk, ended: false, card, card_path, is_open: false, apart, replication, take }
+        let (ended, is_open, repeated) = (false, false, 0);
+        Self { files, in_bulk, ended, card, card_path, is_open, apart, replication, repeated, take }
     }
 
     fn file(&mut self, path: &Path, file: &InputFile, depth: usize) -> Taken {
@@ -362,6 +365,13 @@ impl<'t> BulkReader<'t> {
 
     /// Makes `count` cards from the last one by replication.
     fn replicate(&mut self, count: i64, at: &Place<'_>) -> Taken {
+        self.repeated = self.repeated.saturating_add(count);
+        if self.repeated > MAX_REPEATED_CARDS {
+            let message =
+                format!("lines of repetition represent more than {MAX_REPEATED_CARDS} cards of the deck");
+            let refused = Diagnostic::new(Code::DeckSyntax, message).in_file(at.path).at_line(at.line);
+            return Err(refused.with_help("write the cards one by one"));
+        }
         for _ in 0..count {
             let next = self.replication.next(&self.card);
             let mut next = next.map_err(|diagnostic| diagnostic.in_file(at.path).at_line(at.line))?;

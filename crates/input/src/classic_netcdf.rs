@@ -9,6 +9,8 @@ mod tests;
 
 use super::node_files::NumberType;
 use flexbody_base::memory::left;
+use std::cell::Cell;
+use std::collections::HashMap;
 
 /// Result of reading a file. The error describes the problem.
 pub(super) type Read<T> = Result<T, String>;
@@ -62,8 +64,12 @@ impl Variable {
 pub(super) struct ClassicNetcdf<'f> {
     bytes: &'f [u8],
     variables: Vec<Variable>,
+    /// Index of the first variable of each name.
+    places: HashMap<String, usize>,
     /// Distance of the records of a variable.
     record_bytes: usize,
+    /// Number of bytes of the variables that were read.
+    read: Cell<usize>,
 }
 
 impl<'f> ClassicNetcdf<'f> {
@@ -80,7 +86,7 @@ impl<'f> ClassicNetcdf<'f> {
 
     /// Returns the variable of this name.
     pub(super) fn variable(&self, name: &str) -> Option<&Variable> {
-        self.variables.iter().find(|variable| variable.name == name)
+        self.places.get(name).map(|at| &self.variables[*at])
     }
 
     /// Returns the numbers of a variable, row by row.
@@ -127,6 +133,16 @@ impl<'f> ClassicNetcdf<'f> {
             return Ok(Vec::new());
         }
         piece(count - 1).ok_or_else(ends)?;
+        // Variables do not overlap: all together have no more bytes than the file.
+        let read = variable.bytes.saturating_mul(count).saturating_add(self.read.get());
+        self.read.set(read);
+        if read > self.bytes.len() {
+            return Err(format!(
+                "variable `{}` lies where other variables lie: they have {read} bytes together, the file has {}",
+                variable.name,
+                self.bytes.len()
+            ));
+        }
         (0..count).map(|record| piece(record).ok_or_else(ends)).collect()
     }
 }
@@ -168,7 +184,11 @@ impl<'f> Header<'f> {
             variable.shape[0] = records;
             size(&variable.shape, 1).ok_or(CUT_OFF)?;
         }
-        Ok(ClassicNetcdf { bytes: self.bytes, variables, record_bytes })
+        let mut places = HashMap::new();
+        for (at, variable) in variables.iter().enumerate() {
+            places.entry(variable.name.clone()).or_insert(at);
+        }
+        Ok(ClassicNetcdf { bytes: self.bytes, variables, places, record_bytes, read: Cell::new(0) })
     }
 
     fn take(&mut self, count: usize) -> Read<&'f [u8]> {

@@ -55,7 +55,8 @@ impl Coordinates {
     /// Returns how the file ends; by a line if reading stopped at too many entries.
     ///
     /// # Errors
-    /// FB103 for a damaged compressed file.
+    /// FB103 for a damaged compressed file, FB304 for a compressed file that unpacks to little but blank lines and
+    /// comments, with the bad lines so far.
     pub(super) fn read(
         &mut self,
         path: &Path,
@@ -72,6 +73,12 @@ impl Coordinates {
                 self.stopped = true;
                 return Ok(TextEnd::Line);
             }
+            let entries = self.count - self.bad.count() as u64;
+            blocks.refuse_filling(entries).map_err(|refused| {
+                let mut found = self.bad_lines(TextEnd::Line);
+                found.push(refused);
+                found
+            })?;
             match following? {
                 Some(following) => blocks.take_back(std::mem::replace(&mut block, following)),
                 None => return Ok(blocks.end()),
@@ -171,6 +178,13 @@ const GROWTH: usize = 16;
 /// Bytes per piece that one thread parses.
 const PIECE: usize = 1 << 20;
 
+/// Number of bytes that any compressed text may unpack to, entries or not. A larger number lets a file of a thousandth of
+/// its bytes unpack to as many blanks, for which the reader takes about ten seconds per gigabyte.
+const MAX_FILLING: u64 = 16 << 20;
+
+/// Number of bytes for each entry that a compressed text may have besides. Lines of entries have less than 100.
+const MAX_ENTRY_BYTES: u64 = 256;
+
 /// End of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TextEnd {
@@ -190,16 +204,37 @@ pub(crate) struct Blocks<'a> {
     spare: Vec<u8>,
     /// Last byte of the text so far.
     last: u8,
+    is_packed: bool,
+    /// Number of bytes of the blocks so far.
+    bytes: u64,
 }
 
 impl<'a> Blocks<'a> {
     /// Returns the blocks of the unpacked text of a file.
     pub(crate) fn of(file: &'a InputFile, compression: Compression) -> Self {
-        Self::new(compression.stream_of(file))
+        Self::new(compression.stream_of(file), compression)
     }
 
-    fn new(stream: Box<dyn Read + Send + 'a>) -> Self {
-        Self { stream, carry: Vec::new(), spare: Vec::new(), last: b'\n' }
+    fn new(stream: Box<dyn Read + Send + 'a>, compression: Compression) -> Self {
+        let is_packed = compression != Compression::None;
+        Self { stream, carry: Vec::new(), spare: Vec::new(), last: b'\n', is_packed, bytes: 0 }
+    }
+
+    /// Refuses a compressed text that has far more bytes so far than its `entries` take: a small file may unpack to blank
+    /// lines and comments without end.
+    ///
+    /// # Errors
+    /// FB304.
+    pub(crate) fn refuse_filling(&self, entries: u64) -> Result<(), Diagnostic> {
+        let most = entries.saturating_mul(MAX_ENTRY_BYTES).saturating_add(MAX_FILLING);
+        if !self.is_packed || self.bytes <= most {
+            return Ok(());
+        }
+        let message = format!(
+            "the compressed file unpacks to more than {most} bytes with {entries} values among them: the rest is blank lines and comments"
+        );
+        let help = "write the file again without them, or unpack it";
+        Err(Diagnostic::new(Code::MatrixCount, message).with_help(help))
     }
 
     /// Returns the next block. It ends at a line end, at the end of the file, or anywhere within a line longer than a
@@ -223,6 +258,7 @@ impl<'a> Blocks<'a> {
         block.truncate(end);
         let Some(&last) = block.last() else { return Ok(None) };
         self.last = last;
+        self.bytes += block.len() as u64;
         Ok(Some(block))
     }
 
@@ -425,7 +461,7 @@ mod tests {
         let packed =
             ruzstd::encoding::compress_to_vec(text.as_bytes(), ruzstd::encoding::CompressionLevel::Fastest);
         for (compression, bytes) in [(Compression::None, text.as_bytes()), (Compression::Zstd, &packed)] {
-            let mut blocks = Blocks::new(compression.stream(bytes));
+            let mut blocks = Blocks::new(compression.stream(bytes), compression);
             let mut at = 0;
             while let Some(block) = blocks.next().unwrap() {
                 for piece in line_aligned(&block) {

@@ -6,6 +6,7 @@ use super::classic_netcdf::{ClassicNetcdf, is_classic};
 use super::hdf5;
 use super::mesh::in_order_of_shape;
 use super::reader::HEAD;
+use super::sets::{Item, Members, NodeSets, SetList};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_model::{ElementShape, Elements, Nodes};
@@ -15,8 +16,12 @@ type Found<T> = Result<T, Vec<Diagnostic>>;
 const HELP: &str =
     "give an Exodus mesh in netCDF-4 or classic netCDF, or a table with the columns node, x, y, z";
 
-/// Node numbers of sets by name.
-pub(super) type NamedSets = Vec<(String, Vec<i64>)>;
+/// Largest number of members of all sets together, for each byte of the file: sets of more members name datasets that
+/// others name as well, or are packed far more densely than node numbers are.
+const MAX_MEMBERS_PER_BYTE: u64 = 16;
+
+/// Number of members that the sets of any file may have.
+const MIN_MEMBERS: u64 = 1 << 20;
 
 /// Variables of a file, by their names.
 pub(super) trait ExodusFile {
@@ -79,7 +84,7 @@ fn with_file<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> Found<T>
 ///
 /// # Errors
 /// FB101 for a file that cannot be opened, FB115 for a file that is no such mesh.
-pub(super) fn read_mesh(file: &InputFile) -> Found<(Nodes, NamedSets, Elements)> {
+pub(super) fn read_mesh(file: &InputFile) -> Found<(Nodes, NodeSets, Elements)> {
     with_file(file, |opened| {
         let positions = positions(opened)?;
         let ids = ids(opened, positions.len())?;
@@ -87,7 +92,8 @@ pub(super) fn read_mesh(file: &InputFile) -> Found<(Nodes, NamedSets, Elements)>
             let message = format!("`node_num_map` has {} numbers for {} nodes", ids.len(), positions.len());
             return Err(wrong(message));
         }
-        let sets = sets(opened, &ids)?;
+        let most = file.length().saturating_mul(MAX_MEMBERS_PER_BYTE).max(MIN_MEMBERS);
+        let sets = NodeSets::of_nodes(&ids, sets(opened, &ids, most)?);
         let elements = elements(opened, &ids)?;
         Ok((Nodes { ids, positions }, sets, elements))
     })
@@ -197,10 +203,12 @@ fn elements(file: &dyn ExodusFile, ids: &[i64]) -> Found<Elements> {
 }
 
 /// Returns the node sets, which list node positions from 1. A set without a name is named by its number.
-fn sets(file: &dyn ExodusFile, ids: &[i64]) -> Found<NamedSets> {
+///
+/// * `most`: largest number of members of all sets together.
+fn sets(file: &dyn ExodusFile, ids: &[i64], most: u64) -> Found<SetList> {
     let names = if file.has("ns_names") { file.names("ns_names")? } else { Vec::new() };
     let numbers = if file.has("ns_prop1") { file.whole_numbers("ns_prop1")? } else { Vec::new() };
-    let mut sets = Vec::new();
+    let (mut sets, mut members) = (SetList::default(), 0);
     for k in 0.. {
         let list = format!("node_ns{}", k + 1);
         if !file.has(&list) {
@@ -208,10 +216,17 @@ fn sets(file: &dyn ExodusFile, ids: &[i64]) -> Found<NamedSets> {
             if k < names.len().max(numbers.len()) { continue } else { break }
         }
         let places = file.whole_numbers(&list)?;
+        members += places.len() as u64;
+        if members > most {
+            let message =
+                format!("the node sets up to `{list}` list {members} nodes together, more than {most}");
+            return Err(wrong(message));
+        }
         let nodes = nodes_at(&list, ids, places.iter().map(|place| Some(*place)))?;
         let number = numbers.get(k).copied().unwrap_or(k as i64 + 1);
         let name = names.get(k).filter(|name| !name.is_empty()).cloned();
-        sets.push((name.unwrap_or_else(|| number.to_string()), nodes));
+        let name = name.unwrap_or_else(|| number.to_string());
+        sets.add(&name, vec![Item::own(Members::Numbers(nodes))]);
     }
     Ok(sets)
 }

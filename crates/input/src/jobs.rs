@@ -13,7 +13,8 @@ mod knots;
 mod matrix_files;
 mod nastran;
 
-use super::node_files::{NodeFile, NodeSets, Unresolved};
+use super::node_files::NodeFile;
+use super::sets::NodeSets;
 use abaqus::Abaqus;
 use calculix::Calculix;
 pub(super) use calculix::read_stiffness as read_calculix_stiffness;
@@ -68,8 +69,6 @@ pub(super) struct JobModel {
     pub given_rows: GivenRows,
     /// Node sets; their names are compared without regard to case.
     pub sets: NodeSets,
-    /// Sets whose nodes are unknown.
-    pub unresolved: Unresolved,
     /// Elements by which the part is drawn.
     pub elements: Elements,
     /// Every file that was read, with its role.
@@ -168,8 +167,7 @@ pub(super) fn nodes_of_deck(file: &InputFile) -> Found<NodeFile> {
     let mesh = DeckMesh::of(&Deck::read(file.path())?)?;
     let elements = mesh.drawn();
     let (ids, positions) = mesh.nodes.into_iter().unzip();
-    let DeckMesh { sets, unresolved, .. } = mesh;
-    Ok(NodeFile { nodes: Nodes { ids, positions }, sets, unresolved, elements, ..NodeFile::default() })
+    Ok(NodeFile { nodes: Nodes { ids, positions }, sets: mesh.sets, elements, ..NodeFile::default() })
 }
 
 /// Returns true when a path is that of a keyword deck, by its name.

@@ -47,6 +47,7 @@ mod recipes;
 mod recovery_files;
 mod rows_of_model;
 mod scipy_npz;
+mod sets;
 mod shapes;
 mod stated;
 mod tables;

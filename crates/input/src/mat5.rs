@@ -22,6 +22,8 @@ const HEADER: usize = 128;
 /// Kinds of elements that are variables.
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
+/// Largest number of bytes after the numbers of a compressed variable. No program writes any; more of them are not unpacked.
+const MAX_REST_BYTES: u64 = 1 << 16;
 
 const NAMES: NamedMatrices = NamedMatrices { holder: "variable", file: "FILE.mat", matrices: "matrices" };
 const HELP: &str = "write it again: save('FILE.mat', 'K', 'M')";
@@ -158,7 +160,7 @@ fn paths<'v, 'a: 'v>(variables: impl IntoIterator<Item = &'v Variable<'a>>) -> V
 // A variable of a MAT-file: its kind, and its matrix.
 
 /// Largest number of bytes of the flags, the extents and the name of a variable, each.
-const HEAD_BYTES: u64 = 1 << 16;
+const HEAD_BYTES: u64 = 1 << 12;
 
 const REAL: &str = "save a matrix of real numbers: K = sparse(real(K)); save('FILE.mat', 'K')";
 const BOTH_TRIANGLES: &str = "save both triangles: K + tril(K, -1)'";
@@ -419,12 +421,13 @@ impl Order {
 struct Elements<'a> {
     stream: Box<dyn Read + 'a>,
     order: Order,
+    is_packed: bool,
 }
 
 impl<'a> Elements<'a> {
     /// Returns the elements in the body of a variable.
     fn of(body: &'a [u8], compressed: bool, order: Order) -> Found<Self> {
-        let mut elements = Self { stream: Box::new(body), order };
+        let mut elements = Self { stream: Box::new(body), order, is_packed: compressed };
         if compressed {
             elements.stream = Box::new(flate2::read::ZlibDecoder::new(body));
             // Packed bytes hold a variable with its tag.
@@ -467,8 +470,17 @@ impl<'a> Elements<'a> {
     }
 
     /// Reads to the end, where the checksum of packed bytes is verified.
+    ///
+    /// # Errors
+    /// FB103 for damaged packed bytes, FB304 if the packed bytes do not end soon.
     fn finish(mut self) -> Found<()> {
-        std::io::copy(&mut self.stream, &mut std::io::sink()).map_err(damaged).map(|_| ())
+        let mut rest = self.stream.by_ref().take(MAX_REST_BYTES + 1);
+        let count = std::io::copy(&mut rest, &mut std::io::sink()).map_err(damaged)?;
+        if count <= MAX_REST_BYTES || !self.is_packed {
+            return Ok(());
+        }
+        let message = format!("a compressed variable has more than {MAX_REST_BYTES} bytes after its numbers");
+        Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP))
     }
 
     fn take(&mut self, length: u64) -> Found<Vec<u8>> {

@@ -309,6 +309,7 @@ pub(super) fn read_array(file: &InputFile, compression: Compression) -> Found<Ar
                 reading.content(line).map_err(|diagnostic| vec![diagnostic.at_line(reading.line)])?;
             }
         }
+        blocks.refuse_filling(reading.values.len() as u64).map_err(|diagnostic| vec![diagnostic])?;
     }
     let line = reading.line;
     let array = reading.finish().map_err(|diagnostic| vec![diagnostic])?;

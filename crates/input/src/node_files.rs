@@ -12,6 +12,7 @@ pub(super) use vtk_xml::{CollectionMember, PointArray, PointData, collection, pi
 
 use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};
+use super::sets::NodeSets;
 use super::tables::read_nodes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
@@ -108,19 +109,11 @@ fn refused(file: &InputFile, message: String, help: &str) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).with_help(help)]
 }
 
-/// Named sets of nodes, in the order of their file.
-pub(super) type NodeSets = Vec<(String, Vec<i64>)>;
-
-/// Names of node sets that cannot be resolved, with the reason, which becomes an error if such a set is requested.
-pub(super) type Unresolved = Vec<(String, Diagnostic)>;
-
 /// Nodes, sets and elements of a file.
 #[derive(Debug, Default)]
 pub(super) struct NodeFile {
     pub nodes: Nodes,
     pub sets: NodeSets,
-    /// Sets whose nodes are unknown.
-    pub unresolved: Unresolved,
     pub elements: Elements,
     /// Rows that follow others by constraints of a deck, by the names of the constraints.
     pub followers: Vec<(String, Vec<DofLabel>)>,

@@ -3,23 +3,26 @@
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::input_file::InputFile;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// Files of the model, each opened once.
 pub(super) struct OpenFiles {
-    files: Vec<(PathBuf, std::result::Result<InputFile, Diagnostic>)>,
+    files: Vec<std::result::Result<InputFile, Diagnostic>>,
+    places: HashMap<PathBuf, usize>,
 }
 
 impl OpenFiles {
     /// Opens the files of the given paths.
     pub(super) fn new<'p>(paths: impl Iterator<Item = &'p Path>) -> Self {
-        let mut opened: Vec<(PathBuf, _)> = Vec::new();
+        let (mut files, mut places) = (Vec::new(), HashMap::new());
         for path in paths {
-            if opened.iter().all(|(known, _)| known != path) {
-                opened.push((path.to_path_buf(), InputFile::open_unread(path)));
+            if !places.contains_key(path) {
+                places.insert(path.to_path_buf(), files.len());
+                files.push(InputFile::open_unread(path));
             }
         }
-        Self { files: opened }
+        Self { files, places }
     }
 
     /// Returns a file whose bytes are in memory.
@@ -31,14 +34,13 @@ impl OpenFiles {
 
     /// Returns a file whose bytes may not be in memory yet.
     pub(super) fn unread(&self, path: &Path) -> std::result::Result<&InputFile, Vec<Diagnostic>> {
-        let (_, file) =
-            self.files.iter().find(|(known, _)| known == path).expect("every path of the model is opened");
-        file.as_ref().map_err(|diagnostic| vec![diagnostic.clone()])
+        let place = self.places.get(path).expect("every path of the model is opened");
+        self.files[*place].as_ref().map_err(|diagnostic| vec![diagnostic.clone()])
     }
 
     /// Returns the files that could be opened.
     pub(super) fn all(&self) -> impl Iterator<Item = &InputFile> {
-        self.files.iter().filter_map(|(_, file)| file.as_ref().ok())
+        self.files.iter().filter_map(|file| file.as_ref().ok())
     }
 
     /// Checks that no file has changed.
@@ -52,6 +54,6 @@ impl OpenFiles {
 
     /// Frees the bytes of all files.
     pub(super) fn forget_bytes(&mut self) {
-        self.files.iter_mut().filter_map(|(_, file)| file.as_mut().ok()).for_each(InputFile::forget_bytes);
+        self.files.iter_mut().filter_map(|file| file.as_mut().ok()).for_each(InputFile::forget_bytes);
     }
 }

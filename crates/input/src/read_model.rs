@@ -1,7 +1,7 @@
 //! Reads all files of a model and collects all their problems.
 
 use super::fe_results::{AnswerFiles, read_answers};
-use super::jobs::{JobModel, comparable, read_job};
+use super::jobs::{JobModel, read_job};
 use super::labels_of_file::LabelsOfFile;
 use super::mapping::Mapping;
 use super::mesh::MeshReading;
@@ -9,11 +9,12 @@ use super::model_files::{
     InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
     OperatorSource, RecoverySource, StressStiffnessSource,
 };
-use super::node_files::{NodeFile, NodeSets, Unresolved, read_node_file};
+use super::node_files::{NodeFile, read_node_file};
 use super::open_files::OpenFiles;
 use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::recovery_files::{OperatorColumns, read_forces, read_offset, read_operator};
 use super::rows_of_model::{by_rows_of_model, in_order_of_nodes, refuse_followers, turned};
+use super::sets::NodeSets;
 use super::tables::{read_node_list, read_recovery_rows};
 use super::with_stress::{PlainStiffness, StressMatrix, difference_note, read_stress_matrix};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
@@ -199,8 +200,6 @@ struct ModelMatrices {
     given_rows: GivenRows,
     /// Node sets of a job.
     sets: NodeSets,
-    /// Sets that cannot be resolved, with the reason.
-    unresolved: Unresolved,
     /// Elements by which the part is drawn.
     elements: Elements,
     /// Files of a job.
@@ -287,7 +286,6 @@ impl From<JobModel> for ModelMatrices {
             dofs: Some(job.dofs),
             given_rows: job.given_rows,
             sets: job.sets,
-            unresolved: job.unresolved,
             elements: job.elements,
             files: job.files,
             diagnostics: job.diagnostics,
@@ -316,7 +314,7 @@ impl ParsedTables {
         };
         let tables = files.tables().expect("tables were read");
         let (stiffness, mass, nodes) = (stiffness?, mass?, nodes?);
-        let NodeFile { nodes, sets, unresolved, elements, followers, axes } = nodes;
+        let NodeFile { nodes, sets, elements, followers, axes } = nodes;
         let dofs_path = tables.dofs.clone().unwrap_or_default();
         let dofs = match dofs {
             Some(mapping) => Some(take(diagnostics, mapping.labels(stiffness.matrix.n_rows(), &dofs_path))?),
@@ -340,7 +338,6 @@ impl ParsedTables {
             dofs_path,
             given_rows,
             sets,
-            unresolved,
             elements,
             files: Vec::new(),
             diagnostics: Vec::new(),
@@ -438,8 +435,13 @@ impl<'m> NodeLookup<'m> {
             InterfaceNodes::Listed(nodes) => nodes.clone(),
             InterfaceNodes::File(path) => read_node_list(opened.get(path)?)?,
             InterfaceNodes::Set(name) => {
-                outline = self.members(name).map(<[i64]>::to_vec).unwrap_or_default();
-                self.of_set(owner, name, files)?
+                let nodes = self.of_set(owner, name, files, &mut outline)?;
+                self.refuse_empty(
+                    owner,
+                    nodes,
+                    &format!("no node of the set `{name}` has degrees of freedom"),
+                    files,
+                )?
             }
             InterfaceNodes::Region(region) => {
                 let all = self.matrices.iter().flat_map(|matrices| {
@@ -556,34 +558,25 @@ impl<'m> NodeLookup<'m> {
         self.moving.as_ref().is_none_or(|moving| moving.contains(&node))
     }
 
-    /// Returns the members of a node set, including those without rows.
-    fn members(&self, name: &str) -> Option<&[i64]> {
-        let sets = &self.matrices?.sets;
-        let known = sets.iter().find(|(key, _)| key.eq_ignore_ascii_case(name));
-        let known = known.or_else(|| sets.iter().find(|(key, _)| comparable(key) == comparable(name)));
-        known.map(|(_, nodes)| nodes.as_slice())
-    }
-
-    fn of_set(&self, owner: &str, name: &str, files: &ModelFiles) -> Found<Vec<i64>> {
+    /// Returns the nodes of a set that have rows. `outline` receives all nodes of the set.
+    fn of_set(&self, owner: &str, name: &str, files: &ModelFiles, outline: &mut Vec<i64>) -> Found<Vec<i64>> {
         let Some(matrices) = self.matrices else { return Ok(Vec::new()) };
-        let refused = matrices.unresolved.iter().find(|(key, _)| comparable(key) == comparable(name));
-        if let Some((_, refused)) = refused {
-            return Err(vec![refused.clone().about(owner)]);
+        match matrices.sets.find(name) {
+            Some(Ok(nodes)) => *outline = nodes,
+            Some(Err(refused)) => return Err(vec![refused.about(owner)]),
+            None => {
+                let names: Vec<String> = matrices.sets.names().take(20).collect();
+                let message = format!("{owner}: the model has no node set `{name}`");
+                let help = if names.is_empty() {
+                    "list the nodes, or give a region: the files of the model have no node sets".to_owned()
+                } else {
+                    format!("name one of the node sets: {}", names.join(", "))
+                };
+                let unknown = Diagnostic::new(Code::NodeSetUnknown, message);
+                return Err(vec![said_in(files, unknown).with_help(help)]);
+            }
         }
-        let Some(nodes) = self.members(name) else {
-            let names: Vec<&str> = matrices.sets.iter().map(|(key, _)| key.as_str()).take(20).collect();
-            let message = format!("{owner}: the model has no node set `{name}`");
-            let help = if names.is_empty() {
-                "list the nodes, or give a region: the files of the model have no node sets".to_owned()
-            } else {
-                format!("name one of the node sets: {}", names.join(", "))
-            };
-            return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message)).with_help(help)]);
-        };
-        // A set may list nodes without degrees of freedom, and some nodes twice.
-        let mut seen = HashSet::new();
-        let nodes = nodes.iter().copied().filter(|id| self.moves(*id) && seen.insert(*id)).collect();
-        self.refuse_empty(owner, nodes, &format!("no node of the set `{name}` has degrees of freedom"), files)
+        Ok(outline.iter().copied().filter(|id| self.moves(*id)).collect())
     }
 
     fn refuse_empty(&self, owner: &str, nodes: Vec<i64>, why: &str, files: &ModelFiles) -> Found<Vec<i64>> {
@@ -690,7 +683,7 @@ fn sources(
 ) -> std::result::Result<Vec<SourceFile>, Diagnostic> {
     let mut of_tables = Vec::new();
     for (role, path) in roles(files) {
-        if let Some(file) = opened.all().find(|file| file.path() == path) {
+        if let Ok(file) = opened.unread(path) {
             let sha256 = file.sha256()?;
             // The manifest was parsed before the other files were opened.
             if role == "manifest" && files.manifest_sha256.as_ref().is_some_and(|parsed| *parsed != sha256) {

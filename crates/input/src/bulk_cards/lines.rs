@@ -135,8 +135,8 @@ fn end_of(line: &[u8]) -> Vec<u8> {
 // Replication: `=` copies the field of the card above, `*(x)` adds x to that field, `==` copies all fields from there
 // on, and `=(n)` repeats the line above it n times.
 
-/// Largest number of cards that one line may represent.
-const MAX_REPEATED_CARDS: i64 = 1_000_000;
+/// Largest number of cards that lines of repetition of a deck may represent together.
+pub(super) const MAX_REPEATED_CARDS: i64 = 1_000_000;
 
 /// Change of a field from card to card.
 #[derive(Clone)]

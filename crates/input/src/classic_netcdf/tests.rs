@@ -62,6 +62,18 @@ fn records_of_several_variables_are_padded_and_those_of_one_are_not() {
     );
 }
 
+/// Variables that lie at one place are read as often as the file has bytes for them.
+#[test]
+fn variables_have_no_more_bytes_than_their_file() {
+    let bytes = of_short_numbers(&["a", "b"], 2, &[1, 2, 3, 0, 7, 8, 9, 0, 4, 5, 6, 0, 10, 11, 12]);
+    let file = ClassicNetcdf::open(&bytes).expect("a file");
+    let numbers = |_| file.numbers(file.variable("a").expect("a variable"));
+    let refused = (0..bytes.len()).map(numbers).position(|read| read.is_err()).expect("refused");
+    assert_eq!(refused, bytes.len() / 12);
+    let message = numbers(0).expect_err("refused");
+    assert!(message.contains("`a` lies where other variables lie"), "{message}");
+}
+
 /// A program that ended while it wrote has left the number of records open.
 #[test]
 fn records_that_are_not_counted_are_those_in_the_file() {

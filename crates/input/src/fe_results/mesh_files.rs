@@ -24,6 +24,12 @@ pub(super) fn is_vtk(head: &[u8]) -> bool {
 /// Returns the paths of the files of a collection (.pvd), of its pieces, or of the pieces of a parallel file (.pvtu); none if
 /// the file is neither or cannot be read.
 pub(super) fn files_of(path: &Path) -> Vec<PathBuf> {
+    let mut known = HashSet::new();
+    listed_files(path).into_iter().filter(|file| known.insert(file.clone())).collect()
+}
+
+/// Returns the paths that [`files_of`] returns, some of them twice.
+fn listed_files(path: &Path) -> Vec<PathBuf> {
     let ends = |end: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(end));
     let opened = || InputFile::open(path).ok();
     if ends("pvtu") {
@@ -60,6 +66,7 @@ fn beside(listing: &Path, member: &str) -> PathBuf {
 /// # Errors
 /// FB327 for another mesh, for a step without one of the two arrays, and for points without numbers.
 pub(super) fn read_vtk(file: &InputFile, members: &[&InputFile]) -> Found<StepValues> {
+    let members: &Opened<'_> = &members.iter().map(|member| (member.path(), *member)).collect();
     let listed = match node_files::is_vtk_xml(&file.first_bytes(HEAD)) {
         true => collection(file.bytes()).map_err(|message| unreadable(file, message))?,
         false => None,
@@ -85,16 +92,15 @@ pub(super) fn read_vtk(file: &InputFile, members: &[&InputFile]) -> Found<StepVa
     StepValues::of(steps, digits, file)?.with_stresses(file)
 }
 
+/// Opened files by their paths.
+type Opened<'f> = HashMap<&'f Path, &'f InputFile>;
+
 /// Reads the files of a collection, one for each step, in the order of their times.
-fn read_collection(
-    file: &InputFile,
-    listed: &[CollectionMember],
-    members: &[&InputFile],
-) -> Found<StepValues> {
+fn read_collection(file: &InputFile, listed: &[CollectionMember], members: &Opened<'_>) -> Found<StepValues> {
     let (mut steps, mut digits) = (Vec::new(), 15);
     for member in listed {
         let path = beside(file.path(), &member.file);
-        let Some(own) = members.iter().find(|own| own.path() == path) else {
+        let Some(own) = members.get(path.as_path()) else {
             let message =
                 format!("the collection lists {} and its own name does not end with .pvd", member.file);
             return Err(unreadable(file, message));
@@ -114,7 +120,7 @@ fn read_collection(
 }
 
 /// Returns the numbers of the points of a mesh and the arrays at them; of a parallel file those of all pieces.
-fn point_data(file: &InputFile, members: &[&InputFile]) -> Found<(Vec<i64>, Vec<PointArray>)> {
+fn point_data(file: &InputFile, members: &Opened<'_>) -> Found<(Vec<i64>, Vec<PointArray>)> {
     let sources = match node_files::is_vtk_xml(&file.first_bytes(HEAD)) {
         true => pieces(file.bytes()).map_err(|message| unreadable(file, message))?,
         false => None,
@@ -134,14 +140,14 @@ const MAX_PIECE_DIFFERENCE: f64 = 1e-5;
 fn data_of_pieces(
     file: &InputFile,
     sources: &[String],
-    members: &[&InputFile],
+    members: &Opened<'_>,
 ) -> Found<(Vec<i64>, Vec<PointArray>)> {
     let mut whole: Option<(Vec<i64>, Vec<PointArray>)> = None;
     let mut place: HashMap<i64, usize> = HashMap::new();
     let mut left: HashSet<i64> = HashSet::new();
     for source in sources {
         let path = beside(file.path(), source);
-        let Some(own) = members.iter().find(|own| own.path() == path) else {
+        let Some(own) = members.get(path.as_path()) else {
             let message =
                 format!("the file lists the piece {source} and its own name does not end with .pvtu");
             return Err(unreadable(file, message));

@@ -5,6 +5,7 @@ use super::{Members, layout, opened};
 use crate::exodus::{ExodusFile, NumberTable, wrong_layers};
 use flexbody_base::text::InputFile;
 use hdf5_metno::Group;
+use std::cell::Cell;
 
 /// Opens a file and runs `read` on it; returns its result.
 ///
@@ -13,7 +14,8 @@ use hdf5_metno::Group;
 pub(crate) fn with_exodus<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> T) -> Found<T> {
     let opened = opened(file)?;
     let root = opened.group("/").map_err(|e| vec![layout(format!("file cannot be read: {e}"))])?;
-    Ok(read(&Datasets { members: Members::of(&root), root, heaps: Heaps::of(file) }))
+    let members = Members::of(&root);
+    Ok(read(&Datasets { members, root, heaps: Heaps::of(file), length: file.length(), read: Cell::new(0) }))
 }
 
 /// Datasets of the root group.
@@ -21,14 +23,33 @@ struct Datasets<'f> {
     root: Group,
     members: Members,
     heaps: Heaps<'f>,
+    /// Number of bytes of the file.
+    length: u64,
+    /// Number of stored bytes of the datasets that were read.
+    read: Cell<u64>,
 }
 
 impl Datasets<'_> {
     fn vector(&self, name: &str) -> Found<Vector> {
+        self.numbers(name)?;
         Vector::open(&self.root, &self.members, "", name)
     }
 
+    /// Opens a dataset to read its values. Each dataset has one name: all together store no more bytes than the file has.
     fn numbers(&self, name: &str) -> Found<Numbers> {
+        let numbers = self.unread(name)?;
+        let read = self.read.get().saturating_add(numbers.dataset.storage_size());
+        self.read.set(read);
+        if read <= self.length {
+            return Ok(numbers);
+        }
+        let (dataset, length) = (&numbers.name, self.length);
+        Err(vec![layout(format!(
+            "dataset {dataset} has several names: the datasets up to it store {read} bytes together, the file has {length}"
+        ))])
+    }
+
+    fn unread(&self, name: &str) -> Found<Numbers> {
         Numbers::open(&self.root, &self.members, "", name)
     }
 }
@@ -70,7 +91,7 @@ impl ExodusFile for Datasets<'_> {
     }
 
     fn element_type(&self, name: &str) -> String {
-        let kind = self.numbers(name).ok().and_then(|numbers| numbers.dataset.attr("elem_type").ok());
+        let kind = self.unread(name).ok().and_then(|numbers| numbers.dataset.attr("elem_type").ok());
         kind.and_then(|kind| text_of(&kind, &self.heaps)).unwrap_or_default()
     }
 }

@@ -59,7 +59,6 @@ impl JobReader for Abaqus {
             // With condensed matrices no element has all of its nodes.
             elements: if rows.condensed.is_some() { Elements::default() } else { mesh.drawn() },
             sets: mesh.sets,
-            unresolved: mesh.unresolved,
             files: deck_files.chain(rows.files).collect(),
             diagnostics: mesh.notes.into_iter().chain(note).chain(rows.condensed).collect(),
         })
@@ -125,12 +124,14 @@ impl Rows {
 
 /// Returns FB111 for retained nodes whose rows are along other axes.
 fn turned(deck: &Deck, mesh: &DeckMesh, retained: &BTreeSet<i64>) -> Option<Diagnostic> {
-    let members = |name: &str| -> Vec<i64> {
-        mesh.set(name).map_or_else(|| integer(name.as_bytes()).into_iter().collect(), <[i64]>::to_vec)
-    };
     let transforms = deck.cards().iter().filter(|card| card.keyword == "TRANSFORM");
-    transforms.filter_map(|card| Some((card, card.parameter("NSET")?))).find_map(|(card, set)| {
-        let node = members(set).into_iter().find(|node| retained.contains(node))?;
+    let named: Vec<(&Card, &str)> =
+        transforms.filter_map(|card| Some((card, card.parameter("NSET")?))).collect();
+    // Nodes that an earlier card has are not retained, or that card was refused.
+    let members = mesh.sets.union(named.iter().map(|(_, set)| *set));
+    named.into_iter().zip(members).find_map(|((card, set), members)| {
+        let members = members.unwrap_or_else(|| integer(set.as_bytes()).into_iter().collect());
+        let node = members.into_iter().find(|node| retained.contains(node))?;
         let message = format!("*TRANSFORM rotates the rows of node {node}, which is retained");
         let help = "remove *TRANSFORM from the retained nodes";
         Some(deck.about(card, Code::DeckUnsupported, message).with_help(help))

@@ -3,8 +3,8 @@
 
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
-use super::deck_sets::nodes_of_surface;
-use super::expanded::{Once, label_once, sets_of_copies};
+use super::deck_sets::Surfaces;
+use super::expanded::{Once, copies_in_sets, label_once};
 use super::knots::Knots;
 use super::matrix_files::CoordinateFile;
 use super::{Found, JobFile, JobModel, JobReader, both, is_deck, missing};
@@ -74,7 +74,7 @@ impl JobReader for Calculix {
         let mut nodes: BTreeMap<i64, [f64; 3]> = placed.map(place).collect();
         nodes.extend(places);
         let elements = mesh.drawn_by_corners();
-        let sets = sets_of_copies(mesh.sets, &copies, &nodes, &dofs);
+        let sets = mesh.sets.with_copies(copies_in_sets(copies, &nodes, &dofs));
         let (ids, positions) = nodes.into_iter().unzip();
         let mut diagnostics = mesh.notes.clone();
         diagnostics.extend(placed_note(&means, &dofs, path));
@@ -88,7 +88,6 @@ impl JobReader for Calculix {
             given_rows,
             elements,
             sets,
-            unresolved: mesh.unresolved,
             files,
             diagnostics,
         })
@@ -231,8 +230,8 @@ impl Coupling<'_> {
     /// directions creates one node for each node of the surface. With ORIENTATION every node of the surface creates a
     /// copy of itself and one node for the equations of the copy, and the lines create none. Returns `None` if the
     /// nodes of the surface are unknown.
-    fn n_numbers(&self, deck: &Deck, mesh: &DeckMesh) -> Option<i64> {
-        let nodes = nodes_of_surface(deck, mesh, &self.card.name("SURFACE")?)?.len();
+    fn n_numbers(&self, surfaces: &mut Surfaces<'_>) -> Option<i64> {
+        let nodes = surfaces.count(&self.card.name("SURFACE")?)?;
         let for_each = if self.card.parameter("ORIENTATION").is_some() { 2 } else { self.n_lines };
         i64::try_from(nodes.checked_mul(for_each)?).ok()
     }
@@ -243,7 +242,7 @@ impl Coupling<'_> {
     /// FB111 if REF NODE is neither.
     fn reference(&self, deck: &Deck, mesh: &DeckMesh) -> Found<i64> {
         let text = self.card.parameter("REFNODE").unwrap_or_default();
-        let set = || match mesh.set(text)? {
+        let set = || match mesh.set(text)?.as_slice() {
             [node] => Some(*node),
             _ => None,
         };
@@ -278,6 +277,7 @@ fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel])
     let mut next = mesh.nodes.keys().next_back().and_then(|highest| highest.checked_add(1));
     let mut end = i64::MIN;
     let mut numbered = Vec::new();
+    let mut surfaces = Surfaces::of(deck, mesh);
     for coupling in Coupling::all(deck) {
         let reference = coupling.reference(deck, mesh)?;
         let Some(node) = next else {
@@ -286,7 +286,7 @@ fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel])
                 "write the *SURFACE of each coupling by nodes or by the faces S1 to S6 of solid elements";
             return coupling.refuse(deck, reference, why, help);
         };
-        next = coupling.n_numbers(deck, mesh).and_then(|count| node.checked_add(count)?.checked_add(1));
+        next = coupling.n_numbers(&mut surfaces).and_then(|count| node.checked_add(count)?.checked_add(1));
         // Numbers below `end` belong to couplings.
         end = next.unwrap_or(node);
         numbered.push(Numbered { coupling, reference, node });
@@ -408,14 +408,14 @@ fn placed_note(means: &BTreeMap<i64, [f64; 3]>, labels: &[DofLabel], path: &Path
 /// The set is missing, or has other elements than one DCOUP3D; the error is in words.
 fn reference_node(card: &Card, mesh: &DeckMesh) -> Result<i64, String> {
     let set = card.name("ELSET").ok_or("ELSET is missing")?;
-    let members = mesh.element_sets.get(&set).ok_or_else(|| format!("element set `{set}` is unknown"))?;
+    let members = mesh.sets.elements(&set).ok_or_else(|| format!("element set `{set}` is unknown"))?;
     let is_coupling = |kind: &str| kind == "DCOUP3D";
     let nodes: Vec<i64> = mesh
         .elements
         .iter()
         .filter(|elements| is_coupling(&elements.kind))
-        .flat_map(|elements| &elements.members)
-        .filter(|(id, _)| members.contains(id))
+        .flat_map(|elements| elements.members.iter())
+        .filter(|(id, _)| members.as_slice() == [*id])
         .flat_map(|(_, nodes)| nodes.iter().copied())
         .collect();
     match (nodes.as_slice(), members.len()) {
@@ -432,7 +432,7 @@ fn weighted(line: &[u8], mesh: &DeckMesh) -> Option<(Vec<[f64; 3]>, f64)> {
     let weight = real(weight).filter(|weight| weight.is_finite())?;
     let nodes: BTreeSet<i64> = match integer(name) {
         Some(node) => BTreeSet::from([node]),
-        None => mesh.set(&String::from_utf8_lossy(name))?.iter().copied().collect(),
+        None => mesh.set(&String::from_utf8_lossy(name))?.into_iter().collect(),
     };
     let places: Option<Vec<[f64; 3]>> = nodes.iter().map(|node| mesh.nodes.get(node).copied()).collect();
     Some((places?, weight))

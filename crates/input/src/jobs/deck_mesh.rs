@@ -1,16 +1,22 @@
 //! Nodes, elements and sets of a keyword deck, including parts and instances of Abaqus.
 
+use super::Found;
 use super::deck::{Card, Deck, comparable, fields};
-use super::deck_sets::{Elements, Found as Resolved, Instances, Member, Scope};
+use super::deck_sets::{Elements, Scope};
 use super::element_kinds::{Drawing, drawing};
-use super::{Found, NodeSets, Unresolved};
+use crate::sets::{Item, Members, NodeSets, SetIndex, SetInstance, SetScope, dotted};
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::scanner::{self, BadLines, excerpt, integer};
 use nalgebra::{Rotation3, Unit, Vector3};
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
-/// Largest number of members of a line of a generated set.
+/// Largest number of values of a line of a generated set. More of them are a mistake: no model has so many nodes.
 const MAX_GENERATED: i64 = 100_000_000;
+
+/// Bytes of memory of a node or an element of an instance, at least.
+const BYTES_PER_NODE: f64 = 64.0;
 
 /// Upper limit of the numbers of renumbered nodes.
 const MAX_NODE_NUMBER: i64 = 1_000_000_000_000;
@@ -21,12 +27,8 @@ pub(super) struct DeckMesh {
     /// Positions of the nodes, ascending by number.
     pub nodes: BTreeMap<i64, [f64; 3]>,
     pub elements: Vec<Elements>,
-    /// Node sets by name as in the deck, in the order of the deck.
+    /// Node sets, and element sets without those of parts and instances.
     pub sets: NodeSets,
-    /// Node sets that cannot be resolved, with the reason.
-    pub unresolved: Unresolved,
-    /// Element sets by name in the form of comparison, without those of parts and instances.
-    pub element_sets: HashMap<String, Vec<i64>>,
     /// Notes about the numbering.
     pub notes: Vec<Diagnostic>,
 }
@@ -37,7 +39,7 @@ impl DeckMesh {
     /// # Errors
     /// FB110 for lines that cannot be read, FB111 for cards that define nodes in a way that is not supported.
     pub(super) fn of(deck: &Deck) -> Found<Self> {
-        let mut reading = DeckMeshReader { deck, bad: BadLines::default() };
+        let mut reading = DeckMeshReader { deck, bad: BadLines::default(), placed: 0 };
         let mut scopes = Scopes::default();
         for card in deck.cards() {
             reading.card(card, &mut scopes);
@@ -62,7 +64,7 @@ impl DeckMesh {
     fn drawn_with(&self, part: impl for<'n> Fn(&str, &'n [i64]) -> &'n [i64]) -> flexbody_model::Elements {
         let mut drawn = flexbody_model::Elements::default();
         for Elements { kind, members } in &self.elements {
-            for (_, nodes) in members {
+            for (_, nodes) in members.iter() {
                 match drawing(kind, part(kind, nodes)) {
                     Drawing::Shape(shape, nodes) => drawn.add(kind, shape, &nodes),
                     Drawing::Nothing => {}
@@ -110,16 +112,27 @@ struct Scopes {
     top: Scope,
     parts: HashMap<String, Scope>,
     instances: Vec<Instance>,
+    /// Index of the first instance of each name in the form of comparison.
+    places: HashMap<String, usize>,
     part: Option<String>,
     in_instance: bool,
 }
 
 impl Scopes {
-    /// Returns the instances with their sets, for sets of the assembly; none within a part or an instance.
-    fn instances(&self) -> Instances<'_> {
+    /// Returns the index of an instance that sets of the assembly may name; `None` within a part or an instance.
+    fn instance(&self, name: &str) -> Option<usize> {
         let is_assembly = self.part.is_none() && !self.in_instance;
-        let some = if is_assembly { self.instances.as_slice() } else { &[] };
-        Instances::new(some.iter().map(|one| (one.name.as_str(), &one.scope)).collect())
+        self.places.get(&comparable(name)).copied().filter(|_| is_assembly)
+    }
+
+    /// Returns the node `INSTANCE.12` or the set `INSTANCE.SET`.
+    fn named(&self, name: &str) -> Option<Item> {
+        dotted(name).find_map(|(instance, rest)| {
+            let instance = self.instance(instance)?;
+            let set = self.instances[instance].scope.sets.so_far(rest).map(Members::Set);
+            let node = || integer(rest.as_bytes()).map(|id| Members::Numbers(vec![id]));
+            Some(Item { instance: Some(instance), members: set.or_else(node)? })
+        })
     }
 
     /// Returns the scope to which cards belong; `None` for a part without content.
@@ -157,12 +170,12 @@ impl Scopes {
         // Nodes of the assembly keep their numbers.
         let first = i64::from(!self.top.nodes.is_empty());
         let mut mesh = DeckMesh {
-            nodes: self.top.nodes.clone(),
-            elements: self.top.elements.clone(),
-            element_sets: self.top.element_sets.clone(),
+            nodes: self.top.nodes.as_ref().clone(),
+            elements: self.top.elements.as_ref().clone(),
             ..DeckMesh::default()
         };
-        let mut shifts = Vec::new();
+        let mut numbers = Numbers::default();
+        let mut instances = Vec::new();
         for (k, (instance, scope)) in placed.iter().enumerate() {
             let shift = stride * (k as i64 + first);
             if shift > 0 {
@@ -174,28 +187,49 @@ impl Scopes {
                 mesh.notes.push(Diagnostic::new(Code::DeckRenumbered, message));
             }
             mesh.add(scope, shift, instance);
-            shifts.push((instance.name.as_str(), *scope, shift));
+            instances.push(SetInstance { name: instance.name.clone(), scope: numbers.scope(scope, shift) });
         }
-        (mesh.sets, mesh.unresolved) = self.top.sets.of_model(&shifts);
+        mesh.sets = NodeSets::of_instances(numbers.scope(&self.top, 0), instances);
         Ok(mesh)
+    }
+}
+
+/// Numbers of the nodes of scopes. Instances of a part share them.
+#[derive(Default)]
+struct Numbers(HashMap<*const BTreeMap<i64, [f64; 3]>, Arc<Vec<i64>>>);
+
+impl Numbers {
+    /// Returns the sets of a scope with its nodes and elements.
+    fn scope(&mut self, scope: &Scope, shift: i64) -> SetScope {
+        let numbers = || Arc::new(scope.nodes.keys().copied().collect());
+        SetScope {
+            nodes: Arc::clone(&scope.sets),
+            elements: Arc::clone(&scope.element_sets),
+            ids: Arc::clone(self.0.entry(Arc::as_ptr(&scope.nodes)).or_insert_with(numbers)),
+            element_nodes: scope.elements.iter().map(|elements| Arc::clone(&elements.members)).collect(),
+            shift,
+            index: SetIndex::default(),
+        }
     }
 }
 
 impl DeckMesh {
     fn add(&mut self, scope: &Scope, shift: i64, instance: &Instance) {
         self.nodes.extend(scope.nodes.iter().map(|(id, x)| (id + shift, instance.moved.of(*x))));
-        for elements in &scope.elements {
+        for elements in scope.elements.iter() {
             let member =
                 |(id, nodes): &(i64, Vec<i64>)| (id + shift, nodes.iter().map(|id| id + shift).collect());
-            let members = elements.members.iter().map(member).collect();
+            let members = match shift {
+                0 => Arc::clone(&elements.members),
+                _ => Arc::new(elements.members.iter().map(member).collect()),
+            };
             self.elements.push(Elements { kind: elements.kind.clone(), members });
         }
     }
 
     /// Returns the nodes of a set.
-    pub(super) fn set(&self, name: &str) -> Option<&[i64]> {
-        let name = comparable(name);
-        self.sets.iter().find(|(key, _)| comparable(key) == name).map(|(_, nodes)| nodes.as_slice())
+    pub(super) fn set(&self, name: &str) -> Option<Vec<i64>> {
+        self.sets.find(name)?.ok()
     }
 }
 
@@ -212,6 +246,8 @@ fn power_of_ten_above(number: i64) -> i64 {
 struct DeckMeshReader<'d> {
     deck: &'d Deck,
     bad: BadLines,
+    /// Number of nodes and elements of the instances so far.
+    placed: usize,
 }
 
 impl DeckMeshReader<'_> {
@@ -224,6 +260,8 @@ impl DeckMeshReader<'_> {
                 let name = card.parameter("NAME").unwrap_or_default().to_owned();
                 let part = card.name("PART").unwrap_or_default();
                 let scope = scopes.parts.get(&part).cloned().unwrap_or_default();
+                let scope = self.within_memory(card, scope);
+                scopes.places.entry(comparable(&name)).or_insert(scopes.instances.len());
                 scopes.instances.push(Instance { name, scope, moved });
                 scopes.in_instance = true;
             }
@@ -261,6 +299,24 @@ impl DeckMeshReader<'_> {
         Some(rows)
     }
 
+    /// Returns the content of an instance. Each instance places all nodes of its part once more: those that do not fit the
+    /// memory are an error, and empty.
+    fn within_memory(&mut self, card: &Card, scope: Scope) -> Scope {
+        let elements: usize = scope.elements.iter().map(|elements| elements.members.len()).sum();
+        self.placed += scope.nodes.len() + elements;
+        let what = format!("placing {} nodes and elements of instances", self.placed);
+        let needed = BYTES_PER_NODE * self.placed as f64;
+        match refuse_beyond(left(), needed, &what, "remove instances, or use a larger machine") {
+            Ok(()) => scope,
+            Err(refused) => {
+                let message = refused.first_error().message().to_owned();
+                let refused = self.deck.about(card, Code::MemoryShort, message);
+                self.bad.add(refused.with_help("remove instances, or use a larger machine"));
+                Scope::default()
+            }
+        }
+    }
+
     fn placement(&mut self, card: &Card) -> Placement {
         let rows = self.numbers(card, 7).unwrap_or_default();
         let mut placement = Placement::default();
@@ -283,6 +339,7 @@ impl DeckMeshReader<'_> {
     fn nodes(&mut self, card: &Card, scope: &mut Scope) {
         let system = card.name("SYSTEM").unwrap_or_default();
         let mut ids = Vec::new();
+        let nodes = Arc::make_mut(&mut scope.nodes);
         for (line, text) in self.deck.data(card) {
             let mut given = fields(text);
             let id = given.next().and_then(integer);
@@ -297,14 +354,14 @@ impl DeckMeshReader<'_> {
             }
             match id {
                 Some(id) if read && x.iter().all(|value| value.is_finite()) => {
-                    scope.nodes.insert(id, in_cartesian(&system, x));
+                    nodes.insert(id, in_cartesian(&system, x));
                     ids.push(id);
                 }
                 _ => self.syntax(card, line, "a node number and its coordinates", text),
             }
         }
         if let Some(name) = card.parameter("NSET") {
-            scope.sets.extend(name, Ok(ids.into_iter().map(Member::of_scope).collect()));
+            Arc::make_mut(&mut scope.sets).extend(name, Ok(vec![Item::own(Members::Numbers(ids))]));
         }
     }
 
@@ -331,29 +388,35 @@ impl DeckMeshReader<'_> {
             continues = wanted.map_or(text.ends_with(b","), |wanted| have < wanted);
         }
         if let Some(name) = card.name("ELSET") {
-            scope.element_sets.entry(name).or_default().extend(members.iter().map(|(id, _)| *id));
+            let ids = members.iter().map(|(id, _)| *id).collect();
+            Arc::make_mut(&mut scope.element_sets).extend(&name, Ok(vec![Item::own(Members::Numbers(ids))]));
         }
-        scope.elements.push(Elements { kind, members });
+        Arc::make_mut(&mut scope.elements).push(Elements { kind, members: Arc::new(members) });
     }
 
-    /// Returns the members of a set: numbers, ranges with GENERATE, and the result of `known` for names. The first
-    /// unknown name is an error for the whole set.
-    fn members<T>(
+    /// Returns the parts of a set: numbers, ranges with GENERATE, and the result of `known` for names. The first unknown
+    /// name is an error for the whole set.
+    ///
+    /// * `instance`: index of the instance to which numbers belong; `None` for the scope of the card.
+    fn items(
         &mut self,
         card: &Card,
-        number: impl Fn(i64) -> T,
-        known: impl Fn(&str) -> Option<Vec<T>>,
-    ) -> Resolved<T> {
+        instance: Option<usize>,
+        known: impl Fn(&str) -> Option<Item>,
+    ) -> Result<Vec<Item>, Diagnostic> {
         let generate = card.parameter("GENERATE").is_some();
-        let (mut members, mut unknown) = (Vec::new(), None);
+        let (mut items, mut unknown) = (Vec::new(), None);
+        let mut numbers = Vec::new();
+        let listed = |numbers: &mut Vec<i64>| {
+            let members = std::mem::take(numbers);
+            (!members.is_empty()).then_some(Item { instance, members: Members::Numbers(members) })
+        };
         for (line, text) in self.deck.data(card) {
             if generate {
                 let bounds: Option<Vec<i64>> =
                     fields(text).filter(|field| !field.is_empty()).map(integer).collect();
                 match bounds.as_deref().and_then(range) {
-                    Some((first, last, step)) => {
-                        members.extend((first..=last).step_by(step as usize).map(&number));
-                    }
+                    Some(members) => items.push(Item { instance, members }),
                     None => self.syntax(card, line, "first, last and increment", text),
                 }
                 continue;
@@ -361,22 +424,25 @@ impl DeckMeshReader<'_> {
             for field in fields(text).filter(|field| !field.is_empty()) {
                 let name = String::from_utf8_lossy(field);
                 let name = name.trim_matches('"');
-                match integer(name.as_bytes()).map(|id| vec![number(id)]).or_else(|| known(name)) {
-                    Some(more) => members.extend(more),
-                    None => {
-                        let message = format!(
-                            "*{}: `{name}` is neither a number nor a set that is defined above",
-                            card.title
-                        );
-                        let help = "define the set before this line, or correct the name";
-                        let refused = self.deck.at(card, line, Code::DeckSyntax, message).with_help(help);
-                        unknown.get_or_insert(refused);
-                    }
+                if let Some(number) = integer(name.as_bytes()) {
+                    numbers.push(number);
+                } else if let Some(item) = known(name) {
+                    items.extend(listed(&mut numbers));
+                    items.push(item);
+                } else {
+                    let message = format!(
+                        "*{}: `{name}` is neither a number nor a set that is defined above",
+                        card.title
+                    );
+                    let help = "define the set before this line, or correct the name";
+                    let refused = self.deck.at(card, line, Code::DeckSyntax, message).with_help(help);
+                    unknown.get_or_insert(refused);
                 }
             }
         }
+        items.extend(listed(&mut numbers));
         match unknown {
-            None => Ok(members),
+            None => Ok(items),
             Some(refused) => Err(refused),
         }
     }
@@ -386,20 +452,23 @@ impl DeckMeshReader<'_> {
             let diagnostic = self.deck.about(card, Code::DeckSyntax, "*NSET has no name");
             return self.bad.add(diagnostic.with_help("write *NSET, NSET=NAME"));
         };
-        let members = match card.parameter("ELSET").filter(|elements| !elements.is_empty()) {
-            Some(elements) => self.nodes_of_elements(card, elements, scopes),
+        let items = match card.parameter("ELSET").filter(|elements| !elements.is_empty()) {
+            Some(elements) => self.nodes_of_elements(card, elements, scopes).map(|item| vec![item]),
             None => self.nodes_of_set(card, scopes),
         };
-        scopes.current().sets.extend(&name, members);
+        Arc::make_mut(&mut scopes.current().sets).extend(&name, items);
     }
 
     /// Returns the nodes of *NSET, ELSET=NAME, of an instance or of the scope of the card.
-    fn nodes_of_elements(&self, card: &Card, elements: &str, scopes: &Scopes) -> Resolved<Member> {
+    fn nodes_of_elements(&self, card: &Card, elements: &str, scopes: &Scopes) -> Result<Item, Diagnostic> {
         let nodes = match card.parameter("INSTANCE") {
-            Some(instance) => scopes.instances().nodes_of_elements(instance, elements),
+            Some(instance) => scopes.instance(instance).and_then(|at| {
+                let set = scopes.instances[at].scope.element_sets.so_far(elements)?;
+                Some(Item { instance: Some(at), members: Members::NodesOfElements(set) })
+            }),
             None => {
-                let nodes = scopes.open().and_then(|scope| scope.nodes_of_elements(elements));
-                nodes.map(|ids| ids.into_iter().map(Member::of_scope).collect())
+                let set = scopes.open().and_then(|scope| scope.element_sets.so_far(elements));
+                set.map(|set| Item::own(Members::NodesOfElements(set)))
             }
         };
         nodes.ok_or_else(|| {
@@ -410,17 +479,19 @@ impl DeckMeshReader<'_> {
     }
 
     /// Returns the nodes of *NSET by numbers and names, of an instance or of the scope of the card.
-    fn nodes_of_set(&mut self, card: &Card, scopes: &Scopes) -> Resolved<Member> {
-        let instances = scopes.instances();
+    fn nodes_of_set(&mut self, card: &Card, scopes: &Scopes) -> Result<Vec<Item>, Diagnostic> {
         let Some(instance) = card.parameter("INSTANCE") else {
             let known = |set: &str| {
-                let known_set = scopes.open().and_then(|scope| scope.sets.find(set)?.as_ref().ok());
-                known_set.cloned().or_else(|| instances.named(set))
+                let own = scopes.open().and_then(|scope| scope.sets.so_far(set));
+                own.map(|set| Item::own(Members::Set(set))).or_else(|| scopes.named(set))
             };
-            return self.members(card, Member::of_scope, known);
+            return self.items(card, None, known);
         };
-        match instances.find(instance) {
-            Some(one) => self.members(card, |id| one.member(id), |set| one.set(set)),
+        match scopes.instance(instance) {
+            Some(at) => self.items(card, Some(at), |set| {
+                let set = scopes.instances[at].scope.sets.so_far(set)?;
+                Some(Item { instance: Some(at), members: Members::Set(set) })
+            }),
             None => {
                 let message = format!("the instance `{instance}` is not in the deck");
                 let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
@@ -432,25 +503,26 @@ impl DeckMeshReader<'_> {
     fn element_set(&mut self, card: &Card, scope: &mut Scope) {
         // Element sets of the assembly select elements of instances; they are not needed.
         let (Some(name), None) = (card.name("ELSET"), card.parameter("INSTANCE")) else { return };
-        let known = |set: &str| scope.element_sets.get(&comparable(set)).cloned();
+        let known = |set: &str| scope.element_sets.so_far(set).map(|set| Item::own(Members::Set(set)));
+        let items = self.items(card, None, known);
+        let sets = Arc::make_mut(&mut scope.element_sets);
         // A set with an unknown name is unknown as well.
-        if let Ok(members) = self.members(card, |id| id, known) {
-            scope.element_sets.entry(name).or_default().extend(members);
-        } else {
-            scope.element_sets.remove(&name);
+        match items {
+            Ok(items) => sets.extend(&name, Ok(items)),
+            Err(_) => sets.forget(&name),
         }
     }
 }
 
-/// Returns first, last and increment of a generated set.
-fn range(bounds: &[i64]) -> Option<(i64, i64, i64)> {
+/// Returns the range of a line of a generated set: first, last and increment.
+fn range(bounds: &[i64]) -> Option<Members> {
     let (first, last, step) = match *bounds {
         [first, last] => (first, last, 1),
         [first, last, step] if step > 0 => (first, last, step),
         _ => return None,
     };
     let few = last.checked_sub(first).is_some_and(|length| length / step < MAX_GENERATED);
-    (first <= last && few).then_some((first, last, step))
+    (first <= last && few).then_some(Members::Range { first, last, step })
 }
 
 /// Returns a number; an empty field is zero.

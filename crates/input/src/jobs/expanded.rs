@@ -7,9 +7,10 @@
 //! the rigid rotations R. If none of the three is at x, the middle one keeps the number of the node; others get numbers
 //! that the deck does not have. Of the two nodes of a linear shell the upper one keeps the number.
 
+use super::Found;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
-use super::{Found, NodeSets};
+use crate::sets::NodeCopies;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::scanner::real;
@@ -118,7 +119,7 @@ fn offsets(
             "SNEG" => Some(-0.5),
             number => real(number.as_bytes()).filter(|value| value.is_finite()),
         };
-        let members = card.name("ELSET").and_then(|set| mesh.element_sets.get(&set));
+        let members = card.name("ELSET").and_then(|set| mesh.sets.elements(&set));
         let (Some(offset), Some(members)) = (offset, members) else {
             return Err("the OFFSET of a section, or its elements, cannot be read");
         };
@@ -126,9 +127,7 @@ fn offsets(
     }
     // Nodes take the OFFSET of their elements, which must agree.
     let mut of_nodes: BTreeMap<i64, f64> = BTreeMap::new();
-    for (element, nodes_of_element) in
-        mesh.elements.iter().flat_map(|nodes_of_element| &nodes_of_element.members)
-    {
+    for (element, nodes_of_element) in mesh.elements.iter().flat_map(|elements| elements.members.iter()) {
         let offset = of_elements.get(element).copied().unwrap_or(0.0);
         for node in nodes_of_element.iter().filter(|node| nodes.contains_key(node)) {
             if of_nodes.insert(*node, offset).is_some_and(|other| other != offset) {
@@ -179,7 +178,7 @@ fn numbered(
 /// Returns the nodes of linear shells.
 fn corners_of_linear_shells(mesh: &DeckMesh) -> HashSet<i64> {
     let linear = mesh.elements.iter().filter(|elements| LINEAR_SHELLS.contains(&elements.kind.as_str()));
-    let members = linear.flat_map(|elements| &elements.members);
+    let members = linear.flat_map(|elements| elements.members.iter());
     members.flat_map(|(_, nodes)| nodes.iter().copied()).collect()
 }
 
@@ -260,33 +259,21 @@ pub(super) fn solved(matrix: &SymmetricMatrix, load: &Mat<f64>) -> Option<Mat<f6
     Some(solution)
 }
 
-/// Returns the node sets of a deck with the new nodes that stand for their nodes: a set whose nodes with rows do not
-/// lie on one line stays as it is, unless nodes of linear shells, which lie on one face, belong to it. The others get all
-/// copies of their nodes, on both faces, so that the edge of a shell determines a rotation.
-pub(super) fn sets_of_copies(
-    sets: NodeSets,
-    copies: &HashMap<i64, Vec<i64>>,
+/// Returns the new nodes that stand for nodes of the sets of a deck; `None` if there are none. A set whose nodes with rows
+/// do not lie on one line stays as it is, unless nodes of linear shells, which lie on one face, belong to it. The others
+/// get all copies of their nodes, on both faces, so that the edge of a shell determines a rotation.
+pub(super) fn copies_in_sets(
+    copies: HashMap<i64, Vec<i64>>,
     places: &BTreeMap<i64, [f64; 3]>,
     labels: &[DofLabel],
-) -> NodeSets {
-    if copies.is_empty() {
-        return sets;
-    }
-    let with_rows: HashSet<i64> = labels.iter().map(|label| label.node).collect();
-    let whole = |(name, nodes): (String, Vec<i64>)| {
-        let of_copies = |node: &i64| copies.get(node).into_iter().flatten().copied();
-        let moving = nodes.iter().filter(|node| with_rows.contains(node));
-        let points: Vec<[f64; 3]> = moving.filter_map(|node| places.get(node).copied()).collect();
-        // One new node: the other copy has the number of the deck.
-        let on_face =
-            |node: &i64| with_rows.contains(node) && copies.get(node).is_some_and(|own| own.len() == 1);
-        if nodes.iter().any(on_face) || are_on_one_line(&points) {
-            let more: Vec<i64> = nodes.iter().flat_map(of_copies).collect();
-            return (name, [nodes, more].concat());
-        }
-        (name, nodes)
-    };
-    sets.into_iter().map(whole).collect()
+) -> Option<NodeCopies> {
+    let with_rows = || labels.iter().map(|label| label.node).collect();
+    (!copies.is_empty()).then(|| NodeCopies {
+        copies,
+        places: places.clone(),
+        with_rows: with_rows(),
+        needs_copies: are_on_one_line,
+    })
 }
 
 /// Returns true if two or more points lie on one line, to the accuracy of their coordinates.

@@ -67,7 +67,7 @@ impl Knots {
             .elements
             .iter()
             .filter(|elements| elements.kind.starts_with('S'))
-            .flat_map(|elements| &elements.members)
+            .flat_map(|elements| elements.members.iter())
             .flat_map(|(_, nodes)| nodes.iter().copied())
             .collect();
         let is_point = |own: &Vec<u8>| own.as_slice() == [1, 2, 3];

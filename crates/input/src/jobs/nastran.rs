@@ -9,7 +9,8 @@ mod systems;
 
 use super::{Found, JobFile, JobModel, JobReader, condensed};
 use crate::bulk_cards::is_bulk_data;
-use crate::node_files::{NodeFile, NodeSets, Unresolved};
+use crate::node_files::NodeFile;
+use crate::sets::{Edit, Item, Members, NodeSets, SetList};
 use bulk::Bulk;
 use elimination::GridPlaces;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -17,7 +18,7 @@ use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::BadLines;
 use flexbody_model::{Elements, NodeAxes as Axes, Nodes};
 use matrices::Matrices;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use systems::Systems;
 
@@ -67,22 +68,10 @@ impl JobReader for Nastran {
             bulk.files.iter().map(|file| ("deck", file.clone())).collect();
         files.extend(matrices.files.iter().map(|file| ("matrices", file.clone())));
         let given_rows = matrices.given_rows(axes);
-        let unresolved = Unresolved::new();
         let Matrices { stiffness, mass, labels: dofs, .. } = matrices;
         // With condensed matrices no element has all of its nodes.
         let elements = if bulk.is_condensed() { Elements::default() } else { bulk.elements };
-        Ok(JobModel {
-            stiffness,
-            mass,
-            nodes,
-            dofs,
-            given_rows,
-            sets,
-            unresolved,
-            elements,
-            files,
-            diagnostics,
-        })
+        Ok(JobModel { stiffness, mass, nodes, dofs, given_rows, sets, elements, files, diagnostics })
     }
 }
 
@@ -181,23 +170,27 @@ impl SetLines {
 
     /// Returns the sets with those members that are nodes, each by its number and as `SET5`.
     fn of<T>(&self, nodes: &BTreeMap<i64, T>) -> NodeSets {
-        let mut sets = Vec::new();
+        let mut sets = SetList::default();
         for line in &self.lines {
-            let Some((number, members)) = parsed(line, nodes) else { continue };
-            for name in [format!("SET{number}"), number.to_string()] {
-                // A set that is defined again in another subcase is another set: the last one is used.
-                sets.retain(|(key, _): &(String, Vec<i64>)| *key != name);
-                sets.push((name, members.clone()));
-            }
+            let Some((number, edits)) = parsed(line) else { continue };
+            let name = format!("SET{number}");
+            // A set that is defined again in another subcase is another set: the last one is used.
+            sets.forget(&name);
+            sets.forget(&number.to_string());
+            let set = sets.add(&name, vec![Item::own(Members::Edited(edits))]);
+            let same = Item::own(Members::Set(sets.all_of(set)));
+            sets.add(&number.to_string(), vec![same]);
         }
-        sets
+        let ids: Vec<i64> = nodes.keys().copied().collect();
+        NodeSets::of_nodes(&ids, sets)
     }
 }
 
-fn parsed<T>(line: &str, nodes: &BTreeMap<i64, T>) -> Option<(i64, Vec<i64>)> {
+/// Returns the number of a set and the steps by which its members are selected.
+fn parsed(line: &str) -> Option<(i64, Vec<Edit>)> {
     let (head, members) = line.split_once('=')?;
     let number: i64 = head.split_whitespace().nth(1)?.parse().ok()?;
-    let mut listed = BTreeSet::new();
+    let mut edits = Vec::new();
     // Exceptions are taken out of the last range; numbers beyond it are members again.
     let (mut range, mut except) = (None, false);
     let mut words = members.split([',', ' ', '\t']).filter(|word| !word.is_empty()).peekable();
@@ -207,23 +200,23 @@ fn parsed<T>(line: &str, nodes: &BTreeMap<i64, T>) -> Option<(i64, Vec<i64>)> {
             continue;
         }
         if word.eq_ignore_ascii_case("ALL") {
-            listed.extend(nodes.keys().copied());
+            edits.push(Edit::Add { first: i64::MIN, last: i64::MAX });
             continue;
         }
         let first: i64 = word.parse().ok()?;
         if words.next_if(|word| word.eq_ignore_ascii_case("THRU")).is_some() {
             let last: i64 = words.next()?.parse().ok()?;
             let listed_range = (first <= last).then_some(first..=last)?;
-            listed.extend(nodes.range(listed_range.clone()).map(|(id, _)| *id));
+            edits.push(Edit::Add { first, last });
             (range, except) = (Some(listed_range), false);
         } else if except && range.as_ref().is_some_and(|range| range.contains(&first)) {
-            listed.remove(&first);
+            edits.push(Edit::Remove(first));
         } else {
             except = false;
-            listed.extend(nodes.contains_key(&first).then_some(first));
+            edits.push(Edit::Add { first, last: first });
         }
     }
-    Some((number, listed.into_iter().collect()))
+    Some((number, edits))
 }
 
 /// Lines of a deck above its bulk data that assign files.
@@ -304,12 +297,12 @@ mod tests {
         }
         let nodes: BTreeMap<i64, ()> = [1, 2, 3, 4, 6, 9, 11].map(|id| (id, ())).into();
         let sets = lines.of(&nodes);
-        let of = |name: &str| sets.iter().find(|(key, _)| key == name).expect("a set").1.clone();
+        let of = |name: &str| sets.find(name).expect("a set").expect("resolved");
         // Numbers beyond the range are members again.
         assert_eq!(of("SET5"), [1, 3, 6, 9]);
         assert_eq!(of("7"), [1, 2, 3, 4, 6, 9, 11]);
         assert_eq!(of("8"), [3]);
-        assert_eq!(sets.len(), 6);
+        assert_eq!(sets.names().count(), 6);
     }
 
     #[test]

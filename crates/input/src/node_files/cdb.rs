@@ -3,6 +3,7 @@
 
 use super::ansys_list::axes;
 use super::{Found, NodeFile, syntax};
+use crate::sets::{Item, Members, NodeSets, SetList};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Lines, excerpt, field, integer, real};
 use flexbody_model::{ElementShape, Elements};
@@ -20,6 +21,7 @@ pub(super) fn recognises(head: &str) -> bool {
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     let text: Vec<&[u8]> = Lines::of(file.bytes()).map(|line| line.text).collect();
     let mut read = NodeFile::default();
+    let mut sets = SetList::default();
     let mut types = Types::default();
     let mut at = 0;
     while at < text.len() {
@@ -27,7 +29,7 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
         at = if head.starts_with("NBLOCK,") {
             nodes(file, &text, at, &mut read)?
         } else if head.starts_with("CMBLOCK,") {
-            component(file, &text, at, &mut read)?
+            component(file, &text, at, &mut sets)?
         } else if head.starts_with("EBLOCK,") {
             read_eblock(&text, at, &types, &mut read.elements)
         } else {
@@ -35,6 +37,7 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
             at + 1
         };
     }
+    read.sets = NodeSets::of_nodes(&read.nodes.ids, sets);
     Ok(read)
 }
 
@@ -106,7 +109,8 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
     Err(syntax(file, text.len(), "file ends within NBLOCK: it may be cut off".to_owned()))
 }
 
-fn component(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> Found<usize> {
+/// Reads a component, which is a set if its members are nodes. Returns the index of the line after it.
+fn component(file: &InputFile, text: &[&[u8]], head: usize, sets: &mut SetList) -> Found<usize> {
     let line = String::from_utf8_lossy(text[head]).into_owned();
     let words: Vec<&str> = line.split(',').map(str::trim).collect();
     let of_nodes = words.get(2).is_some_and(|kind| kind.to_uppercase().starts_with("NODE"));
@@ -126,9 +130,9 @@ fn component(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile)
         ));
     };
     let lines = count.div_ceil(per_line.max(1));
-    let mut known = read.nodes.ids.clone();
-    known.sort_unstable();
-    let mut members: Vec<i64> = Vec::new();
+    let mut items = Vec::new();
+    let mut numbers: Vec<i64> = Vec::new();
+    let mut last = None;
     for k in 0..count {
         let line = text.get(head + 2 + k / per_line.max(1)).copied().unwrap_or_default();
         let Some(member) = integer(nth_field(line, k % per_line.max(1), width)) else {
@@ -138,17 +142,20 @@ fn component(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile)
                 format!("CMBLOCK `{name}`: expected {count} numbers"),
             ));
         };
-        match members.last() {
-            // A negative number ends a range that the preceding number begins.
-            Some(&first) if member < 0 => {
-                let after = known.partition_point(|id| *id <= first);
-                members.extend(known[after..].iter().take_while(|id| **id <= member.saturating_neg()));
+        // A negative number ends a range that the preceding number begins.
+        match last {
+            Some(first) if member < 0 => {
+                let last = member.saturating_neg();
+                items.push(Item::own(Members::Numbers(std::mem::take(&mut numbers))));
+                items.push(Item::own(Members::Range { first, last, step: 1 }));
             }
-            _ => members.push(member),
+            _ => numbers.push(member),
         }
+        last = Some(member.saturating_abs());
     }
+    items.push(Item::own(Members::Numbers(numbers)));
     if of_nodes {
-        read.sets.push(((*name).to_owned(), members));
+        sets.add(name, items);
     }
     Ok(head + 2 + lines)
 }

@@ -1,11 +1,12 @@
 //! Meshes of Gmsh (.msh, versions 2.2 and 4.1, text): nodes, the nodes of physical groups as sets, and elements.
 
 use super::{Found, NodeFile, syntax};
+use crate::sets::{Item, Members, NodeSets, SetList, SoFar};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Words, integer, number};
 use flexbody_model::{ElementShape, Elements};
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap};
 
 /// Returns true when the text is a mesh of Gmsh.
 pub(super) fn recognises(head: &str) -> bool {
@@ -22,22 +23,23 @@ struct Mesh {
     names: HashMap<Tag, String>,
     /// Physical groups of the entities (version 4).
     groups: HashMap<Tag, Vec<i64>>,
-    members: HashMap<Tag, BTreeSet<i64>>,
+    /// Nodes of the elements of each entity (version 4), or of each group (version 2).
+    members: BTreeMap<Tag, Vec<i64>>,
+    version: i64,
 }
 
 /// Reads nodes, groups and elements.
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     let mut words = MeshWords { file, text: Words::of(file.bytes()) };
     let mut mesh = Mesh::default();
-    let mut version = 0;
     while let Some(section) = words.section() {
         match section.as_str() {
-            "$MeshFormat" => version = format(&mut words)?,
+            "$MeshFormat" => mesh.version = format(&mut words)?,
             "$PhysicalNames" => mesh.physical_names(&mut words)?,
-            "$Entities" if version == 4 => mesh.entities(&mut words)?,
-            "$Nodes" if version == 4 => mesh.nodes_4(&mut words)?,
+            "$Entities" if mesh.version == 4 => mesh.entities(&mut words)?,
+            "$Nodes" if mesh.version == 4 => mesh.nodes_4(&mut words)?,
             "$Nodes" => mesh.nodes_2(&mut words)?,
-            "$Elements" if version == 4 => mesh.elements_4(&mut words)?,
+            "$Elements" if mesh.version == 4 => mesh.elements_4(&mut words)?,
             "$Elements" => mesh.elements_2(&mut words)?,
             _ => {}
         }
@@ -134,7 +136,7 @@ impl Mesh {
             let nodes = words.nodes(kind)?;
             draw(&mut self.read.elements, kind, &nodes);
             if let (Some(&group), Some(dimension)) = (tags.first(), dimension_of(kind)) {
-                self.members.entry((dimension, group)).or_default().extend(nodes);
+                self.add_members((dimension, group), &nodes);
             }
         }
         Ok(())
@@ -148,30 +150,47 @@ impl Mesh {
         for _ in 0..blocks {
             let (dimension, entity) = (words.whole("a dimension")?, words.whole("an entity")?);
             let (kind, count) = (words.whole("a type")?, words.whole("a count")?);
-            let groups = self.groups.get(&(dimension, entity)).cloned().unwrap_or_default();
             for _ in 0..count {
                 words.whole("an element")?;
                 let nodes = words.nodes(kind)?;
                 draw(&mut self.read.elements, kind, &nodes);
-                for group in &groups {
-                    self.members.entry((dimension, *group)).or_default().extend(nodes.iter().copied());
-                }
+                self.add_members((dimension, entity), &nodes);
             }
         }
         Ok(())
     }
 
-    /// Returns the nodes, sets and elements. Groups without a name are named by their tag.
+    /// Adds the nodes of an element to an entity or a group. A full list is sorted and keeps each node once before it grows.
+    fn add_members(&mut self, tag: Tag, nodes: &[i64]) {
+        let members = self.members.entry(tag).or_default();
+        if members.len() + nodes.len() > members.capacity() {
+            members.sort_unstable();
+            members.dedup();
+            members.reserve(members.len() + nodes.len());
+        }
+        members.extend(nodes);
+    }
+
+    /// Returns the nodes, sets and elements. Groups without a name are named by their tag. The nodes of an entity are kept
+    /// once, however many groups it has.
     fn finish(self) -> NodeFile {
-        let Self { mut read, names, members, .. } = self;
-        let mut groups: Vec<(Tag, BTreeSet<i64>)> =
-            members.into_iter().filter(|((_, tag), _)| *tag != 0).collect();
-        groups.sort_by_key(|(tag, _)| *tag);
-        let named = groups.into_iter().map(|(tag, nodes)| {
+        let Self { mut read, names, groups, members, version } = self;
+        let mut sets = SetList::default();
+        let mut parts: BTreeMap<Tag, Vec<SoFar>> = BTreeMap::new();
+        for ((dimension, tag), nodes) in members {
+            let nodes = sets.add_nameless(vec![Item::own(Members::Numbers(nodes))]);
+            let own = [tag];
+            let of_entity = groups.get(&(dimension, tag)).map_or(&[][..], Vec::as_slice);
+            for group in if version == 4 { of_entity } else { &own } {
+                parts.entry((dimension, *group)).or_default().push(nodes);
+            }
+        }
+        for (tag, nodes) in parts.into_iter().filter(|((_, tag), _)| *tag != 0) {
             let name = names.get(&tag).cloned().unwrap_or_else(|| tag.1.to_string());
-            (name, nodes.into_iter().collect())
-        });
-        read.sets = named.collect();
+            let items = nodes.into_iter().map(|nodes| Item::own(Members::Set(nodes)));
+            sets.add_sorted(&name, items.collect());
+        }
+        read.sets = NodeSets::of_nodes(&read.nodes.ids, sets);
         read
     }
 }

@@ -274,6 +274,11 @@ impl<'a> Base64<'a> {
         Self { text, group: [0; 3], count: 0, given: 0 }
     }
 
+    /// Returns the number of characters that were not decoded yet.
+    pub(super) fn n_unread(&self) -> usize {
+        self.text.len()
+    }
+
     /// Decodes the next four characters. Returns false at the end.
     fn next_group(&mut self) -> std::io::Result<bool> {
         let wrong = |what: &str| Err(Error::new(ErrorKind::InvalidData, what));

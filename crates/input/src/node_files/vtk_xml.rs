@@ -4,11 +4,15 @@
 
 use super::vtk_legacy::{Base64, NumberType, Packing, Unpacked};
 use super::{Found, NodeFile, refused};
+use crate::sets::{Item, Members, NodeSets, SetList};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{number, words};
 use flexbody_model::{ElementShape, Elements, Nodes};
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
+use std::cell::Cell;
+use std::collections::HashSet;
+use std::sync::Arc;
 
 const HELP: &str = "write one mesh of points and cells (.vtu) in double precision, as it is or compressed by zlib, or give a table of nodes";
 
@@ -29,7 +33,7 @@ fn points_and_sets(bytes: &[u8]) -> Unpacked<NodeFile> {
         Some(name) => mesh.numbered_by(name)?,
         None => (0..positions.len() as i64).collect(),
     };
-    let sets = mesh.sets(&ids)?;
+    let sets = NodeSets::of_nodes(&ids, mesh.sets()?);
     let elements = mesh.cells(&ids)?;
     Ok(NodeFile { nodes: Nodes { ids, positions }, sets, elements, ..NodeFile::default() })
 }
@@ -103,7 +107,7 @@ pub(crate) fn pieces(bytes: &[u8]) -> Unpacked<Option<Vec<String>>> {
     if elements.first().and_then(|head| head.attribute("type")) != Some("PUnstructuredGrid") {
         return Ok(None);
     }
-    let pieces = elements.iter().filter(|element| element.name == "Piece");
+    let pieces = elements.iter().filter(|element| &*element.name == "Piece");
     let source = |(at, piece): (usize, &Element<'_>)| {
         let source = piece.attribute("Source").filter(|source| !source.is_empty());
         source.map(str::to_owned).ok_or_else(|| format!("piece {} names no file (`Source`)", at + 1))
@@ -130,7 +134,7 @@ pub(crate) fn collection(bytes: &[u8]) -> Unpacked<Option<Vec<CollectionMember>>
         return Ok(None);
     }
     let mut members = Vec::new();
-    for element in elements.iter().filter(|element| element.name == "DataSet") {
+    for element in elements.iter().filter(|element| &*element.name == "DataSet") {
         let time = element.attribute("timestep").and_then(|time| number(time.trim().as_bytes()));
         let time = time.filter(|time| time.is_finite());
         let file = element.attribute("file").filter(|file| !file.is_empty());
@@ -140,8 +144,12 @@ pub(crate) fn collection(bytes: &[u8]) -> Unpacked<Option<Vec<CollectionMember>>
         members.push(CollectionMember { time, file: file.to_owned() });
     }
     members.sort_by(|one, other| one.time.total_cmp(&other.time));
-    match members.windows(2).find(|pair| pair[0].time == pair[1].time) {
-        Some(pair) => Err(format!("time {} has several files, expected one mesh in one piece", pair[0].time)),
+    if let Some(pair) = members.windows(2).find(|pair| pair[0].time == pair[1].time) {
+        return Err(format!("time {} has several files, expected one mesh in one piece", pair[0].time));
+    }
+    let mut files = HashSet::new();
+    match members.iter().find(|member| !files.insert(&member.file)) {
+        Some(member) => Err(format!("{} is the file of several times, expected one of each", member.file)),
         None => Ok(Some(members)),
     }
 }
@@ -172,11 +180,13 @@ struct Mesh<'a> {
     points: u64,
     /// Number of cells, if the piece states it.
     cells: Option<u64>,
+    /// Number of bytes of the appended data that were read.
+    appended: Cell<usize>,
 }
 
 impl<'a> Mesh<'a> {
     fn of(elements: Vec<Element<'a>>) -> Unpacked<Self> {
-        let outermost = elements.first().filter(|element| element.name == "VTKFile");
+        let outermost = elements.first().filter(|element| &*element.name == "VTKFile");
         let head = outermost.ok_or("file does not begin with VTKFile")?;
         let kind = head.attribute("type").unwrap_or_default();
         if !["UnstructuredGrid", "PolyData", "StructuredGrid"].contains(&kind) {
@@ -194,14 +204,14 @@ impl<'a> Mesh<'a> {
         };
         let packing =
             Packing { big_endian: head.attribute("byte_order") == Some("BigEndian"), header_bytes, zlib };
-        let pieces: Vec<&Element<'_>> = elements.iter().filter(|element| element.name == "Piece").collect();
+        let pieces: Vec<&Element<'_>> = elements.iter().filter(|element| &*element.name == "Piece").collect();
         let [piece] = pieces.as_slice() else {
             return Err(format!("file has {} pieces, expected one", pieces.len()));
         };
         let points = piece.number("NumberOfPoints").or_else(|| extent(piece));
         let points = points.ok_or("the piece does not state its number of points")?;
         let cells = piece.number("NumberOfCells");
-        Ok(Self { elements, packing, points, cells })
+        Ok(Self { elements, packing, points, cells, appended: Cell::new(0) })
     }
 
     /// Returns the coordinates of the points.
@@ -217,7 +227,7 @@ impl<'a> Mesh<'a> {
 
     /// Returns the name of the array that numbers the points, if the file declares one.
     fn global_ids(&self) -> Option<&str> {
-        let data = self.elements.iter().find(|element| element.name == "PointData")?;
+        let data = self.elements.iter().find(|element| &*element.name == "PointData")?;
         data.attribute("GlobalIds").filter(|name| !name.is_empty())
     }
 
@@ -228,15 +238,18 @@ impl<'a> Mesh<'a> {
         exact_ids(name, &self.list(array)?)
     }
 
-    /// Returns the sets: lists of zeros and ones, which mark their points.
-    fn sets(&self, ids: &[i64]) -> Unpacked<Vec<(String, Vec<i64>)>> {
-        let mut sets = Vec::new();
-        for array in self.lists().filter(|array| array.attribute("Name") != self.global_ids()) {
+    /// Returns the sets: lists of zeros and ones, which mark their points. A set takes a bit for each point until it is
+    /// requested.
+    fn sets(&self) -> Unpacked<SetList> {
+        let mut sets = SetList::default();
+        let global_ids = self.global_ids();
+        for array in self.lists().filter(|array| array.attribute("Name") != global_ids) {
             let marks = self.list(array)?;
             if marks.iter().all(|mark| [0.0, 1.0].contains(mark)) {
-                let marked = ids.iter().zip(&marks).filter(|(_, mark)| **mark == 1.0);
+                let bits = |marks: &[f64]| marks.iter().rev().fold(0, |bits, mark| bits << 1 | *mark as u64);
+                let marked: Arc<[u64]> = marks.chunks(64).map(bits).collect();
                 let name = array.attribute("Name").unwrap_or_default();
-                sets.push((name.to_owned(), marked.map(|(id, _)| *id).collect()));
+                sets.add(name, vec![Item::own(Members::Marked(marked))]);
             }
         }
         Ok(sets)
@@ -269,7 +282,9 @@ impl<'a> Mesh<'a> {
 
     /// Returns the arrays within the elements named `parent`.
     fn arrays(&self, parent: &'static str) -> impl Iterator<Item = &Element<'a>> {
-        self.elements.iter().filter(move |element| element.name == "DataArray" && element.parent == parent)
+        self.elements
+            .iter()
+            .filter(move |element| &*element.name == "DataArray" && &*element.parent == parent)
     }
 
     /// Returns the numbers of an array. A compressed array may have at most `most` of them.
@@ -292,19 +307,36 @@ impl<'a> Mesh<'a> {
         Ok(kind.decode(&bytes, self.packing.big_endian))
     }
 
+    /// Returns the bytes of an appended array. Arrays do not overlap: all together have no more bytes than the file.
     fn appended(&self, array: &Element<'_>, most: u64) -> Unpacked<Vec<u8>> {
-        let data = self.elements.iter().find(|element| element.name == "AppendedData");
+        // No element follows the appended data.
+        let data = self.elements.last().filter(|element| &*element.name == "AppendedData");
         let data = data.ok_or("is appended, but the file has no appended data")?;
         // The data begin after an underscore.
         let content = data.content.trim_ascii_start().strip_prefix(b"_").unwrap_or_default();
         let offset = array.number("offset").and_then(|offset| usize::try_from(offset).ok());
         let encoded = offset.and_then(|offset| content.get(offset..));
         let encoded = encoded.ok_or("begins behind the end of the file: it may be cut off")?;
-        match data.attribute("encoding") {
-            Some("raw") => self.packing.unpack(encoded, most),
-            Some("base64") | None => self.packing.unpack(Base64::new(encoded), most),
-            Some(other) => Err(format!("is encoded by `{other}`, which is not read")),
+        let (bytes, unread) = match data.attribute("encoding") {
+            Some("raw") => {
+                let mut stream = encoded;
+                (self.packing.unpack(&mut stream, most)?, stream.len())
+            }
+            Some("base64") | None => {
+                let mut stream = Base64::new(encoded);
+                (self.packing.unpack(&mut stream, most)?, stream.n_unread())
+            }
+            Some(other) => return Err(format!("is encoded by `{other}`, which is not read")),
+        };
+        let read = self.appended.get() + (encoded.len() - unread);
+        self.appended.set(read);
+        if read > content.len() {
+            return Err(format!(
+                "lies where other arrays lie: they have {read} bytes together, the appended data have {}",
+                content.len()
+            ));
         }
+        Ok(bytes)
     }
 }
 
@@ -374,9 +406,9 @@ fn add(elements: &mut Elements, kind: u8, nodes: Vec<i64>) {
 
 /// Element of an XML file.
 struct Element<'a> {
-    pub name: String,
+    pub name: Arc<str>,
     /// Name of the enclosing element; empty for the outermost.
-    pub parent: String,
+    pub parent: Arc<str>,
     attributes: Vec<(String, String)>,
     /// Bytes between its tag and the next one.
     pub content: &'a [u8],
@@ -407,7 +439,8 @@ fn elements<'a>(bytes: &'a [u8], last: &str) -> Result<Vec<Element<'a>>, String>
         let begins = matches!(event, Event::Start(_));
         match event {
             Event::Start(tag) | Event::Empty(tag) => {
-                let parent = open.last().map_or(String::new(), |outer| elements[*outer].name.clone());
+                let parent =
+                    open.last().map_or_else(Arc::default, |outer| Arc::clone(&elements[*outer].name));
                 elements.push(element(&tag, parent)?);
             }
             Event::End(_) => {
@@ -420,7 +453,7 @@ fn elements<'a>(bytes: &'a [u8], last: &str) -> Result<Vec<Element<'a>>, String>
         if let (true, Some(element)) = (begins, elements.last_mut()) {
             let begin = usize::try_from(reader.buffer_position()).unwrap_or(bytes.len());
             let rest = bytes.get(begin..).unwrap_or_default();
-            if element.name == last {
+            if &*element.name == last {
                 element.content = rest;
                 return Ok(elements);
             }
@@ -430,13 +463,18 @@ fn elements<'a>(bytes: &'a [u8], last: &str) -> Result<Vec<Element<'a>>, String>
     }
 }
 
-fn element<'a>(tag: &BytesStart<'_>, parent: String) -> Result<Element<'a>, String> {
-    let mut attributes = Vec::new();
-    for attribute in tag.attributes() {
+fn element<'a>(tag: &BytesStart<'_>, parent: Arc<str>) -> Result<Element<'a>, String> {
+    let (mut attributes, mut names) = (Vec::new(), HashSet::new());
+    // The check of the reader compares every name with all others.
+    for attribute in tag.attributes().with_checks(false) {
         let attribute = attribute.map_err(|error| format!("file is not XML: {error}"))?;
         let value = attribute.normalized_value(XmlVersion::default());
         let value = value.map_err(|error| format!("file is not XML: {error}"))?;
-        attributes.push((attribute.key.as_ref().to_owned(), value.into_owned()));
+        let name: &str = attribute.key.as_ref();
+        if !names.insert(name.to_owned()) {
+            return Err(format!("file is not XML: attribute `{name}` is given twice"));
+        }
+        attributes.push((name.to_owned(), value.into_owned()));
     }
-    Ok(Element { name: tag.name().as_ref().to_owned(), parent, attributes, content: &[] })
+    Ok(Element { name: Arc::from(tag.name().as_ref() as &str), parent, attributes, content: &[] })
 }

@@ -43,6 +43,38 @@ fn a_matrix_market_file_is_read_up_to_its_first_entry_too_many() {
     assert_refused(&path, Code::MatrixCount, "header announces 78 entries, the file has more");
 }
 
+/// Returns a file of the tetrahedron with `times` times 65536 lines behind its text.
+fn with_tail(folder: &Path, name: &str, text: &str, line: &str, times: usize) -> std::path::PathBuf {
+    let path = folder.join(name);
+    gzip(&path, text, line, times);
+    path
+}
+
+/// Blank lines and comments behind the entries, which a small file may unpack to without end. Few of them are no error.
+#[test]
+fn a_text_is_read_up_to_16_mib_of_blank_lines_and_comments() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = fs::read_to_string(fixtures().join("small/tet4/K.mtx")).expect("a matrix");
+    let blanks = format!("{}\n", " ".repeat(63));
+    for (line, times) in [("\n", 400), ("% of a comment, of many\n", 20), (&blanks, 8)] {
+        let path = with_tail(folder.path(), "K.mtx.gz", &text, line, times);
+        assert_refused(&path, Code::MatrixCount, "bytes with 42 values among them");
+        let path = with_tail(folder.path(), "K.mtx.gz", &text, line, 1);
+        let location = MatrixLocation { path, group: None };
+        let read = read_matrix(&location, MatrixRole::Stiffness).expect("a matrix with a short tail");
+        assert_eq!(read.matrix.n_rows(), 12);
+    }
+    let text = "%%MatrixMarket matrix array real general\n12 1\n".to_owned() + &"1\n".repeat(12);
+    let path = with_tail(folder.path(), "shapes.mtx.gz", &text, &blanks, 8);
+    let location = MatrixLocation { path, group: None };
+    let error = flexbody_input::read_shapes(&location, &[12], "shapes").expect_err("refused");
+    assert!(error.to_string().contains("bytes with 12 values among them"), "{error}");
+    // Lines that cannot be read are named as well.
+    let line = format!("no entry{blanks}");
+    let path = with_tail(folder.path(), "K.mtx.gz", &format!("{BANNER}12 12 900000\n"), &line, 5);
+    assert_refused(&path, Code::MatrixSyntax, "no entry");
+}
+
 /// Matrices without a header have the rows of their job.
 #[test]
 fn lines_without_a_head_are_no_more_than_their_rows_can_have() {
@@ -57,6 +89,9 @@ fn lines_without_a_head_are_no_more_than_their_rows_can_have() {
     gzip(&folder.path().join("job.sti"), "", "1 1 1\n", 40);
     let error = read_model(&files).expect_err("refused");
     assert!(error.to_string().contains("declares") && error.has(Code::MatrixCount), "{error}");
+    gzip(&folder.path().join("job.sti"), "1 1 1\n", "\n", 400);
+    let error = read_model(&files).expect_err("refused");
+    assert!(error.to_string().contains("bytes with 1 values among them"), "{error}");
 }
 
 /// Returns a NumPy array with this header and data.
@@ -137,6 +172,44 @@ fn a_variable_of_matlab_has_no_more_bytes_than_its_extents_leave() {
     );
 }
 
+/// Zeros behind the numbers of a packed variable.
+#[test]
+fn a_variable_of_matlab_ends_with_its_numbers() {
+    let element = |kind: u32, bytes: &[u8]| {
+        let mut own = [kind.to_le_bytes(), (bytes.len() as u32).to_le_bytes()].concat();
+        own.extend(bytes);
+        own.resize(own.len().next_multiple_of(8), 0);
+        own
+    };
+    let value = |count: usize| {
+        let head = [element(6, &[6, 0, 0, 0, 0, 0, 0, 0]), element(5, &[2, 0, 0, 0, 2, 0, 0, 0])];
+        let numbers = [element(1, b"K"), element(9, &[2.0f64, 1.0, 1.0, 2.0].map(f64::to_le_bytes).concat())];
+        let mut variable = [head.concat(), numbers.concat()].concat();
+        variable.resize(variable.len() + count, 0);
+        let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
+        let tag = [14u32.to_le_bytes(), (variable.len() as u32).to_le_bytes()].concat();
+        packed.write_all(&[tag, variable].concat()).expect("memory");
+        let packed = packed.finish().expect("memory");
+        let mut file = b"MATLAB 5.0 MAT-file".to_vec();
+        file.resize(124, b' ');
+        file.extend(b"\x00\x01IM");
+        file.extend([15u32.to_le_bytes(), (packed.len() as u32).to_le_bytes()].concat());
+        file.extend(packed);
+        file
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("K.mat");
+    fs::write(&path, value(1 << 20)).expect("written");
+    assert_refused(
+        &path,
+        Code::MatrixCount,
+        "a compressed variable has more than 65536 bytes after its numbers",
+    );
+    fs::write(&path, value(8)).expect("written");
+    let location = MatrixLocation { path, group: None };
+    assert_eq!(read_matrix(&location, MatrixRole::Stiffness).expect("a matrix").matrix.get(0, 0), 2.0);
+}
+
 #[test]
 fn points_of_vtk_are_unpacked_as_many_as_there_are() {
     const BLOCK: usize = 1 << 22;
@@ -192,4 +265,61 @@ fn written(path: &Path, fill: impl Fn(&hdf5_metno::Group)) {
     let group = file.create_group("K").expect("a group");
     group.new_dataset_builder().with_data(&[0_i32]).create("indices").expect("indices");
     fill(&group);
+}
+
+/// Short lines of a deck of Nastran that stand for a million grids each.
+#[test]
+fn lines_of_nastran_stand_for_a_million_grids_in_all() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("nodes.bdf");
+    let small = |name: &str| fixtures().join("small/tet4").join(name);
+    let dofs = Some(small("dofs.csv"));
+    let files = ModelFiles::from_arguments(small("K.mtx"), small("M.mtx"), &path, dofs, Some("m,kg,s"))
+        .expect("units");
+    let head = "SOL 103\nCEND\nBEGIN BULK\nGRID,10,,0.,0.,0.\nGRID,20,,.1,0.,0.\nGRID,30,,0.,.2,0.\nGRID,40,,0.,0.,.3\n";
+    let ranges =
+        |last: u32| format!("RBE2,1,10,123,100,THRU,{last}\nRBE2,2,10,123,100,THRU,{last}\nENDDATA\n");
+    let repeated = |count: u32| format!("GRID,100,,0.,0.,0.\n=,*1,==\n=({count}),\n=({count}),\nENDDATA\n");
+    for (lines, part) in [(ranges(600_000), "RBE2"), (repeated(600_000), "more than 1000000 cards")] {
+        fs::write(&path, format!("{head}{lines}")).expect("written");
+        let error = read_model(&files).expect_err("refused");
+        assert_eq!(error.first_error().code(), Code::DeckSyntax, "{error}");
+        assert!(error.to_string().contains(part), "{error}");
+    }
+    for lines in [ranges(60_000), repeated(60_000)] {
+        fs::write(&path, format!("{head}{lines}")).expect("written");
+        if let Err(error) = read_model(&files) {
+            assert!(!error.has(Code::DeckSyntax), "{error}");
+        }
+    }
+}
+
+/// Several names of one dataset, each of which would be read.
+#[test]
+fn datasets_of_exodus_store_no_more_than_their_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("nodes.exo");
+    let write = |sets: usize| {
+        let file = hdf5_metno::File::create(&path).expect("a file");
+        for (name, values) in [
+            ("coordx", [0.0, 0.1, 0.0, 0.0]),
+            ("coordy", [0.0, 0.0, 0.2, 0.0]),
+            ("coordz", [0.0, 0.0, 0.0, 0.3]),
+        ] {
+            file.new_dataset_builder().with_data(&values).create(name).expect("coordinates");
+        }
+        file.new_dataset_builder().with_data(&[10, 20, 30, 40]).create("node_num_map").expect("numbers");
+        file.new_dataset_builder().with_data(&[1; 20_000]).create("node_ns1").expect("a set");
+        (2..=sets).for_each(|k| file.link_hard("node_ns1", &format!("node_ns{k}")).expect("a name"));
+    };
+    let small = |name: &str| fixtures().join("small/tet4").join(name);
+    let dofs = Some(small("dofs.csv"));
+    let files = ModelFiles::from_arguments(small("K.mtx"), small("M.mtx"), &path, dofs, Some("m,kg,s"))
+        .expect("units");
+    write(1);
+    read_model(&files).expect("a set with a node many times");
+    write(200);
+    let error = read_model(&files).expect_err("refused");
+    assert_eq!(error.first_error().code(), Code::NodeFileSyntax, "{error}");
+    assert!(error.to_string().contains("node_ns2` has several names"), "{error}");
 }

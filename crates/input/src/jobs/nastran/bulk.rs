@@ -12,6 +12,7 @@ use flexbody_base::text::input_file::SeenFile;
 use flexbody_base::text::scanner::{BadLines, excerpt, whole};
 use flexbody_model::{ElementShape, Elements};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// Largest number of scalar points in a range; `MAX_SCALARS` is the largest number in a deck.
@@ -124,11 +125,14 @@ impl Bulk {
 
     fn named(&self, members: &[Members]) -> BTreeSet<(i64, u8)> {
         let mut points = BTreeSet::new();
-        for Members { first, last, components } in members.iter().filter(|range| range.first <= range.last) {
-            for (&id, _) in self.grids.range(first..=last) {
-                points.extend(components.iter().filter(|c| **c > 0).map(|&c| (id, c)));
+        for component in 1..=6 {
+            let with_component = members.iter().filter(|range| range.components.contains(&component));
+            for range in apart(with_component) {
+                points.extend(self.grids.range(range).map(|(&id, _)| (id, component)));
             }
-            points.extend(self.scalars.range(first..=last).map(|&id| (id, 0)));
+        }
+        for range in apart(members.iter()) {
+            points.extend(self.scalars.range(range).map(|&id| (id, 0)));
         }
         points
     }
@@ -327,6 +331,21 @@ fn triples(card: &Card, members: &mut Vec<Members>) -> Option<()> {
         members.push(Members { first: id, last: id, components: components(card.field(k + 1))? });
     }
     Some(())
+}
+
+/// Returns the ranges of members without their overlaps, ascending, so that each point is visited once.
+fn apart<'m>(members: impl Iterator<Item = &'m Members>) -> Vec<RangeInclusive<i64>> {
+    let mut ranges: Vec<[i64; 2]> = members.map(|range| [range.first, range.last]).collect();
+    ranges.sort_unstable();
+    let (mut apart, mut next) = (Vec::new(), i64::MIN);
+    for [first, last] in ranges {
+        let first = first.max(next);
+        if first <= last {
+            apart.push(first..=last);
+            next = last.saturating_add(1);
+        }
+    }
+    apart
 }
 
 /// Adds the points of a card with components, then points or a range of them.

@@ -14,13 +14,15 @@ const NOT_READ: &[&str] = &[
     "RTRPLT", "RTRPLT1", "RJOINT", "RSPLINE", "RSSCON", "RSPINT", "RBE2GS", "RBE2A", "RBE3U", "MPCY", "MPCAX",
 ];
 
-/// Largest number of points in a THRU of a rigid element.
-const MAX_RANGE: i64 = 1_000_000;
+/// Largest number of points that THRU of all rigid elements of a deck may represent together.
+const MAX_RANGED: i64 = 1_000_000;
 
 /// Constraints of a deck.
 #[derive(Default)]
 pub(super) struct Constraints {
     all: Vec<Constraint>,
+    /// Number of points that THRU has represented.
+    ranged: i64,
     /// Sets joined by MPCADD.
     joined: BTreeMap<i64, Vec<i64>>,
     /// Sets selected by the case control.
@@ -100,12 +102,12 @@ impl Constraints {
     /// Reads a card. Returns false if it is no constraint, `None` if it cannot be read.
     pub(super) fn card(&mut self, card: &Card, path: &Path) -> Option<bool> {
         let relation = match card.name.as_str() {
-            "RBE2" => rbe2(card)?,
+            "RBE2" => rbe2(card, &mut self.ranged)?,
             "RBAR" => rbar(card)?,
             "RBAR1" => rbar1(card)?,
             "RBE1" => rbe1(card)?,
             "RROD" => rrod(card)?,
-            "RBE3" => rbe3(card)?,
+            "RBE3" => rbe3(card, &mut self.ranged)?,
             "MPC" => sum(card)?,
             "MPCADD" => {
                 let sets: Option<Vec<i64>> = filled(card, 1).map(|k| card.integer(k)).collect();
@@ -211,14 +213,15 @@ fn all_of(grid: i64) -> impl Iterator<Item = Point> {
 }
 
 /// Returns the grids, including ranges, from a field up to the first that is no whole number, and the index of that
-/// field.
-fn grids(card: &Card, from: usize) -> Option<(Vec<i64>, usize)> {
+/// field. Adds the number of grids in ranges to `ranged`.
+fn grids(card: &Card, from: usize, ranged: &mut i64) -> Option<(Vec<i64>, usize)> {
     let (mut ids, mut k) = (Vec::new(), from);
     while k < card.len() {
         let field = card.field(k);
         if field.eq_ignore_ascii_case(b"THRU") {
             let (first, last) = (*ids.last()?, grid(card, k + 1)?);
-            (last > first && last - first < MAX_RANGE).then_some(())?;
+            *ranged = ranged.saturating_add(last.checked_sub(first).filter(|more| *more > 0)?);
+            (*ranged < MAX_RANGED).then_some(())?;
             ids.extend(first + 1..=last);
             k += 1;
         } else if !field.is_empty() {
@@ -238,9 +241,9 @@ fn not_read(card: &Card) -> Relation {
 }
 
 /// Reads RBE2 with the fields EID, GN, CM, GM1, GM2, ..., ALPHA.
-fn rbe2(card: &Card) -> Option<Relation> {
+fn rbe2(card: &Card, ranged: &mut i64) -> Option<Relation> {
     let listed = components(card.field(2)).filter(|listed| !listed.is_empty() && !listed.contains(&0))?;
-    let (followers, end) = grids(card, 3)?;
+    let (followers, end) = grids(card, 3, ranged)?;
     (end >= card.len() || is_real(card.field(end))).then_some(())?;
     let dependent = followers.iter().flat_map(|id| listed.iter().map(|c| (*id, *c))).collect();
     Some(Relation::Rigid { independent: all_of(grid(card, 1)?).collect(), dependent })
@@ -301,7 +304,7 @@ fn rrod(card: &Card) -> Option<Relation> {
 }
 
 /// Reads RBE3 with the fields EID, blank, REFGRID, REFC, then groups of weight, components and grids, UM, ALPHA.
-fn rbe3(card: &Card) -> Option<Relation> {
+fn rbe3(card: &Card, ranged: &mut i64) -> Option<Relation> {
     let reference = grid(card, 2)?;
     let listed = components(card.field(3)).filter(|listed| !listed.is_empty() && !listed.contains(&0))?;
     let (mut weighted, mut k) = (Vec::new(), 4);
@@ -316,7 +319,7 @@ fn rbe3(card: &Card) -> Option<Relation> {
         } else {
             let weight = real(field).filter(|weight| weight.is_finite())?;
             let components = components(card.field(k + 1))?;
-            let (members, end) = grids(card, k + 2)?;
+            let (members, end) = grids(card, k + 2, ranged)?;
             (!members.is_empty()).then_some(())?;
             let points = members.iter().flat_map(|id| components.iter().map(|c| ((*id, *c), weight)));
             weighted.extend(points);
