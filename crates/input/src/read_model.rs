@@ -60,6 +60,16 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     Ok(RawModel { sources: Sources::later(move || sources(&given, &of_job, &opened)), ..model })
 }
 
+/// Returns errors for files that name other rows than those of the model.
+fn misfits(named: &[LabelsOfFile], matrices: &ModelMatrices, files: &ModelFiles) -> Vec<Diagnostic> {
+    let rows = matrices.plain(files.dimension).labels;
+    let misfit = |one: &LabelsOfFile| match files.source {
+        ModelSource::Job(_) => one.misfit_of_job(&rows),
+        ModelSource::Tables(_) => one.misfit(&rows),
+    };
+    named.iter().filter_map(misfit).collect()
+}
+
 /// Returns the error without quotes from files that the manifest or the deck names outside the model.
 fn without_outside_quotes(files: &ModelFiles, error: Error) -> Error {
     let main = match (&files.manifest, &files.source) {
@@ -85,14 +95,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         Matrices::Tables(tables) => tables.taken(files, &mut diagnostics),
         Matrices::Job(job) => take(&mut diagnostics, *job),
     };
-    if let Some(matrices) = &matrices {
-        let rows = matrices.plain(files.dimension).labels;
-        let misfit = |one: &LabelsOfFile| match files.source {
-            ModelSource::Job(_) => one.misfit_of_job(&rows),
-            ModelSource::Tables(_) => one.misfit(&rows),
-        };
-        diagnostics.extend(parsed.labels.iter().filter_map(misfit));
-    }
+    diagnostics.extend(matrices.iter().flat_map(|matrices| misfits(&parsed.labels, matrices, files)));
     // Damping and geometric stiffness follow K and M to the rows of the model.
     let no_rows = GivenRows::default();
     let rows = matrices.as_ref().map_or(&no_rows, |matrices| &matrices.given_rows);

@@ -104,6 +104,14 @@ impl RecoveredMotion {
     }
 }
 
+/// Returns true if a table has modal coordinates of a body in mean axes whose file has another frame, and the names of the
+/// columns of all modes for a prefix (`q`, `qd`, `qdd`).
+fn modal_columns(file: &InputFile, body: &FlexBody) -> (bool, impl Fn(&str) -> Vec<String> + use<>) {
+    let is_in_mean_axes = !body.conditions().is_mean() && has_column(file, &format!("{MEAN_AXES}q_1"));
+    let (modes, count) = (if is_in_mean_axes { MEAN_AXES } else { "" }, body.n_modes());
+    (is_in_mean_axes, move |prefix| (1..=count).map(|j| format!("{modes}{prefix}_{j}")).collect())
+}
+
 impl LoadedHistory {
     /// Reads the columns `time`, `q_1` to `q_n` (or, for a body whose frame is on an interface, `mean_axes_q_1` to
     /// `mean_axes_q_n`, so the rates and accelerations too), `angular_velocity_x` to `_z`; `qd_1` to `qd_n`, `qdd_1` to `qdd_n` and
@@ -117,11 +125,7 @@ impl LoadedHistory {
     /// times that do not ascend; the errors of [`InputFile::open`].
     pub fn read(path: &Path, body: &FlexBody) -> Result<Self> {
         let file = InputFile::open(path)?;
-        let is_in_mean_axes = !body.conditions().is_mean() && has_column(&file, &format!("{MEAN_AXES}q_1"));
-        let modes = if is_in_mean_axes { MEAN_AXES } else { "" };
-        let modal = |prefix: &str| -> Vec<String> {
-            (1..=body.n_modes()).map(|j| format!("{modes}{prefix}_{j}")).collect()
-        };
+        let (is_in_mean_axes, modal) = modal_columns(&file, body);
         let mut wanted: Vec<String> = modal("q");
         // A vector is in the file if any of its columns is; then all must be. Returns the place of its first column.
         let mut all_of = |names: Vec<String>| {
