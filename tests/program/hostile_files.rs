@@ -298,3 +298,23 @@ fn what_a_head_announces_is_held_to_the_memory_that_is_left() {
         "{said}"
     );
 }
+
+/// Each of 40000 lines places a part once more: its nodes are refused before there are any.
+#[test]
+fn instances_of_parts_are_held_to_the_memory_that_is_left() {
+    let folder = tet4();
+    let nodes: String = (1..=20_000).map(|id| format!("{id},{id}.,0.,0.\n")).collect();
+    let instances: String =
+        (0..40_000).map(|k| format!("*INSTANCE,NAME=I{k},PART=P\n*END INSTANCE\n")).collect();
+    let deck = format!("*PART,NAME=P\n*NODE\n{nodes}*END PART\n*ASSEMBLY,NAME=A\n{instances}*END ASSEMBLY\n");
+    fs::write(folder.path().join("nodes.inp"), deck).expect("written");
+    edit(&folder.path().join("model.toml"), "nodes.csv", "nodes.inp");
+    let run = Command::new("sh")
+        .args(["-c", "ulimit -v 3000000 && exec \"$@\"", "sh", env!("CARGO_BIN_EXE_flexbody")])
+        .args(["convert", "model.toml", "-o", "b.h5"])
+        .current_dir(folder.path())
+        .output()
+        .expect("a shell");
+    let said = told(&run);
+    assert!(run.status.code() == Some(4) && said.contains("nodes and elements of instances takes"), "{said}");
+}
