@@ -152,6 +152,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB451", "tests/program/motion/stiffening.rs"),
     ("FB453", "crates/input/src/fe_results/tests/punch.rs"),
     ("FB454", "tests/program/bodies/checked_against.rs"),
+    ("FB456", "crates/body/tests/body/node_inertia.rs"),
     ("FB501", "crates/body/tests/body/single_precision.rs"),
     ("FB505", "crates/body/tests/body/single_precision.rs"),
     ("FB506", "tests/program/cluster.rs"),

@@ -1,11 +1,11 @@
 //! Rows of matrices whose files name them, beside tables of nodes that list the nodes in any order.
 
-use super::model_files::MatrixLocation;
+use super::model_files::{MatrixLocation, ModelFiles, StressStiffnessSource};
 use super::open_files::OpenFiles;
 use super::reader::{MatrixRole, MatrixSource, reader_for};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::Compression;
-use flexbody_model::DofLabel;
+use flexbody_model::{Damping, DofLabel};
 use std::path::PathBuf;
 
 /// Labels of the rows in the file of a matrix.
@@ -24,6 +24,21 @@ impl LabelsOfFile {
         let source = MatrixSource { file, compression, group, role, keep_in: None };
         let labels = reader_for(file, compression).ok()?.labels(&source).ok()??;
         Some(Self { role, path: location.path.clone(), labels })
+    }
+
+    /// Returns the labels of all files of matrices beside the stiffness that name their rows: M of tables, damping,
+    /// geometric stiffness.
+    pub(super) fn of_others(files: &ModelFiles, opened: &OpenFiles) -> Vec<Self> {
+        let mass = files.tables().map(|tables| (MatrixRole::Mass, &tables.mass));
+        let damping = files.damping.as_ref().and_then(Damping::matrix);
+        let damping = damping.map(|location| (MatrixRole::Damping, location));
+        // Rows of CalculiX have their labels in a file beside the matrix.
+        let is_unlabelled =
+            |one: &&StressStiffnessSource| one.with_stress.as_ref().is_none_or(|with| with.dofs.is_none());
+        let of_stress = files.geometric_stiffness.iter().map(|one| &one.matrix).filter(is_unlabelled);
+        let of_stress = of_stress.map(|one| (MatrixRole::GeometricStiffness, &one.location));
+        let all = mass.into_iter().chain(damping).chain(of_stress);
+        all.filter_map(|(role, location)| Self::of(location, role, opened)).collect()
     }
 
     /// Returns an error if the file does not name all `rows` of the model of a job, in their order. Between them it may name

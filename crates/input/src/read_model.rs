@@ -7,7 +7,7 @@ use super::mapping::Mapping;
 use super::mesh::MeshReading;
 use super::model_files::{
     InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
-    OperatorSource, RecoverySource, StressStiffnessSource,
+    OperatorSource, RecoverySource,
 };
 use super::node_files::{NodeFile, read_node_file};
 use super::open_files::OpenFiles;
@@ -376,17 +376,7 @@ impl Parsed {
                 Matrices::Tables(Box::new(ParsedTables { stiffness, mass, nodes, dofs, labels }))
             }
         };
-        let damping = files.damping.as_ref().and_then(Damping::matrix);
-        let others =
-            [(MatrixRole::Mass, files.tables().map(|tables| &tables.mass)), (MatrixRole::Damping, damping)];
-        // Rows of CalculiX have their labels in a file beside the matrix.
-        let of_stress = files.geometric_stiffness.iter().map(|one| &one.matrix);
-        let unlabelled =
-            |one: &&StressStiffnessSource| one.with_stress.as_ref().is_none_or(|with| with.dofs.is_none());
-        let of_stress =
-            of_stress.filter(unlabelled).map(|one| (MatrixRole::GeometricStiffness, Some(&one.location)));
-        let others = others.into_iter().chain(of_stress);
-        let labels = others.filter_map(|(role, at)| LabelsOfFile::of(at?, role, opened)).collect();
+        let labels = LabelsOfFile::of_others(files, opened);
         let mesh = files.mesh.as_ref().map(|path| read_node_file(opened.get(path)?, files.dimension));
         let damping = files.damping.as_ref();
         let damping = damping.map(|d| d.borrowed().try_map(|place| matrix(place, MatrixRole::Damping)));
