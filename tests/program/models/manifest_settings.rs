@@ -141,7 +141,7 @@ fn geometric_stiffness_goes_from_the_manifest_to_the_file_and_is_recomputed() {
     assert_eq!(names, ["force x at `tip`", "load `stretch`"]);
     let notes: Vec<_> =
         report["diagnostics"].as_array().expect("a list").iter().map(|d| &d["code"]).collect();
-    assert_eq!(notes, ["FB531", "FB526"]);
+    assert_eq!(notes, ["FB420", "FB531", "FB526"]);
     let (code, _, err) = flexbody(path, "check b.h5 --against model.toml");
     assert_eq!((code, err.as_str()), (0, ""), "no file has changed");
     let checks = json(path, "check b.h5 --against model.toml --json");
