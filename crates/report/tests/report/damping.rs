@@ -103,8 +103,9 @@ fn a_matrix_of_rayleigh_damping_gives_what_rayleigh_damping_gives() {
     }
     // Mass-proportional damping resists rigid motion, stiffness-proportional damping does not.
     let warned = |done: &Conversion| done.diagnostics.iter().any(|d| d.code() == Code::DampingRigid);
-    assert!(warned(&given) && !warned(&stated));
+    assert!(warned(&given) && warned(&stated));
     assert!(!warned(&converted(rayleigh_matrix(0.0, beta))));
+    assert!(!warned(&converted(Damping::Rayleigh { alpha: 0.0, beta })));
 }
 
 #[test]
