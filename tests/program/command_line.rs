@@ -355,7 +355,8 @@ fn compare_agrees_on_a_model_in_another_order_and_differs_beyond_tolerance() {
     done(folder, &format!("compare {a} {c} --frequency 1e-6 --invariants 2e-6"));
     // Bodies with different units cannot be compared.
     let manifest = fs::read_to_string(folders[2].path().join("model.toml")).unwrap();
-    let units = "allow_implausible = true\n[model.units]\nlength = \"m\"\nmass = \"kg\"\ntime = \"ms\"\n[files]";
+    let units =
+        "allow_implausible = true\n[model.units]\nlength = \"m\"\nmass = \"kg\"\ntime = \"ms\"\n[files]";
     fs::write(folders[2].path().join("model.toml"), manifest.replace("[files]", units)).unwrap();
     done(folders[2].path(), "convert model.toml -o body.h5 --modes 12 --quiet");
     let run = flexbody(folder, &format!("compare {a} {c}"));
