@@ -68,10 +68,9 @@ pub fn measured_run(
     // The extremes belong to the continuous motion, the comparison to the instants of the history.
     let (continuous, diagnostics) = trace(whole, scene, context)?;
     let sampled = trace_at(whole, scene, &history.time, context)?;
-    let framed_whole = FramedScene::new(whole, scene)?;
-    let unseen = between_instants(whole, scene, &framed_whole, (&continuous, &sampled))?;
-    let motion = Trace { extremes: continuous.extremes, ..sampled };
+    let motion = Trace { extremes: continuous.extremes.clone(), ..sampled };
     let own = Trace::of_history(body, scene, &history, &motion)?;
+    let framed_whole = FramedScene::new(whole, scene)?;
     let framed_body = FramedScene::new(body, scene)?.body;
     let measure = Measure::new(&framed_whole.body, &framed_whole.scene, &motion);
     let errors = match &shared {
@@ -96,6 +95,7 @@ pub fn measured_run(
         growth: errors.growth(&motion, &tolerance),
     };
     if run.holds() {
+        let unseen = between_instants(whole, scene, &framed_whole, (&continuous, &motion))?;
         refuse_sparse(&history, unseen, &tolerance)?;
     }
     Ok((run, diagnostics))

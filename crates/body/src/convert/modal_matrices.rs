@@ -4,7 +4,8 @@
 use super::body_modes::reduced;
 use crate::basis::{BasisChoice, Loads};
 use crate::flex_body::{
-    FlexBody, Frame, SOFTENING, SplitStiffness, along, axis_in_words, split, stiffness_about,
+    FlexBody, Frame, SOFTENING, SplitStiffness, along, axis_in_words, diagonal_ratios, proportional_damping,
+    split, stiffness_about,
 };
 use crate::invariants::Invariants;
 use faer::{Mat, MatRef};
@@ -49,8 +50,7 @@ pub fn modal_damping(
         (Mat::from_fn(critical.len(), critical.len(), diagonal), ratio)
     };
     let from_matrix = |matrix: Mat<f64>| {
-        // Negative values are rounding here: other negative values were rejected.
-        let ratio = critical.iter().enumerate().map(|(j, c)| matrix[(j, j)].max(0.0) / c).collect();
+        let ratio = diagonal_ratios(&matrix, eigenvalues);
         (matrix, ratio)
     };
     let (matrix, ratio): (Mat<f64>, Vec<f64>) = match damping {
@@ -59,10 +59,7 @@ pub fn modal_damping(
             let hertz = eigenvalues.iter().map(|&lambda| model.units().frequency_of(lambda));
             from_ratios(hertz.map(|f| ratio_at(bands, f)).collect())
         }
-        Damping::Rayleigh { alpha, beta } => {
-            let (m, k) = (invariants.modal_mass(), invariants.modal_stiffness());
-            from_matrix(Mat::from_fn(m.nrows(), m.ncols(), |i, j| alpha * m[(i, j)] + beta * k[(i, j)]))
-        }
+        Damping::Rayleigh { alpha, beta } => from_matrix(proportional_damping(invariants, *alpha, *beta)),
         Damping::Matrix(d) => {
             let matrix = reduced(d, vectors);
             check_semidefinite(model, d, vectors, &matrix)?;

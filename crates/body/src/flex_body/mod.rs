@@ -41,5 +41,7 @@ pub use recovery::{LOAD_COMPONENTS, LoadColumns, Recovery, RecoveryState, Static
 pub use reference_conditions::ReferenceConditions;
 pub use rotated_stiffness::{RotatedStiffness, SplitStiffness, joined, split};
 pub use softening::{SOFTENING, axis_in_words};
+pub use stated_damping::diagonal_ratios;
+pub(crate) use stated_damping::proportional_damping;
 pub use storage::Storage;
 pub use terms::{Subset, TermDecision};

@@ -3,6 +3,7 @@
 
 use super::modal_change::{ModalChange, diagonal_eigenvalues, reduced_residuals};
 use super::rotated_stiffness::{split, transformed};
+use super::stated_damping::diagonal_ratios;
 use super::{Carrier, Certificate, FixedInterface, FlexBody, LoadKind, LumpedBody, Modes, Parts, Recovery};
 use crate::invariants::{BodyFrame, FrameChoice, Invariants, TermGroups, error_norms, principal_axes};
 use faer::Mat;
@@ -208,8 +209,7 @@ impl FlexBody {
             }
             None => {
                 let damping = change.congruent(&damping);
-                let ratio = |(j, lambda): (usize, &f64)| (0.5 * damping[(j, j)] / lambda.sqrt()).max(0.0);
-                let ratios = eigenvalue.iter().enumerate().map(ratio).collect();
+                let ratios = diagonal_ratios(&damping, &eigenvalue);
                 (Some(damping), ratios)
             }
         };

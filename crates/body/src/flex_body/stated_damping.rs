@@ -58,8 +58,14 @@ impl StatedDamping {
     }
 }
 
+/// Returns the damping ratios of the diagonal of D, D_jj / (2 sqrt(lambda_j)); negative entries are rounding.
+pub fn diagonal_ratios(damping: &Mat<f64>, eigenvalues: &[f64]) -> Vec<f64> {
+    let ratio = |(j, lambda): (usize, &f64)| (0.5 * damping[(j, j)] / lambda.sqrt()).max(0.0);
+    eigenvalues.iter().enumerate().map(ratio).collect()
+}
+
 /// Returns alpha m_ff + beta K_ff.
-fn proportional(invariants: &Invariants, alpha: f64, beta: f64) -> Mat<f64> {
+pub(crate) fn proportional_damping(invariants: &Invariants, alpha: f64, beta: f64) -> Mat<f64> {
     let (mass, stiffness) = (invariants.modal_mass(), invariants.modal_stiffness());
     Mat::from_fn(mass.nrows(), mass.ncols(), |i, j| alpha * mass[(i, j)] + beta * stiffness[(i, j)])
 }
@@ -76,7 +82,7 @@ impl FlexBody {
                 modes.eigenvalue.iter().zip(&modes.damping_ratio).all(|(&lambda, &own)| at(lambda) == own)
             }
             StatedDamping::Rayleigh { alpha, beta } => {
-                let (own, stated) = (self.damping(), proportional(self.invariants(), *alpha, *beta));
+                let (own, stated) = (self.damping(), proportional_damping(self.invariants(), *alpha, *beta));
                 (&own - &stated).norm_max() <= MAX_DEVIATION * stated.norm_max()
             }
         };
@@ -89,11 +95,10 @@ impl FlexBody {
             None => Ok(self),
             Some(StatedDamping::Ratios(ratios)) => self.with_damping_ratios(&ratios),
             Some(StatedDamping::Rayleigh { alpha, beta }) => {
-                let damping = proportional(self.invariants(), alpha, beta);
+                let damping = proportional_damping(self.invariants(), alpha, beta);
                 let mut parts = self.into_parts();
                 let modes = &mut parts.modes;
-                let ratio = |(j, lambda): (usize, &f64)| (0.5 * damping[(j, j)] / lambda.sqrt()).max(0.0);
-                modes.damping_ratio = modes.eigenvalue.iter().enumerate().map(ratio).collect();
+                modes.damping_ratio = diagonal_ratios(&damping, &modes.eigenvalue);
                 modes.modal_damping = Some(damping);
                 Self::new(parts)
             }

@@ -8,8 +8,8 @@ use flexbody_base::provenance::SourceFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     Certificate, FlexBody, Frame, GeometricStiffness, Interface, MassStructure, ModalChange, Modes, Parts,
-    ReferenceConditions, Source, Storage, TermDecision, TermGroup, diagonal_eigenvalues, reduced_residuals,
-    rigid_motions,
+    ReferenceConditions, Source, Storage, TermDecision, TermGroup, diagonal_eigenvalues, diagonal_ratios,
+    reduced_residuals, rigid_motions,
 };
 use flexbody_body::invariants::{
     BodyFrame, Expected, FrameChoice, IdentityCheck, Invariants, Numbered, Turning, identities,
@@ -264,9 +264,7 @@ fn modes(
 ) -> Modes {
     let eigenvalue = diagonal_eigenvalues(invariants);
     let damping_ratio = match &damping {
-        Some(d) => {
-            eigenvalue.iter().enumerate().map(|(j, l)| (0.5 * d[(j, j)] / l.sqrt()).max(0.0)).collect()
-        }
+        Some(damping) => diagonal_ratios(damping, &eigenvalue),
         None => vec![0.0; eigenvalue.len()],
     };
     Modes {

@@ -141,30 +141,37 @@ fn an_archive_of_scipy_is_unpacked_as_its_headers_announce() {
     assert_refused(&path, Code::MatrixKind, "stored in the form");
 }
 
-#[test]
-fn a_variable_of_matlab_has_no_more_bytes_than_its_extents_leave() {
-    let element = |kind: u32, bytes: &[u8]| {
-        let mut own = [kind.to_le_bytes(), (bytes.len() as u32).to_le_bytes()].concat();
-        own.extend(bytes);
-        own.resize(own.len().next_multiple_of(8), 0);
-        own
-    };
-    let head =
-        [element(6, &[5, 0, 0, 0, 1, 0, 0, 0]), element(5, &[12, 0, 0, 0, 12, 0, 0, 0]), element(1, b"K")];
-    let mut variable = head.concat();
-    variable.extend(element(5, &vec![0; 32_000_000]));
+/// Returns an element of a MAT-file, padded to a multiple of eight bytes.
+fn element(kind: u32, bytes: &[u8]) -> Vec<u8> {
+    let mut own = [kind.to_le_bytes(), (bytes.len() as u32).to_le_bytes()].concat();
+    own.extend(bytes);
+    own.resize(own.len().next_multiple_of(8), 0);
+    own
+}
+
+/// Returns a MAT-file with one compressed variable.
+fn mat_file(variable: &[u8]) -> Vec<u8> {
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
     packed.write_all(&[14u32.to_le_bytes(), (variable.len() as u32).to_le_bytes()].concat()).expect("memory");
-    packed.write_all(&variable).expect("memory");
+    packed.write_all(variable).expect("memory");
     let packed = packed.finish().expect("memory");
     let mut file = b"MATLAB 5.0 MAT-file".to_vec();
     file.resize(124, b' ');
     file.extend(b"\x00\x01IM");
     file.extend([15u32.to_le_bytes(), (packed.len() as u32).to_le_bytes()].concat());
     file.extend(packed);
+    file
+}
+
+#[test]
+fn a_variable_of_matlab_has_no_more_bytes_than_its_extents_leave() {
+    let head =
+        [element(6, &[5, 0, 0, 0, 1, 0, 0, 0]), element(5, &[12, 0, 0, 0, 12, 0, 0, 0]), element(1, b"K")];
+    let mut variable = head.concat();
+    variable.extend(element(5, &vec![0; 32_000_000]));
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("K.mat");
-    fs::write(&path, file).expect("written");
+    fs::write(&path, mat_file(&variable)).expect("written");
     assert_refused(
         &path,
         Code::MatrixCount,
@@ -175,27 +182,12 @@ fn a_variable_of_matlab_has_no_more_bytes_than_its_extents_leave() {
 /// Zeros behind the numbers of a packed variable.
 #[test]
 fn a_variable_of_matlab_ends_with_its_numbers() {
-    let element = |kind: u32, bytes: &[u8]| {
-        let mut own = [kind.to_le_bytes(), (bytes.len() as u32).to_le_bytes()].concat();
-        own.extend(bytes);
-        own.resize(own.len().next_multiple_of(8), 0);
-        own
-    };
     let value = |count: usize| {
         let head = [element(6, &[6, 0, 0, 0, 0, 0, 0, 0]), element(5, &[2, 0, 0, 0, 2, 0, 0, 0])];
         let numbers = [element(1, b"K"), element(9, &[2.0f64, 1.0, 1.0, 2.0].map(f64::to_le_bytes).concat())];
         let mut variable = [head.concat(), numbers.concat()].concat();
         variable.resize(variable.len() + count, 0);
-        let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
-        let tag = [14u32.to_le_bytes(), (variable.len() as u32).to_le_bytes()].concat();
-        packed.write_all(&[tag, variable].concat()).expect("memory");
-        let packed = packed.finish().expect("memory");
-        let mut file = b"MATLAB 5.0 MAT-file".to_vec();
-        file.resize(124, b' ');
-        file.extend(b"\x00\x01IM");
-        file.extend([15u32.to_le_bytes(), (packed.len() as u32).to_le_bytes()].concat());
-        file.extend(packed);
-        file
+        mat_file(&variable)
     };
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("K.mat");

@@ -20,6 +20,8 @@ use std::borrow::Cow;
 pub(super) struct FramedBody {
     pub damped: FlexBody,
     pub at_centre: FlexBody,
+    /// Eigenvalues of the body held at its moving interface; none without one. Unit: 1/time^2.
+    held: Vec<f64>,
     /// Warning about modes that leave out much of the deformation which the acceleration of the base causes.
     pub unresolved: Option<Diagnostic>,
 }
@@ -27,13 +29,14 @@ pub(super) struct FramedBody {
 impl FramedBody {
     pub(super) fn new(body: &FlexBody, settings: &ResponseSettings, excitation: &Excitation) -> Result<Self> {
         let mean = body.in_mean_axes()?;
-        let mut unresolved = None;
+        let (mut held_eigenvalues, mut unresolved) = (Vec::new(), None);
         let damped = match excitation {
             // Damping ratios are those of the modes of the body as it is held.
             Excitation::Base(Place { point: Point::Interface(name), .. }) => {
                 let carrier = Carrier::Interface(name.clone());
                 let held = mean.carried(&carrier)?;
                 unresolved = held.unresolved(&carrier, &mean);
+                held_eigenvalues = held.eigenvalues_in_frame().unwrap_or_default();
                 let damped = damped(&held, settings)?;
                 if damped.damping() == mean.damping() {
                     mean.into_owned()
@@ -45,7 +48,7 @@ impl FramedBody {
         };
         let centre = damped.invariants().first_moment() / damped.invariants().mass();
         let at_centre = damped.in_model_axes(centre)?;
-        Ok(Self { damped, at_centre, unresolved })
+        Ok(Self { damped, at_centre, held: held_eigenvalues, unresolved })
     }
 
     /// Returns the modal damping; `None` without damping.
@@ -54,16 +57,12 @@ impl FramedBody {
     }
 
     /// Returns the resonances of a sum, and those of the body held at its moving interface.
-    pub(super) fn resonances(&self, sum: &ModalSum, excitation: &Excitation) -> Result<Vec<Resonance>> {
+    pub(super) fn resonances(&self, sum: &ModalSum) -> Vec<Resonance> {
         let units = self.damped.units();
         let mut all: Vec<Resonance> = sum.resonances().map(|found| in_hertz(units, found)).collect();
-        if let Excitation::Base(Place { point: Point::Interface(name), .. }) = excitation {
-            let ratio = all.iter().map(|one| one.ratio).fold(f64::INFINITY, f64::min);
-            let held = self.damped.carried(&Carrier::Interface(name.clone()))?;
-            let squares = held.eigenvalues_in_frame().unwrap_or_default().into_iter();
-            all.extend(squares.map(|square| in_hertz(units, (square, ratio))));
-        }
-        Ok(all)
+        let ratio = all.iter().map(|one| one.ratio).fold(f64::INFINITY, f64::min);
+        all.extend(self.held.iter().map(|&square| in_hertz(units, (square, ratio))));
+        all
     }
 }
 

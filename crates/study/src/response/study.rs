@@ -206,7 +206,7 @@ pub fn respond(
     };
     // Frequencies cluster at the resonances of the best sum at hand.
     let best = known.as_ref().and_then(|known| known.enriched.as_ref()).unwrap_or(&reduced);
-    let resonances = framed.resonances(best, ends.from)?;
+    let resonances = framed.resonances(best);
     let solves = if known.is_some() { settings.solves } else { 0 };
     let frequencies = settings.band.frequencies(settings.points, solves, &resonances);
     let blocks = blocks(ends, &read, dimension);
