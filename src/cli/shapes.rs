@@ -9,7 +9,7 @@ use super::terminal::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_body::convert::recovery_shapes;
+use flexbody_body::convert::{UNIFORM_STRAIN, recovery_shapes};
 use flexbody_formats::shapes::{NodalShapes, StressDeck, StressPlaces};
 use flexbody_input::{
     ElementDeck, ModelFiles, ModelSource, OperatorSource, RecoverySource, read_model, read_nodes_of_table,
@@ -58,6 +58,7 @@ pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
     let watch = |event: Event<'_>| watcher.hear(event);
     let shapes = recovery_shapes(&body, &model, deformed_inertia, &context(None, false, &watch))
         .map_err(|error| error.in_file(&arguments.body))?;
+    let shapes = if arguments.uniform_strains { shapes.with_uniform_strains(&model)? } else { shapes };
     let shapes = NodalShapes::new(&shapes, &model, &body);
     watcher.finish();
     refuse_warnings(arguments.printing, &diagnostics)?;
@@ -210,7 +211,10 @@ fn outcome(
     let all: Vec<(String, f64)> =
         shapes.columns().map(|(column, factor)| (column.to_string(), factor)).collect();
     let modes = all.iter().filter(|(name, _)| name.starts_with("mode ")).count();
-    text += &format!("{} shapes: {modes} modes and {} static columns\n", all.len(), all.len() - modes);
+    let strains = all.iter().filter(|(name, _)| name.starts_with(UNIFORM_STRAIN)).count();
+    let columns = all.len() - modes - strains;
+    let and_strains = if strains > 0 { format!(", and {strains} uniform strains") } else { String::new() };
+    text += &format!("{} shapes: {modes} modes and {columns} static columns{and_strains}\n", all.len());
     if let Some(asked) = asked {
         let stem = arguments.output.with_extension("");
         let (ending, places) = match asked.places {

@@ -1,6 +1,6 @@
 //! Random bodies: solids, plane bodies, nodes with rotations, singular mass matrices.
 
-use crate::draws::{between, one_in, pick};
+use crate::draws::{between, direction, one_in, pick};
 use crate::stress::of_spin;
 use crate::{named_loads, recoveries};
 use flexbody_model::{Coupling, Damping, NodeSet, RawModel, Reference};
@@ -37,7 +37,8 @@ pub fn body(kind: usize, random: &mut Random) -> RawModel {
         6 => rectangle(3, 1, between(random, 0.0, 3.0), [between(random, -3.0, 3.0), 1.0]),
         _ => raw_fixture("plane_frame"),
     };
-    let raw = with_ends(raw, kind == 2);
+    let offset = (kind == 2 && one_in(random, 2)).then(|| direction(random, 3) * 0.2);
+    let raw = with_ends(raw, kind == 2, offset);
     let (recoveries, named_loads) = (recoveries::of(&raw), named_loads::of(&raw));
     RawModel { damping: damping(random), recoveries, named_loads, ..raw }
 }
@@ -77,8 +78,9 @@ fn graded_block(random: &mut Random, rule: MassRule) -> RawModel {
 }
 
 /// Returns the model with interfaces `root` and `tip` of its nodes with smallest and largest x; if `by_node`
-/// is true, the root is its last node. Three of the nodes may lie on one line, four do not.
-fn with_ends(raw: RawModel, by_node: bool) -> RawModel {
+/// is true, the root is its last node, with a reference point `offset` beside it or at it. Three of the nodes may lie on one
+/// line, four do not.
+fn with_ends(raw: RawModel, by_node: bool, offset: Option<Vector3<f64>>) -> RawModel {
     const AT_ROOT: usize = 3;
     const AT_TIP: usize = 4;
     let mut order: Vec<usize> = (0..raw.nodes.len()).collect();
@@ -93,7 +95,14 @@ fn with_ends(raw: RawModel, by_node: bool) -> RawModel {
         }
     };
     let root = match by_node {
-        true => NodeSet::new("root", raw.nodes.ids.last().copied().into_iter().collect()),
+        true => {
+            let own = NodeSet::new("root", raw.nodes.ids.last().copied().into_iter().collect());
+            let beside = offset.zip(raw.nodes.positions.last()).map(|(by, x)| Vector3::from(*x) + by);
+            match beside {
+                Some(point) => NodeSet { reference: Reference::Point(point.into()), ..own },
+                None => own,
+            }
+        }
         false => set("root", &order[..AT_ROOT]),
     };
     let interfaces = vec![root, set("tip", &order[order.len() - AT_TIP..])];

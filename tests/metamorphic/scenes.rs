@@ -2,11 +2,10 @@
 
 use crate::bodies::{self, KINDS, turns};
 use crate::draws::{axis, between, direction, one_in, pick, stream};
-use crate::subject::{Basis, Subject};
+use crate::subject::{Basis, Subject, frames};
 use crate::{named_loads, recoveries};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_body::invariants::BodyFrame;
 use flexbody_linalg::context::Context;
 use flexbody_model::RawModel;
 use flexbody_motion::dynamics::RotationVector;
@@ -52,7 +51,8 @@ pub fn subject(seed: u64) -> Result<Subject> {
     let kind = pick(random, KINDS.len());
     let raw = bodies::body(kind, random);
     let scene = nothing_happens("crossing", 1.0, TOLERANCE);
-    let frame = BodyFrame::ALL[pick(random, BodyFrame::ALL.len())];
+    let frames = frames();
+    let frame = frames[pick(random, frames.len())].clone();
     let subject = Subject {
         kind: KINDS[kind],
         raw,
@@ -63,6 +63,7 @@ pub fn subject(seed: u64) -> Result<Subject> {
         second: None,
         stored: false,
         written: false,
+        by_table: false,
     };
     let probe = subject.body()?;
     let rate = probe.modes().eigenvalue[0].sqrt();

@@ -5,7 +5,7 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisChoice, CraigBampton, ModeSettings};
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
-use flexbody_body::invariants::BodyFrame;
+use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawModel};
@@ -22,6 +22,12 @@ pub enum Basis {
     Fixed,
 }
 
+/// Returns all frames of a conversion: those of the body, and at its interfaces.
+pub fn frames() -> Vec<FrameChoice> {
+    let at = |name: &str| FrameChoice::Interface(name.to_owned());
+    BodyFrame::ALL.into_iter().map(FrameChoice::Mean).chain([at("root"), at("tip")]).collect()
+}
+
 /// A model, its conversion, and the load cases of the body.
 #[derive(Debug, Clone)]
 pub struct Subject {
@@ -32,7 +38,7 @@ pub struct Subject {
     /// Modes of the conversion.
     pub basis: Basis,
     /// Frame of the conversion.
-    pub frame: BodyFrame,
+    pub frame: FrameChoice,
     /// Scene of the first load case.
     pub scene: Scene,
     /// Number of load cases that repeat the scene.
@@ -43,6 +49,8 @@ pub struct Subject {
     pub stored: bool,
     /// True if the scene is written and read before use.
     pub written: bool,
+    /// True if rows of recoveries are those of `recover` for the table of the motion.
+    pub by_table: bool,
 }
 
 impl Subject {
@@ -67,7 +75,7 @@ impl Subject {
         ConvertSettings {
             modes: ModeSettings { wanted: Wanted::Lowest(wanted), ..ModeSettings::default() },
             basis,
-            frame: self.frame.into(),
+            frame: self.frame.clone(),
             lumped: Vec::new(),
             ..ConvertSettings::default()
         }

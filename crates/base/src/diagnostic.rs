@@ -204,6 +204,8 @@ codes! {
     InterfacesUncompared = "FB454", Note, Done, "interfaces of the body are not stated like this by the model that it is checked against", "state them by --interface NAME=NODES,COUPLING, or by [[interface]] in the manifest, to compare them";
     SectionAbout = "FB455", Note, Done, "moments of a section are about the origin of the model", "state the point: about = [x, y, z] in its [[recovery]], in model axes";
     NodeInertia = "FB456", Warning, Done, "rotary inertia of a node is that of no rigid mass", "nothing to do for a disc of which only the inertia about its axis is meant; else give all moments of inertia (a thin disc has half of that about its axis about each diameter): none is larger than the sum of the other two";
+    RecoveryContradicts = "FB460", Error, BadInput, "stresses of a recovery contradict the stiffness of the model under uniform strain", "check the order, signs and units of the rows (shear stresses belong to s_xy, not to twice or half of it), and that the operator belongs to this model; --allow-implausible (or allow_implausible in [model]) if the rows are meant so";
+    RecoveryUncompared = "FB461", Note, Done, "stresses of a recovery were not compared with the stiffness, or only along other axes", "nothing to do; compare stresses under one load with those of the FE program";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";

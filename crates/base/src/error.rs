@@ -46,9 +46,10 @@ impl Error {
         Self { diagnostics: self.diagnostics.into_iter().map(|d| d.about(&what)).collect() }
     }
 
-    /// Adds the file to every diagnostic.
+    /// Adds the file to every diagnostic that names none.
     pub fn in_file(self, file: impl AsRef<std::path::Path>) -> Self {
-        Self { diagnostics: self.diagnostics.into_iter().map(|d| d.in_file(&file)).collect() }
+        let located = |d: Diagnostic| if d.file().is_none() { d.in_file(&file) } else { d };
+        Self { diagnostics: self.diagnostics.into_iter().map(located).collect() }
     }
 
     /// Returns the exit code of the first error.

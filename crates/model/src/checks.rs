@@ -11,7 +11,7 @@ use super::recovery::check_rigid_responses;
 use super::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
 use super::rows::{centre_and_length, extents, rigid_residuals};
 use super::stress::check_stress;
-use super::stress_points::check_stress_scale;
+use super::uniform_strains::check_stresses;
 use super::wording::{in_words, name_some};
 use super::{Damping, DofLabel, FeModel, Nodes, RawModel, Rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -98,6 +98,7 @@ pub(super) fn check_body(
     let mass_path = body.raw.mass.path.clone();
     let stress_files = std::mem::take(&mut body.raw.geometric_stiffness);
     let [first, second] = [form.worst.0, form.worst.1].map(|row| body.rows.label(&body.nodes, row));
+    let allowed = body.raw.allow_implausible;
     let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
     model.find_fixed_mass(mass_rounding);
     let kept = unrotated_mass_note(&model, mass_rounding, [first, second]);
@@ -105,7 +106,7 @@ pub(super) fn check_body(
     found.extend(kept.map(|note| with_help_for_dependents(note, follows).in_file(&mass_path)));
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
     let density = plausibility.densities.map(|densities| densities.quartiles[1]);
-    check_stress_scale(&model, density, &mut found);
+    check_stresses(&model, density, allowed, &mut found);
     stop_on_error(&mut found)?;
     // Compute the fingerprints now, so that the files need not stay open.
     model.find_sources()?;

@@ -41,6 +41,7 @@ mod stress_points;
 mod surface;
 #[cfg(debug_assertions)]
 mod test_rounding;
+mod uniform_strains;
 mod wording;
 
 pub use checks::{BodyNumber, CheckedModel, Plausibility, check};
@@ -61,3 +62,4 @@ pub use rows::{Rows, centre_and_length, extents, rigid_axes, rigid_count, rigid_
 pub use separate_bodies::check_bodies;
 pub use stress_points::{StressPoint, pascals};
 pub use surface::{Skin, SurfaceMesh, skin};
+pub use uniform_strains::{STRAIN_NAMES, uniform_strains};

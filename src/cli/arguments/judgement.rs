@@ -127,9 +127,13 @@ pub struct ShapesArguments {
     /// With --to calculix: places of the stresses
     #[arg(long, value_enum, value_name = "PLACES", default_value_t = PlacesName::Nodes)]
     pub at: PlacesName,
+    /// Also the six uniform strains, under which the stiffness knows the stresses of a solid: convert then compares the
+    /// answers with it (component order, signs, units)
+    #[arg(long)]
+    pub uniform_strains: bool,
     /// Whole static responses to unit spin and unit loads at the interfaces instead of the shapes of a body, with a
     /// script that assembles the stiffness with the stress of each: geometric stiffness by CalculiX
-    #[arg(long)]
+    #[arg(long, conflicts_with = "uniform_strains")]
     pub geometric_stiffness: bool,
     /// Stresses that CalculiX printed for these responses: writes the deck of each load with its stress, and the tables
     /// of the manifest that read the results (the script calls this)

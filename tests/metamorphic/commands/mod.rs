@@ -66,7 +66,9 @@ pub const OPEN: [&str; 3] = ["largest deflection of the body", "percentages of F
 /// Outputs that a transformation changes by definition, by a part of their names.
 ///
 /// * The possible effect of loads on a free body until the end of its motion grows if the motion ends later.
-pub const CHANGED: [(&str, &str); 4] = [
+/// * The largest rows of a motion lie between the instants of its table.
+pub const CHANGED: [(&str, &str); 5] = [
+    ("largest of", "recover the table"),
     ("significances", "start later"),
     ("FB542", "start later"),
     ("FB543", "start later"),

@@ -8,7 +8,8 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::Orientation;
-use flexbody_motion::scene::{Recording, simulate};
+use flexbody_motion::scene::{Carried, LoadedHistory, Recording, RecoveredMotion, simulate};
+use flexbody_report::simulation_csv;
 use nalgebra::{Matrix3, Vector3};
 
 const LENGTH: [i32; 3] = [1, 0, 0];
@@ -61,9 +62,22 @@ pub fn simulation(subject: &Subject) -> Result<Outputs> {
     places(&recording, &sizes, &mut outputs);
     states(&recording, &sizes, &mut outputs);
     largest(&recording, &sizes, &mut outputs);
-    recovered(&recording, &sizes, &mut outputs);
+    match subject.by_table {
+        true => outputs_of_rows(&of_table(&body, subject, &recording)?, &sizes, &mut outputs),
+        false => recording.recovered.iter().for_each(|rows| outputs_of_rows(rows, &sizes, &mut outputs)),
+    }
     outputs.all.extend(findings(&found));
     Ok(outputs)
+}
+
+/// Returns the rows of the recoveries as `recover` computes them from the table of the motion.
+fn of_table(body: &FlexBody, subject: &Subject, recording: &Recording) -> Result<RecoveredMotion> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.csv");
+    std::fs::write(&path, simulation_csv(recording)).expect("a table");
+    let mut history = LoadedHistory::read(&path, body)?;
+    history.carrier = subject.scene.carried.as_ref().map(Carried::carrier);
+    history.recover(body, &[])
 }
 
 fn vectors(name: String, along: Along, unit: [i32; 3], rates: Vec<Vector3<f64>>, least: f64) -> Output {
@@ -162,8 +176,7 @@ fn largest(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
 }
 
 /// Adds the rows of the recoveries, and the largest gauge.
-fn recovered(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
-    let Some(recovered) = &recording.recovered else { return };
+fn outputs_of_rows(recovered: &RecoveredMotion, sizes: &Sizes, outputs: &mut Outputs) {
     for (map, extremes) in recovered.recoveries.iter().zip(&recovered.extremes) {
         let rows: Vec<Vec<f64>> = recovered.states.iter().map(|z| map.values(z)).collect();
         match map.name.as_str() {

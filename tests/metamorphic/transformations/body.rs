@@ -3,15 +3,15 @@
 use super::Pair;
 use crate::correspondence::Correspondence;
 use crate::features::has_singular_mass;
-use crate::subject::{Basis, Subject};
+use crate::subject::{Basis, Subject, frames};
 use flexbody_base::error::Result;
-use flexbody_body::invariants::BodyFrame;
 use oracle::random::Random;
 
 /// Converts with another frame.
 pub fn frame(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
-    let others: Vec<BodyFrame> = BodyFrame::ALL.into_iter().filter(|frame| *frame != subject.frame).collect();
-    let frame = others[crate::draws::pick(random, others.len())];
+    let mut others = frames();
+    others.retain(|frame| *frame != subject.frame);
+    let frame = others[crate::draws::pick(random, others.len())].clone();
     Ok(Some(Pair::new(subject, Subject { frame, ..subject.clone() }, Correspondence::default())))
 }
 
@@ -35,5 +35,12 @@ pub fn stored(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
 /// Writes the scene to files and reads it.
 pub fn written(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
     let changed = Subject { written: true, ..subject.clone() };
+    Ok(Some(Pair::new(subject, changed, Correspondence::default())))
+}
+
+/// Recovers the rows from the table of the motion, with no difference but that of its largest rows, which are found between
+/// its instants too.
+pub fn by_table(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
+    let changed = Subject { by_table: true, ..subject.clone() };
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))
 }

@@ -66,7 +66,7 @@ const fn of(name: &'static str, reach: Reach, apply: Apply) -> Transformation {
 }
 
 /// All transformations.
-pub const ALL: [Transformation; 21] = [
+pub const ALL: [Transformation; 23] = [
     of("turn the world", Reach::Scene, world::turn),
     of("shift the world", Reach::Scene, world::shift),
     of("boost the world", Reach::Scene, world::boost),
@@ -76,11 +76,13 @@ pub const ALL: [Transformation; 21] = [
     of("shift the model", Reach::All, model::shift),
     of("renumber the nodes", Reach::All, model::renumber),
     of("permute the rows", Reach::All, model::permute),
+    of("round the matrices", Reach::All, model::round),
     of("change the units", Reach::All, units::change),
     of("another frame", Reach::All, body::frame),
     of("another complete basis", Reach::Simulation, body::basis),
     of("write and read the body", Reach::Body, body::stored),
     of("write and read the scene", Reach::Scene, body::written),
+    of("recover the table", Reach::Simulation, body::by_table),
     of("other axes of vectors", Reach::Scene, scene::axes),
     of("split a load", Reach::Scene, scene::split),
     of("refine a table", Reach::Scene, scene::refine),

@@ -8,7 +8,7 @@ use crate::draws::direction;
 use crate::subject::Subject;
 use crate::{named_loads, recoveries};
 use flexbody_base::error::Result;
-use flexbody_linalg::CscMatrix;
+use flexbody_linalg::{CscMatrix, uniform};
 use flexbody_model::{Damping, DofLabel, GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad};
 use flexbody_motion::scene::Point;
 use nalgebra::{Matrix3, Vector3};
@@ -83,6 +83,24 @@ pub fn permute(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     changed.raw.nodes.ids = nodes.iter().map(|&i| raw.nodes.ids[i]).collect();
     changed.raw.nodes.positions = nodes.iter().map(|&i| raw.nodes.positions[i]).collect();
     changed.raw.interfaces.iter_mut().for_each(|set| set.nodes.reverse());
+    Ok(Some(Pair::new(subject, changed, Correspondence::default())))
+}
+
+/// Changes every entry of K and M by up to 1e-15 of itself, as another order of the sums behind it does on another
+/// processor: decisions and texts must stay.
+pub fn round(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
+    const CHANGE: f64 = 1e-15;
+    let seed = random.next_u64() >> 1;
+    let rounded = |own: &RawMatrix, seed: u64| {
+        // Both triangles have the same change.
+        let factor = |i: u32, j: u32| 1.0 + CHANGE * uniform(seed, u64::from(i.min(j)), u64::from(i.max(j)));
+        let all: Vec<_> = entries(&own.matrix).map(|(i, j, v)| (i, j, v * factor(i, j))).collect();
+        let n = own.matrix.n_rows();
+        RawMatrix { matrix: CscMatrix::from_triplets(n, n, &all), ..own.clone() }
+    };
+    let mut changed = subject.clone();
+    changed.raw.stiffness = rounded(&subject.raw.stiffness, seed);
+    changed.raw.mass = rounded(&subject.raw.mass, seed + 1);
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))
 }
 

@@ -3,6 +3,7 @@
 
 pub mod compression;
 pub mod input_file;
+mod last_field;
 pub mod quotes;
 pub mod scanner;
 pub mod series;

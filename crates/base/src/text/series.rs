@@ -5,6 +5,7 @@
 //! first row, if it has as many fields. A line below the names without any number holds units, which are not read.
 
 use super::input_file::InputFile;
+use super::last_field::LastFields;
 use super::scanner::{BadLines, Line, Lines, Separator, excerpt, number, without_mark};
 use crate::diagnostic::{Code, Diagnostic};
 
@@ -63,7 +64,7 @@ pub struct Series {
 ///
 /// # Errors
 /// FB215 for all columns that the file does not have. FB216 for rows that cannot be read (the first few, and the number
-/// of others), for times that do not ascend and for fewer than two rows.
+/// of others), for times that do not ascend, for fewer than two rows and for a file that may end within its last number.
 pub fn read_series(
     file: &InputFile,
     time: &ColumnKey,
@@ -78,14 +79,16 @@ pub fn read_series(
     };
     let places = layout.places(file, std::iter::once(time).chain(wanted))?;
     let mut reading = SeriesReader::new(file, &layout, places);
-    let mut fields = Vec::new();
+    let (mut fields, mut last) = (Vec::new(), LastFields::default());
     for row in layout.rows(text) {
         split_into(layout.separator, row.text, &mut fields);
+        last.row(row.number, fields.last().copied().unwrap_or_default());
         if let Err(diagnostic) = reading.row(row.number, &fields) {
             reading.bad.add(diagnostic);
         }
     }
-    reading.finish()
+    let cut_off = last.cut_off(text, Code::SeriesRow).map(|cut_off| cut_off.in_file(file.path()));
+    reading.finish().and_then(|series| cut_off.map_or(Ok(series), |cut_off| Err(vec![cut_off])))
 }
 
 /// Returns true if the file has a column of this name, with or without a unit in brackets after it, or several.

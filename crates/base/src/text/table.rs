@@ -2,6 +2,7 @@
 
 use super::compression::refuse_packed;
 use super::input_file::InputFile;
+use super::last_field::LastFields;
 use super::scanner::{BadLines, Line, Lines, Separator, excerpt, number, without_mark};
 use crate::diagnostic::{Code, Diagnostic};
 use std::path::Path;
@@ -89,7 +90,8 @@ impl<'a> Table<'a> {
     /// Reads all rows with `read`, which receives the line number and one field per column.
     ///
     /// # Errors
-    /// The first few bad rows and the number of others; FB204 if there is no row.
+    /// The first few bad rows and the number of others; FB204 if there is no row, and if the file may
+    /// end within its last number.
     pub fn rows<T>(
         &self,
         mut read: impl FnMut(usize, &[&'a [u8]]) -> Result<T, Diagnostic>,
@@ -98,8 +100,10 @@ impl<'a> Table<'a> {
         let mut bad = BadLines::default();
         let mut columns: Vec<&[u8]> = vec![b""; self.columns];
         let mut fields: Vec<&[u8]> = Vec::new();
+        let mut last = LastFields::default();
         for Line { number, text } in self.rest.clone().filter_map(content) {
             self.separator.split_into(text, &mut fields);
+            last.row(number, fields.last().copied().unwrap_or_default());
             let row = if fields.len() == self.order.len() {
                 self.order.iter().zip(&fields).for_each(|(&column, field)| columns[column] = *field);
                 read(number, &columns)
@@ -122,7 +126,10 @@ impl<'a> Table<'a> {
             return Err(vec![Diagnostic::new(Code::TableRow, message).in_file(self.path)]);
         }
         bad.finish(Code::TableRow, "row")?;
-        Ok(rows)
+        match last.cut_off(self.rest.rest(), Code::TableRow) {
+            Some(cut_off) => Err(vec![cut_off.in_file(self.path)]),
+            None => Ok(rows),
+        }
     }
 }
 

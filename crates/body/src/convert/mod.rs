@@ -29,4 +29,4 @@ pub use node_inertia::unusual_node_inertia;
 pub(crate) use recovery::{BodyOfModel, Recovered};
 pub use recovery::{recovered_rows, recovery_loads};
 pub use settings::{ConvertSettings, Lumping, MeshChoice};
-pub use shapes::{RecoveryShapes, ShapeColumn, load_shapes, recovery_shapes};
+pub use shapes::{RecoveryShapes, ShapeColumn, UNIFORM_STRAIN, load_shapes, recovery_shapes};

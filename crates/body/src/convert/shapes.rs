@@ -8,7 +8,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{gram, largest_entry, side_by_side};
-use flexbody_model::{FeModel, LoadKind, ModelLoad, UnitLoad, extents};
+use flexbody_model::{FeModel, LoadKind, ModelLoad, STRAIN_NAMES, UnitLoad, extents, uniform_strains};
 
 /// Difference of Psi'K Psi from the stored K_ff, relative to its largest entry, above which the model is another one.
 const MAX_STIFFNESS_DIFFERENCE: f64 = 1e-5;
@@ -20,6 +20,9 @@ const MIN_RESPONSE: f64 = 1e-9;
 /// strength, so that values in tables with few decimals keep their digits.
 const SHAPE_SIZE: f64 = 1e-3;
 
+/// Beginning of the names of steps of uniform strain.
+pub const UNIFORM_STRAIN: &str = "uniform strain ";
+
 /// Mode or static column that a shape is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ShapeColumn {
@@ -29,6 +32,8 @@ pub enum ShapeColumn {
     Static(String),
     /// Whole static response to a unit load.
     Load(UnitLoad),
+    /// Uniform strain of this component, in the order of [`STRAIN_NAMES`].
+    Strain(usize),
 }
 
 impl std::fmt::Display for ShapeColumn {
@@ -37,6 +42,7 @@ impl std::fmt::Display for ShapeColumn {
             Self::Mode(number) => write!(f, "mode {number}"),
             Self::Static(name) => f.write_str(name),
             Self::Load(load) => write!(f, "{load}"),
+            Self::Strain(component) => write!(f, "{UNIFORM_STRAIN}{}", STRAIN_NAMES[*component]),
         }
     }
 }
@@ -50,6 +56,27 @@ pub struct RecoveryShapes {
     pub factors: Vec<f64>,
     /// Displacements by internal rows of the model (N x s).
     pub fields: Mat<f64>,
+}
+
+impl RecoveryShapes {
+    /// Returns the shapes with those of the six uniform strains of `model`, whose stresses the stiffness knows.
+    ///
+    /// # Errors
+    /// [`Usage`](Code::Usage) for a plane model.
+    pub fn with_uniform_strains(self, model: &FeModel) -> Result<Self> {
+        if model.dimension() != 3 {
+            let message = "the model is plane: uniform strains are those of solids";
+            return Err(Diagnostic::new(Code::Usage, message).into());
+        }
+        let columns: Vec<ShapeColumn> = (0..STRAIN_NAMES.len()).map(ShapeColumn::Strain).collect();
+        let all: Vec<usize> = (0..columns.len()).collect();
+        let strains = scaled(model, &columns, &uniform_strains(model), &all);
+        Ok(Self {
+            columns: self.columns.into_iter().chain(strains.columns).collect(),
+            factors: self.factors.into_iter().chain(strains.factors).collect(),
+            fields: side_by_side(&[self.fields.as_ref(), strains.fields.as_ref()]),
+        })
+    }
 }
 
 /// Returns the shapes of `body`, whose combinations are its modes and the static columns of every recovery, except

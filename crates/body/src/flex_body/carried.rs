@@ -274,7 +274,7 @@ impl FlexBody {
     }
 
     /// Returns eigenvalues and m_ff-orthonormal eigenvectors of (K_ff, m_ff).
-    fn eigenpairs_in_frame(&self) -> Option<(Vec<f64>, Mat<f64>)> {
+    pub(super) fn eigenpairs_in_frame(&self) -> Option<(Vec<f64>, Mat<f64>)> {
         let lower = dense_cholesky(self.invariants().modal_mass())?;
         let half = solve_lower(&lower, self.invariants().modal_stiffness());
         let eigen = symmetric_eigen(solve_lower(&lower, &half.transpose().to_owned()).as_ref())?;

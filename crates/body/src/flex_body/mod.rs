@@ -4,6 +4,7 @@ mod body;
 mod carried;
 mod carried_stiffness;
 mod held_modes;
+mod held_response;
 mod identities;
 mod in_units;
 mod interface;
@@ -29,6 +30,7 @@ pub use flexbody_model::{
     Coupling, GeometricStiffness, LoadKind, Quantity, RecoveryRow, SurfaceMesh, UnitLoad,
 };
 pub use held_modes::HeldMode;
+pub use held_response::RigidAccelerations;
 pub use interface::{Interface, InterfaceRows};
 pub use modal_change::{ModalChange, RigidMotions, diagonal_eigenvalues, reduced_residuals, rigid_motions};
 pub use model_axes::{along, stiffness_about};

@@ -89,6 +89,15 @@ impl FlexBody {
         has.then_some(law)
     }
 
+    /// Returns beta of the damping alpha M + beta K that the settings of the conversion state and the modes of this body
+    /// have; 0 for other damping. What the modes leave out has the part beta K as well. Unit: time.
+    pub fn stiffness_damping(&self) -> f64 {
+        match self.stated_damping() {
+            Some(StatedDamping::Rayleigh { beta, .. }) => beta,
+            _ => 0.0,
+        }
+    }
+
     /// Returns this body with the damping of a law in its own frame; itself without a law.
     pub(super) fn with_stated_damping(self, law: Option<StatedDamping>) -> Result<Self> {
         match law {

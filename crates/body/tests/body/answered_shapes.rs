@@ -4,7 +4,9 @@ use faer::Mat;
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisChoice, CraigBampton, FreeSurface};
-use flexbody_body::convert::{Conversion, ConvertSettings, ShapeColumn, convert, recovery_shapes};
+use flexbody_body::convert::{
+    Conversion, ConvertSettings, RecoveryShapes, ShapeColumn, convert, recovery_shapes,
+};
 use flexbody_body::flex_body::{FlexBody, MotionLoad, Recovery};
 use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_linalg::context::Context;
@@ -70,6 +72,11 @@ fn answered_with(
     deformed_inertia: bool,
 ) -> (AnsweredShapes, Vec<ShapeColumn>) {
     let shapes = recovery_shapes(body, model, deformed_inertia, &Context::QUIET).expect("shapes");
+    answers_to(shapes, model)
+}
+
+/// Returns the answers to shapes.
+fn answers_to(shapes: RecoveryShapes, model: &FeModel) -> (AnsweredShapes, Vec<ShapeColumn>) {
     let RecoveryOperator::Rows { transposed, .. } = operator().operator else { panic!("an operator") };
     let u = &shapes.fields;
     // The rows of this model are in the order of its files.
@@ -213,4 +220,34 @@ fn another_stiffness_of_the_fe_program_is_refused() {
     }
     let found = made(scaled(1.0, 0.97), free(), 4, BodyFrame::Principal).expect("converts");
     assert!(found.diagnostics.iter().any(|one| one.code() == Code::RecoveryEnergyDiffers));
+}
+
+/// Answers are held to the stiffness where the FE program was given the uniform strains too, and only then.
+#[test]
+fn answers_to_uniform_strains_are_held_to_the_stiffness() {
+    let known = model(bracket(operator()));
+    let body = made(operator(), free(), 4, BodyFrame::Com).expect("converts").body;
+    let shapes = recovery_shapes(&body, &known, false, &Context::QUIET).expect("shapes");
+    let with = shapes.clone().with_uniform_strains(&known).expect("a solid");
+    assert_eq!(with.columns.len(), shapes.columns.len() + 6);
+    let codes = |change: &dyn Fn(usize) -> f64, shapes: RecoveryShapes| -> Vec<Code> {
+        let (mut answered, _) = answers_to(shapes, &known);
+        let answers = &answered.answers;
+        answered.answers = Mat::from_fn(answers.nrows(), answers.ncols(), |i, j| change(i) * answers[(i, j)]);
+        let found = match FeModel::from_raw(bracket(recovery_of(answered))) {
+            Ok(checked) => checked.diagnostics,
+            Err(error) => error.diagnostics().to_vec(),
+        };
+        let judged = [Code::RecoveryContradicts, Code::RecoveryUncompared];
+        found.iter().map(|one| one.code()).filter(|code| judged.contains(code)).collect()
+    };
+    assert_eq!(codes(&|_| 1.0, with.clone()), []);
+    assert_eq!(codes(&|_| 1.0, shapes), [Code::RecoveryUncompared]);
+    // Shears of engineering, a sign, and another unit of stress.
+    assert_eq!(codes(&|row| if row % 6 < 3 { 1.0 } else { 2.0 }, with.clone()), [Code::RecoveryContradicts]);
+    assert_eq!(
+        codes(&|row| if row % 6 == 4 { -1.0 } else { 1.0 }, with.clone()),
+        [Code::RecoveryContradicts]
+    );
+    assert_eq!(codes(&|_| 1e6, with), [Code::RecoveryContradicts]);
 }

@@ -5,3 +5,4 @@
 mod assembler;
 mod internal_rows;
 mod stress_relations;
+mod uniform_strains;

@@ -12,6 +12,7 @@
 use super::LoadedHistory;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_body::convert::UNIFORM_STRAIN;
 use flexbody_body::flex_body::{FlexBody, MotionLoad};
 use flexbody_model::{LoadKind, ShapeSteps, UnitLoad};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -45,7 +46,7 @@ enum Source {
     Preload,
     /// Force of motion of a kind: its component and its mode.
     Motion(MotionLoad, usize, usize),
-    /// Load that the history does not have.
+    /// Load that the history does not have, or a uniform strain.
     Unloaded,
 }
 
@@ -122,6 +123,10 @@ impl LoadedHistory {
         let number = name.strip_prefix("mode ").and_then(|number| number.parse::<usize>().ok());
         if let Some(number) = number.filter(|number| (1..=body.n_modes()).contains(number)) {
             return Ok(Source::Mode(number - 1));
+        }
+        // Uniform strains test the answers of the FE program, and no motion has them.
+        if name.starts_with(UNIFORM_STRAIN) {
+            return Ok(Source::Unloaded);
         }
         let is_spin =
             |component: &usize| UnitLoad { kind: LoadKind::Spin, component: *component }.step() == name;

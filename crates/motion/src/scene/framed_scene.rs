@@ -4,6 +4,7 @@
 //! of a scene does not depend on this choice: everything is computed in the frame defined here, and vectors
 //! of the results are along its axes, which are those of the model.
 
+use super::carrier_motion::accelerations;
 use super::{Axes, Carried, History, Load, Point, Range, Scene, VectorHistory};
 use crate::dynamics::{Orientation, RotationVector};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -70,6 +71,10 @@ impl<'a> FramedScene<'a> {
         };
         let mut resolved = resolved(scene, &body.frame().axes, &framed_body.frame().origin);
         found.extend(idle(&framed_body, &resolved));
+        if let Some(carrier) = scene.carried.as_ref().map(Carried::carrier) {
+            let motion = accelerations(framed_body.frame(), &resolved);
+            found.extend(framed_body.lacks_response(&carrier, body, motion));
+        }
         found.extend(gravity_in_other_units(body.units(), scene));
         found.extend(released_preloads(body, scene));
         let preloads = body.named_loads().iter().filter(|load| load.preload);

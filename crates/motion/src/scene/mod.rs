@@ -1,5 +1,6 @@
 //! Scenes: the scene file, and its simulation.
 
+mod carrier_motion;
 mod channels;
 mod description;
 mod envelope;

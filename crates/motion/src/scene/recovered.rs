@@ -270,21 +270,40 @@ impl LoadedHistory {
             .map(|load| (load.preload, self.named.iter().find(|one| one.load == load.name)))
             .collect();
         let mut states = RowStates::new(layout);
+        let delay = body.stiffness_damping();
+        let is_carrier = |load: &LoadHistory| {
+            self.carrier.as_ref().is_some_and(|by| *by == Carrier::Interface(load.interface.clone()))
+        };
         for (i, &time) in self.time.iter().enumerate() {
+            let (last, share) = self.before(i, delay);
             let motion = self.motion(i, &to_body);
             let mut z = states.layout.state(motion.q, &motion.angular_velocity);
             states.layout.set_motion(&mut z, &motion, |load| self.missing_for(load).is_empty());
             for (place, load) in &places {
-                let [force, torque] = load.values[i].map(|vector| to_body * vector);
+                let share = if is_carrier(load) { 0.0 } else { share };
+                let late = |k: usize| load.values[i][k] + share * (load.values[last][k] - load.values[i][k]);
+                let [force, torque] = [0, 1].map(|k| to_body * late(k));
                 states.layout.add_load(&mut z, *place, &force, &torque);
             }
             for (place, (is_preload, own)) in named.iter().enumerate() {
-                let amplitude = if *is_preload { 1.0 } else { own.map_or(0.0, |one| one.values[i]) };
+                let late =
+                    |one: &AmplitudeHistory| one.values[i] + share * (one.values[last] - one.values[i]);
+                let amplitude = if *is_preload { 1.0 } else { own.map_or(0.0, late) };
                 states.layout.add_amplitude(&mut z, place, amplitude);
             }
             states.push(time, &z);
         }
         Ok(states)
+    }
+
+    /// Returns the instant before instant `i`, and its share in what loads were at a `delay` before: what the modes leave out
+    /// follows loads late by beta of damping in proportion to the stiffness. The share is at most one: where instants are
+    /// closer than the delay, loads hardly change within it.
+    fn before(&self, i: usize, delay: f64) -> (usize, f64) {
+        match i.checked_sub(1) {
+            Some(last) => (last, (delay / (self.time[i] - self.time[last])).min(1.0)),
+            None => (i, 0.0),
+        }
     }
 
     /// Refuses the run of a carried body for a body in another frame, to which the forces of the deformed body that turns
@@ -433,7 +452,7 @@ impl SceneRows {
         }
         let layout = RowLayout::new(body, all);
         let recoveries: Vec<RowMap> = all.iter().map(|one| RowMap::new(one, &layout)).collect();
-        let sampler = RowSampler::new(layout.clone(), scene);
+        let sampler = RowSampler::new(layout.clone(), body, scene);
         let unseen = sampler.unseen(scene);
         let rows = Self {
             states: RowStates::new(layout.clone()),

@@ -36,7 +36,7 @@ impl TracedRecoveries {
         let chosen = limits.iter().map(|one| limited(body, one)).collect::<Result<Vec<_>>>()?;
         let layout = RowLayout::new(body, chosen.iter().copied());
         let maps = chosen.iter().map(|one| RowMap::new(one, &layout)).collect();
-        let sampler = RowSampler::new(layout.clone(), scene);
+        let sampler = RowSampler::new(layout.clone(), body, scene);
         Ok(Some((Self { maps, states: RowStates::new(layout) }, sampler)))
     }
 

@@ -273,6 +273,8 @@ pub(super) struct RowSampler {
     loaded: Vec<Option<Columns>>,
     /// Interface that carries the body.
     carrier: Option<usize>,
+    /// Delay of the response to loads: beta of damping in proportion to the stiffness.
+    delay: f64,
 }
 
 /// Static columns of a load.
@@ -285,8 +287,8 @@ enum Columns {
 }
 
 impl RowSampler {
-    /// Creates the states in the order `layout` for `scene`.
-    pub(super) fn new(layout: RowLayout, scene: &Scene) -> Self {
+    /// Creates the states in the order `layout` for `body` in `scene`.
+    pub(super) fn new(layout: RowLayout, body: &FlexBody, scene: &Scene) -> Self {
         let column = |place: &Point| match place {
             Point::Interface(name) => layout.interface(name).map(Columns::Interface),
             Point::NamedLoad(name) => layout.named.iter().position(|known| known == name).map(Columns::Named),
@@ -299,6 +301,7 @@ impl RowSampler {
                 Some(Columns::Interface(place)) => Some(place),
                 _ => None,
             },
+            delay: body.stiffness_damping(),
             layout,
         }
     }
@@ -327,7 +330,10 @@ impl RowSampler {
         let now = motion.evaluate(time, state)?;
         let evaluation = now.evaluation();
         let mut z = self.layout.state(evaluation.modal_coordinates(), &evaluation.rigid_velocity().1);
-        for (place, (_, force, torque)) in self.loaded.iter().zip(forces.acting(time, now.place())) {
+        // What the modes leave out follows a load that swings at w with 1 / (1 + i w beta), about exp(-i w beta): it is late
+        // by beta.
+        let before = (time - self.delay).max(0.0);
+        for (place, (_, force, torque)) in self.loaded.iter().zip(forces.acting(before, now.place())) {
             match *place {
                 Some(Columns::Interface(place)) => self.layout.add_load(&mut z, place, &force, &torque),
                 Some(Columns::Named(place)) => self.layout.add_amplitude(&mut z, place, force.x),

@@ -16,6 +16,9 @@ const GROWTH_LIMIT: f64 = 1e-4;
 
 /// Largest number of iterative refinements of a solution.
 const MAX_REFINEMENTS: usize = 4;
+/// Largest number of refinements where the factor knows the damping of the modes only: what they leave out is stiff
+/// beside its damping force, w beta times its stiffness.
+const MAX_ITERATIONS: usize = 30;
 /// Relative change of a solution at which refinement stops.
 const REFINEMENT_TOLERANCE: f64 = 1e-11;
 /// Largest relative change after the last refinement at which the solution is accepted.
@@ -39,6 +42,8 @@ pub(super) struct DirectSolver<'m> {
     rigid_gain: Mat<f64>,
     /// U (N x m) and C (m x m) of D = U C U', for the columns that have damping; `None` without damping.
     damping: Option<(Mat<f64>, Mat<f64>)>,
+    /// beta and C' of D = U C' U' + beta K, where the damping is in proportion to the stiffness too.
+    whole: Option<(f64, Mat<f64>)>,
 }
 
 /// Frequency response at one frequency.
@@ -58,6 +63,7 @@ impl<'m> DirectSolver<'m> {
     /// * `loads`, `measured`: B and L in all rows of the model.
     /// * `moving`: true for outputs that move with the body, false for those relative to its frame.
     /// * `damping`: the products M Psi and the modal matrix C of D = M Psi C (M Psi)'.
+    /// * `whole`: beta and C' = C - beta K_ff, if the damping is D = M Psi C' (M Psi)' + beta K.
     ///
     /// # Errors
     /// [`MemoryShort`](Code::MemoryShort) and [`WorkLong`](Code::WorkLong), before any solution.
@@ -66,6 +72,7 @@ impl<'m> DirectSolver<'m> {
         [loads, measured]: [&Mat<f64>; 2],
         moving: &[bool],
         damping: Option<(&Mat<f64>, &Mat<f64>)>,
+        whole: Option<(f64, Mat<f64>)>,
         solves: usize,
         context: &Context<'_>,
     ) -> Result<Self> {
@@ -82,7 +89,13 @@ impl<'m> DirectSolver<'m> {
         clear_rows(&mut rigid_gain, moving);
         subtract_combination(loads.as_mut(), rigid_products.as_ref(), rigid_loads.as_ref());
         let damping = damping.and_then(|(u, c)| damped_columns(&model.restrict(u.clone()), c));
-        let solver = Self { pencil, analysis, rigid, rigid_products, loads, measured, rigid_gain, damping };
+        // Damping in proportion to the stiffness leaves no mode without.
+        let is_whole = |(_, beside): &(f64, Mat<f64>)| {
+            damping.as_ref().is_some_and(|(_, c)| c.ncols() == beside.ncols())
+        };
+        let whole = whole.filter(is_whole);
+        let solver =
+            Self { pencil, analysis, rigid, rigid_products, loads, measured, rigid_gain, damping, whole };
         solver.refuse_too_much(solves, context)?;
         Ok(solver)
     }
@@ -218,7 +231,8 @@ impl Point<'_, '_> {
         };
         let mut x = self.solved(loads.clone());
         let mut change = f64::INFINITY;
-        for _ in 0..MAX_REFINEMENTS {
+        let refinements = if self.solver.whole.is_some() { MAX_ITERATIONS } else { MAX_REFINEMENTS };
+        for _ in 0..refinements {
             let mut residual = &loads - self.product(&x);
             self.solver.equilibrate(&mut residual);
             let correction = self.solved(residual);
@@ -246,10 +260,21 @@ impl Point<'_, '_> {
 
     /// Returns (K + i w D - w^2 M) X.
     fn product(&self, x: &Parts) -> Parts {
-        let DirectSolver { pencil, damping, .. } = self.solver;
-        let mut product = pencil.apply_stiffness(x.as_ref())
-            - pencil.apply_mass(x.as_ref()) * Scale(self.omega * self.omega);
+        let DirectSolver { pencil, damping, whole, .. } = self.solver;
+        let elastic = pencil.apply_stiffness(x.as_ref());
+        let mut product = &elastic - pencil.apply_mass(x.as_ref()) * Scale(self.omega * self.omega);
+        if let Some((beta, _)) = whole {
+            // i w beta K X.
+            let (columns, factor) = (x.ncols() / 2, self.omega * beta);
+            for j in 0..columns {
+                for i in 0..x.nrows() {
+                    product[(i, j)] -= factor * elastic[(i, columns + j)];
+                    product[(i, columns + j)] += factor * elastic[(i, j)];
+                }
+            }
+        }
         if let Some((u, c)) = damping {
+            let c = whole.as_ref().map_or(c, |(_, beside)| beside);
             let c = DMatrix::from_fn(c.nrows(), c.ncols(), |i, j| Complex::new(0.0, self.omega * c[(i, j)]));
             let forces = c * complex(&gram(u.as_ref(), x.as_ref()));
             add_combination(product.as_mut(), u.as_ref(), real(&forces).as_ref());

@@ -22,6 +22,9 @@ pub(super) struct FramedBody {
     pub at_centre: FlexBody,
     /// Eigenvalues of the body held at its moving interface; none without one. Unit: 1/time^2.
     held: Vec<f64>,
+    /// beta of damping in proportion to the stiffness, which the static columns of recoveries have too; 0 for other
+    /// damping. Unit: time.
+    pub lag: f64,
     /// Warning about modes that leave out much of the deformation which the acceleration of the base causes.
     pub unresolved: Option<Diagnostic>,
 }
@@ -30,6 +33,7 @@ impl FramedBody {
     pub(super) fn new(body: &FlexBody, settings: &ResponseSettings, excitation: &Excitation) -> Result<Self> {
         let mean = body.in_mean_axes()?;
         let (mut held_eigenvalues, mut unresolved) = (Vec::new(), None);
+        let lag = damped(&mean, settings)?.stiffness_damping();
         let damped = match excitation {
             // Damping ratios are those of the modes of the body as it is held.
             Excitation::Base(Place { point: Point::Interface(name), .. }) => {
@@ -48,7 +52,7 @@ impl FramedBody {
         };
         let centre = damped.invariants().first_moment() / damped.invariants().mass();
         let at_centre = damped.in_model_axes(centre)?;
-        Ok(Self { damped, at_centre, held: held_eigenvalues, unresolved })
+        Ok(Self { damped, at_centre, held: held_eigenvalues, lag, unresolved })
     }
 
     /// Returns the modal damping; `None` without damping.
@@ -126,7 +130,12 @@ fn in_hertz(units: &UnitSystem, (square, ratio): (f64, f64)) -> Resonance {
 ///
 /// # Errors
 /// [`PlaceUnknown`](Code::PlaceUnknown) for a place or direction that the body does not have.
-pub(super) fn reduced_sum(body: &FlexBody, read: &Read<'_>, damping: Option<Mat<f64>>) -> Result<ModalSum> {
+pub(super) fn reduced_sum(
+    body: &FlexBody,
+    read: &Read<'_>,
+    damping: Option<Mat<f64>>,
+    lag: f64,
+) -> Result<ModalSum> {
     let rows = |places: &[Place]| places.iter().map(|place| place.rows(body)).collect::<Result<Vec<_>>>();
     let joined = |rows: &[PlaceRows], part: fn(&PlaceRows) -> &Mat<f64>, count: usize| match rows {
         [] => Mat::zeros(count, 0),
@@ -161,6 +170,7 @@ pub(super) fn reduced_sum(body: &FlexBody, read: &Read<'_>, damping: Option<Mat<
         outputs_of_rates,
         rigid,
         direct: Some(direct),
+        lag,
     })
 }
 

@@ -1,6 +1,6 @@
 //! Transfer function as a sum over rigid motion and modes.
 
-use faer::{Mat, MatRef};
+use faer::{Mat, MatRef, Scale};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::{CoupledModel, free_static_responses};
@@ -12,7 +12,7 @@ use flexbody_linalg::{
 use nalgebra::{Complex, DMatrix};
 
 /// Receptances of a free body in coordinates of diagonal stiffness and mass: H(w) = -G / w^2 + (C + i w C1 - w^2 C2)'
-/// (diag(k) - w^2 diag(m) + i w D)^-1 B + S.
+/// (diag(k) - w^2 diag(m) + i w D)^-1 B + S / (1 + i w beta).
 pub(super) struct ModalSum {
     /// Stiffness k of the coordinates (n).
     pub stiffness: Vec<f64>,
@@ -30,6 +30,8 @@ pub(super) struct ModalSum {
     pub rigid: Mat<f64>,
     /// Static response S outside the coordinates (outputs x inputs); `None` for zero.
     pub direct: Option<Mat<f64>>,
+    /// beta of damping in proportion to the stiffness, which S has too: S / (1 + i w beta). Unit: time.
+    pub lag: f64,
 }
 
 impl ModalSum {
@@ -48,8 +50,13 @@ impl ModalSum {
             let flexible: Complex<f64> =
                 (0..self.mass.len()).map(|j| amplitudes[(j, i)] * output(j, o)).sum();
             let direct = self.direct.as_ref().map_or(0.0, |direct| direct[(o, i)]);
-            flexible - self.rigid[(o, i)] / (omega * omega) + direct
+            flexible - self.rigid[(o, i)] / (omega * omega) + direct / self.lagging(omega)
         })
+    }
+
+    /// Returns 1 + i w beta.
+    pub(super) fn lagging(&self, omega: f64) -> Complex<f64> {
+        Complex::new(1.0, omega * self.lag)
     }
 
     /// Returns (diag(k) - w^2 diag(m) + i w D)^-1 B.
@@ -114,11 +121,14 @@ pub(super) struct NodalModes<'m> {
     pub moving: Vec<bool>,
     /// Number of outputs, the first ones, whose static responses improve the estimate.
     pub improved: usize,
+    /// beta of damping in proportion to the stiffness, which what the modes leave out has too; 0 for other damping.
+    pub lag: f64,
 }
 
 impl NodalModes<'_> {
     /// Returns the transfer function in the span of the modes and of the static responses E = K^+ \[(1 - M Phi Phi' - M
-    /// Psi Psi') \[B, L\], K Psi - M Psi Psi'K Psi\], with the modal damping C: D = M Psi C (M Psi)'. Returns `None` if
+    /// Psi Psi') \[B, L\], K Psi - M Psi Psi'K Psi\], with the modal damping C: D = M Psi (C - beta K_ff) (M Psi)' + beta K.
+    /// Returns `None` if
     /// the modes leave no unbalanced force; otherwise also the displacements of its coordinates (N x n).
     ///
     /// # Errors
@@ -139,6 +149,14 @@ impl NodalModes<'_> {
             )
         };
         Ok(Some(self.in_span(&all, damping).ok_or_else(dependent)?))
+    }
+
+    /// Returns C - beta K_ff: what modal damping has beside that in proportion to the stiffness.
+    pub(super) fn beside_stiffness(&self, damping: &Mat<f64>) -> Mat<f64> {
+        match self.lag {
+            0.0 => damping.clone(),
+            beta => damping - gram(self.vectors.as_ref(), self.elastic.as_ref()) * Scale(beta),
+        }
     }
 
     /// Returns E (N x k), orthonormal in K; `None` if there are no unbalanced forces.
@@ -207,7 +225,13 @@ impl NodalModes<'_> {
         clear_rows(&mut rigid, &self.moving);
         let damping = damping.map(|c| {
             let modal = seen(self.inertial.as_ref());
-            combine(combine(modal.as_ref(), c.as_ref()).as_ref(), modal.transpose().to_owned().as_ref())
+            let beside = self.beside_stiffness(c);
+            let all = combine(
+                combine(modal.as_ref(), beside.as_ref()).as_ref(),
+                modal.transpose().to_owned().as_ref(),
+            );
+            // The stiffness of the coordinates is one.
+            Mat::from_fn(all.nrows(), all.ncols(), |i, j| all[(i, j)] + if i == j { self.lag } else { 0.0 })
         });
         let sum = ModalSum {
             stiffness: vec![1.0; eigen.values.len()],
@@ -218,6 +242,7 @@ impl NodalModes<'_> {
             outputs_of_rates: None,
             rigid,
             direct: None,
+            lag: 0.0,
         };
         Some((sum, combine(span.as_ref(), coordinates.as_ref())))
     }
@@ -289,6 +314,7 @@ mod tests {
             outputs_of_rates: None,
             rigid: Mat::from_fn(2, 2, |_, _| 0.5 / m),
             direct: None,
+            lag: 0.0,
         };
         for omega in [0.1, 5.0, 7.0710678, 30.0] {
             let h = sum(false).at(omega);

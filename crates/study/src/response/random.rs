@@ -147,8 +147,8 @@ impl Covariance {
 }
 
 impl RandomStudy<'_> {
-    /// Computes the root mean squares. States are, in this order, the coordinates of the body, the forces on it, the forces
-    /// over the square of the frequency, the first and second time derivatives of the coordinates if recoveries depend on
+    /// Computes the root mean squares. States are, in this order, the coordinates of the body, the forces on it that deform
+    /// what the modes leave out, the forces over the square of the frequency, the first and second time derivatives of the coordinates if recoveries depend on
     /// them and, with a model, the coordinates of the enriched response.
     ///
     /// # Errors
@@ -234,7 +234,11 @@ impl RandomStudy<'_> {
         let coordinates = self.reduced.amplitudes(omega) * &own;
         let rates = [Complex::new(0.0, omega), Complex::new(-omega * omega, 0.0)];
         let rates = rates.iter().filter(|_| self.has_rates()).map(|factor| &coordinates * *factor);
-        let mut parts = vec![coordinates.clone(), own.clone(), own / Complex::new(omega * omega, 0.0)];
+        let mut parts = vec![
+            coordinates.clone(),
+            &own / self.reduced.lagging(omega),
+            own / Complex::new(omega * omega, 0.0),
+        ];
         parts.extend(rates);
         if let Some(enriched) = self.known.and_then(|known| known.enriched.as_ref()) {
             parts.push(enriched.amplitudes(omega) * forces(enriched));

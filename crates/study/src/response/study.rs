@@ -199,9 +199,9 @@ pub fn respond(
     let (body, dimension) = (&framed.damped, body.dimension());
     let read = Read::new(&framed.at_centre, ends)?;
     let damping = framed.damping();
-    let reduced = reduced_sum(&framed.at_centre, &read, damping.clone())?;
+    let reduced = reduced_sum(&framed.at_centre, &read, damping.clone(), framed.lag)?;
     let known = match model {
-        Some(model) => Some(ModelResponse::new(model, body, &read, damping.as_ref(), context)?),
+        Some(model) => Some(ModelResponse::new(model, &framed, &read, damping.as_ref(), context)?),
         None => None,
     };
     // Frequencies cluster at the resonances of the best sum at hand.
@@ -264,13 +264,14 @@ pub(super) struct ModelResponse<'m> {
 impl<'m> ModelResponse<'m> {
     fn new(
         model: &'m FeModel,
-        body: &FlexBody,
+        framed: &FramedBody,
         read: &Read<'_>,
         damping: Option<&Mat<f64>>,
         context: &Context<'m>,
     ) -> Result<Self> {
         context.phase("estimate of the error");
-        let nodal = nodal_modes(model, body, read)?;
+        let body = &framed.damped;
+        let nodal = NodalModes { lag: framed.lag, ..nodal_modes(model, body, read)? };
         let (enriched, shapes) = nodal.enriched(body, damping)?.unzip();
         Ok(Self { nodal, enriched, shapes, damping: damping.cloned(), context: *context })
     }
@@ -285,7 +286,9 @@ impl<'m> ModelResponse<'m> {
     fn direct_solver<'s>(&'s self, model: &'s CoupledModel<'_>, solves: usize) -> Result<DirectSolver<'s>> {
         let NodalModes { inertial, loads, measured, moving, .. } = &self.nodal;
         let damping = self.damping.as_ref().map(|c| (inertial, c));
-        DirectSolver::new(model, [loads, measured], moving, damping, solves, &self.context)
+        let beta = Some(self.nodal.lag).filter(|beta| *beta > 0.0);
+        let whole = beta.zip(self.damping.as_ref()).map(|(beta, c)| (beta, self.nodal.beside_stiffness(c)));
+        DirectSolver::new(model, [loads, measured], moving, damping, whole, solves, &self.context)
     }
 
     /// Returns the model with deformable interfaces; `None` if no interface of the body is rigid.
@@ -339,6 +342,7 @@ fn nodal_modes<'m>(model: &'m FeModel, body: &FlexBody, read: &Read<'_>) -> Resu
         measured,
         moving: read.moving(model.dimension()),
         improved,
+        lag: 0.0,
     })
 }
 
