@@ -149,6 +149,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         recoveries,
         named_loads,
         allow_implausible: files.allow_implausible,
+        keep_soft_rotations: files.keep_soft_rotations,
         sources: Sources::default(),
         diagnostics,
     };

@@ -11,7 +11,7 @@ use super::rows::{extents, rigid_count};
 use super::wording::name_some;
 use super::{
     Damping, DofLabel, GeometricStiffness, ModelLoad, ModelRecovery, Nodes, RawMatrix, RawModel, Rows,
-    SurfaceMesh,
+    SoftRotations, SurfaceMesh,
 };
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
@@ -57,8 +57,9 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     (raw.nodes, raw.dofs) = (Nodes::default(), None);
     let row_to_internal = (!layout.is_identity()).then_some(layout.row_to_internal);
     let rows = layout.rows;
-    let Following { stiffness, mass, note } = with_following_rotations(&raw, &rows, &nodes, stiffness, mass);
-    found.extend(note);
+    let following = with_following_rotations(&raw, &rows, &nodes, stiffness, mass);
+    found.extend(following.found);
+    let Following { stiffness, mass, soft, .. } = following;
     #[cfg(debug_assertions)]
     let [stiffness, mass] = super::test_rounding::rounded([stiffness, mass]);
     let body = Assembled {
@@ -68,6 +69,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
         rows,
         stiffness,
         mass,
+        soft,
         row_to_internal,
         damping,
         geometric_stiffness,
@@ -443,6 +445,8 @@ pub(super) struct Assembled {
     pub stiffness: SymmetricMatrix,
     /// M.
     pub mass: SymmetricMatrix,
+    /// Rotations that K holds by misaligned elements only, with the terms of K that make them follow.
+    pub soft: SoftRotations,
     /// Internal row of each matrix row, `u32::MAX` for rows that are left out; `None` if the orders are
     /// equal, or for one of several bodies.
     pub row_to_internal: Option<Vec<u32>>,

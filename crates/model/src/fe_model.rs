@@ -5,7 +5,7 @@ use super::assemble::Assembled;
 use super::mass_structure::MassForm;
 use super::{
     BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery,
-    NodeSet, Nodes, Rows, SurfaceMesh,
+    NodeSet, Nodes, Rows, SoftRotations, SurfaceMesh,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
@@ -25,6 +25,7 @@ pub struct FeModel {
     mesh: Option<SurfaceMesh>,
     rows: Rows,
     stiffness: SymmetricMatrix,
+    soft_rotations: Arc<SoftRotations>,
     /// Ms, or its closest approximation.
     mean_mass: SymmetricMatrix,
     /// M, if it is not Ms kron I_d.
@@ -69,6 +70,7 @@ impl FeModel {
             rows,
             stiffness,
             mass,
+            soft,
             damping,
             geometric_stiffness,
             recoveries,
@@ -84,6 +86,7 @@ impl FeModel {
             mesh,
             rows,
             stiffness,
+            soft_rotations: Arc::new(soft),
             mean_mass: form.scalar,
             whole_mass: (!scalar).then_some(mass),
             commutes: form.commutes,
@@ -134,6 +137,12 @@ impl FeModel {
     /// Returns K: row d i + k for direction k of node i, then the other rows.
     pub fn stiffness(&self) -> &SymmetricMatrix {
         &self.stiffness
+    }
+
+    /// Returns the rotations that [`stiffness`](Self::stiffness) makes follow their elements although the
+    /// matrix as read gives them a stiffness.
+    pub fn soft_rotations(&self) -> &SoftRotations {
+        &self.soft_rotations
     }
 
     /// Returns the model with its whole mass lumped: `masses` (one per node) at the displacements of the

@@ -94,6 +94,9 @@ pub struct RawModel {
     /// True if findings that the user has accepted are warnings instead of errors: implausible densities,
     /// and mass coupling without stiffness.
     pub allow_implausible: bool,
+    /// True if soft rotations, to which only elements that are not quite coplanar give a stiffness, stay as K
+    /// has them instead of following their elements.
+    pub keep_soft_rotations: bool,
     /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `recovery`, `named_load`, `mesh`, `manifest`), file name
     /// and SHA-256 (hex) of every file read.
     pub sources: Sources,
@@ -132,6 +135,7 @@ impl RawModel {
             recoveries: Vec::new(),
             named_loads: Vec::new(),
             allow_implausible: false,
+            keep_soft_rotations: false,
             sources: Sources::default(),
             diagnostics: Vec::new(),
         }

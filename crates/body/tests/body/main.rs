@@ -36,6 +36,7 @@ mod residual_vectors;
 mod second_shift;
 mod single_precision;
 mod small_models;
+mod soft_rotations;
 mod spinning_shaft;
 mod stated_ratios;
 mod store_body;
