@@ -17,6 +17,7 @@ mod director_blocks;
 mod director_mass;
 mod drilling;
 mod fe_model;
+mod followers;
 mod geometric_stiffness;
 mod given_rows;
 mod ground;
@@ -49,6 +50,7 @@ pub use damping::{DAMPING_BAND_KEYS, Damping, DampingBand, DampingRatios, dampin
 pub use density::{Densities, SoundSpeed};
 pub use director_mass::{DirectorMass, NodeMoments, RigidAcceleration};
 pub use fe_model::FeModel;
+pub use followers::{Followers, RawFollowers};
 pub use geometric_stiffness::{GeometricStiffness, LoadKind, UnitLoad};
 pub use given_rows::{GivenRows, LostRow, NodeAxes, RowMap};
 pub use inertial_rows::InertialRows;

@@ -1,7 +1,8 @@
 //! A model as delivered by the readers: parsed, but not yet checked as a mechanical body.
 
 use super::{
-    Damping, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes, SurfaceMesh,
+    Damping, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes, RawFollowers,
+    SurfaceMesh,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
@@ -81,6 +82,8 @@ pub struct RawModel {
     pub dofs_path: PathBuf,
     /// Maps for shapes and loads from the rows of the files to the rows of K and M here.
     pub given_rows: GivenRows,
+    /// Points with mass that follow several nodes by constraints which the reader eliminated.
+    pub followers: Option<RawFollowers>,
     /// Named node sets.
     pub interfaces: Vec<NodeSet>,
     /// Damping, if given; a matrix has the rows of K and M.
@@ -129,6 +132,7 @@ impl RawModel {
             dofs: None,
             dofs_path: PathBuf::new(),
             given_rows: GivenRows::default(),
+            followers: None,
             interfaces: Vec::new(),
             damping: None,
             geometric_stiffness: Vec::new(),

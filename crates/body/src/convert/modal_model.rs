@@ -83,7 +83,8 @@ impl<'m> ModalModel<'m> {
         let (geometric_stiffness, rotated_stiffness) =
             modal_geometric_stiffness(model, &modes.vectors, &frame, &shift)?;
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
-        let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
+        let all = model.nodes_of_body();
+        let nodes = Nodes { ids: all.ids.clone(), positions: frame.to_body(&all.positions) };
         let interfaces = body_modes::interfaces_in_frame(model, &frame, coupled);
         Ok(Self {
             model,

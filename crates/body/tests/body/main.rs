@@ -15,6 +15,7 @@ mod empty_rows;
 mod errata;
 mod extremes;
 mod first_shift;
+mod followers;
 mod held_modes;
 mod held_node;
 mod invariants;
