@@ -172,7 +172,7 @@ impl Model {
     /// Makes a model from arrays, which `flexbody.model` prepares.
     #[staticmethod]
     #[pyo3(name = "_assembled")]
-    #[pyo3(signature = (name, stiffness, mass, node_ids, positions, *, plane, dofs, interfaces, units, damping, residual_vectors, allow_implausible))]
+    #[pyo3(signature = (name, stiffness, mass, node_ids, positions, *, plane, dofs, interfaces, units, damping, residual_vectors, allow_implausible, keep_soft_rotations))]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn assembled<'py>(
         py: Python<'py>,
@@ -188,6 +188,7 @@ impl Model {
         damping: Option<Damping<'py>>,
         residual_vectors: (bool, bool),
         allow_implausible: bool,
+        keep_soft_rotations: bool,
     ) -> PyResult<Self> {
         let (stiffness, mass) = (stiffness.matrix(py)?, mass.matrix(py)?);
         let positions = rows_of_three(&positions, "nodes")?;
@@ -222,6 +223,9 @@ impl Model {
         }
         if allow_implausible {
             builder = builder.allow_implausible();
+        }
+        if keep_soft_rotations {
+            builder = builder.keep_soft_rotations();
         }
         Self::with_warnings(py, run(py, move |_| builder.build())?)
     }

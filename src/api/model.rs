@@ -346,6 +346,13 @@ impl ModelBuilder {
         self
     }
 
+    /// Leaves rotations that only elements that are not quite coplanar hold as K has them, as shells without
+    /// drilling stiffness have them about their normals. By default they follow the nodes around them.
+    pub fn keep_soft_rotations(mut self) -> Self {
+        self.raw.keep_soft_rotations = true;
+        self
+    }
+
     /// Checks the model.
     ///
     /// # Errors

@@ -41,6 +41,7 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         nodes: None,
         dofs: None,
         allow_implausible: prepared.model.allow_implausible,
+        keep_soft_rotations: prepared.model.keep_soft_rotations,
         output: arguments.output.clone(),
         modes: arguments.modes.or(modes),
         max_frequency: prepared.wanted.below.filter(|_| arguments.modes.is_none()).map(hertz),

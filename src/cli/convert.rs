@@ -490,6 +490,7 @@ fn lumping_schemes(text: &str) -> Result<Vec<Scheme>> {
 pub(super) fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
     let mut files = stated_files(arguments)?;
     files.allow_implausible |= arguments.allow_implausible;
+    files.keep_soft_rotations |= arguments.keep_soft_rotations;
     Ok(files)
 }
 

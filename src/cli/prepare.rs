@@ -18,6 +18,7 @@ pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
     }
     let mut files = of_manifest_or_job(&arguments.model, &arguments.job)?;
     files.allow_implausible |= arguments.allow_implausible;
+    files.keep_soft_rotations |= arguments.keep_soft_rotations;
     files.keep_in = Some(folder_around(&arguments.output));
     if !files.residual_vectors.is_empty() {
         return Err(usage(
@@ -44,6 +45,7 @@ pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
             interfaces: arguments.job.interface.clone(),
             damping: arguments.job.damping.clone(),
             allow_implausible: arguments.allow_implausible,
+            keep_soft_rotations: arguments.keep_soft_rotations,
         },
     };
     let (prepared, bytes) = in_made_folder(&arguments.output, || {

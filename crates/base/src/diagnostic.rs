@@ -177,6 +177,8 @@ codes! {
     MagnitudeExtreme = "FB424", Error, BadInput, "numbers are too large or too small for products in double precision", "write the model in units that bring its numbers closer to one";
     NodesRounded = "FB425", Warning, Done, "node positions do not fit the stiffness to all digits", "write coordinates with 17 digits and keep the body near the origin: far from it, coordinates lose digits";
     RotationsFollow = "FB427", Note, Done, "rotations without stiffness and mass follow the nodes around them", "nothing to do for shells without drilling stiffness: no frequency and no displacement depends on these rotations";
+    SoftRotationsFollow = "FB428", Warning, Done, "rotations that are held by elements that are not quite coplanar follow the nodes around them", "nothing to do for shells without drilling stiffness; --keep-soft-rotations (or keep_soft_rotations in [model]) leaves these rotations as K has them";
+    SoftRotationsEffect = "FB429", Note, Done, "frequencies without the rotations that were made to follow their elements", "nothing to do: a rotation about the normal that elements hold only because they are not quite coplanar is a hinge between them, of the mesh and not of the part";
     InterfaceCoupling = "FB430", Error, BadInput, "interface cannot be coupled to its reference point", "give the interface three nodes that do not lie on one line (two in the plane), or another coupling";
     InterfaceShared = "FB431", Error, BadInput, "interfaces share nodes", "assign each shared node to one interface";
     InterfaceFit = "FB432", Warning, Done, "interface declared rigid deforms in the modes", "convert with --basis craig-bampton (select, trade and simulate take the body file), or declare the interface averaging";

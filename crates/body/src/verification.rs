@@ -151,11 +151,12 @@ fn check_comparable(body: &FlexBody, model: &FeModel) -> Result<()> {
         let message = format!("the body has dimension {}, the model {}", body.dimension(), model.dimension());
         return Err(of_other_model(body, message));
     }
-    if body.nodes().ids != model.nodes().ids {
+    let nodes = model.nodes_of_body();
+    if body.nodes().ids != nodes.ids {
         let message = format!(
             "the body has {} nodes, the model {} with other numbers or in another order",
             body.nodes().ids.len(),
-            model.nodes().ids.len()
+            nodes.ids.len()
         );
         return Err(of_other_model(body, message));
     }
@@ -196,7 +197,8 @@ impl<'a> Recomputed<'a> {
 
     /// Compares the positions of the nodes in the body frame.
     fn positions(&self) -> IdentityCheck {
-        let recomputed = self.place.positions.iter().flatten();
+        let in_frame = self.place.frame.to_body(&self.model.nodes_of_body().positions);
+        let recomputed = in_frame.iter().flatten();
         let size = recomputed.clone().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
         let stored = self.body.nodes().positions.iter().flatten();
         let moved = largest(recomputed.zip(stored).map(|(a, b)| (a - b).abs()));

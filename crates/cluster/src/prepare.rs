@@ -212,6 +212,9 @@ pub struct ModelReference {
     pub damping: Option<String>,
     /// True if implausible findings were treated as warnings.
     pub allow_implausible: bool,
+    /// True if soft rotations stayed as K has them.
+    #[serde(default)]
+    pub keep_soft_rotations: bool,
 }
 
 /// Requested modes: a number, or all below an eigenvalue.

@@ -23,7 +23,7 @@ use deck_mesh::DeckMesh;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::compression::refuse_packed;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
-use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
+use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawFollowers, RawMatrix};
 use nastran::Nastran;
 use std::path::{Path, PathBuf};
 
@@ -67,6 +67,8 @@ pub(super) struct JobModel {
     pub dofs: Vec<DofLabel>,
     /// Maps from the rows of the files to the rows of this model.
     pub given_rows: GivenRows,
+    /// Points with mass that follow several nodes by constraints which the reader eliminated.
+    pub followers: Option<RawFollowers>,
     /// Node sets; their names are compared without regard to case.
     pub sets: NodeSets,
     /// Elements by which the part is drawn.

@@ -20,7 +20,7 @@ use toml::de::DeValue;
 
 const TOP: &[&str] =
     &["model", "files", "interface", "damping", "geometric_stiffness", "recovery", "named_load", "basis"];
-const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible"];
+const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible", "keep_soft_rotations"];
 const UNITS: &[&str] = &["length", "mass", "time"];
 const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program", "matrices", "mesh"];
 
@@ -84,7 +84,8 @@ impl ManifestWalk<'_, '_> {
             self.string(table, "name")
         });
         let dimension = model_keys.and_then(|table| self.dimension(table)).unwrap_or(3);
-        let allow_implausible = model_keys.and_then(|table| self.allow_implausible(table)).unwrap_or(false);
+        let [allow_implausible, keep_soft_rotations] = ["allow_implausible", "keep_soft_rotations"]
+            .map(|key| model_keys.and_then(|table| self.flag(table, key)).unwrap_or(false));
         let units = match model_keys.and_then(|table| self.table(table, "units")) {
             Some((table, span)) => self.units(table, span)?,
             None => UnitSystem::default(),
@@ -111,6 +112,7 @@ impl ManifestWalk<'_, '_> {
             dimension,
             units,
             allow_implausible,
+            keep_soft_rotations,
             source: source?,
             mesh,
             interfaces: interfaces?,
@@ -191,12 +193,12 @@ impl ManifestWalk<'_, '_> {
         }
     }
 
-    fn allow_implausible(&mut self, table: &TomlTable) -> Option<bool> {
-        let value = table.get("allow_implausible")?;
+    fn flag(&mut self, table: &TomlTable, key: &str) -> Option<bool> {
+        let value = table.get(key)?;
         match value.get_ref() {
             DeValue::Boolean(allowed) => Some(*allowed),
             _ => {
-                self.mistyped("allow_implausible", value, "true or false");
+                self.mistyped(key, value, "true or false");
                 None
             }
         }

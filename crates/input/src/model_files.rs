@@ -23,6 +23,8 @@ pub struct ModelFiles {
     /// True if implausible properties that a person has checked are warnings: see
     /// [`RawModel`](flexbody_model::RawModel).
     pub allow_implausible: bool,
+    /// True if soft rotations stay as K has them: see [`RawModel`](flexbody_model::RawModel).
+    pub keep_soft_rotations: bool,
     /// Source of matrices, nodes and labels.
     pub source: ModelSource,
     /// File whose elements draw the part, if it is not the file of the nodes.
@@ -365,6 +367,7 @@ impl ModelFiles {
             dimension: 3,
             units: units.map_or_else(|| Ok(UnitSystem::default()), parse_units)?,
             allow_implausible: false,
+            keep_soft_rotations: false,
             source,
             mesh: None,
             interfaces: Vec::new(),

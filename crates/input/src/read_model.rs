@@ -26,7 +26,7 @@ use flexbody_base::text::quotes::without_foreign_quotes;
 use flexbody_linalg::{CscMatrix, parallel};
 use flexbody_model::{
     Damping, DofLabel, Elements, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes,
-    RawMatrix, RawModel, RecoveryOperator, Reference, UnitLoad, filled_rows,
+    RawFollowers, RawMatrix, RawModel, RecoveryOperator, Reference, UnitLoad, filled_rows,
 };
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -143,12 +143,14 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         dofs: matrices.dofs,
         dofs_path: matrices.dofs_path,
         given_rows: matrices.given_rows,
+        followers: matrices.followers,
         interfaces,
         damping,
         geometric_stiffness,
         recoveries,
         named_loads,
         allow_implausible: files.allow_implausible,
+        keep_soft_rotations: files.keep_soft_rotations,
         sources: Sources::default(),
         diagnostics,
     };
@@ -201,6 +203,7 @@ struct ModelMatrices {
     dofs: Option<Vec<DofLabel>>,
     dofs_path: PathBuf,
     given_rows: GivenRows,
+    followers: Option<RawFollowers>,
     /// Node sets of a job.
     sets: NodeSets,
     /// Elements by which the part is drawn.
@@ -288,6 +291,7 @@ impl From<JobModel> for ModelMatrices {
             nodes: job.nodes,
             dofs: Some(job.dofs),
             given_rows: job.given_rows,
+            followers: job.followers,
             sets: job.sets,
             elements: job.elements,
             files: job.files,
@@ -340,6 +344,7 @@ impl ParsedTables {
             dofs,
             dofs_path,
             given_rows,
+            followers: None,
             sets,
             elements,
             files: Vec::new(),

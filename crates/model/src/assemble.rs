@@ -2,6 +2,7 @@
 //! of matrices and tables by themselves.
 
 use super::drilling::{Following, with_following_rotations};
+use super::followers::GivenFollowers;
 use super::geometric_stiffness::check_loads;
 use super::layout::{Layout, layout};
 use super::named_load::checked_loads;
@@ -11,7 +12,7 @@ use super::rows::{extents, rigid_count};
 use super::wording::name_some;
 use super::{
     Damping, DofLabel, GeometricStiffness, ModelLoad, ModelRecovery, Nodes, RawMatrix, RawModel, Rows,
-    SurfaceMesh,
+    SoftRotations, SurfaceMesh,
 };
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
@@ -19,6 +20,7 @@ use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
 use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Name of geometric stiffness in messages.
 const GEOMETRIC_STIFFNESS: &str = "geometric stiffness";
@@ -55,10 +57,15 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     found.extend(check_magnitudes(&stiffness, &mass, &nodes, &raw));
     stop_on_error(&mut found)?;
     (raw.nodes, raw.dofs) = (Nodes::default(), None);
+    let followers = raw.followers.take().map(|raw| {
+        let to_internal = layout.row_to_internal.clone();
+        GivenFollowers { raw: Arc::new(raw), to_internal }
+    });
     let row_to_internal = (!layout.is_identity()).then_some(layout.row_to_internal);
     let rows = layout.rows;
-    let Following { stiffness, mass, note } = with_following_rotations(&raw, &rows, &nodes, stiffness, mass);
-    found.extend(note);
+    let following = with_following_rotations(&raw, &rows, &nodes, stiffness, mass);
+    found.extend(following.found);
+    let Following { stiffness, mass, soft, .. } = following;
     #[cfg(debug_assertions)]
     let [stiffness, mass] = super::test_rounding::rounded([stiffness, mass]);
     let body = Assembled {
@@ -68,6 +75,8 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
         rows,
         stiffness,
         mass,
+        soft,
+        followers,
         row_to_internal,
         damping,
         geometric_stiffness,
@@ -443,6 +452,10 @@ pub(super) struct Assembled {
     pub stiffness: SymmetricMatrix,
     /// M.
     pub mass: SymmetricMatrix,
+    /// Rotations that K holds by misaligned elements only, with the terms of K that make them follow.
+    pub soft: SoftRotations,
+    /// Points with mass that follow nodes by constraints.
+    pub followers: Option<GivenFollowers>,
     /// Internal row of each matrix row, `u32::MAX` for rows that are left out; `None` if the orders are
     /// equal, or for one of several bodies.
     pub row_to_internal: Option<Vec<u32>>,

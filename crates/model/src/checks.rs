@@ -13,7 +13,7 @@ use super::rows::{centre_and_length, extents, rigid_residuals};
 use super::stress::check_stress;
 use super::uniform_strains::check_stresses;
 use super::wording::{in_words, name_some};
-use super::{Damping, DofLabel, FeModel, Nodes, RawModel, Rows};
+use super::{Damping, DofLabel, FeModel, Followers, Nodes, RawModel, Rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
 use flexbody_base::numbers::significant;
@@ -73,7 +73,10 @@ pub(super) fn check_body(
 ) -> Result<CheckedModel> {
     found.extend(check_exchanged_matrices(&body));
     stop_on_error(&mut found)?;
-    let [mass_pairs, foreign_pairs] = check_mass_pairs(&body, &mut found);
+    let given = body.followers.take();
+    let followers = given.and_then(|given| Followers::new(&given, &body.rows, &body.nodes));
+    let own_mass = followers.as_ref().map(|followers| followers.own_mass(body.rows.len()));
+    let [mass_pairs, foreign_pairs] = check_mass_pairs(&body, own_mass.as_ref(), &mut found);
     stop_on_error(&mut found)?;
     let form = form_of_mass(&body, &mut found);
     check_connections(&body, &mut found);
@@ -99,10 +102,11 @@ pub(super) fn check_body(
     let stress_files = std::mem::take(&mut body.raw.geometric_stiffness);
     let [first, second] = [form.worst.0, form.worst.1].map(|row| body.rows.label(&body.nodes, row));
     let allowed = body.raw.allow_implausible;
-    let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
+    let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass, number).with_followers(followers);
     model.find_fixed_mass(mass_rounding);
     let kept = unrotated_mass_note(&model, mass_rounding, [first, second]);
-    let follows = found.iter().any(|note| note.code() == Code::DeckConstrained);
+    let follows = found.iter().any(|note| note.code() == Code::DeckConstrained)
+        && model.followers().is_none_or(|points| !points.are_all());
     found.extend(kept.map(|note| with_help_for_dependents(note, follows).in_file(&mass_path)));
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
     let density = plausibility.densities.map(|densities| densities.quartiles[1]);
@@ -203,7 +207,8 @@ fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnos
 /// labels the rows of the displacement block that differs most by direction.
 fn unrotated_mass_note(model: &FeModel, rounding: f64, worst: [DofLabel; 2]) -> Option<Diagnostic> {
     let share = model.fixed_mass_share();
-    let deviation = model.mass_deviation();
+    // Blocks of displacements differ by direction also because their nodes carry a point that follows them.
+    let deviation = if model.followers().is_some() { 0.0 } else { model.mass_deviation() };
     (share > 0.0).then(|| {
         let [a, b] = worst;
         let place = if a == b { format!("at {a}") } else { format!("between {a} and {b}") };

@@ -46,8 +46,8 @@ struct Partial {
 }
 
 impl<'a> Blocks<'a> {
-    /// Creates the blocks of the mass `m` of these rows; `None` if no rotation carries mass.
-    pub(crate) fn new(m: &'a SymmetricMatrix, rows: &'a Rows) -> Option<Self> {
+    /// Creates the blocks of the mass `m` of these rows.
+    pub(crate) fn new(m: &'a SymmetricMatrix, rows: &'a Rows) -> Self {
         let first = rows.displacements();
         let mut nodes: Vec<u32> = Vec::new();
         for (at, &(node, _)) in rows.rotations().iter().enumerate() {
@@ -58,7 +58,12 @@ impl<'a> Blocks<'a> {
         let points = first / rows.dimension;
         let mut place_of = vec![NO_DIRECTORS; points];
         nodes.iter().zip(0..).for_each(|(&node, place)| place_of[node as usize] = place);
-        (!nodes.is_empty()).then_some(Self { m, rows, nodes, place_of, points })
+        Self { m, rows, nodes, place_of, points }
+    }
+
+    /// Returns true if a rotation carries mass.
+    pub(crate) fn turn(&self) -> bool {
+        !self.nodes.is_empty()
     }
 
     /// Returns the number of vertices.

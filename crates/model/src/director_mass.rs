@@ -15,6 +15,7 @@
 //! of the body; they are called the rest. For a plane body, with the directors e_x, e_y, h = (M_y, -M_x) of
 //! the column M_tr, P = M_rr/2 I and N = 0.
 
+use super::Followers;
 use super::director_blocks::{Blocks, ROUNDING_ENTRY};
 use super::rows::Rows;
 use faer::{Mat, MatMut, MatRef};
@@ -23,6 +24,8 @@ use flexbody_linalg::{
     SymmetricMatrix, contiguous, contiguous_mut, multiply, multiply_vector, parallel, zeros,
 };
 use nalgebra::{Matrix3, Vector3};
+use std::borrow::Cow;
+use std::sync::Arc;
 
 /// Part of the size of a second moment below which a negative eigenvalue is rounding.
 const NEGATIVE_MOMENT: f64 = 1e-12;
@@ -33,6 +36,9 @@ const NEGATIVE_MOMENT: f64 = 1e-12;
 /// directors (d for each of the d directors of a node with rotational mass), then, if there is a rest, the
 /// rotations of these nodes (three each, in the plane one). [`DirectorMass::extend`] maps columns of a
 /// model to extended rows, [`DirectorMass::restrict`] maps forces back.
+///
+/// Points that follow several nodes by constraints ([`Followers`]) have points and directors of their own: the
+/// motion of the model is first mapped to *full rows*, on which the mass is that before the constraints.
 #[derive(Debug, Clone)]
 pub struct DirectorMass {
     dimension: usize,
@@ -46,12 +52,14 @@ pub struct DirectorMass {
     scalar: SymmetricMatrix,
     /// Rest N and D on extended rows.
     rest: Option<SymmetricMatrix>,
+    followers: Option<Arc<Followers>>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Rotation {
     place: usize,
     axis: usize,
+    /// Full row, which is a row of the model if no point follows nodes.
     row: usize,
 }
 
@@ -59,7 +67,18 @@ impl DirectorMass {
     /// Creates the mass of points and directors from `m` (rows of the model, symmetric); `None` if no
     /// rotation carries mass.
     pub(super) fn new(m: &SymmetricMatrix, rows: &Rows) -> Option<Self> {
-        let blocks = Blocks::new(m, rows)?;
+        let blocks = Blocks::new(m, rows);
+        blocks.turn().then(|| Self::of_blocks(blocks, rows))
+    }
+
+    /// Creates the mass of a model with `rows` rows whose nodes carry `followers`.
+    pub(super) fn with_followers(followers: &Arc<Followers>, rows: usize) -> Self {
+        let full = followers.rows();
+        let own = Self::of_blocks(Blocks::new(followers.mass(), full), full);
+        Self { model_rows: rows, followers: Some(Arc::clone(followers)), ..own }
+    }
+
+    fn of_blocks(blocks: Blocks<'_>, rows: &Rows) -> Self {
         let rotations =
             rows.rotations().iter().zip(rows.displacements()..).filter_map(|(&(node, axis), row)| {
                 let place = blocks.place(node as usize)? as usize;
@@ -67,7 +86,7 @@ impl DirectorMass {
             });
         let rotations = rotations.collect();
         let (scalar, rest) = blocks.split();
-        Some(Self {
+        Self {
             dimension: rows.dimension,
             model_rows: rows.len(),
             points: blocks.points(),
@@ -75,7 +94,29 @@ impl DirectorMass {
             nodes: blocks.into_nodes(),
             scalar,
             rest,
-        })
+            followers: None,
+        }
+    }
+
+    /// Returns the full rows for rows of the model.
+    fn full<'x>(&self, x: &'x [f64]) -> Cow<'x, [f64]> {
+        match &self.followers {
+            Some(followers) => Cow::Owned(followers.lift(x)),
+            None => Cow::Borrowed(x),
+        }
+    }
+
+    /// Adds forces to `forces` on the rows of the model; `add` adds them to those on full rows.
+    fn add_on_full_rows(&self, forces: &mut [f64], add: impl FnOnce(&mut [f64])) {
+        let Some(followers) = &self.followers else { return add(forces) };
+        let mut full = vec![0.0; followers.rows().len()];
+        add(&mut full);
+        followers.add_restricted(&full, forces);
+    }
+
+    /// Returns true if points of the mass follow nodes of the model.
+    pub fn has_followers(&self) -> bool {
+        self.followers.is_some()
     }
 
     /// Returns the largest entry of the rest of the mass `m`, as [`DirectorMass::new`] finds it, relative
@@ -84,11 +125,18 @@ impl DirectorMass {
     /// of the element size to that of the rotary inertia of their sections. Returns `None` if no rotation
     /// carries mass.
     pub(super) fn rest_share(m: &SymmetricMatrix, rows: &Rows) -> Option<f64> {
-        let share = Blocks::new(m, rows)?.share();
-        Some(if share > ROUNDING_ENTRY { share } else { 0.0 })
+        let blocks = Blocks::new(m, rows);
+        blocks.turn().then(|| Self::share(m, rows))
     }
 
-    /// Returns the nodes with directors, ascending.
+    /// Returns the share of [`DirectorMass::rest_share`] for any mass.
+    pub(super) fn share(m: &SymmetricMatrix, rows: &Rows) -> f64 {
+        let share = Blocks::new(m, rows).share();
+        if share > ROUNDING_ENTRY { share } else { 0.0 }
+    }
+
+    /// Returns the nodes with directors, ascending. Points that follow nodes come after nodes and vectors of the
+    /// model.
     pub fn nodes(&self) -> &[u32] {
         &self.nodes
     }
@@ -177,6 +225,7 @@ impl DirectorMass {
     /// Extends one column into `extended`; see [`DirectorMass::extend`].
     pub fn extend_vector(&self, shape: &[f64], extended: &mut [f64]) {
         let points = self.dimension * self.points;
+        let shape = self.full(shape);
         extended[..points].copy_from_slice(&shape[..points]);
         extended[points..].fill(0.0);
         for &Rotation { place, axis, row } in &self.rotations {
@@ -210,8 +259,9 @@ impl DirectorMass {
     /// # Panics
     /// When a vector has another length.
     pub fn add_second_order_motion(&self, x: &[f64], y: &[f64], factor: f64, extended: &mut [f64]) {
+        let [x, y] = [x, y].map(|u| self.full(u));
         for (place, rotations) in self.turning_nodes() {
-            let [theta, phi] = [x, y].map(|u| rotation_vector(rotations, u).cross_matrix());
+            let [theta, phi] = [&x, &y].map(|u| rotation_vector(rotations, u).cross_matrix());
             let second = (theta * phi + phi * theta) * (0.5 * factor);
             for a in 0..self.dimension {
                 let row = self.director(place, a);
@@ -241,7 +291,9 @@ impl DirectorMass {
         assert_eq!(fields.nrows(), self.model_rows, "one row per row of the model");
         let (d, points) = (self.dimension, self.dimension * self.points);
         let mut extended = zeros(self.rows(), fields.ncols());
-        extended.as_mut().subrows_mut(0, points).copy_from(fields.subrows(0, points));
+        each_column(fields, &mut extended, |from, to| {
+            to[..points].copy_from_slice(&self.full(from)[..points])
+        });
         for column in d..fields.ncols() {
             let axis = if d == 2 { 2 } else { column - 3 };
             let extended = extended.col_as_slice_mut(column);
@@ -264,16 +316,19 @@ impl DirectorMass {
 
     /// Restricts one column into `restricted`; see [`DirectorMass::restrict`].
     pub fn restrict_vector(&self, forces: &[f64], restricted: &mut [f64]) {
-        let points = self.dimension * self.points;
-        restricted[..points].copy_from_slice(&forces[..points]);
-        restricted[points..].fill(0.0);
-        for &Rotation { place, axis, row } in &self.rotations {
-            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-            restricted[row] = forces[self.director(place, a) + b] - forces[self.director(place, b) + a];
-            if self.rest.is_some() {
-                restricted[row] += forces[self.rotation(place) + if self.dimension == 2 { 0 } else { axis }];
+        restricted.fill(0.0);
+        self.add_on_full_rows(restricted, |restricted| {
+            let points = self.dimension * self.points;
+            restricted[..points].copy_from_slice(&forces[..points]);
+            for &Rotation { place, axis, row } in &self.rotations {
+                let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+                restricted[row] = forces[self.director(place, a) + b] - forces[self.director(place, b) + a];
+                if self.rest.is_some() {
+                    let turn = if self.dimension == 2 { 0 } else { axis };
+                    restricted[row] += forces[self.rotation(place) + turn];
+                }
             }
-        }
+        });
     }
 
     /// Adds the moments that `forces` on extended rows gain by the rotations theta in `u` (N rows of the model), to first
@@ -285,17 +340,20 @@ impl DirectorMass {
     /// When a vector has another length.
     pub fn add_turned_moments(&self, forces: &[f64], u: &[f64], restricted: &mut [f64]) {
         let d = self.dimension;
-        for (place, rotations) in self.turning_nodes() {
-            let theta = rotation_vector(rotations, u);
-            let gained = |a: usize| {
-                let row = self.director(place, a);
-                let force = Vector3::from_fn(|k, _| if k < d { forces[row + k] } else { 0.0 });
-                let axis = Vector3::ith(a, 1.0);
-                theta.cross(&axis).cross(&force) + axis.cross(&force.cross(&theta))
-            };
-            let moment = (0..d).map(gained).sum::<Vector3<f64>>() * 0.5;
-            rotations.iter().for_each(|rotation| restricted[rotation.row] += moment[rotation.axis]);
-        }
+        let u = self.full(u);
+        self.add_on_full_rows(restricted, |restricted| {
+            for (place, rotations) in self.turning_nodes() {
+                let theta = rotation_vector(rotations, &u);
+                let gained = |a: usize| {
+                    let row = self.director(place, a);
+                    let force = Vector3::from_fn(|k, _| if k < d { forces[row + k] } else { 0.0 });
+                    let axis = Vector3::ith(a, 1.0);
+                    theta.cross(&axis).cross(&force) + axis.cross(&force.cross(&theta))
+                };
+                let moment = (0..d).map(gained).sum::<Vector3<f64>>() * 0.5;
+                rotations.iter().for_each(|rotation| restricted[rotation.row] += moment[rotation.axis]);
+            }
+        });
     }
 
     /// Computes y = E x of extended rows.
@@ -333,10 +391,13 @@ impl DirectorMass {
     /// When `u` or `forces` does not have one entry per row of the model.
     pub fn add_second_order(&self, h: impl Fn(usize) -> Matrix3<f64>, u: &[f64], forces: &mut [f64]) {
         assert!(u.len() == self.model_rows && forces.len() == u.len(), "one row per row of the model");
-        for (place, rotations) in self.turning_nodes() {
-            let moment = h(place) * rotation_vector(rotations, u);
-            rotations.iter().for_each(|rotation| forces[rotation.row] += moment[rotation.axis]);
-        }
+        let u = self.full(u);
+        self.add_on_full_rows(forces, |forces| {
+            for (place, rotations) in self.turning_nodes() {
+                let moment = h(place) * rotation_vector(rotations, &u);
+                rotations.iter().for_each(|rotation| forces[rotation.row] += moment[rotation.axis]);
+            }
+        });
     }
 
     /// Returns the rotations that the rows of the model have of every node, with the index of the node in

@@ -1,7 +1,7 @@
-//! Rotations about directions without any matrix entries, such as about the normal of a shell without
-//! drilling stiffness. If the normal is an axis of the model, the rows are empty and left out. Otherwise
-//! the direction is found from the block of each node, and the rotation is made to follow the nodes of an
-//! element around it.
+//! Rotations about directions without stiffness, such as about the normal of a shell without drilling
+//! stiffness. If the normal is an axis of the model, the rows are empty and left out. Otherwise the direction
+//! is found from the block of each node, and the rotation is made to follow the nodes of an element around
+//! it.
 //!
 //! With n the direction at node i, and w(u) the angular velocity of the rigid motion that fits the
 //! displacements of node i and of two other nodes of an element, the term
@@ -13,34 +13,63 @@
 //! is added to the elastic energy, where k is the largest stiffness of the rotations of the node. No other
 //! term depends on n' theta_i, so the term is zero in every static response and every mode for any k: the
 //! body does not change, and the rotation moves with its element. Rigid motion leaves the term zero.
+//!
+//! Elements whose normals deviate from n by a small angle delta, as coordinates of few digits make them, give
+//! n' theta_i a stiffness of delta^2 times their bending stiffness, and couple it with the bending rotations
+//! of other nodes by delta times their bending stiffness. The elements then bend against each other as at a
+//! hinge while the node turns by 1/delta times the angle of the hinge, which no small rotation is. Such a
+//! rotation is *soft*. The same term makes it follow its element, up to delta^2 of the bending stiffness.
+//! A spring, a beam or a shaft of small stiffness about n couples n' theta_i with other rotations by no more
+//! than a few times its stiffness, and stays as it is.
 
 use super::assemble::rounding;
 use super::node_pairs::neighbours;
 use super::wording::name_some;
-use super::{Nodes, RawModel, Rows};
+use super::{Nodes, RawModel, Rows, SoftRotation, SoftRotations};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::ties::TIE_MARGIN;
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use std::collections::BTreeMap;
 
 /// Area of the triangle of three nodes, projected across the direction and relative to the square of its
 /// longest side, below which the nodes determine no rotation about it.
 const MIN_TRIANGLE_AREA: f64 = 1e-3;
 
+/// Smallest principal stiffness of the rotations of a node, relative to the largest, below which a rotation
+/// may be soft: the square of the angle between the normals of elements, 1e-3 rad. A larger value also takes
+/// folds that a mesh may mean.
+const SOFT_STIFFNESS: f64 = 1e-6;
+
+/// Coupling of a soft rotation with the bending rotations of other nodes, relative to its own stiffness, from
+/// which misaligned elements explain it. Flat shells with angles of 1e-3 to 1e-5 rad between elements have 2e2
+/// to 2e4; springs, beams and shafts stay below 2.
+const MISALIGNED_COUPLING: f64 = 20.0;
+
+/// Part of the stiffness of a soft rotation that is due to the bending of misaligned elements, from which the
+/// rotation acts as a hinge. Shells without drilling stiffness have 0.05 and more. With smaller parts a spring
+/// or a drilling stiffness holds the rotation, and the hinge changes bending by less than this part.
+const HINGE_SHARE: f64 = 1e-3;
+
+/// Rounding error of a principal stiffness, relative to the tolerance for entries of K.
+const ROUNDING_SHARE: f64 = 1e-2;
+
 /// Number of digits of M below which rounding entries along a direction without mass are removed: they
 /// would make M indefinite.
 const FULL_DIGITS: u8 = 15;
 
-/// K and M of a model whose rotations about directions without stiffness and mass follow their elements,
-/// and a note about them.
+/// K and M of a model whose rotations about directions without stiffness follow their elements, and
+/// diagnostics about them.
 pub(super) struct Following {
     pub stiffness: SymmetricMatrix,
     pub mass: SymmetricMatrix,
-    pub note: Option<Diagnostic>,
+    /// Rotations to which K gives a stiffness, by misaligned elements.
+    pub soft: SoftRotations,
+    pub found: Vec<Diagnostic>,
 }
 
-/// Returns K and M, with added terms that make rotations about directions without stiffness and mass follow
-/// the nodes around them, if there are any.
+/// Returns K and M, with added terms that make rotations about directions without stiffness follow the nodes
+/// around them, if there are any.
 pub(super) fn with_following_rotations(
     raw: &RawModel,
     rows: &Rows,
@@ -48,40 +77,68 @@ pub(super) fn with_following_rotations(
     stiffness: SymmetricMatrix,
     mass: SymmetricMatrix,
 ) -> Following {
+    let unchanged = |stiffness, mass| {
+        let (soft, found) = (SoftRotations::default(), Vec::new());
+        Following { stiffness, mass, soft, found }
+    };
     if rows.dimension != 3 || rows.rotations().is_empty() {
-        return Following { stiffness, mass, note: None };
+        return unchanged(stiffness, mass);
     }
-    let body = Shell { rows, nodes, stiffness: &stiffness, mass: &mass };
-    let found = body.followers([raw.stiffness.digits, raw.mass.digits]);
-    if found.is_empty() {
-        return Following { stiffness, mass, note: None };
+    let body = Shell { rows, nodes, stiffness: &stiffness, mass: &mass, keeps_soft: raw.keep_soft_rotations };
+    let followers = body.followers([raw.stiffness.digits, raw.mass.digits]);
+    if followers.is_empty() {
+        return unchanged(stiffness, mass);
     }
-    let mut ids: Vec<i64> = found.iter().map(|one| nodes.ids[one.node]).collect();
-    ids.dedup();
-    let message = format!(
-        "rotations of {} nodes have neither stiffness nor mass about one direction: they follow the nodes around ({})",
-        ids.len(),
-        name_some(&ids)
-    );
-    let note = Diagnostic::new(Code::RotationsFollow, message).in_file(&raw.stiffness.path);
-    let added: Vec<(u32, u32, f64)> = found.iter().flat_map(|one| square(&one.term, one.stiffness)).collect();
+    let found = [false, true].into_iter().filter_map(|soft| remark(&followers, nodes, soft));
+    let found = found.map(|one| one.in_file(&raw.stiffness.path)).collect();
+    let added: Vec<(u32, u32, f64)> =
+        followers.iter().flat_map(|one| square(&one.rotation.term, one.rotation.stiffness)).collect();
     let held = sum(&stiffness, &added);
     let rounded = raw.mass.digits < FULL_DIGITS;
-    let left: Vec<(u32, u32, f64)> =
-        found.iter().filter(|_| rounded).flat_map(|one| rest(&mass, one)).collect();
+    let without_mass = followers.iter().filter(|one| rounded && !one.has_mass);
+    let left: Vec<(u32, u32, f64)> = without_mass.flat_map(|one| rest(&mass, &one.rotation)).collect();
     let mass = if left.is_empty() { mass } else { sum(&mass, &left) };
-    Following { stiffness: held, mass, note: Some(note) }
+    let soft = followers.into_iter().filter(|one| one.is_soft).map(|one| one.rotation).collect();
+    Following { stiffness: held, mass, soft: SoftRotations::new(soft), found }
 }
 
-/// Rotation of a node about a direction without stiffness and mass.
+/// Returns a diagnostic about the soft rotations that follow, or about those without stiffness and mass;
+/// `None` if there are none.
+fn remark(followers: &[Follower], nodes: &Nodes, soft: bool) -> Option<Diagnostic> {
+    let mut ids: Vec<i64> =
+        followers.iter().filter(|one| one.is_soft == soft).map(|one| nodes.ids[one.node]).collect();
+    ids.dedup();
+    let (count, named) = (ids.len(), name_some(&ids));
+    let (code, message) = if soft {
+        let message = format!(
+            "rotations of {count} nodes have less than {SOFT_STIFFNESS:.0e} of the largest rotational stiffness of their node about one direction, by elements that are not quite coplanar, which would act as hinges: they follow the nodes around ({named})"
+        );
+        (Code::SoftRotationsFollow, message)
+    } else {
+        let message = format!(
+            "rotations of {count} nodes have neither stiffness nor mass about one direction: they follow the nodes around ({named})"
+        );
+        (Code::RotationsFollow, message)
+    };
+    (count > 0).then(|| Diagnostic::new(code, message))
+}
+
+/// Rotation of a node that follows the nodes around.
 struct Follower {
     node: usize,
-    /// Unit vector of the direction: rows of rotations and components.
-    direction: Vec<(u32, f64)>,
-    /// g: the rotation minus that of the nodes around it.
-    term: Vec<(u32, f64)>,
-    /// Stiffness k of the added term.
-    stiffness: f64,
+    rotation: SoftRotation,
+    /// True if K gives the rotation a stiffness, by misaligned elements.
+    is_soft: bool,
+    /// True if M has entries about the direction.
+    has_mass: bool,
+}
+
+/// Direction of the rotations of a node without stiffness, or with the stiffness of misaligned elements.
+struct LooseDirection {
+    /// Unit vector in the rotations of the node.
+    vector: Vec<f64>,
+    is_soft: bool,
+    has_mass: bool,
 }
 
 /// Returns the entries of k g g'.
@@ -92,7 +149,7 @@ fn square(term: &[(u32, f64)], size: f64) -> impl Iterator<Item = (u32, u32, f64
 }
 
 /// Returns the entries of (I - v v') M (I - v v') - M, which removes the products of M with a direction v.
-fn rest(mass: &SymmetricMatrix, follower: &Follower) -> Vec<(u32, u32, f64)> {
+fn rest(mass: &SymmetricMatrix, follower: &SoftRotation) -> Vec<(u32, u32, f64)> {
     let v = &follower.direction;
     let mut product: Vec<(u32, f64)> = Vec::new();
     for &(column, part) in v {
@@ -124,11 +181,13 @@ struct Shell<'b> {
     nodes: &'b Nodes,
     stiffness: &'b SymmetricMatrix,
     mass: &'b SymmetricMatrix,
+    /// True if soft rotations stay as K has them.
+    keeps_soft: bool,
 }
 
 impl Shell<'_> {
-    /// Returns all rotations about directions without stiffness and mass, node by node; `digits` are those
-    /// of K and M.
+    /// Returns all rotations about directions without stiffness and mass and all soft rotations, node by
+    /// node; `digits` are those of K and M.
     fn followers(&self, digits: [u8; 2]) -> Vec<Follower> {
         let tolerances = digits.map(|digits| rounding(digits, 2));
         let mut found = Vec::new();
@@ -138,32 +197,98 @@ impl Shell<'_> {
             first += of_node.len();
             let node = of_node[0].0 as usize;
             let axes: Vec<usize> = of_node.iter().map(|&(_, axis)| usize::from(axis)).collect();
-            for (direction, stiffness) in self.empty_directions(&rows, tolerances) {
-                let direction: Vec<(u32, f64)> = rows.iter().map(|&row| row as u32).zip(direction).collect();
-                let term = self.term(node, &axes, &direction);
-                found.extend(term.map(|term| Follower { node, direction, term, stiffness }));
+            let (largest, loose) = self.loose_directions(&rows, tolerances);
+            for LooseDirection { vector, is_soft, has_mass } in loose {
+                let direction: Vec<(u32, f64)> = rows.iter().map(|&row| row as u32).zip(vector).collect();
+                let Some(term) = self.term(node, &axes, &direction) else { continue };
+                let stiffness = if has_mass { largest.max(self.holding(&direction, &term)) } else { largest };
+                let rotation = SoftRotation { direction, term, stiffness };
+                found.push(Follower { node, rotation, is_soft, has_mass });
             }
         }
         found
     }
 
-    /// Returns unit vectors in the rotations `own` of a node along which neither K nor M has entries, and
-    /// the largest stiffness of these rotations. `tolerances` are the relative rounding errors due to the
-    /// digits of K and M.
-    fn empty_directions(&self, rows: &[usize], tolerances: [f64; 2]) -> Vec<(Vec<f64>, f64)> {
+    /// Returns the largest principal stiffness of the rotations `rows` of a node, and the directions along
+    /// which neither K nor M has entries, or which are soft. `tolerances` are the relative rounding errors due
+    /// to the digits of K and M.
+    fn loose_directions(&self, rows: &[usize], tolerances: [f64; 2]) -> (f64, Vec<LooseDirection>) {
         let block = DMatrix::from_fn(rows.len(), rows.len(), |i, j| entry(self.stiffness, rows[i], rows[j]));
         let eigen = block.symmetric_eigen();
         let largest = eigen.eigenvalues.max();
         if rows.len() < 2 || largest.is_nan() || largest <= 0.0 {
-            return Vec::new();
+            return (0.0, Vec::new());
         }
-        let small = (0..rows.len()).filter(|&j| eigen.eigenvalues[j] <= 1e-3 * largest);
-        let vectors = small.map(|j| eigen.eigenvectors.column(j).iter().copied().collect::<Vec<f64>>());
-        let is_empty = |vector: &Vec<f64>| {
-            let matrices = [self.stiffness, self.mass].into_iter().zip(tolerances);
-            matrices.into_iter().all(|(matrix, tolerance)| vanishes(matrix, rows, vector, tolerance))
+        let loose = |j: usize| {
+            let vector: Vec<f64> = eigen.eigenvectors.column(j).iter().copied().collect();
+            let own = eigen.eigenvalues[j] / largest;
+            let [no_stiffness, no_mass] = [0, 1]
+                .map(|which| vanishes([self.stiffness, self.mass][which], rows, &vector, tolerances[which]));
+            let may_be_soft = !no_stiffness && !self.keeps_soft && own <= SOFT_STIFFNESS;
+            let rounding = ROUNDING_SHARE * tolerances[0];
+            let is_soft =
+                may_be_soft && self.is_misaligned(rows, &vector, [largest * own, largest * rounding]);
+            ((no_stiffness && no_mass) || is_soft).then_some(LooseDirection {
+                vector,
+                is_soft,
+                has_mass: !no_mass,
+            })
         };
-        vectors.filter(is_empty).map(|vector| (vector, largest)).collect()
+        let small = (0..rows.len()).filter(|&j| eigen.eigenvalues[j] <= 1e-3 * largest);
+        (largest, small.filter_map(loose).collect())
+    }
+
+    /// Returns true if misaligned elements explain the stiffness `own` of a rotation, known to `rounding`.
+    ///
+    /// A unit rotation about `direction`, all other rows being held, causes moments about directions across it
+    /// at other nodes. They are compared with the stiffness of the rotation, and so is the energy that turning
+    /// these nodes would release.
+    fn is_misaligned(&self, rows: &[usize], direction: &[f64], [own, rounding]: [f64; 2]) -> bool {
+        let (mut squares, mut released) = (0.0, 0.0);
+        for (node, moment) in self.bending_moments(rows, direction) {
+            let first = self.rows.displacements();
+            let at = self.rows.rotations().partition_point(|&(other, _)| other < node);
+            let others = self.rows.rotations()[at..].iter().take_while(|(other, _)| *other == node);
+            let stiffness: f64 =
+                others.enumerate().map(|(k, _)| entry(self.stiffness, first + at + k, first + at + k)).sum();
+            squares += moment.norm_squared();
+            released += if stiffness > 0.0 { moment.norm_squared() / stiffness } else { 0.0 };
+        }
+        squares.sqrt() > MISALIGNED_COUPLING * own.max(rounding)
+            && (own <= rounding || released > HINGE_SHARE * own)
+    }
+
+    /// Returns the moments about directions across `direction` that a unit rotation about it causes at other
+    /// nodes, all other rows being held.
+    fn bending_moments(&self, rows: &[usize], direction: &[f64]) -> BTreeMap<u32, Vector3<f64>> {
+        let first = self.rows.displacements();
+        let rotation = |row: usize| row.checked_sub(first).and_then(|at| self.rows.rotations().get(at));
+        let mut normal = Vector3::zeros();
+        let mut moments: BTreeMap<u32, Vector3<f64>> = BTreeMap::new();
+        for (&row, &part) in rows.iter().zip(direction) {
+            let Some(&(own, axis)) = rotation(row) else { continue };
+            normal[usize::from(axis)] = part;
+            let (columns, values) = self.stiffness.row(row);
+            for (&column, &value) in columns.iter().zip(values) {
+                if let Some(&(node, axis)) = rotation(column as usize).filter(|(node, _)| *node != own) {
+                    moments.entry(node).or_default()[usize::from(axis)] += part * value;
+                }
+            }
+        }
+        moments.values_mut().for_each(|moment| *moment -= normal * normal.dot(moment));
+        moments
+    }
+
+    /// Returns a stiffness that holds the inertia about `direction` to the nodes of `term` up to the highest
+    /// frequency of their displacements.
+    fn holding(&self, direction: &[(u32, f64)], term: &[(u32, f64)]) -> f64 {
+        let pairs = direction.iter().flat_map(|a| direction.iter().map(move |b| (a, b)));
+        let inertia: f64 = pairs.map(|(a, b)| a.1 * b.1 * entry(self.mass, a.0 as usize, b.0 as usize)).sum();
+        let frequencies = term[direction.len()..].iter().filter_map(|&(row, _)| {
+            let [k, m] = [self.stiffness, self.mass].map(|matrix| entry(matrix, row as usize, row as usize));
+            (m > 0.0).then(|| k / m)
+        });
+        inertia * frequencies.fold(0.0, f64::max)
     }
 
     /// Returns g with g'x = n' theta - n' w(u); `None` if no two nodes of an element with the node

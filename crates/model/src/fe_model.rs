@@ -4,8 +4,8 @@
 use super::assemble::Assembled;
 use super::mass_structure::MassForm;
 use super::{
-    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery,
-    NodeSet, Nodes, Rows, SurfaceMesh,
+    BodyNumber, Damping, DirectorMass, DofLabel, Followers, GeometricStiffness, GivenRows, ModelLoad,
+    ModelRecovery, NodeSet, Nodes, Rows, SoftRotations, SurfaceMesh,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
@@ -25,6 +25,7 @@ pub struct FeModel {
     mesh: Option<SurfaceMesh>,
     rows: Rows,
     stiffness: SymmetricMatrix,
+    soft_rotations: Arc<SoftRotations>,
     /// Ms, or its closest approximation.
     mean_mass: SymmetricMatrix,
     /// M, if it is not Ms kron I_d.
@@ -50,6 +51,8 @@ pub struct FeModel {
     given_rows: Arc<GivenRows>,
     number: Option<BodyNumber>,
     elimination: EliminationOrder,
+    /// Points with mass that follow nodes, if M is not Ms kron I_d.
+    followers: Option<Arc<Followers>>,
     /// M on points and directors, computed on demand.
     director_mass: OnceLock<Option<Arc<DirectorMass>>>,
 }
@@ -69,6 +72,7 @@ impl FeModel {
             rows,
             stiffness,
             mass,
+            soft,
             damping,
             geometric_stiffness,
             recoveries,
@@ -84,6 +88,7 @@ impl FeModel {
             mesh,
             rows,
             stiffness,
+            soft_rotations: Arc::new(soft),
             mean_mass: form.scalar,
             whole_mass: (!scalar).then_some(mass),
             commutes: form.commutes,
@@ -102,8 +107,41 @@ impl FeModel {
             given_rows: Arc::new(raw.given_rows),
             number,
             elimination: EliminationOrder::default(),
+            followers: None,
             director_mass: OnceLock::new(),
         }
+    }
+
+    /// Returns the model with points that follow its nodes. If the mass commutes with rotations, the points are
+    /// not needed: their mass is that of points at rest between the nodes.
+    pub(super) fn with_followers(self, followers: Option<Followers>) -> Self {
+        let followers = followers.filter(|_| !self.commutes).map(Arc::new);
+        Self { followers, ..self }
+    }
+
+    /// Returns the points with mass that follow nodes by constraints and turn with them.
+    pub fn followers(&self) -> Option<&Followers> {
+        self.followers.as_deref()
+    }
+
+    /// Returns the nodes of a body made of the model: those of the model, then the points that follow them.
+    pub fn nodes_of_body(&self) -> Cow<'_, Nodes> {
+        let Some(followers) = &self.followers else { return Cow::Borrowed(&self.nodes) };
+        let (mut nodes, points) = (self.nodes.clone(), followers.points());
+        nodes.ids.extend(&points.ids);
+        nodes.positions.extend(&points.positions);
+        Cow::Owned(nodes)
+    }
+
+    /// Returns the index among [`nodes_of_body`](Self::nodes_of_body) of a node of [`DirectorMass::nodes`].
+    pub fn node_of_body(&self, node: u32) -> usize {
+        let (node, nodes) = (node as usize, self.nodes.len());
+        if node < nodes { node } else { node - self.rows.vectors() }
+    }
+
+    /// Returns true if a body made of the model has rotations of nodes.
+    pub fn has_rotations(&self) -> bool {
+        !self.rows.rotations().is_empty() || self.followers.as_ref().is_some_and(|points| points.turn())
     }
 
     /// Returns the name of the model.
@@ -136,6 +174,12 @@ impl FeModel {
         &self.stiffness
     }
 
+    /// Returns the rotations that [`stiffness`](Self::stiffness) makes follow their elements although the
+    /// matrix as read gives them a stiffness.
+    pub fn soft_rotations(&self) -> &SoftRotations {
+        &self.soft_rotations
+    }
+
     /// Returns the model with its whole mass lumped: `masses` (one per node) at the displacements of the
     /// nodes, zero at other rows. Mass-proportional damping follows the new mass.
     ///
@@ -159,6 +203,7 @@ impl FeModel {
             fixed_mass_share: 0.0,
             diagonal_mass: true,
             elimination: EliminationOrder::default(),
+            followers: None,
             director_mass: OnceLock::new(),
             ..self.clone()
         }
@@ -181,12 +226,12 @@ impl FeModel {
         self.exact_scalar_mass
     }
 
-    /// Returns M on points and directors; `None` if no rotation of a node carries mass. Computed at the
-    /// first call.
+    /// Returns M on points and directors; `None` if no rotation of a node carries mass and no point follows
+    /// nodes. Computed at the first call.
     pub fn director_mass(&self) -> Option<&Arc<DirectorMass>> {
-        let made = || {
-            let mass = self.whole_mass.as_ref()?;
-            DirectorMass::new(mass, &self.rows).map(Arc::new)
+        let made = || match &self.followers {
+            Some(followers) => Some(Arc::new(DirectorMass::with_followers(followers, self.rows.len()))),
+            None => DirectorMass::new(self.whole_mass.as_ref()?, &self.rows).map(Arc::new),
         };
         self.director_mass.get_or_init(made).as_ref()
     }
@@ -292,6 +337,10 @@ impl FeModel {
     /// Finds the part of M that does not turn; parts up to `rounding` count as zero.
     pub(super) fn find_fixed_mass(&mut self, rounding: f64) {
         let share = match (self.scalar_mass(), &self.whole_mass) {
+            (None, Some(_)) if self.followers.is_some() => {
+                let followers = self.followers.as_ref().expect("there are some");
+                DirectorMass::share(followers.mass(), followers.rows())
+            }
             (None, Some(mass)) => DirectorMass::rest_share(mass, &self.rows).unwrap_or(self.mass_deviation),
             (None, None) => self.mass_deviation,
             (Some(_), _) => 0.0,

@@ -87,9 +87,14 @@ fn by_mass(mass: &SymmetricMatrix, diagonal: &[f64], rows: &Rows, vertex: usize)
 /// Adds an error if the mass couples nodes that the stiffness does not couple, which cannot happen if both
 /// have one order of rows. The finding is a warning if the pairs belong to mass elements, or if the user
 /// allows it. Returns the number of pairs coupled by the mass, and the number of these that the stiffness
-/// does not couple.
-pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) -> [usize; 2] {
-    let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
+/// does not couple. `own_mass` is the mass without that of points which follow nodes, if there are any.
+pub(super) fn check_mass_pairs(
+    body: &Assembled,
+    own_mass: Option<&SymmetricMatrix>,
+    found: &mut Vec<Diagnostic>,
+) -> [usize; 2] {
+    let Assembled { raw, nodes, rows, stiffness, .. } = body;
+    let mass = own_mass.unwrap_or(&body.mass);
     let MassPairs { count, foreign } = MassPairs::new(stiffness, mass, rows);
     if foreign.is_empty() {
         return [count, 0];

@@ -1,7 +1,8 @@
 //! A model as delivered by the readers: parsed, but not yet checked as a mechanical body.
 
 use super::{
-    Damping, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes, SurfaceMesh,
+    Damping, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes, RawFollowers,
+    SurfaceMesh,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
@@ -81,6 +82,8 @@ pub struct RawModel {
     pub dofs_path: PathBuf,
     /// Maps for shapes and loads from the rows of the files to the rows of K and M here.
     pub given_rows: GivenRows,
+    /// Points with mass that follow several nodes by constraints which the reader eliminated.
+    pub followers: Option<RawFollowers>,
     /// Named node sets.
     pub interfaces: Vec<NodeSet>,
     /// Damping, if given; a matrix has the rows of K and M.
@@ -94,6 +97,9 @@ pub struct RawModel {
     /// True if findings that the user has accepted are warnings instead of errors: implausible densities,
     /// and mass coupling without stiffness.
     pub allow_implausible: bool,
+    /// True if soft rotations, to which only elements that are not quite coplanar give a stiffness, stay as K
+    /// has them instead of following their elements.
+    pub keep_soft_rotations: bool,
     /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `recovery`, `named_load`, `mesh`, `manifest`), file name
     /// and SHA-256 (hex) of every file read.
     pub sources: Sources,
@@ -126,12 +132,14 @@ impl RawModel {
             dofs: None,
             dofs_path: PathBuf::new(),
             given_rows: GivenRows::default(),
+            followers: None,
             interfaces: Vec::new(),
             damping: None,
             geometric_stiffness: Vec::new(),
             recoveries: Vec::new(),
             named_loads: Vec::new(),
             allow_implausible: false,
+            keep_soft_rotations: false,
             sources: Sources::default(),
             diagnostics: Vec::new(),
         }

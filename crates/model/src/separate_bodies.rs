@@ -181,6 +181,8 @@ fn body_model(
         rows,
         stiffness: whole.stiffness.principal(kept),
         mass: whole.mass.principal(kept),
+        soft: whole.soft.of_body(kept),
+        followers: whole.followers.as_ref().map(|followers| followers.of_body(kept)),
         row_to_internal: None,
         damping,
         geometric_stiffness,

@@ -126,6 +126,7 @@ def model(
     damping: _types.Damping | None = None,
     residual_vectors: _types.ResidualLoads | Sequence[_types.ResidualLoads] = (),
     allow_implausible: bool = False,
+    keep_soft_rotations: bool = False,
 ) -> Model:
     """Creates a finite element model from matrices and checks it.
 
@@ -160,6 +161,9 @@ def model(
         Loads whose static responses join free modes: "interfaces", "centrifugal", or both in a list.
     allow_implausible
         True to treat implausible densities, and mass coupling between nodes without stiffness, as warnings.
+    keep_soft_rotations
+        True to leave rotations that only elements that are not quite coplanar hold as K has them, instead of making
+        them follow the nodes around them.
 
     Raises
     ------
@@ -184,6 +188,7 @@ def model(
         damping=_inputs.damping_of(damping),
         residual_vectors=_inputs.residual_loads(residual_vectors),
         allow_implausible=allow_implausible,
+        keep_soft_rotations=keep_soft_rotations,
     )
 
 
@@ -238,6 +243,7 @@ def convert(
     damping: _types.Damping | None = None,
     residual_vectors: _types.ResidualLoads | Sequence[_types.ResidualLoads] = (),
     allow_implausible: bool = False,
+    keep_soft_rotations: bool = False,
 ) -> Body: ...
 
 

@@ -48,6 +48,7 @@ class Model:
         damping: float | tuple[float, float] | list[tuple[float, float]] | _Compressed | None,
         residual_vectors: tuple[bool, bool],
         allow_implausible: bool,
+        keep_soft_rotations: bool,
     ) -> Model: ...
     @staticmethod
     def _read(

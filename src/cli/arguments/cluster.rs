@@ -21,6 +21,10 @@ pub struct PrepareArguments {
     /// Treat implausible densities, and mass coupling without stiffness, as warnings instead of errors
     #[arg(long)]
     pub allow_implausible: bool,
+    /// Leave rotations that only elements that are not quite coplanar hold as K has them, instead of making them
+    /// follow the nodes around them (FB428)
+    #[arg(long)]
+    pub keep_soft_rotations: bool,
     /// Folder to write, with all that the cluster needs; it is created if it does not exist
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,

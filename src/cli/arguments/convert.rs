@@ -39,6 +39,10 @@ pub struct ConvertArguments {
     /// Treat implausible densities, and mass coupling without stiffness, as warnings instead of errors
     #[arg(long, conflicts_with = "from")]
     pub allow_implausible: bool,
+    /// Leave rotations that only elements that are not quite coplanar hold as K has them, instead of making them
+    /// follow the nodes around them (FB428)
+    #[arg(long, conflicts_with = "from")]
+    pub keep_soft_rotations: bool,
     /// Convert each of several bodies in the matrices, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports likewise)
     #[arg(long, conflicts_with = "shapes")]
     pub split: bool,

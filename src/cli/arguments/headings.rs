@@ -38,6 +38,7 @@ const GROUPS: &[(&str, &[&str])] = &[
             "nodes",
             "dofs",
             "allow_implausible",
+            "keep_soft_rotations",
             "split",
             "model",
         ],

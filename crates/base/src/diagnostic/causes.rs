@@ -115,6 +115,8 @@ causes! {
     MagnitudeExtreme = "Products of the entries overflow or vanish in double precision.";
     NodesRounded = "The rigid rotations that the coordinates give strain the stiffness a little: the coordinates were written with fewer digits than the matrix was computed with.";
     RotationsFollow = "Rotations about the normal of a shell often have neither stiffness nor mass; they are determined from the displacements around them.";
+    SoftRotationsFollow = "Shells without drilling stiffness give a rotation about the normal a small stiffness if their elements are not quite coplanar, as with coordinates of few digits. The elements then bend against each other as at hinges, and frequencies are several percent too low.";
+    SoftRotationsEffect = "The rotations of FB428 turn freely in the stiffness as read, which lowers frequencies.";
     InterfaceCoupling = "The nodes of the interface do not determine the motion that the coupling needs, such as a rotation about the line on which they lie.";
     InterfaceShared = "Interface motions must be independent, and a shared node would belong to two of them.";
     InterfaceFit = "The modes were computed without rigid interfaces, so the nodes of the interface move relative to each other in them.";

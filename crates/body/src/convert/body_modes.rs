@@ -65,7 +65,10 @@ pub struct BodyModes {
     pub vectors: Mat<f64>,
     /// Displacements in body axes: three per node, then three per vector without a position.
     pub displacements: Mat<f64>,
-    /// Rotations in body axes, three per node, zero at nodes without rotations.
+    /// Displacements in body axes of the points that follow nodes, three each.
+    pub followers: Mat<f64>,
+    /// Rotations in body axes, three per node and then per point that follows nodes, zero at nodes without
+    /// rotations.
     pub rotations: Option<Mat<f64>>,
     /// Rows without a position: vectors in body axes, then massless rows.
     pub internal: Option<InternalRows>,
@@ -85,8 +88,11 @@ impl BodyModes {
         let mut displacements =
             in_space(vectors.as_ref().subrows(0, rows.displacements()), model.dimension());
         place.frame.rotate_shapes(&mut displacements);
-        let mut rotations = (!rows.rotations().is_empty()).then(|| {
-            let mut rotations = zeros(3 * nodes, nf);
+        let [mut followers, turned] = motion_of_followers(model, &vectors);
+        place.frame.rotate_shapes(&mut followers);
+        let mut rotations = model.has_rotations().then(|| {
+            let mut rotations = zeros(3 * nodes + turned.nrows(), nf);
+            rotations.subrows_mut(3 * nodes, turned.nrows()).copy_from(&turned);
             for (row, &(node, axis)) in (rows.displacements()..).zip(rows.rotations()) {
                 for j in 0..nf {
                     rotations[(3 * node as usize + usize::from(axis), j)] = vectors[(row, j)];
@@ -104,27 +110,41 @@ impl BodyModes {
         };
         let signs = parallel::map(0..nf, sign);
         // Turn the modes with a negative sign.
-        for shapes in [&mut vectors, &mut displacements].into_iter().chain(&mut rotations) {
+        for shapes in [&mut vectors, &mut displacements, &mut followers].into_iter().chain(&mut rotations) {
             let reversed = shapes.col_iter_mut().zip(&signs).filter(|(_, sign)| **sign < 0.0);
             parallel::for_each(reversed, |(shape, _)| {
                 contiguous_mut(shape).iter_mut().for_each(|x| *x = -*x)
             });
         }
         let internal = internal(model, &vectors, &displacements);
-        Self { vectors, displacements, rotations, internal, signs, nodes }
+        Self { vectors, displacements, followers, rotations, internal, signs, nodes }
     }
 
     /// Returns the modes of a body that was made from `model`; `None` if the body has other rows than the
     /// model.
     pub fn of_body(model: &FeModel, body: &FlexBody) -> Option<Self> {
         let modes = body.modes();
+        let displacements = body.displacements_of(model)?;
+        let nodes = model.nodes().len();
+        let points = modes.shape.nrows() - 3 * nodes;
         Some(Self {
+            followers: copied(modes.shape.as_ref().subrows(3 * nodes, points)),
             vectors: body.vectors_of(model)?,
-            displacements: body.displacements_of(model)?,
+            displacements,
             rotations: modes.rotation.clone(),
             internal: modes.internal.clone(),
             signs: vec![1.0; body.n_modes()],
-            nodes: model.nodes().len(),
+            nodes,
+        })
+    }
+
+    /// Returns the displacements of the nodes of the body: those of the model, then the points that follow them.
+    pub fn of_body_nodes(&self) -> Mat<f64> {
+        let nodes = self.of_nodes();
+        let all = nodes.nrows() + self.followers.nrows();
+        Mat::from_fn(all, nodes.ncols(), |row, j| match row.checked_sub(nodes.nrows()) {
+            Some(after) => self.followers[(after, j)],
+            None => nodes[(row, j)],
         })
     }
 
@@ -154,9 +174,9 @@ impl BodyModes {
         let mut fields = mass.extend_rigid(model.rigid_fields(frame.origin.into(), 1.0).as_ref());
         frame.rotate_rigid(&mut fields);
         let nothing = NodeMoments { first: Vector3::zeros(), second: nalgebra::Matrix3::zeros() };
-        let mut moments = vec![nothing; self.nodes];
+        let mut moments = vec![nothing; rotations.nrows() / 3];
         for (&node, moment) in mass.nodes().iter().zip(mass.moments(fields.as_ref(), &frame.axes)) {
-            moments[node as usize] = moment;
+            moments[model.node_of_body(node)] = moment;
         }
         Some(InertiaStiffness::new(moments, rotations.as_ref(), model.dimension()))
     }
@@ -218,6 +238,23 @@ impl BodyModes {
         let shapes = mass.extend(self.vectors.as_ref());
         condensed(mass, &motion, shapes.as_ref()).with_w0_of_c1().shifted(-offset)
     }
+}
+
+/// Returns displacements and rotations, along the axes of the model, of the points that follow nodes.
+fn motion_of_followers(model: &FeModel, vectors: &Mat<f64>) -> [Mat<f64>; 2] {
+    let Some(followers) = model.followers() else {
+        return [Mat::zeros(0, vectors.ncols()), Mat::zeros(0, vectors.ncols())];
+    };
+    let rows = 3 * followers.points().len();
+    let mut motion = [Mat::zeros(rows, vectors.ncols()), Mat::zeros(rows, vectors.ncols())];
+    for j in 0..vectors.ncols() {
+        let columns = followers.motion(vectors.col_as_slice(j));
+        motion
+            .iter_mut()
+            .zip(columns)
+            .for_each(|(to, column)| to.col_as_slice_mut(j).copy_from_slice(&column));
+    }
+    motion
 }
 
 /// Returns the centre of mass in a frame.

@@ -15,7 +15,6 @@ use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
 use flexbody_eigen::{Plan, Proof, energy_noise};
 use flexbody_linalg::context::{Context, Work};
-use flexbody_linalg::copied;
 use flexbody_linalg::ties::first_largest;
 use flexbody_model::{Coupling, FeModel, rigid_count};
 
@@ -171,7 +170,7 @@ impl ModalModel<'_> {
             residual: solution.residuals.clone(),
             provenance: self.found.provenance.clone(),
             truncation: self.found.truncation.clone(),
-            shape: copied(self.modes.of_nodes()),
+            shape: self.modes.of_body_nodes(),
             rotation: self.modes.rotations.clone(),
             internal: self.modes.internal.clone(),
         };

@@ -19,6 +19,7 @@ mod node_inertia;
 mod recovery;
 mod settings;
 mod shapes;
+mod soft_rotations;
 
 pub use body_modes::{BodyModes, NodesInFrame, interfaces_in_frame, rigid_mass};
 pub use conversion::{Conversion, convert, interface_compliance, poor_fits};

@@ -2,6 +2,7 @@
 //! invariants, in one or two steps.
 
 use super::body_modes::{self, reduced, reduced_in_twice_the_precision};
+use super::soft_rotations::effect_of_soft_rotations;
 use super::{BodyModes, ConvertSettings, NodesInFrame, modal_geometric_stiffness, rigid_mass};
 use crate::basis::{BasisChoice, ModalBasis, Task};
 use crate::flex_body::{Guarantee, Interface, RotatedStiffness, TermDecision, TermGroup, TermGroups};
@@ -57,6 +58,8 @@ impl<'m> ModalModel<'m> {
         let counter = WorkCounter::default();
         let task = Task { model, settings: &settings.modes, context: &context.with_counter(&counter) };
         let mut found = settings.basis.basis().modes(&task)?;
+        let released = effect_of_soft_rotations(model, &found);
+        found.diagnostics.extend(released);
         context.phase("invariants");
         // Body frame: requested one in mean axes, or the one on an interface, which then constrains the modes.
         let (frame, mass_properties) = body_frame(model, &settings.frame)?;
@@ -80,7 +83,8 @@ impl<'m> ModalModel<'m> {
         let (geometric_stiffness, rotated_stiffness) =
             modal_geometric_stiffness(model, &modes.vectors, &frame, &shift)?;
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
-        let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
+        let all = model.nodes_of_body();
+        let nodes = Nodes { ids: all.ids.clone(), positions: frame.to_body(&all.positions) };
         let interfaces = body_modes::interfaces_in_frame(model, &frame, coupled);
         Ok(Self {
             model,

@@ -37,7 +37,7 @@ pub fn unusual_node_inertia(body: &FlexBody, model: Option<&FeModel>) -> Option<
 /// Returns a text about the node with the most negative second moment; `None` if no node has one.
 fn of_node(model: &FeModel, mass: &DirectorMass) -> Option<String> {
     let (node, smallest, count) = mass.negative_moments()?;
-    let id = model.nodes().ids[node as usize];
+    let id = model.nodes_of_body().ids[model.node_of_body(node)];
     let others = match count {
         1 => String::new(),
         _ => format!(", one of {count} such nodes"),

@@ -163,7 +163,7 @@ fn basis_of<'m>(body: &FlexBody, model: &'m FeModel, vectors: &Mat<f64>) -> Resu
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) if the body has other nodes or rows than `model`.
 fn vectors_of(body: &FlexBody, model: &FeModel) -> Result<Mat<f64>> {
-    let vectors = (body.nodes().ids == model.nodes().ids).then(|| body.vectors_of(model)).flatten();
+    let vectors = (body.nodes().ids == model.nodes_of_body().ids).then(|| body.vectors_of(model)).flatten();
     vectors.ok_or_else(|| incomparable("the nodes and rows of the body are not those of the model"))
 }
 

@@ -195,17 +195,17 @@ impl FlexBody {
     /// Returns the modes Psi (N x nf) in the rows and axes of the model that the body was made of; `None`
     /// if the body has other rows than the model.
     pub fn vectors_of(&self, model: &FeModel) -> Option<Mat<f64>> {
-        let split = self.rows_in_space(model)? - 3 * self.n_nodes();
+        let split = self.rows_in_space(model)? - 3 * model.nodes().len();
         let (rows, modes, d) = (model.rows(), self.modes(), model.dimension());
         let massless = rows.without_place()[1].start;
         let axes = &self.frame().axes;
         let turned = |shape: &dyn Fn(usize) -> f64, vector: usize, k: usize| -> f64 {
             (0..3).map(|l| axes[(k, l)] * shape(3 * vector + l)).sum()
         };
-        let first = rows.displacements();
+        let (first, nodes) = (rows.displacements(), model.nodes().len());
         Some(Mat::from_fn(rows.len(), self.n_modes(), |row, j| {
             match (row.checked_sub(first), &modes.rotation) {
-                (None, _) => turned(&|at| self.displacement(at, j), row / d, row % d),
+                (None, _) => turned(&|at| self.displacement(nodes, at, j), row / d, row % d),
                 (Some(after), Some(rotation)) if after < rows.rotations().len() => {
                     let (node, axis) = rows.rotations()[after];
                     turned(&|at| rotation[(at, j)], node as usize, axis.into())
@@ -242,7 +242,8 @@ impl FlexBody {
     /// position. Returns `None` in the cases of [`FlexBody::vectors_of`].
     pub(crate) fn displacements_of(&self, model: &FeModel) -> Option<Mat<f64>> {
         let rows = self.rows_in_space(model)?;
-        Some(Mat::from_fn(rows, self.n_modes(), |row, j| self.displacement(row, j)))
+        let nodes = model.nodes().len();
+        Some(Mat::from_fn(rows, self.n_modes(), |row, j| self.displacement(nodes, row, j)))
     }
 
     /// Returns the number of spatial displacement rows of nodes and of vectors without a position, if the
@@ -251,15 +252,17 @@ impl FlexBody {
         let (rows, modes) = (model.rows(), self.modes());
         let massless = rows.without_place()[1].len();
         let internal = modes.internal.as_ref().map_or(0, |internal| internal.shape.nrows());
-        let same = self.n_nodes() == model.nodes().len()
+        let same = self.n_nodes() == model.nodes_of_body().len()
             && self.dimension() == model.dimension()
             && internal == 3 * rows.vectors() + massless
-            && modes.rotation.is_some() != rows.rotations().is_empty();
-        same.then(|| 3 * (self.n_nodes() + rows.vectors()))
+            && modes.rotation.is_some() == model.has_rotations();
+        same.then(|| 3 * (model.nodes().len() + rows.vectors()))
     }
 
-    fn displacement(&self, row: usize, j: usize) -> f64 {
-        match (row.checked_sub(3 * self.n_nodes()), &self.modes().internal) {
+    /// Returns a displacement of a model with this number of nodes: those of the nodes, then those of vectors
+    /// without a position.
+    fn displacement(&self, nodes: usize, row: usize, j: usize) -> f64 {
+        match (row.checked_sub(3 * nodes), &self.modes().internal) {
             (Some(row), Some(internal)) => internal.shape[(row, j)],
             _ => self.modes().shape[(row, j)],
         }

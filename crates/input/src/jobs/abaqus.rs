@@ -61,6 +61,7 @@ impl JobReader for Abaqus {
             sets: mesh.sets,
             files: deck_files.chain(rows.files).collect(),
             diagnostics: mesh.notes.into_iter().chain(note).chain(rows.condensed).collect(),
+            followers: None,
         })
     }
 }

@@ -90,6 +90,7 @@ impl JobReader for Calculix {
             sets,
             files,
             diagnostics,
+            followers: None,
         })
     }
 }

@@ -2,6 +2,7 @@
 //! or in its folder: DMIG cards, which name their rows, or OUTPUT4, whose rows follow the points.
 
 mod bulk;
+mod carried_mass;
 mod constraints;
 mod elimination;
 mod matrices;
@@ -67,11 +68,23 @@ impl JobReader for Nastran {
         let mut files: Vec<(&'static str, SeenFile)> =
             bulk.files.iter().map(|file| ("deck", file.clone())).collect();
         files.extend(matrices.files.iter().map(|file| ("matrices", file.clone())));
+        let followers = matrices.carried(&nodes, &axes);
         let given_rows = matrices.given_rows(axes);
         let Matrices { stiffness, mass, labels: dofs, .. } = matrices;
         // With condensed matrices no element has all of its nodes.
         let elements = if bulk.is_condensed() { Elements::default() } else { bulk.elements };
-        Ok(JobModel { stiffness, mass, nodes, dofs, given_rows, sets, elements, files, diagnostics })
+        Ok(JobModel {
+            stiffness,
+            mass,
+            nodes,
+            dofs,
+            given_rows,
+            followers,
+            sets,
+            elements,
+            files,
+            diagnostics,
+        })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::Axes;
 use super::bulk::Bulk;
+use super::carried_mass::CarriedMass;
 use super::elimination::{Elimination, Followers, GridPlaces};
 use crate::dmig::{Dmigs, Point, label};
 use crate::jobs::{Found, JobFile, JobSibling, beginning_alike, both, missing, siblings};
@@ -11,7 +12,7 @@ use crate::output4;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_linalg::CscMatrix;
-use flexbody_model::{DofLabel, GivenRows, RawMatrix, RowMap, filled_rows};
+use flexbody_model::{DofLabel, GivenRows, Nodes, RawFollowers, RawMatrix, RowMap, filled_rows};
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -27,6 +28,8 @@ pub(super) struct Matrices {
     /// Elimination of dependent rows by constraints of the deck with the names of the constraints, if the files contain
     /// these rows.
     followers: Option<(Elimination, String)>,
+    /// Mass of points that follow several grids, before the elimination.
+    carried: Option<CarriedMass>,
     /// Rotation of the rows to the axes of the model, if they had others.
     turn: Option<CscMatrix>,
     /// Rows that were kept, if others were left out.
@@ -95,7 +98,17 @@ impl Matrices {
         let followers = eliminated.transpose().map_err(in_file)?;
         let n_given = points.len();
         let labels = points.into_iter().map(label).collect();
-        Ok(Self { stiffness, mass, labels, files, n_given, followers, turn: None, retained: None })
+        Ok(Self {
+            stiffness,
+            mass,
+            labels,
+            files,
+            n_given,
+            followers,
+            carried: None,
+            turn: None,
+            retained: None,
+        })
     }
 
     /// Returns the matrices without the rows that follow others by constraints of the deck.
@@ -108,11 +121,28 @@ impl Matrices {
         let map = RowMap::new(elimination.follows.clone(), elimination.picks.clone(), all);
         let rows = GivenRows::new(vec![map], HashMap::new());
         let labels = elimination.points.iter().copied().map(label).collect();
+        let points: Vec<Point> = self.labels.iter().map(|label| (label.node, label.direction)).collect();
+        let carried = CarriedMass::new(&points, &self.mass.matrix, elimination);
         let [stiffness, mass] = [&self.stiffness, &self.mass].map(|raw| {
             let matrix = rows.matrix(raw.matrix.clone()).expect("all rows are kept");
             RawMatrix { matrix, digits: raw.digits, path: raw.path.clone() }
         });
-        Self { stiffness, mass, labels, ..self }
+        Self { stiffness, mass, labels, carried, ..self }
+    }
+
+    /// Returns the points with mass that follow several grids, for the rows as they are now. `axes` are the row axes
+    /// of the grids.
+    pub(super) fn carried(&self, nodes: &Nodes, axes: &HashMap<i64, Axes>) -> Option<RawFollowers> {
+        let (elimination, _) = self.followers.as_ref()?;
+        let n = elimination.points.len();
+        let mut follows = match &self.turn {
+            Some(turn) => product(turn, &elimination.follows),
+            None => elimination.follows.clone(),
+        };
+        if let Some(retained) = &self.retained {
+            follows = product(&transposed(&columns_of_identity(n, retained)), &follows);
+        }
+        self.carried.as_ref()?.followers(&follows, nodes, axes)
     }
 
     /// Returns the matrices with all rows along the axes of the basic system.
@@ -222,6 +252,17 @@ fn columns_of_identity(n: usize, columns: &[usize]) -> CscMatrix {
     let entries: Vec<(u32, u32, f64)> =
         (0u32..).zip(columns).map(|(at, &row)| (row as u32, at, 1.0)).collect();
     CscMatrix::from_triplets(n, columns.len(), &entries)
+}
+
+/// Returns the transposed matrix.
+fn transposed(matrix: &CscMatrix) -> CscMatrix {
+    let entries: Vec<(u32, u32, f64)> = (0..matrix.n_cols())
+        .flat_map(|column| {
+            let (rows, values) = matrix.column(column);
+            rows.iter().zip(values).map(move |(row, value)| (column as u32, *row, *value))
+        })
+        .collect();
+    CscMatrix::from_triplets(matrix.n_cols(), matrix.n_rows(), &entries)
 }
 
 /// Returns the product of two sparse matrices.

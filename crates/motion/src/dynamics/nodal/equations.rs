@@ -170,6 +170,9 @@ impl<'m> NodalEquations<'m> {
         frame: &Frame,
         conditions: &ReferenceConditions,
     ) -> Result<Self, NodalError> {
+        if model.followers().is_some() {
+            return Err(NodalError::MassFollows);
+        }
         let moving: &[usize] = if model.dimension() == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
         let (rigid, mass_rigid) = rigid_motions(model, frame, moving);
         let factor = SparseLdl::new(model.pencil().mass(), NULL_PIVOT).ok_or(NodalError::MassIndefinite)?;
@@ -476,6 +479,8 @@ pub enum NodalError {
         /// Number of rows.
         rows: usize,
     },
+    /// Points with mass follow several nodes by constraints.
+    MassFollows,
     /// Damping is given by ratios of modes.
     DampingOfModes,
     /// The body does not belong to the model.
@@ -516,6 +521,9 @@ impl std::fmt::Display for NodalError {
             Self::NullSpaceTooLarge { null_vectors, rows } => write!(
                 f,
                 "the mass matrix of {rows} rows has {null_vectors} null vectors, too many for dense storage; help: integrate the mass fully, or use the reduced equations"
+            ),
+            Self::MassFollows => f.write_str(
+                "points with mass follow several nodes by constraints (RBE3, MPC), and turn with them only in the reduced equations; help: give these points rows of their own, tied by RBE2 or stiff beams",
             ),
             Self::DampingOfModes => f.write_str(
                 "damping ratios need the modes of a body, and none is given; help: give the body (`of_body`), Rayleigh damping or a damping matrix",
