@@ -204,6 +204,8 @@ codes! {
     InterfacesUncompared = "FB454", Note, Done, "interfaces of the body are not stated like this by the model that it is checked against", "state them by --interface NAME=NODES,COUPLING, or by [[interface]] in the manifest, to compare them";
     SectionAbout = "FB455", Note, Done, "moments of a section are about the origin of the model", "state the point: about = [x, y, z] in its [[recovery]], in model axes";
     NodeInertia = "FB456", Warning, Done, "rotary inertia of a node is that of no rigid mass", "nothing to do for a disc of which only the inertia about its axis is meant; else give all moments of inertia (a thin disc has half of that about its axis about each diameter): none is larger than the sum of the other two";
+    RecoveryPlane = "FB458", Note, Done, "stresses of a recovery are read as those of a plane state", "nothing to do for plane stress and membranes; of a solid give all six components";
+    RecoveryNoEquivalent = "FB459", Note, Done, "no von Mises and principal stresses are formed of stresses that look like a tensor", "name the components xx, yy, zz, xy, yz, xz (or 11, S11, sigma_xx and their like), and let the name of each row end with its component: `e1 xx`";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";

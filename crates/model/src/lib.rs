@@ -36,6 +36,7 @@ mod rigid_motion;
 mod rows;
 mod separate_bodies;
 mod stress;
+mod stress_labels;
 mod stress_loads;
 mod stress_points;
 mod surface;

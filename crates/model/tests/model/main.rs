@@ -4,4 +4,5 @@
 
 mod assembler;
 mod internal_rows;
+mod stress_components;
 mod stress_relations;
