@@ -7,10 +7,11 @@
 //! materials and anisotropy by less.
 
 use super::stress_labels::{StressLabel, labels_of};
-use super::{FeModel, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
+use super::{AnsweredShapes, FeModel, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use nalgebra::Matrix3;
+use std::collections::HashMap;
 
 /// Point of the part whose stresses are rows of a recovery.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -150,7 +151,13 @@ pub(super) fn check_stress_scale(model: &FeModel, density: Option<f64>, found: &
     let strained = sheared(model);
     let energies = energies(model, &strained);
     for one in asked {
-        if let Some(ratio) = stress_ratio(model, one, &strained, &energies, volume)
+        let ratio = match &one.operator {
+            RecoveryOperator::Shapes { shapes, labels } => {
+                stress_ratio_of_shapes(model, shapes, labels, &energies, volume)
+            }
+            _ => stress_ratio(model, one, &strained, &energies, volume),
+        };
+        if let Some(ratio) = ratio
             && !(1.0 / MAX_RATIO..=MAX_RATIO).contains(&ratio)
         {
             let message = format!(
@@ -229,6 +236,50 @@ fn stress_ratio(
     let count = (points.len() * energies.len()) as f64;
     let ratio = (sum / count).sqrt();
     (count > 0.0 && ratio.is_finite()).then_some(ratio)
+}
+
+/// Returns the root mean square of the equivalent stresses of answered shapes relative to the expected one; `None` without stresses
+/// in a known unit, or for shapes that do not move all nodes.
+///
+/// The mean of vm^2 / (3 G) over the volume is the part of 2 U / V of a shape with the strain energy U that changes no volume. With
+/// G V from uniform shear, vm^2 = 6 U G V / V^2 for a shape of shear and less for others; stresses at nodes of a bent part are
+/// larger by a small factor.
+fn stress_ratio_of_shapes(
+    model: &FeModel,
+    shapes: &AnsweredShapes,
+    labels: &[RecoveryRow],
+    energies: &[f64],
+    volume: f64,
+) -> Option<f64> {
+    let nodes = model.nodes();
+    let place: HashMap<i64, usize> = nodes.ids.iter().copied().zip(0..).collect();
+    let rows = model.rows().len();
+    let count = shapes.displacements.ncols();
+    let mut fields = Mat::zeros(rows, count);
+    for (at, dof) in shapes.dofs.iter().enumerate().filter(|(_, dof)| dof.direction <= 3) {
+        let row = 3 * place.get(&dof.node)? + usize::from(dof.direction) - 1;
+        (0..count).for_each(|c| fields[(row, c)] = shapes.displacements[(at, c)]);
+    }
+    if shapes.dofs.len() != rows || rows != 3 * nodes.ids.len() {
+        return None;
+    }
+    let points = StressPoint::among(labels);
+    let pascals = points.iter().map(|point| pascals(&point.unit)).collect::<Option<Vec<f64>>>()?;
+    let units = model.units();
+    let of_model = units.mass.to_si() / (units.length.to_si() * units.time.to_si().powi(2));
+    let of_shear = energies.iter().sum::<f64>() / energies.len() as f64;
+    let forces = model.pencil().apply_stiffness(fields.as_ref());
+    let (mut sum, mut expected) = (0.0, 0.0);
+    for c in 0..count {
+        let twice_energy: f64 = (0..rows).map(|i| fields[(i, c)] * forces[(i, c)]).sum();
+        expected += 3.0 * twice_energy * of_shear / volume.powi(2) * of_model.powi(2);
+        let square = |(point, pascals): (&StressPoint, &f64)| {
+            (StressPoint::von_mises_of(&point.stress(|row| shapes.answers[(row, c)])) * pascals).powi(2)
+        };
+        sum += points.iter().zip(&pascals).map(square).sum::<f64>() / points.len() as f64;
+    }
+    let ratio = (sum / expected).sqrt();
+    ratio.is_finite().then_some(ratio)
 }
 
 #[cfg(test)]

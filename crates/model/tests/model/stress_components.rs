@@ -1,9 +1,12 @@
 //! Notes about stresses of recoveries that are read as plane states, and about those of which no equivalent stress is formed.
 
+use faer::Mat;
 use flexbody_base::diagnostic::Code;
-use flexbody_model::{FeModel, RawModel, RecoveryOperator, StressPoint};
+use flexbody_base::units::UnitSystem;
+use flexbody_linalg::CscMatrix;
+use flexbody_model::{AnsweredShapes, DofLabel, FeModel, RawModel, RecoveryOperator, StressPoint};
 use oracle::elements::{ElementKind, MassRule, Material};
-use oracle::mesh::{Mesh, grid};
+use oracle::mesh::{Mesh, entries, grid};
 
 /// Components of the operator of stresses, in its order.
 const SIX: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
@@ -45,6 +48,45 @@ fn usual_spellings_of_the_components_are_points() {
     ] {
         let (points, said) = told(six);
         assert!(points == 16 && said.is_empty(), "{six:?}: {points} {said:?}");
+    }
+}
+
+/// Stresses of shapes in Pa for a model in mm are a million times those of its stiffness.
+#[test]
+fn stresses_of_shapes_in_another_unit_are_reported() {
+    let said = |factor: f64| {
+        let mut raw = model();
+        raw.units = UnitSystem::parse("mm", "t", "s").expect("units");
+        let scaled = |matrix: &CscMatrix, factor: f64| {
+            let all: Vec<_> = entries(matrix).map(|(r, c, v)| (r, c, factor * v)).collect();
+            CscMatrix::from_triplets(matrix.n_rows(), matrix.n_cols(), &all)
+        };
+        // The model of metres in millimetres and tonnes: stiffness in N/mm, stresses in MPa per mm.
+        raw.stiffness.matrix = scaled(&raw.stiffness.matrix, 1e-3);
+        raw.mass.matrix = scaled(&raw.mass.matrix, 1e-3);
+        raw.nodes.positions.iter_mut().flatten().for_each(|x| *x *= 1e3);
+        let RecoveryOperator::Rows { transposed, labels, .. } = &raw.recoveries[0].operator else {
+            panic!("rows")
+        };
+        let (n, rows) = (transposed.n_rows(), transposed.n_cols());
+        let dof = |row: usize| DofLabel { node: raw.nodes.ids[row / 3], direction: 1 + (row % 3) as u8 };
+        let mut labels = labels.clone();
+        labels.iter_mut().for_each(|label| label.unit = "MPa".to_owned());
+        let shapes = AnsweredShapes {
+            dofs: (0..n).map(dof).collect(),
+            displacements: Mat::identity(n, n),
+            digits: 15,
+            answers: Mat::from_fn(rows, n, |i, j| factor * 1e-9 * transposed.get(j, i)),
+            answer_digits: 15,
+            energies: None,
+        };
+        raw.recoveries[0].operator = RecoveryOperator::Shapes { shapes, labels };
+        let diagnostics = FeModel::from_raw(raw).expect("a sound model").diagnostics;
+        diagnostics.iter().find(|one| one.code() == Code::RecoveryScale).map(|one| one.message().to_owned())
+    };
+    assert_eq!(said(1.0), None);
+    for factor in [1e6, 1e-3] {
+        assert!(said(factor).is_some_and(|text| text.contains("times those that the stiffness")), "{factor}");
     }
 }
 
