@@ -400,7 +400,7 @@ impl Body {
     }
 
     /// Compares another body (a Body, or the path of its file) with this one, like `flexbody compare`. With `common` only
-    /// the modes that both have are compared. The tolerances are relative; 1e-9 without, 1e-8 for `invariants`.
+    /// the modes and the groups of the kinetic energy that both have are compared. The tolerances are relative; 1e-9 without, 1e-8 for `invariants`.
     #[pyo3(signature = (other, *, common=false, frequency=None, mass=None, centre_of_mass=None, inertia=None, invariants=None))]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn compare(

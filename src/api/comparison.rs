@@ -18,13 +18,15 @@ impl FlexBody {
     /// Compares `other` with this body, like `flexbody compare`.
     ///
     /// # Errors
-    /// FB707 if dimensions or numbers of modes differ, or units of which only one body states its own.
+    /// FB707 if dimensions or numbers of modes differ, units of which only one body states its own, or reference conditions that
+    /// cannot be changed to mean axes.
     pub fn compare(&self, other: &FlexBody, tolerances: &Tolerances) -> Result<Comparison> {
         let inner = flexbody_report::compare(&self.0, &other.0, tolerances)?;
         Ok(Comparison { inner, reference: self.name().to_owned(), other: other.name().to_owned() })
     }
 
-    /// Compares the modes that `other` and this body have in common, like `flexbody compare --common`.
+    /// Compares the modes and the groups of the kinetic energy that `other` and this body have in common, like
+    /// `flexbody compare --common`.
     ///
     /// # Errors
     /// FB707 if units or dimensions differ, or if the bodies have no mode in common.

@@ -510,8 +510,8 @@ pub struct CompareArguments {
     /// Body to compare with the reference
     #[arg(value_name = "B.flex.h5")]
     pub b: PathBuf,
-    /// For bodies with different numbers of modes, compare the common modes: those of the body with fewer, each with
-    /// the closest of the other
+    /// Compare what the bodies have in common: the modes of the body with fewer, each with the closest of the other, and
+    /// the groups of the kinetic energy (W1, W2, W3) that both hold
     #[arg(long)]
     pub common: bool,
     /// Largest relative difference of a frequency

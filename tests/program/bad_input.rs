@@ -155,6 +155,8 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB453", "crates/input/src/fe_results/tests/punch.rs"),
     ("FB454", "tests/program/bodies/checked_against.rs"),
     ("FB456", "crates/body/tests/body/node_inertia.rs"),
+    ("FB458", "crates/model/tests/model/stress_components.rs"),
+    ("FB459", "crates/model/tests/model/stress_components.rs"),
     ("FB501", "crates/body/tests/body/single_precision.rs"),
     ("FB505", "crates/body/tests/body/single_precision.rs"),
     ("FB506", "tests/program/cluster.rs"),

@@ -16,6 +16,7 @@ mod exit_code;
 #[cfg(feature = "hdf5")]
 pub mod hdf5_file;
 pub mod memory;
+pub mod named_unit;
 pub mod numbers;
 pub mod output;
 pub mod provenance;

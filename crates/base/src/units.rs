@@ -23,24 +23,27 @@ impl Unit {
         if self.name.parse::<f64>().is_ok() { format!("[{} {si}]", self.name) } else { self.name.clone() }
     }
 
+    /// Returns the unit with a name of the table.
+    pub(crate) fn named(text: &str, table: &[(&str, f64)]) -> Option<Self> {
+        let (name, to_si) = table.iter().find(|(name, _)| *name == text)?;
+        Some(Self { name: (*name).to_owned(), to_si: *to_si })
+    }
+
     fn parse(text: &str, table: &[(&str, f64)]) -> Option<Self> {
-        let to_si = table
-            .iter()
-            .find(|(name, _)| *name == text)
-            .map(|(_, to_si)| *to_si)
-            .or_else(|| text.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0))?;
-        Some(Self { name: text.to_owned(), to_si })
+        let of_size = |to_si: f64| Self { name: text.to_owned(), to_si };
+        Self::named(text, table)
+            .or_else(|| text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0).map(of_size))
     }
 }
 
 /// SI prefixes by power of ten.
-const PREFIXES: [(i32, &str); 8] =
+pub(crate) const PREFIXES: [(i32, &str); 8] =
     [(-12, "p"), (-9, "n"), (-6, "\u{b5}"), (-3, "m"), (0, ""), (3, "k"), (6, "M"), (9, "G")];
 
-const LENGTH: &[(&str, f64)] =
+pub(crate) const LENGTH: &[(&str, f64)] =
     &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("km", 1e3), ("in", 0.0254), ("ft", 0.3048)];
 
-const MASS: &[(&str, f64)] = &[
+pub(crate) const MASS: &[(&str, f64)] = &[
     ("kg", 1.0),
     ("g", 1e-3),
     ("t", 1e3),
@@ -51,7 +54,7 @@ const MASS: &[(&str, f64)] = &[
     ("slinch", 4.448_221_615_260_5 / 0.0254),
 ];
 
-const TIME: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
+pub(crate) const TIME: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
 
 /// Units of a model. The units of force, stress and frequency follow from the three base units.
 #[derive(Debug, Clone, PartialEq)]

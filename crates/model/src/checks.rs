@@ -11,6 +11,7 @@ use super::recovery::check_rigid_responses;
 use super::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
 use super::rows::{centre_and_length, extents, rigid_residuals};
 use super::stress::check_stress;
+use super::stress_labels::note_stress_points;
 use super::uniform_strains::check_stresses;
 use super::wording::{in_words, name_some};
 use super::{Damping, DofLabel, FeModel, Followers, Nodes, RawModel, Rows};
@@ -111,6 +112,7 @@ pub(super) fn check_body(
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
     let density = plausibility.densities.map(|densities| densities.quartiles[1]);
     check_stresses(&model, density, allowed, &mut found);
+    note_stress_points(&model, &mut found);
     stop_on_error(&mut found)?;
     // Compute the fingerprints now, so that the files need not stay open.
     model.find_sources()?;

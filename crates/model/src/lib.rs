@@ -38,6 +38,7 @@ mod rows;
 mod separate_bodies;
 mod soft_rotations;
 mod stress;
+mod stress_labels;
 mod stress_loads;
 mod stress_points;
 mod surface;

@@ -12,7 +12,9 @@
 
 use super::node_pairs::neighbours;
 use super::rows::centre_and_length;
-use super::{AnsweredShapes, FeModel, ModelRecovery, Quantity, RecoveryOperator, StressPoint, pascals};
+use super::{
+    AnsweredShapes, DofLabel, FeModel, ModelRecovery, Quantity, RecoveryOperator, StressPoint, pascals,
+};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::numbers::significant;
@@ -59,13 +61,15 @@ pub(super) fn check_stresses(
         if !labels.iter().any(|row| row.quantity == Quantity::Stress) {
             continue;
         }
-        let points = StressPoint::among(labels);
+        let mut points = StressPoint::among(labels);
+        // A plane state does not resist the strains out of its plane.
+        points.retain(|point| !point.is_plane());
         let compared = match points.is_empty() {
             true => Err("no point has all six components".to_owned()),
             false if model.dimension() != 3 => Err("the model is plane".to_owned()),
             false => {
                 let strained = strained.get_or_insert_with(|| UniformStrains::new(model, density));
-                strained.rows(model, &one.operator).and_then(|rows| strained.compare(&points, &rows))
+                strained.outcome(model, &one.operator, &points)
             }
         };
         found.extend(finding(one, compared, allowed));
@@ -165,6 +169,27 @@ impl UniformStrains {
         }
     }
 
+    /// Compares the stresses of `points`, rows of an operator or answers to shapes.
+    ///
+    /// # Errors
+    /// The reason why they cannot be compared.
+    fn outcome(
+        &self,
+        model: &FeModel,
+        operator: &RecoveryOperator,
+        points: &[StressPoint],
+    ) -> Result<Agreement, String> {
+        let compared = self.rows(model, operator).and_then(|rows| self.compare(points, &rows));
+        // Answers to other shapes show their size.
+        match (compared, operator) {
+            (Err(why), RecoveryOperator::Shapes { shapes, .. }) => {
+                let factor = self.factor_of_shapes(model, shapes, points);
+                factor.filter(is_far).map(Agreement::Far).ok_or(why)
+            }
+            (compared, _) => compared,
+        }
+    }
+
     /// Returns the rows of a recovery under the six strains (rows x 6).
     ///
     /// # Errors
@@ -196,7 +221,8 @@ impl UniformStrains {
     /// # Errors
     /// The reason why some of them cannot be compared.
     fn compare(&self, points: &[StressPoint], values: &Mat<f64>) -> Result<Agreement, String> {
-        let of_point = |point: &StressPoint| Matrix6::from_fn(|k, l| values[(point.rows[k], l)]);
+        let of_point =
+            |point: &StressPoint| Matrix6::from_fn(|k, l| point.rows[k].map_or(0.0, |row| values[(row, l)]));
         let stresses: Vec<Matrix6<f64>> = points.iter().map(of_point).collect();
         // Where K is not that of one solid, isotropic points are compared with themselves.
         let of_body = self.compliance();
@@ -259,6 +285,44 @@ impl UniformStrains {
         (factor.is_finite() && factor > 0.0).then_some(factor)
     }
 
+    /// Returns the root mean square of the equivalent stresses of answered shapes relative to the expected one; `None` without
+    /// a volume, without stresses in a known unit, or for shapes that do not move all nodes.
+    ///
+    /// The mean of vm^2 / (3 G) over the volume is the part of 2 U / V of a shape with the strain energy U that changes no
+    /// volume. With G V from uniform shear, vm^2 = 6 U G V / V^2 for a shape of shear and less for others; stresses at nodes of
+    /// a bent part are larger by a small factor.
+    fn factor_of_shapes(
+        &self,
+        model: &FeModel,
+        shapes: &AnsweredShapes,
+        points: &[StressPoint],
+    ) -> Option<f64> {
+        let volume = self.volume?;
+        let rows = displacement_rows(model, shapes)?;
+        let (all, count) = (model.rows().len(), shapes.displacements.ncols());
+        if shapes.dofs.len() != all || all != 3 * model.nodes().len() {
+            return None;
+        }
+        let mut fields = Mat::zeros(all, count);
+        for (at, row) in rows {
+            (0..count).for_each(|c| fields[(row, c)] = shapes.displacements[(at, c)]);
+        }
+        let pascals = points.iter().map(|point| pascals(&point.unit)).collect::<Option<Vec<f64>>>()?;
+        let of_shear = (3..6).map(|k| self.energies[(k, k)]).sum::<f64>() / 3.0;
+        let forces = model.pencil().apply_stiffness(fields.as_ref());
+        let (mut sum, mut expected) = (0.0, 0.0);
+        for c in 0..count {
+            let twice_energy: f64 = (0..all).map(|i| fields[(i, c)] * forces[(i, c)]).sum();
+            expected += 3.0 * twice_energy * of_shear / volume.powi(2) * self.unit.powi(2);
+            let square = |(point, pascals): (&StressPoint, &f64)| {
+                (StressPoint::von_mises_of(&point.stress(|row| shapes.answers[(row, c)])) * pascals).powi(2)
+            };
+            sum += points.iter().zip(&pascals).map(square).sum::<f64>() / points.len() as f64;
+        }
+        let factor = (sum / expected).sqrt();
+        factor.is_finite().then_some(factor)
+    }
+
     /// Returns the reason why K is not that of a homogeneous solid.
     fn reason(&self) -> String {
         let sizes = self.energies.diagonal();
@@ -281,12 +345,7 @@ impl UniformStrains {
 fn answers(model: &FeModel, fields: &Mat<f64>, shapes: &AnsweredShapes) -> Option<Mat<f64>> {
     /// Largest difference of a shape from a strain, relative to the shape, by root mean squares.
     const MAX_DIFFERENCE: f64 = 1e-4;
-    let place: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, id)| (*id, i)).collect();
-    // Rows of displacements among those of the shapes, and of the model.
-    let mut rows = Vec::new();
-    for (at, dof) in shapes.dofs.iter().enumerate().filter(|(_, dof)| (1..=3).contains(&dof.direction)) {
-        rows.push((at, 3 * place.get(&dof.node)? + usize::from(dof.direction) - 1));
-    }
+    let rows = displacement_rows(model, shapes)?;
     let displacements =
         Mat::from_fn(rows.len(), shapes.displacements.ncols(), |i, c| shapes.displacements[(rows[i].0, c)]);
     let (centre, length) = centre_and_length(&model.nodes().positions);
@@ -314,6 +373,22 @@ fn answers(model: &FeModel, fields: &Mat<f64>, shapes: &AnsweredShapes) -> Optio
     };
     let all: Vec<Vec<f64>> = (0..COMPONENTS.len()).map(strain_of).collect::<Option<_>>()?;
     Some(Mat::from_fn(shapes.answers.nrows(), COMPONENTS.len(), |row, strain| all[strain][row]))
+}
+
+/// Returns the rows of displacements among those of the shapes, each with that of the model; `None` for a node that the
+/// model does not have.
+fn displacement_rows(model: &FeModel, shapes: &AnsweredShapes) -> Option<Vec<(usize, usize)>> {
+    let place: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, id)| (*id, i)).collect();
+    let displacements = shapes.dofs.iter().enumerate().filter(|(_, dof)| (1..=3).contains(&dof.direction));
+    let of_model = |(at, dof): (usize, &DofLabel)| {
+        Some((at, 3 * place.get(&dof.node)? + usize::from(dof.direction) - 1))
+    };
+    displacements.map(of_model).collect()
+}
+
+/// Returns true for a factor that no composite and no gauge in a stiff inclusion has.
+fn is_far(factor: &f64) -> bool {
+    !(1.0 / MAX_FACTOR_OF_ANY..=MAX_FACTOR_OF_ANY).contains(factor)
 }
 
 /// Returns the displacements of the six uniform strains (N x 6) with u = E_k x about the centre of the nodes: E_k has one at

@@ -1,7 +1,10 @@
 //! Comparison of two bodies that does not depend on the signs of modes, the basis inside repeated
 //! eigenvalues, the order of the nodes or the body frame.
 
+mod comparable;
 mod entries;
+mod groups;
+mod modal_rows;
 mod modes;
 mod named_loads;
 mod recoveries;
@@ -10,14 +13,19 @@ pub(super) use modes::by_shape;
 pub(super) use modes::signed_percent;
 pub use modes::{ModePair, Pairing};
 
+use comparable::{Comparable, in_own_frame, is_placed};
+use groups::OneSidedGroups;
+use modal_rows::ModalRows;
+
 use super::common_modes::{CommonModes, clusters};
 use super::comparison_report::{ComparisonFormat, ComparisonReport};
 use super::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
-use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::{Error, Result};
-use flexbody_body::flex_body::{FlexBody, Frame, ReferenceConditions, TermGroup};
+#[cfg(doc)]
+use flexbody_base::diagnostic::Code;
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{CauchySchwarz, Invariants, compare_invariants};
 use flexbody_linalg::larger;
 use nalgebra::{Matrix3, Vector3};
@@ -97,22 +105,31 @@ pub struct BodyComparison {
 /// interfaces are compared in both cases. [`BodyComparison::not_compared`] lists the entries of the file that
 /// are not compared.
 ///
+/// A group of the kinetic energy that one body has dropped is a difference of its own size; [`compare_common`] leaves it out.
+/// Bodies with different reference conditions are compared in mean axes.
+///
 /// The place of the body frame in the model is unknown for a body imported from another program. If one body
 /// is such an import, the two body frames are assumed to coincide.
 ///
 /// # Errors
-/// [`BodyIncomparable`](Code::BodyIncomparable) when dimensions or numbers of modes differ, or units of which only one
-/// body states its own; [`compare_common`] compares bodies with different numbers of modes.
+/// [`BodyIncomparable`](Code::BodyIncomparable) when dimensions or numbers of modes differ, units of which only one
+/// body states its own, or reference conditions that cannot be changed to mean axes; [`compare_common`] compares bodies with
+/// different numbers of modes.
 pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
-    let mut comparison = compared(a, b, tolerances)?;
+    let bodies = Comparable::of(a, b)?;
+    bodies.require_equal_numbers_of_modes()?;
+    let mut comparison = compared(&bodies, tolerances, OneSidedGroups::Differ)?;
     comparison.say_of_modes();
     Ok(comparison)
 }
 
 /// Returns the comparison of [`compare`] without the notes on modes.
-fn compared(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
-    comparable(a, b)?;
-    let b = &*in_units_of(a, b)?;
+fn compared(
+    bodies: &Comparable<'_>,
+    tolerances: &Tolerances,
+    one_sided: OneSidedGroups,
+) -> Result<BodyComparison> {
+    let (a, b) = (&*bodies.a, &*bodies.b);
     let placed = is_placed(a) && is_placed(b);
     let (in_own_a, in_own_b);
     // A body without a known place in the model is compared in its own frame.
@@ -130,7 +147,7 @@ fn compared(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyC
         paired: Pairing::Order,
         modes: Vec::new(),
         rows: Vec::new(),
-        notes: Vec::new(),
+        notes: bodies.notes.clone(),
         not_compared: Vec::new(),
     };
     // Quantities that need no common basis or node.
@@ -143,6 +160,7 @@ fn compared(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyC
     // Mode by mode with common nodes, otherwise by norms over clusters of modes.
     let order = common_nodes(&a.nodes().ids, &b.nodes().ids);
     comparison.not_compared = entries::not_compared(a, b, order.is_some());
+    comparison.not_compared.extend(bodies.left_out.iter().cloned());
     let common = match order {
         Some(order) => Some(comparison.mode_by_mode(&pair, &order, tolerances)),
         None => {
@@ -153,15 +171,15 @@ fn compared(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyC
     let (basis, assurance) = common.map(|common| (common.basis, common.assurance)).unzip();
     comparison.frequencies(a, b, assurance.as_ref(), tolerances.frequency);
     comparison.modal_matrices(&pair, basis.as_ref(), tolerances.invariants);
-    comparison.recoveries(&pair, tolerances.invariants);
-    comparison.named_loads(&pair, tolerances.invariants);
+    comparison.recoveries(&pair, basis.as_ref(), tolerances.invariants)?;
+    comparison.named_loads(&pair, basis.as_ref(), tolerances.invariants);
     comparison.interfaces(&pair, tolerances.centre_of_mass);
     // Notes on the limits of the comparison.
     if !placed {
         let note = "a body comes from a file of another program, which does not state the position of its frame in the model: the body frames are assumed to be the same";
         comparison.notes.push(note.to_owned());
     }
-    comparison.say_what_is_dropped(a, b);
+    comparison.groups(a, b, one_sided, tolerances.invariants);
     if a.storage() != b.storage() {
         comparison.notes.push("one of the bodies is rounded to 32-bit floats".to_owned());
     }
@@ -174,98 +192,35 @@ fn compared(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyC
     Ok(comparison)
 }
 
-/// Compares two bodies of which one may have fewer modes. Each mode of the smaller body is paired with a mode
+/// Compares what two bodies have in common: one may have fewer modes, and groups of the kinetic energy that one has dropped are
+/// left out. Each mode of the smaller body is paired with a mode
 /// of the larger one: with that of its shape, others in ascending order, so that the frequencies deviate least. The notes list the
-/// modes that were compared and the modes that were left out.
+/// modes that were compared, and the modes and groups that were left out.
 ///
 /// # Errors
-/// [`BodyIncomparable`](Code::BodyIncomparable) when units or dimensions differ, or when the bodies have no
-/// mode in common.
+/// [`BodyIncomparable`](Code::BodyIncomparable) when units or dimensions differ, when reference conditions cannot be changed to
+/// mean axes, or when the bodies have no mode in common.
 pub fn compare_common(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
+    let bodies = Comparable::of(a, b)?;
+    let (a, b) = (&*bodies.a, &*bodies.b);
     if a.n_modes() == b.n_modes() {
-        return compare(a, b, tolerances);
+        let mut comparison = compared(&bodies, tolerances, OneSidedGroups::LeftOut)?;
+        comparison.say_of_modes();
+        return Ok(comparison);
     }
-    let b = &*in_units_of(a, b)?;
     let common = CommonModes::of(a, b, assurance_of_all(a, b).as_ref())?;
     let some = |body: &FlexBody, modes: &[usize]| body.reduced(modes, body.groups(), Vec::new());
-    let mut comparison = compared(&some(a, &common.a)?, &some(b, &common.b)?, tolerances)?;
+    let reduced = Comparable {
+        a: Cow::Owned(some(a, &common.a)?),
+        b: Cow::Owned(some(b, &common.b)?),
+        notes: bodies.notes.clone(),
+        left_out: bodies.left_out.clone(),
+    };
+    let mut comparison = compared(&reduced, tolerances, OneSidedGroups::LeftOut)?;
     comparison.number_modes(&common.a, &common.b);
     comparison.say_of_modes();
     comparison.notes.splice(0..0, common.notes);
     Ok(comparison)
-}
-
-/// Returns true if the place of the body frame in the model is known.
-fn is_placed(body: &FlexBody) -> bool {
-    body.source().n_dofs > 0
-}
-
-/// Returns the body with its frame declared as the frame of the model.
-fn in_own_frame(body: &FlexBody) -> Result<FlexBody> {
-    let mut parts = body.parts().clone();
-    parts.frame = Frame { origin: Vector3::zeros(), axes: Matrix3::identity() };
-    FlexBody::new(parts)
-}
-
-fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
-    let mut problems = Vec::new();
-    let incomparable = |message: String| Diagnostic::new(Code::BodyIncomparable, message);
-    let (ua, ub) = (a.units(), b.units());
-    // Stated units can be converted; assumed ones may be wrong.
-    let are_stated = ua.stated && ub.stated;
-    for (what, x, y) in
-        [("length", &ua.length, &ub.length), ("mass", &ua.mass, &ub.mass), ("time", &ua.time, &ub.time)]
-    {
-        if x.to_si() != y.to_si() && !are_stated {
-            let message = format!(
-                "unit of {what} is `{}` in the first body and `{}` in the second, and only one body states its units",
-                x.name(),
-                y.name()
-            );
-            let help = "convert the model of the other body again, with its units stated";
-            problems.push(incomparable(message).with_help(help));
-        }
-    }
-    if !have_the_same_modes(a.conditions(), b.conditions()) {
-        let (a, b) = (a.conditions(), b.conditions());
-        let message = format!(
-            "the modes belong to different reference conditions: {a} in the first body, {b} in the second"
-        );
-        let help = "convert both with the same --frame";
-        problems.push(incomparable(message).with_help(help));
-    }
-    if a.dimension() != b.dimension() {
-        let (a, b) = (a.dimension(), b.dimension());
-        problems.push(incomparable(format!("the first body has dimension {a}, the second {b}")));
-    }
-    if a.n_modes() != b.n_modes() {
-        let message = format!("the first body has {} modes, the second {}", a.n_modes(), b.n_modes());
-        let help = "compare with --common, which uses the modes that both bodies have and names the others";
-        problems.push(incomparable(message).with_help(help));
-    }
-    if problems.is_empty() { Ok(()) } else { Err(Error::new(problems)) }
-}
-
-/// Returns `b` in the units of `a`, if both bodies state their units; else `b` as it is.
-fn in_units_of<'b>(a: &FlexBody, b: &'b FlexBody) -> Result<Cow<'b, FlexBody>> {
-    let (ua, ub) = (a.units(), b.units());
-    let pairs = [(&ua.length, &ub.length), (&ua.mass, &ub.mass), (&ua.time, &ub.time)];
-    let are_equal = pairs.iter().all(|(a, b)| a.to_si() == b.to_si());
-    if are_equal || !(ua.stated && ub.stated) {
-        return Ok(Cow::Borrowed(b));
-    }
-    b.in_units(ua).map(Cow::Owned)
-}
-
-/// Returns true if two reference conditions may be the same; a file of another program does not state its
-/// conditions.
-fn have_the_same_modes(a: &ReferenceConditions, b: &ReferenceConditions) -> bool {
-    use ReferenceConditions::{MeanAxes, Unstated};
-    match (a, b) {
-        (Unstated, MeanAxes) | (MeanAxes, Unstated) => false,
-        (Unstated, _) | (_, Unstated) => true,
-        _ => a == b,
-    }
 }
 
 /// Two bodies brought into one frame.
@@ -415,20 +370,6 @@ impl BodyComparison {
             tolerance,
             passed: difference <= tolerance,
         });
-    }
-
-    /// Lists each group of the kinetic energy that one body dropped as not compared; a dropped group is not
-    /// taken as zero.
-    fn say_what_is_dropped(&mut self, a: &FlexBody, b: &FlexBody) {
-        for group in TermGroup::ALL {
-            let whose = match (a.groups().has(group), b.groups().has(group)) {
-                (true, true) => continue,
-                (false, true) => "the first body",
-                (true, false) => "the second body",
-                (false, false) => "both bodies",
-            };
-            self.notes.push(format!("{} was dropped from {whose}: it is not compared", group.name()));
-        }
     }
 
     /// Compares mass, centre of mass and inertia about it.

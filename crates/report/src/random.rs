@@ -153,7 +153,7 @@ impl EnvelopeKind {
             Self::Vtu => {
                 let values = |one: &RandomRecovery| PointValues {
                     name: format!("{} von Mises RMS", one.name),
-                    nodes: one.points.iter().map(|point| one.rows[point.rows[0]].node).collect(),
+                    nodes: one.points.iter().map(|point| one.rows[point.first_row()].node).collect(),
                     values: one.von_mises.clone(),
                     is_smallest: false,
                     cases: Vec::new(),
@@ -196,7 +196,7 @@ fn random_csv(random: &RandomResponse) -> String {
         for (row, rms) in one.rows.iter().zip(&one.rms) {
             push(&one.name, "row", &row.name, Some(row), *rms);
         }
-        let of_point = |point: &StressPoint| &one.rows[point.rows[0]];
+        let of_point = |point: &StressPoint| &one.rows[point.first_row()];
         for (point, rms) in one.points.iter().zip(&one.von_mises) {
             push(&one.name, "von Mises", &point.name, Some(of_point(point)), *rms);
         }

@@ -143,6 +143,8 @@ causes! {
     RecoveryCorners = "The results list the corners of elements, and several elements share a node.";
     SectionAbout = "The moment of the forces across a section depends on the point that it is about. Without a stated point this is the origin of the model, which need not be near the section.";
     NodeInertia = "A moment of inertia at a node is larger than the sum of the other two, or negative. The mass is carried as it is, and the bounds that points of mass fulfil do not hold.";
+    RecoveryPlane = "Points of a recovery have the stresses xx, yy and xy, with or without zz, and none across the plane. Von Mises and principal stresses are those of a plane state.";
+    RecoveryNoEquivalent = "Several stresses of one place look like a tensor, but their components are not known, not complete, or not at the end of the names of the rows. The rows are used one by one, without an equivalent stress.";
     RecoveryContradicts = "Under uniform strain all points of a homogeneous solid have one stress, which K gives: s : E V = u'K u. The rows give another.";
     RecoveryUncompared = "Under uniform strain K is not that of a homogeneous solid, a point lacks components, or its stresses are along axes of elements.";
     InterfacesUncompared = "The matrices say nothing of interfaces: they are stated beside the model, and were left out or stated differently when the body was checked.";

@@ -7,8 +7,8 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{column_products, combine, gram, side_by_side, subtract_combination, symmetric_eigen};
-use flexbody_model::{AnsweredShapes, DofLabel, FeModel, ModelRecovery};
-use std::collections::HashMap;
+use flexbody_model::{AnsweredShapes, DofLabel, FeModel, ModelRecovery, RecoveryOperator};
+use std::collections::{BTreeSet, HashMap};
 
 /// Largest misfit of a mode or a static column. Shapes that were written for the body reach 1e-12; a shape that is
 /// missing gives 1e-2 to 1. A larger limit lets stresses of other modes pass.
@@ -279,14 +279,28 @@ impl Misfits {
             None => "; the results have no strain energies to compare with K",
         };
         let message = format!(
-            "recovery `{}`: {} rows from {} shapes; values have {} digits; largest misfit of a mode {}, of a static column {}{energies}",
+            "recovery `{}`: {} rows{} from {} shapes; values have {} digits; largest misfit of a mode {}, of a static column {}{energies}",
             recovery.name,
             shapes.answers.nrows(),
+            units_of(recovery),
             shapes.answers.ncols(),
             shapes.answer_digits,
             worst(0..self.modes),
             worst(self.modes..self.all.len())
         );
         Ok(Diagnostic::new(Code::RecoveryMapped, message).in_file(&recovery.path))
+    }
+}
+
+/// Returns the units of the rows of answered shapes, such as ` in MPa`; empty for rows without units. No file of answers states
+/// them.
+fn units_of(recovery: &ModelRecovery) -> String {
+    let RecoveryOperator::Shapes { labels, .. } = &recovery.operator else { return String::new() };
+    let units: BTreeSet<&str> =
+        labels.iter().map(|row| row.unit.as_str()).filter(|unit| !unit.is_empty()).collect();
+    if units.is_empty() {
+        String::new()
+    } else {
+        format!(" in {}", units.into_iter().collect::<Vec<_>>().join(", "))
     }
 }

@@ -9,8 +9,8 @@ use std::collections::HashMap;
 /// Stresses of the nodes of a file in the modes, along body axes.
 pub(crate) struct NodalStresses<'b> {
     recovery: &'b Recovery,
-    /// Rows of the six stresses of each node of the file; `None` for a node without stresses.
-    points: Vec<Option<[usize; 6]>>,
+    /// Rows of the stresses of each node of the file; `None` for a node without stresses.
+    points: Vec<Option<StressPoint>>,
     /// Axes of the body in the axes of the rows.
     axes: Matrix3<f64>,
 }
@@ -23,12 +23,12 @@ impl<'b> NodalStresses<'b> {
         body.recoveries().iter().find_map(|recovery| {
             let mut rows = HashMap::new();
             for point in StressPoint::among(&recovery.rows) {
-                let node = recovery.rows[point.rows[0]].node?;
-                if rows.insert(node, point.rows).is_some() {
+                let node = recovery.rows[point.first_row()].node?;
+                if rows.insert(node, point).is_some() {
                     return None;
                 }
             }
-            let points: Vec<_> = numbers.clone().map(|number| rows.get(&number).copied()).collect();
+            let points: Vec<_> = numbers.clone().map(|number| rows.get(&number).cloned()).collect();
             points.iter().any(Option::is_some).then_some(Self { recovery, points, axes })
         })
     }
@@ -50,8 +50,8 @@ impl<'b> NodalStresses<'b> {
     }
 
     fn along_body(&self, node: usize, value: impl Fn(usize) -> f64) -> [f64; 6] {
-        let Some(rows) = self.points[node] else { return [0.0; 6] };
-        let [xx, yy, zz, xy, yz, xz] = rows.map(value);
+        let Some(point) = &self.points[node] else { return [0.0; 6] };
+        let [xx, yy, zz, xy, yz, xz] = point.stress(value);
         let stress = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         let own = self.axes.transpose() * stress * self.axes;
         [own[(0, 0)], own[(1, 1)], own[(2, 2)], own[(0, 1)], own[(1, 2)], own[(0, 2)]]

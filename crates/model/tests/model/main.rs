@@ -4,5 +4,6 @@
 
 mod assembler;
 mod internal_rows;
+mod stress_components;
 mod stress_relations;
 mod uniform_strains;

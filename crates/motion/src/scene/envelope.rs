@@ -115,7 +115,7 @@ impl RecoveryEnvelope {
 
 impl PointPeaks {
     fn new(map: &RowMap, point: &StressPoint, own: &PointEnvelope) -> Self {
-        let row = &map.rows[point.rows[0]];
+        let row = &map.rows[point.first_row()];
         let peak = |sign: f64, peak: &Peak| CasePeak { value: sign * peak.value, time: peak.time, case: 0 };
         Self {
             name: point.name.clone(),

@@ -23,7 +23,7 @@ pub fn stresses_at_rigid_interfaces(body: &FlexBody, motion: &RecoveredMotion) -
     }
     let note = |(at, map): (usize, &RowMap)| {
         let extreme = motion.extremes.get(at)?.von_mises?;
-        let node_of = |point: usize| map.rows[map.points[point].rows[0]].node;
+        let node_of = |point: usize| map.rows[map.points[point].first_row()].node;
         let node = node_of(extreme.place)?;
         let (interface, _) = interfaces.get(&node).filter(|(_, is_rigid)| *is_rigid)?;
         let unit = &map.points[extreme.place].unit;

@@ -371,7 +371,7 @@ impl RecoveryMeasure {
 /// Returns the groups of rows and points of a recovery.
 fn groups_of(map: &RowMap) -> Vec<(Magnitude, Vec<usize>)> {
     let mut of_points = vec![false; map.rows.len()];
-    map.points.iter().flat_map(|point| point.rows).for_each(|row| of_points[row] = true);
+    map.points.iter().flat_map(|point| point.rows).flatten().for_each(|row| of_points[row] = true);
     let apart = |group: Vec<usize>| group.into_iter().filter(|row| !of_points[*row]).collect::<Vec<usize>>();
     let groups = RecoveryRow::by_unit(&map.rows).into_iter().map(apart).filter(|rows| !rows.is_empty());
     let points = (!map.points.is_empty()).then(|| (Magnitude::VonMises, (0..map.points.len()).collect()));
@@ -380,7 +380,7 @@ fn groups_of(map: &RowMap) -> Vec<(Magnitude, Vec<usize>)> {
 
 /// Returns a row of a place.
 fn first_row(map: &RowMap, magnitude: Magnitude, place: usize) -> usize {
-    if magnitude == Magnitude::Row { place } else { map.points[place].rows[0] }
+    if magnitude == Magnitude::Row { place } else { map.points[place].first_row() }
 }
 
 /// Returns the largest magnitude at any of `places`.

@@ -84,7 +84,7 @@ impl Magnitude {
             return Mat::from_fn(1, m, |_, c| rows.matrix[(place, c)]);
         }
         let [xx, yy, zz, xy, yz, xz] = rows.points[place].rows;
-        let row = |i: usize, c: usize| rows.matrix[(i, c)];
+        let row = |i: Option<usize>, c: usize| i.map_or(0.0, |i| rows.matrix[(i, c)]);
         let (difference, shear) = (0.5f64.sqrt(), 3.0f64.sqrt());
         match self {
             // The sum of squares is the square of the equivalent stress.

@@ -1,6 +1,6 @@
 //! Comparison of the named loads of two bodies.
 
-use super::{BodyComparison, Pair, relative, relative_difference};
+use super::{BodyComparison, ModalRows, Pair, relative, relative_difference};
 use faer::Mat;
 use flexbody_body::flex_body::{FlexBody, NamedLoad};
 use flexbody_linalg::larger;
@@ -9,8 +9,8 @@ use std::ops::Range;
 
 impl BodyComparison {
     /// Compares the named loads of the same names: kinds, modal loads by groups of modes, resultants and first moments about
-    /// the origin of the first body, and compliances.
-    pub(super) fn named_loads(&mut self, pair: &Pair<'_>, tolerance: f64) {
+    /// the origin of the first body, and compliances. `basis` transforms the modes of the second body to those of the first.
+    pub(super) fn named_loads(&mut self, pair: &Pair<'_>, basis: Option<&Mat<f64>>, tolerance: f64) {
         let has = |body: &FlexBody| !body.named_loads().is_empty();
         let neither = !has(pair.a) && !has(pair.b);
         if neither || self.leave_out(pair, "named loads", "/named_loads", has) {
@@ -31,7 +31,7 @@ impl BodyComparison {
                 differing += 1;
                 continue;
             };
-            in_modes = larger(in_modes, difference_in_modes(own, other, &pair.groups));
+            in_modes = larger(in_modes, difference_in_modes(own, other, basis, &pair.groups));
             resultants = larger(resultants, difference_of_resultants(own, other, pair.a.extent()));
         }
         for other in b.iter().filter(|other| a.iter().all(|own| own.name != other.name)) {
@@ -40,23 +40,25 @@ impl BodyComparison {
         }
         let meaning = "number of named loads that differ in name or kind";
         self.row("named loads", meaning, differing as f64, 0.0);
-        let meaning = "modal loads and torques by the modes, norm over a group of modes / largest norm";
+        let meaning = "modal loads and torques by the modes, over a group of modes / largest norm";
         self.row("loads on the modes", meaning, in_modes, tolerance);
         let meaning = "resultants, first moments and compliances / largest of the load";
         self.row("resultants", meaning, resultants, tolerance);
     }
 }
 
-/// Returns the largest difference of the norms of modal loads and of torques by the modes over a group of modes, relative to
-/// the largest norm of its kind. Norms are the same in every basis of a repeated eigenvalue.
-fn difference_in_modes(a: &NamedLoad, b: &NamedLoad, groups: &[Range<usize>]) -> f64 {
+/// Returns the largest difference of modal loads and of torques by the modes over a group of modes, relative to the largest norm
+/// of its kind.
+fn difference_in_modes(
+    a: &NamedLoad,
+    b: &NamedLoad,
+    basis: Option<&Mat<f64>>,
+    groups: &[Range<usize>],
+) -> f64 {
     let modal = |of: &NamedLoad| Mat::from_fn(1, of.modal.len(), |_, j| of.modal[j]);
     let worst = |a: &Mat<f64>, b: &Mat<f64>| {
-        let norm = |x: &Mat<f64>, k: usize, g: &Range<usize>| {
-            g.clone().map(|j| x[(k, j)].powi(2)).sum::<f64>().sqrt()
-        };
-        let pairs = (0..a.nrows()).flat_map(|k| groups.iter().map(move |g| (k, g)));
-        relative_difference(pairs.map(|(k, g)| (1.0, norm(a, k, g), norm(b, k, g))))
+        let rows: Vec<(usize, f64)> = (0..a.nrows()).map(|k| (k, 1.0)).collect();
+        ModalRows::new(a, b, basis).difference(&rows, groups)
     };
     larger(worst(&modal(a), &modal(b)), worst(&a.turning, &b.turning))
 }

@@ -61,15 +61,15 @@ impl Field {
     pub(crate) fn of_modes(body: &FlexBody, recovery: &Recovery, modes: usize) -> Result<Self, String> {
         let points = StressPoint::among(&recovery.rows);
         let places = Places::of(body);
-        let node_of = |point: &StressPoint| recovery.rows[point.rows[0]].node;
+        let node_of = |point: &StressPoint| recovery.rows[point.first_row()].node;
         places.refuse_undrawable(
-            points.iter().map(|point| (node_of(point), recovery.rows[point.rows[0]].element)),
+            points.iter().map(|point| (node_of(point), recovery.rows[point.first_row()].element)),
         )?;
         let set = |j: usize| {
             let size = body.largest_displacement(j);
             let size = if size > 0.0 { 1.0 / size } else { 0.0 };
             let stress = |point: &StressPoint| {
-                size * StressPoint::von_mises_of(&point.rows.map(|row| recovery.modes[(row, j)]))
+                size * StressPoint::von_mises_of(&point.stress(|row| recovery.modes[(row, j)]))
             };
             let (values, _) =
                 places.largest(body.n_nodes(), points.iter().map(|own| (node_of(own), stress(own))));

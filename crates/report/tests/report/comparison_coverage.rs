@@ -369,6 +369,15 @@ fn damping_and_stiffness_of_loads_that_differ_are_named() {
     assert_eq!(rows, ["stiffness of inertia"], "{text}");
 }
 
+/// The sign of a modal load relative to the mode is not that of the mode.
+#[test]
+fn named_loads_with_another_sign_differ() {
+    let (rows, text) = differing(|p| p.named_loads[0].modal[2] *= -1.0);
+    assert_eq!(rows, ["loads on the modes"], "{text}");
+    let (rows, text) = differing(|p| p.named_loads[0].turning[(1, 2)] *= -1.0);
+    assert_eq!(rows, ["loads on the modes"], "{text}");
+}
+
 /// A file of another program may lack interfaces, damping and other data; they are listed as not compared.
 #[test]
 fn what_a_file_of_another_program_has_none_of_is_listed() {
@@ -420,6 +429,10 @@ fn frames_signs_and_node_numbers_make_no_difference_to_what_is_beside_the_invari
         p.modes.modal_damping.iter_mut().for_each(square);
         p.geometric_stiffness.iter_mut().for_each(|one| square(&mut one.matrix));
         inertia(p).stiffness.iter_mut().for_each(|one| square(&mut one.matrix));
+        for load in &mut p.named_loads {
+            load.modal.iter_mut().enumerate().for_each(|(j, value)| *value *= sign(j));
+            columns(&mut load.turning);
+        }
         p.invariants = p.invariants.with_basis(t.as_ref());
     });
     for other in [&moved, &flipped] {

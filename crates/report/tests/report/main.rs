@@ -3,6 +3,7 @@
 #![allow(unreachable_pub)] // tests export nothing
 
 mod comparison_coverage;
+mod comparison_metamorphic;
 mod craig_bampton;
 mod damping;
 mod geometric_stiffness;

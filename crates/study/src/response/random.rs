@@ -135,12 +135,15 @@ impl Covariance {
     /// Returns the roots of the mean squares of the von Mises stress at `points` of the rows.
     fn von_mises(&self, rows: &Mat<f64>, points: &[StressPoint]) -> Vec<f64> {
         let of_point = |point: &StressPoint| {
-            let stresses = point.rows.map(|row| self.along(rows, row));
+            let count = self.factor.ncols();
+            let along =
+                |row: Option<usize>| row.map_or_else(|| vec![0.0; count], |row| self.along(rows, row));
+            let stresses = point.rows.map(along);
             let square = |j: usize| {
                 let values: [f64; 6] = std::array::from_fn(|k| stresses[k][j]);
                 StressPoint::von_mises_of(&values).powi(2)
             };
-            (0..self.factor.ncols()).map(square).sum::<f64>().sqrt()
+            (0..count).map(square).sum::<f64>().sqrt()
         };
         parallel::map(points, of_point)
     }
