@@ -129,7 +129,8 @@ impl DirectorMass {
         blocks.turn().then(|| Self::share(m, rows))
     }
 
-    /// Returns the share of [`DirectorMass::rest_share`] for any mass.
+    /// Returns the largest entry of the rest of the mass `m`, which may have no rotations, relative to
+    /// sqrt(M_ii M_jj); zero if it is rounding.
     pub(super) fn share(m: &SymmetricMatrix, rows: &Rows) -> f64 {
         let share = Blocks::new(m, rows).share();
         if share > ROUNDING_ENTRY { share } else { 0.0 }

@@ -69,9 +69,9 @@ struct Follower {
     displacement: [Sum; 3],
     /// Sums of the rotations; `None` for a point without rotations.
     rotation: Option<[Sum; 3]>,
-    /// r, from the centre to the point.
+    /// Arm r from the centre to the point.
     arm: Vector3<f64>,
-    /// u_c.
+    /// Sums of the displacement u_c of the centre.
     centre: [Sum; 3],
 }
 
@@ -404,5 +404,5 @@ fn arm(leaders: &BTreeMap<usize, Leader>, size: f64) -> Vector3<f64> {
     }
     let decomposition = normal.svd(true, true);
     let limit = SINGULAR * decomposition.singular_values.max();
-    decomposition.solve(&right, limit).map_or_else(|_| Vector3::zeros(), |arm| arm)
+    decomposition.solve(&right, limit).unwrap_or_else(|_| Vector3::zeros())
 }

@@ -269,9 +269,11 @@ impl Occupied {
         sorted
     }
 
-    /// Adds a note about nodes that are left out, except those whose rows a note already reports (`reported`).
+    /// Adds a note about nodes that are left out, except those whose rows a note already reports (`reported`) and points
+    /// with mass that follow other nodes.
     fn note_unused(&self, raw: &RawModel, reported: &[i64], found: &mut Vec<Diagnostic>) {
-        let reported: HashSet<i64> = reported.iter().copied().collect();
+        let following = raw.followers.iter().flat_map(|followers| &followers.points.ids);
+        let reported: HashSet<i64> = reported.iter().chain(following).copied().collect();
         let unused: Vec<i64> = self.unused.iter().copied().filter(|node| !reported.contains(node)).collect();
         if !unused.is_empty() {
             let message = format!(

@@ -82,7 +82,7 @@ impl SoftRotations {
         let released = Released::new(self, stiffness);
         // R = V'K Psi: moments that held the rotations; Z = (V'K V)^-1 R: rotations without the moments.
         let n = eigenvalues.len();
-        let moments: Vec<Vec<f64>> = (0..n).map(|j| released.moments(&contiguous(shapes.col(j)))).collect();
+        let moments: Vec<Vec<f64>> = (0..n).map(|j| released.moments(contiguous(shapes.col(j)))).collect();
         let turns: Vec<Vec<f64>> = moments.iter().map(|moments| released.turns(moments)).collect();
         // K of the shapes minus the energy that turning releases.
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();

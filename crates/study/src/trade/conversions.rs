@@ -126,12 +126,10 @@ const PART_OF_SHAPES: f64 = 0.9;
 const OF_THE_MODEL: &str = "bodies that were made from the model";
 
 /// Returns schemes that lump the whole mass of `model`. Empty if the mass is lumped already, or if rows without a
-/// position carry mass that belongs to no node.
+/// position or points that follow nodes carry mass that belongs to no node.
 fn lumpings(model: &FeModel) -> Vec<Lumping> {
-    match model.has_diagonal_mass() || model.rows().vectors() > 0 {
-        true => Vec::new(),
-        false => ConvertSettings::default().lumped,
-    }
+    let elsewhere = model.rows().vectors() > 0 || model.followers().is_some();
+    if model.has_diagonal_mass() || elsewhere { Vec::new() } else { ConvertSettings::default().lumped }
 }
 
 /// Settings of a body of the study.
