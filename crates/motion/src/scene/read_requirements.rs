@@ -135,7 +135,8 @@ impl Section<'_, '_> {
         let (attitude, deflection) = (attitude?, deflection?);
         let (stress, reaction, recovery) = (stress?, reaction?, default.recovery);
         let errors = PerQuantity { attitude, deflection, stress, reaction, recovery };
-        Some(Tolerance { errors, least_deflection: least_deflection? })
+        let states_stress = self.table.contains_key("stress");
+        Some(Tolerance { errors, least_deflection: least_deflection?, states_stress })
     }
 
     /// Reads the table `recovery`: a limit for each recovery, as a part of the largest value, as a text with a value and

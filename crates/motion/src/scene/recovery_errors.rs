@@ -159,7 +159,7 @@ impl RecoveryMeasure {
         let maps: Vec<&RowMap> = reference.maps.iter().collect();
         let states = Some(reference.states.sampled());
         let limits = &scene.requirements.recoveries;
-        Some(Self::of_maps(body, scene, limits.iter().zip(maps), states))
+        Some(Self::of_maps(body, limits.iter().zip(maps), states))
     }
 
     /// Creates the measure for the motion `recovered` of `body`, or for a motion of unknown size; `None` for a scene
@@ -179,17 +179,17 @@ impl RecoveryMeasure {
         let named =
             limits.iter().filter_map(|one| Some((one, own.iter().find(|map| map.name == one.recovery)?)));
         let states = recovered.map(|motion| motion.states.sampled());
-        Some(Self::of_maps(body, scene, named, states))
+        Some(Self::of_maps(body, named, states))
     }
 
     fn of_maps<'r>(
         body: &FlexBody,
-        scene: &Scene,
         limits: impl Iterator<Item = (&'r RecoveryTolerance, &'r RowMap)>,
         states: Option<SampledStates<'_>>,
     ) -> Self {
         let directions = states.and_then(Directions::new);
-        let resolution = Resolution::new(body, scene.requirements.tolerance.least_deflection);
+        // A limit of a stress holds however small the deflections are.
+        let rounding = Resolution::root_energy_of_rounding(body);
         let unit_energy: Vec<f64> =
             body.modes().eigenvalue.iter().map(|lambda| 1.0 / lambda.sqrt()).collect();
         let measured = |(limit, map): (&RecoveryTolerance, &'r RowMap)| {
@@ -216,7 +216,7 @@ impl RecoveryMeasure {
                 let unit = &map.rows[first_row(map, magnitude, places[0])].unit;
                 let limit = match &limit.limit {
                     RecoveryLimit::Relative(part) => {
-                        Limit::Relative { part: *part, least: reach * 2f64.sqrt() * resolution.root_energy }
+                        Limit::Relative { part: *part, least: reach * 2f64.sqrt() * rounding }
                     }
                     RecoveryLimit::Absolute { value, unit: of_value } => {
                         Limit::Absolute(value * factor(of_value, unit).unwrap_or(1.0))

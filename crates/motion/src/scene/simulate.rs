@@ -5,7 +5,9 @@ use super::framed_scene::{UNCOUPLED, is_uncoupled};
 use super::pace::Pace;
 use super::prepared::{PARTS, Prepared, damped};
 use super::recovered::SceneRows;
-use super::{Drift, Extremes, FramedScene, RecoveredMotion, Scene, Scheme, stresses_at_rigid_interfaces};
+use super::{
+    Drift, Extremes, FramedScene, RecoveredMotion, Scene, Scheme, Tolerance, stresses_at_rigid_interfaces,
+};
 use crate::dynamics::{Balance, BodyPoint, Configuration, Evaluation, Motion, Orientation, RotationVector};
 use crate::integration::{Failure, ObserverEvent, Work};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -384,15 +386,33 @@ impl Resolution {
     /// metre.
     const SMALLEST_DEFLECTION: f64 = 1e-5;
 
-    /// Creates the resolution for `body`; `least` is the smallest deflection, if given.
-    pub fn new(body: &FlexBody, least: Option<f64>) -> Self {
-        let deflection = least.unwrap_or(Self::SMALLEST_DEFLECTION * body.extent());
-        let modes = &body.modes().eigenvalue;
-        let root_energy =
-            |(j, lambda): (usize, &f64)| (0.5 * lambda).sqrt() * deflection / body.largest_displacement(j);
-        let root_energy = modes.iter().enumerate().map(root_energy).fold(f64::INFINITY, f64::min);
+    /// Part of the default below which a stress is rounding. A larger part hides stresses of stiff bodies, a smaller one compares
+    /// the rounding of motions that strain nothing.
+    const ROUNDING: f64 = 1e-6;
+
+    /// Creates the resolution for `body`. Stresses with a tolerance of their own count down to rounding, others as far as the
+    /// deflections.
+    pub fn new(body: &FlexBody, tolerance: &Tolerance) -> Self {
+        let deflection = tolerance.least_deflection.unwrap_or(Self::SMALLEST_DEFLECTION * body.extent());
+        let root_energy = if tolerance.states_stress {
+            Self::root_energy_of_rounding(body)
+        } else {
+            root_energy_at(body, deflection)
+        };
         Self { deflection, root_energy }
     }
+
+    /// Returns the root of the elastic energy below which stresses are rounding.
+    pub fn root_energy_of_rounding(body: &FlexBody) -> f64 {
+        root_energy_at(body, Self::ROUNDING * Self::SMALLEST_DEFLECTION * body.extent())
+    }
+}
+
+/// Returns the root of the elastic energy of the mode that needs least of it to deflect some node by `deflection`.
+fn root_energy_at(body: &FlexBody, deflection: f64) -> f64 {
+    let root_energy =
+        |(j, lambda): (usize, &f64)| (0.5 * lambda).sqrt() * deflection / body.largest_displacement(j);
+    body.modes().eigenvalue.iter().enumerate().map(root_energy).fold(f64::INFINITY, f64::min)
 }
 
 /// Path of a point of the body. The axes of the model turn with the body.

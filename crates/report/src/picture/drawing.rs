@@ -1,12 +1,12 @@
 //! Drawn parts of a body: its surface, with fewer triangles if it is large, or its nodes as points.
 
-use super::{Field, Packed, Placed};
+use super::{Field, InitialView, MarkedPlace, Packed, Placed};
 use crate::html::Plain;
 use crate::numbers::{counted, significant};
 use faer::MatRef;
 use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
 use maud::Render;
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -133,7 +133,7 @@ impl<'b> Drawing<'b> {
     }
 
     /// Returns the vertices of every triangle.
-    fn triangle_corners(&self) -> Vec<[u32; 3]> {
+    pub(super) fn triangle_corners(&self) -> Vec<[u32; 3]> {
         let triangles = self.mesh.iter().flat_map(SurfaceMesh::triangles);
         triangles.filter_map(|nodes| self.vertices_of(nodes)).collect()
     }
@@ -272,7 +272,8 @@ pub(crate) fn still(body: &FlexBody, field: Option<&Field>) -> Option<String> {
         return None;
     }
     let placed = Placed::of(body);
-    let view = Projection::onto_page(&drawing, &placed, body.dimension() == 2)?;
+    let marked = tones.as_ref().map(|tones| &tones.marked);
+    let view = Projection::onto_page(&drawing, &placed, body.dimension() == 2, marked)?;
     let content = match &tones {
         Some(_) => "coloured by stress, with its scale, the place of the largest value",
         None => "with its principal axes of inertia 1, 2 and 3 at the centre of mass",
@@ -287,6 +288,7 @@ pub(crate) fn still(body: &FlexBody, field: Option<&Field>) -> Option<String> {
         surface(&mut svg, &drawing, &view, tones.as_ref())
     }
     if let Some(tones) = &tones {
+        tones.mark(&mut svg, &drawing, &view);
         tones.legend(&mut svg, &view);
     } else {
         principal_axes(&mut svg, &placed, &view);
@@ -308,15 +310,14 @@ struct Projection {
 }
 
 impl Projection {
-    fn onto_page(drawing: &Drawing<'_>, placed: &Placed, plane: bool) -> Option<Self> {
-        let turned = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
-        let turn = if plane {
-            turned(Vector3::x_axis(), -0.35)
-        } else {
-            turned(Vector3::x_axis(), -1.12) * turned(Vector3::z_axis(), -0.6)
-        };
+    fn onto_page(
+        drawing: &Drawing<'_>,
+        placed: &Placed,
+        is_plane: bool,
+        marked: Option<&MarkedPlace>,
+    ) -> Option<Self> {
         let mut own = Self {
-            turn: turn.into_inner(),
+            turn: InitialView::of(drawing, is_plane, marked).turn(),
             centre: drawing.centre().into(),
             radius: drawing.radius(),
             scale: 1.0,
@@ -464,9 +465,10 @@ const SCALE_LENGTH: f64 = 130.0;
 struct Tones {
     /// Value of each vertex relative to the largest; `None` without a value.
     levels: Vec<Option<f64>>,
-    /// Largest value with its unit, and its undeformed place in model coordinates.
+    /// Largest value with its unit.
     largest: String,
-    place: [f64; 3],
+    /// Place of the largest value.
+    marked: MarkedPlace,
 }
 
 impl Tones {
@@ -478,7 +480,7 @@ impl Tones {
         Some(Self {
             levels: drawing.nodes().iter().map(of_node).collect(),
             largest: format!("{} {unit}", significant(largest, 4)),
-            place: body.frame().to_model(body.nodes().positions[node]),
+            marked: field.marked(body, drawing)?,
         })
     }
 
@@ -492,10 +494,20 @@ impl Tones {
         Some(tone((a? + b? + c?) / 3.0))
     }
 
-    /// Draws the scale of the colours, and marks the largest value.
+    /// Marks the largest value by a ring, which is dashed and labelled where the surface hides its place.
+    fn mark(&self, svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
+        let [x, y] = view.at(&view.turned(&self.marked.position));
+        let is_hidden = self.marked.is_hidden(drawing, &view.turn);
+        let class = if is_hidden { "largest behind" } else { "largest" };
+        let _ = writeln!(svg, "<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"6\"/>");
+        if is_hidden {
+            let (x, y) = (x + 10.0, y + 4.0);
+            let _ = writeln!(svg, "<text class=\"model\" x=\"{x:.1}\" y=\"{y:.1}\">behind</text>");
+        }
+    }
+
+    /// Draws the scale of the colours.
     fn legend(&self, svg: &mut String, view: &Projection) {
-        let [x, y] = view.at(&view.turned(&self.place));
-        let _ = writeln!(svg, "<circle class=\"largest\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"6\"/>");
         let (from, top) = (WIDTH - SCALE_LENGTH - MARGIN, view.height - MARGIN);
         let width = SCALE_LENGTH / (TONES + 1.0);
         for k in 0..=(TONES as u8) {

@@ -1,7 +1,7 @@
 //! Values at the nodes of a body that colour its picture: equivalent stresses of its modes, or the largest ones of a
 //! motion.
 
-use super::Drawing;
+use super::{Drawing, MarkedPlace};
 use crate::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, Recovery};
 use flexbody_motion::scene::{CasePeak, Envelope, RecoveryEnvelope, StressPoint};
@@ -138,6 +138,13 @@ impl Field {
     pub(super) fn single(&self) -> Option<(&[f64], &str, usize)> {
         let set = self.sets.first().filter(|_| !self.is_per_mode)?;
         Some((&set.values, &self.unit, set.node))
+    }
+
+    /// Returns the place of the largest value of the first set; `None` without values.
+    pub(super) fn marked(&self, body: &FlexBody, drawing: &Drawing<'_>) -> Option<MarkedPlace> {
+        let set = self.sets.first().filter(|set| !set.words.is_empty())?;
+        let position = body.frame().to_model(body.nodes().positions[set.node]);
+        Some(MarkedPlace { position, vertex: drawing.vertex(set.node) })
     }
 
     /// Returns the texts and numbers of the page.

@@ -3,6 +3,7 @@
 
 mod drawing;
 mod field;
+mod initial_view;
 
 use crate::facts::UnitFacts;
 use crate::html::Plain;
@@ -20,6 +21,7 @@ pub(super) use drawing::Drawing;
 #[cfg(feature = "hdf5")]
 pub(super) use drawing::HALF_STEP;
 pub(super) use field::{Field, Fields};
+use initial_view::{InitialView, MarkedPlace};
 
 // Picture of a body in a report: an interactive drawing of its modes if scripts run, otherwise (and on
 // paper) a still picture.
@@ -126,8 +128,8 @@ pub(super) struct ShownBody<'a, M> {
     generator: String,
     units: UnitFacts,
     terms: Vec<(&'static str, String)>,
-    /// True for a body of two dimensions; its initial view is from above.
-    plane: bool,
+    /// Rotations about x and about z of the initial view, which shows the place of the largest value. Unit: rad.
+    view: [f64; 2],
     vertices: usize,
     centre: [f64; 3],
     half: f64,
@@ -175,12 +177,14 @@ impl<'a, M: Serialize> ShownBody<'a, M> {
         starts_with_field: bool,
     ) -> Self {
         let placed = Placed::of(body);
+        let first = fields.first().filter(|_| starts_with_field);
+        let marked = first.and_then(|field| field.marked(body, drawing));
         Self {
             name: plain(&body.source().name),
             generator: provenance::generator(),
             units: UnitFacts::new(body.units()),
             terms,
-            plane: body.dimension() == 2,
+            view: InitialView::of(drawing, body.dimension() == 2, marked.as_ref()).angles,
             vertices: drawing.vertices(),
             centre: drawing.centre(),
             half: drawing.half(),

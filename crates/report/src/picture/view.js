@@ -58,7 +58,7 @@ const ofEuler = ([w, x, y, z]) => [
 const IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1];
 
 // What is shown, and from where.
-const START = () => ({ view: facts.plane ? turn(0, -0.35) : product(turn(0, -1.12), turn(2, -0.6)), zoom: Number(canvas.dataset.zoom || 1), pan: [0, 0] });
+const START = () => ({ view: product(turn(0, facts.view[0]), turn(2, facts.view[1])), zoom: Number(canvas.dataset.zoom || 1), pan: [0, 0] });
 const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
 const state = { ...START(), mode: 0, phase: 0.25, time: 0, playing: !still, factor: 1, speed: 1, last: 0 };
 
@@ -236,6 +236,31 @@ function label(text, place, tone) {
   own.element.style.transform = `translate(${(place[0] + 1) / 2 * canvas.clientWidth + 6}px, ${(1 - place[1]) / 2 * canvas.clientHeight - 9}px)`;
 }
 
+/// Ring of a mark that the body hides, over the canvas.
+const ring = document.createElement("span");
+ring.hidden = true;
+ring.dataset.behind = "";
+Object.assign(ring.style, { boxSizing: "border-box", width: "16px", height: "16px", border: "2px dashed #d9403a", borderRadius: "50%" });
+byId("labels").appendChild(ring);
+/// True if a triangle is in front of a point of the undeformed body with this displacement, seen along the third axis of `view`.
+/// Triangles at the vertex of the point do not hide it; those of a thinned surface may pass in front of a point without one.
+function isHidden(point, vertex, view, amplitude) {
+  const [x, y, z] = times(view, point), front = z + (vertex === null ? 0.02 : 1e-3) * facts.radius;
+  const at = (i, k) => half * STEP * positions[3 * i + k] + amplitude * displacement[3 * i + k];
+  const seen = (i, row) => view[row] * at(i, 0) + view[3 + row] * at(i, 1) + view[6 + row] * at(i, 2);
+  for (let t = 0; t < triangles.length; t += 3) {
+    const a = triangles[t], b = triangles[t + 1], c = triangles[t + 2];
+    if (a === vertex || b === vertex || c === vertex) continue;
+    const ax = seen(a, 0), bx = seen(b, 0), cx = seen(c, 0);
+    if (Math.min(ax, bx, cx) > x || Math.max(ax, bx, cx) < x) continue;
+    const ay = seen(a, 1), by = seen(b, 1), cy = seen(c, 1);
+    const whole = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
+    const u = ((cx - bx) * (y - by) - (cy - by) * (x - bx)) / whole, v = ((ax - cx) * (y - cy) - (ay - cy) * (x - cx)) / whole, w = 1 - u - v;
+    if (u >= 0 && v >= 0 && w >= 0 && u * seen(a, 2) + v * seen(b, 2) + w * seen(c, 2) > front) return true;
+  }
+  return false;
+}
+
 function draw() {
   const ratio = Math.min(devicePixelRatio || 1, 2), width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
   if (!width || !height) return;
@@ -343,9 +368,18 @@ function draw() {
     const { place, vertex, largest } = setOf(toned), at = vertex === null ? 0 : 3 * vertex;
     const moved = vertex === null ? [0, 0, 0] : Array.from(displacement.subarray(at, at + 3));
     const marked = sum(sum(place, facts.centre, -1), moved, amplitude);
-    segments([marked], { points: true, dot: 13, plain: [0.85, 0.25, 0.22, 1] });
-    segments([marked], { points: true, dot: 7, plain: [1, 1, 1, 1] });
-    label(toned.isPerMode ? short(largest) : `${short(largest)} ${toned.unit}`, seen(marked), AXES[0]);
+    const behind = isHidden(marked, vertex, product(state.view, model), amplitude), [x, y] = seen(marked);
+    if (!behind) {
+      segments([marked], { points: true, dot: 13, plain: [0.85, 0.25, 0.22, 1] });
+      segments([marked], { points: true, dot: 7, plain: [1, 1, 1, 1] });
+    }
+    ring.hidden = !behind;
+    ring.style.transform = `translate(${(x + 1) / 2 * canvas.clientWidth - 8}px, ${(1 - y) / 2 * canvas.clientHeight - 8}px)`;
+    label(`${short(largest)}${toned.isPerMode ? "" : ` ${toned.unit}`}${behind ? ", behind" : ""}`, [x, y], AXES[0]);
+    document.documentElement.dataset.mark = behind ? "behind" : "visible";
+  } else {
+    ring.hidden = true;
+    delete document.documentElement.dataset.mark;
   }
   if (isChecked("axes")) {
     const centre = sum(facts.centreOfMass, facts.centre, -1);

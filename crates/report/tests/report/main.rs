@@ -6,6 +6,7 @@ mod comparison_coverage;
 mod comparison_metamorphic;
 mod craig_bampton;
 mod damping;
+mod first_view;
 mod geometric_stiffness;
 mod histories;
 mod import_body;
