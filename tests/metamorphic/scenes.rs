@@ -51,7 +51,7 @@ pub fn subject(seed: u64) -> Result<Subject> {
     let kind = pick(random, KINDS.len());
     let raw = bodies::body(kind, random);
     let scene = nothing_happens("crossing", 1.0, TOLERANCE);
-    let frames = frames();
+    let frames = frames(&raw);
     let frame = frames[pick(random, frames.len())].clone();
     let subject = Subject {
         kind: KINDS[kind],

@@ -22,10 +22,12 @@ pub enum Basis {
     Fixed,
 }
 
-/// Returns all frames of a conversion: those of the body, and at its interfaces.
-pub fn frames() -> Vec<FrameChoice> {
-    let at = |name: &str| FrameChoice::Interface(name.to_owned());
-    BodyFrame::ALL.into_iter().map(FrameChoice::Mean).chain([at("root"), at("tip")]).collect()
+/// Returns the frames of a conversion of a model: those of the body, and at its interfaces. The geometric stiffness of a body in
+/// the latter does not hold in mean axes (FB214).
+pub fn frames(raw: &RawModel) -> Vec<FrameChoice> {
+    let at = |name: &&str| FrameChoice::Interface((*name).to_owned());
+    let interfaces = if raw.geometric_stiffness.is_empty() { &["root", "tip"][..] } else { &[] };
+    BodyFrame::ALL.into_iter().map(FrameChoice::Mean).chain(interfaces.iter().map(at)).collect()
 }
 
 /// A model, its conversion, and the load cases of the body.

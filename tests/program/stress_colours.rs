@@ -274,7 +274,7 @@ fn stresses_that_cannot_be_drawn_are_refused_with_the_reason() {
     done(folder.path(), "simulate body.flex.h5 --scene spin.toml --envelope env.csv -o run.h5");
     let table = fs::read_to_string(folder.path().join("env.csv")).expect("a table");
     let without_skin: Vec<&str> = table.lines().filter(|line| !line.starts_with("skin,")).collect();
-    fs::write(folder.path().join("inside.csv"), without_skin.join("\n")).expect("written");
+    fs::write(folder.path().join("inside.csv"), without_skin.join("\n") + "\n").expect("written");
     let foreign = table.replace(",kPa,", ",MPa,").replacen(",MPa,", ",kPa,", 1);
     fs::write(folder.path().join("units.csv"), foreign).expect("written");
     let numbers = "recovery,point,node,unit,von_mises\nskin,p,1,kPa,-2\n";

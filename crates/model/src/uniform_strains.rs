@@ -111,6 +111,11 @@ fn finding(
     Some(diagnostic.in_file(&recovery.path))
 }
 
+/// Returns a ratio in two digits, beyond a hundred in one: `0.5`, `1e6`.
+fn in_digits(ratio: f64) -> String {
+    if (0.01..100.0).contains(&ratio) { significant(ratio, 2) } else { short(ratio) }
+}
+
 /// Returns a ratio in one digit: `1e-6`, `0.004`, `300`.
 fn short(ratio: f64) -> String {
     if (1e-3..1e4).contains(&ratio) {
@@ -249,7 +254,7 @@ impl UniformStrains {
             [relations.iter().filter(|one| one.is_none()).count(), found(Kind::Turned).len()];
         match (factor, of_body) {
             (Some(factor), Some(_)) => {
-                let facts = format!("they are {} times those of the stiffness", significant(factor, 2));
+                let facts = format!("they are {} times those of the stiffness", in_digits(factor));
                 Ok(Agreement::Contradiction(facts))
             }
             (Some(factor), None) => Ok(Agreement::Far(factor)),

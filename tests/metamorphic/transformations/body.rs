@@ -9,7 +9,7 @@ use oracle::random::Random;
 
 /// Converts with another frame.
 pub fn frame(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
-    let mut others = frames();
+    let mut others = frames(&subject.raw);
     others.retain(|frame| *frame != subject.frame);
     let frame = others[crate::draws::pick(random, others.len())].clone();
     Ok(Some(Pair::new(subject, Subject { frame, ..subject.clone() }, Correspondence::default())))

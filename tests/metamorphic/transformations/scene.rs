@@ -7,6 +7,7 @@ use crate::draws::{between, pick};
 use crate::scenes::scaled;
 use crate::subject::Subject;
 use flexbody_base::error::Result;
+use flexbody_body::invariants::FrameChoice;
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{
@@ -149,7 +150,11 @@ pub fn restart(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
         .carried
         .as_ref()
         .is_some_and(|carried| matches!(carried.translation, Some(Drive::Acceleration(_))));
-    let (Some(duration), false) = (scene.run.duration, by_acceleration) else { return Ok(None) };
+    // Without a carrier a body whose frame is on an interface is simulated in mean axes, in which it has other modes.
+    let has_other_modes = scene.carried.is_none() && matches!(subject.frame, FrameChoice::Interface(_));
+    let (Some(duration), false) = (scene.run.duration, by_acceleration || has_other_modes) else {
+        return Ok(None);
+    };
     let skipped = 1 + pick(random, scene.run.outputs / 2);
     let body = subject.body()?;
     let (recording, _) = simulate(&body, scene, &Context::QUIET)?;

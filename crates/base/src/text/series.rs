@@ -408,7 +408,7 @@ mod tests {
             ("t [s];x;F\ns;m;N\n0;9;1.5\n0.5;9;-20;\n", "t [s]", "F"),
             ("0 9 1.5\n0.5 9 -2.0D+01\n", "1", "3"),
             ("# t, x, F\n0, 9, 1.5\n# between\n\n0.5, 9, -20\n", "t", "F"),
-            ("#t x F\n0 9 1.5\n0.5 9 -20", "t", "F"),
+            ("#t x F\n0 9 1.5\n0.5 9 -20\n", "t", "F"),
             ("my time\tthe x\tF\n0\t9\t1.5\n0.5\t9\t-20\n", "my time", "F"),
             ("t,name,F\n0,ab,1.5\n0.5,\"c,d\",-20\n", "t", "F"),
         ] {
@@ -433,6 +433,13 @@ mod tests {
             ("t,F\n0,1\n1,NaN\n", "t", "F", 3, "`NaN` in column `F` is not a finite number"),
             ("t,F\n0,1\n1,-inf\n", "t", "F", 3, "`-inf` in column `F` is not a finite number"),
             ("t,F\n0,1\n1,\n", "t", "F", 3, "row has 1 field, the first line has 2"),
+            (
+                "#t x F\n0 9 1.5\n0.5 9 -20",
+                "t",
+                "F",
+                3,
+                "the file may end within its last number: unlike the others, the last line has no line end",
+            ),
             ("t,F\n0,1\n1,2\n1,3\n", "t", "F", 4, "time 1 does not increase: line 3 has 1"),
         ] {
             let found = read(text, time, &[value]).expect_err(text);

@@ -2,14 +2,11 @@
 
 use crate::recovery::{body, bracket, mesh};
 use faer::{Mat, Scale};
-use flexbody_base::diagnostic::Code;
-use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{BasisChoice, CraigBampton, FreeSurface, Loads};
 use flexbody_body::flex_body::{FlexBody, Parts};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_body::verification::verify;
-use flexbody_linalg::CscMatrix;
-use flexbody_model::{Coupling, FeModel, ModelLoad, RecoveryOperator};
+use flexbody_model::{Coupling, FeModel, ModelLoad};
 
 /// Rows under constant unit loads belong to the model: they are the same for any modes, basis and frame.
 #[test]

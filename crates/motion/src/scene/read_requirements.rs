@@ -135,8 +135,7 @@ impl Section<'_, '_> {
         let (attitude, deflection) = (attitude?, deflection?);
         let (stress, reaction, recovery) = (stress?, reaction?, default.recovery);
         let errors = PerQuantity { attitude, deflection, stress, reaction, recovery };
-        let states_stress = self.table.contains_key("stress");
-        Some(Tolerance { errors, least_deflection: least_deflection?, states_stress })
+        Some(Tolerance { errors, least_deflection: least_deflection? })
     }
 
     /// Reads the table `recovery`: a limit for each recovery, as a part of the largest value, as a text with a value and

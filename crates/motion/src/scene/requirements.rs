@@ -172,9 +172,6 @@ pub struct Tolerance {
     /// Smallest deflection that is compared ([`Resolution`](super::Resolution)); `None`: 1e-5 of the extent
     /// of the body.
     pub least_deflection: Option<f64>,
-    /// True if the scene states the tolerance of the stress: stresses then count however small the deflections are.
-    #[serde(skip)]
-    pub states_stress: bool,
 }
 
 impl Default for Tolerance {
@@ -182,7 +179,7 @@ impl Default for Tolerance {
     /// material data and damping. Recoveries have none.
     fn default() -> Self {
         let errors = PerQuantity { attitude: 1e-3, recovery: f64::INFINITY, ..PerQuantity::all(0.01) };
-        Self { errors, least_deflection: None, states_stress: false }
+        Self { errors, least_deflection: None }
     }
 }
 
@@ -235,7 +232,7 @@ pub struct PerQuantity<T> {
     pub deflection: T,
     /// Stress, estimated without stress recovery. The error is sqrt(V(u - u_ref) / max V(u_ref)), where V
     /// is the elastic energy of a deformation; the smallest energy that is compared replaces a smaller
-    /// maximum. If the scene states a tolerance of the stress, that energy is rounding.
+    /// maximum.
     pub stress: T,
     /// Force F and torque T of the prescribed motion. The error is relative to the largest force or torque,
     /// or to one thousandth of w^2 m r or w^2 I, with the radius of gyration r and I = m r^2, or to one

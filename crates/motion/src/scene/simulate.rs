@@ -5,9 +5,7 @@ use super::framed_scene::{UNCOUPLED, is_uncoupled};
 use super::pace::Pace;
 use super::prepared::{PARTS, Prepared, damped};
 use super::recovered::SceneRows;
-use super::{
-    Drift, Extremes, FramedScene, RecoveredMotion, Scene, Scheme, Tolerance, stresses_at_rigid_interfaces,
-};
+use super::{Drift, Extremes, FramedScene, RecoveredMotion, Scene, Scheme, stresses_at_rigid_interfaces};
 use crate::dynamics::{Balance, BodyPoint, Configuration, Evaluation, Motion, Orientation, RotationVector};
 use crate::integration::{Failure, ObserverEvent, Work};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -390,19 +388,13 @@ impl Resolution {
     /// the rounding of motions that strain nothing.
     const ROUNDING: f64 = 1e-6;
 
-    /// Creates the resolution for `body`. Stresses with a tolerance of their own count down to rounding, others as far as the
-    /// deflections.
-    pub fn new(body: &FlexBody, tolerance: &Tolerance) -> Self {
-        let deflection = tolerance.least_deflection.unwrap_or(Self::SMALLEST_DEFLECTION * body.extent());
-        let root_energy = if tolerance.states_stress {
-            Self::root_energy_of_rounding(body)
-        } else {
-            root_energy_at(body, deflection)
-        };
-        Self { deflection, root_energy }
+    /// Creates the resolution for `body`; `least` is the smallest deflection, if given.
+    pub fn new(body: &FlexBody, least: Option<f64>) -> Self {
+        let deflection = least.unwrap_or(Self::SMALLEST_DEFLECTION * body.extent());
+        Self { deflection, root_energy: root_energy_at(body, deflection) }
     }
 
-    /// Returns the root of the elastic energy below which stresses are rounding.
+    /// Returns the root of the elastic energy below which the stresses of a recovery with a limit are rounding.
     pub fn root_energy_of_rounding(body: &FlexBody) -> f64 {
         root_energy_at(body, Self::ROUNDING * Self::SMALLEST_DEFLECTION * body.extent())
     }

@@ -242,7 +242,7 @@ impl<'r> Tracer<'r> {
             extremes: Extremes::default(),
             work: Work::default(),
             size: (0.0, 0.0),
-            resolution: Resolution::new(run.body, &scene.requirements.tolerance),
+            resolution: Resolution::new(run.body, scene.requirements.tolerance.least_deflection),
         };
         Ok(Self { run, trace, sampler })
     }

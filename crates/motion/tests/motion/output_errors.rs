@@ -169,8 +169,7 @@ fn what_is_too_small_to_count_is_measured_against_the_least_that_counts() {
     let other = changed(&recording, |_, q| q[0] += 1e-20);
     let errors = Measure::new(&body, &scene(30.0), &recording).of_subset(&other, &[0, 1, 2, 3]).largest();
     // The extent of a body is measured along the axes of the model.
-    let least =
-        Resolution::new(&FramedScene::new(&body, &at_rest).expect("a stage").body, &Tolerance::default());
+    let least = Resolution::new(&FramedScene::new(&body, &at_rest).expect("a stage").body, None);
     let lambda = body.modes().eigenvalue[0];
     let expected = (0.5 * lambda).sqrt() * 1e-20 / least.root_energy;
     assert!((errors.stress.expect("modes") / expected - 1.0).abs() < 1e-12);

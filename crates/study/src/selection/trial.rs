@@ -279,7 +279,7 @@ impl TrialRuns<'_> {
         error: &ErrorBound,
         torque: f64,
     ) -> OutputErrors {
-        let least = Resolution::new(self.body, &self.scene.requirements.tolerance);
+        let least = Resolution::new(self.body, self.scene.requirements.tolerance.least_deflection);
         let relative = |error: f64, size: &dyn Fn(&Recording) -> f64, least: f64| {
             error / (run.map_or(0.0, size) - error).max(least)
         };

@@ -265,7 +265,8 @@ fn damping_in_proportion_to_the_stiffness_is_in_the_static_columns() {
     let lag = 0.1 * damped.part_of_static_columns(&damped.recoveries()[0]);
     assert!(own < 0.1 * lag && solved < 1e-8, "{own:e} of {lag:e}, {solved:e}");
     // Over time, after the start has died away: the rows swing with the amplitude and the phase of the response.
-    let amplitude = 1e-4;
+    // A small force, which hardly turns the free body.
+    let amplitude = 1e-8;
     let mut scene = nothing_happens("swinging", 6.0 / hertz, 1e-9);
     scene.run.outputs = 240;
     scene.loads = vec![Load::named("push", History::Sine { amplitude, frequency: hertz, phase: 0.0 })];

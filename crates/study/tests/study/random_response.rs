@@ -240,7 +240,9 @@ fn summed(
             *value += weight * spectrum[(r, r)].re;
         }
         for (point, value) in points.iter().zip(&mut of_points) {
-            let s = |a: usize, b: usize| spectrum[(point.rows[a], point.rows[b])].re;
+            let s = |a: usize, b: usize| {
+                spectrum[(point.rows[a].expect("a solid"), point.rows[b].expect("a solid"))].re
+            };
             let normal = s(0, 0) + s(1, 1) + s(2, 2) - s(0, 1) - s(1, 2) - s(2, 0);
             *value += weight * (normal + 3.0 * (s(3, 3) + s(4, 4) + s(5, 5)));
         }
