@@ -31,7 +31,7 @@ pub(super) fn labels_of(row: &RecoveryRow) -> Option<StressLabel<'_>> {
     // The words of `p sigma_xx` and `p tau_xy` differ, their point is one.
     let last = before.rfind(SEPARATORS).map_or(0, |at| at + 1);
     let is_word = |word: &&str| word.len() > 1 && before[last..].eq_ignore_ascii_case(word);
-    let name = if STRESS_WORDS.iter().any(|word| is_word(&word)) {
+    let name = if STRESS_WORDS.iter().any(is_word) {
         before[..last].trim_end_matches(SEPARATORS)
     } else {
         before
@@ -112,6 +112,9 @@ fn note_of_plane_states(recovery: &ModelRecovery, points: &[StressPoint]) -> Opt
     Some(Diagnostic::new(Code::RecoveryPlane, message).in_file(&recovery.path))
 }
 
+/// Node, element and the common part of the names of rows.
+type Place<'r> = (Option<i64>, Option<i64>, &'r str);
+
 fn note_of_tensors(
     recovery: &ModelRecovery,
     labels: &[RecoveryRow],
@@ -120,7 +123,7 @@ fn note_of_tensors(
     let mut is_of_point = vec![false; labels.len()];
     points.iter().flat_map(|point| point.rows).flatten().for_each(|row| is_of_point[row] = true);
     // Components at each place: at a node and element, or of rows whose names are equal before the component.
-    let mut places: BTreeMap<(Option<i64>, Option<i64>, &str), BTreeSet<&str>> = BTreeMap::new();
+    let mut places: BTreeMap<Place<'_>, BTreeSet<&str>> = BTreeMap::new();
     for (row, _) in labels
         .iter()
         .zip(&is_of_point)

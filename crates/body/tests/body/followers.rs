@@ -233,7 +233,7 @@ fn assert_turned(carrier: &Carrier, body: &FlexBody, psi: &DMatrix<f64>, mass: f
     };
     let (mut compared, axis) = (0, |k: usize| Vector3::<f64>::ith(k, 1.0));
     for one in &body.inertia_stiffness().expect("directors").stiffness {
-        let at = |x: &Vector3<f64>| match (&one.load.kind, usize::from(one.load.component)) {
+        let at = |x: &Vector3<f64>| match (&one.load.kind, one.load.component) {
             (LoadKind::Acceleration, k) => Some(axis(k)),
             (LoadKind::AngularAcceleration, k) => Some(axis(k).cross(x)),
             (LoadKind::Spin, k @ 0..3) => Some(axis(k).cross(&axis(k).cross(x))),

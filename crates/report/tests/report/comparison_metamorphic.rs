@@ -101,7 +101,7 @@ fn in_unit(recovery: &mut Recovery, from: &str, to: &str, factor: f64) {
 /// Returns the body with the signs of every second mode changed.
 fn flipped(body: &FlexBody) -> FlexBody {
     let nf = body.n_modes();
-    let sign = |j: usize| if j % nf % 2 == 0 { -1.0 } else { 1.0 };
+    let sign = |j: usize| if (j % nf).is_multiple_of(2) { -1.0 } else { 1.0 };
     changed(body, |parts| {
         let t = Mat::from_fn(nf, nf, |i, j| if i == j { sign(j) } else { 0.0 });
         let columns = |a: &mut Mat<f64>| *a = Mat::from_fn(a.nrows(), a.ncols(), |i, j| sign(j) * a[(i, j)]);
