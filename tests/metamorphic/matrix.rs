@@ -10,6 +10,7 @@ use crate::subject::Subject;
 use crate::text::Text;
 use crate::transformations::{self, Pair, Transformation};
 use flexbody_base::error::{Error, Result};
+use flexbody_body::invariants::FrameChoice;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::Mutex;
@@ -115,6 +116,12 @@ impl Crossing {
             Ok(None) => return Outcome::Apart,
             Err(error) => return refused(&error),
         };
+        // Verdicts about modes are those of bodies in mean axes.
+        let has_mean_axes = |subject: &Subject| matches!(subject.frame, FrameChoice::Mean(_));
+        let takes_frames = ["simulate", "response"].contains(&self.names().1);
+        if !takes_frames && ![&pair.original, &pair.changed].into_iter().all(has_mean_axes) {
+            return Outcome::Apart;
+        }
         let (own, other): (Result<Outputs>, Result<Outputs>) =
             (command(&pair.original), command(&pair.changed));
         match (own, other) {

@@ -6,6 +6,7 @@ use crate::subject::{Basis, Subject, frames};
 use crate::{named_loads, recoveries};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_linalg::context::Context;
 use flexbody_model::RawModel;
 use flexbody_motion::dynamics::RotationVector;
@@ -51,8 +52,11 @@ pub fn subject(seed: u64) -> Result<Subject> {
     let kind = pick(random, KINDS.len());
     let raw = bodies::body(kind, random);
     let scene = nothing_happens("crossing", 1.0, TOLERANCE);
-    let frames = frames(&raw);
-    let frame = frames[pick(random, frames.len())].clone();
+    let frame = FrameChoice::Mean(BodyFrame::ALL[pick(random, BodyFrame::ALL.len())]);
+    let frame = match one_in(&mut stream(seed, 9), 3) {
+        true => frames(&raw).pop().unwrap_or(frame),
+        false => frame,
+    };
     let subject = Subject {
         kind: KINDS[kind],
         raw,

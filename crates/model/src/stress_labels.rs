@@ -31,11 +31,8 @@ pub(super) fn labels_of(row: &RecoveryRow) -> Option<StressLabel<'_>> {
     // The words of `p sigma_xx` and `p tau_xy` differ, their point is one.
     let last = before.rfind(SEPARATORS).map_or(0, |at| at + 1);
     let is_word = |word: &&str| word.len() > 1 && before[last..].eq_ignore_ascii_case(word);
-    let name = if STRESS_WORDS.iter().any(is_word) {
-        before[..last].trim_end_matches(SEPARATORS)
-    } else {
-        before
-    };
+    let name =
+        if STRESS_WORDS.iter().any(is_word) { before[..last].trim_end_matches(SEPARATORS) } else { before };
     Some(StressLabel { component, name })
 }
 

@@ -23,7 +23,7 @@ const OUT_OF_PLANE: [usize; 2] = [4, 5];
 
 impl StressPoint {
     /// Returns the points among `rows`: stresses of one node, element and unit whose names end with their components and are
-    /// equal before them. Components have any spelling of [`labels_of`]. A point has all six components; or xx, yy and xy, with or
+    /// equal before them. Components have any usual spelling (`ZX`, `13`, `sigma_xx`). A point has all six components; or xx, yy and xy, with or
     /// without zz, of a plane state whose other stresses are zero. The order is that of the first rows of the points.
     pub fn among(rows: &[RecoveryRow]) -> Vec<Self> {
         type Key<'r> = (&'r str, &'r str, Option<i64>, Option<i64>);
