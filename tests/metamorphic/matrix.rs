@@ -55,10 +55,11 @@ fn is_open(name: &str) -> bool {
 }
 
 /// Returns the outcome of an error. Random scenes are valid except for a torque at a point without rotation
-/// (FB212), and bodies that `trade --reference nodal` does not support (FB801).
+/// (FB212), bodies that `trade --reference nodal` does not support (FB801), and motions that its iteration does not
+/// follow (FB540).
 fn refused(error: &Error) -> Outcome {
     match code(error) {
-        code if ["FB212", "FB801"].contains(&&*code) => Outcome::Refused(code),
+        code if ["FB212", "FB801", "FB540"].contains(&&*code) => Outcome::Refused(code),
         _ => violated(format!("a sound scene is refused: {error}")),
     }
 }

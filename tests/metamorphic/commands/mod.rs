@@ -67,7 +67,9 @@ pub const OPEN: [&str; 3] = ["largest deflection of the body", "percentages of F
 ///
 /// * The possible effect of loads on a free body until the end of its motion grows if the motion ends later.
 /// * The largest rows of a motion lie between the instants of its table.
-pub const CHANGED: [(&str, &str); 5] = [
+/// * FB546 estimates by the upper half of the modes of the file, which are others in another frame.
+pub const CHANGED: [(&str, &str); 6] = [
+    ("FB546", "another frame"),
     ("largest of", "recover the table"),
     ("significances", "start later"),
     ("FB542", "start later"),
