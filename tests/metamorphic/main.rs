@@ -24,7 +24,7 @@ mod transformations;
 const FEW: u64 = 30;
 
 /// Number of crossings of the slow test: within three minutes on two cores.
-const MANY: u64 = 100;
+const MANY: u64 = 90;
 
 #[test]
 fn crossings_keep_the_physics() {
