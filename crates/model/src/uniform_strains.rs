@@ -232,14 +232,19 @@ impl UniformStrains {
         // Where K is not that of one solid, isotropic points are compared with themselves.
         let of_body = self.compliance();
         let expected = |stress: &Matrix6<f64>| of_body.or_else(|| isotropic(stress)?.try_inverse());
-        let relations: Vec<Option<Relation>> =
-            stresses.iter().map(|stress| Some(Relation::new(stress * expected(stress)?))).collect();
-        let found = |kind: Kind| {
-            let of_kind = move |(_, relation): &(&StressPoint, &Relation)| relation.kind() == kind;
-            let known = points.iter().zip(&relations).filter_map(|(point, one)| Some((point, one.as_ref()?)));
-            known.filter(of_kind).collect::<Vec<_>>()
-        };
-        let wrong = found(Kind::Other);
+        let (mut unknown, mut turned, mut wrong) = (0, 0, Vec::new());
+        for (point, stress) in points.iter().zip(&stresses) {
+            let Some(expected) = expected(stress) else {
+                unknown += 1;
+                continue;
+            };
+            let relation = Relation::new(stress * expected);
+            match relation.kind() {
+                Kind::Same => {}
+                Kind::Turned => turned += 1,
+                Kind::Other => wrong.push((point, relation)),
+            }
+        }
         if let Some((point, relation)) = wrong.first() {
             let more = match wrong.len() - 1 {
                 0 => String::new(),
@@ -250,8 +255,6 @@ impl UniformStrains {
         }
         let limit = if of_body.is_some() { MAX_FACTOR } else { MAX_FACTOR_OF_ANY };
         let factor = self.factor(points, &stresses).filter(|factor| !(1.0 / limit..=limit).contains(factor));
-        let [unknown, turned] =
-            [relations.iter().filter(|one| one.is_none()).count(), found(Kind::Turned).len()];
         match (factor, of_body) {
             (Some(factor), Some(_)) => {
                 let facts = format!("they are {} times those of the stiffness", in_digits(factor));
@@ -507,7 +510,6 @@ struct Relation {
 }
 
 /// Kind of a [`Relation`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// T = 1.
     Same,

@@ -237,6 +237,12 @@ impl FlexBody {
         })
     }
 
+    /// Returns true if the basis spans all motions of the model except rigid ones.
+    pub(super) fn is_complete(&self) -> bool {
+        let rows = self.source().n_dofs;
+        rows > 0 && self.n_modes() + 6 >= rows
+    }
+
     /// Returns true if the basis contains the static responses to loads at `carrier`.
     fn resolves(&self, carrier: &Carrier) -> bool {
         let Carrier::Interface(name) = carrier else { return false };
@@ -244,9 +250,7 @@ impl FlexBody {
         // Example of a provenance: `residual vector: 98 % bore force x`.
         let made_for = |provenance: &str| provenance.split_once(" % ").is_some_and(|(_, load)| named(load));
         let modes = self.modes();
-        // The basis is complete if it spans all motions of the model except rigid ones.
-        let complete = self.n_modes() + 6 >= self.source().n_dofs && self.source().n_dofs > 0;
-        complete
+        self.is_complete()
             || self.coordinates().is_some_and(|all| all.names.iter().any(|coordinate| named(coordinate)))
             || modes.truncation.iter().any(|one| named(&one.load))
                 && modes.truncation.iter().all(|one| !named(&one.load) || one.after < MAX_TRUNCATION)

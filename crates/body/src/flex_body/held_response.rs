@@ -69,8 +69,7 @@ impl FlexBody {
         motion: impl IntoIterator<Item = RigidAccelerations>,
     ) -> Option<Diagnostic> {
         let Carrier::Interface(name) = carrier else { return None };
-        let is_complete = self.n_modes() + 6 >= self.source().n_dofs && self.source().n_dofs > 0;
-        if is_complete || !original.is_whole_craig_bampton(name) {
+        if self.is_complete() || !original.is_whole_craig_bampton(name) {
             return None;
         }
         let (values, vectors) = self.eigenpairs_in_frame()?;

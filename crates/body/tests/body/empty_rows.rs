@@ -14,6 +14,7 @@ use flexbody_linalg::context::Context;
 use flexbody_model::{CheckedModel, DofLabel, FeModel, NodeSet, Nodes, RawModel, RawShapes};
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 use oracle::mesh::Mesh;
+use oracle::turning;
 use std::path::PathBuf;
 
 fn converted(model: &FeModel, modes: usize, method: Method) -> Conversion {
@@ -182,12 +183,7 @@ fn turned(rotation: &Rotation3<f64>) -> RawModel {
         let matrix = &all * matrix * all.transpose();
         let matrix = 0.5 * (&matrix + matrix.transpose());
         // Rounding in empty rows remains in the matrix, like in files of FE programs.
-        let entries: Vec<(u32, u32, f64)> = (0..n)
-            .flat_map(|i| (0..n).map(move |j| (i, j)))
-            .map(|(i, j)| (i as u32, j as u32, matrix[(i, j)]))
-            .filter(|entry| entry.2 != 0.0)
-            .collect();
-        CscMatrix::from_triplets(n, n, &entries)
+        turning::sparse(&matrix)
     };
     let nodes = Nodes {
         ids: (1..=places.len() as i64).collect(),

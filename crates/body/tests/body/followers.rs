@@ -18,6 +18,7 @@ use flexbody_model::{
 };
 use nalgebra::{DMatrix, Matrix3, Rotation3, Vector3};
 use oracle::fixtures;
+use oracle::turning::{dense, sparse};
 use std::fs;
 
 /// Number of the point that follows.
@@ -96,19 +97,6 @@ impl Carrier {
         }
         motions
     }
-}
-
-fn sparse(matrix: &DMatrix<f64>) -> CscMatrix {
-    let entries: Vec<(u32, u32, f64)> = (0..matrix.nrows())
-        .flat_map(|i| (0..matrix.ncols()).map(move |j| (i, j)))
-        .filter(|at| matrix[*at] != 0.0)
-        .map(|(i, j)| (i as u32, j as u32, matrix[(i, j)]))
-        .collect();
-    CscMatrix::from_triplets(matrix.nrows(), matrix.ncols(), &entries)
-}
-
-fn dense(matrix: &CscMatrix) -> DMatrix<f64> {
-    DMatrix::from_fn(matrix.n_rows(), matrix.n_cols(), |i, j| matrix.get(i, j))
 }
 
 /// Returns the model with a point at `place` with the mass `own` that moves by `follows`, as a reader delivers it.

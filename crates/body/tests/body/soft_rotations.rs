@@ -10,6 +10,7 @@ use flexbody_linalg::CscMatrix;
 use flexbody_linalg::context::Context;
 use flexbody_model::{CheckedModel, DofLabel, FeModel, Nodes, RawModel};
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
+use oracle::turning;
 
 /// Sheet of bars with out-of-plane bending and torsion along edges and diagonals of a grid of nodes; each bar has
 /// a normal of its own, and bends about the direction across it.
@@ -103,12 +104,7 @@ impl Sheet {
         let sparse = |matrix: &DMatrix<f64>, size: f64| {
             let matrix = size * &all * matrix * all.transpose();
             let matrix = 0.5 * (&matrix + matrix.transpose());
-            let entries: Vec<(u32, u32, f64)> = (0..n)
-                .flat_map(|i| (0..n).map(move |j| (i, j)))
-                .map(|(i, j)| (i as u32, j as u32, matrix[(i, j)]))
-                .filter(|entry| entry.2 != 0.0)
-                .collect();
-            CscMatrix::from_triplets(n, n, &entries)
+            turning::sparse(&matrix)
         };
         let nodes = Nodes {
             ids: order.iter().map(|&node| node as i64 + 1).collect(),

@@ -1,7 +1,7 @@
 //! Accelerations of a carried body by the motion that its scene prescribes.
 
 use super::{Driving, Scene};
-use crate::dynamics::{Orientation, RotationVector};
+use crate::dynamics::{AlongFrame, Orientation, RotationVector};
 use flexbody_body::flex_body::{Frame, RigidAccelerations};
 use nalgebra::{Rotation3, Vector3};
 
@@ -21,8 +21,7 @@ pub(super) fn accelerations(frame: &Frame, scene: &Scene) -> Vec<RigidAccelerati
     let mut all = Vec::with_capacity(count);
     for instant in 0..count {
         let (velocities, rates) = driving.at(instant as f64 * step, &axes);
-        let vector =
-            |value: Option<crate::dynamics::AlongFrame>| value.map_or_else(Vector3::zeros, |along| along.0);
+        let vector = |value: Option<AlongFrame>| value.map_or_else(Vector3::zeros, |along| along.0);
         let (velocity, omega) = (vector(velocities.linear), vector(velocities.angular));
         let (rate, alpha) = (vector(rates.linear), vector(rates.angular));
         let origin = rate + omega.cross(&velocity) - axes.tr_mul(&gravity);

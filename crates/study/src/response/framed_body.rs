@@ -33,8 +33,7 @@ impl FramedBody {
     pub(super) fn new(body: &FlexBody, settings: &ResponseSettings, excitation: &Excitation) -> Result<Self> {
         let mean = body.in_mean_axes()?;
         let (mut held_eigenvalues, mut unresolved) = (Vec::new(), None);
-        let lag = damped(&mean, settings)?.stiffness_damping();
-        let damped = match excitation {
+        let (damped, lag) = match excitation {
             // Damping ratios are those of the modes of the body as it is held.
             Excitation::Base(Place { point: Point::Interface(name), .. }) => {
                 let carrier = Carrier::Interface(name.clone());
@@ -42,13 +41,18 @@ impl FramedBody {
                 unresolved = held.unresolved(&carrier, &mean);
                 held_eigenvalues = held.eigenvalues_in_frame().unwrap_or_default();
                 let damped = damped(&held, settings)?;
+                let lag = damped.stiffness_damping();
                 if damped.damping() == mean.damping() {
-                    mean.into_owned()
+                    (mean.into_owned(), lag)
                 } else {
-                    mean.with_damping_of(&damped)?
+                    (mean.with_damping_of(&damped)?, lag)
                 }
             }
-            _ => damped(&mean, settings)?.into_owned(),
+            _ => {
+                let damped = damped(&mean, settings)?.into_owned();
+                let lag = damped.stiffness_damping();
+                (damped, lag)
+            }
         };
         let centre = damped.invariants().first_moment() / damped.invariants().mass();
         let at_centre = damped.in_model_axes(centre)?;

@@ -1,6 +1,6 @@
 //! Transfer function as a sum over rigid motion and modes.
 
-use faer::{Mat, MatRef, Scale};
+use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::{CoupledModel, free_static_responses};
@@ -121,8 +121,9 @@ pub(super) struct NodalModes<'m> {
     pub moving: Vec<bool>,
     /// Number of outputs, the first ones, whose static responses improve the estimate.
     pub improved: usize,
-    /// beta of damping in proportion to the stiffness, which what the modes leave out has too; 0 for other damping.
-    pub lag: f64,
+    /// beta and C - beta K_ff of modal damping C in proportion to the stiffness, which what the modes leave out has too;
+    /// `None` for other damping.
+    pub whole: Option<(f64, Mat<f64>)>,
 }
 
 impl NodalModes<'_> {
@@ -149,14 +150,6 @@ impl NodalModes<'_> {
             )
         };
         Ok(Some(self.in_span(&all, damping).ok_or_else(dependent)?))
-    }
-
-    /// Returns C - beta K_ff: what modal damping has beside that in proportion to the stiffness.
-    pub(super) fn beside_stiffness(&self, damping: &Mat<f64>) -> Mat<f64> {
-        match self.lag {
-            0.0 => damping.clone(),
-            beta => damping - gram(self.vectors.as_ref(), self.elastic.as_ref()) * Scale(beta),
-        }
     }
 
     /// Returns E (N x k), orthonormal in K; `None` if there are no unbalanced forces.
@@ -224,14 +217,13 @@ impl NodalModes<'_> {
         );
         clear_rows(&mut rigid, &self.moving);
         let damping = damping.map(|c| {
+            let (beta, c) = self.whole.as_ref().map_or((0.0, c), |(beta, beside)| (*beta, beside));
             let modal = seen(self.inertial.as_ref());
-            let beside = self.beside_stiffness(c);
-            let all = combine(
-                combine(modal.as_ref(), beside.as_ref()).as_ref(),
-                modal.transpose().to_owned().as_ref(),
-            );
+            let left = combine(modal.as_ref(), c.as_ref());
+            let of_modes = combine(left.as_ref(), modal.transpose().to_owned().as_ref());
             // The stiffness of the coordinates is one.
-            Mat::from_fn(all.nrows(), all.ncols(), |i, j| all[(i, j)] + if i == j { self.lag } else { 0.0 })
+            let entry = |i: usize, j: usize| of_modes[(i, j)] + if i == j { beta } else { 0.0 };
+            Mat::from_fn(of_modes.nrows(), of_modes.ncols(), entry)
         });
         let sum = ModalSum {
             stiffness: vec![1.0; eigen.values.len()],

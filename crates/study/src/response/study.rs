@@ -10,7 +10,7 @@ use super::framed_body::{FramedBody, Read, numbered, reduced_sum};
 use super::modal_sum::{ModalSum, NodalModes};
 use super::place::{Direction, Place};
 use super::random::{RandomResponse, RandomStudy, input_names};
-use faer::Mat;
+use faer::{Mat, Scale};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::units::UnitSystem;
@@ -271,7 +271,7 @@ impl<'m> ModelResponse<'m> {
     ) -> Result<Self> {
         context.phase("estimate of the error");
         let body = &framed.damped;
-        let nodal = NodalModes { lag: framed.lag, ..nodal_modes(model, body, read)? };
+        let nodal = nodal_modes(model, framed, read, damping)?;
         let (enriched, shapes) = nodal.enriched(body, damping)?.unzip();
         Ok(Self { nodal, enriched, shapes, damping: damping.cloned(), context: *context })
     }
@@ -284,11 +284,9 @@ impl<'m> ModelResponse<'m> {
     /// Prepares the equations of all nodes of `model`, with the couplings of the body or without, for `solves`
     /// frequencies.
     fn direct_solver<'s>(&'s self, model: &'s CoupledModel<'_>, solves: usize) -> Result<DirectSolver<'s>> {
-        let NodalModes { inertial, loads, measured, moving, .. } = &self.nodal;
+        let NodalModes { inertial, loads, measured, moving, whole, .. } = &self.nodal;
         let damping = self.damping.as_ref().map(|c| (inertial, c));
-        let beta = Some(self.nodal.lag).filter(|beta| *beta > 0.0);
-        let whole = beta.zip(self.damping.as_ref()).map(|(beta, c)| (beta, self.nodal.beside_stiffness(c)));
-        DirectSolver::new(model, [loads, measured], moving, damping, whole, solves, &self.context)
+        DirectSolver::new(model, [loads, measured], moving, damping, whole.clone(), solves, &self.context)
     }
 
     /// Returns the model with deformable interfaces; `None` if no interface of the body is rigid.
@@ -299,7 +297,13 @@ impl<'m> ModelResponse<'m> {
 }
 
 /// Expresses the body in the rows of the model that it was made of, and refuses a body of another model.
-fn nodal_modes<'m>(model: &'m FeModel, body: &FlexBody, read: &Read<'_>) -> Result<NodalModes<'m>> {
+fn nodal_modes<'m>(
+    model: &'m FeModel,
+    framed: &FramedBody,
+    read: &Read<'_>,
+    damping: Option<&Mat<f64>>,
+) -> Result<NodalModes<'m>> {
+    let body = &framed.damped;
     let foreign = |why: &str| {
         let message = format!("the body was not made from this model: {why}");
         let help = "give the model that the body was converted from";
@@ -320,6 +324,7 @@ fn nodal_modes<'m>(model: &'m FeModel, body: &FlexBody, read: &Read<'_>) -> Resu
         let why = format!("modal masses or stiffnesses of its modes differ by up to {apart:.1e}");
         return Err(foreign(&why).into());
     }
+    let whole = damping.filter(|_| framed.lag > 0.0).map(|c| (framed.lag, c - stiffness * Scale(framed.lag)));
     let unit_loads = |places: &[Place]| -> Result<Mat<f64>> {
         if places.is_empty() {
             return Ok(Mat::zeros(model.rows().len(), 0));
@@ -342,7 +347,7 @@ fn nodal_modes<'m>(model: &'m FeModel, body: &FlexBody, read: &Read<'_>) -> Resu
         measured,
         moving: read.moving(model.dimension()),
         improved,
-        lag: 0.0,
+        whole,
     })
 }
 

@@ -232,7 +232,7 @@ fn responses_have_the_columns_of_rates() {
     assert!(apart < 1.1 * with, "{apart:e} {with:e}");
 }
 
-/// What the modes leave out is damped in proportion to its stiffness too: its response lags by 1 / (1 + i w beta). Rows of the
+/// The response outside of the modes is damped in proportion to its stiffness too, and lags by 1 / (1 + i w beta). Rows of the
 /// body, and those of all nodes that its error is measured by, agree with dense equations.
 #[test]
 fn damping_in_proportion_to_the_stiffness_is_in_the_static_columns() {

@@ -140,7 +140,7 @@ impl Matrices {
             None => elimination.follows.clone(),
         };
         if let Some(retained) = &self.retained {
-            follows = product(&transposed(&columns_of_identity(n, retained)), &follows);
+            follows = product(&columns_of_identity(n, retained).transpose(), &follows);
         }
         self.carried.as_ref()?.followers(&follows, nodes, axes)
     }
@@ -252,17 +252,6 @@ fn columns_of_identity(n: usize, columns: &[usize]) -> CscMatrix {
     let entries: Vec<(u32, u32, f64)> =
         (0u32..).zip(columns).map(|(at, &row)| (row as u32, at, 1.0)).collect();
     CscMatrix::from_triplets(n, columns.len(), &entries)
-}
-
-/// Returns the transposed matrix.
-fn transposed(matrix: &CscMatrix) -> CscMatrix {
-    let entries: Vec<(u32, u32, f64)> = (0..matrix.n_cols())
-        .flat_map(|column| {
-            let (rows, values) = matrix.column(column);
-            rows.iter().zip(values).map(move |(row, value)| (column as u32, *row, *value))
-        })
-        .collect();
-    CscMatrix::from_triplets(matrix.n_cols(), matrix.n_rows(), &entries)
 }
 
 /// Returns the product of two sparse matrices.
