@@ -4,17 +4,19 @@ use crate::draws::{between, direction, one_in, pick};
 use crate::stress::of_spin;
 use crate::{named_loads, recoveries};
 use flexbody_model::{Coupling, Damping, NodeSet, RawModel, Reference};
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 use oracle::beams::{BeamMass, elbow, star};
+use oracle::carried_mass::Carrier;
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::general::raw_fixture;
 use oracle::mesh::{Mesh, grid};
 use oracle::plane::rectangle;
 use oracle::random::Random;
+use oracle::sheet::Sheet;
 use oracle::turning::block;
 
 /// Kinds of bodies.
-pub const KINDS: [&str; 8] = [
+pub const KINDS: [&str; 10] = [
     "solid",
     "solid, singular mass",
     "solid with a rigid end",
@@ -23,7 +25,12 @@ pub const KINDS: [&str; 8] = [
     "elbow",
     "plane solid",
     "plane frame",
+    "sheet, soft rotations",
+    "sheet with a mass on weighted nodes",
 ];
+
+/// Number of kinds of which most bodies are; the others have draws of their own.
+pub const FREQUENT: usize = 8;
 
 /// Returns a random body of one of the [`KINDS`].
 pub fn body(kind: usize, random: &mut Random) -> RawModel {
@@ -35,7 +42,9 @@ pub fn body(kind: usize, random: &mut Random) -> RawModel {
         4 => star(BeamMass::Lumped),
         5 => elbow(3),
         6 => rectangle(3, 1, between(random, 0.0, 3.0), [between(random, -3.0, 3.0), 1.0]),
-        _ => raw_fixture("plane_frame"),
+        7 => raw_fixture("plane_frame"),
+        8 => Sheet::new(between(random, 1e-6, 5e-5), 0.0).plain(),
+        _ => Carrier::new(Sheet::new(0.0, 0.0).plain(), &Rotation3::identity(), 1.0, one_in(random, 2)).raw,
     };
     // Numbers of their own, so that other features of a seed do not depend on the offset.
     let own = &mut Random(random.0 ^ 0x5eed);

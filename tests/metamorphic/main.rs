@@ -4,6 +4,7 @@
 #![allow(unreachable_pub)] // tests export nothing
 
 mod bodies;
+mod carried_mass;
 mod commands;
 mod correspondence;
 mod draws;

@@ -76,10 +76,16 @@ fn code(error: &Error) -> String {
 
 impl Crossing {
     /// Returns the crossing of a number. Transformations alternate, and half of all crossings run `simulate`,
-    /// which has the most outputs; with `FLEXBODY_SIMULATED_CROSSINGS` all of them.
+    /// which has the most outputs; with `FLEXBODY_SIMULATED_CROSSINGS` all of them. `FLEXBODY_TRANSFORMATION`
+    /// names the only transformation.
     fn of(number: u64) -> Self {
         let random = &mut stream(number, 7);
-        let transformation = number as usize % transformations::ALL.len();
+        let only = std::env::var("FLEXBODY_TRANSFORMATION").ok();
+        let named = |name: String| {
+            let found = transformations::ALL.iter().position(|one| one.name == name);
+            found.unwrap_or_else(|| panic!("FLEXBODY_TRANSFORMATION: no transformation `{name}`"))
+        };
+        let transformation = only.map_or(number as usize % transformations::ALL.len(), named);
         let Transformation { reach, .. } = transformations::ALL[transformation];
         let met: Vec<usize> = (0..commands::ALL.len()).filter(|&i| (commands::ALL[i].meets)(reach)).collect();
         let simulated = one_in(random, 2) || std::env::var_os("FLEXBODY_SIMULATED_CROSSINGS").is_some();

@@ -8,12 +8,13 @@ use std::path::PathBuf;
 /// Name of the load.
 pub const WIND: &str = "wind";
 
-/// Returns a load with forces at all nodes, moments where nodes have rotations, and a resultant.
+/// Returns a load with forces at all nodes, moments where nodes have rotations with a stiffness, and a resultant.
 pub fn of(raw: &RawModel) -> Vec<ModelLoad> {
     let force = |(row, label): (usize, &flexbody_model::DofLabel)| {
         let has_place = raw.nodes.ids.contains(&label.node);
         let size = if label.direction > 3 { 0.1 } else { 1.0 };
-        if has_place { size * (0.7 * (row + 1) as f64).sin() } else { 0.0 }
+        let is_empty = [&raw.stiffness, &raw.mass].iter().all(|one| one.matrix.column(row).0.is_empty());
+        if has_place && !is_empty { size * (0.7 * (row + 1) as f64).sin() } else { 0.0 }
     };
     let forces = rows(raw).iter().enumerate().map(force).collect();
     vec![ModelLoad { name: WIND.to_owned(), forces, preload: false, path: PathBuf::new() }]

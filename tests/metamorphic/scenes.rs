@@ -1,6 +1,6 @@
 //! Random scenes: every feature of a scene is randomly present or absent.
 
-use crate::bodies::{self, KINDS, turns};
+use crate::bodies::{self, FREQUENT, KINDS, turns};
 use crate::draws::{axis, between, direction, one_in, pick, stream};
 use crate::subject::{Basis, Subject, frames};
 use crate::{named_loads, recoveries};
@@ -49,7 +49,10 @@ struct Scales<'r> {
 /// The errors of the conversion and of the motion that scales the loads.
 pub fn subject(seed: u64) -> Result<Subject> {
     let random = &mut stream(seed, 1);
-    let kind = pick(random, KINDS.len());
+    let frequent = pick(random, FREQUENT);
+    // Draws of their own, so that other features of a seed do not depend on the later kinds.
+    let own = &mut stream(seed, 10);
+    let kind = if one_in(own, 6) { FREQUENT + pick(own, KINDS.len() - FREQUENT) } else { frequent };
     let raw = bodies::body(kind, random);
     let scene = nothing_happens("crossing", 1.0, TOLERANCE);
     let frame = FrameChoice::Mean(BodyFrame::ALL[pick(random, BodyFrame::ALL.len())]);

@@ -21,6 +21,8 @@ pub mod beams;
 #[cfg(feature = "model")]
 pub mod brackets;
 #[cfg(feature = "model")]
+pub mod carried_mass;
+#[cfg(feature = "model")]
 pub mod files;
 #[cfg(feature = "model")]
 pub mod general;
@@ -34,6 +36,8 @@ pub mod plane;
 pub mod reference;
 #[cfg(feature = "model")]
 pub mod rounding;
+#[cfg(feature = "model")]
+pub mod sheet;
 #[cfg(feature = "model")]
 pub mod turned_energy;
 #[cfg(feature = "model")]

@@ -9,7 +9,7 @@ mod units;
 mod world;
 
 pub use histories::{Driven, for_driving};
-pub use model::{rows, turned_rows};
+pub use model::{rows, turned, turned_rows};
 
 use crate::correspondence::Correspondence;
 use crate::subject::Subject;

@@ -6,7 +6,7 @@ use super::world::{extent, turning};
 use crate::correspondence::Correspondence;
 use crate::draws::direction;
 use crate::subject::Subject;
-use crate::{named_loads, recoveries};
+use crate::{carried_mass, named_loads, recoveries};
 use flexbody_base::error::Result;
 use flexbody_linalg::{CscMatrix, uniform};
 use flexbody_model::{Damping, DofLabel, GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad};
@@ -78,6 +78,7 @@ pub fn permute(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     }
     changed.raw.recoveries = recoveries::permuted(raw, &place);
     changed.raw.named_loads = named_loads::permuted(raw, &place);
+    changed.raw.followers = carried_mass::permuted(raw, &place);
     changed.raw.dofs = Some(order.iter().map(|&old| labels[old]).collect());
     let nodes = random.permutation(raw.nodes.len());
     changed.raw.nodes.ids = nodes.iter().map(|&i| raw.nodes.ids[i]).collect();
@@ -118,7 +119,11 @@ pub fn rows(raw: &RawModel) -> Vec<DofLabel> {
 
 /// Returns for every row of a model the rows of the same vector, and the coefficients of the rotation.
 pub fn turned_rows(raw: &RawModel, turn: &Matrix3<f64>) -> Vec<Vec<(u32, f64)>> {
-    let labels = rows(raw);
+    turned(&rows(raw), turn)
+}
+
+/// Returns for every one of these rows the rows of the same vector, and the coefficients of the rotation.
+pub fn turned(labels: &[DofLabel], turn: &Matrix3<f64>) -> Vec<Vec<(u32, f64)>> {
     let place: HashMap<DofLabel, u32> =
         labels.iter().enumerate().map(|(i, &label)| (label, i as u32)).collect();
     let of_row = |label: &DofLabel| {

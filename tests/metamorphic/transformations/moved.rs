@@ -3,7 +3,7 @@
 use super::model::{conjugated, geometric};
 use super::scene::start_axes;
 use crate::subject::Subject;
-use crate::{named_loads, recoveries};
+use crate::{carried_mass, named_loads, recoveries};
 use flexbody_model::{Damping, RawMatrix, RawModel, Reference};
 use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{Axes, Drive, Scene, VectorHistory};
@@ -61,6 +61,7 @@ impl Motion {
         }
         moved.recoveries = recoveries::moved(raw, &self.model, |x| self.place(x));
         moved.named_loads = named_loads::turned(raw, &self.model);
+        moved.followers = carried_mass::moved(raw, &self.model, |x| self.place(x));
         if self.model != Matrix3::identity() {
             let turned = |matrix: &RawMatrix| RawMatrix {
                 matrix: conjugated(raw, &matrix.matrix, &self.model),

@@ -6,7 +6,7 @@ use super::model::rows;
 use crate::correspondence::Correspondence;
 use crate::draws::pick;
 use crate::subject::Subject;
-use crate::{named_loads, recoveries};
+use crate::{carried_mass, named_loads, recoveries};
 use flexbody_base::error::Result;
 use flexbody_base::units::UnitSystem;
 use flexbody_linalg::CscMatrix;
@@ -85,6 +85,7 @@ impl Units {
         }
         changed.recoveries = recoveries::scaled(raw, self.length);
         changed.named_loads = named_loads::scaled(raw, self.force(), self.length);
+        changed.followers = carried_mass::scaled(raw, self.length, self.mass);
         changed.units = self.named(&raw.units);
         changed
     }
