@@ -53,7 +53,9 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
         unreachable!("an asymmetric matrix is an error")
     };
-    check_diagonals(&stiffness, &mass, |row| layout.rows.label(&nodes, row), &raw, &mut found);
+    let label = |row: usize| layout.rows.label(&nodes, row);
+    check_diagonal(&stiffness, "stiffness", &raw.stiffness.path, label, &mut found);
+    check_diagonal(&mass, "mass", &raw.mass.path, label, &mut found);
     found.extend(check_magnitudes(&stiffness, &mass, &nodes, &raw));
     stop_on_error(&mut found)?;
     (raw.nodes, raw.dofs) = (Nodes::default(), None);
@@ -66,6 +68,8 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     let following = with_following_rotations(&raw, &rows, &nodes, stiffness, mass);
     found.extend(following.found);
     let Following { stiffness, mass, soft, .. } = following;
+    check_empty_rows([&stiffness, &mass], |row| rows.label(&nodes, row), &raw, &mut found);
+    stop_on_error(&mut found)?;
     #[cfg(debug_assertions)]
     let [stiffness, mass] = super::test_rounding::rounded([stiffness, mass]);
     let body = Assembled {
@@ -351,18 +355,14 @@ impl Asymmetry {
     }
 }
 
-fn check_diagonals(
-    stiffness: &SymmetricMatrix,
-    mass: &SymmetricMatrix,
+fn check_empty_rows(
+    matrices: [&SymmetricMatrix; 2],
     label: impl Fn(usize) -> DofLabel,
     raw: &RawModel,
     found: &mut Vec<Diagnostic>,
 ) {
-    check_diagonal(stiffness, "stiffness", &raw.stiffness.path, &label, found);
-    check_diagonal(mass, "mass", &raw.mass.path, &label, found);
-    let empty = |m: &SymmetricMatrix, i: usize| m.row(i).0.is_empty();
-    let both: Vec<DofLabel> =
-        (0..stiffness.n()).filter(|&i| empty(stiffness, i) && empty(mass, i)).map(&label).collect();
+    let is_empty = |&row: &usize| matrices.iter().all(|matrix| matrix.row(row).0.is_empty());
+    let both: Vec<DofLabel> = (0..matrices[0].n()).filter(is_empty).map(label).collect();
     if !both.is_empty() {
         let message = format!("{} rows are empty in both matrices: {}", both.len(), name_some(&both));
         found.push(Diagnostic::new(Code::PencilSingular, message).in_file(&raw.stiffness.path));

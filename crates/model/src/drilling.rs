@@ -1,7 +1,6 @@
 //! Rotations about directions without stiffness, such as about the normal of a shell without drilling
-//! stiffness. If the normal is an axis of the model, the rows are empty and left out. Otherwise the direction
-//! is found from the block of each node, and the rotation is made to follow the nodes of an element around
-//! it.
+//! stiffness. The direction is found from the block of each node, and the rotation is made to follow the nodes of
+//! an element around it. If the normal is an axis of the model, a row is empty; it is kept for such a node.
 //!
 //! With n the direction at node i, and w(u) the angular velocity of the rigid motion that fits the
 //! displacements of node i and of two other nodes of an element, the term
@@ -11,8 +10,9 @@
 //! ```
 //!
 //! is added to the elastic energy, where k is the largest stiffness of the rotations of the node. No other
-//! term depends on n' theta_i, so the term is zero in every static response and every mode for any k: the
-//! body does not change, and the rotation moves with its element. Rigid motion leaves the term zero.
+//! term depends on n' theta_i, so the term is zero for any k in every mode and every static response to loads
+//! without a moment about n: the body does not change, and the rotation moves with its element, which takes
+//! moments about n. Rigid motion leaves the term zero.
 //!
 //! Elements whose normals deviate from n by a small angle delta, as coordinates of few digits make them, give
 //! n' theta_i a stiffness of delta^2 times their bending stiffness, and couple it with the bending rotations
@@ -23,18 +23,14 @@
 //! than a few times its stiffness, and stays as it is.
 
 use super::assemble::rounding;
+use super::element_around::element_around;
 use super::node_pairs::neighbours;
 use super::wording::name_some;
 use super::{Nodes, RawModel, Rows, SoftRotation, SoftRotations};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_linalg::ties::TIE_MARGIN;
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::collections::BTreeMap;
-
-/// Area of the triangle of three nodes, projected across the direction and relative to the square of its
-/// longest side, below which the nodes determine no rotation about it.
-const MIN_TRIANGLE_AREA: f64 = 1e-3;
 
 /// Smallest principal stiffness of the rotations of a node, relative to the largest, below which a rotation
 /// may be soft: the square of the angle between the normals of elements, 1e-3 rad. A larger value also takes
@@ -296,8 +292,13 @@ impl Shell<'_> {
     fn term(&self, node: usize, axes: &[usize], direction: &[(u32, f64)]) -> Option<Vec<(u32, f64)>> {
         let mut normal = Vector3::zeros();
         axes.iter().zip(direction).for_each(|(&axis, &(_, part))| normal[axis] = part);
-        let around = self.element_around(node, &normal)?;
         let place = |node: usize| Vector3::from(self.nodes.positions[node]);
+        let coupled = |node: usize| {
+            let mut near = neighbours(self.stiffness, self.rows, node, |_, _, value| value != 0.0);
+            near.retain(|&other| self.rows.is_node(other as usize));
+            near
+        };
+        let around = element_around(node, &normal, place, coupled)?;
         let centre = around.iter().map(|&node| place(node)).sum::<Vector3<f64>>() / around.len() as f64;
         let arms = around.map(|node| place(node) - centre);
         let moment = |r: &Vector3<f64>| Matrix3::identity() * r.norm_squared() - r * r.transpose();
@@ -308,35 +309,6 @@ impl Shell<'_> {
             (0..3).map(move |axis| ((3 * node + axis) as u32, -force[axis]))
         });
         Some(direction.iter().copied().chain(moved).collect())
-    }
-
-    /// Returns the node and two others that K couples with it and with each other: those with the largest
-    /// triangle across `normal`.
-    fn element_around(&self, node: usize, normal: &Vector3<f64>) -> Option<[usize; 3]> {
-        let coupled = |node: usize| neighbours(self.stiffness, self.rows, node, |_, _, value| value != 0.0);
-        let near: Vec<usize> = coupled(node)
-            .into_iter()
-            .map(|other| other as usize)
-            .filter(|&other| self.rows.is_node(other))
-            .collect();
-        let arm = |other: usize| {
-            Vector3::from(self.nodes.positions[other]) - Vector3::from(self.nodes.positions[node])
-        };
-        let mut best: Option<(f64, [usize; 3])> = None;
-        for &a in &near {
-            let beside = coupled(a);
-            for &b in near.iter().filter(|&&b| b > a && beside.binary_search(&(b as u32)).is_ok()) {
-                let (x, y) = (arm(a), arm(b));
-                let longest = x.norm_squared().max(y.norm_squared());
-                let area = x.cross(&y).dot(normal).abs();
-                if area > MIN_TRIANGLE_AREA * longest
-                    && best.is_none_or(|(largest, _)| area > largest * (1.0 + TIE_MARGIN))
-                {
-                    best = Some((area, [node, a, b]));
-                }
-            }
-        }
-        best.map(|(_, around)| around)
     }
 }
 

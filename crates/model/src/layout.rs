@@ -1,11 +1,13 @@
 //! Conversion from labelled matrix rows to the internal order of [`Rows`]: every used node has as many
 //! displacements as the model has dimensions.
 
+use super::element_around::element_around;
 use super::rows::{Recovered, Rows};
 use super::wording::name_some;
 use super::{Damping, DofLabel, Nodes, RawModel};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{CscMatrix, parallel};
+use nalgebra::Vector3;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
@@ -172,9 +174,9 @@ impl RowsOfNodes {
 }
 
 impl RowsOfNodes {
-    /// Leaves out rows that are empty in all matrices: all rows of a node without elements, and rotations.
-    /// A displacement without stiffness and mass is kept if the node has other displacements: it is an
-    /// error.
+    /// Leaves out rows that are empty in all matrices: all rows of a node without elements, and rotations, but
+    /// for those about the normal of a shell: there the node has other rotations and an element around it. A
+    /// displacement without stiffness and mass is kept if the node has other displacements: it is an error.
     fn leave_out_empty(&mut self, raw: &RawModel) -> LeftOut {
         let others = raw.damping.as_ref().and_then(Damping::matrix).into_iter();
         let others = others.chain(raw.geometric_stiffness.iter().map(|one| &one.matrix));
@@ -184,6 +186,7 @@ impl RowsOfNodes {
         if filled.iter().all(|filled| *filled) {
             return left_out;
         }
+        let about_normals = self.about_normals(raw, &filled);
         let placed = raw.nodes.ids.iter().copied().zip(&mut self.placed);
         let without_place = self.without_place.iter_mut().map(|(node, rows)| (*node, rows));
         for (node, rows) in placed.chain(without_place) {
@@ -195,12 +198,61 @@ impl RowsOfNodes {
                 left_out.of_nodes += given;
                 *rows = [MISSING_ROW; 6];
             }
-            for row in rows[3..].iter_mut().filter(|row| is_empty(**row)) {
+            let counts = |row: u32| is_empty(row) && about_normals.binary_search(&row).is_err();
+            for row in rows[3..].iter_mut().filter(|row| counts(**row)) {
                 left_out.rotations += 1;
                 *row = MISSING_ROW;
             }
         }
         left_out
+    }
+
+    /// Returns the empty rows of rotations about the normals of shells, ascending.
+    fn about_normals(&self, raw: &RawModel, filled: &[bool]) -> Vec<u32> {
+        let is_filled = |row: u32| row != MISSING_ROW && filled[row as usize];
+        let is_empty = |row: u32| row != MISSING_ROW && !filled[row as usize];
+        let candidates = self.placed.iter().enumerate().filter(|(_, rows)| {
+            rows[..3].iter().all(|&row| is_filled(row))
+                && rows[3..].iter().any(|&row| is_filled(row))
+                && rows[3..].iter().any(|&row| is_empty(row))
+        });
+        let candidates: Vec<(usize, &[u32; 6])> = candidates.collect();
+        if candidates.is_empty() {
+            return Vec::new();
+        }
+        let matrix = &raw.stiffness.matrix;
+        let mut node_of = vec![MISSING_ROW; matrix.n_cols()];
+        for (node, rows) in self.placed.iter().enumerate() {
+            rows.iter()
+                .filter(|row| **row != MISSING_ROW)
+                .for_each(|&row| node_of[row as usize] = node as u32);
+        }
+        let coupled = |node: usize| {
+            let rows = self.placed[node].iter().filter(|row| **row != MISSING_ROW);
+            let entries = rows.flat_map(|&row| {
+                let (rows, values) = matrix.column(row as usize);
+                rows.iter()
+                    .zip(values)
+                    .filter(|(_, value)| **value != 0.0)
+                    .map(|(&row, _)| node_of[row as usize])
+            });
+            let mut near: Vec<u32> =
+                entries.filter(|&other| other != MISSING_ROW && other as usize != node).collect();
+            near.sort_unstable();
+            near.dedup();
+            near
+        };
+        let place = |node: usize| Vector3::from(raw.nodes.positions[node]);
+        let mut all: Vec<u32> = Vec::new();
+        for (node, rows) in candidates {
+            let normals = (3..6).filter(|&direction| is_empty(rows[direction]));
+            let has_element = |direction: &usize| {
+                element_around(node, &Vector3::ith(direction - 3, 1.0), place, coupled).is_some()
+            };
+            all.extend(normals.filter(has_element).map(|direction| rows[direction]));
+        }
+        all.sort_unstable();
+        all
     }
 }
 

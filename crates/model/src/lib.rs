@@ -16,6 +16,7 @@ mod density;
 mod director_blocks;
 mod director_mass;
 mod drilling;
+mod element_around;
 mod fe_model;
 mod followers;
 mod geometric_stiffness;

@@ -4,6 +4,7 @@ use super::{error, findings};
 use crate::outputs::{Output, Outputs, Values};
 use crate::subject::Subject;
 use flexbody_base::error::Result;
+use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_linalg::context::Context;
 use flexbody_motion::scene::Point;
 use flexbody_study::response::{
@@ -20,7 +21,9 @@ const STEEP: f64 = 50.0;
 /// Returns the response at the tip to forces at a node.
 pub fn response(subject: &Subject) -> Result<Outputs> {
     let (model, body) = (subject.model()?, subject.body()?);
-    let hertz = body.frequencies_hz();
+    // The same band in every frame: in that of an interface the frequencies are others.
+    let free = Subject { frame: FrameChoice::Mean(BodyFrame::Com), stored: false, ..subject.clone() };
+    let hertz = free.body()?.frequencies_hz();
     let [first, third] = [hertz[0], hertz[hertz.len().min(3) - 1]];
     let settings = ResponseSettings {
         band: Band::new(0.3 * first, 1.2 * third).expect("a band"),

@@ -1,0 +1,35 @@
+//! The element around a node of a shell, by the nodes that K couples.
+
+use flexbody_linalg::ties::TIE_MARGIN;
+use nalgebra::Vector3;
+
+/// Area of the triangle of three nodes, projected across the direction and relative to the square of its
+/// longest side, below which the nodes determine no rotation about it.
+const MIN_TRIANGLE_AREA: f64 = 1e-3;
+
+/// Returns a node and two others that K couples with it and with each other: those with the largest triangle
+/// across `normal`. `coupled` returns the other nodes that K couples with a node, ascending.
+pub(super) fn element_around(
+    node: usize,
+    normal: &Vector3<f64>,
+    place: impl Fn(usize) -> Vector3<f64>,
+    coupled: impl Fn(usize) -> Vec<u32>,
+) -> Option<[usize; 3]> {
+    let near = coupled(node);
+    let arm = |other: usize| place(other) - place(node);
+    let mut best: Option<(f64, [usize; 3])> = None;
+    for &a in &near {
+        let beside = coupled(a as usize);
+        for &b in near.iter().filter(|&&b| b > a && beside.binary_search(&b).is_ok()) {
+            let (x, y) = (arm(a as usize), arm(b as usize));
+            let longest = x.norm_squared().max(y.norm_squared());
+            let area = x.cross(&y).dot(normal).abs();
+            if area > MIN_TRIANGLE_AREA * longest
+                && best.is_none_or(|(largest, _)| area > largest * (1.0 + TIE_MARGIN))
+            {
+                best = Some((area, [node, a as usize, b as usize]));
+            }
+        }
+    }
+    best.map(|(_, around)| around)
+}
