@@ -159,6 +159,14 @@ impl<'a> PointFacts<'a> {
     }
 }
 
+/// Drift at or below which the last bits decide about its digits.
+const ROUNDING_DRIFT: f64 = 1e-14;
+
+/// Returns a relative drift in words.
+fn drift_in_words(drift: f64) -> String {
+    if drift <= ROUNDING_DRIFT { format!("below {ROUNDING_DRIFT:.0e}") } else { format!("{drift:.1e}") }
+}
+
 /// Returns the length of the longest vector.
 fn longest(vectors: &[Vector3<f64>]) -> f64 {
     vectors.iter().fold(0.0, |most, vector| larger(most, vector.norm()))
@@ -320,8 +328,7 @@ impl<'a> SimulationFacts<'a> {
 
     fn document(&self) -> Document<'_> {
         let [energy, linear, angular] =
-            [self.energy_drift, self.linear_momentum_drift, self.angular_momentum_drift]
-                .map(|v| format!("{v:.1e}"));
+            [self.energy_drift, self.linear_momentum_drift, self.angular_momentum_drift].map(drift_in_words);
         let head = format!("Energy drift {energy}, momentum drift {linear} (linear), {angular} (angular).");
         let method = format!("{}: {}", self.method_in_words(), self.work_in_words());
         let drift = format!("energy {energy}, linear momentum {linear}, angular momentum {angular}");

@@ -48,13 +48,11 @@ impl FlexBody {
                 // Spin axis that softens the present motion most, then the motion that it softens most.
                 let next = largest_direction(&self.softening_of(&motion)?);
                 let (greater, other) = self.softest_motion(&next)?;
-                let is_done = greater <= part * (1.0 + MIN_GROWTH);
-                if greater > part {
-                    (omega, part, motion) = (next, greater, other);
-                }
-                if is_done {
+                // A growth within rounding would move to another of equally soft axes.
+                if greater <= part * (1.0 + MIN_GROWTH) {
                     break;
                 }
+                (omega, part, motion) = (next, greater, other);
             }
             Some((omega, part))
         };

@@ -4,6 +4,7 @@
 use super::residual::NodalView;
 use super::turning_products::TurningProducts;
 use faer::Mat;
+use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{combine, gram, side_by_side, subtract_combination, symmetric_eigen};
 use flexbody_model::{FeModel, RigidAcceleration};
 use flexbody_motion::scene::Instant;
@@ -214,8 +215,14 @@ impl Compressed {
             subtract_combination(weighted_rest.as_mut(), weighted.as_ref(), shared.as_ref());
             basis = side_by_side(&[basis.as_ref(), own.as_ref()]);
         }
+        if basis.ncols() == 0 {
+            return None;
+        }
+        // The same space with directions that do not turn in it where principal directions have nearly one size.
+        let own = gram(weigh(&basis).as_ref(), weigh(forces).as_ref());
+        basis = combine(basis.as_ref(), directions_of_largest(own).as_ref());
         let weighted = weigh(&basis);
-        (basis.ncols() > 0).then_some(Self { basis, weights, weighted })
+        Some(Self { basis, weights, weighted })
     }
 
     /// Returns C (k x m) such that B C is the best approximation of `forces` F (N x m) in the weighted norm.
@@ -223,6 +230,28 @@ impl Compressed {
         let weighted = Mat::from_fn(forces.nrows(), forces.ncols(), |i, j| self.weights[i] * forces[(i, j)]);
         gram(self.weighted.as_ref(), weighted.as_ref())
     }
+}
+
+/// Returns an orthonormal basis (k x p) of the columns of `rest` (k x m), each direction that of the largest column without
+/// its part in the earlier directions. Principal directions whose sizes differ by d are determined to rounding over d,
+/// these to rounding.
+fn directions_of_largest(mut rest: Mat<f64>) -> Mat<f64> {
+    let mut basis = Mat::zeros(rest.nrows(), 0);
+    while basis.ncols() < rest.nrows() {
+        let Some(largest) = first_largest(0..rest.ncols(), |&j| rest.col(j).norm_l2()) else { break };
+        let size = rest.col(largest).norm_l2();
+        if !(size > 0.0) {
+            break;
+        }
+        let own = Mat::from_fn(rest.nrows(), 1, |i, _| rest[(i, largest)] / size);
+        // Subtract twice: little may be left.
+        for _ in 0..2 {
+            let along = gram(own.as_ref(), rest.as_ref());
+            subtract_combination(rest.as_mut(), own.as_ref(), along.as_ref());
+        }
+        basis = side_by_side(&[basis.as_ref(), own.as_ref()]);
+    }
+    basis
 }
 
 /// Returns an orthonormal basis (k x p) of the principal directions of the columns of `columns` (k x m), in descending

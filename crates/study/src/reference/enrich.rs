@@ -9,10 +9,13 @@ use flexbody_linalg::side_by_side;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{LoadCases, Scene, SceneVariation, ends_a_run};
 
-/// Largest ratio of the truncation error to that of the previous round at which another round is made. The value is
-/// close to one because the first responses may leave most of the error from inertia to the next round. A smaller value
-/// gives up earlier.
-const MAX_ERROR_RATIO: f64 = 0.9;
+/// Largest ratio of the truncation error to that of the previous round at which another round is made, after the first
+/// responses: they may leave most of the error from inertia to the next round. A smaller value gives up earlier.
+const MAX_FIRST_ERROR_RATIO: f64 = 0.9;
+
+/// Largest such ratio after later responses. A larger value adds responses that hardly pay, whose choice rounding
+/// decides: the motion of a long run magnifies it a thousandfold in every round.
+const MAX_LATER_ERROR_RATIO: f64 = 0.8;
 
 /// Largest number of enrichment rounds for an ordinary reference.
 const MOST_ROUNDS: usize = 4;
@@ -174,13 +177,14 @@ impl CaseEnrichment {
     /// Returns true if the last body contains forces of this case and its error decreased by enough.
     fn has_reduced_error(&self, now: Option<&Estimate>) -> bool {
         match (self.rounds.last(), now) {
-            (Some(before), Some(now)) if self.asked => !Self::is_without_progress(before, &now.error),
+            (Some(before), Some(now)) if self.asked => !self.is_without_progress(before, &now.error),
             _ => false,
         }
     }
 
-    fn is_without_progress(before: &ReferenceError, now: &ReferenceError) -> bool {
-        now.worst > MAX_ERROR_RATIO * before.worst
+    fn is_without_progress(&self, before: &ReferenceError, now: &ReferenceError) -> bool {
+        let most = if self.rounds.len() == 1 { MAX_FIRST_ERROR_RATIO } else { MAX_LATER_ERROR_RATIO };
+        now.worst > most * before.worst
     }
 
     /// Records the estimated error. Returns the forces that this case asks for, if its error exceeds `enough` and
@@ -188,7 +192,7 @@ impl CaseEnrichment {
     fn update(&mut self, estimate: Estimate, enough: f64) -> Option<Mat<f64>> {
         let Estimate { error, missing } = estimate;
         self.gave_up |=
-            self.asked && self.rounds.last().is_some_and(|before| Self::is_without_progress(before, &error));
+            self.asked && self.rounds.last().is_some_and(|before| self.is_without_progress(before, &error));
         self.asked = error.worst > enough && missing.ncols() > 0 && !self.gave_up;
         self.rounds.push(error);
         self.asked.then_some(missing)

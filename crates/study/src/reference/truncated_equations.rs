@@ -1,21 +1,60 @@
 //! Dynamic response of the truncated part of the model to the forces that the reduced motion leaves unbalanced, with
 //! the inertia of the static responses and their coupling to the modes of the body.
 
-use super::compressed::principal;
 use super::estimate::Grid;
 use faer::Mat;
 use flexbody_body::invariants::symmetric_part;
 use flexbody_linalg::{
-    add_combination, combine, dense_cholesky, gram, solve_lower, solve_upper, symmetric_eigen,
+    add_combination, combine, dense_cholesky, gram, larger, solve_lower, solve_upper, symmetric_eigen,
 };
 use flexbody_motion::integration::free_oscillation;
 use flexbody_motion::scene::{Interpolation, Sample, Samples};
 use nalgebra::Vector1;
 use std::ops::Range;
 
-/// Part of the trace of E'K E at or below which a direction counts as rounding. A larger value drops directions of
-/// little elastic energy.
-pub(super) const ROUNDING: f64 = 1e-12;
+/// Part of the elastic energy of a response at or below which what it does not have in common with others is rounding. A
+/// larger value drops directions that differ little.
+const ROUNDING: f64 = 1e-10;
+
+/// Returns T (k x p) that makes E T K-orthonormal, for responses E with the stiffness E'K E (k x k), in the order of the
+/// responses: each without what it has in common with those before it, unless the rest is [`ROUNDING`]. Returns `None` if
+/// the responses are zero or not finite.
+pub(super) fn of_unit_energy(stiffness: &Mat<f64>) -> Option<Mat<f64>> {
+    let k = stiffness.nrows();
+    // Responses of one size: they differ as their forces do, which says nothing about dependence.
+    let sizes: Vec<f64> = (0..k).map(|i| stiffness[(i, i)].max(0.0).sqrt()).collect();
+    let largest = sizes.iter().copied().fold(0.0, larger);
+    if !(largest.is_finite() && largest > 0.0) {
+        return None;
+    }
+    // Gram and Schmidt in the product of E'K E. A direction has the same components whatever rounding is in the others.
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    for (j, size) in sizes.iter().enumerate().filter(|(_, size)| **size > ROUNDING * largest) {
+        let mut column = vec![0.0; k];
+        column[j] = size.recip();
+        for _ in 0..2 {
+            let weighted = weighted(stiffness, &column);
+            let shared: Vec<f64> = columns.iter().map(|known| product(known, &weighted)).collect();
+            for (known, shared) in columns.iter().zip(shared) {
+                column.iter_mut().zip(known).for_each(|(own, known)| *own -= shared * known);
+            }
+        }
+        let rest = product(&column, &weighted(stiffness, &column));
+        if rest > ROUNDING {
+            column.iter_mut().for_each(|own| *own /= rest.sqrt());
+            columns.push(column);
+        }
+    }
+    Some(Mat::from_fn(k, columns.len(), |i, j| columns[j][i]))
+}
+
+fn weighted(stiffness: &Mat<f64>, column: &[f64]) -> Vec<f64> {
+    (0..stiffness.nrows()).map(|i| (0..column.len()).map(|j| stiffness[(i, j)] * column[j]).sum()).collect()
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
 
 /// Equations of motion of the displacements Psi y + E z. Psi are the modes of a body and E static responses that are
 /// K-orthogonal to the modes. The loads are the forces whose static responses are E c(t), and the forces M Psi m_ff^-1
@@ -111,12 +150,12 @@ impl TruncatedEquations {
     fn eigenmodes(&self) -> Option<(Mat<f64>, Vec<f64>)> {
         let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
         // A basis of unit stiffness: L'^-1 for the modes (K_ff = L L'), principal directions for the responses.
-        let (turned, roots) = principal(self.stiffness.clone(), ROUNDING, usize::MAX)?;
+        let of_responses = of_unit_energy(&self.stiffness)?;
         let lower = dense_cholesky(self.modal_stiffness.clone())?;
         let of_modes = solve_upper(&lower, &Mat::identity(nf, nf));
-        let unit = Mat::from_fn(nf + k, nf + roots.len(), |i, j| match (i < nf, j < nf) {
+        let unit = Mat::from_fn(nf + k, nf + of_responses.ncols(), |i, j| match (i < nf, j < nf) {
             (true, true) => of_modes[(i, j)],
-            (false, false) => turned[(i - nf, j - nf)] / roots[j - nf],
+            (false, false) => of_responses[(i - nf, j - nf)],
             _ => 0.0,
         });
         // The eigenvectors of the mass in that basis decouple both matrices.

@@ -3,8 +3,8 @@
 use super::compressed::{Compressed, Projected, UnbalancedAmplitudes, principal, principal_directions};
 use super::estimate::Grid;
 use super::residual::{Held, NodalView};
-use super::truncated_equations::ROUNDING;
-use faer::Mat;
+use super::truncated_equations::of_unit_energy;
+use faer::{Mat, MatRef};
 use flexbody_base::error::Result;
 use flexbody_body::basis::{free_static_responses_twice, oscillating_responses};
 use flexbody_body::flex_body::FlexBody;
@@ -39,13 +39,13 @@ const NEW: f64 = 1e-4;
 pub(super) struct TruncatedResponses {
     /// Forces B (N x k) with E = K^+ B.
     pub forces: Mat<f64>,
-    /// Amplitudes c (k x m) of the unbalanced forces B c(t). The rows that belong to inertia and resonances are zero.
+    /// Amplitudes c (k x m) of the unbalanced forces B c(t).
     pub amplitudes: Mat<f64>,
     /// Modal forces g (nf x m) of the unbalanced forces.
     pub in_modes: Mat<f64>,
     /// Responses E (N x k), K-orthogonal to the modes. If a point carries the body, the point is at rest.
     pub responses: Mat<f64>,
-    /// Stiffness E'K E of the responses (k x k).
+    /// Stiffness E'K E of the responses (k x k), the unit matrix but for rounding.
     pub energy: Mat<f64>,
 }
 
@@ -95,7 +95,22 @@ impl TruncatedResponses {
             );
             missed.add_resonance(&projection, forces, resonance.rate)?;
         }
-        Ok(missed)
+        Ok(missed.orthonormal(&projection))
+    }
+
+    /// Returns the same displacements as amplitudes of K-orthonormal responses. Their natural frequencies are accurate to
+    /// rounding, and so are the phases of oscillations after thousands of periods.
+    fn orthonormal(mut self, projection: &ModalProjection<'_>) -> Self {
+        // Nearly dependent responses leave what rounding is in the larger ones, which a second time removes.
+        for _ in 0..2 {
+            let Some(unit) = of_unit_energy(&self.energy) else { break };
+            let weighted = combine(self.energy.as_ref(), self.amplitudes.as_ref());
+            self.amplitudes = gram(unit.as_ref(), weighted.as_ref());
+            self.forces = combine(self.forces.as_ref(), unit.as_ref());
+            self.responses = combine(self.responses.as_ref(), unit.as_ref());
+            self.energy = projection.energy(&self.responses);
+        }
+        self
     }
 
     /// Adds the harmonic response of the model to `forces` at the circular frequency `rate`.
@@ -129,14 +144,9 @@ impl TruncatedResponses {
     pub(super) fn dominant(&self, moving: &Mat<f64>, enough: f64) -> Mat<f64> {
         let none = || Mat::zeros(self.forces.nrows(), 0);
         // Principal directions of the elastic energy.
-        let Some((turned, roots)) = principal(self.energy.clone(), ROUNDING, usize::MAX) else {
-            return none();
-        };
-        // w = T'z with E'K E = T T': the elastic energy is |w|^2 / 2.
-        let w = |k: usize, i: usize| -> f64 {
-            roots[k] * (0..turned.nrows()).map(|row| turned[(row, k)] * moving[(row, i)]).sum::<f64>()
-        };
-        let w = Mat::from_fn(roots.len(), moving.ncols(), w);
+        let Some(unit) = of_unit_energy(&self.energy) else { return none() };
+        // w = T'E'K E z: the elastic energy of E z is |w|^2 / 2.
+        let w = gram(unit.as_ref(), combine(self.energy.as_ref(), moving.as_ref()).as_ref());
         // Principal directions of w over time; find the smallest number that leaves a small enough rest.
         let Some(directions) = principal_directions(&w, 0.0, MOST_RESPONSES) else { return none() };
         let along = gram(directions.as_ref(), w.as_ref());
@@ -148,11 +158,25 @@ impl TruncatedResponses {
         let worst = |count: &usize| (0..w.ncols()).map(|i| left(*count, i)).fold(0.0, larger);
         let count =
             (0..directions.ncols()).find(|count| worst(count) <= enough).unwrap_or(directions.ncols());
-        let y = Mat::from_fn(turned.nrows(), count, |row, p| {
-            (0..roots.len()).map(|k| turned[(row, k)] / roots[k] * directions[(k, p)]).sum()
-        });
+        let y = combine(unit.as_ref(), coarse(directions.as_ref().subcols(0, count)).as_ref());
         combine(self.forces.as_ref(), y.as_ref())
     }
+}
+
+/// Number of steps from zero to the largest component of a direction. A smaller number leaves more of the responses to
+/// the next round.
+const STEPS_OF_DIRECTIONS: f64 = 4096.0;
+
+/// Returns directions whose components are rounded to a grid. The motion of the enriched body magnifies differences
+/// between directions a thousandfold in a long run (by the phases of its oscillations), and each round magnifies those of
+/// the round before: without the grid, last bits decide about the body after four rounds.
+fn coarse(directions: MatRef<'_, f64>) -> Mat<f64> {
+    let largest = |j: usize| directions.col(j).iter().fold(0.0f64, |most, value| most.max(value.abs()));
+    let steps: Vec<f64> =
+        (0..directions.ncols()).map(|j| largest(j).max(f64::MIN_POSITIVE) / STEPS_OF_DIRECTIONS).collect();
+    Mat::from_fn(directions.nrows(), directions.ncols(), |i, j| {
+        (directions[(i, j)] / steps[j]).round() * steps[j]
+    })
 }
 
 /// Returns the histories whose largest values must be among the evaluated instants: loads, accelerations and spin of
@@ -210,16 +234,14 @@ impl<'v> ModalProjection<'v> {
     /// * `energy`: E'K E.
     /// * `amplitudes`: c.
     fn inertia(&self, responses: &Mat<f64>, energy: &Mat<f64>, amplitudes: &Mat<f64>) -> Mat<f64> {
-        let Some((turned, roots)) = principal(energy.clone(), ROUNDING, usize::MAX) else {
+        let Some(unit) = of_unit_energy(energy) else {
             return Mat::zeros(responses.nrows(), 0);
         };
         // Amplitudes scaled to the root of the elastic energy; their principal directions over time.
-        let moving = gram(turned.as_ref(), amplitudes.as_ref());
-        let moving = Mat::from_fn(roots.len(), moving.ncols(), |k, i| roots[k] * moving[(k, i)]);
+        let moving = gram(unit.as_ref(), combine(energy.as_ref(), amplitudes.as_ref()).as_ref());
         let Some(directions) = principal_directions(&moving, INERTIA_LEFT_OUT, MAX_INERTIA_RESPONSES) else {
             return Mat::zeros(responses.nrows(), 0);
         };
-        let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);
         let few = combine(responses.as_ref(), combine(unit.as_ref(), directions.as_ref()).as_ref());
         self.view.part(self.view.model.pencil().apply_mass(few.as_ref())).forces
     }
@@ -233,8 +255,8 @@ impl<'v> ModalProjection<'v> {
         let own = self.energy(&further);
         let sizes: Vec<f64> = (0..own.nrows()).map(|j| own[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
         further = Mat::from_fn(further.nrows(), further.ncols(), |i, j| further[(i, j)] / sizes[j]);
-        let Some((turned, roots)) = principal(energy.clone(), ROUNDING, usize::MAX) else { return further };
-        let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);
+        let Some(unit) = of_unit_energy(energy) else { return further };
+        let largest = (0..energy.nrows()).map(|j| energy[(j, j)]).fold(0.0, f64::max).sqrt();
         let orthonormal = combine(known.as_ref(), unit.as_ref());
         let weighted = self.view.model.pencil().apply_stiffness(orthonormal.as_ref());
         // Orthogonalise twice: the new part may be small compared with the common part.
@@ -247,7 +269,7 @@ impl<'v> ModalProjection<'v> {
         };
         // A response without a new direction leaves rounding only.
         let kept = own.iter().take_while(|root| **root > NEW).count();
-        let scaled = Mat::from_fn(turned.nrows(), kept, |row, k| turned[(row, k)] * roots[0] / own[k]);
+        let scaled = Mat::from_fn(turned.nrows(), kept, |row, k| turned[(row, k)] * largest / own[k]);
         combine(further.as_ref(), scaled.as_ref())
     }
 }

@@ -142,6 +142,9 @@ fn turning(scene: &Scene, inertia: &Matrix3<f64>, duration: f64, points: &[BodyP
     )
 }
 
+/// Difference of principal moments of inertia, relative to the larger, up to which they are equal.
+const EQUAL_MOMENTS: f64 = 1e-9;
+
 /// Returns the largest angular velocity and acceleration in the run of the scene.
 fn turning_of_run(
     scene: &Scene,
@@ -171,8 +174,9 @@ fn turning_of_run(
             } else {
                 "[initial] angular_velocity and [[load]] (estimate for a rigid body)"
             };
-            // |omega x I omega| is at most (I_max - I_min) |omega|^2.
-            let acceleration = ((most - least) * spin * spin + torque) / least;
+            // |omega x I omega| is at most (I_max - I_min) |omega|^2; equal moments differ by rounding.
+            let spread = if most - least > EQUAL_MOMENTS * most { most - least } else { 0.0 };
+            let acceleration = (spread * spin * spin + torque) / least;
             [(spin, source.to_owned()), (acceleration, source.to_owned())]
         }
     }
