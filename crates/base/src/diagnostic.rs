@@ -2,9 +2,8 @@
 //! in this table. `docs/reference/codes.md` is generated from the table; `fixtures/cases/` triggers each code.
 
 mod causes;
-mod explanation;
 
-pub use explanation::Explanation;
+pub use crate::explanation::Explanation;
 
 use crate::exit_code::ExitCode;
 use std::borrow::Cow;
@@ -319,7 +318,7 @@ codes! {
 }
 
 /// Subjects of the codes, by their first digit.
-const SUBJECTS: [(char, &str); 9] = [
+pub(crate) const SUBJECTS: [(char, &str); 9] = [
     ('1', "files, and input decks of FE programs"),
     ('2', "manifest, tables, scene file"),
     ('3', "matrices and arrays"),

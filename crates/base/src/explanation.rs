@@ -1,6 +1,6 @@
 //! Explanations of codes for `flexbody explain`, from the table of which `docs/reference/codes.md` is made.
 
-use super::{Code, Diagnostic, SUBJECTS, Severity};
+use crate::diagnostic::{Code, Diagnostic, SUBJECTS, Severity};
 use crate::error::Result;
 use std::fmt;
 

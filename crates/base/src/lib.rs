@@ -13,6 +13,7 @@ pub mod children;
 pub mod diagnostic;
 pub mod error;
 mod exit_code;
+mod explanation;
 #[cfg(feature = "hdf5")]
 pub mod hdf5_file;
 pub mod memory;

@@ -7,7 +7,7 @@
 //! (2017). With u = 2^-53, relative errors are at most 3 u^2 for a sum, 4 u^2 for a product and 15 u^2 for a quotient,
 //! without overflow or underflow.
 
-use super::dense::contiguous;
+use super::columns::contiguous;
 use super::{SymmetricMatrix, parallel};
 use faer::{Mat, MatRef};
 use std::ops::{Add, Div, Mul, Neg, Sub};

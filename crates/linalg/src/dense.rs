@@ -1,5 +1,5 @@
-//! Dense matrices: symmetric eigenproblems and singular values of moderate size, maxima that keep NaN, and columns as
-//! slices.
+//! Dense matrices: symmetric eigenproblems and singular values of moderate size, and maxima that keep
+//! NaN.
 
 use super::combine;
 use dyn_stack::{MemBuffer, MemStack};
@@ -12,7 +12,7 @@ use faer::linalg::evd::{
 };
 use faer::linalg::householder;
 use faer::linalg::qr::no_pivoting::factor as qr;
-use faer::{Auto, Col, ColMut, ColRef, Conj, Mat, MatRef, Par};
+use faer::{Auto, Col, Conj, Mat, MatRef, Par};
 
 /// Largest backward error |A V - V L| / |A| (maximum norms) of an accepted decomposition.
 const MAX_BACKWARD_ERROR: f64 = 3e-14;
@@ -236,16 +236,6 @@ pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
 /// Returns the largest magnitude among the entries of a matrix; NaN if one of them is NaN.
 pub fn largest_entry(a: MatRef<'_, f64>) -> f64 {
     largest((0..a.ncols()).flat_map(|j| (0..a.nrows()).map(move |i| a[(i, j)].abs())))
-}
-
-/// Returns a column as a slice. Every block in this crate is column-major.
-pub fn contiguous(column: ColRef<'_, f64>) -> &[f64] {
-    column.try_as_col_major().expect("blocks are column-major").as_slice()
-}
-
-/// Returns a column as a mutable slice.
-pub fn contiguous_mut(column: ColMut<'_, f64>) -> &mut [f64] {
-    column.try_as_col_major_mut().expect("blocks are column-major").as_slice_mut()
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! first, which here takes longer than the products. Sums run over blocks of rows, and within these over lanes, in a
 //! fixed order.
 
-use super::dense::{contiguous, contiguous_mut};
+use super::columns::{contiguous, contiguous_mut};
 use super::parallel::prefetch;
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, MatRef};

@@ -1,7 +1,7 @@
 //! Factor K - sigma M = L B L' with pivoting inside the panels of each front, kept for solutions: the dynamic stiffness
 //! at a frequency in double precision, and inertia counts in single precision.
 
-use super::dense::contiguous_mut;
+use super::columns::contiguous_mut;
 use super::factor::{Analysis, COLUMNS_PER_SOLVE, Solve, substitute};
 use super::front::{PANEL_COLUMNS, ROWS_PER_PIECE, Real, Trapezoid};
 use super::inertia::{Blocks, Contribution, Inertia, eliminate_front};

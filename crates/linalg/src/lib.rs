@@ -8,6 +8,7 @@
 )]
 
 mod assembly_tree;
+mod columns;
 mod compensated;
 pub mod context;
 mod dense;
@@ -27,13 +28,14 @@ mod substitution;
 mod tall;
 pub mod ties;
 
+pub use columns::{contiguous, contiguous_mut};
 pub use compensated::{
     CompensatedBlock, DoubleDouble, LANES, SmallEigen, accumulate, accumulate_pair, gram_compensated,
     multiply_compensated, projection_compensated, small_pencil, sum_length, with_fma,
 };
 pub use dense::{
-    SymmetricEigen, contiguous, contiguous_mut, dense_cholesky, dense_inverse, full_qr, larger, largest,
-    largest_entry, left_singular_vectors, not_negative, solve_lower, solve_upper, symmetric_eigen,
+    SymmetricEigen, dense_cholesky, dense_inverse, full_qr, larger, largest, largest_entry,
+    left_singular_vectors, not_negative, solve_lower, solve_upper, symmetric_eigen,
 };
 pub use factor::{Analysis, Cholesky, EliminationOrder, Peaks, Solve, is_positive_semidefinite};
 pub use front::Real;

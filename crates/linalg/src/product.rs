@@ -4,7 +4,7 @@
 //! and every gathered row is one cache line (measured: 6 times faster than column by column). Each result row is one
 //! sum in storage order, so that the bits do not depend on the number of threads.
 
-use super::dense::{contiguous, contiguous_mut};
+use super::columns::{contiguous, contiguous_mut};
 use super::{SymmetricMatrix, parallel};
 use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};

@@ -1,7 +1,7 @@
 //! Products of tall, skinny blocks (n x m, n large) with fixed partitions. Partial results of fixed row chunks are
 //! added in a fixed order, so that the bits do not depend on the number of threads.
 
-use super::dense::{contiguous, contiguous_mut};
+use super::columns::{contiguous, contiguous_mut};
 use super::few_columns::{MAX_FEW_COLUMNS, add_few_combinations, gram_of_few};
 use super::parallel;
 use faer::linalg::matmul::matmul;

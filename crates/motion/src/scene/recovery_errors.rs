@@ -187,7 +187,9 @@ impl RecoveryMeasure {
         limits: impl Iterator<Item = (&'r RecoveryTolerance, &'r RowMap)>,
         states: Option<SampledStates<'_>>,
     ) -> Self {
-        let directions = states.and_then(Directions::new);
+        let limits: Vec<_> = limits.collect();
+        let places = limits.iter().map(|(_, map)| map.rows.len()).sum();
+        let directions = states.and_then(|states| Directions::new(states, places));
         // A limit of a stress holds however small the deflections are.
         let rounding = Resolution::root_energy_of_rounding(body);
         let unit_energy: Vec<f64> =
@@ -231,7 +233,7 @@ impl RecoveryMeasure {
                 map: map.clone(),
             }
         };
-        Self { recoveries: limits.map(measured).collect() }
+        Self { recoveries: limits.into_iter().map(measured).collect() }
     }
 
     /// Returns the names of the recoveries.
@@ -271,7 +273,8 @@ impl RecoveryMeasure {
         if times.is_empty() || width == 0 {
             return history;
         }
-        let directions = Directions::new(states);
+        let places = self.recoveries.iter().flat_map(|one| &one.groups).map(|group| group.places.len()).sum();
+        let directions = Directions::new(states, places);
         for (one, matrix) in self.recoveries.iter().zip(differences) {
             let rows = LinearRows { matrix: matrix.as_ref(), points: &one.map.points };
             for group in &one.groups {

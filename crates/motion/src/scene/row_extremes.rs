@@ -133,9 +133,14 @@ pub(super) struct Directions {
 }
 
 impl Directions {
-    /// Returns the directions of a history; `None` if it has numbers that are not finite.
-    pub(super) fn new(states: SampledStates<'_>) -> Option<Self> {
+    /// Returns the directions of a history, by which most of `places` need not be evaluated; `None` if it has numbers that
+    /// are not finite, or if evaluating all places is cheaper: one takes a product for each number of a state, the
+    /// directions take as many for each of these numbers.
+    pub(super) fn new(states: SampledStates<'_>, places: usize) -> Option<Self> {
         let m = states.width;
+        if places <= m {
+            return None;
+        }
         // Numbers of one size: unit and kind of the coordinates do not matter.
         let mut scale = vec![0.0f64; m];
         for z in states.iter() {
@@ -222,7 +227,8 @@ impl ExtremeSearch {
             return;
         }
         let states = states.sampled();
-        let directions = Directions::new(states);
+        let places = maps.iter().map(|map| map.rows.len() + map.points.len()).sum();
+        let directions = Directions::new(states, places);
         for (map, found) in maps.iter().zip(&mut self.found) {
             let rows = LinearRows::of(map);
             for magnitude in Magnitude::ALL {
