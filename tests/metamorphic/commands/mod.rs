@@ -10,7 +10,7 @@ use crate::transformations::Reach;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_motion::scene::{LoadCases, Scheme};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A command with its name.
 pub struct Command {
@@ -67,9 +67,12 @@ pub const OPEN: [&str; 3] = ["largest deflection of the body", "percentages of F
 ///
 /// * The possible effect of loads on a free body until the end of its motion grows if the motion ends later.
 /// * The largest rows of a motion lie between the instants of its table.
+/// * Motion between the standard variations and the end lasts longer, too.
 /// * FB546 estimates by the upper half of the modes of the file, which are others in another frame.
-pub const CHANGED: [(&str, &str); 6] = [
+pub const CHANGED: [(&str, &str); 8] = [
     ("FB546", "another frame"),
+    ("findings", "another frame"),
+    ("errors of the selected body", "start later"),
     ("largest of", "recover the table"),
     ("significances", "start later"),
     ("FB542", "start later"),
@@ -116,20 +119,24 @@ pub fn number(name: &str, unit: [i32; 3], value: f64, least: f64) -> Output {
     Output { values, unit, least, ..facts(name, String::new()) }
 }
 
-/// Returns the codes of findings, and the percentages in their messages.
+/// Returns the codes of findings, and the largest percentage in the messages of each code: a load in two parts has two
+/// findings.
 pub fn findings(found: &[Diagnostic]) -> Vec<Output> {
     let mut outputs = vec![facts("findings", codes(found))];
-    for (i, one) in found.iter().enumerate() {
-        let name = format!("percentages of {}, finding {i}", one.code().id());
+    let mut largest: BTreeMap<&str, f64> = BTreeMap::new();
+    for one in found {
         let words: Vec<&str> = one.message().split_whitespace().collect();
         let numbers = words.windows(2).filter(|pair| pair[1].starts_with('%'));
-        let numbers: Vec<f64> = numbers.filter_map(|pair| pair[0].parse().ok()).collect();
-        outputs.push(Output {
-            values: Values::Numbers(numbers),
-            slack: DIGITS,
-            ..facts(&name, String::new())
-        });
+        for number in numbers.filter_map(|pair| pair[0].parse::<f64>().ok()) {
+            let most = largest.entry(one.code().id()).or_insert(number);
+            *most = most.max(number);
+        }
     }
+    outputs.extend(largest.into_iter().map(|(code, number)| Output {
+        values: Values::Numbers(vec![number]),
+        slack: DIGITS,
+        ..facts(&format!("percentages of {code}"), String::new())
+    }));
     outputs
 }
 

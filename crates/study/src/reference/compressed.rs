@@ -240,7 +240,7 @@ fn directions_of_largest(mut rest: Mat<f64>) -> Mat<f64> {
     while basis.ncols() < rest.nrows() {
         let Some(largest) = first_largest(0..rest.ncols(), |&j| rest.col(j).norm_l2()) else { break };
         let size = rest.col(largest).norm_l2();
-        if !(size > 0.0) {
+        if size.is_nan() || size <= 0.0 {
             break;
         }
         let own = Mat::from_fn(rest.nrows(), 1, |i, _| rest[(i, largest)] / size);
