@@ -9,13 +9,20 @@ use flexbody_study::selection::VariedSelection;
 use flexbody_study::trade::{InCase, Trade, TradeVariation};
 use serde::Serialize;
 
+/// Error whose digits are those of rounding: they differ between processors.
+const ROUNDING: f64 = 1e-12;
+
 /// Returns the error of a quantity in words: `0.001 rad` for the attitude, `60 % of its limit` for recoveries, `1 %` for
 /// other quantities.
 pub(super) fn error_in_words(quantity: &str, error: f64, digits: usize) -> String {
+    let number = |factor: f64| match error {
+        error if 0.0 < error && error <= ROUNDING => format!("below {}", significant(factor * ROUNDING, 1)),
+        error => significant(factor * error, digits),
+    };
     match quantity {
-        "attitude" => format!("{} rad", significant(error, digits)),
-        "recovery" => format!("{} % of its limit", significant(100.0 * error, digits)),
-        _ => format!("{} %", significant(100.0 * error, digits)),
+        "attitude" => format!("{} rad", number(1.0)),
+        "recovery" => format!("{} % of its limit", number(100.0)),
+        _ => format!("{} %", number(100.0)),
     }
 }
 
