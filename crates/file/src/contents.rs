@@ -1,7 +1,6 @@
 //! The content of a flex-body file as plain data, for formats that carry the same entries in another container.
 
 use super::names;
-use super::names::place;
 use super::schema::{ORDER, TABLE};
 use super::value::Value;
 use flexbody_body::flex_body::FlexBody;
@@ -55,7 +54,7 @@ pub fn contents(body: &FlexBody) -> (Vec<NamedAttributes>, Vec<NamedArray>) {
             attributes.push(NamedAttributes { path, values: vec![(ORDER.to_owned(), order.into())] });
         }
         for (name, view) in instances {
-            let path = place(group, name.as_deref().map(names::encode).as_deref());
+            let path = group.place(name.as_deref().map(names::encode).as_deref());
             let path = path.trim_start_matches('/');
             let mut texts = Vec::new();
             for item in group.entries() {

@@ -2,7 +2,7 @@
 
 #![cfg_attr(not(feature = "hdf5"), allow(dead_code))] // used by the reader only
 
-use super::item::Per;
+use super::per::Per;
 use super::value::ReadValue;
 use faer::Mat;
 use flexbody_base::units::UnitSystem;

@@ -2,6 +2,7 @@
 
 use super::draft::Draft;
 use super::names;
+use super::per::Per;
 use super::value::{ReadValue, Units, Value, View, text};
 #[cfg(feature = "hdf5")]
 use flexbody_body::flex_body::Storage;
@@ -162,26 +163,6 @@ pub(super) const DERIVED_TOLERANCE: f64 = 1e-12;
 #[cfg(feature = "hdf5")]
 pub(super) const SHORT_TOLERANCE: f64 = f32::EPSILON as f64;
 
-/// Number of instances of a group in a file: one for the body, or one for each object of this kind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Per {
-    Body,
-    LumpingScheme,
-    Interface,
-    UnitLoad,
-    RotatedLoad,
-    InertiaLoad,
-    Recovery,
-    NamedLoad,
-}
-
-impl Per {
-    /// Returns true if the order of the objects is data: rows and coordinates elsewhere follow it.
-    pub(crate) fn is_ordered(self) -> bool {
-        matches!(self, Self::Interface | Self::Recovery | Self::NamedLoad)
-    }
-}
-
 /// A row of the table: a dataset or attribute.
 pub(super) struct Item {
     pub name: &'static str,
@@ -325,6 +306,14 @@ impl SchemaGroup {
     /// Returns the path without the last name.
     pub(crate) fn parent(&self) -> &'static str {
         self.path.rfind('/').map_or(self.path, |i| &self.path[..i])
+    }
+
+    /// Returns the path of an instance, with the placeholder replaced by a link name.
+    pub(crate) fn place(&self, link: Option<&str>) -> String {
+        match link {
+            Some(link) => format!("{}/{link}", self.parent()),
+            None => self.path.to_owned(),
+        }
     }
 
     /// Returns the link names of `instances` as a JSON array, if there are several and their order is data.

@@ -13,6 +13,7 @@ mod document;
 mod draft;
 mod item;
 mod names;
+mod per;
 #[cfg(feature = "hdf5")]
 mod read;
 mod recorded_motion;

@@ -1,15 +1,5 @@
 //! Names that are data, as HDF5 link names. In a link name `/` separates groups, and `.` denotes the group itself.
 
-use super::item::SchemaGroup;
-
-/// Returns the path of an instance of a group, with the placeholder replaced by a link name.
-pub(super) fn place(group: &SchemaGroup, link: Option<&str>) -> String {
-    match link {
-        Some(link) => format!("{}/{link}", group.parent()),
-        None => group.path.to_owned(),
-    }
-}
-
 /// Percent-encodes the characters that a link name cannot hold: `/`, `%`, control characters, and a leading dot.
 pub(super) fn encode(name: &str) -> String {
     let mut out = String::with_capacity(name.len());

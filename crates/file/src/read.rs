@@ -2,9 +2,9 @@
 
 use super::draft::Draft;
 use super::item::{
-    DERIVED_TOLERANCE, EntrySet, Extent, Item, Membership, Origin, Per, SHORT_TOLERANCE, SchemaGroup,
+    DERIVED_TOLERANCE, EntrySet, Extent, Item, Membership, Origin, SHORT_TOLERANCE, SchemaGroup,
 };
-use super::names::place;
+use super::per::Per;
 use super::scan::{Scan, index, key};
 use super::schema::{FORMAT, MAJOR, TABLE};
 use super::value::{ReadValue, Value, View};
@@ -157,7 +157,7 @@ fn instances(scan: &Scan, group: &SchemaGroup) -> Vec<(String, String)> {
         Per::Body => vec![(String::new(), group.path.to_owned())],
         _ => {
             let named = scan.instances(group.parent()).into_iter();
-            named.map(|(name, link)| (name, place(group, Some(&link)))).collect()
+            named.map(|(name, link)| (name, group.place(Some(&link)))).collect()
         }
     }
 }
@@ -221,7 +221,7 @@ fn check_derived(scan: &mut Scan, body: &Parts) {
             _ => scan.instances(group.parent()).into_iter().map(|(_, link)| Some(link)).collect(),
         };
         for ((_, view), link) in group.instances(body).into_iter().zip(links) {
-            check_group(scan, group, &place(group, link.as_deref()), &view);
+            check_group(scan, group, &group.place(link.as_deref()), &view);
         }
     }
 }

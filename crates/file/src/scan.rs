@@ -1,8 +1,9 @@
 //! Reads the entries of the table from a file and collects every violation. Nothing that the file declares is trusted
 //! before it is checked against the rest.
 
-use super::item::{Extent, Item, ItemKind, Origin, Per, SchemaGroup};
-use super::names::{self, place};
+use super::item::{Extent, Item, ItemKind, Origin, SchemaGroup};
+use super::names;
+use super::per::Per;
 use super::schema::certificate::{DROPPED, KEPT};
 use super::schema::{DIGESTS_SINCE, LIST, MAJOR, ORDER, TABLE, WHOLE};
 use super::value::Value;
@@ -157,7 +158,7 @@ impl Scan {
     }
 
     fn group(&mut self, file: &hdf5::File, group: &SchemaGroup, link: Option<&str>) {
-        let path = place(group, link);
+        let path = group.place(link);
         let opened = match hdf5_file::open_group(file, &path) {
             Ok(opened) => opened,
             // The body has no such group, or the file has an older minor version.

@@ -2,6 +2,7 @@
 //! schema follow.
 
 pub(super) mod certificate;
+mod entry;
 mod interfaces;
 mod invariants;
 mod named_load;
@@ -9,11 +10,16 @@ mod recovery;
 
 use super::draft::node_indices;
 use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, Triangles};
-use super::item::ItemKind::{self, Floats, Indices, Int, Ints, Text};
-use super::item::Origin::{self, ConstantInt, ConstantText, Primary};
-use super::item::{Access, EntrySet, Item, Per, SchemaGroup, both, field, put, written};
+use super::item::ItemKind::{Floats, Indices, Int, Ints, Text};
+use super::item::Origin::{ConstantInt, ConstantText};
+use super::item::{EntrySet, Item, SchemaGroup, both, field, put, written};
+use super::per::Per;
 use super::value::{Stored, Units, Value, indices, json_list, shape_rows, text};
 use certificate::{CERTIFICATE, CERTIFIED, FREE_EIGENVALUE, FREE_EIGENVALUE_LOWER, INVARIANT_DIGITS, TERMS};
+use entry::{
+    INERTIA, LENGTH, MASS_LENGTH, MASS_LENGTH2, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, PER_TIME2,
+    attribute, constant, dataset, named,
+};
 use flexbody_base::provenance;
 use flexbody_body::flex_body::{MassStructure, Parts, ReferenceConditions, Storage};
 use flexbody_model::NodeMoments;
@@ -58,74 +64,6 @@ const WITHOUT_MESH: i64 = 4;
 pub(super) const DIGESTS_SINCE: i64 = 4;
 /// Value of the root attribute `format`.
 pub(super) const FORMAT: &str = "flexbody";
-
-const ONE: Units = Units::One;
-const MASS: Units = Units::Of { mass_halves: 2, length: 0, time: 0 };
-const LENGTH: Units = Units::Of { mass_halves: 0, length: 1, time: 0 };
-const MASS_LENGTH: Units = Units::Of { mass_halves: 2, length: 1, time: 0 };
-const MASS_LENGTH2: Units = Units::Of { mass_halves: 2, length: 2, time: 0 };
-const ROOT_MASS: Units = Units::Of { mass_halves: 1, length: 0, time: 0 };
-const ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: 1, length: 1, time: 0 };
-const PER_ROOT_MASS: Units = Units::Of { mass_halves: -1, length: 0, time: 0 };
-const PER_ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: -1, length: -1, time: 0 };
-const PER_TIME: Units = Units::Of { mass_halves: 0, length: 0, time: -1 };
-const FORCE: Units = Units::Of { mass_halves: 2, length: 1, time: -2 };
-const TORQUE: Units = Units::Of { mass_halves: 2, length: 2, time: -2 };
-const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
-
-/// Returns a required dataset of version 1.0.
-const fn dataset(
-    name: &'static str,
-    kind: ItemKind,
-    units: Units,
-    symbol: &'static str,
-    description: &'static str,
-    access: Access,
-) -> Item {
-    Item {
-        name,
-        kind,
-        units,
-        symbol,
-        description,
-        required: true,
-        since: 0,
-        origin: Primary(access.get),
-        put: access.put,
-        together: None,
-        of: None,
-        large: false,
-    }
-}
-
-/// Returns a required attribute of version 1.0.
-const fn attribute(
-    name: &'static str,
-    kind: ItemKind,
-    units: Units,
-    description: &'static str,
-    access: Access,
-) -> Item {
-    dataset(name, kind, units, "", description, access)
-}
-
-/// Returns a required attribute of version 1.0 with one value for every file.
-const fn constant(name: &'static str, kind: ItemKind, origin: Origin, description: &'static str) -> Item {
-    Item {
-        name,
-        kind,
-        units: ONE,
-        symbol: "",
-        description,
-        required: true,
-        since: 0,
-        origin,
-        put: None,
-        together: None,
-        of: None,
-        large: false,
-    }
-}
 
 const ROOT: &[Item] = &[
     constant("format", Text, ConstantText(FORMAT), "marks a flex-body file"),
@@ -230,13 +168,6 @@ fn both_or_none(entries: &[(String, bool)]) -> String {
 
 static BODY_NUMBER: EntrySet = EntrySet { problem: both_or_none };
 static INTERNAL_ROWS: EntrySet = EntrySet { problem: both_or_none };
-static INERTIA: EntrySet = EntrySet {
-    problem: |entries| {
-        let names: Vec<&str> = entries.iter().map(|(name, _)| name.as_str()).collect();
-        format!("{}: expected all or none, found some", names.join(", "))
-    },
-};
-
 const SOURCE: &[Item] = &[
     attribute("model", Text, ONE, "name of the model", field!(source.name)),
     attribute(
@@ -571,14 +502,6 @@ const MODES: &[Item] = &[
     .added(2)
     .large(),
 ];
-
-/// Returns the element of `all` with the name `found`. The error lists the known names.
-fn named<T: Copy>(found: String, all: &[T], name: fn(T) -> &'static str) -> Result<T, String> {
-    all.iter().copied().find(|one| name(*one) == found).ok_or_else(|| {
-        let known: Vec<String> = all.iter().map(|one| format!("`{}`", name(*one))).collect();
-        format!("expected one of {}, found {found:?}", known.join(", "))
-    })
-}
 
 /// Groups of the file, in the order in which they are written.
 pub(super) const TABLE: &[SchemaGroup] = &[

@@ -1,8 +1,8 @@
 //! Writes a body by the rows of the table.
 
-use super::item::{Item, ItemKind, Per};
+use super::item::{Item, ItemKind};
 use super::names;
-use super::names::place;
+use super::per::Per;
 use super::scan::key;
 use super::schema::ORDER;
 use super::schema::TABLE;
@@ -85,7 +85,7 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
             {
                 continue;
             }
-            let path = place(group, name.as_deref().map(names::encode).as_deref());
+            let path = group.place(name.as_deref().map(names::encode).as_deref());
             let target = if path == "/" { file.as_group()? } else { make(&file, &path)? };
             for item in group.entries() {
                 let Some(value) = item.value(&view) else { continue };

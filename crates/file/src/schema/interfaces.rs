@@ -4,8 +4,8 @@ use super::super::item::Extent::{Coordinates, Fixed, InterfaceNodes, Modes};
 use super::super::item::Item;
 use super::super::item::ItemKind::{Floats, Ints, Text};
 use super::super::item::{EntrySet, both, field, put, written};
-use super::named;
-use super::{LENGTH, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, attribute, dataset};
+use super::entry::named;
+use super::entry::{LENGTH, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, attribute, dataset};
 use crate::value::{Stored, Units, Value, matrix, shape_rows, text};
 use flexbody_model::Coupling;
 

@@ -5,7 +5,7 @@ use super::super::item::Extent::{Fixed, Modes, ThreeModes};
 use super::super::item::ItemKind::{Floats, Int, Named, Text};
 use super::super::item::{Item, both, field, put, written};
 use super::super::value::{Stored, Units, Value, View, matrix, rows, text};
-use super::{
+use super::entry::{
     INERTIA, MASS, MASS_LENGTH, MASS_LENGTH2, ONE, PER_TIME, PER_TIME2, ROOT_MASS, ROOT_MASS_LENGTH,
     attribute, dataset,
 };

@@ -4,7 +4,7 @@ use super::super::item::Extent::{Fixed, Modes};
 use super::super::item::Item;
 use super::super::item::ItemKind::{Float, Floats, Int};
 use super::super::item::{both, field, put};
-use super::{FORCE, ONE, TORQUE, attribute, dataset};
+use super::entry::{FORCE, ONE, TORQUE, attribute, dataset};
 use crate::value::{Units, Value};
 
 /// Unit of a modal load: force over the square root of mass.

@@ -6,7 +6,7 @@ use super::super::item::Extent::{
 use super::super::item::Item;
 use super::super::item::ItemKind::{Floats, Text};
 use super::super::item::{both, field};
-use super::{ONE, attribute, dataset};
+use super::entry::{ONE, attribute, dataset};
 use crate::value::{Units, Value, text};
 use faer::Mat;
 use flexbody_body::flex_body::{

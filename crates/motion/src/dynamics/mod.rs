@@ -12,17 +12,19 @@ mod natural_modes;
 mod nodal;
 mod orientation;
 mod points;
+mod prescribed;
 mod snapshot;
 
 pub use definiteness::{deflection_of_indefinite_inertia, indefinite_inertia};
 pub use equations::{Constants, EquationsOfMotion, Stiffening, Terms, stiffness_under};
 pub use evaluation::Evaluation;
 pub use jacobian::{LoadAxes, LoadJacobian};
-pub use motion::{AlongFrame, EmptySpace, Motion, NotPositiveDefinite, Prescribed, Surroundings};
+pub use motion::{EmptySpace, Motion, NotPositiveDefinite, Surroundings};
 pub use nodal::{
     NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion, NodalPoint,
     ReferenceConditions,
 };
 pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};
 pub use points::BodyPoint;
+pub use prescribed::{AlongFrame, Prescribed};
 pub use snapshot::{Balance, Configuration, Place, Snapshot};

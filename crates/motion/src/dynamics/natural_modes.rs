@@ -1,6 +1,7 @@
 //! Natural oscillators of a body whose modes are not mass-normalised.
 
-use super::{EquationsOfMotion, Evaluation, Prescribed};
+use super::prescribed::Prescribed;
+use super::{EquationsOfMotion, Evaluation};
 use nalgebra::{DMatrix, DVector};
 
 /// Natural oscillators of a body in a frame whose motion is prescribed in part: shapes T with T'mT = I and T'K T

@@ -1,5 +1,6 @@
 //! Implicit conserving steps: collocation at Gauss points.
 
+use super::stages::{STAGES, StageMode};
 use super::{Failure, Oscillator, System, Work};
 use flexbody_linalg::ties::first_largest;
 use nalgebra::{Complex, DMatrix};
@@ -286,24 +287,6 @@ fn product(a: &[f64; STAGES], b: &[f64; STAGES]) -> f64 {
 }
 
 // Stages of an implicit step, decoupled by the eigenvalues of the method.
-
-/// Number of stages of the method of the highest order.
-pub const STAGES: usize = 3;
-
-/// Eigenvalue mu of the matrix A of the method, with its part of every stage: the sum over all eigenvalues
-/// of right_i mu left_j is A_ij. Of a conjugate pair only the eigenvalue above the real axis is stored, and
-/// twice the real part of its contribution counts.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StageMode {
-    /// Eigenvalue mu; mu and mu^2 lie to the right of the imaginary axis.
-    pub value: Complex<f64>,
-    /// Weights that extract the part of this eigenvalue from the stages.
-    pub left: [Complex<f64>; STAGES],
-    /// Weights that distribute this part to the stages.
-    pub right: [Complex<f64>; STAGES],
-    /// True if there is a conjugate eigenvalue.
-    pub paired: bool,
-}
 
 /// Returns the eigenvalues of the first `stages` rows and columns of A, which are distinct.
 fn stage_modes(a: &[[f64; STAGES]; STAGES], stages: usize) -> Vec<StageMode> {

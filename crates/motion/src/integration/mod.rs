@@ -3,9 +3,11 @@
 mod explicit;
 mod gauss;
 mod schedule;
+mod stages;
 mod system;
 
 pub use explicit::Explicit;
-pub use gauss::{Gauss, STAGES, StageMode};
+pub use gauss::Gauss;
 pub use schedule::{Method, ObserverEvent, integrate, integrate_closely};
+pub use stages::{STAGES, StageMode};
 pub use system::{Failure, Oscillator, System, Work, free_oscillation};

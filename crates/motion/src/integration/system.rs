@@ -1,6 +1,6 @@
 //! Systems of differential equations, and reasons for an integration to end early.
 
-use super::StageMode;
+use super::stages::StageMode;
 use flexbody_base::numbers::significant;
 
 /// System of ordinary differential equations y' = f(t, y).

@@ -1,6 +1,6 @@
 //! Reference conditions, which tie the frame to the body.
 
-use super::NodalError;
+use super::error::NodalError;
 use faer::{Mat, MatRef};
 use flexbody_base::error::Result;
 use flexbody_body::basis::interface_loads;

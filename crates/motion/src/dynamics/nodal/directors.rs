@@ -1,7 +1,7 @@
 //! Constants of the kinetic energy of nodes with rotational mass (theory section 6).
 
-use super::NodalError;
 use super::conditions::{Motions, add_motion};
+use super::error::NodalError;
 use flexbody_linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
 use flexbody_model::{DirectorMass, FeModel};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Vector3, Vector6};

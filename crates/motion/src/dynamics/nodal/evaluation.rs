@@ -3,10 +3,10 @@
 use super::NodalPoint;
 use super::conditions::{NamedForces, Weights, add_motion, halves, joined, sums};
 use super::directors::Workspace;
-use super::driven::{Drive, LOST};
+use super::drive::{Drive, LOST};
 use super::equations::{Amplitudes, ModalDamping, NodalEquations};
 use super::inversion::{Conditions, Given, TurnedMass};
-use super::state::{ANGULAR, LINEAR, OFFSET, attitude};
+use super::state_layout::{ANGULAR, LINEAR, OFFSET, attitude};
 use crate::dynamics::kernels::add_scaled;
 use crate::dynamics::{EulerParameters, LoadAxes, Orientation, RotationVector};
 use crate::integration::Failure;

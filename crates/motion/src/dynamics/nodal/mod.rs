@@ -3,16 +3,21 @@
 
 mod conditions;
 mod directors;
+mod drive;
 mod driven;
 mod equations;
+mod error;
 mod evaluation;
 mod inversion;
 mod kinetics;
 mod motion;
 mod state;
+mod state_layout;
+mod turned_evaluation;
 
 pub use conditions::{NodalPoint, ReferenceConditions};
-pub use equations::{NodalEquations, NodalError};
+pub use equations::NodalEquations;
+pub use error::NodalError;
 pub use evaluation::NodalEvaluation;
 pub use motion::NodalMotion;
 pub use state::{NodalConfiguration, NodalModes};

@@ -2,7 +2,7 @@
 
 use super::conditions::{Motions, add_motion, sums};
 use super::equations::{NodalEquations, products};
-use super::state::{ANGULAR, ATTITUDE, DISPLACEMENTS, LINEAR, attitude};
+use super::state_layout::{ANGULAR, ATTITUDE, DISPLACEMENTS, LINEAR, attitude};
 use super::{NodalConfiguration, NodalEvaluation};
 use crate::dynamics::{Orientation, Prescribed};
 use crate::integration::{Failure, STAGES, StageMode, System};

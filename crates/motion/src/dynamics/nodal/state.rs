@@ -3,6 +3,7 @@
 
 use super::equations::NodalEquations;
 use super::inversion::{Conditions, TurnedMass};
+use super::state_layout::{ANGULAR, ATTITUDE, DISPLACEMENTS, LINEAR, OFFSET, attitude};
 use super::{NodalError, NodalEvaluation};
 use crate::dynamics::{Configuration, EulerParameters, Orientation};
 use faer::{Mat, MatRef};
@@ -15,13 +16,6 @@ const ROUNDING: f64 = 1e-8;
 
 /// Rigid motion in displacements, relative to the extent of the body, that counts as rounding of positions.
 const ROUNDING_OF_POSITIONS: f64 = 1e-12;
-
-/// First index of each part but the first in a state y = (G, D, e, P, L, u, w).
-pub(super) const OFFSET: usize = 3;
-pub(super) const ATTITUDE: usize = 6;
-pub(super) const LINEAR: usize = 10;
-pub(super) const ANGULAR: usize = 13;
-pub(super) const DISPLACEMENTS: usize = 16;
 
 /// State in velocities: a [`Configuration`](crate::dynamics::Configuration) with nodal displacements.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,11 +109,6 @@ impl NodalEquations<'_> {
     pub fn elastic_energy(&self, u: &[f64]) -> f64 {
         0.5 * quadratic_form(self.stiffness(), u)
     }
-}
-
-/// Returns the Euler parameters of a state.
-pub(super) fn attitude(frame: &[f64]) -> EulerParameters {
-    EulerParameters([frame[ATTITUDE], frame[ATTITUDE + 1], frame[ATTITUDE + 2], frame[ATTITUDE + 3]])
 }
 
 impl NodalEvaluation<'_> {
