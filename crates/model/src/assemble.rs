@@ -8,6 +8,7 @@ use super::layout::{Layout, layout};
 use super::named_load::checked_loads;
 use super::recovery::{RowsOfFiles, checked_recoveries};
 use super::references::resolve_references;
+use super::rounding::rounding;
 use super::rows::{extents, rigid_count};
 use super::wording::name_some;
 use super::{
@@ -426,16 +427,6 @@ fn check_magnitudes(
         MAX_MAGNITUDE.recip()
     );
     Some(Diagnostic::new(Code::MagnitudeExtreme, message).in_file(file))
-}
-
-/// Returns the relative difference that rounding of values with `digits` significant digits explains.
-pub(super) fn rounding(digits: u8, margin: i32) -> f64 {
-    10f64.powi(margin - i32::from(digits)).clamp(1e-12, 1e-4)
-}
-
-/// Returns the relative deviation of a mass block from a multiple of the identity that rounding explains.
-pub(super) fn block_tolerance(digits: u8) -> f64 {
-    rounding(digits, 3).max(1e-10)
 }
 
 /// Model in the internal order whose matrices are valid by themselves.

@@ -1,6 +1,7 @@
 //! Checks of a model before any work: each failure is reported with its facts.
 
-use super::assemble::{Assembled, assemble, block_tolerance, rounding};
+use super::assemble::{Assembled, assemble};
+use super::body_number::BodyNumber;
 use super::density::{Densities, LocalMass, SoundSpeed, check_density, check_exchanged, check_speed};
 use super::geometric_stiffness::missing_components;
 use super::internal_rows::refuse_turned_internals;
@@ -9,9 +10,10 @@ use super::named_load::{check_preloads, refuse_stiff_preloads};
 use super::node_pairs::check_mass_pairs;
 use super::recovery::check_rigid_responses;
 use super::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
+use super::rounding::{block_tolerance, rounding};
 use super::rows::{centre_and_length, extents, rigid_residuals};
 use super::stress::check_stress;
-use super::stress_labels::note_stress_points;
+use super::stress_notes::note_stress_points;
 use super::uniform_strains::check_stresses;
 use super::wording::{in_words, name_some};
 use super::{Damping, DofLabel, FeModel, Followers, Nodes, RawModel, Rows};
@@ -356,20 +358,4 @@ fn free_rows(matrix: &SymmetricMatrix, rows: &Rows) -> f64 {
         }
     }
     f64::from(free) / f64::from((free + held).max(1))
-}
-
-/// Number of a model among several bodies in one pair of matrices.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BodyNumber {
-    /// Number from 1, in the order of the first node of each body in the node table.
-    pub number: usize,
-    /// Number of all bodies.
-    pub of: usize,
-}
-
-impl std::fmt::Display for BodyNumber {
-    /// Formats the number as `body 1 of 2`.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "body {} of {}", self.number, self.of)
-    }
 }

@@ -11,7 +11,7 @@ use super::assemble::Assembled;
 use super::materials::{
     MetalIn, Solid, StiffnessUnit, fitting_units, metal_in_metric_units, stiffness_unit, units_of_speed,
 };
-use super::node_pairs::neighbours;
+use super::neighbours::neighbours;
 use super::wording::name_some;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::numbers::significant;

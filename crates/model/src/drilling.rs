@@ -22,9 +22,9 @@
 //! A spring, a beam or a shaft of small stiffness about n couples n' theta_i with other rotations by no more
 //! than a few times its stiffness, and stays as it is.
 
-use super::assemble::rounding;
 use super::element_around::element_around;
-use super::node_pairs::neighbours;
+use super::neighbours::neighbours;
+use super::rounding::rounding;
 use super::wording::name_some;
 use super::{Nodes, RawModel, Rows, SoftRotation, SoftRotations};
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -9,6 +9,7 @@
 )]
 
 mod assemble;
+mod body_number;
 mod checks;
 mod damping;
 mod decimate;
@@ -18,6 +19,7 @@ mod director_mass;
 mod drilling;
 mod element_around;
 mod fe_model;
+mod feature_edges;
 mod followers;
 mod geometric_stiffness;
 mod given_rows;
@@ -29,18 +31,22 @@ mod layout;
 mod mass_structure;
 mod materials;
 mod named_load;
+mod neighbours;
 mod node_pairs;
 mod nodes;
 mod raw;
+mod raw_matrix;
 mod recovery;
 mod references;
 mod rigid_motion;
+mod rounding;
 mod rows;
 mod separate_bodies;
 mod soft_rotations;
 mod stress;
 mod stress_labels;
 mod stress_loads;
+mod stress_notes;
 mod stress_points;
 mod surface;
 #[cfg(debug_assertions)]
@@ -48,7 +54,8 @@ mod test_rounding;
 mod uniform_strains;
 mod wording;
 
-pub use checks::{BodyNumber, CheckedModel, Plausibility, check};
+pub use body_number::BodyNumber;
+pub use checks::{CheckedModel, Plausibility, check};
 pub use damping::{DAMPING_BAND_KEYS, Damping, DampingBand, DampingRatios, damping_bands, ratio_at};
 pub use density::{Densities, SoundSpeed};
 pub use director_mass::{DirectorMass, NodeMoments, RigidAcceleration};
@@ -61,7 +68,8 @@ pub use interface::{Coupling, InterfaceMotion, NodeSet, Reference};
 pub use layout::filled_rows;
 pub use named_load::ModelLoad;
 pub use nodes::{DofLabel, ElementShape, Elements, Nodes};
-pub use raw::{RawMatrix, RawModel, RawModes, RawShapes};
+pub use raw::{RawModel, RawModes, RawShapes};
+pub use raw_matrix::RawMatrix;
 pub use recovery::{AnsweredShapes, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow, ShapeSteps};
 pub use rows::{Rows, centre_and_length, extents, rigid_axes, rigid_count, rigid_fields, span};
 pub use separate_bodies::check_bodies;

@@ -2,6 +2,7 @@
 //! stiffness too.
 
 use super::assemble::Assembled;
+use super::neighbours::neighbours;
 use super::rows::Rows;
 use super::wording::name_some;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -51,30 +52,6 @@ impl MassPairs {
         }
         all
     }
-}
-
-/// Returns the other vertices to which `matrix` has an entry from the rows of `vertex`, ascending. `counts`
-/// gets row, column and value of an entry and returns true if it counts.
-pub(super) fn neighbours(
-    matrix: &SymmetricMatrix,
-    rows: &Rows,
-    vertex: usize,
-    counts: impl Fn(usize, usize, f64) -> bool,
-) -> Vec<u32> {
-    let mut others = Vec::new();
-    for row in rows.of_vertex(vertex) {
-        let (columns, values) = matrix.row(row);
-        for (&column, &value) in columns.iter().zip(values) {
-            let other = rows.vertex(column as usize) as u32;
-            if others.last() != Some(&other) && counts(row, column as usize, value) {
-                others.push(other);
-            }
-        }
-    }
-    others.sort();
-    others.dedup();
-    others.retain(|&other| other as usize != vertex);
-    others
 }
 
 fn by_mass(mass: &SymmetricMatrix, diagonal: &[f64], rows: &Rows, vertex: usize) -> Vec<u32> {

@@ -1,5 +1,6 @@
 //! A model as delivered by the readers: parsed, but not yet checked as a mechanical body.
 
+use super::raw_matrix::RawMatrix;
 use super::{
     Damping, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes, RawFollowers,
     SurfaceMesh,
@@ -10,18 +11,6 @@ use flexbody_base::provenance::{SourceFile, Sources};
 use flexbody_base::units::UnitSystem;
 use flexbody_linalg::CscMatrix;
 use std::path::PathBuf;
-
-/// Matrix with the properties of its file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RawMatrix {
-    /// Matrix with both triangles (a reader expands a stored triangle), zeros dropped, duplicates summed.
-    pub matrix: CscMatrix,
-    /// Significant decimal digits of the values, 1 to 17, independent of the number of digits written; 17
-    /// for short exact numbers. Thresholds of the model checks depend on it.
-    pub digits: u8,
-    /// Path of the file; empty for matrices in memory.
-    pub path: PathBuf,
-}
 
 /// Shapes or loads as delivered by a reader: one column each.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Check of geometric stiffness by its behaviour under rigid motion (theory section 7).
 
 use super::stress_loads::UnitLoads;
-use crate::assemble::rounding;
+use crate::rounding::rounding;
 use crate::rows::{centre_and_length, rigid_axes};
 use crate::wording::name_some;
 use crate::{FeModel, GeometricStiffness, RawMatrix, UnitLoad};

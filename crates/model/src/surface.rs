@@ -1,6 +1,6 @@
 //! Surface of a part, for drawing.
 
-use super::decimate::{Side, feature_edges};
+use super::feature_edges::{Side, feature_edges};
 use crate::Nodes;
 use crate::nodes::{ElementShape, Elements};
 use std::collections::{HashMap, HashSet};

@@ -10,7 +10,7 @@
 //! a_i for each node, the integral of its shape function over the surface. Forces that no a_i gives belong to several
 //! materials, to beams, shells and rigid connections, or to elements that fail the patch test.
 
-use super::node_pairs::neighbours;
+use super::neighbours::neighbours;
 use super::rows::centre_and_length;
 use super::{
     AnsweredShapes, DofLabel, FeModel, ModelRecovery, Quantity, RecoveryOperator, StressPoint, pascals,

@@ -2,7 +2,7 @@
 
 use super::kernels::{add_scaled, dot};
 use super::natural_modes::NaturalModes;
-use super::prescribed::{AlongFrame, Prescribed};
+use super::prescribed::Prescribed;
 use super::{Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place, Snapshot};
 use crate::integration::{Failure, Oscillator, System};
 use nalgebra::{Matrix3, Vector3, Vector6};

@@ -7,7 +7,7 @@ use super::equations::NodalEquations;
 use super::inversion::{Conditions, Given};
 use crate::dynamics::{AlongFrame, Prescribed};
 use crate::integration::Failure;
-use nalgebra::{Const, LU, Matrix6, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{Vector3, Vector6};
 
 impl NodalEquations<'_> {
     /// Returns the prescribed components of (V, omega), or of their rates: model axes, zero elsewhere.

@@ -6,7 +6,7 @@ use super::error::NodalError;
 use faer::Mat;
 use flexbody_body::flex_body::{FlexBody, Frame};
 use flexbody_linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
-use flexbody_model::{Damping, DofLabel, FeModel, centre_and_length};
+use flexbody_model::{Damping, FeModel, centre_and_length};
 use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
 
 /// Smallest ratio of the smallest to the largest singular value of C R for which the conditions fix the

@@ -1,6 +1,6 @@
 //! Velocities from the momenta of turned nodes.
 
-use super::conditions::{add_motion, halves, sums};
+use super::conditions::{add_motion, sums};
 use super::directors::Workspace;
 use super::drive::LOST;
 use super::equations::NodalEquations;
@@ -8,7 +8,7 @@ use super::kinetics::Kinetics;
 use crate::dynamics::kernels::{add_scaled, dot};
 use crate::integration::Failure;
 use flexbody_linalg::multiply_vector;
-use nalgebra::{LU, Matrix6, U6, Vector3, Vector6};
+use nalgebra::{LU, Matrix6, U6, Vector6};
 
 /// Relative size of the residual, in the energy norm, at which iterations end: rounding.
 const SOLVED: f64 = 1e-15;
@@ -78,7 +78,7 @@ impl Given {
     }
 
     /// Returns `free` in the free components and `own` in the prescribed ones.
-    fn or_own(&self, free: &Vector6<f64>, own: &Vector6<f64>) -> Vector6<f64> {
+    pub(super) fn or_own(&self, free: &Vector6<f64>, own: &Vector6<f64>) -> Vector6<f64> {
         Vector6::from_fn(|k, _| if self.components[k] { own[k] } else { free[k] })
     }
 

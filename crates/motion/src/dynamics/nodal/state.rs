@@ -3,7 +3,7 @@
 
 use super::equations::NodalEquations;
 use super::inversion::{Conditions, TurnedMass};
-use super::state_layout::{ANGULAR, ATTITUDE, DISPLACEMENTS, LINEAR, OFFSET, attitude};
+use super::state_layout::DISPLACEMENTS;
 use super::{NodalError, NodalEvaluation};
 use crate::dynamics::{Configuration, EulerParameters, Orientation};
 use faer::{Mat, MatRef};

@@ -4,7 +4,6 @@ use super::NodalEvaluation;
 use super::conditions::{halves, sums};
 use super::drive::Drive;
 use super::inversion::Given;
-use crate::dynamics::kernels::add_scaled;
 use crate::integration::Failure;
 use nalgebra::{Vector3, Vector6};
 
