@@ -6,6 +6,7 @@ mod answers;
 mod bad_input;
 mod bodies;
 mod ci_example;
+mod circles;
 mod cluster;
 mod command_line;
 mod docs_generated;

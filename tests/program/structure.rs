@@ -79,26 +79,6 @@ fn every_exception_to_the_ban_of_unsafe_code_is_named() {
     assert_eq!(quoted(paragraph), found);
 }
 
-/// Repeatedly removes files that use no remaining file, until none remain or the rest form a circle.
-#[test]
-fn the_extension_module_has_no_circle_of_files() {
-    let mut uses: BTreeMap<String, String> = rust_files("python/src")
-        .into_iter()
-        .map(|file| {
-            (file.file_stem().expect("a name").to_str().expect("our own names").to_owned(), read(&file))
-        })
-        .collect();
-    loop {
-        let left: Vec<String> = uses.keys().map(|name| format!("crate::{name}::")).collect();
-        let count = uses.len();
-        uses.retain(|_, text| left.iter().any(|used| text.contains(used)));
-        if uses.len() == count {
-            break;
-        }
-    }
-    assert!(uses.is_empty(), "{:?}", uses.keys());
-}
-
 /// Choices among computed values allow for rounding: `max_by` and `min_by` with a comparison of their own take the last or
 /// first of values that rounding makes unequal.
 #[test]

@@ -22,7 +22,7 @@
 //! A spring, a beam or a shaft of small stiffness about n couples n' theta_i with other rotations by no more
 //! than a few times its stiffness, and stays as it is.
 
-use super::element_around::element_around;
+use super::element_around::{element_around, mean};
 use super::neighbours::neighbours;
 use super::rounding::rounding;
 use super::wording::name_some;
@@ -80,7 +80,14 @@ pub(super) fn with_following_rotations(
     if rows.dimension != 3 || rows.rotations().is_empty() {
         return unchanged(stiffness, mass);
     }
-    let body = Shell { rows, nodes, stiffness: &stiffness, mass: &mass, keeps_soft: raw.keep_soft_rotations };
+    let body = Shell {
+        rows,
+        nodes,
+        stiffness: &stiffness,
+        mass: &mass,
+        centre: mean(&nodes.positions),
+        keeps_soft: raw.keep_soft_rotations,
+    };
     let followers = body.followers([raw.stiffness.digits, raw.mass.digits]);
     if followers.is_empty() {
         return unchanged(stiffness, mass);
@@ -177,6 +184,8 @@ struct Shell<'b> {
     nodes: &'b Nodes,
     stiffness: &'b SymmetricMatrix,
     mass: &'b SymmetricMatrix,
+    /// Mean of the positions of the nodes.
+    centre: Vector3<f64>,
     /// True if soft rotations stay as K has them.
     keeps_soft: bool,
 }
@@ -298,7 +307,7 @@ impl Shell<'_> {
             near.retain(|&other| self.rows.is_node(other as usize));
             near
         };
-        let around = element_around(node, &normal, place, coupled)?;
+        let around = element_around(node, &normal, &self.centre, place, coupled)?;
         let centre = around.iter().map(|&node| place(node)).sum::<Vector3<f64>>() / around.len() as f64;
         let arms = around.map(|node| place(node) - centre);
         let moment = |r: &Vector3<f64>| Matrix3::identity() * r.norm_squared() - r * r.transpose();

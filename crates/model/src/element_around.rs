@@ -8,28 +8,38 @@ use nalgebra::Vector3;
 const MIN_TRIANGLE_AREA: f64 = 1e-3;
 
 /// Returns a node and two others that K couples with it and with each other: those with the largest triangle
-/// across `normal`. `coupled` returns the other nodes that K couples with a node, ascending.
+/// across `normal`, of equal ones the nearest to `centre`, so that neither the order of the nodes nor the axes
+/// of the model decide. `coupled` returns the other nodes that K couples with a node, ascending.
 pub(super) fn element_around(
     node: usize,
     normal: &Vector3<f64>,
+    centre: &Vector3<f64>,
     place: impl Fn(usize) -> Vector3<f64>,
     coupled: impl Fn(usize) -> Vec<u32>,
 ) -> Option<[usize; 3]> {
     let near = coupled(node);
     let arm = |other: usize| place(other) - place(node);
-    let mut best: Option<(f64, [usize; 3])> = None;
+    let mut best: Option<(f64, f64, [usize; 3])> = None;
     for &a in &near {
         let beside = coupled(a as usize);
         for &b in near.iter().filter(|&&b| b > a && beside.binary_search(&b).is_ok()) {
             let (x, y) = (arm(a as usize), arm(b as usize));
             let longest = x.norm_squared().max(y.norm_squared());
             let area = x.cross(&y).dot(normal).abs();
-            if area > MIN_TRIANGLE_AREA * longest
-                && best.is_none_or(|(largest, _)| area > largest * (1.0 + TIE_MARGIN))
-            {
-                best = Some((area, [node, a as usize, b as usize]));
+            let distance = (place(node) + (x + y) / 3.0 - centre).norm();
+            let is_better = |&(largest, nearest, _): &(f64, f64, [usize; 3])| {
+                area > largest * (1.0 + TIE_MARGIN)
+                    || area > largest * (1.0 - TIE_MARGIN) && distance < nearest * (1.0 - TIE_MARGIN)
+            };
+            if area > MIN_TRIANGLE_AREA * longest && best.as_ref().is_none_or(is_better) {
+                best = Some((area, distance, [node, a as usize, b as usize]));
             }
         }
     }
-    best.map(|(_, around)| around)
+    best.map(|(_, _, around)| around)
+}
+
+/// Returns the mean of positions.
+pub(super) fn mean(positions: &[[f64; 3]]) -> Vector3<f64> {
+    positions.iter().map(|x| Vector3::from(*x)).sum::<Vector3<f64>>() / positions.len().max(1) as f64
 }

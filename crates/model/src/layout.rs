@@ -1,7 +1,7 @@
 //! Conversion from labelled matrix rows to the internal order of [`Rows`]: every used node has as many
 //! displacements as the model has dimensions.
 
-use super::element_around::element_around;
+use super::element_around::{element_around, mean};
 use super::rows::{Recovered, Rows};
 use super::wording::name_some;
 use super::{Damping, DofLabel, Nodes, RawModel};
@@ -243,11 +243,12 @@ impl RowsOfNodes {
             near
         };
         let place = |node: usize| Vector3::from(raw.nodes.positions[node]);
+        let centre = mean(&raw.nodes.positions);
         let mut all: Vec<u32> = Vec::new();
         for (node, rows) in candidates {
             let normals = (3..6).filter(|&direction| is_empty(rows[direction]));
             let has_element = |direction: &usize| {
-                element_around(node, &Vector3::ith(direction - 3, 1.0), place, coupled).is_some()
+                element_around(node, &Vector3::ith(direction - 3, 1.0), &centre, place, coupled).is_some()
             };
             all.extend(normals.filter(has_element).map(|direction| rows[direction]));
         }
