@@ -19,6 +19,7 @@ mod motion;
 mod progress;
 mod recovery;
 mod report;
+mod report_format;
 mod response;
 mod scene;
 #[cfg(feature = "hdf5")]
@@ -51,7 +52,7 @@ pub use model::{Model, ModelBuilder, SparseMatrix};
 pub use motion::{Motion, PointPath};
 pub use progress::{Listener, Progress};
 pub use recovery::{Channels, LoadedHistory, Recovered, RecoveredRows};
-pub use report::ReportFormat;
+pub use report_format::ReportFormat;
 pub use response::{Response, ResponseOptions, TransferFunction};
 pub use scene::{Scene, Selection};
 #[cfg(feature = "hdf5")]

@@ -1,7 +1,5 @@
 //! Motion of a body.
 
-use super::Recovered;
-use super::recovery::RowSource;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::units::UnitSystem;
 use flexbody_motion::scene::Recording;
@@ -144,12 +142,6 @@ impl Motion {
     /// Returns warnings and notes.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
-    }
-
-    /// Returns the recoveries of the body over this motion, at the instants of the output; `None` if the body has none.
-    pub fn recovered(&self) -> Option<Recovered> {
-        let source = RowSource::Scene(self.recording.scene.clone());
-        self.recording.recovered.clone().map(|motion| Recovered { motion, source, diagnostics: Vec::new() })
     }
 
     /// Writes the motion to an HDF5 file in the format of `flexbody simulate -o` (docs/reference/simulate.md). The

@@ -1,7 +1,8 @@
 //! Recoveries: stresses, strains and forces over a motion of any program.
 
 use super::matrix::by_rows;
-use super::{FlexBody, Matrix, ReportFormat};
+use super::report_format::ReportFormat;
+use super::{FlexBody, Matrix, Motion};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
@@ -237,6 +238,14 @@ pub struct RecoveredRows {
     pub signed_von_mises: Matrix,
     /// Principal stresses, the largest first, each in the same shape.
     pub principal: [Matrix; 3],
+}
+
+impl Motion {
+    /// Returns the recoveries of the body over this motion, at the instants of the output; `None` if the body has none.
+    pub fn recovered(&self) -> Option<Recovered> {
+        let source = RowSource::Scene(self.recording.scene.clone());
+        self.recording.recovered.clone().map(|motion| Recovered { motion, source, diagnostics: Vec::new() })
+    }
 }
 
 impl FlexBody {

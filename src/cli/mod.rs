@@ -12,6 +12,7 @@ mod completions;
 mod convert;
 mod convert_options;
 mod doctor;
+mod element_decks;
 mod ending;
 mod exit;
 mod explain;

@@ -1,10 +1,10 @@
 //! Command `flexbody shapes --geometric-stiffness`.
 
 use super::arguments::ShapesArguments;
+use super::element_decks::deck_for;
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_replacing, refuse_replacing_read, refuse_warnings};
 use super::resources::context;
-use super::shapes::deck_for;
 use super::terminal::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
