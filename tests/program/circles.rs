@@ -190,7 +190,7 @@ impl Crate {
         seen: &mut BTreeSet<(Module, String)>,
     ) -> Module {
         while let Some(name) = path.first().cloned() {
-            let child = [module.as_slice(), &[name.clone()]].concat();
+            let child = [module.as_slice(), std::slice::from_ref(&name)].concat();
             let file = &self.0[&module];
             if self.0.contains_key(&child) {
                 module = child;
