@@ -1,9 +1,10 @@
 //! Files of a crate and their folders form no circle. The arrows are those of the code outside of tests: paths that
 //! lead to another module of the crate, followed through re-exports to the file that defines the item.
 
+use crate::structure::rust_files;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Crates whose files still form circles.
 const WITH_CIRCLES: [&str; 5] =
@@ -145,27 +146,19 @@ impl File {
 struct Crate(BTreeMap<Module, File>);
 
 impl Crate {
-    fn read(src: &Path) -> Self {
-        let mut files = BTreeMap::new();
-        let mut left = vec![PathBuf::new()];
-        while let Some(place) = left.pop() {
-            for entry in fs::read_dir(src.join(&place)).expect("a folder") {
-                let path = place.join(entry.expect("an entry").file_name());
-                if src.join(&path).is_dir() {
-                    left.push(path);
-                } else if path.extension().is_some_and(|ending| ending == "rs") {
-                    let name = path.with_extension("");
-                    let mut module: Module =
-                        name.iter().map(|part| part.to_str().expect("our own names").to_owned()).collect();
-                    if ["mod", "lib"].contains(&&**module.last().expect("a name")) {
-                        module.pop();
-                    }
-                    let text = fs::read_to_string(src.join(&path)).expect("a text");
-                    files.insert(module, File::new(&text));
-                }
+    /// Reads the files below a folder of the workspace.
+    fn read(src: &str) -> Self {
+        let file = |path: PathBuf| {
+            let name = path.strip_prefix(src).expect("a file below").with_extension("");
+            let mut module: Module =
+                name.iter().map(|part| part.to_str().expect("our own names").to_owned()).collect();
+            if ["mod", "lib"].contains(&&**module.last().expect("a name")) {
+                module.pop();
             }
-        }
-        Self(files)
+            let text = fs::read_to_string(oracle::root().join(&path)).expect("a text");
+            (module, File::new(&text))
+        };
+        Self(rust_files(src).into_iter().map(file).collect())
     }
 
     /// Returns the module in which a path of `module` starts, and the rest of the path; `None` for paths of other crates.
@@ -282,7 +275,7 @@ fn files_of_a_crate_make_no_circle() {
     let sources = crates.iter().map(|name| format!("crates/{name}/src"));
     let sources = sources.chain(["src".to_owned(), "python/src".to_owned()]);
     let found: BTreeMap<String, Vec<String>> = sources
-        .map(|src| (src.clone(), Crate::read(&oracle::root().join(src)).circles()))
+        .map(|src| (src.clone(), Crate::read(&src).circles()))
         .filter(|(_, members)| !members.is_empty())
         .collect();
     let names: Vec<&str> = found.keys().map(String::as_str).collect();

@@ -18,7 +18,7 @@ fn quoted(text: &str) -> BTreeSet<String> {
 }
 
 /// Returns all Rust files below a folder of the workspace, with paths from the root.
-fn rust_files(folder: &str) -> Vec<PathBuf> {
+pub(crate) fn rust_files(folder: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut left = vec![PathBuf::from(folder)];
     while let Some(place) = left.pop() {

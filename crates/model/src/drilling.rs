@@ -22,9 +22,10 @@
 //! A spring, a beam or a shaft of small stiffness about n couples n' theta_i with other rotations by no more
 //! than a few times its stiffness, and stays as it is.
 
-use super::element_around::{element_around, mean};
+use super::element_around::element_around;
 use super::neighbours::neighbours;
 use super::rounding::rounding;
+use super::rows::centre_and_length;
 use super::wording::name_some;
 use super::{Nodes, RawModel, Rows, SoftRotation, SoftRotations};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -85,7 +86,7 @@ pub(super) fn with_following_rotations(
         nodes,
         stiffness: &stiffness,
         mass: &mass,
-        centre: mean(&nodes.positions),
+        centre: centre_and_length(&nodes.positions).0.into(),
         keeps_soft: raw.keep_soft_rotations,
     };
     let followers = body.followers([raw.stiffness.digits, raw.mass.digits]);

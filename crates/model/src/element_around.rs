@@ -38,8 +38,3 @@ pub(super) fn element_around(
     }
     best.map(|(_, _, around)| around)
 }
-
-/// Returns the mean of positions.
-pub(super) fn mean(positions: &[[f64; 3]]) -> Vector3<f64> {
-    positions.iter().map(|x| Vector3::from(*x)).sum::<Vector3<f64>>() / positions.len().max(1) as f64
-}

@@ -1,8 +1,8 @@
 //! Conversion from labelled matrix rows to the internal order of [`Rows`]: every used node has as many
 //! displacements as the model has dimensions.
 
-use super::element_around::{element_around, mean};
-use super::rows::{Recovered, Rows};
+use super::element_around::element_around;
+use super::rows::{Recovered, Rows, centre_and_length};
 use super::wording::name_some;
 use super::{Damping, DofLabel, Nodes, RawModel};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -243,7 +243,7 @@ impl RowsOfNodes {
             near
         };
         let place = |node: usize| Vector3::from(raw.nodes.positions[node]);
-        let centre = mean(&raw.nodes.positions);
+        let centre = centre_and_length(&raw.nodes.positions).0.into();
         let mut all: Vec<u32> = Vec::new();
         for (node, rows) in candidates {
             let normals = (3..6).filter(|&direction| is_empty(rows[direction]));

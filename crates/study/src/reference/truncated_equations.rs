@@ -149,7 +149,7 @@ impl TruncatedEquations {
     /// circular frequencies).
     fn eigenmodes(&self) -> Option<(Mat<f64>, Vec<f64>)> {
         let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
-        // A basis of unit stiffness: L'^-1 for the modes (K_ff = L L'), principal directions for the responses.
+        // A basis of unit stiffness: L'^-1 for the modes (K_ff = L L'), K-orthonormal combinations of the responses.
         let of_responses = of_unit_energy(&self.stiffness)?;
         let lower = dense_cholesky(self.modal_stiffness.clone())?;
         let of_modes = solve_upper(&lower, &Mat::identity(nf, nf));

@@ -4,7 +4,7 @@ use super::compressed::{Compressed, Projected, UnbalancedAmplitudes, principal, 
 use super::estimate::Grid;
 use super::residual::{Held, NodalView};
 use super::truncated_equations::of_unit_energy;
-use faer::{Mat, MatRef};
+use faer::{ColRef, Mat, MatRef};
 use flexbody_base::error::Result;
 use flexbody_body::basis::{free_static_responses_twice, oscillating_responses};
 use flexbody_body::flex_body::FlexBody;
@@ -171,9 +171,8 @@ const STEPS_OF_DIRECTIONS: f64 = 4096.0;
 /// between directions a thousandfold in a long run (by the phases of its oscillations), and each round magnifies those of
 /// the round before: without the grid, last bits decide about the body after four rounds.
 fn coarse(directions: MatRef<'_, f64>) -> Mat<f64> {
-    let largest = |j: usize| directions.col(j).iter().fold(0.0f64, |most, value| most.max(value.abs()));
-    let steps: Vec<f64> =
-        (0..directions.ncols()).map(|j| largest(j).max(f64::MIN_POSITIVE) / STEPS_OF_DIRECTIONS).collect();
+    let step = |column: ColRef<'_, f64>| column.norm_max().max(f64::MIN_POSITIVE) / STEPS_OF_DIRECTIONS;
+    let steps: Vec<f64> = directions.col_iter().map(step).collect();
     Mat::from_fn(directions.nrows(), directions.ncols(), |i, j| {
         (directions[(i, j)] / steps[j]).round() * steps[j]
     })
@@ -256,7 +255,7 @@ impl<'v> ModalProjection<'v> {
         let sizes: Vec<f64> = (0..own.nrows()).map(|j| own[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
         further = Mat::from_fn(further.nrows(), further.ncols(), |i, j| further[(i, j)] / sizes[j]);
         let Some(unit) = of_unit_energy(energy) else { return further };
-        let largest = (0..energy.nrows()).map(|j| energy[(j, j)]).fold(0.0, f64::max).sqrt();
+        let largest = (0..energy.nrows()).map(|j| energy[(j, j)]).fold(0.0, larger).sqrt();
         let orthonormal = combine(known.as_ref(), unit.as_ref());
         let weighted = self.view.model.pencil().apply_stiffness(orthonormal.as_ref());
         // Orthogonalise twice: the new part may be small compared with the common part.
