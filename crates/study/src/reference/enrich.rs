@@ -15,7 +15,7 @@ const MAX_FIRST_ERROR_RATIO: f64 = 0.9;
 
 /// Largest such ratio after later responses. A larger value adds responses that hardly pay, whose choice rounding
 /// decides: the motion of a long run magnifies it a thousandfold in every round.
-const MAX_LATER_ERROR_RATIO: f64 = 0.8;
+const MAX_LATER_ERROR_RATIO: f64 = 0.75;
 
 /// Largest number of enrichment rounds for an ordinary reference.
 const MOST_ROUNDS: usize = 4;
