@@ -296,12 +296,13 @@ impl Model {
     /// Computes modes and invariants, like `flexbody.convert`.
     ///
     /// With a `scene` (a `Scene`, the path of a scene file, or a list of load cases) the body has only the terms and
-    /// modes that the scene needs; `Body.terms` gives the reasons.
+    /// modes that the scene needs; `Body.terms` gives the reasons. A selection that does not hold, or cannot be judged, is
+    /// an error (FB557) unless `allow_unjudged` is true.
     ///
     /// Raises InputError, NumericalError or ResourceError.
     #[pyo3(
-        signature = (*, modes=None, max_frequency=None, basis=None, accuracy=None, frame=None, comparators=true, scene=None),
-        text_signature = "($self, *, modes=None, max_frequency=None, basis=\"free\", accuracy=\"standard\", frame=\"com\", comparators=True, scene=None)"
+        signature = (*, modes=None, max_frequency=None, basis=None, accuracy=None, frame=None, comparators=true, scene=None, allow_unjudged=false),
+        text_signature = "($self, *, modes=None, max_frequency=None, basis=\"free\", accuracy=\"standard\", frame=\"com\", comparators=True, scene=None, allow_unjudged=False)"
     )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn convert(
@@ -314,8 +315,15 @@ impl Model {
         frame: Argument<'_, '_>,
         comparators: bool,
         scene: Argument<'_, '_>,
+        allow_unjudged: bool,
     ) -> PyResult<Body> {
-        let options = convert_options(modes, max_frequency, [basis, accuracy, frame], comparators)?;
+        let mut options = convert_options(modes, max_frequency, [basis, accuracy, frame], comparators)?;
+        if allow_unjudged {
+            if scene.is_none() {
+                return Err(value_error(py, "`allow_unjudged` is given without a `scene`"));
+            }
+            options = options.allow_unjudged();
+        }
         let model = Arc::clone(&self.inner);
         let (body, mut found): (flexbody::FlexBody, Vec<Diagnostic>) = match scene {
             None => {

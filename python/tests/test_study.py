@@ -40,6 +40,20 @@ def test_a_body_made_for_a_scene(scene: Path) -> None:
     assert again == body
 
 
+def test_a_body_that_cannot_be_judged() -> None:
+    model = flexbody.read_model(MODELS / "cube_hex8" / "model.toml")
+    shock = {
+        "run": {"duration": 2e-4, "outputs": 20},
+        "load": [{"node": 1, "force": [10, 20, 100]}],
+        "tolerance": {"deflection": 0.5, "stress": 0.5},
+    }
+    with pytest.raises(flexbody.FlexbodyError, match="FB557"):
+        model.convert(modes=5, scene=shock)
+    assert model.convert(modes=5, scene=shock, allow_unjudged=True).n_modes > 0
+    with pytest.raises(flexbody.InputError, match="without a `scene`"):
+        model.convert(allow_unjudged=True)
+
+
 def test_trade(bracket_body: flexbody.Body, scene: Path, tmp_path: Path) -> None:
     trade = bracket_body.trade(flexbody.Scene(scene), repeat=1)
     assert len(trade.candidates) > 3 and trade.recommended is not None and trade.holds

@@ -7,10 +7,9 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{self, Subset};
 use flexbody_body::verification::{accept, body_identities};
-use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
-use flexbody_motion::scene::{self, Point, body_point, simulate, simulate_with_envelope, unsettled_rate};
-use flexbody_study::selection::select;
+use flexbody_motion::scene::{Point, Simulated, SimulationRequest, body_point};
+use flexbody_study::selection_request::SelectionRequest;
 use nalgebra::{Matrix3, Vector3};
 #[cfg(feature = "hdf5")]
 use std::path::Path;
@@ -208,8 +207,9 @@ impl FlexBody {
     /// # Errors
     /// The errors of [`FlexBody::select`]; FB605 if the listener stops it.
     pub fn select_with_progress(&self, scene: &Scene, listener: Listener<'_>) -> Result<Selection> {
-        heard(listener, |context| select(&self.0, &[], &scene.0, context))
-            .map(|inner| Selection { inner, is_of_body: true })
+        let request = SelectionRequest::default();
+        heard(listener, |context| request.for_body(&self.0, &scene.0, context))
+            .map(|selected| Selection { inner: selected.selection, is_of_body: true })
     }
 
     /// Returns the body with some of its modes and groups of terms, like `flexbody reduce`.
@@ -302,7 +302,7 @@ impl FlexBody {
     /// # Errors
     /// The errors of [`FlexBody::simulate`]; FB605 if the listener stops it.
     pub fn simulate_with_progress(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
-        self.simulate_by(simulate, scene, listener)
+        self.simulate_by(SimulationRequest::default(), scene, listener)
     }
 
     /// Does the work of [`FlexBody::simulate_with_progress`], and finds the largest stresses of every point of the
@@ -311,25 +311,23 @@ impl FlexBody {
     /// # Errors
     /// The errors of [`FlexBody::simulate_with_progress`].
     pub fn simulate_with_envelope(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
-        self.simulate_by(simulate_with_envelope, scene, listener)
+        let request = SimulationRequest { needs_envelope: true, ..SimulationRequest::default() };
+        self.simulate_by(request, scene, listener)
     }
 
-    fn simulate_by(&self, simulate: Simulate, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
+    fn simulate_by(
+        &self,
+        request: SimulationRequest,
+        scene: &Scene,
+        listener: Listener<'_>,
+    ) -> Result<Motion> {
         let scene = scene.0.single()?;
-        let (recording, diagnostics) = heard(listener, |context| {
-            context.phase("simulation");
-            let (recording, mut found) = simulate(&self.0, scene, context)?;
-            found.extend(unsettled_rate(&self.0, scene, &recording, context)?);
-            Ok((recording, found))
-        })?;
+        let Simulated { recording, diagnostics } =
+            heard(listener, |context| request.run(&self.0, scene, context))?;
         let (units, extent) = (self.0.units().clone(), self.0.extent());
         Ok(Motion { recording, units, extent, diagnostics })
     }
 }
-
-/// Simulation of a body in a scene.
-type Simulate =
-    fn(&flex_body::FlexBody, &scene::Scene, &Context<'_>) -> Result<(scene::Recording, Vec<Diagnostic>)>;
 
 /// Flex-body file in a temporary folder, since HDF5 reads and writes files.
 #[cfg(feature = "hdf5")]

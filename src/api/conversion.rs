@@ -4,95 +4,71 @@ use super::progress::{Listener, NO_LISTENER, heard};
 use super::{Basis, FlexBody, Model, Scene, Selection};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_body::convert::{self, ConvertSettings, Lumping, MeshChoice, convert};
+use flexbody_body::convert::{self, MeshChoice};
 use flexbody_body::invariants::FrameChoice;
-use flexbody_body::verification::accept;
-use flexbody_eigen::{Accuracy, Wanted};
+use flexbody_eigen::Accuracy;
 use flexbody_motion::scene::LoadCases;
-use flexbody_study::tailoring::{Tailoring, computed_basis, convert_for, loads_for};
+use flexbody_study::conversion::ConversionRequest;
+use flexbody_study::selection;
 
 /// Settings of a conversion. By default 20 free-surface modes, proved complete, about the centre of mass along the axes
 /// of the model.
 #[derive(Debug, Clone, Default)]
-pub struct ConvertOptions {
-    modes: Option<usize>,
-    highest: Option<f64>,
-    basis: Basis,
-    accuracy: Accuracy,
-    frame: FrameChoice,
-    without_comparators: bool,
-    mesh: MeshChoice,
-}
+pub struct ConvertOptions(ConversionRequest);
 
 impl ConvertOptions {
     /// Requests the `count` lowest modes.
     pub fn modes(mut self, count: usize) -> Self {
-        self.modes = Some(count);
+        self.0.modes = Some(count);
         self
     }
 
     /// Requests all modes below a frequency. Unit: Hz.
     pub fn below_hz(mut self, frequency: f64) -> Self {
-        self.highest = Some(frequency);
+        self.0.max_frequency = Some(frequency);
         self
     }
 
     /// Sets the basis.
     pub fn basis(mut self, basis: Basis) -> Self {
-        self.basis = basis;
+        self.0.basis = basis;
         self
     }
 
     /// Sets the accuracy.
     pub fn accuracy(mut self, accuracy: Accuracy) -> Self {
-        self.accuracy = accuracy;
+        self.0.accuracy = accuracy;
         self
     }
 
     /// Sets the body frame.
     pub fn frame(mut self, frame: impl Into<FrameChoice>) -> Self {
-        self.frame = frame.into();
+        self.0.frame = frame.into();
         self
     }
 
     /// Disables the comparison with lumped masses.
     pub fn without_comparators(mut self) -> Self {
-        self.without_comparators = true;
+        self.0.lumped = Vec::new();
         self
     }
 
     /// Leaves out the surface of the model.
     pub fn without_mesh(mut self) -> Self {
-        self.mesh = MeshChoice::Without;
+        self.0.mesh = MeshChoice::Without;
         self
     }
 
     /// Limits the surface to `most` triangles.
     pub fn mesh_triangles(mut self, most: usize) -> Self {
-        self.mesh = MeshChoice::AtMost(most);
+        self.0.mesh = MeshChoice::AtMost(most);
         self
     }
 
-    fn settings(&self, model: &Model, cases: Option<&LoadCases>) -> Result<ConvertSettings> {
-        let followed = self.basis.follows_scene() && self.accuracy != Accuracy::Certified;
-        let loads = loads_for(cases.filter(|_| followed), &model.residual_vectors);
-        let mut settings = ConvertSettings {
-            basis: computed_basis(self.basis, &loads, &model.checked)?,
-            frame: self.frame.clone(),
-            mesh: self.mesh,
-            ..ConvertSettings::default()
-        };
-        settings.modes.accuracy = self.accuracy;
-        if let Some(count) = self.modes {
-            settings.modes.wanted = Wanted::Lowest(count);
-        }
-        if let Some(frequency) = self.highest {
-            settings.modes.wanted = Wanted::Below(model.checked.units().eigenvalue_of(frequency));
-        }
-        if self.without_comparators {
-            settings.lumped = Vec::<Lumping>::new();
-        }
-        Ok(settings)
+    /// Permits a body for a scene although the selection of its terms and modes does not hold, or cannot be judged.
+    pub fn allow_unjudged(mut self) -> Self {
+        self.0.allow_unjudged = true;
+        self
     }
 }
 
@@ -126,20 +102,19 @@ impl Model {
         options: &ConvertOptions,
         listener: Listener<'_>,
     ) -> Result<Conversion> {
-        if options.basis == Basis::Scene {
+        if options.0.basis == Basis::Scene {
             let message = "a basis made for a scene needs the scene: use `convert_for`";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
-        let settings = options.settings(self, None)?;
-        let conversion = heard(listener, |context| convert(&self.checked, &settings, context))?;
-        accepted(conversion)
+        self.converted(options, None, listener).map(|(conversion, _)| conversion)
     }
 
     /// Converts with only the terms and modes that the load cases of `scene` need. Returns the decision about each as
     /// well.
     ///
     /// # Errors
-    /// The errors of [`Model::convert`]; FB212 if the scene does not match the body.
+    /// The errors of [`Model::convert`]; FB212 if the scene does not match the body; FB557 if the selection does not hold
+    /// or cannot be judged, unless [`ConvertOptions::allow_unjudged`] permits it.
     pub fn convert_for(&self, scene: &Scene, options: &ConvertOptions) -> Result<(Conversion, Selection)> {
         self.convert_for_with_progress(scene, options, NO_LISTENER)
     }
@@ -154,17 +129,20 @@ impl Model {
         options: &ConvertOptions,
         listener: Listener<'_>,
     ) -> Result<(Conversion, Selection)> {
-        let settings = options.settings(self, Some(&scene.0))?;
-        let by_band = options.modes.is_none() && options.highest.is_none() && options.basis.follows_scene();
-        let tailoring = Tailoring { settings, by_band, of_motion: options.basis == Basis::Scene };
-        let (conversion, selection) =
-            heard(listener, |context| convert_for(&self.checked, &tailoring, &scene.0, context))?;
-        Ok((accepted(conversion)?, Selection { inner: selection, is_of_body: false }))
+        let (conversion, selection) = self.converted(options, Some(&scene.0), listener)?;
+        let inner = selection.expect("a conversion for a scene selects");
+        Ok((conversion, Selection { inner, is_of_body: false }))
     }
-}
 
-/// Returns a finished conversion in the types of this library, once its body has passed every check.
-fn accepted(conversion: convert::Conversion) -> Result<Conversion> {
-    accept(&conversion.body)?;
-    Ok(Conversion { body: FlexBody(conversion.body), diagnostics: conversion.diagnostics })
+    fn converted(
+        &self,
+        options: &ConvertOptions,
+        cases: Option<&LoadCases>,
+        listener: Listener<'_>,
+    ) -> Result<(Conversion, Option<selection::Selection>)> {
+        let loads = &self.residual_vectors;
+        let made = heard(listener, |context| options.0.convert(&self.checked, loads, cases, None, context))?;
+        let convert::Conversion { body, diagnostics, .. } = made.conversion;
+        Ok((Conversion { body: FlexBody(body), diagnostics }, made.selection))
+    }
 }

@@ -10,7 +10,7 @@ use flexbody_body::flex_body::Carrier;
 use flexbody_input::read_steps;
 use flexbody_model::RecoveryRow;
 use flexbody_motion::scene::{
-    self, AmplitudeHistory, Envelope, LoadHistory, RecoveredMotion, RowMap, StressPoint,
+    self, AmplitudeHistory, Envelope, LoadHistory, RecoveredMotion, RecoveryRequest, RowMap, StressPoint,
 };
 use flexbody_report::{EnvelopeKind, RecoveredFacts, RunData, channels_csv, recovered_csv};
 use nalgebra::Vector3;
@@ -257,10 +257,9 @@ impl FlexBody {
     /// lie on one line; FB804 for another number of modal coordinates.
     pub fn recover(&self, history: &LoadedHistory, names: &[&str]) -> Result<Recovered> {
         history.refuse_foreign(self)?;
-        let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
-        let motion = history.0.recover(&self.0, &names)?;
-        let mut diagnostics = Vec::from_iter(history.0.left_out(&self.0, &names));
-        diagnostics.extend(scene::stresses_at_rigid_interfaces(&self.0, &motion));
+        let only = names.iter().map(|name| (*name).to_owned()).collect();
+        let request = RecoveryRequest { only, ..RecoveryRequest::default() };
+        let scene::Recovered { motion, diagnostics } = request.run(&self.0, &history.0)?;
         Ok(Recovered { motion, source: RowSource::History(Box::new(history.clone())), diagnostics })
     }
 

@@ -6,7 +6,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_report::{ResponseFacts, response_csv};
 use flexbody_study::response::{
-    self, Band, Place, RandomResponse, ResponseRequest, ResponseSettings, converted_for_response,
+    self, Band, Place, RandomResponse, Responded, ResponseRequest, ResponseSettings,
 };
 use nalgebra::Complex;
 use std::path::PathBuf;
@@ -18,8 +18,6 @@ pub struct ResponseOptions {
     request: ResponseRequest,
     band: Option<(f64, f64)>,
     scene: Option<Scene>,
-    basis: Basis,
-    modes: Option<usize>,
 }
 
 impl ResponseOptions {
@@ -93,13 +91,13 @@ impl ResponseOptions {
 
     /// Sets the basis of the body that [`Model::response`] makes if it is given none.
     pub fn basis(mut self, basis: Basis) -> Self {
-        self.basis = basis;
+        self.request.basis = Some(basis);
         self
     }
 
     /// Sets the number of modes of the body that [`Model::response`] makes if it is given none. Default 20.
     pub fn modes(mut self, count: usize) -> Self {
-        self.modes = Some(count);
+        self.request.modes = Some(count);
         self
     }
 
@@ -159,21 +157,11 @@ impl Model {
     ) -> Result<Response> {
         let (request, scene) = (options.request()?, options.scene.as_ref());
         let scene = scene.map(|scene| scene.0.single()).transpose()?;
-        heard(listener, |context| {
-            let mut diagnostics = self.diagnostics().to_vec();
-            let made = match body {
-                Some(_) => None,
-                None => {
-                    let (loads, modes) = (&self.residual_vectors, options.modes);
-                    let made = converted_for_response(&self.checked, options.basis, loads, modes, context)?;
-                    diagnostics.extend(made.diagnostics);
-                    Some(made.body)
-                }
-            };
-            let body = made.as_ref().or(body.map(|body| &body.0)).expect("one of the two");
-            let (inner, settings) = request.respond(Some(&self.checked), body, scene, context)?;
-            Ok(Response { inner, settings, diagnostics })
-        })
+        let body = body.map(|body| &body.0);
+        let responded = heard(listener, |context| {
+            request.for_model(&self.checked, &self.residual_vectors, body, scene, context)
+        })?;
+        Ok(Response::new(responded, self.diagnostics()))
     }
 }
 
@@ -186,15 +174,18 @@ impl FlexBody {
     pub fn response(&self, options: &ResponseOptions, listener: Listener<'_>) -> Result<Response> {
         let (request, scene) = (options.request()?, options.scene.as_ref());
         let scene = scene.map(|scene| scene.0.single()).transpose()?;
-        heard(listener, |context| {
-            let (inner, settings) = request.respond(None, &self.0, scene, context)?;
-            let diagnostics = inner.diagnostics.clone();
-            Ok(Response { inner, settings, diagnostics })
-        })
+        let responded = heard(listener, |context| request.for_body(&self.0, scene, context))?;
+        Ok(Response::new(responded, &[]))
     }
 }
 
 impl Response {
+    /// Returns a response, with `earlier` diagnostics before its own.
+    fn new(responded: Responded, earlier: &[Diagnostic]) -> Self {
+        let Responded { response: inner, settings, diagnostics, .. } = responded;
+        Self { inner, settings, diagnostics: [earlier, &diagnostics].concat() }
+    }
+
     /// Returns the frequencies, ascending. Unit: Hz.
     pub fn frequencies_hz(&self) -> &[f64] {
         &self.inner.frequencies

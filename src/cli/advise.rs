@@ -1,19 +1,17 @@
 //! Command `flexbody advise`.
 
 use super::arguments::{AdviseArguments, Deflection};
-use super::outcome::{Outcome, format_of, refuse_replacing, refuse_warnings};
+use super::outcome::Outcome;
+use super::run::Run;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::output::OutputSlot;
-use flexbody_report::{AdviceFacts, Format, RunData};
+use flexbody_report::AdviceFacts;
 use flexbody_study::advice::{AttachedMass, Ranges, advise};
 
 pub(super) fn run(arguments: &AdviseArguments) -> Result<Outcome> {
-    let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
-    refuse_replacing(std::iter::once(&arguments.body), arguments.report.iter())?;
+    let mut run = Run::begin(arguments.printing, [&arguments.body], None, &arguments.report)?;
     let attached = arguments.attached.as_deref().map(attached_mass).transpose()?;
-    let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
-    let (body, diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
+    let body = run.read_body(&arguments.body)?;
     let ranges = Ranges {
         spin_hz: arguments.spin,
         deflection: arguments.deflection.map(|deflection| match deflection {
@@ -25,15 +23,9 @@ pub(super) fn run(arguments: &AdviseArguments) -> Result<Outcome> {
         limit: arguments.limit,
     };
     let advice = advise(&body, ranges)?;
-    let run = RunData { diagnostics, ..RunData::default() };
-    refuse_warnings(arguments.printing, &run.diagnostics)?;
-    let facts = AdviceFacts::new(&advice, &body, &arguments.body.display().to_string(), &run);
-    for (slot, format) in reports.iter().zip(formats) {
-        slot.fill(facts.render(format).as_bytes())?;
-    }
-    OutputSlot::commit_all(reports)?;
-    let (text, json) = (facts.render(Format::Terminal), facts.render(Format::Json));
-    Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
+    let data = run.data()?;
+    let facts = AdviceFacts::new(&advice, &body, &arguments.body.display().to_string(), &data);
+    run.end(None, |format| facts.render(format), true)
 }
 
 /// Parses an attached mass: `MASS` or `MASS@INTERFACE`.

@@ -153,7 +153,7 @@ pub struct StatedArguments {
     #[arg(long, value_name = "GROUPS", conflicts_with = "from")]
     pub terms: Option<String>,
     /// Numbers of the modes that the body keeps, instead of a selection: 1,3,5-9
-    #[arg(long, value_name = "NUMBERS", conflicts_with = "from")]
+    #[arg(long, value_name = "NUMBERS", conflicts_with_all = ["from", "split"])]
     pub keep_modes: Option<String>,
     /// With --basis scene: number of shapes of the motion [default: the fewest that suffice]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "from")]

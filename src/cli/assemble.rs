@@ -1,72 +1,65 @@
 //! Command `flexbody assemble`: a conversion with modes that a cluster has found.
 
-use super::arguments::{AssembleArguments, ConvertArguments, EngineArguments, JobArguments, StatedArguments};
-use super::convert::run_with;
-use super::mode_source::ModeSource;
+use super::arguments::{AssembleArguments, JobArguments};
+use super::conversion_request::lumping_schemes;
+use super::convert::ConversionRun;
+use super::mode_source::{ModeSource, folder_around};
+use super::models::of_manifest_or_job;
 use super::outcome::Outcome;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_body::basis::BasisKind;
+use flexbody_body::convert::MeshChoice;
 use flexbody_cluster::{Prepared, read_prepared};
-use flexbody_eigen::FactorChoice;
+use flexbody_input::ModelFiles;
+use flexbody_study::conversion::ConversionRequest;
 
 pub(super) fn run(arguments: &AssembleArguments) -> Result<Outcome> {
     let prepared = read_prepared(&arguments.folder)?;
-    let converted = as_conversion(arguments, &prepared)?;
+    let conversion = conversion(arguments, &prepared)?;
     let (folder, prove) = (arguments.folder.clone(), arguments.prove);
-    run_with(&converted, &ModeSource::Cluster { folder, prepared: Box::new(prepared), prove })
+    conversion.run(&ModeSource::Cluster { folder, prepared: Box::new(prepared), prove })
 }
 
-/// Returns the corresponding arguments of `convert`.
-fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<ConvertArguments> {
-    let model = arguments.model.clone().or_else(|| prepared.model.path.clone()).ok_or_else(|| {
+/// Returns the conversion of the model that was prepared.
+fn conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<ConversionRun> {
+    let stated = &prepared.model;
+    let model = arguments.model.clone().or_else(|| stated.path.clone()).ok_or_else(|| {
         Diagnostic::new(Code::Usage, "the folder does not state the path of its model")
             .with_help("give the path with --model")
     })?;
+    let job = JobArguments {
+        matrices: stated.matrices.clone(),
+        dimension: stated.dimension,
+        format: stated.format.clone(),
+        units: stated.units.clone(),
+        interface: stated.interfaces.clone(),
+        damping: stated.damping.clone(),
+    };
+    let mut files = of_manifest_or_job(&model, &job)?;
+    files.allow_implausible |= stated.allow_implausible;
+    files.keep_soft_rotations |= stated.keep_soft_rotations;
     let hertz = |lambda: f64| lambda.sqrt() / std::f64::consts::TAU * prepared.hertz;
-    let modes = prepared.wanted.modes.and_then(|count| u32::try_from(count).ok());
-    Ok(ConvertArguments {
-        model: Some(model),
-        from: None,
-        job: JobArguments {
-            matrices: prepared.model.matrices.clone(),
-            dimension: prepared.model.dimension,
-            format: prepared.model.format.clone(),
-            units: prepared.model.units.clone(),
-            interface: prepared.model.interfaces.clone(),
-            damping: prepared.model.damping.clone(),
-        },
-        stiffness: None,
-        mass: None,
-        nodes: None,
-        dofs: None,
-        allow_implausible: prepared.model.allow_implausible,
-        keep_soft_rotations: prepared.model.keep_soft_rotations,
-        output: arguments.output.clone(),
-        modes: arguments.modes.or(modes),
+    let request = ConversionRequest {
+        modes: arguments.modes.map(u64::from).or(prepared.wanted.modes).map(|modes| modes as usize),
         max_frequency: prepared.wanted.below.filter(|_| arguments.modes.is_none()).map(hertz),
-        basis: BasisKind::Free,
-        shapes: None,
-        residual_vectors: Some(String::new()),
+        residual_vectors: Some(Vec::new()),
         accuracy: prepared.accuracy(),
-        factor: FactorChoice::Auto,
         storage: arguments.storage,
+        frame: arguments.frame.clone().unwrap_or_default(),
+        mesh: if arguments.no_mesh { MeshChoice::Without } else { MeshChoice::Whole },
+        ..ConversionRequest::default()
+    };
+    Ok(ConversionRun {
+        request,
+        schemes: lumping_schemes(&arguments.lumped)?,
+        files: ModelFiles { keep_in: Some(folder_around(&arguments.output)), ..files },
+        cases: None,
+        also_read: Vec::new(),
+        output: arguments.output.clone(),
+        reports: arguments.report.clone(),
+        split: false,
         memory_limit: arguments.memory_limit,
         allow_long: true,
-        frame: arguments.frame.clone(),
-        lumped: arguments.lumped.clone(),
-        lumped_modes: false,
-        mesh_triangles: None,
-        no_mesh: arguments.no_mesh,
-        scene: None,
-        case: None,
-        allow_unjudged: false,
-        like: None,
-        stated: StatedArguments::default(),
-        report: arguments.report.clone(),
-        split: false,
-        engine: EngineArguments::default(),
-        threads: arguments.threads,
         verbose: arguments.verbose,
         printing: arguments.printing,
     })

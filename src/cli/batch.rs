@@ -2,14 +2,13 @@
 //! the memory.
 
 use super::arguments::{Arguments, BatchArguments, Command, ConvertArguments};
-use super::convert::{model_files, wanted};
-use super::outcome::{Outcome, format_of, refuse_replacing, refuse_replacing_read};
+use super::outcome::{Outcome, refuse_replacing, refuse_replacing_read};
 use super::resources::{for_threads, memory_left};
+use super::run::Run;
 use super::terminal::Watcher;
 use flexbody_base::children;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, ExitCode, Result};
-use flexbody_base::output::OutputSlot;
 use flexbody_body::basis::ModeSettings;
 use flexbody_cluster::{
     BatchBody, BatchList, Budget, Ledger, conversion_bytes, inputs_fingerprint, read_batch_list,
@@ -17,7 +16,7 @@ use flexbody_cluster::{
 use flexbody_input::read_model;
 use flexbody_linalg::context::{Event, Watch};
 use flexbody_model::FeModel;
-use flexbody_report::{BatchFacts, BatchRow, Format};
+use flexbody_report::{BatchFacts, BatchRow};
 use serde_json::Value;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -79,10 +78,8 @@ fn this_program() -> Result<Vec<OsString>> {
 }
 
 pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
-    let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let list = read_batch_list(&arguments.list)?;
-    refuse_replacing(std::iter::once(&arguments.list), arguments.report.iter())?;
-    let slots = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let mut run = Run::begin(arguments.printing, [&arguments.list], None, &arguments.report)?;
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading the list");
     let task = BatchTask {
         path: &arguments.list,
@@ -95,13 +92,10 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
     let made = task.run(&|event| watcher.hear(event));
     watcher.clear();
     let facts = made?;
-    for (slot, format) in slots.iter().zip(formats) {
-        slot.fill(facts.render(format).as_bytes())?;
-    }
-    OutputSlot::commit_all(slots)?;
-    let (text, json) = (facts.render(Format::Terminal), facts.render(Format::Json));
     let failed = failed(&facts, &arguments.list);
-    Ok(Outcome { text, json, passed: failed.is_none(), diagnostics: failed.into_iter().collect() })
+    let passed = failed.is_none();
+    run.note(failed);
+    run.end(None, |format| facts.render(format), passed)
 }
 
 /// Returns the error about failed bodies; `None` if all were made.
@@ -166,7 +160,7 @@ impl BatchTask<'_> {
     ) -> Result<()> {
         let files = |converted: &ConvertArguments| match &converted.from {
             Some(_) => converted.model.iter().cloned().collect(),
-            None => model_files(converted).map(|files| files.paths()).unwrap_or_default(),
+            None => converted.model_files().map(|files| files.paths()).unwrap_or_default(),
         };
         let mut inputs: Vec<PathBuf> = parsed.iter().flat_map(|(_, converted)| files(converted)).collect();
         inputs.push(self.path.to_path_buf());
@@ -274,7 +268,7 @@ fn refused(body: &BatchBody, why: &str) -> Error {
 
 /// Returns the fingerprint of the options of a conversion and of every file that they or the model name.
 fn inputs_of(words: &[String], converted: &ConvertArguments) -> String {
-    let mut files = model_files(converted).map(|files| files.paths()).unwrap_or_default();
+    let mut files = converted.model_files().map(|files| files.paths()).unwrap_or_default();
     let named = words.iter().skip(1).map(|word| word.rsplit('=').next().unwrap_or(word)).map(PathBuf::from);
     files.extend(named.filter(|path| *path != converted.output && path.is_file()));
     inputs_fingerprint(words, &files)
@@ -290,8 +284,9 @@ fn need(body: &BatchBody, converted: &ConvertArguments, watch: Watch<'_>) -> Res
         return Ok(IMPORT);
     }
     watch(Event::Phase("estimating"));
-    let model = FeModel::from_raw(read_model(&model_files(converted)?)?)?.model;
-    let settings = ModeSettings { wanted: wanted(converted, model.units()), ..ModeSettings::default() };
+    let model = FeModel::from_raw(read_model(&converted.model_files()?)?)?.model;
+    let wanted = converted.request()?.mode_settings(model.units()).wanted;
+    let settings = ModeSettings { wanted, ..ModeSettings::default() };
     for_threads(converted.threads, || conversion_bytes(&model, &settings))
 }
 

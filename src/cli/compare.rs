@@ -1,7 +1,8 @@
 //! Command `flexbody compare`.
 
 use super::arguments::CompareArguments;
-use super::outcome::{Outcome, refuse_replacing, refuse_warnings};
+use super::outcome::Outcome;
+use super::run::{Printed, Run};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
@@ -9,29 +10,23 @@ use flexbody_report::{ComparisonFormat, ComparisonReport, Tolerances, compare, c
 use std::path::Path;
 
 pub(super) fn run(arguments: &CompareArguments) -> Result<Outcome> {
-    let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
-    refuse_replacing([&arguments.a, &arguments.b].into_iter(), arguments.report.iter())?;
-    let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
-    let (a, mut diagnostics) = flexbody_file::read_with_notes(&arguments.a)?;
-    let (b, of_b) = flexbody_file::read_with_notes(&arguments.b)?;
-    diagnostics.extend(of_b);
+    let CompareArguments { a, b, report, .. } = arguments;
+    let formats = report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
+    let mut run = Run::begin(arguments.printing, [a, b], report, &[])?;
+    let reports = report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let (first, second) = (run.read_body(a)?, run.read_body(b)?);
     let compare = if arguments.common { compare_common } else { compare };
-    let comparison = compare(&a, &b, &tolerances(arguments))?;
+    let comparison = compare(&first, &second, &tolerances(arguments))?;
     if !reports.is_empty() {
-        refuse_warnings(arguments.printing, &diagnostics)?;
+        run.data()?;
     }
-    let (a, b) = (arguments.a.display().to_string(), arguments.b.display().to_string());
-    let report = ComparisonReport { comparison: &comparison, a: &a, b: &b };
+    let (a, b) = (a.display().to_string(), b.display().to_string());
+    let facts = ComparisonReport { comparison: &comparison, a: &a, b: &b };
     for (slot, format) in reports.iter().zip(formats) {
-        slot.fill(report.render(format).as_bytes())?;
+        slot.fill(facts.render(format).as_bytes())?;
     }
-    OutputSlot::commit_all(reports)?;
-    Ok(Outcome {
-        text: comparison.text(),
-        json: format!("{:#}", comparison.json()),
-        diagnostics,
-        passed: comparison.passed(),
-    })
+    let printed = Printed { text: comparison.text(), json: format!("{:#}", comparison.json()) };
+    run.end_with(reports, |_| String::new(), printed, comparison.passed())
 }
 
 fn tolerances(arguments: &CompareArguments) -> Tolerances {

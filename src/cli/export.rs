@@ -1,15 +1,14 @@
 //! Command `flexbody export`.
 
 use super::arguments::ExportArguments;
-use super::outcome::{Outcome, refuse_replacing, refuse_warnings};
-use super::resources::context;
+use super::outcome::{Outcome, refuse_replacing};
+use super::run::{Printed, Run};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_file::read_simulation;
-use flexbody_formats::export::{AllowedLosses, ExportOptions, Exported, Points};
+use flexbody_formats::export::{AllowedLosses, ExportFormat, ExportOptions, Exported, Points};
 use flexbody_formats::{export_in_units, find_format, motion_of_losses};
 use flexbody_input::parse_units;
-use flexbody_linalg::context::Context;
 use flexbody_motion::scene::LoadCases;
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -33,19 +32,18 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     };
     let units = arguments.to_units.as_deref().map(parse_units).transpose()?;
     let inputs = || std::iter::once(&arguments.body).chain(&arguments.simulation).chain(&arguments.scene);
-    refuse_replacing(inputs(), std::iter::once(&arguments.output))?;
+    let mut run = Run::begin(arguments.printing, inputs(), [&arguments.output], &[])?;
     let slot = OutputSlot::prepare(&arguments.output)?;
 
-    let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
+    let body = run.read_body(&arguments.body)?;
     if let Some(scene) = &arguments.scene {
-        let limits = context(None, true, Context::QUIET.watch);
         let cases = LoadCases::read(scene, None)?;
-        options.in_scene = motion_of_losses(&body, format, &options, &cases, &limits)?;
+        options.in_scene = motion_of_losses(&body, format, &options, &cases, &run.context(true))?;
     }
     let (exported, findings) = export_in_units(&body, format, &options, units.as_ref(), allowed)
         .map_err(|error| error.in_file(arguments.simulation.as_ref().unwrap_or(&arguments.body)))?;
-    diagnostics.extend(findings);
-    refuse_warnings(arguments.printing, &diagnostics)?;
+    run.note(findings);
+    run.data()?;
     // Files beside the output are known only now: they must not replace an input either.
     let place_and_size = |(ending, bytes): &(Cow<'_, str>, Vec<u8>)| {
         (Exported::place_beside(&arguments.output, ending), bytes.len())
@@ -53,9 +51,13 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let beside: Vec<(PathBuf, usize)> = exported.beside.iter().map(place_and_size).collect();
     let taken: Vec<&PathBuf> = inputs().chain(std::iter::once(&arguments.output)).collect();
     refuse_replacing(taken.into_iter(), beside.iter().map(|(path, _)| path))?;
-    OutputSlot::commit_all(exported.fill(slot)?)?;
+    let slots = exported.fill(slot)?;
     let written = [vec![(arguments.output.clone(), exported.file.len())], beside].concat();
+    run.end_with(slots, |_| String::new(), printed(format, &written), true)
+}
 
+/// Returns the texts about the `written` files and their sizes.
+fn printed(format: &dyn ExportFormat, written: &[(PathBuf, usize)]) -> Printed {
     let line = |(path, size): &(PathBuf, usize)| match path.extension() {
         Some(extension) if extension == "py" => {
             format!("{}, {size} bytes: a program, run it with python3\n", path.display())
@@ -73,7 +75,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
         let size: usize = others.iter().map(|(_, size)| size).sum();
         text += &format!("{} and others, {} files, {size} bytes\n", first.display(), others.len());
     }
-    Ok(Outcome { text, json: format!("{json:#}"), diagnostics, passed: true })
+    Printed { text, json: format!("{json:#}") }
 }
 
 /// Number of files up to which each is listed. Of more files the first is listed, with a summary of the others.

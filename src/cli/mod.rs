@@ -9,6 +9,7 @@ mod batch;
 mod check;
 mod compare;
 mod completions;
+mod conversion_request;
 mod convert;
 mod convert_options;
 mod doctor;
@@ -29,6 +30,7 @@ mod recover;
 mod reduce;
 mod resources;
 mod response;
+mod run;
 mod select;
 mod shapes;
 #[cfg(unix)]

@@ -1,6 +1,6 @@
 //! Outcome of a command.
 
-use super::arguments::{ConvertArguments, Printing};
+use super::arguments::Printing;
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::output::OutputSlot;
@@ -51,10 +51,10 @@ pub(super) struct Reserved {
 }
 
 impl BodyOutputs {
-    /// Returns the outputs that the command line names; for one of several bodies, with a number in every name.
-    pub(super) fn of(arguments: &ConvertArguments, number: Option<usize>) -> Self {
-        let place = |path: &PathBuf| number.map_or_else(|| path.clone(), |number| marked(path, number));
-        Self { body: place(&arguments.output), reports: arguments.report.iter().map(place).collect() }
+    /// Returns the outputs of a body; of one of several bodies, with its number in every name.
+    pub(super) fn of(body: &Path, reports: &[PathBuf], number: Option<usize>) -> Self {
+        let place = |path: &Path| number.map_or_else(|| path.to_owned(), |number| marked(path, number));
+        Self { body: place(body), reports: reports.iter().map(|path| place(path)).collect() }
     }
 
     /// Returns all files.
@@ -68,6 +68,11 @@ impl BodyOutputs {
             reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
         })
     }
+}
+
+/// Returns the size of the content of a slot in bytes; zero if it is not known.
+pub(super) fn size_of(slot: &OutputSlot) -> u64 {
+    std::fs::metadata(slot.temporary()).map_or(0, |file| file.len())
 }
 
 /// Returns the format of a report by its file name.

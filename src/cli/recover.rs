@@ -1,16 +1,15 @@
 //! Command `flexbody recover`.
 
 use super::arguments::RecoverArguments;
-use super::outcome::{Outcome, format_of, refuse_replacing, refuse_warnings};
+use super::outcome::Outcome;
+use super::run::{Printed, Run};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_body::flex_body::{Carrier, FlexBody};
+use flexbody_body::flex_body::FlexBody;
 use flexbody_input::read_steps;
-use flexbody_motion::scene::{
-    Channels, Envelope, LoadedHistory, RecoveredMotion, stresses_at_rigid_interfaces,
-};
-use flexbody_report::{EnvelopeKind, Format, RecoveredFacts, RunData, channels_csv, recovered_csv};
+use flexbody_motion::scene::{Channels, Envelope, LoadedHistory, RecoveredMotion, RecoveryRequest};
+use flexbody_report::{EnvelopeKind, Format, RecoveredFacts, channels_csv, recovered_csv};
 use std::path::{Path, PathBuf};
 
 /// Kind of a file of recoveries over time.
@@ -72,55 +71,51 @@ impl RowsFile {
 }
 
 pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
-    let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
-    let kind = arguments.output.as_deref().map(RowsFile::of).transpose()?;
-    let of_channels = arguments.channels.as_deref().map(RowsFile::of).transpose()?;
-    let envelope = arguments.envelope.as_deref().map(EnvelopeKind::of).transpose()?;
-    let RecoverArguments { output, channels, .. } = arguments;
-    let outputs = || output.iter().chain(channels).chain(&arguments.envelope).chain(&arguments.report);
-    let inputs = [&arguments.body, &arguments.history].into_iter().chain(&arguments.shapes);
-    refuse_replacing(inputs, outputs())?;
+    let RecoverArguments { body, history, shapes, output, channels, envelope, .. } = arguments;
+    let kind = output.as_deref().map(RowsFile::of).transpose()?;
+    let of_channels = channels.as_deref().map(RowsFile::of).transpose()?;
+    let of_envelope = envelope.as_deref().map(EnvelopeKind::of).transpose()?;
+    let request = RecoveryRequest {
+        carried_by: arguments.carried_by.clone(),
+        only: arguments.only.clone(),
+        needs_envelope: of_envelope.is_some(),
+    };
+    let inputs = [body, history].into_iter().chain(shapes);
+    let outputs = output.iter().chain(channels).chain(envelope);
+    let mut run = Run::begin(arguments.printing, inputs, outputs, &arguments.report)?;
     let prepare = |path: &Option<PathBuf>| path.as_ref().map(OutputSlot::prepare).transpose();
-    let (slot, channel_slot) = (prepare(output)?, prepare(channels)?);
-    let envelope_slot = prepare(&arguments.envelope)?;
-    let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
-    let (body, diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
-    let mut history = LoadedHistory::read(&arguments.history, &body)?;
-    history.carrier = arguments.carried_by.as_ref().map(|name| Carrier::named(&body, name));
-    let diagnostics = diagnostics.into_iter().chain(history.left_out(&body, &arguments.only)).collect();
-    let mut run = RunData { diagnostics, ..RunData::default() };
-    refuse_warnings(arguments.printing, &run.diagnostics)?;
+    let (slot, channel_slot, envelope_slot) = (prepare(output)?, prepare(channels)?, prepare(envelope)?);
+    let body = run.read_body(body)?;
+    let mut history = LoadedHistory::read(history, &body)?;
+    request.carry(&body, &mut history);
     let mut found = None;
-    if let (Some(steps), Some(kind), Some(slot)) = (&arguments.shapes, of_channels, &channel_slot) {
+    if let (Some(steps), Some(kind), Some(slot)) = (shapes, of_channels, &channel_slot) {
         let channels = channels_of(&body, &history, steps)?;
         kind.fill_channels(&body, &channels, &history, slot)?;
         found = Some(channels);
     }
-    let needs_rows = kind.is_some() || envelope.is_some() || !formats.is_empty();
+    let needs_rows = kind.is_some() || of_envelope.is_some() || !arguments.report.is_empty();
     if !needs_rows && body.recoveries().is_empty() {
-        OutputSlot::commit_all(channel_slot)?;
-        let (text, json) = (channels_in_words(found.as_ref()), channels_json(found.as_ref()));
-        return Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true });
+        run.data()?;
+        let printed =
+            Printed { text: channels_in_words(found.as_ref()), json: channels_json(found.as_ref()) };
+        return run.end_with(channel_slot, |_| String::new(), printed, true);
     }
-    let mut recovered = history.recover(&body, &arguments.only)?;
-    if envelope.is_some() {
-        recovered = recovered.with_envelope();
-    }
+    let recovered = request.run(&body, &history)?;
+    run.note(recovered.diagnostics);
+    let data = run.data()?;
+    let motion = &recovered.motion;
     if let (Some(kind), Some(slot)) = (kind, &slot) {
-        kind.fill(&body, &recovered, ("history", &history.path.display().to_string()), slot)?;
+        kind.fill(&body, motion, ("history", &history.path.display().to_string()), slot)?;
     }
-    if let (Some(kind), Some(slot), Some(found)) = (envelope, &envelope_slot, Envelope::of(&recovered, None))
-    {
+    if let (Some(kind), Some(slot), Some(found)) = (of_envelope, &envelope_slot, Envelope::of(motion, None)) {
         slot.fill(&kind.bytes(&body, &found)?)?;
     }
-    run.diagnostics.extend(stresses_at_rigid_interfaces(&body, &recovered));
-    let facts = RecoveredFacts::new(&body, &history, &recovered, &run);
-    for (slot, format) in reports.iter().zip(formats) {
-        slot.fill(facts.render(format).as_bytes())?;
-    }
-    OutputSlot::commit_all(slot.into_iter().chain(channel_slot).chain(envelope_slot).chain(reports))?;
+    let facts = RecoveredFacts::new(&body, &history, motion, &data);
     let text = facts.render(Format::Terminal) + &channels_in_words(found.as_ref());
-    Ok(Outcome { text, json: facts.render(Format::Json), diagnostics: run.diagnostics.clone(), passed: true })
+    let printed = Printed { text, json: facts.render(Format::Json) };
+    let files = slot.into_iter().chain(channel_slot).chain(envelope_slot);
+    run.end_with(files, |format| facts.render(format), printed, true)
 }
 
 /// Returns the channels of the steps in an archive of `flexbody shapes`.

@@ -1,15 +1,16 @@
 //! Command `flexbody reduce`.
 
 use super::arguments::ReduceArguments;
-use super::convert::subset;
-use super::outcome::{Outcome, refuse_replacing, refuse_warnings};
+use super::conversion_request::subset;
+use super::outcome::{Outcome, size_of};
+use super::run::{Printed, Run};
 use super::terminal::body_text;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Storage};
 use flexbody_body::verification::accept;
 use flexbody_motion::dynamics::indefinite_inertia;
-use flexbody_report::{Facts, Format, RunData, render};
+use flexbody_report::{Facts, Format, render};
 
 pub(super) fn run(arguments: &ReduceArguments) -> Result<Outcome> {
     let subset = subset(arguments.terms.as_deref(), arguments.keep_modes.as_deref())?;
@@ -18,21 +19,19 @@ pub(super) fn run(arguments: &ReduceArguments) -> Result<Outcome> {
         let help = "name the modes or terms to keep, as in --keep-modes 1,3,5-9 --terms W1";
         return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
     }
-    refuse_replacing(std::iter::once(&arguments.body), std::iter::once(&arguments.output))?;
+    let mut run = Run::begin(arguments.printing, [&arguments.body], [&arguments.output], &[])?;
     let slot = flexbody_file::prepare_output(&arguments.output)?;
-    let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
+    let body = run.read_body(&arguments.body)?;
     let body = stored(body.subset(&subset)?, arguments.storage)?;
     accept(&body)?;
-    diagnostics.extend(indefinite_inertia(&body));
-    refuse_warnings(arguments.printing, &diagnostics)?;
+    run.note(indefinite_inertia(&body));
+    let mut data = run.data()?;
     flexbody_file::fill_slot(&body, &slot)?;
-    let size = std::fs::metadata(slot.temporary()).map(|meta| meta.len()).unwrap_or(0);
-    let output = Some((arguments.output.display().to_string(), size));
-    let run = RunData { output, diagnostics: diagnostics.clone(), ..RunData::default() };
-    let facts = Facts::new(&body, &run);
-    let (text, json) = (body_text(&facts, false, arguments.printing), render(&facts, Format::Json));
-    slot.commit()?;
-    Ok(Outcome { text, json, diagnostics, passed: true })
+    data.output = Some((arguments.output.display().to_string(), size_of(&slot)));
+    let facts = Facts::new(&body, &data);
+    let text = body_text(&facts, false, arguments.printing);
+    let printed = Printed { text, json: render(&facts, Format::Json) };
+    run.end_with([slot], |format| render(&facts, format), printed, true)
 }
 
 /// Returns the body with the floats that are asked for.

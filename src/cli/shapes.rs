@@ -3,10 +3,9 @@
 use super::arguments::{PlacesName, ShapeFormat, ShapesArguments};
 use super::element_decks::deck_for;
 use super::models::of_manifest_or_job;
-use super::outcome::{Outcome, refuse_replacing, refuse_replacing_read, refuse_warnings};
-use super::resources::context;
+use super::outcome::{Outcome, size_of};
+use super::run::{Printed, Run};
 use super::stiffening;
-use super::terminal::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
@@ -15,7 +14,6 @@ use flexbody_formats::shapes::{NodalShapes, StressDeck, StressPlaces};
 use flexbody_input::{
     ElementDeck, ModelFiles, OperatorSource, RecoverySource, read_model, read_nodes_of_table,
 };
-use flexbody_linalg::context::Event;
 use flexbody_model::{CheckedModel, FeModel};
 use std::fs::OpenOptions;
 use std::io::{BufWriter, Write};
@@ -40,32 +38,32 @@ pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
     let inputs = [&arguments.body, &arguments.model];
     let deck = arguments.deck.as_ref();
     let named = files.paths();
-    refuse_replacing(inputs.into_iter().chain(deck).chain(&named), outputs.iter())?;
+    let inputs = inputs.into_iter().chain(deck).chain(&named);
+    let mut run = Run::begin(arguments.printing, inputs, &outputs, &[])?.with_progress();
     let slots = outputs.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
-    let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
-    let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
-    let CheckedModel { model, diagnostics: of_model, .. } = FeModel::from_raw(read_model(&files)?)?;
-    diagnostics.extend(of_model);
+    let body = run.read_body(&arguments.body)?;
+    let CheckedModel { model, diagnostics, .. } = FeModel::from_raw(read_model(&files)?)?;
+    run.note(diagnostics);
     let asked = match arguments.to {
         ShapeFormat::Calculix => Some(Asked::of(arguments, &files, &model)?),
         ShapeFormat::Csv | ShapeFormat::Npz => None,
     };
-    refuse_replacing_read(outputs.iter())?;
-    let watch = |event: Event<'_>| watcher.hear(event);
-    let shapes = recovery_shapes(&body, &model, deformed_inertia, &context(None, false, &watch))
+    run.refuse_read()?;
+    let shapes = recovery_shapes(&body, &model, deformed_inertia, &run.context(false))
         .map_err(|error| error.in_file(&arguments.body))?;
     let shapes = if arguments.uniform_strains { shapes.with_uniform_strains(&model)? } else { shapes };
     let shapes = NodalShapes::new(&shapes, &model, &body);
-    watcher.finish();
-    refuse_warnings(arguments.printing, &diagnostics)?;
+    run.data()?;
     match (arguments.to, &asked) {
         (ShapeFormat::Calculix, Some(asked)) => asked.write(&shapes, &slots[0])?,
         (ShapeFormat::Csv, _) => slots[0].fill(shapes.csv().as_bytes())?,
         _ => {}
     }
     slots[slots.len() - 1].fill(&shapes.npz())?;
-    OutputSlot::commit_all(slots)?;
-    Ok(outcome(arguments, &outputs, &shapes, asked.as_ref(), diagnostics))
+    let sizes: Vec<u64> = slots.iter().map(size_of).collect();
+    let written: Vec<(&PathBuf, u64)> = outputs.iter().zip(sizes).collect();
+    let printed = printed(arguments, &written, &shapes, asked.as_ref());
+    run.end_with(slots, |_| String::new(), printed, true)
 }
 
 /// Refuses options that only a deck has.
@@ -140,17 +138,16 @@ fn watched(arguments: &ShapesArguments, deck: &ElementDeck, model: &FeModel) -> 
     }
 }
 
-fn outcome(
+/// Returns the texts about the `written` files and their sizes.
+fn printed(
     arguments: &ShapesArguments,
-    outputs: &[PathBuf],
+    written: &[(&PathBuf, u64)],
     shapes: &NodalShapes,
     asked: Option<&Asked>,
-    diagnostics: Vec<Diagnostic>,
-) -> Outcome {
-    let size = |path: &PathBuf| std::fs::metadata(path).map_or(0, |file| file.len());
+) -> Printed {
     let mut text = String::new();
-    for path in outputs {
-        text += &format!("{}, {} bytes\n", path.display(), size(path));
+    for (path, size) in written {
+        text += &format!("{}, {size} bytes\n", path.display());
     }
     let all: Vec<(String, f64)> =
         shapes.columns().map(|(column, factor)| (column.to_string(), factor)).collect();
@@ -176,14 +173,13 @@ fn outcome(
             answers.display()
         );
     }
-    let file =
-        |path: &PathBuf| serde_json::json!({ "path": path.display().to_string(), "bytes": size(path) });
+    let file = |(path, size): &(&PathBuf, u64)| serde_json::json!({ "path": path.display().to_string(), "bytes": size });
     let shape = |(name, factor): &(String, f64)| serde_json::json!({ "column": name, "factor": factor });
     let json = serde_json::json!({
-        "files": outputs.iter().map(file).collect::<Vec<_>>(),
+        "files": written.iter().map(file).collect::<Vec<_>>(),
         "shapes": all.iter().map(shape).collect::<Vec<_>>(),
         "watched_nodes": asked.map(|asked| asked.watched.len()),
         "cards_left_out": asked.map(|asked| asked.deck.left_out.clone()),
     });
-    Outcome { text, json: format!("{json:#}"), diagnostics, passed: true }
+    Printed { text, json: format!("{json:#}") }
 }

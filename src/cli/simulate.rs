@@ -5,14 +5,12 @@ use super::outcome::{Outcome, format_of, marked, refuse_replacing, refuse_replac
 use super::recover::RowsFile;
 use super::resources::{context, use_threads};
 use super::terminal::Watcher;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Event;
-use flexbody_motion::scene::{
-    Envelope, LoadCases, Recording, Scene, simulate, simulate_with_envelope, unsettled_rate,
-};
+use flexbody_motion::scene::{self as motion, Envelope, LoadCases, Recording, Scene, SimulationRequest};
 use flexbody_report::{EnvelopeFacts, EnvelopeKind, Format, RunData, SimulationFacts, simulation_csv};
 use std::path::{Path, PathBuf};
 
@@ -20,6 +18,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let rows = arguments.rows.as_deref().map(RowsFile::of).transpose()?;
     let envelope = arguments.envelope.as_deref().map(EnvelopeKind::of).transpose()?;
+    let request = SimulationRequest { needs_rows: rows.is_some(), needs_envelope: envelope.is_some() };
     let places = SimulationOutputs::of(arguments, None);
     let of_all_cases = || arguments.envelope.iter();
     refuse_replacing([&arguments.body, &arguments.scene].into_iter(), places.all().chain(of_all_cases()))?;
@@ -43,13 +42,10 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
         all => all.iter().map(SimulationOutputs::reserve).collect::<Result<Vec<_>>>()?,
     };
     let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
-    if (rows.is_some() || envelope.is_some()) && body.recoveries().is_empty() {
-        let message = "the body has no recovery, so there are no rows to write";
-        return Err(Diagnostic::new(Code::RecoveryUnknown, message).in_file(&arguments.body).into());
-    }
+    request.check(&body).map_err(|error| error.in_file(&arguments.body))?;
     let printing = arguments.printing;
-    let job =
-        Job { path: &arguments.scene, printing, body: &body, formats: &formats, rows, envelope, threads };
+    let path = &arguments.scene;
+    let job = Job { path, printing, body: &body, request, formats: &formats, rows, threads };
     let several = cases.len() > 1;
     // Reports of load cases that draw the largest stresses of all are written after the last of them.
     let waits = several && envelope.is_some() && formats.contains(&Format::Html);
@@ -103,9 +99,9 @@ struct Job<'a> {
     path: &'a Path,
     printing: Printing,
     body: &'a FlexBody,
+    request: SimulationRequest,
     formats: &'a [Format],
     rows: Option<RowsFile>,
-    envelope: Option<EnvelopeKind>,
     threads: usize,
 }
 
@@ -126,20 +122,11 @@ impl Job<'_> {
         notes: &[Diagnostic],
         watcher: &Watcher,
     ) -> Result<Simulated> {
-        watcher.hear(Event::Phase("simulation"));
         let name = scene.case_name().filter(|_| several).map(|name| format!("case `{name}`"));
         let watch = |event: Event<'_>| watcher.hear(event);
-        let left = || context(None, true, &watch);
         // The motion and its diagnostics, which name the load case if there are several.
-        let simulated = match self.envelope {
-            Some(_) => simulate_with_envelope(self.body, scene, &left()),
-            None => simulate(self.body, scene, &left()),
-        };
-        let run = simulated.and_then(|(recording, mut found)| {
-            found.extend(unsettled_rate(self.body, scene, &recording, &left())?);
-            Ok((recording, found))
-        });
-        let (recording, found) = run.map_err(|error| {
+        let run = self.request.run(self.body, scene, &context(None, true, &watch));
+        let motion::Simulated { recording, diagnostics: found } = run.map_err(|error| {
             let error = error.in_file(self.path);
             match &name {
                 Some(name) => error.about(name),
@@ -154,10 +141,6 @@ impl Job<'_> {
         let run =
             RunData { phases: watcher.finish(), diagnostics, threads: self.threads, ..RunData::default() };
         refuse_warnings(self.printing, &run.diagnostics)?;
-        if (self.rows.is_some() || self.envelope.is_some()) && recording.recovered.is_none() {
-            let message = "no recovery of the body is left in this scene, so there are no rows to write";
-            return Err(Diagnostic::new(Code::RecoveryUnknown, message).in_file(self.path).into());
-        }
         let case = scene.case_name().filter(|_| several);
         let envelope = recording.recovered.as_ref().and_then(|rows| Envelope::of(rows, case));
         Ok(Simulated { recording, run, envelope })

@@ -3,9 +3,8 @@
 use super::arguments::ShapesArguments;
 use super::element_decks::deck_for;
 use super::models::of_manifest_or_job;
-use super::outcome::{Outcome, refuse_replacing, refuse_replacing_read, refuse_warnings};
-use super::resources::context;
-use super::terminal::Watcher;
+use super::outcome::{Outcome, refuse_replacing, refuse_replacing_read, size_of};
+use super::run::{Printed, Run};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
@@ -13,7 +12,6 @@ use flexbody_body::convert::load_shapes;
 use flexbody_formats::shapes::{NodalShapes, StressDeck, StressPlaces};
 use flexbody_formats::stiffening::{StepStresses, StiffeningDecks, stiffening_script};
 use flexbody_input::{ElementDeck, ModelFiles, read_model, read_point_stresses};
-use flexbody_linalg::context::Event;
 use flexbody_model::{CheckedModel, FeModel};
 use std::fs::OpenOptions;
 use std::io::{self, BufWriter, Write};
@@ -28,23 +26,22 @@ pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
     let inputs =
         [Some(&arguments.body), Some(&arguments.model), arguments.deck.as_ref(), arguments.stresses.as_ref()];
     let inputs: Vec<&PathBuf> = inputs.into_iter().flatten().chain(&named).collect();
-    refuse_replacing(inputs.iter().copied(), std::iter::once(&arguments.output))?;
-    let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
-    let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
-    let CheckedModel { model, diagnostics: of_model, .. } = FeModel::from_raw(read_model(&files)?)?;
-    diagnostics.extend(of_model);
+    let (read, output) = (inputs.iter().copied(), [&arguments.output]);
+    let mut run = Run::begin(arguments.printing, read, output, &[])?.with_progress();
+    let body = run.read_body(&arguments.body)?;
+    let CheckedModel { model, diagnostics, .. } = FeModel::from_raw(read_model(&files)?)?;
+    run.note(diagnostics);
     let deck = deck_for(arguments, &files, &model)?;
-    let watch = |event: Event<'_>| watcher.hear(event);
-    let shapes = load_shapes(&body, &model, &context(None, false, &watch))
-        .map_err(|error| error.in_file(&arguments.body))?;
+    let shapes =
+        load_shapes(&body, &model, &run.context(false)).map_err(|error| error.in_file(&arguments.body))?;
     let shapes = NodalShapes::new(&shapes, &model, &body);
-    watcher.finish();
-    refuse_warnings(arguments.printing, &diagnostics)?;
+    run.data()?;
     let written = match &arguments.stresses {
         None => write_question(arguments, &shapes, &deck, &model, &inputs)?,
         Some(stresses) => write_decks(arguments, &shapes, &deck, stresses, &inputs)?,
     };
-    Ok(outcome(&written, &shapes, &deck, diagnostics))
+    let printed = printed(&written, &shapes, &deck);
+    run.end_with(written.slots, |_| String::new(), printed, true)
 }
 
 /// Refuses options of the other shapes, and names of files that the outputs beside them have.
@@ -61,9 +58,10 @@ fn refuse_unused_options(arguments: &ShapesArguments) -> Result<()> {
     Err(Diagnostic::new(Code::Usage, message).into())
 }
 
-/// Files that were written, and the next step of the user.
+/// Files that are written but not yet in their places, and the next step of the user.
 struct Written {
     files: Vec<PathBuf>,
+    slots: Vec<OutputSlot>,
     next: String,
 }
 
@@ -95,13 +93,12 @@ fn write_question(
     let stem = |path: &PathBuf| text(&path.with_extension(""));
     let script = stiffening_script(&stem(output), &words, &decks.iter().map(stem).collect::<Vec<_>>());
     slots[2].fill(script.as_bytes())?;
-    OutputSlot::commit_all(slots)?;
     let next = format!(
         "next: sh {}, then append {} to the manifest\n",
         files[2].display(),
         output.with_extension("toml").display()
     );
-    Ok(Written { files, next })
+    Ok(Written { files, slots, next })
 }
 
 /// Writes the deck of each load with its stress, and the tables of the manifest.
@@ -139,10 +136,9 @@ fn write_decks(
     for (step, slot) in slots[1..].iter().enumerate() {
         fill(slot, |out| stiffening.write(step, out))?;
     }
-    OutputSlot::commit_all(slots)?;
     let next =
         format!("next: ccx on each deck, then append {} to the manifest\n", arguments.output.display());
-    Ok(Written { files, next })
+    Ok(Written { files, slots, next })
 }
 
 /// Returns the decks with the stress of each load, numbered from 1 beside the output.
@@ -168,31 +164,27 @@ fn fill(slot: &OutputSlot, write: impl Fn(&mut BufWriter<std::fs::File>) -> io::
     all().map_err(|error| slot.failure(&error))
 }
 
-fn outcome(
-    written: &Written,
-    shapes: &NodalShapes,
-    deck: &ElementDeck,
-    diagnostics: Vec<Diagnostic>,
-) -> Outcome {
-    let size = |path: &PathBuf| std::fs::metadata(path).map_or(0, |file| file.len());
+/// Returns the texts about the written files.
+fn printed(written: &Written, shapes: &NodalShapes, deck: &ElementDeck) -> Printed {
+    let sizes = written.slots.iter().map(size_of);
+    let files: Vec<(&PathBuf, u64)> = written.files.iter().zip(sizes).collect();
     let mut text = String::new();
-    for path in &written.files {
-        text += &format!("{}, {} bytes\n", path.display(), size(path));
+    for (path, size) in &files {
+        text += &format!("{}, {size} bytes\n", path.display());
     }
     text += &format!("{} unit loads\n", shapes.count());
     if !deck.left_out.is_empty() {
         text += &format!("cards of the deck that are left out: *{}\n", deck.left_out.join(", *"));
     }
     text += &written.next;
-    let file =
-        |path: &PathBuf| serde_json::json!({ "path": path.display().to_string(), "bytes": size(path) });
+    let file = |(path, size): &(&PathBuf, u64)| serde_json::json!({ "path": path.display().to_string(), "bytes": size });
     let shape = |(name, factor): (String, f64)| serde_json::json!({ "column": name, "factor": factor });
     let columns = shapes.columns().map(|(column, factor)| shape((column.to_string(), factor)));
     let json = serde_json::json!({
-        "files": written.files.iter().map(file).collect::<Vec<_>>(),
+        "files": files.iter().map(file).collect::<Vec<_>>(),
         "shapes": columns.collect::<Vec<_>>(),
         "watched_nodes": null,
         "cards_left_out": deck.left_out,
     });
-    Outcome { text, json: format!("{json:#}"), diagnostics, passed: true }
+    Printed { text, json: format!("{json:#}") }
 }

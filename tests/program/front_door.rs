@@ -75,6 +75,21 @@ fn every_long_work_can_be_stopped() {
     }
 }
 
+/// The library refuses what the command refuses: a body whose selection cannot be judged.
+#[test]
+fn a_body_that_cannot_be_judged_is_made_only_if_this_is_allowed() {
+    let cube = Model::read(fixtures().join("models/cube_hex8/model.toml")).expect("a model");
+    let shock = "[run]\nduration = 2e-4\noutputs = 20\n[[load]]\nnode = 1\nforce = [10, 20, 100]\n\
+                 [tolerance]\ndeflection = 0.5\nstress = 0.5\n";
+    let scene = Scene::parse(shock, "").expect("a scene");
+    let options = ConvertOptions::default().modes(5);
+    let error = cube.convert_for(&scene, &options).expect_err("refused");
+    assert!(error.has(Code::SelectionUnjudged) && error.exit_code() == ExitCode::CheckFailed, "{error}");
+    assert!(error.has(Code::ReferenceIncomplete), "the reason stands before the error: {error}");
+    let (_, selection) = cube.convert_for(&scene, &options.allow_unjudged()).expect("a body");
+    assert!(!selection.holds());
+}
+
 #[test]
 fn interfaces_have_their_nodes_and_what_the_modes_do_there() {
     let body = bracket()

@@ -10,11 +10,13 @@
 
 pub mod advice;
 mod attached_mass;
+pub mod conversion;
 pub mod measured_run;
 pub mod recipe;
 pub mod reference;
 pub mod response;
 pub mod selection;
+pub mod selection_request;
 pub mod tailoring;
 #[cfg(feature = "hdf5")]
 pub mod trade;

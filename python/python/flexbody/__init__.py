@@ -235,6 +235,7 @@ def convert(
     frame: _types.Frame = "com",
     comparators: bool = True,
     scene: Scene | Sequence[Scene] | Mapping[str, Any] | _types.Path | None = None,
+    allow_unjudged: bool = False,
     name: str = "model",
     node_ids: ArrayLike | None = None,
     dofs: ArrayLike | int | None = None,
@@ -260,6 +261,7 @@ def convert(
     frame: _types.Frame = "com",
     comparators: bool = True,
     scene: Scene | Sequence[Scene] | Mapping[str, Any] | _types.Path | None = None,
+    allow_unjudged: bool = False,
     program: _types.Program | None = None,
     units: _types.Units | None = None,
     interfaces: Mapping[str, str | tuple[str, _types.Coupling | None]] | None = None,
@@ -278,6 +280,7 @@ def convert(
     frame: _types.Frame = "com",
     comparators: bool = True,
     scene: Any = None,
+    allow_unjudged: bool = False,
     **of_model: Any,
 ) -> Body:
     """Converts a model to a flexible body.
@@ -305,6 +308,8 @@ def convert(
     scene
         A Scene, a list of load cases, or a scene as `flexbody.Scene` takes it (the path of a file, a text, a
         dict), for a body with the terms and modes alone that it needs.
+    allow_unjudged
+        True to return the body although the selection for its scene does not hold, or cannot be judged (FB557).
 
     Raises
     ------
@@ -330,4 +335,5 @@ def convert(
         frame=frame,
         comparators=comparators,
         scene=scene,
+        allow_unjudged=allow_unjudged,
     )

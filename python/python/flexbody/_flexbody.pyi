@@ -78,6 +78,7 @@ class Model:
         frame: _types.Frame = "com",
         comparators: bool = True,
         scene: _Cases | None = None,
+        allow_unjudged: bool = False,
     ) -> Body: ...
     def trade(
         self, scene: _Cases, *, modes: int = 20, repeat: int = 3, reference: _types.Reference = "full"

@@ -21,6 +21,7 @@ mod read_requirements;
 mod read_values;
 mod recovered;
 mod recovery_errors;
+mod requests;
 mod requirements;
 mod row_extremes;
 mod row_states;
@@ -49,6 +50,7 @@ pub use load_cases::LoadCases;
 pub use prepared::{damped, damped_once, ends_a_run, fastest_history, find_nodal_point, nodal_point};
 pub use recovered::{AmplitudeHistory, LoadHistory, LoadedHistory, MEAN_AXES, RecoveredMotion};
 pub use recovery_errors::{RecoveryMeasure, TracedRecoveries};
+pub use requests::{Recovered, RecoveryRequest, Simulated, SimulationRequest};
 pub use requirements::{
     Attachment, AttachmentKind, Limits, MotionRange, PerQuantity, Range, RecoveryLimit, RecoveryTolerance,
     Requirements, Tolerance,

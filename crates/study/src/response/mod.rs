@@ -20,5 +20,5 @@ pub use errors::{At, Effectivity, PairErrors};
 pub use nalgebra::Complex;
 pub use place::{Direction, Place};
 pub use random::{RandomErrors, RandomRecovery, RandomResponse, RandomValue};
-pub use request::{ResponseRequest, converted_for_response};
+pub use request::{Responded, ResponseRequest};
 pub use study::{CouplingEffect, Function, Pair, Response, ResponseEnds, ResponseSettings, Solved, respond};

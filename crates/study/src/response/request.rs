@@ -4,6 +4,8 @@ use super::band::Band;
 use super::ends::Excitation;
 use super::place::Place;
 use super::study::{Response, ResponseEnds, ResponseSettings, respond};
+use crate::conversion::RESIDUALS_NEED_FREE_MODES;
+use crate::tailoring::computed_basis;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisKind, ModeSettings};
@@ -40,6 +42,25 @@ pub struct ResponseRequest {
     pub points: usize,
     /// Approximate number of frequencies at which the equations of all nodes are solved.
     pub solves: usize,
+    /// Basis of the body that is made of a model without a body; `None` for free modes.
+    pub basis: Option<BasisKind>,
+    /// Number of modes of that body; `None` for the default number.
+    pub modes: Option<usize>,
+    /// Loads of its residual vectors; `None` for those of the manifest.
+    pub residual_vectors: Option<Vec<LoadSource>>,
+}
+
+/// Response with the body that was made for it.
+#[derive(Debug, Clone)]
+pub struct Responded {
+    /// Frequency response.
+    pub response: Response,
+    /// Settings, completed by those of the scene.
+    pub settings: ResponseSettings,
+    /// Body that was made; `None` if one was given.
+    pub made: Option<FlexBody>,
+    /// Warnings and notes about the body that was made and about the response.
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 impl Default for ResponseRequest {
@@ -55,6 +76,9 @@ impl Default for ResponseRequest {
             tolerance: ResponseSettings::TOLERANCE,
             points: ResponseSettings::POINTS,
             solves: ResponseSettings::SOLVES,
+            basis: None,
+            modes: None,
+            residual_vectors: None,
         }
     }
 }
@@ -64,6 +88,105 @@ impl ResponseRequest {
     pub const POINTS: RangeInclusive<usize> = 2..=100_000;
     /// Possible numbers of frequencies at which the equations of all nodes are solved.
     pub const SOLVES: RangeInclusive<usize> = 2..=10_000;
+
+    /// Refuses settings that contradict the inputs.
+    ///
+    /// * `has_model`: true if the model is given.
+    /// * `has_body`: true if a body is given beside the model.
+    ///
+    /// # Errors
+    /// [`Usage`](Code::Usage) for a body beside another body, for settings of a body that is not made, and for a basis that
+    /// needs a scene or shapes.
+    pub fn check(&self, has_model: bool, has_body: bool) -> Result<()> {
+        let states_body = self.modes.is_some() || self.basis.is_some() || self.residual_vectors.is_some();
+        let rules = [
+            (
+                has_body && !has_model,
+                "give the model first (a manifest or a job), then the body that was made from it",
+            ),
+            (
+                states_body && (has_body || !has_model),
+                "--modes, --basis and --residual-vectors apply to a model without a body: the modes of a body file are fixed",
+            ),
+            (
+                self.basis == Some(BasisKind::Scene),
+                "--basis scene works only in convert: convert the model first, then give the body after the model",
+            ),
+            (
+                self.basis == Some(BasisKind::Imported),
+                "--basis imported works only in convert: convert the model first, then give the body after the model",
+            ),
+            (
+                self.basis == Some(BasisKind::CraigBampton) && self.residual_vectors.is_some(),
+                RESIDUALS_NEED_FREE_MODES,
+            ),
+        ];
+        match rules.into_iter().find(|(contradicts, _)| *contradicts) {
+            Some((_, message)) => Err(Diagnostic::new(Code::Usage, message).into()),
+            None => Ok(()),
+        }
+    }
+
+    /// Computes the response of a `body` of `model` with its errors, or without a body that of one that is made now.
+    ///
+    /// * `of_manifest`: loads of residual vectors that the manifest of the model states.
+    ///
+    /// # Errors
+    /// The errors of [`ResponseRequest::check`], of the conversion, and of [`ResponseRequest::respond`].
+    pub fn for_model(
+        &self,
+        model: &FeModel,
+        of_manifest: &[LoadSource],
+        body: Option<&FlexBody>,
+        scene: Option<&Scene>,
+        context: &Context<'_>,
+    ) -> Result<Responded> {
+        self.check(true, body.is_some())?;
+        let conversion = match body {
+            Some(_) => None,
+            None => Some(self.body_of(model, of_manifest, context)?),
+        };
+        let of_body = conversion.as_ref().map_or_else(Vec::new, |made| made.diagnostics.clone());
+        let made = conversion.map(|conversion| conversion.body);
+        let body = made.as_ref().or(body).expect("a body is given or made");
+        let (response, settings) = self.respond(Some(model), body, scene, context)?;
+        let diagnostics = [of_body, response.diagnostics.clone()].concat();
+        Ok(Responded { response, settings, made, diagnostics })
+    }
+
+    /// Computes the response of `body` without its model, so that its errors are not known.
+    ///
+    /// # Errors
+    /// The errors of [`ResponseRequest::check`] and [`ResponseRequest::respond`].
+    pub fn for_body(
+        &self,
+        body: &FlexBody,
+        scene: Option<&Scene>,
+        context: &Context<'_>,
+    ) -> Result<Responded> {
+        self.check(false, false)?;
+        let (response, settings) = self.respond(None, body, scene, context)?;
+        let diagnostics = response.diagnostics.clone();
+        Ok(Responded { response, settings, made: None, diagnostics })
+    }
+
+    /// Converts a model to a body for a frequency response: without lumped comparators.
+    fn body_of(
+        &self,
+        model: &FeModel,
+        of_manifest: &[LoadSource],
+        context: &Context<'_>,
+    ) -> Result<Conversion> {
+        let loads = self.residual_vectors.as_deref().unwrap_or(of_manifest);
+        let wanted = Wanted::Lowest(self.modes.unwrap_or(ModeSettings::DEFAULT_COUNT));
+        let settings = ConvertSettings {
+            modes: ModeSettings { wanted, ..ModeSettings::default() },
+            basis: computed_basis(self.basis.unwrap_or_default(), loads, model)?,
+            lumped: Vec::new(),
+            ..ConvertSettings::default()
+        };
+        convert(model, &settings, context)
+    }
 
     /// Computes the response of `body`, with its errors if its `model` is given. Returns the settings as well.
     ///
@@ -183,25 +306,4 @@ fn chosen(stated: &[Place], of_scene: &[&Point]) -> Vec<Place> {
 fn missing(what: &str, option: &str, key: &str) -> Diagnostic {
     let help = format!("give --{option} INTERFACE or --{option} NODE, or a --scene with [[{key}]]");
     Diagnostic::new(Code::Usage, format!("no place of {what} is given")).with_help(help)
-}
-
-/// Converts a model to a body for a frequency response: without lumped comparators, and with the given number of modes.
-///
-/// # Errors
-/// FB801 for a basis that needs a scene or imported shapes; the errors of [`convert`].
-pub fn converted_for_response(
-    model: &FeModel,
-    basis: BasisKind,
-    loads: &[LoadSource],
-    modes: Option<usize>,
-    context: &Context<'_>,
-) -> Result<Conversion> {
-    let wanted = Wanted::Lowest(modes.unwrap_or(ModeSettings::DEFAULT_COUNT));
-    let settings = ConvertSettings {
-        modes: ModeSettings { wanted, ..ModeSettings::default() },
-        basis: crate::tailoring::computed_basis(basis, loads, model)?,
-        lumped: Vec::new(),
-        ..ConvertSettings::default()
-    };
-    convert(model, &settings, context)
 }

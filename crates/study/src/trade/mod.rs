@@ -8,6 +8,7 @@ mod front;
 mod nodal_reference;
 mod nodal_trace;
 mod progress;
+mod request;
 mod study;
 mod timing;
 
@@ -16,5 +17,6 @@ pub use case::{InVariations, TradeVariation, Varied};
 pub use conversions::{Conversions, WantedBodies, conversions};
 pub use front::{Failed, InCase, Measured, Recommendation, Timed, TradeRow, front};
 pub use nodal_reference::{NodalIntegration, NodalReference};
+pub use request::{TradeRequest, TradeStudy};
 pub use study::{ReferenceChoice, ReferenceKind, Trade, TradeCase, TradeSettings, reserved, trade};
 pub use timing::TimedRun;
