@@ -12,13 +12,15 @@
 //! each. With a second shift among the modes they take two.
 
 use super::correction::{Correction, Corrector, capacity_with_levels};
+use super::failure::EigenFailure;
 use super::lanczos::{Iteration, Outcome, columns_per_step};
-use super::plan::{
-    Attempt, Goal, Needs, Unusable, basis_columns, factor_needs, made_of_modes, resident, search_seconds,
-    vector_bytes,
+use super::needs::{
+    Needs, Unusable, basis_columns, factor_needs, made_of_modes, resident, search_seconds, vector_bytes,
 };
-use super::problem::{Accuracy, EigenFailure, EigenProblem, FactorChoice, Method, Precision, Task, Wanted};
+use super::problem::{EigenProblem, Task};
 use super::refine::{FoundModes, refine};
+use super::search::{Attempt, Goal};
+use super::settings::{Accuracy, FactorChoice, Method, Precision, Wanted};
 use faer::Mat;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::multigrid::{can_have_levels, levels};

@@ -8,14 +8,39 @@
 //! double-double arithmetic, with a bound of the rounding of that arithmetic.
 
 use super::canonical::clusters;
-use super::problem::{EigenFailure, EigenvalueBounds, Task};
-use super::solve::count_below;
+use super::count::count_below;
+use super::failure::EigenFailure;
+use super::problem::Task;
 use faer::{Mat, MatRef};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     Analysis, Cholesky, CompensatedBlock, DoubleDouble, LANES, Pencil, Solve, gram_compensated, largest,
     multiply_compensated, small_pencil, sum_length,
 };
+
+/// Guaranteed bounds of the eigenvalues of K and M as they are stored, at [`Accuracy::Certified`](super::Accuracy::Certified).
+#[derive(Debug, Clone, PartialEq)]
+pub struct EigenvalueBounds {
+    /// Lower bounds, ascending: lower\[j\] <= lambda_j.
+    pub lower: Vec<f64>,
+    /// Upper bounds, ascending: lambda_j <= upper\[j\].
+    pub upper: Vec<f64>,
+    /// Upper bound of the distance of each mode to the exact eigenspace of its cluster, in the norm of M.
+    pub shape_error: Vec<f64>,
+    /// Shift between the rigid modes and the first flexible mode.
+    pub shift_below: f64,
+    /// Number of negative pivots of K - shift_below M: the number of rigid modes.
+    pub pivots_below: usize,
+}
+
+impl EigenvalueBounds {
+    /// Moves eigenvalues that lie outside their bounds onto them: the bounds have more digits than a projection in f64.
+    pub(super) fn clamp(&self, eigenvalues: &mut [f64]) {
+        for ((lambda, lower), upper) in eigenvalues.iter_mut().zip(&self.lower).zip(&self.upper) {
+            *lambda = lambda.clamp(*lower, *upper);
+        }
+    }
+}
 
 /// Unit roundoff of f64.
 const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;

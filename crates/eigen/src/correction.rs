@@ -4,10 +4,11 @@
 //! makes modes of them.
 
 use super::canonical::{CLUSTER_GAP, cluster_end};
-use super::plan::Goal;
-use super::problem::{EigenFailure, EigenProblem, Task};
+use super::count::size_along;
+use super::failure::EigenFailure;
+use super::problem::{EigenProblem, Task};
 use super::refine::{FoundModes, Refined, independent, leave_unbalanced, residuals, small_ritz};
-use super::solve::size_along;
+use super::search::Goal;
 use faer::Mat;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::multigrid::{CorrectionTarget, DeflationSpace, Levels};

@@ -1,9 +1,12 @@
 //! The attempt for small pencils: all finite modes by one dense symmetric eigenproblem.
 
 use super::canonical::{CLUSTER_GAP, cluster_end};
-use super::plan::{Attempt, Goal, Needs, Unusable, dense_seconds, made_of_modes, resident, with_bounds};
-use super::problem::{EigenFailure, EigenProblem, Method, Task};
+use super::failure::EigenFailure;
+use super::needs::{Needs, Unusable, dense_seconds, made_of_modes, resident, with_bounds};
+use super::problem::{EigenProblem, Task};
 use super::refine::{FoundModes, Refined, refine};
+use super::search::{Attempt, Goal};
+use super::settings::Method;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, Par};

@@ -5,10 +5,11 @@
 //! repeated eigenvalues; the later inertia count proves that none is missing.
 
 use super::canonical::{CLUSTER_GAP, cluster_end};
+use super::failure::EigenFailure;
 use super::krylov::Krylov;
-use super::plan::Goal;
-use super::problem::{EigenFailure, EigenProblem};
+use super::problem::EigenProblem;
 use super::refine::{FoundModes, NOISE_DEVIATIONS, Refined, energy_noise, is_noisy, residuals};
+use super::search::Goal;
 use faer::Mat;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{Solve, SymmetricEigen, symmetric_eigen};

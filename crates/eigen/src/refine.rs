@@ -1,7 +1,8 @@
 //! Refinement shared by all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes, residuals; and
 //! the motions whose energy cannot be distinguished from zero with the digits of K.
 
-use super::problem::{EigenFailure, EigenProblem};
+use super::failure::EigenFailure;
+use super::problem::EigenProblem;
 use faer::{ColRef, Mat, MatRef};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{
@@ -361,6 +362,12 @@ pub fn rounding_residual(k: &SymmetricMatrix, x: MatRef<'_, f64>) -> Vec<f64> {
 /// rotate modes into each other by eps |K| |x|, the rounding of K x, divided by distances of eigenvalues.
 pub(super) fn is_noisy(floors: &[f64], tolerance: f64) -> bool {
     floors.iter().any(|floor| *floor > tolerance)
+}
+
+/// Returns true when a K-residual keeps the guarantee: the tolerance, or 30 times the rounding floor (measured:
+/// residuals of up to 6 times the estimate of the floor).
+pub(super) fn keeps(residual: f64, floor: f64, tolerance: f64) -> bool {
+    residual <= tolerance.max(30.0 * floor)
 }
 
 /// Returns sum_j f(K_ij x_j) for each row i and each column x.

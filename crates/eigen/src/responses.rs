@@ -2,8 +2,10 @@
 //! preconditioned by the factor of K + tau M, and harmonic responses with the factor of K - w^2 M.
 
 use super::attempts::factorise;
-use super::problem::{EigenFailure, EigenProblem, Precision};
+use super::failure::EigenFailure;
+use super::problem::EigenProblem;
 use super::refine::rounding_residual;
+use super::settings::Precision;
 use faer::{Mat, MatRef, Scale};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{
