@@ -4,7 +4,9 @@
 mod compressed;
 mod enrich;
 mod estimate;
+mod grid;
 mod motion_bodies;
+mod principal;
 mod residual;
 mod truncated_equations;
 mod truncated_motion;

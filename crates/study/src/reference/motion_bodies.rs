@@ -1,6 +1,6 @@
 //! Bodies whose modes are made of the shapes of motions, and their errors in these motions.
 
-use super::compressed::principal;
+use super::principal::principal;
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisChoice, ImportedShapes};

@@ -1,7 +1,7 @@
 //! Dynamic response of the truncated part of the model to the forces that the reduced motion leaves unbalanced, with
 //! the inertia of the static responses and their coupling to the modes of the body.
 
-use super::estimate::Grid;
+use super::grid::Grid;
 use faer::Mat;
 use flexbody_body::invariants::symmetric_part;
 use flexbody_linalg::{

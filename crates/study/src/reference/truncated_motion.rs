@@ -1,6 +1,6 @@
 //! Truncated part of a motion, and the errors that it causes in the outputs.
 
-use super::estimate::{Grid, LARGE};
+use super::grid::Grid;
 use super::residual::{BLOCK, NodalView, SceneLoad};
 use super::truncated_equations::{TruncatedAmplitudes, TruncatedDamping, TruncatedEquations};
 use super::truncated_responses::TruncatedResponses;
@@ -15,6 +15,10 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 /// Number of instants at which nodal displacements and reactions are evaluated. With so many samples at arbitrary
 /// phase, little of a vibration's peak is missed.
 const EVALUATED_INSTANTS: usize = 480;
+
+/// Part of the largest value from which a value counts as large. Several peaks of a vibration are nearly as large as the
+/// largest; the first of them does not depend on rounding.
+const LARGE: f64 = 0.8;
 
 /// Truncated displacements X y(t) of all rows, with X = [Psi, E]: the modes, which are moved by
 /// the truncated part, and the static responses outside the modes.

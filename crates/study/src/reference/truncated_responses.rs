@@ -1,7 +1,8 @@
 //! Static responses that the body does not contain along its motion, and the selection of the most important ones.
 
-use super::compressed::{Compressed, Projected, UnbalancedAmplitudes, principal, principal_directions};
-use super::estimate::Grid;
+use super::compressed::{Compressed, Projected, UnbalancedAmplitudes};
+use super::grid::Grid;
+use super::principal::{principal, principal_directions};
 use super::residual::{Held, NodalView};
 use super::truncated_equations::of_unit_energy;
 use faer::{ColRef, Mat, MatRef};

@@ -1,7 +1,7 @@
 //! Forces of second order of nodes whose rotations carry mass: fixed nodal vectors times products of the amplitudes of the
 //! modes.
 
-use super::compressed::principal_directions;
+use super::principal::principal_directions;
 use super::residual::NodalView;
 use faer::Mat;
 use flexbody_linalg::{combine, side_by_side};
