@@ -3,23 +3,29 @@
 
 mod bounds;
 mod cases;
+mod choice;
+mod decisions;
 mod demand;
 mod dropped_terms;
 mod norms;
 mod search;
 mod select;
+mod significance;
 mod situation;
 mod trial;
+mod variations;
 
 pub use bounds::{
     Amplitude, Driven, ErrorBound, LoadSizes, ModalLoad, Rotation, Start, TorqueDefect, Variation,
 };
-#[cfg(feature = "hdf5")]
-pub(crate) use cases::stops;
-pub use cases::{CaseSelection, VariedSelection};
+pub use decisions::DecisiveError;
 pub use demand::{BEYOND_BAND, Participation, WantedResponses, largest_eigenvalue, participations};
-pub use norms::{Norms, Significance, significances};
+pub use norms::Norms;
 pub use search::most_excited_modes;
-pub use select::{DecisiveError, Selection, rule_out, select, select_judged};
+pub use select::{CaseSelection, Selection, rule_out, select, select_judged};
+pub use significance::{Significance, significances};
 pub use situation::{Input, Situation};
 pub use trial::{ModeShare, Trial, TrialRuns};
+pub use variations::VariedSelection;
+#[cfg(feature = "hdf5")]
+pub(crate) use variations::stops;

@@ -1,10 +1,12 @@
 //! Groups left open by bounds are decided by simulation: the state of a selection, the search for a cheaper model by
 //! measured motion, and warnings about a selection whose errors are within the tolerances.
 
-use super::cases::{Case, SLACK_OF_RANGE, VariedRuns, VariedSelection, sets_in, together, worst};
+use super::cases::{Case, SLACK_OF_RANGE, sets_in, together, worst};
+use super::choice::Choice;
 use super::demand::{BEYOND_BAND, Demand};
 use super::situation::PointRows;
 use super::trial::{ModeShare, Trial, TrialRuns, multiplications};
+use super::variations::{VariedRuns, VariedSelection};
 use crate::reference::PART_OF_REFERENCE;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -228,31 +230,6 @@ impl<'s> SelectionState<'s> {
 /// Part of the remaining tolerances that dropped terms may take before modes are dropped. In the last search, with the
 /// kept modes, they may take all of it.
 const PART_OF_TERMS: f64 = 0.5;
-
-/// Current choice of terms and modes.
-pub(super) struct Choice {
-    pub groups: TermGroups,
-    pub modes: Vec<usize>,
-    pub shares: Vec<ModeShare>,
-    pub chosen: Option<Trial>,
-}
-
-impl Choice {
-    /// Keeps the first `count` modes of the order `ranked`.
-    pub(super) fn keep_most(&mut self, ranked: &[usize], count: usize) {
-        let mut modes = ranked[..count].to_vec();
-        modes.sort_unstable();
-        self.keep(modes);
-    }
-
-    /// Sets the kept modes.
-    pub(super) fn keep(&mut self, modes: Vec<usize>) {
-        for (j, share) in self.shares.iter_mut().enumerate() {
-            share.kept = modes.binary_search(&j).is_ok();
-        }
-        self.modes = modes;
-    }
-}
 
 /// Returns the contribution of each mode relative to the tolerances: the largest of deflection, stress and recoveries.
 fn weights(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<f64> {

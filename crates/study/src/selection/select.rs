@@ -1,20 +1,20 @@
 //! Selection of the terms and modes that a body needs in a scene.
 
-use super::cases::{
-    CaseSelection, VariedRuns, VariedSelection, by_case, framed_variations, worst_reference_errors,
-};
+use super::choice::Choice;
+use super::decisions::{DecisionInput, DecisiveError, decision};
 use super::demand::{Demand, FramedTests, Participation, participations};
-use super::norms::{Significance, largest_significances, significances};
-use super::search::{Choice, SelectionState};
+use super::search::SelectionState;
+use super::significance::{Significance, largest_significances, significances};
 use super::situation::Input;
 use super::trial::{ModeShare, Trial, multiplications};
+use super::variations::{VariedRuns, VariedSelection, framed_variations};
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroup, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::ties::first_largest;
-use flexbody_motion::scene::{LoadCases, PerQuantity};
+use flexbody_motion::scene::{LoadCases, PerQuantity, Tolerance};
 
 /// Result of a selection, with the reasons.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,6 +81,23 @@ impl Selection {
             None => chosen.passed() && is_reference && in_variations,
         })
     }
+}
+
+/// Result of a selection for one of several load cases.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CaseSelection {
+    /// Name of the load case.
+    pub name: String,
+    /// Tolerances of the load case.
+    pub tolerance: Tolerance,
+    /// Selected model, measured against the whole body; `None` if no motion was integrated.
+    pub chosen: Option<Trial>,
+    /// Groups whose decision rests on this load case.
+    pub binds_groups: Vec<TermGroup>,
+    /// True if one mode fewer would exceed the tolerances most in this load case.
+    pub binds_modes: bool,
+    /// Truncation errors in this case, of the body and of its versions before enrichment.
+    pub reference_errors: Vec<ReferenceError>,
 }
 
 /// Returns decisions about the groups that I0 and the eigenvalues alone rule out (tier 0) in these load cases. `body`
@@ -233,6 +250,49 @@ fn demands<'d>(
     framed_cases.iter().enumerate().map(demand).collect()
 }
 
+/// Returns the results for each of several load cases; empty for a single scene.
+pub(super) fn by_case(
+    demands: &[Demand<'_>],
+    choice: &Choice,
+    trials: &[Trial],
+    decisive_errors: &[Option<DecisiveError>],
+    chosen: Vec<Trial>,
+) -> Vec<CaseSelection> {
+    if demands.len() == 1 {
+        return Vec::new();
+    }
+    // Failed trial with one mode fewer than the choice: its worst load case binds the number of modes.
+    let one_fewer = trials
+        .iter()
+        .rfind(|trial| !trial.by_case.is_empty() && !trial.passed() && trial.modes + 1 == choice.modes.len());
+    let of_case = |(at, demand): (usize, &Demand<'_>)| {
+        let is_bound_here = |group: &TermGroup, decisive_error: &Option<DecisiveError>| {
+            choice.groups.has(*group)
+                && decisive_error.is_some_and(|decisive_error| decisive_error.case == Some(at))
+        };
+        let decisive_errors = TermGroup::ALL.into_iter().zip(decisive_errors);
+        CaseSelection {
+            name: demand.name.unwrap_or_default().to_owned(),
+            tolerance: *demand.tolerance(),
+            chosen: chosen.get(at).cloned(),
+            binds_groups: decisive_errors
+                .filter(|(group, decisive_error)| is_bound_here(group, decisive_error))
+                .map(|(group, _)| group)
+                .collect(),
+            binds_modes: one_fewer.is_some_and(|trial| trial.case == Some(at)),
+            reference_errors: demand.reference_errors.to_vec(),
+        }
+    };
+    demands.iter().enumerate().map(of_case).collect()
+}
+
+/// Returns the truncation errors in the load case whose last error is largest.
+pub(super) fn worst_reference_errors(demands: &[Demand<'_>]) -> Vec<ReferenceError> {
+    let last = |demand: &&Demand<'_>| demand.reference_errors.last().map_or(-1.0, |own| own.worst);
+    let worst = first_largest(demands, |demand| last(demand));
+    worst.map_or_else(Vec::new, |demand| demand.reference_errors.to_vec())
+}
+
 /// Returns the decision about a group that the scene alone would drop, and the error that it then has in the worst
 /// variation.
 fn needed_by_variations(
@@ -294,148 +354,6 @@ fn once(diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
         }
     }
     kept
-}
-
-// Decisions about groups, with their reasons and the trials behind them.
-
-/// Error that decides about a group.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DecisiveError {
-    /// Output whose error is largest relative to its tolerance: attitude, deflection, stress or reaction.
-    pub output: &'static str,
-    /// Error of that output without the group: of the attitude in radians, else relative. It is a bound, or measured
-    /// over a run (`tier` 2).
-    pub error: f64,
-    /// Tolerance of the scene for that output.
-    pub tolerance: f64,
-    /// Part of the tolerance that dropped groups may take.
-    pub budget: f64,
-    /// Tier of the decision. 0: bound from I0 and the frequencies; 1: bound with the norms of the invariants; 2:
-    /// measured.
-    pub tier: u8,
-    /// Index of the load case (from 0), if there are several.
-    pub case: Option<usize>,
-}
-
-/// Input of the decisions: the demands of every load case, the choice, and all trials.
-struct DecisionInput<'d> {
-    pub demands: &'d [Demand<'d>],
-    pub choice: &'d Choice,
-    pub trials: &'d [Trial],
-}
-
-impl DecisionInput<'_> {
-    /// Returns the decision about every group, and the error behind it if there is one.
-    pub(super) fn decisions(&self) -> Vec<(TermDecision, Option<DecisiveError>)> {
-        TermGroup::ALL.into_iter().map(|group| self.decide(group)).collect()
-    }
-
-    fn decide(&self, group: TermGroup) -> (TermDecision, Option<DecisiveError>) {
-        let body = self.demands[0].body;
-        let kept = self.choice.groups.has(group);
-        if !body.invariants().groups().has(group) {
-            let earlier = body.terms().iter().find(|decision| decision.group == group).cloned();
-            return (
-                earlier.unwrap_or_else(|| undecided(group, false, "the body does not have this group")),
-                None,
-            );
-        }
-        // A kept group rests on the last trial without it, a dropped one on the first trial that passed.
-        let basis = if kept { self.last_without(group) } else { self.first_that_passed(group) };
-        let (mut decided, decisive_error) = match basis {
-            Some(trial) => {
-                let rotation = &demand_of(trial, self.demands).situation.spin;
-                (decision(group, kept, trial, self.demands, rotation), decisive_error(trial, self.demands))
-            }
-            None if self.demands.iter().any(|demand| demand.scene.carried.is_some()) => (
-                undecided(
-                    group,
-                    kept,
-                    "not judged: a carried body keeps all groups, since its modes are not those of the file (advise judges them by the rate)",
-                ),
-                None,
-            ),
-            None => (undecided(group, kept, "no bound or run shows that it can be dropped"), None),
-        };
-        // A run slower than the allowed rotation cannot decide about a kept group.
-        let short = self.demands.iter().find_map(|demand| Some((demand, demand.short_of?)));
-        if let Some((demand, (reached, allowed))) = short.filter(|_| kept) {
-            let of = demand.name.map_or_else(String::new, |name| format!(" of case `{name}`"));
-            decided.reason = format!(
-                "{}; the run{of} reaches an angular velocity of only {reached:.3e}, the scene allows {allowed:.3e}, so that no run could decide",
-                decided.reason
-            );
-        }
-        (decided, decisive_error)
-    }
-
-    /// Returns true if the trial covers all load cases; a bound covers one.
-    fn is_of_all(&self, trial: &Trial) -> bool {
-        self.demands.len() == 1 || !trial.by_case.is_empty()
-    }
-
-    /// Returns the last trial of the kept groups without `group`.
-    fn last_without(&self, group: TermGroup) -> Option<&Trial> {
-        let kept = self.choice.groups.and(TermGroups::without(group));
-        let without = || self.trials.iter().filter(move |trial| trial.kept == kept);
-        without().rfind(|trial| self.is_of_all(trial)).or(without().rfind(|trial| !trial.passed()))
-    }
-
-    /// Returns the first trial of the kept groups that passed. If bounds in each load case decided, returns the trial
-    /// with the largest error among those without `group`.
-    fn first_that_passed(&self, group: TermGroup) -> Option<&Trial> {
-        let kept = self.choice.groups;
-        let passed = || self.trials.iter().filter(|trial| trial.passed());
-        let of_all = passed().find(|trial| trial.kept == kept && self.is_of_all(trial));
-        let bounds = passed().filter(|trial| !trial.kept.has(group));
-        of_all.or(self.choice.chosen.as_ref()).or_else(|| first_largest(bounds, |trial| trial.worst))
-    }
-}
-
-fn undecided(group: TermGroup, kept: bool, reason: &str) -> TermDecision {
-    TermDecision { group, kept, tier: 0, bound: 0.0, limit: 0.0, reason: reason.to_owned() }
-}
-
-/// Returns the demand of the load case of a trial.
-fn demand_of<'d>(trial: &Trial, demands: &'d [Demand<'d>]) -> &'d Demand<'d> {
-    &demands[trial.case.unwrap_or(0)]
-}
-
-/// Returns the error of a trial that is largest relative to its tolerance; `None` if the errors are unknown.
-fn decisive_error(trial: &Trial, demands: &[Demand<'_>]) -> Option<DecisiveError> {
-    let errors = trial.errors.as_ref().filter(|_| trial.worst.is_finite())?;
-    let (output, error, tolerance) = errors.decisive(demand_of(trial, demands).tolerance());
-    Some(DecisiveError { output, error, tolerance, budget: trial.budget, tier: trial.tier, case: trial.case })
-}
-
-/// Returns the decision that follows from `trial`. `rotation` is the rotation that the trial assumes.
-fn decision(
-    group: TermGroup,
-    kept: bool,
-    trial: &Trial,
-    demands: &[Demand<'_>],
-    rotation: &Input,
-) -> TermDecision {
-    let decisive_error = decisive_error(trial, demands);
-    let demand = demand_of(trial, demands);
-    let how = match trial.tier {
-        2 => "measured over the run",
-        1 => "bound with the norms of the invariants",
-        _ => "bound from I0 and the frequencies",
-    };
-    let reason = match (&decisive_error, trial.remark.as_str()) {
-        (Some(decisive_error), _) => {
-            format!("error of {}, {how}; rotation from {}", decisive_error.output, rotation.source)
-        }
-        (None, "") => format!("no finite {how}"),
-        (None, remark) => remark.to_owned(),
-    };
-    let reason = match demand.name {
-        Some(name) => format!("case `{name}`: {reason}"),
-        None => reason,
-    };
-    let (bound, limit) = decisive_error.map_or((0.0, 0.0), |one| (one.error, one.tolerance * one.budget));
-    TermDecision { group, kept, tier: trial.tier, bound, limit, reason }
 }
 
 /// Returns the guideline of \[WP19\] section 8 that is closest to a set of groups.

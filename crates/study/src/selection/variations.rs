@@ -1,0 +1,197 @@
+//! Variations of the scene, on which a selection is judged whose terms and modes their motions did not choose.
+
+use super::cases::Case;
+use super::choice::Choice;
+use super::demand::FramedTests;
+use super::trial::Trial;
+use crate::reference::ReferenceError;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_body::flex_body::{FlexBody, TermGroups};
+use flexbody_linalg::context::Context;
+use flexbody_motion::scene::{LoadCases, Measure, SceneVariation, Trace, ends_a_run};
+
+/// Errors of a selected model in a variation of the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VariedSelection {
+    /// Name of the variation.
+    pub name: String,
+    /// Name of the load case that it varies; `None` for a single scene.
+    pub case: Option<String>,
+    /// True if the scene file states the variation, so that the model must hold in it; false for a standard one.
+    pub is_stated: bool,
+    /// The selected model in the variation, measured against the whole body.
+    pub chosen: Trial,
+    /// The model that the scene alone would select; `None` if it is the selected one.
+    pub of_scene: Option<Trial>,
+    /// The groups that the scene alone would select, with all modes; `None` unless these groups fail in a variation.
+    pub with_all_modes: Option<Trial>,
+    /// Truncation errors of the whole body in the variation; empty if no model is at hand.
+    pub reference_errors: Vec<ReferenceError>,
+}
+
+impl VariedSelection {
+    /// Returns true if the selected model is within the tolerances in the variation, and the whole body is a reference
+    /// there.
+    pub fn holds(&self) -> bool {
+        self.chosen.passed() && self.reference_errors.last().is_none_or(ReferenceError::is_reference)
+    }
+
+    /// Returns the warning about a model that does not hold; `None` if it does, or if the variation is a standard one.
+    pub(super) fn warning(&self) -> Option<Diagnostic> {
+        if self.holds() || !self.is_stated {
+            return None;
+        }
+        let message = match self.reference_errors.last().filter(|own| !own.is_reference()) {
+            Some(own) => format!(
+                "the selection cannot be judged in this variation: the body with all its modes differs from the FE model by about {} of the tolerances (estimated)",
+                own.part_of_tolerances()
+            ),
+            None => format!(
+                "the selected modes and terms are off by {:.3} times the tolerances in this variation",
+                self.chosen.worst
+            ),
+        };
+        Some(Diagnostic::new(Code::VariationFails, message).about(format!("variation `{}`", self.name)))
+    }
+}
+
+/// Variations in which a selection is judged, each with the motion of the whole body.
+pub(super) struct VariedRuns<'v> {
+    variations: Vec<&'v SceneVariation>,
+    cases: Vec<Case<'v>>,
+    references: Vec<Trace>,
+    /// Truncation errors of the whole body in each variation; empty lists if none are known.
+    reference_errors: Vec<&'v [ReferenceError]>,
+    /// Notes about variations that cannot be simulated.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Factor by which the number of modes grows from trial to trial. A smaller value finds fewer modes and takes more
+/// simulations.
+const GROWTH: f64 = 1.25;
+
+impl<'v> VariedRuns<'v> {
+    /// Simulates the whole body in every variation. `reference_errors` are its truncation errors there. Unless the scene
+    /// file states the variations, one whose simulation stops is left out.
+    ///
+    /// # Errors
+    /// The errors of [`trace`](flexbody_motion::scene::trace).
+    pub(super) fn new(
+        all: &'v [SceneVariation],
+        cases: &LoadCases,
+        framed: &'v [FramedTests<'_>],
+        reference_errors: &'v [Vec<ReferenceError>],
+        context: &Context<'v>,
+    ) -> Result<Self> {
+        let mut runs = Self {
+            variations: Vec::new(),
+            cases: Vec::new(),
+            references: Vec::new(),
+            reference_errors: Vec::new(),
+            diagnostics: Vec::new(),
+        };
+        for (at, (tests, one)) in framed.iter().zip(all).enumerate() {
+            let case = Case::new(&tests.body, &tests.scene, context)?;
+            let motion = case.runs().motion(tests.body.groups());
+            match motion {
+                Ok((motion, _)) => runs.references.push(motion),
+                Err(error) => match stops(&error, one).filter(|_| !cases.states_variations()) {
+                    Some(note) => {
+                        runs.diagnostics.push(note);
+                        continue;
+                    }
+                    None => return Err(error.about(format!("variation `{}`", one.name))),
+                },
+            }
+            runs.cases.push(case);
+            runs.variations.push(one);
+            runs.reference_errors.push(reference_errors.get(at).map_or(&[], Vec::as_slice));
+        }
+        Ok(runs)
+    }
+
+    /// Returns true if there is no variation.
+    pub(super) fn is_empty(&self) -> bool {
+        self.variations.is_empty()
+    }
+
+    /// Measures a model in every variation; `measures` belong to the references.
+    fn measured(&self, measures: &[Measure<'_>], choice: &Choice) -> Result<Vec<Trial>> {
+        let trial = |(at, (case, measure)): (usize, (&Case<'v>, &Measure<'_>))| {
+            let budget = ReferenceError::left(self.reference_errors[at]);
+            Ok(case.runs().measured(measure, &choice.modes, choice.groups, budget)?.0)
+        };
+        self.cases.iter().zip(measures).enumerate().map(trial).collect()
+    }
+
+    /// Judges `choice`. Unless the scene limits the cost, modes in the order `ranked` are added until the model is within
+    /// the tolerances of every variation; before, all groups of `held` if those of `choice` are not enough even with all
+    /// modes. Returns the errors in each variation.
+    pub(super) fn judge(
+        &self,
+        choice: &mut Choice,
+        ranked: &[usize],
+        held: TermGroups,
+        is_limited: bool,
+        cases: &LoadCases,
+    ) -> Result<Vec<VariedSelection>> {
+        // The measures look at all nodes and instants of the references: made once for all models.
+        let both = self.cases.iter().zip(&self.references);
+        let measures: Vec<Measure<'_>> =
+            both.map(|(case, reference)| Measure::new(case.body, case.scene, reference)).collect();
+        let of_scene = self.measured(&measures, choice)?;
+        let mut chosen = of_scene.clone();
+        let passed = |trials: &[Trial]| trials.iter().all(Trial::passed);
+        let mut count = choice.modes.len();
+        let mut with_all_modes = None;
+        if !is_limited && !passed(&chosen) && choice.groups != held {
+            // Groups are at fault only if they fail with all modes.
+            let modes = choice.modes.clone();
+            choice.keep_most(ranked, ranked.len());
+            let whole = self.measured(&measures, choice)?;
+            choice.keep(modes);
+            if !passed(&whole) {
+                choice.groups = held;
+                chosen = self.measured(&measures, choice)?;
+                with_all_modes = Some(whole);
+            }
+        }
+        while !is_limited && !passed(&chosen) && count < ranked.len() {
+            count = ((count as f64 * GROWTH).ceil() as usize).min(ranked.len());
+            choice.keep_most(ranked, count);
+            chosen = self.measured(&measures, choice)?;
+        }
+        let is_changed = chosen != of_scene;
+        let row = |(at, (chosen, before)): (usize, (Trial, Trial))| VariedSelection {
+            name: self.variations[at].name.clone(),
+            case: cases.case_name(self.variations[at].case).map(str::to_owned),
+            is_stated: cases.states_variations(),
+            chosen,
+            of_scene: is_changed.then_some(before),
+            with_all_modes: with_all_modes.as_ref().map(|all: &Vec<Trial>| all[at].clone()),
+            reference_errors: self.reference_errors[at].to_vec(),
+        };
+        Ok(chosen.into_iter().zip(of_scene).enumerate().map(row).collect())
+    }
+}
+
+/// Returns a note that a variation judges nothing, if `error` says that its simulation stopped.
+pub(crate) fn stops(error: &Error, variation: &SceneVariation) -> Option<Diagnostic> {
+    let first = error.diagnostics().first()?;
+    error.diagnostics().iter().all(|one| ends_a_run(one.code())).then(|| {
+        let message = format!("variation `{}` judges nothing: {}", variation.name, first.message());
+        Diagnostic::new(Code::VariationStops, message)
+    })
+}
+
+/// Returns the body and every variation in one frame.
+pub(super) fn framed_variations<'s>(
+    body: &'s FlexBody,
+    variations: &'s [SceneVariation],
+) -> Result<Vec<FramedTests<'s>>> {
+    let in_frame = |one: &'s SceneVariation| {
+        FramedTests::new(body, &one.scene).map_err(|error| error.about(format!("variation `{}`", one.name)))
+    };
+    variations.iter().map(in_frame).collect()
+}
