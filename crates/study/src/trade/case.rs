@@ -3,7 +3,7 @@
 
 use super::progress::Progress;
 use super::{
-    Candidate, InCase, Measured, NodalReference, Recommendation, Source, TimedRun, TradeRow, front, reserved,
+    Candidate, InCase, InVariations, NodalReference, Recommendation, Source, TimedRun, TradeRow, front,
     timing,
 };
 use crate::reference::ReferenceError;
@@ -200,6 +200,15 @@ fn refuse_too_much(sources: &[Source], reference: &Trace, memory: Option<u64>) -
     refuse_beyond(memory, needed, &what, "use fewer --threads or modes, or a shorter `duration`")
 }
 
+/// Returns the part of the tolerances that the reference takes in each load case, from its enrichment rounds. Zero if
+/// the truncation error is too large for a reference, and for the motion of all nodes (`nodal`).
+pub fn reserved(reference_errors: &[Vec<ReferenceError>], nodal: bool) -> Vec<f64> {
+    let of = |rounds: &Vec<ReferenceError>| {
+        rounds.last().filter(|own| !nodal && own.is_reference()).map_or(0.0, |own| own.worst)
+    };
+    reference_errors.iter().map(of).collect()
+}
+
 /// Largest number of candidates that are judged on variations. More cost time where no cheap candidate holds.
 const MOST_JUDGED: usize = 8;
 
@@ -254,19 +263,6 @@ impl TradeVariation {
         let is_reference = self.reference.as_ref().is_none_or(ReferenceError::is_reference);
         is_reference && errors.is_some_and(|own| own.worst <= 1.0 - self.reserved)
     }
-}
-
-/// Errors of a candidate in the variations of a study.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InVariations {
-    /// Errors in each variation; `None` where its simulation stopped.
-    pub by_variation: Vec<Option<InCase>>,
-    /// Index of the variation with the largest ratio of error to tolerance.
-    pub variation: usize,
-    /// Largest ratio of error to tolerance; infinite if a simulation stopped.
-    pub worst: f64,
-    /// Number of variations whose errors exceed the tolerances that the reference leaves.
-    pub beyond: usize,
 }
 
 /// Variations with the motion of their reference.
@@ -396,11 +392,4 @@ fn measured(
 ) -> Result<InCase> {
     let body = case.body(candidate)?;
     Ok(case.measured(measure, candidate, &body, context)?.0)
-}
-
-impl Measured {
-    /// Returns true if the errors of every variation are within the tolerances, or if none was judged.
-    pub fn holds_in_variations(&self) -> bool {
-        self.varied.as_ref().is_none_or(|varied| varied.beyond == 0)
-    }
 }

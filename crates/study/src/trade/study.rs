@@ -7,7 +7,6 @@ use super::{
     Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Source, Timed,
     TradeRow, TradeVariation, Varied, front,
 };
-use crate::reference::ReferenceError;
 use crate::selection::most_excited_modes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -28,15 +27,6 @@ pub struct TradeSettings<'s> {
     pub reserved: &'s [f64],
     /// Variations of the scene that the cheapest candidates are judged on; `None` to judge on the scene alone.
     pub varied: Option<&'s Varied>,
-}
-
-/// Returns the part of the tolerances that the reference takes in each load case, from its enrichment rounds. Zero if
-/// the truncation error is too large for a reference, and for the motion of all nodes (`nodal`).
-pub fn reserved(reference_errors: &[Vec<ReferenceError>], nodal: bool) -> Vec<f64> {
-    let of = |rounds: &Vec<ReferenceError>| {
-        rounds.last().filter(|own| !nodal && own.is_reference()).map_or(0.0, |own| own.worst)
-    };
-    reference_errors.iter().map(of).collect()
 }
 
 /// Requested reference motion for the errors of a study.

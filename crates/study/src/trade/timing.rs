@@ -1,12 +1,11 @@
 //! Times, measured one after the other on one thread.
 
-use super::InCase;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, NotPositiveDefinite, Terms};
 use flexbody_motion::integration::Work;
-use flexbody_motion::scene::{ModeStart, Scene, Scheme, simulate};
+use flexbody_motion::scene::{Scene, Scheme, simulate};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -25,21 +24,6 @@ const LOOSEST_TOLERANCE: f64 = 1e-2;
 const MIN_STEPS: f64 = 10.0;
 /// Share of a candidate's error that the integration may add where the candidate exceeds the tolerances anyway.
 const SHARE_OF_ERROR: f64 = 0.1;
-
-/// Simulation of a candidate in a load case: errors and time of the same run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TimedRun {
-    /// Method with the cheapest accuracy that meets what is left of the tolerances.
-    pub scheme: Scheme,
-    /// Errors of the run, of the reduction and of its time integration together.
-    pub errors: InCase,
-    /// Duration of the run. Unit: s.
-    pub seconds: f64,
-    /// Steps and evaluations of the run.
-    pub work: Work,
-    /// Initial values of the modes of the candidate's own body, where the scene states those of the reference.
-    pub start: Vec<ModeStart>,
-}
 
 /// Returns the accuracies of the time integration that a candidate is tried with, the cheapest first. The last is
 /// `finest`, the one of the reference, with its actual step.
