@@ -10,6 +10,7 @@ use flexbody_linalg::side_by_side;
 use flexbody_model::{FeModel, RecoveryRow};
 use flexbody_motion::scene::Point;
 use nalgebra::{Complex, DMatrix};
+use std::path::Path;
 
 /// Largest number of rows of recoveries whose transfer functions are computed. More rows make large tables.
 const MOST_ROWS: usize = 2000;
@@ -86,6 +87,19 @@ impl Output {
             Self::Row(row) => &row.name,
         }
     }
+}
+
+/// Ends of the transfer functions of a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResponseEnds<'e> {
+    /// Excitation.
+    pub from: &'e Excitation,
+    /// Places of displacements.
+    pub to: &'e [Place],
+    /// Rows of recoveries: `NAME` for all rows of a recovery, `NAME:ROW` for one.
+    pub rows: &'e [String],
+    /// Table of the spectral densities of a random excitation.
+    pub densities: Option<&'e Path>,
 }
 
 /// Rows of one recovery of a body that are read.

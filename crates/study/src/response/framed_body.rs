@@ -1,10 +1,10 @@
 //! Body in the frames of a frequency response, with its loads and outputs, and its response as a sum over the modes.
 
 use super::band::Resonance;
-use super::ends::{BaseMotion, ChosenRows, Excitation, chosen_rows};
+use super::ends::{BaseMotion, ChosenRows, Excitation, ResponseEnds, chosen_rows};
 use super::modal_sum::ModalSum;
 use super::place::{Direction, Place, PlaceRows};
-use super::study::{ResponseEnds, ResponseSettings};
+use super::settings::ResponseSettings;
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;

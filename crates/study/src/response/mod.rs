@@ -8,17 +8,20 @@ mod ends;
 mod errors;
 mod framed_body;
 mod modal_sum;
+mod model_response;
 mod place;
 mod random;
 mod request;
+mod settings;
 mod study;
 
 pub use band::{Band, Resonance, Spacing};
-pub use ends::{Excitation, Output, Target};
+pub use ends::{Excitation, Output, ResponseEnds, Target};
 pub use errors::{At, Effectivity, PairErrors};
 /// Complex number of a response; the real part is in phase with the force.
 pub use nalgebra::Complex;
 pub use place::{Direction, Place};
 pub use random::{RandomErrors, RandomRecovery, RandomResponse, RandomValue};
 pub use request::{Responded, ResponseRequest};
-pub use study::{CouplingEffect, Function, Pair, Response, ResponseEnds, ResponseSettings, Solved, respond};
+pub use settings::ResponseSettings;
+pub use study::{CouplingEffect, Function, Pair, Response, Solved, respond};

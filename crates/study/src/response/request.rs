@@ -1,9 +1,10 @@
 //! Request for a frequency response: what a user states, completed by a scene.
 
 use super::band::Band;
-use super::ends::Excitation;
+use super::ends::{Excitation, ResponseEnds};
 use super::place::Place;
-use super::study::{Response, ResponseEnds, ResponseSettings, respond};
+use super::settings::ResponseSettings;
+use super::study::{Response, respond};
 use crate::conversion::RESIDUALS_NEED_FREE_MODES;
 use crate::tailoring::computed_basis;
 use flexbody_base::diagnostic::{Code, Diagnostic};

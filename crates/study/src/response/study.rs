@@ -1,60 +1,26 @@
 //! Frequency response of a body over a band, compared with that of its model.
 
 use super::Complex;
-use super::band::{Band, Frequency};
+use super::band::Frequency;
 use super::densities::SpectralDensities;
 use super::direct::{DirectSolution, DirectSolver};
-use super::ends::{BaseMotion, Excitation, Output, Target};
+use super::ends::{BaseMotion, Output, ResponseEnds, Target};
 use super::errors::{At, Compared, PairErrors};
 use super::framed_body::{FramedBody, Read, numbered, reduced_sum};
-use super::modal_sum::{ModalSum, NodalModes};
+use super::modal_sum::ModalSum;
+use super::model_response::ModelResponse;
 use super::place::{Direction, Place};
 use super::random::{RandomResponse, RandomStudy, input_names};
-use faer::{Mat, Scale};
+use super::settings::ResponseSettings;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::units::UnitSystem;
-use flexbody_body::basis::{CoupledModel, rigid_modes};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
+use flexbody_linalg::parallel;
 use flexbody_linalg::ties::first_largest;
-use flexbody_linalg::{gram, largest, parallel, side_by_side};
-use flexbody_model::{DampingRatios, FeModel};
+use flexbody_model::FeModel;
 use nalgebra::DMatrix;
-use std::path::Path;
-
-/// Largest deviation from one of the modal masses (and relative modal stiffnesses) of a body in its own model. It
-/// allows for arrays of 32 bits; a larger deviation means another model.
-const MODAL_MASS: f64 = 1e-4;
-
-/// Largest number of outputs whose static responses improve the estimate of the error. More cost more.
-const MOST_IMPROVED: usize = 36;
-
-/// Settings of a frequency response.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ResponseSettings {
-    /// Frequency band.
-    pub band: Band,
-    /// Approximate number of frequencies of the curves.
-    pub points: usize,
-    /// Approximate number of frequencies at which the equations of all nodes are solved.
-    pub solves: usize,
-    /// Damping ratios of the modes; `None` to use those of the body.
-    pub damping: Option<DampingRatios>,
-    /// True if `damping` replaces the damping of the body. If false, a body with damping is refused.
-    pub replaces_damping: bool,
-    /// Largest relative error that is accepted.
-    pub tolerance: f64,
-}
-
-impl ResponseSettings {
-    /// Default number of frequencies of the curves: more are not visible in a plot.
-    pub const POINTS: usize = 400;
-    /// Default number of frequencies at which the equations are solved: enough for two dozen resonances.
-    pub const SOLVES: usize = 80;
-    /// Default tolerance of the relative error: less than half a decibel.
-    pub const TOLERANCE: f64 = 0.05;
-}
 
 /// Transfer functions over a band.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,19 +132,6 @@ impl Response {
     }
 }
 
-/// Ends of the transfer functions of a body.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ResponseEnds<'e> {
-    /// Excitation.
-    pub from: &'e Excitation,
-    /// Places of displacements.
-    pub to: &'e [Place],
-    /// Rows of recoveries: `NAME` for all rows of a recovery, `NAME:ROW` for one.
-    pub rows: &'e [String],
-    /// Table of the spectral densities of a random excitation.
-    pub densities: Option<&'e Path>,
-}
-
 /// Computes the transfer functions of `body` over a band: displacements, rotations and rows of recoveries for unit forces
 /// and torques, along the axes of the model, H(w) = L'(K + i w D - w^2 M)^-1 B. With the `model` that the body was made of,
 /// the equations of all its nodes are also solved at some of the frequencies, with the damping of the body: D = M Psi C
@@ -246,108 +199,6 @@ pub fn respond(
         solved: known.as_ref().map(|known| curves.solved(known, low)),
         coupling: known.as_ref().and_then(|known| curves.coupling_effect(known, &blocks, settings.tolerance)),
         frequencies: curves.frequencies.iter().map(|f| f.hertz).collect(),
-    })
-}
-
-/// Model of the body, with the enriched response that estimates the error.
-pub(super) struct ModelResponse<'m> {
-    nodal: NodalModes<'m>,
-    /// Response with static responses added to the modes, which estimates the error; `None` if the modes leave no
-    /// unbalanced force.
-    pub enriched: Option<ModalSum>,
-    /// Displacements of the coordinates of this response (N x n).
-    pub shapes: Option<Mat<f64>>,
-    damping: Option<Mat<f64>>,
-    context: Context<'m>,
-}
-
-impl<'m> ModelResponse<'m> {
-    fn new(
-        model: &'m FeModel,
-        framed: &FramedBody,
-        read: &Read<'_>,
-        damping: Option<&Mat<f64>>,
-        context: &Context<'m>,
-    ) -> Result<Self> {
-        context.phase("estimate of the error");
-        let body = &framed.damped;
-        let nodal = nodal_modes(model, framed, read, damping)?;
-        let (enriched, shapes) = nodal.enriched(body, damping)?.unzip();
-        Ok(Self { nodal, enriched, shapes, damping: damping.cloned(), context: *context })
-    }
-
-    /// Returns the model.
-    pub(super) fn model(&self) -> &FeModel {
-        self.nodal.model.model()
-    }
-
-    /// Prepares the equations of all nodes of `model`, with the couplings of the body or without, for `solves`
-    /// frequencies.
-    fn direct_solver<'s>(&'s self, model: &'s CoupledModel<'_>, solves: usize) -> Result<DirectSolver<'s>> {
-        let NodalModes { inertial, loads, measured, moving, whole, .. } = &self.nodal;
-        let damping = self.damping.as_ref().map(|c| (inertial, c));
-        DirectSolver::new(model, [loads, measured], moving, damping, whole.clone(), solves, &self.context)
-    }
-
-    /// Returns the model with deformable interfaces; `None` if no interface of the body is rigid.
-    fn deforming(&self) -> Option<CoupledModel<'m>> {
-        let coupled = &self.nodal.model;
-        (!coupled.rigid_interfaces().is_empty()).then(|| CoupledModel::uncoupled(coupled.model()))
-    }
-}
-
-/// Expresses the body in the rows of the model that it was made of, and refuses a body of another model.
-fn nodal_modes<'m>(
-    model: &'m FeModel,
-    framed: &FramedBody,
-    read: &Read<'_>,
-    damping: Option<&Mat<f64>>,
-) -> Result<NodalModes<'m>> {
-    let body = &framed.damped;
-    let foreign = |why: &str| {
-        let message = format!("the body was not made from this model: {why}");
-        let help = "give the model that the body was converted from";
-        Diagnostic::new(Code::BodyIncomparable, message).with_help(help)
-    };
-    let vectors = body.vectors_of(model).ok_or_else(|| foreign("its matrix rows differ"))?;
-    let pencil = model.pencil();
-    // Modes of this model have modal mass 1 and modal stiffness lambda.
-    let (inertial, elastic) = (pencil.apply_mass(vectors.as_ref()), pencil.apply_stiffness(vectors.as_ref()));
-    let mass = gram(vectors.as_ref(), inertial.as_ref());
-    let eigenvalue = &body.modes().eigenvalue;
-    let stiffness = gram(vectors.as_ref(), elastic.as_ref());
-    let apart = largest(
-        (0..eigenvalue.len())
-            .flat_map(|j| [(mass[(j, j)] - 1.0).abs(), (stiffness[(j, j)] / eigenvalue[j] - 1.0).abs()]),
-    );
-    if apart.is_nan() || apart > MODAL_MASS {
-        let why = format!("modal masses or stiffnesses of its modes differ by up to {apart:.1e}");
-        return Err(foreign(&why).into());
-    }
-    let whole = damping.filter(|_| framed.lag > 0.0).map(|c| (framed.lag, c - stiffness * Scale(framed.lag)));
-    let unit_loads = |places: &[Place]| -> Result<Mat<f64>> {
-        if places.is_empty() {
-            return Ok(Mat::zeros(model.rows().len(), 0));
-        }
-        let loads = places.iter().map(|place| place.loads(model)).collect::<Result<Vec<_>>>()?;
-        Ok(side_by_side(&loads.iter().map(|load| load.as_ref()).collect::<Vec<_>>()))
-    };
-    let of_recoveries = read.rows.iter().map(|one| one.loads(model)).collect::<Result<Vec<_>>>()?;
-    let places = unit_loads(&read.to)?;
-    let outputs: Vec<_> = std::iter::once(&places).chain(&of_recoveries).map(Mat::as_ref).collect();
-    let measured = side_by_side(&outputs);
-    let improved = if measured.ncols() > MOST_IMPROVED { places.ncols() } else { measured.ncols() };
-    Ok(NodalModes {
-        model: body.coupled_model(model, vectors.as_ref()),
-        rigid: rigid_modes(model, &pencil)?,
-        vectors,
-        inertial,
-        elastic,
-        loads: unit_loads(&read.from)?,
-        measured,
-        moving: read.moving(model.dimension()),
-        improved,
-        whole,
     })
 }
 
