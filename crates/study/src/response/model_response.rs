@@ -1,4 +1,4 @@
-//! Model of a body, whose equations are solved at all nodes, with an enriched response of the body that estimates the error.
+//! Model of the body: the equations of all its nodes, and the enriched response that estimates the error.
 
 use super::direct::DirectSolver;
 use super::framed_body::{FramedBody, Read};

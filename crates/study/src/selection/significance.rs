@@ -1,4 +1,4 @@
-//! Significance of every term of the equations of motion for a body and a scene: dimensionless ([WP19] eq. 28 and 36 to
+//! Significance of every term of the equations of motion for a body and a scene: dimensionless (\[WP19\] eq. 28 and 36 to
 //! 40, as corrected in the theory, section 11), and with the invariants of the body.
 
 use super::norms::{Norms, change_of_inertia};
