@@ -18,7 +18,8 @@ use flexbody_linalg::{
     multiply_compensated, small_pencil, sum_length,
 };
 
-/// Guaranteed bounds of the eigenvalues of K and M as they are stored, at [`Accuracy::Certified`](super::Accuracy::Certified).
+/// Guaranteed bounds of the eigenvalues of K and M as they are stored, at
+/// [`Accuracy::Certified`](super::Accuracy::Certified).
 #[derive(Debug, Clone, PartialEq)]
 pub struct EigenvalueBounds {
     /// Lower bounds, ascending: lower\[j\] <= lambda_j.
