@@ -1,10 +1,9 @@
 //! Trade study as a user requests it: of a model, or of a flex-body file.
 
-use super::Source;
 use super::candidate::Source;
 use super::case::{Varied, reserved};
 use super::conversions::{WantedBodies, conversions};
-use super::study::{ReferenceChoice, ReferenceKind, Trade, TradeSettings, reserved, trade};
+use super::study::{ReferenceChoice, ReferenceKind, Trade, TradeSettings, trade};
 use crate::conversion::in_scene_file;
 use crate::recipe::{Origin, Recipe};
 use crate::reference::ReferenceError;
