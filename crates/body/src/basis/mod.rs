@@ -1,5 +1,6 @@
 //! Modal bases: shapes that span the deformation of a body, each kind in one file behind [`Basis`].
 
+mod choice;
 mod coupled_model;
 mod craig_bampton;
 mod craig_chang;
@@ -15,6 +16,7 @@ mod pseudo_free_surface;
 mod residual_vectors;
 mod solved;
 
+pub use choice::BasisChoice;
 pub use coupled_model::{CoupledModel, oscillating_responses};
 pub use craig_bampton::CraigBampton;
 pub use craig_chang::CraigChang;
@@ -24,7 +26,7 @@ pub use flexbody_eigen::EigenSettings as ModeSettings;
 pub use free_surface::{FreeSurface, first_eigenvalue_estimate, free_surface, search_plan};
 pub use imported::ImportedShapes;
 pub use interface_rows::{CoordinatesInModelAxes, InterfaceCoordinates};
-pub use modal_basis::{Basis, BasisChoice, BasisKind, ModalBasis, Task, Truncation, rigid_modes};
+pub use modal_basis::{Basis, BasisKind, ModalBasis, Task, Truncation, rigid_modes};
 pub use residual_vectors::{
     Loads, UserLoads, free_static_responses, free_static_responses_twice, interface_loads,
 };
