@@ -7,10 +7,10 @@
 //! the same to the last bit at any number of threads, and no sum is longer than a chunk, the chunks of a
 //! group or the groups: rounding does not grow with the model.
 
-use super::{Invariants, LumpedMasses, PrimaryData, TermGroups, s_of_modal_mass};
+use super::{Invariants, PrimaryData, TermGroups, s_of_modal_mass};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
-use flexbody_linalg::{SymmetricMatrix, gram, parallel};
+use flexbody_linalg::{SymmetricMatrix, parallel};
 use nalgebra::{Matrix3, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
@@ -364,27 +364,11 @@ pub fn condense_linear(
     of_rigid_products(mass, SolidColumns { positions, shapes }, modal_stiffness, &Mat::identity(nf, nf))
 }
 
-/// Condenses lumped masses without W2 and W3 (see [`condense_lumped`](super::condense_lumped)). m_ff, which
-/// is no identity for lumped masses, is computed.
+/// Returns the primary data without W2 and W3 from the products of the mass with rigid motion; m_ff is `modal_mass`.
 ///
 /// # Panics
 /// When the sizes disagree.
-pub fn condense_lumped_linear(
-    masses: &LumpedMasses,
-    positions: &[[f64; 3]],
-    shapes: MatRef<'_, f64>,
-    modal_stiffness: Mat<f64>,
-) -> Invariants {
-    let m = masses.masses();
-    assert_eq!(m.len(), positions.len(), "nodal masses and positions");
-    let weighted = Mat::from_fn(shapes.nrows(), shapes.ncols(), |row, p| m[row / 3] * shapes[(row, p)]);
-    let product = gram(shapes, weighted.as_ref());
-    let modal_mass =
-        Mat::from_fn(shapes.ncols(), shapes.ncols(), |p, q| 0.5 * (product[(p, q)] + product[(q, p)]));
-    of_rigid_products(m, SolidColumns { positions, shapes }, modal_stiffness, &modal_mass)
-}
-
-fn of_rigid_products<M: NodalMass + ?Sized>(
+pub(super) fn of_rigid_products<M: NodalMass + ?Sized>(
     mass: &M,
     columns: SolidColumns<'_>,
     modal_stiffness: Mat<f64>,

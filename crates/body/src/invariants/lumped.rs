@@ -2,12 +2,12 @@
 //! body.
 
 use super::Invariants;
-use super::condense::condense_with;
+use super::condense::{SolidColumns, condense_with, of_rigid_products};
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
-use flexbody_linalg::SymmetricMatrix;
+use flexbody_linalg::{SymmetricMatrix, gram};
 
 /// Masses below this part of the largest mass count as zero: cancelling row sums leave rounding of either
 /// sign.
@@ -136,4 +136,24 @@ pub fn condense_lumped(
 ) -> Invariants {
     assert_eq!(masses.masses.len(), positions.len(), "nodal masses and positions");
     condense_with(masses.masses.as_slice(), positions, shapes, modal_stiffness)
+}
+
+/// Condenses lumped masses without W2 and W3 (see [`condense_lumped`]). m_ff, which is no identity for lumped
+/// masses, is computed.
+///
+/// # Panics
+/// When the sizes disagree.
+pub fn condense_lumped_linear(
+    masses: &LumpedMasses,
+    positions: &[[f64; 3]],
+    shapes: MatRef<'_, f64>,
+    modal_stiffness: Mat<f64>,
+) -> Invariants {
+    let m = masses.masses();
+    assert_eq!(m.len(), positions.len(), "nodal masses and positions");
+    let weighted = Mat::from_fn(shapes.nrows(), shapes.ncols(), |row, p| m[row / 3] * shapes[(row, p)]);
+    let product = gram(shapes, weighted.as_ref());
+    let modal_mass =
+        Mat::from_fn(shapes.ncols(), shapes.ncols(), |p, q| 0.5 * (product[(p, q)] + product[(q, p)]));
+    of_rigid_products(m, SolidColumns { positions, shapes }, modal_stiffness, &modal_mass)
 }

@@ -11,6 +11,7 @@ mod identities;
 mod identity_terms;
 mod inertia_stiffness;
 mod lumped;
+mod numbered;
 mod primary;
 mod transform;
 
@@ -18,8 +19,8 @@ pub use certified::{CertifiedInvariants, DIGITS, condense_certified, digits_of_e
 pub use comparison::{
     Alignment, CauchySchwarz, ERROR_NORMS, align, compare_invariants, error_norms, primary_differences,
 };
-pub use condense::{condense, condense_linear, condense_lumped_linear};
-pub use derived::{Derived, Numbered};
+pub use condense::{condense, condense_linear};
+pub use derived::Derived;
 pub use frame::{
     BodyFrame, Frame, FrameChoice, MassProperties, choose_frame, choose_general_frame, choose_plane_frame,
     principal_axes,
@@ -29,6 +30,7 @@ pub use identities::{
     BoundsBroken, Expected, IdentityCheck, Turning, bounds_broken, derived_identities, identities,
 };
 pub use inertia_stiffness::{InertiaShares, InertiaStiffness, relative_norm};
-pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
+pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped, condense_lumped_linear};
+pub use numbered::Numbered;
 pub use primary::{GeneralTerms, Invariants, MassKind, PrimaryData, TermGroup, TermGroups};
 pub use transform::{UnitFactors, ibar_of_c2, s_of_modal_mass, symmetric_part};
