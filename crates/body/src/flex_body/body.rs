@@ -1,5 +1,6 @@
 //! The validated body.
 
+use super::rotated_stiffness::joined;
 use super::validate::problems;
 use super::{
     Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, NamedLoad, Parts, Recovery,
@@ -196,6 +197,13 @@ impl FlexBody {
     /// Returns the geometric stiffness of unit loads along body axes, reduced to the modes.
     pub fn geometric_stiffness(&self) -> &[GeometricStiffness<Mat<f64>>] {
         &self.parts.geometric_stiffness
+    }
+
+    /// Returns K_geo of every load on modes and unit rotations together ((nf + 3) square); `None` if that of the rotations
+    /// is not known.
+    pub(super) fn stiffness_with_rotation(&self) -> Option<Vec<GeometricStiffness<Mat<f64>>>> {
+        let rotated = &self.parts().rotated_stiffness;
+        (!rotated.is_empty()).then(|| joined(self.geometric_stiffness(), rotated, 1.0))
     }
 
     /// Returns the stiffness of inertia of nodes whose rotations carry mass: the terms of the kinetic

@@ -3,6 +3,7 @@
 mod body;
 mod carried;
 mod carried_stiffness;
+mod frame_change;
 mod held_modes;
 mod held_response;
 mod identities;
@@ -16,9 +17,12 @@ mod parts;
 mod recovery;
 mod reference_conditions;
 mod rotated_stiffness;
+mod rounding;
 mod softening;
 mod stated_damping;
+mod static_response;
 mod storage;
+mod subset;
 mod terms;
 mod validate;
 
@@ -39,11 +43,13 @@ pub use named_load::NamedLoad;
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, is_static,
 };
-pub use recovery::{LOAD_COMPONENTS, LoadColumns, Recovery, RecoveryState, StaticCoordinates};
+pub use recovery::{LOAD_COMPONENTS, LoadColumns, Recovery, RecoveryState};
 pub use reference_conditions::ReferenceConditions;
 pub use rotated_stiffness::{RotatedStiffness, SplitStiffness, joined, split};
 pub use softening::{SOFTENING, axis_in_words};
 pub use stated_damping::diagonal_ratios;
 pub(crate) use stated_damping::proportional_damping;
+pub use static_response::StaticCoordinates;
 pub use storage::Storage;
-pub use terms::{Subset, TermDecision};
+pub use subset::Subset;
+pub use terms::TermDecision;

@@ -10,7 +10,7 @@
 //! with the angular acceleration alpha, C_kk = S_k S_k and C_kl = S_k S_l + S_l S_k. The rows of a recovery in their static
 //! responses outside the modes are columns beside those of loads and spin.
 
-use super::{LoadKind, Recovery, UnitLoad};
+use super::{LoadKind, UnitLoad};
 use crate::invariants::{Invariants, TermGroups};
 use faer::Mat;
 use flexbody_linalg::side_by_side;
@@ -315,13 +315,6 @@ fn rigid_products(invariants: &Invariants, b: &Matrix3<f64>, j: usize) -> [f64; 
         None => shift[a],
         Some(k) => weighed(&(turning(k).transpose() * b)),
     })
-}
-
-impl Recovery {
-    /// Returns the columns of the forces of a kind; `None` if the recovery does not have them.
-    pub fn of_motion(&self, load: MotionLoad) -> Option<&Mat<f64>> {
-        self.motion.iter().find(|one| one.load == load).map(|one| &one.columns)
-    }
 }
 
 /// Returns true if the modes of a body with `groups` respond to the forces of a kind.

@@ -4,7 +4,7 @@
 //! Rigid translations cause no force, K_geo t = 0, so that rotations about the origin of the frame are those about any
 //! point. A rotation turns the forces of the load with the body (theory section 7): K_geo (phi x x) is not zero.
 
-use super::{FlexBody, GeometricStiffness, UnitLoad};
+use super::{GeometricStiffness, UnitLoad};
 use faer::{Mat, MatRef};
 use flexbody_linalg::{combine, gram};
 use nalgebra::Matrix3;
@@ -54,15 +54,6 @@ pub fn joined(
         GeometricStiffness { load: own.load.clone(), matrix: Mat::from_fn(nf + 3, nf + 3, entry) }
     });
     both.collect()
-}
-
-impl FlexBody {
-    /// Returns K_geo of every load on modes and unit rotations together ((nf + 3) square); `None` if that of the rotations
-    /// is not known.
-    pub(super) fn stiffness_with_rotation(&self) -> Option<Vec<GeometricStiffness<Mat<f64>>>> {
-        let rotated = &self.parts().rotated_stiffness;
-        (!rotated.is_empty()).then(|| joined(self.geometric_stiffness(), rotated, 1.0))
-    }
 }
 
 /// Returns T'A T of every matrix A.
