@@ -11,16 +11,16 @@
 //! frame is the motion of the interface, so that no constraint is left to solve. The body held at the
 //! interface has the eigenpairs of (K_ff, m_ff), with m_ff of the new modes.
 
-use super::modal_change::{rotations_without, shapes_without, stacked};
+use super::carrier::{CarriedPoint, refused};
+use super::modal_change::{rotations_without, shapes_without};
 use super::rotated_stiffness::{SplitStiffness, split, transformed, without_rotation};
-use super::{FlexBody, Interface, Modes, Recovery, ReferenceConditions, TermGroups};
+use super::{Carrier, FlexBody, Interface, Modes, ReferenceConditions, TermGroups};
 use crate::basis::BasisKind;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::{Error, Result};
+use flexbody_base::error::Result;
 use flexbody_base::numbers::about_percent;
-use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
-use flexbody_model::{Coupling, DampingRatios, rigid_count};
+use flexbody_model::{Coupling, rigid_count};
 use nalgebra::{Matrix3, Vector3};
 
 /// Largest truncation error of the static response of a carried body that passes without a warning.
@@ -33,52 +33,6 @@ const MAX_RIGID_DEFORMATION: f64 = 1e-4;
 /// Motion of the interface, relative to the largest displacement of a mode, below which the motion is taken
 /// for rounding.
 const ROUNDING_MOTION: f64 = 1e-12;
-
-/// Carrier of a body: the place that its frame is fixed to.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Carrier {
-    /// The reference point of the interface of this name.
-    Interface(String),
-    /// Node of this number, which must have rotations.
-    Node(i64),
-}
-
-impl Carrier {
-    /// Returns the interface of `body` with this name, or else the node with this number.
-    pub fn named(body: &FlexBody, name: &str) -> Self {
-        let is_interface = body.interfaces().iter().any(|interface| interface.name == name);
-        match name.parse() {
-            Ok(number) if !is_interface => Self::Node(number),
-            _ => Self::Interface(name.to_owned()),
-        }
-    }
-
-    /// Parses the name of a carrier in simulation files: `interface NAME` or `node 17`.
-    pub fn from_words(words: &str) -> Option<Self> {
-        match words.split_once(' ')? {
-            ("interface", name) => Some(Self::Interface(name.to_owned())),
-            ("node", number) => Some(Self::Node(number.parse().ok()?)),
-            _ => None,
-        }
-    }
-}
-
-impl std::fmt::Display for Carrier {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Interface(name) => write!(f, "interface `{name}`"),
-            Self::Node(number) => write!(f, "node {number}"),
-        }
-    }
-}
-
-/// Reference point of a carrier and its motion in every mode.
-struct CarriedPoint {
-    /// Reference point, body frame.
-    reference: Vector3<f64>,
-    /// Translations, then rotations, of the point in the modes (6 x nf), body axes.
-    motion: Mat<f64>,
-}
 
 impl FlexBody {
     /// Returns this body in the frame of `carrier`: the origin is the reference point of the carrier, the
@@ -155,37 +109,6 @@ impl FlexBody {
                 (self.stiffness_with_reaction(self.geometric_stiffness().to_vec(), carrier), Vec::new())
             }
         }
-    }
-
-    /// Returns the eigenvalues lambda of (K_ff, m_ff), ascending: for free modes their eigenvalues, for a
-    /// carried body those of the body held at its interface. Unit: 1/time^2.
-    pub fn eigenvalues_in_frame(&self) -> Option<Vec<f64>> {
-        Some(self.eigenpairs_in_frame()?.0)
-    }
-
-    /// Sets modal damping: each eigenpair in the frame of the body gets the ratio of `ratios` at its
-    /// frequency, D = m_ff X diag(2 ratio omega) X' m_ff. For a body of free modes the eigenpairs are the
-    /// modes. Static columns of other damping forces are left out of recoveries.
-    ///
-    /// # Errors
-    /// The errors of [`FlexBody::new`].
-    pub fn with_damping_ratios(&self, ratios: &DampingRatios) -> Result<Self> {
-        let mut parts = self.clone().into_parts();
-        let ratio = |eigenvalue: f64| ratios.at(self.units().frequency_of(eigenvalue.max(0.0)));
-        parts.modes.damping_ratio = self.modes().eigenvalue.iter().map(|&lambda| ratio(lambda)).collect();
-        parts.modes.modal_damping = None;
-        parts.recoveries.iter_mut().for_each(Recovery::remove_damping);
-        let mass = self.invariants().modal_mass();
-        let apart = |i: usize, j: usize| (mass[(i, j)] - f64::from(i == j)).abs();
-        let nf = self.n_modes();
-        let normalised = (0..nf).all(|i| (0..nf).all(|j| apart(i, j) < 1e-6));
-        if let Some((values, vectors)) = (!normalised).then(|| self.eigenpairs_in_frame()).flatten() {
-            let moved = &mass * &vectors;
-            let rate = |p: usize| 2.0 * ratio(values[p]) * values[p].max(0.0).sqrt();
-            let entry = |i: usize, j: usize| (0..nf).map(|p| moved[(i, p)] * rate(p) * moved[(j, p)]).sum();
-            parts.modes.modal_damping = Some(Mat::from_fn(nf, nf, entry));
-        }
-        Self::new(parts)
     }
 
     /// Returns a warning if the modes of a carried body leave more than one hundredth of its static
@@ -277,14 +200,6 @@ impl FlexBody {
         whole && boundary.iter().any(|one| one.name == name)
     }
 
-    /// Returns eigenvalues and m_ff-orthonormal eigenvectors of (K_ff, m_ff).
-    pub(super) fn eigenpairs_in_frame(&self) -> Option<(Vec<f64>, Mat<f64>)> {
-        let lower = dense_cholesky(self.invariants().modal_mass())?;
-        let half = solve_lower(&lower, self.invariants().modal_stiffness());
-        let eigen = symmetric_eigen(solve_lower(&lower, &half.transpose().to_owned()).as_ref())?;
-        Some((eigen.values, solve_upper(&lower, &eigen.vectors)))
-    }
-
     /// True if the origin of the frame is the reference point of `carrier`, which moves in no mode.
     ///
     /// # Errors
@@ -308,61 +223,6 @@ impl FlexBody {
             (0..3).all(|k| motion[(k, j)].abs() <= size && motion[(3 + k, j)].abs() * extent <= size)
         })
     }
-
-    /// Returns the reference point of `carrier` and its translations and rotations in the modes (6 x nf), body axes.
-    ///
-    /// # Errors
-    /// The errors FB212 and FB214 of [`FlexBody::carried`].
-    pub(super) fn motion_of(&self, carrier: &Carrier) -> Result<(Vector3<f64>, Mat<f64>)> {
-        let CarriedPoint { reference, motion } = self.place_of(carrier)?;
-        Ok((reference, motion))
-    }
-
-    fn place_of(&self, carrier: &Carrier) -> Result<CarriedPoint> {
-        let unknown = |message: String| Err(Diagnostic::new(Code::SceneBody, message).into());
-        match carrier {
-            Carrier::Node(number) => {
-                let Some(node) = self.nodes().ids.iter().position(|id| id == number) else {
-                    return unknown(format!("the body has no node {number}"));
-                };
-                let rotation = self.modes().rotation.as_ref();
-                let at = |shape: &Mat<f64>| shape.as_ref().subrows(3 * node, 3).to_owned();
-                let rotation = rotation.map(at).filter(|rows| rows.norm_max() > 0.0);
-                let Some(rotation) = rotation else {
-                    return Err(refused(format!(
-                        "node {number} has no rotations: its orientation is not known"
-                    )));
-                };
-                let motion = stacked(&at(&self.modes().shape), &rotation);
-                Ok(CarriedPoint { reference: Vector3::from(self.nodes().positions[node]), motion })
-            }
-            Carrier::Interface(name) => {
-                let Some(interface) = self.interfaces().iter().find(|interface| interface.name == *name)
-                else {
-                    let all: Vec<&str> = self.interfaces().iter().map(|i| i.name.as_str()).collect();
-                    let known = if all.is_empty() { "it has none".to_owned() } else { all.join(", ") };
-                    return unknown(format!("the body has no interface `{name}`: {known}"));
-                };
-                let modes = self.modes();
-                let rotation = modes.rotation.as_ref().map(Mat::as_ref);
-                let rows = interface.rows(self.nodes(), modes.shape.as_ref(), rotation, self.dimension());
-                let Some((rows, reference)) = rows.zip(interface.reference) else {
-                    let why = if interface.coupling == Some(Coupling::Free) { " (it is free)" } else { "" };
-                    return Err(refused(format!("interface `{name}` has no reference point{why}")));
-                };
-                let Some(motion) = rows.rigid_motion() else {
-                    return Err(refused(format!(
-                        "the nodes of interface `{name}` lie on one line: its orientation is not known"
-                    )));
-                };
-                Ok(CarriedPoint { reference: Vector3::from(reference), motion })
-            }
-        }
-    }
-}
-
-fn refused(message: String) -> Error {
-    Diagnostic::new(Code::CarrierImpossible, message).into()
 }
 
 /// Relative energy of a direction, compared with the largest, below which the direction counts as free of

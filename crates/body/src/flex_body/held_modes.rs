@@ -1,4 +1,4 @@
-//! Natural modes of a body that is held at one of its interfaces, and their effective masses.
+//! Natural modes of a body in its frame, and of a body that is held at one of its interfaces with their effective masses.
 //!
 //! With the motion A (6 x nf) of the interface in the modes, as rigid motion about the origin, the body held there has the
 //! modal mass and the coupling to its rigid motion
@@ -10,6 +10,7 @@
 //! and its modes are the eigenvectors X of (K_ff, m') with X'm'X = 1. A base acceleration along a direction drives mode j by
 //! its participation g_j, the entry of X'C' of this direction; g_j^2 is its effective mass.
 
+use super::carrier::CarriedPoint;
 use super::{Carrier, FlexBody};
 use faer::Mat;
 use flexbody_base::error::Result;
@@ -32,7 +33,7 @@ impl FlexBody {
     /// # Errors
     /// FB212 if the body has no interface or node of this name; FB214 if `carrier` has no reference point or no orientation.
     pub fn held_modes(&self, carrier: &Carrier) -> Result<Vec<HeldMode>> {
-        let (reference, motion) = self.motion_of(carrier)?;
+        let CarriedPoint { reference, motion } = self.place_of(carrier)?;
         let nf = self.n_modes();
         // The rigid motion about the origin that moves the reference point as the interface moves.
         let rigid = Mat::from_fn(6, nf, |i, j| {
@@ -64,5 +65,19 @@ impl FlexBody {
             HeldMode { eigenvalue: eigen.values[j], effective_mass }
         };
         Ok((0..nf).map(mode).collect())
+    }
+
+    /// Returns the eigenvalues lambda of (K_ff, m_ff), ascending: for free modes their eigenvalues, for a
+    /// carried body those of the body held at its interface. Unit: 1/time^2.
+    pub fn eigenvalues_in_frame(&self) -> Option<Vec<f64>> {
+        Some(self.eigenpairs_in_frame()?.0)
+    }
+
+    /// Returns eigenvalues and m_ff-orthonormal eigenvectors of (K_ff, m_ff).
+    pub(super) fn eigenpairs_in_frame(&self) -> Option<(Vec<f64>, Mat<f64>)> {
+        let lower = dense_cholesky(self.invariants().modal_mass())?;
+        let half = solve_lower(&lower, self.invariants().modal_stiffness());
+        let eigen = symmetric_eigen(solve_lower(&lower, &half.transpose().to_owned()).as_ref())?;
+        Some((eigen.values, solve_upper(&lower, &eigen.vectors)))
     }
 }

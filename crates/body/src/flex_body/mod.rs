@@ -3,6 +3,7 @@
 mod body;
 mod carried;
 mod carried_stiffness;
+mod carrier;
 mod frame_change;
 mod held_modes;
 mod held_response;
@@ -29,7 +30,7 @@ mod validate;
 pub use crate::basis::{FixedInterface, FreeEstimate, InterfaceCoordinates, Truncation};
 pub use crate::invariants::{Frame, TermGroup, TermGroups};
 pub use body::FlexBody;
-pub use carried::Carrier;
+pub use carrier::Carrier;
 pub use flexbody_model::{
     Coupling, GeometricStiffness, LoadKind, Quantity, RecoveryRow, SurfaceMesh, UnitLoad,
 };

@@ -1,4 +1,5 @@
-//! Damping that the settings of a conversion state as a law, which holds in every frame of an analysis.
+//! Modal damping by ratios, and damping that the settings of a conversion state as a law, which holds in every frame of
+//! an analysis.
 //!
 //! Ratios are those of the modes of the body as an analysis holds it: free in mean axes, or at rest at its carrier.
 //! Damping in proportion to mass and stiffness is alpha m_ff + beta K_ff, with the mass of the modes relative to the same
@@ -96,6 +97,31 @@ impl FlexBody {
             Some(StatedDamping::Rayleigh { beta, .. }) => beta,
             _ => 0.0,
         }
+    }
+
+    /// Sets modal damping: each eigenpair in the frame of the body gets the ratio of `ratios` at its
+    /// frequency, D = m_ff X diag(2 ratio omega) X' m_ff. For a body of free modes the eigenpairs are the
+    /// modes. Static columns of other damping forces are left out of recoveries.
+    ///
+    /// # Errors
+    /// The errors of [`FlexBody::new`].
+    pub fn with_damping_ratios(&self, ratios: &DampingRatios) -> Result<Self> {
+        let mut parts = self.clone().into_parts();
+        let ratio = |eigenvalue: f64| ratios.at(self.units().frequency_of(eigenvalue.max(0.0)));
+        parts.modes.damping_ratio = self.modes().eigenvalue.iter().map(|&lambda| ratio(lambda)).collect();
+        parts.modes.modal_damping = None;
+        parts.recoveries.iter_mut().for_each(Recovery::remove_damping);
+        let mass = self.invariants().modal_mass();
+        let apart = |i: usize, j: usize| (mass[(i, j)] - f64::from(i == j)).abs();
+        let nf = self.n_modes();
+        let normalised = (0..nf).all(|i| (0..nf).all(|j| apart(i, j) < 1e-6));
+        if let Some((values, vectors)) = (!normalised).then(|| self.eigenpairs_in_frame()).flatten() {
+            let moved = &mass * &vectors;
+            let rate = |p: usize| 2.0 * ratio(values[p]) * values[p].max(0.0).sqrt();
+            let entry = |i: usize, j: usize| (0..nf).map(|p| moved[(i, p)] * rate(p) * moved[(j, p)]).sum();
+            parts.modes.modal_damping = Some(Mat::from_fn(nf, nf, entry));
+        }
+        Self::new(parts)
     }
 
     /// Returns this body with the damping of a law in its own frame; itself without a law.
