@@ -1,7 +1,7 @@
 //! Lines of bulk data cards: continuations that do not follow their card, whose names identify the card that they
 //! continue; replication of fields; and the consecutive lines of DMIG cards.
 
-use super::{
+use super::card::{
     Card, Line, bare, card_fields, fixed_fields, free_fields, is_begin, is_include, without_comment,
 };
 use flexbody_base::diagnostic::{Code, Diagnostic};
