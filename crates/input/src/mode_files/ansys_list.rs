@@ -1,6 +1,6 @@
 //! Lists of Ansys: `PRNSOL,U` or `PRNSOL,DOF` after `SET` for every mode, in one file.
 
-use super::{Found, ModeTable, syntax, unexpected, unreadable};
+use super::mode_table::{Found, ModeTable, syntax, unexpected, unreadable};
 use crate::digits::written_digits;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, excerpt, integer, real, words};

@@ -1,7 +1,7 @@
 //! Results of CalculiX (.frd, text): the displacements of every mode of a `*FREQUENCY` step, with five decimals, in
 //! fields of fixed width that touch each other.
 
-use super::{Found, ModeTable, syntax, unexpected, unreadable};
+use super::mode_table::{Found, ModeTable, syntax, unexpected, unreadable};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, field, integer, real, words};
 use flexbody_model::DofLabel;

@@ -3,7 +3,7 @@
 //! after them. Between records are keys (records of one word): a positive key is the number of words of the next
 //! record, a key that is not positive ends a part of the table, and zero ends the table.
 
-use super::{Found, ModeTable, unreadable};
+use super::mode_table::{Found, ModeTable, unreadable};
 use flexbody_base::text::InputFile;
 use flexbody_model::DofLabel;
 

@@ -1,7 +1,7 @@
 //! Punch files of Nastran (.pch): `DISPLACEMENT(PUNCH) = ALL` in SOL 103 writes two lines for every grid point of every
 //! mode, with seven digits.
 
-use super::{Found, ModeTable, syntax, unexpected, unreadable};
+use super::mode_table::{Found, ModeTable, syntax, unexpected, unreadable};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, integer, real, words};
 use flexbody_model::DofLabel;
