@@ -7,10 +7,10 @@ mod dat;
 mod frd;
 mod mesh_files;
 mod punch;
+mod step_values;
 #[cfg(test)]
 mod tests;
 
-use self::averaged::Averaged;
 use super::classic_netcdf::is_classic;
 use super::exodus::has_nodal_variables;
 use super::hdf5::Hdf5;
@@ -26,11 +26,7 @@ use flexbody_linalg::ties::TIE_MARGIN;
 use flexbody_model::{AnsweredShapes, DofLabel, Quantity, RecoveryOperator, RecoveryRow, ShapeSteps};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
-
-type Found<T> = Result<T, Vec<Diagnostic>>;
-
-/// Components of the stress in the order of the rows of a recovery.
-const COMPONENTS: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
+use step_values::{COMPONENTS, Found, Place, StepValues, unreadable};
 
 /// Smallest tolerance of displacements that an FE program returns, relative to the largest one of their shape. Files
 /// with fewer digits get a tolerance of ten units of their last digit.
@@ -238,101 +234,6 @@ fn stress_unit(units: &UnitSystem) -> String {
         }
     }
     format!("{pascal:e} Pa")
-}
-
-/// Place of six stresses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Place {
-    /// Number of a node.
-    Node(i64),
-    /// Integration point of an element.
-    Point { element: i64, point: i64 },
-}
-
-/// Stresses and displacements of all steps.
-#[derive(Debug, Default)]
-struct StepValues {
-    /// Places of the stresses, equal in all steps.
-    places: Vec<Place>,
-    /// Stresses of each step and place, in the order xx, yy, zz, xy, yz, xz.
-    stresses: Vec<Vec<[f64; 6]>>,
-    /// Nodes of the displacements, equal in all steps.
-    moved: Vec<i64>,
-    /// Displacements of each step and node.
-    displacements: Vec<Vec<[f64; 3]>>,
-    /// Strain energies of the steps; fewer than the steps if some have none.
-    energies: Vec<f64>,
-    /// Significant decimal digits of stresses and displacements.
-    digits: u8,
-    /// Means among the stresses.
-    averaged: Averaged,
-}
-
-/// Values of one step.
-#[derive(Debug, Default)]
-struct Step {
-    stresses: Vec<(Place, [f64; 6])>,
-    displacements: Vec<(i64, [f64; 3])>,
-    energy: Option<f64>,
-}
-
-impl StepValues {
-    /// Collects the values of all steps.
-    ///
-    /// # Errors
-    /// FB327 for results without stresses, for steps with different places, and for values that are not finite.
-    fn of(steps: Vec<Step>, digits: u8, file: &InputFile) -> Found<Self> {
-        let mut values = Self { digits, ..Self::default() };
-        for (at, step) in steps.into_iter().enumerate() {
-            let (places, stresses): (Vec<_>, Vec<_>) = step.stresses.into_iter().unzip();
-            let (moved, displacements): (Vec<_>, Vec<_>) = step.displacements.into_iter().unzip();
-            if at == 0 {
-                (values.places, values.moved) = (places, moved);
-            } else if places != values.places || moved != values.moved {
-                let message = format!("step {} has values at other places than step 1", at + 1);
-                return Err(unreadable(file, message));
-            }
-            let finite = stresses.iter().flatten().chain(displacements.iter().flatten());
-            if finite.chain(&step.energy).any(|value| !value.is_finite()) {
-                return Err(unreadable(file, format!("a value of step {} is not finite", at + 1)));
-            }
-            values.stresses.push(stresses);
-            values.displacements.push(displacements);
-            values.energies.extend(step.energy);
-        }
-        Ok(values)
-    }
-
-    /// Refuses values without stresses.
-    ///
-    /// # Errors
-    /// FB327.
-    fn with_stresses(self, file: &InputFile) -> Found<Self> {
-        if self.places.is_empty() {
-            return Err(unreadable(file, "no stresses are in the file"));
-        }
-        Ok(self)
-    }
-
-    /// Returns the number of steps.
-    fn steps(&self) -> usize {
-        self.stresses.len()
-    }
-
-    /// Returns the strain energies; `None` if there are none.
-    fn energies(&self) -> Option<Vec<f64>> {
-        (!self.energies.is_empty()).then(|| self.energies.clone())
-    }
-
-    /// Returns the stresses with six rows for each place and one column for each step.
-    fn stresses(&self) -> Mat<f64> {
-        Mat::from_fn(6 * self.places.len(), self.steps(), |row, step| self.stresses[step][row / 6][row % 6])
-    }
-}
-
-/// Returns FB327 about a file.
-fn unreadable(file: &InputFile, message: impl Into<String>) -> Vec<Diagnostic> {
-    vec![Diagnostic::new(Code::FeResultsSyntax, message).in_file(file.path())]
 }
 
 // Displacements of shapes as `flexbody shapes` writes them: an archive of the arrays `nodes` (n), `displacements`

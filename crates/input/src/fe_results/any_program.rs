@@ -2,7 +2,7 @@
 //! with the datasets `nodes` (n), `displacements` (steps x 3n), `stresses` (steps x 6n) and optionally `strain_energy`
 //! (steps), node by node.
 
-use super::{Found, Place, Step, StepValues, unreadable};
+use super::step_values::{Found, Place, Step, StepValues, unreadable};
 use crate::array::Array;
 use crate::hdf5::read_array;
 use flexbody_base::diagnostic::{Code, Diagnostic};

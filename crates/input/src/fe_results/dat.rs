@@ -1,7 +1,7 @@
 //! Printed results of CalculiX (.dat): stresses at integration points, displacements and the strain energy of the part,
 //! with seven digits.
 
-use super::{Found, Place, Step, StepValues};
+use super::step_values::{Found, Place, Step, StepValues};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, excerpt, integer, real, words};

@@ -1,7 +1,7 @@
 //! Results of CalculiX (.frd): text with six digits, or text with blocks of 32-bit or 64-bit numbers. The blocks are
 //! described in the manual of CalculiX GraphiX, section "Result format".
 
-use super::{COMPONENTS, Found, Place, Step, StepValues, unreadable};
+use super::step_values::{COMPONENTS, Found, Place, Step, StepValues, unreadable};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{excerpt, field, integer, line_end, line_number, real};

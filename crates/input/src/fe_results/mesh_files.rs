@@ -2,7 +2,7 @@
 //! `stress N` of each step at the points, files of pieces (.pvtu), collections of such files (.pvd), and Exodus, with
 //! variables of the nodes at every time.
 
-use super::{Found, Place, Step, StepValues, unreadable};
+use super::step_values::{Found, Place, Step, StepValues, unreadable};
 use crate::exodus::{NodalVariables, read_nodal_variables};
 use crate::node_files::{
     self, CollectionMember, PointArray, PointData, collection, legacy_point_arrays, pieces, point_arrays,

@@ -3,7 +3,7 @@
 //! behind 18 characters for the number of the element or grid point, or for -CONT-.
 
 use super::averaged::{Averaged, NodeStress};
-use super::{Found, Place, Step, StepValues, unreadable};
+use super::step_values::{Found, Place, Step, StepValues, unreadable};
 use crate::mode_files::is_punch;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;

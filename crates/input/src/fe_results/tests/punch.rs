@@ -1,6 +1,6 @@
 //! Punch files of Nastran, written by the tests.
 
-use super::{NODES, Place, archive, displacement, exponential, parts, stress};
+use super::answers::{NODES, Place, archive, displacement, exponential, parts, stress};
 use flexbody_base::diagnostic::Code;
 
 /// Element types of a tetrahedron and of a four-sided shell.
