@@ -27,7 +27,6 @@ use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawFollowers, RawMatr
 use nastran::Nastran;
 use std::path::{Path, PathBuf};
 
-pub(super) use deck::comparable;
 pub use deck_of_elements::ElementDeck;
 pub(super) use nastran::nodes_of_bulk;
 

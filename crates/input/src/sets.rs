@@ -2,261 +2,29 @@
 //! The members of a set are found when the set is requested, each of them once, so that a short file cannot define sets of
 //! more members than there are nodes, and sets that nobody requests take no more memory than their text.
 
+mod list;
+mod names;
+mod scope;
 mod walk;
 
-use super::jobs::comparable;
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use list::NamedSet;
+use scope::SetScopes;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use walk::Walk;
+
+pub(super) use list::{Edit, Item, Members, SetList, SoFar};
+pub(super) use names::{comparable, dotted};
+pub(super) use scope::{ElementNodes, SetIndex, SetInstance, SetScope};
 
 /// Number of instances that a message names.
 const MAX_NAMED: usize = 5;
 
-/// Largest number of dots of a name `INSTANCE.SET` at which the name of the instance may end.
-const MAX_DOTS: usize = 20;
-
-/// Part of a set.
-#[derive(Debug, Clone)]
-pub(crate) struct Item {
-    /// Index of the instance to which numbers, sets and elements belong; `None` for the scope that defines the set.
-    pub instance: Option<usize>,
-    pub members: Members,
-}
-
-/// Members of a part of a set.
-#[derive(Debug, Clone)]
-pub(crate) enum Members {
-    /// Numbers in their order.
-    Numbers(Vec<i64>),
-    /// Existing numbers from `first` to `last` in steps of `step`, which is positive.
-    Range { first: i64, last: i64, step: i64 },
-    /// Members of another set.
-    Set(SoFar),
-    /// Nodes of the elements of an element set, ascending.
-    NodesOfElements(SoFar),
-    /// Nodes whose bit is set, in the order of the nodes in the file.
-    Marked(Arc<[u64]>),
-    /// Existing numbers that remain after additions and removals, ascending.
-    Edited(Vec<Edit>),
-}
-
-/// Step by which members of [`Members::Edited`] are selected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Edit {
-    /// Adds the existing numbers of a range.
-    Add { first: i64, last: i64 },
-    /// Removes a number.
-    Remove(i64),
-}
-
-/// Set as far as it was defined when another set named it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct SoFar {
-    set: usize,
-    /// Number of its first items that count.
-    items: usize,
-}
-
-impl Item {
-    /// Returns a part of the scope that defines the set.
-    pub(crate) fn own(members: Members) -> Self {
-        Self { instance: None, members }
-    }
-}
-
-/// Set with its parts.
-#[derive(Debug, Clone)]
-struct NamedSet {
-    /// Name as written; `None` for a set that only other sets name.
-    name: Option<String>,
-    items: Vec<Item>,
-    /// Reason why the set cannot be resolved.
-    refused: Option<Diagnostic>,
-    /// True if members are in ascending order.
-    is_sorted: bool,
-}
-
-/// Sets of a scope in the order of the file, found by their names.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct SetList {
-    all: Vec<NamedSet>,
-    /// Index of the first set of each name in lower case.
-    by_name: HashMap<String, usize>,
-    /// Index of the first set of each name in the form of comparison.
-    by_form: HashMap<String, usize>,
-}
-
-impl SetList {
-    /// Returns the set of a name, without regard to case, or else without regard to blanks as well.
-    pub(crate) fn find(&self, name: &str) -> Option<usize> {
-        let by_form = || self.by_form.get(&comparable(name));
-        self.by_name.get(&name.to_ascii_lowercase()).or_else(by_form).copied()
-    }
-
-    /// Returns a set as far as it is defined; `None` if there is no such set or it cannot be resolved.
-    pub(crate) fn so_far(&self, name: &str) -> Option<SoFar> {
-        let set = self.find(name)?;
-        self.all[set].refused.is_none().then(|| self.all_of(set))
-    }
-
-    /// Returns all of a set.
-    pub(crate) fn all_of(&self, set: usize) -> SoFar {
-        SoFar { set, items: self.all[set].items.len() }
-    }
-
-    /// Adds parts to the set of this name, which is created if necessary. A set with a part that cannot be resolved is an
-    /// error as a whole.
-    pub(crate) fn extend(&mut self, name: &str, items: Result<Vec<Item>, Diagnostic>) {
-        let known = self.by_form.get(&comparable(name)).copied();
-        let set = known.unwrap_or_else(|| self.add(name, Vec::new()));
-        let set = &mut self.all[set];
-        match items {
-            Ok(items) if set.refused.is_none() => set.items.extend(items),
-            Ok(_) => {}
-            Err(refused) => {
-                set.refused.get_or_insert(refused);
-            }
-        }
-    }
-
-    /// Adds a set. Of several sets of one name the first is found.
-    pub(crate) fn add(&mut self, name: &str, items: Vec<Item>) -> usize {
-        let set = self.all.len();
-        self.by_name.entry(name.to_ascii_lowercase()).or_insert(set);
-        self.by_form.entry(comparable(name)).or_insert(set);
-        self.all.push(NamedSet { name: Some(name.to_owned()), items, refused: None, is_sorted: false });
-        set
-    }
-
-    /// Adds a set whose members are in ascending order.
-    pub(crate) fn add_sorted(&mut self, name: &str, items: Vec<Item>) {
-        let set = self.add(name, items);
-        self.all[set].is_sorted = true;
-    }
-
-    /// Adds a set that only other sets name.
-    pub(crate) fn add_nameless(&mut self, items: Vec<Item>) -> SoFar {
-        self.all.push(NamedSet { name: None, items, refused: None, is_sorted: false });
-        self.all_of(self.all.len() - 1)
-    }
-
-    /// Removes the name of a set, whose members other sets may still name.
-    pub(crate) fn forget(&mut self, name: &str) {
-        if let Some(set) = self.by_form.remove(&comparable(name)) {
-            let written = self.all[set].name.take().unwrap_or_default().to_ascii_lowercase();
-            if self.by_name.get(&written) == Some(&set) {
-                self.by_name.remove(&written);
-            }
-        }
-    }
-
-    /// Returns the names of the sets that can be resolved.
-    fn names(&self) -> impl Iterator<Item = &str> {
-        self.all.iter().filter(|set| set.refused.is_none()).filter_map(|set| set.name.as_deref())
-    }
-
-    fn has_ranges(&self) -> bool {
-        let is_range = |item: &Item| matches!(item.members, Members::Range { .. });
-        self.all.iter().flat_map(|set| &set.items).any(is_range)
-    }
-
-    fn name_elements(&self) -> bool {
-        let of_elements = |item: &Item| matches!(item.members, Members::NodesOfElements(_));
-        self.all.iter().flat_map(|set| &set.items).any(of_elements)
-    }
-}
-
-/// Elements with their nodes.
-pub(crate) type ElementNodes = Arc<Vec<(i64, Vec<i64>)>>;
-
-/// Sets of a part, of the assembly, or of a file without either, with the nodes and elements that they select.
-#[derive(Debug, Default)]
-pub(crate) struct SetScope {
-    pub nodes: Arc<SetList>,
-    pub elements: Arc<SetList>,
-    /// Node numbers in the order of the file.
-    pub ids: Arc<Vec<i64>>,
-    pub element_nodes: Vec<ElementNodes>,
-    /// Difference of the node numbers of the model from those of the scope.
-    pub shift: i64,
-    pub index: SetIndex,
-}
-
-/// Nodes and elements of a scope by their numbers, made when a set is requested.
-#[derive(Debug, Default)]
-pub(crate) struct SetIndex {
-    ids: OnceLock<Arc<Vec<i64>>>,
-    elements: OnceLock<ElementIndex>,
-}
-
-/// Elements by their numbers.
-#[derive(Debug, Default)]
-struct ElementIndex {
-    /// Numbers, ascending, each once.
-    ids: Arc<Vec<i64>>,
-    /// Number, block and place in the block of every element, ascending.
-    places: Vec<(i64, u32, u32)>,
-}
-
-impl SetScope {
-    fn sorted_ids(&self) -> Arc<Vec<i64>> {
-        let sorted = || {
-            if self.ids.is_sorted_by(|a, b| a < b) {
-                return Arc::clone(&self.ids);
-            }
-            let mut ids = self.ids.to_vec();
-            ids.sort_unstable();
-            ids.dedup();
-            Arc::new(ids)
-        };
-        Arc::clone(self.index.ids.get_or_init(sorted))
-    }
-
-    fn element_index(&self) -> &ElementIndex {
-        self.index.elements.get_or_init(|| {
-            let of_block = |(block, elements): (usize, &ElementNodes)| {
-                let places = elements.iter().enumerate();
-                places.map(|(at, (id, _))| (*id, block as u32, at as u32)).collect::<Vec<_>>()
-            };
-            let mut places: Vec<_> = self.element_nodes.iter().enumerate().flat_map(of_block).collect();
-            places.sort_unstable();
-            let mut ids: Vec<i64> = places.iter().map(|(id, ..)| *id).collect();
-            ids.dedup();
-            ElementIndex { ids: Arc::new(ids), places }
-        })
-    }
-
-    /// Returns the nodes of elements, ascending.
-    fn nodes_of(&self, elements: &[i64]) -> Vec<i64> {
-        let places = &self.element_index().places;
-        let of_element = |id: &i64| {
-            let id = *id;
-            let first = places.partition_point(|(other, ..)| *other < id);
-            places[first..].iter().take_while(move |(other, ..)| *other == id)
-        };
-        let found = elements.iter().flat_map(of_element);
-        let mut nodes: Vec<i64> = found
-            .flat_map(|(_, block, at)| self.element_nodes[*block as usize][*at as usize].1.iter().copied())
-            .collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        nodes
-    }
-}
-
-/// Instance of a part with its sets.
-#[derive(Debug)]
-pub(crate) struct SetInstance {
-    pub name: String,
-    pub scope: SetScope,
-}
-
 /// Named node sets of a model.
 #[derive(Debug, Default)]
 pub(crate) struct NodeSets {
-    top: SetScope,
-    instances: Vec<SetInstance>,
+    scopes: SetScopes,
     /// Index of the first instance of each name in the form of comparison.
     by_form: HashMap<String, usize>,
     copies: Option<NodeCopies>,
@@ -294,7 +62,7 @@ impl NodeSets {
         // Files without sets need no copy of the numbers.
         let ids = if nodes.all.is_empty() { Vec::new() } else { ids.to_vec() };
         let top = SetScope { nodes: Arc::new(nodes), ids: Arc::new(ids), ..SetScope::default() };
-        Self { top, ..Self::default() }
+        Self { scopes: SetScopes { top, instances: Vec::new() }, ..Self::default() }
     }
 
     /// Returns the sets of an assembly and of its instances.
@@ -309,7 +77,7 @@ impl NodeSets {
         for (at, instance) in instances.iter().enumerate() {
             by_form.entry(comparable(&instance.name)).or_insert(at);
         }
-        Self { top, instances, by_form, copies: None }
+        Self { scopes: SetScopes { top, instances }, by_form, copies: None }
     }
 
     /// Returns the sets with copies of their nodes.
@@ -328,7 +96,7 @@ impl NodeSets {
         if let Some(refused) = &set.refused {
             return Some(Err(refused.clone()));
         }
-        let mut members = Walk::new(self).members(place.instance, place.all());
+        let mut members = Walk::new(&self.scopes).members(place.instance, place.all());
         if set.is_sorted {
             members.sort_unstable();
         }
@@ -338,7 +106,7 @@ impl NodeSets {
 
     /// Returns for each set the members that no set named before it has; `None` for a set that cannot be resolved.
     pub(crate) fn union<'n>(&self, names: impl Iterator<Item = &'n str>) -> Vec<Option<Vec<i64>>> {
-        let mut walk = Walk::new(self);
+        let mut walk = Walk::new(&self.scopes);
         let members = |name: &'n str| match self.place(name)? {
             Ok(place) if place.named_set().refused.is_none() => {
                 Some(walk.members(place.instance, place.all()))
@@ -350,8 +118,8 @@ impl NodeSets {
 
     /// Returns the members of an element set outside of parts and instances.
     pub(crate) fn elements(&self, name: &str) -> Option<Vec<i64>> {
-        let set = self.top.elements.so_far(name)?;
-        Some(Walk::new(self).elements(None, set))
+        let set = self.scopes.top.elements.so_far(name)?;
+        Some(Walk::new(&self.scopes).elements(None, set))
     }
 
     /// Returns the index of an instance.
@@ -366,16 +134,16 @@ impl NodeSets {
             let instance = one.name.clone();
             list.into_iter().flat_map(move |name| [format!("{instance}.{name}"), name])
         };
-        let top = self.top.nodes.names().map(str::to_owned);
-        let is_own = |name: &String| self.top.nodes.find(name).is_some();
-        let inner = self.instances.iter().flat_map(of_instance).filter(move |name| !is_own(name));
+        let top = self.scopes.top.nodes.names().map(str::to_owned);
+        let is_own = |name: &String| self.scopes.top.nodes.find(name).is_some();
+        let inner = self.scopes.instances.iter().flat_map(of_instance).filter(move |name| !is_own(name));
         top.chain(inner.filter(|name| matches!(self.place(name), Some(Ok(_)))))
     }
 
     /// Returns the place of a set; an error for a name that several instances have.
     fn place(&self, name: &str) -> Option<Result<SetPlace<'_>, Diagnostic>> {
         let within = |instance: Option<usize>, name: &str| {
-            let scope = self.scope(instance);
+            let scope = self.scopes.of(instance);
             Some(SetPlace { instance, scope, set: scope.nodes.find(name)? })
         };
         let of_instance =
@@ -383,28 +151,19 @@ impl NodeSets {
         if let Some(place) = within(None, name).or_else(of_instance) {
             return Some(Ok(place));
         }
-        let mut holders = (0..self.instances.len()).filter_map(|at| within(Some(at), name));
+        let mut holders = (0..self.scopes.instances.len()).filter_map(|at| within(Some(at), name));
         let first = holders.next()?;
         let Some(second) = holders.next() else { return Some(Ok(first)) };
         let own = first.name().unwrap_or(name).to_owned();
         let all = [first, second].into_iter().chain(holders).take(MAX_NAMED);
-        let named =
-            |place: SetPlace<'_>| Some(format!("{}.{}", self.instances[place.instance?].name, place.name()?));
+        let named = |place: SetPlace<'_>| {
+            Some(format!("{}.{}", self.scopes.instances[place.instance?].name, place.name()?))
+        };
         let names: Vec<String> = all.filter_map(named).collect();
         let message = format!("several instances have a set `{own}`");
         let help = format!("name one of them: {}", names.join(", "));
         Some(Err(Diagnostic::new(Code::NodeSetUnknown, message).with_help(help)))
     }
-
-    /// Returns the scope of an instance, or that of the assembly.
-    fn scope(&self, instance: Option<usize>) -> &SetScope {
-        instance.map_or(&self.top, |at| &self.instances[at].scope)
-    }
-}
-
-/// Returns the ways to divide `INSTANCE.REST`. Names may contain dots.
-pub(crate) fn dotted(name: &str) -> impl Iterator<Item = (&str, &str)> {
-    name.match_indices('.').take(MAX_DOTS).map(|(dot, _)| (&name[..dot], &name[dot + 1..]))
 }
 
 /// New nodes that stand for nodes of sets.
@@ -439,4 +198,213 @@ impl NodeCopies {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::node_files::read_node_file;
+    use flexbody_base::text::InputFile;
+
+    fn own(members: Members) -> Item {
+        Item::own(members)
+    }
+
+    fn range(first: i64, last: i64, step: i64) -> Item {
+        own(Members::Range { first, last, step })
+    }
+
+    impl NodeSets {
+        /// Returns the number of numbers, of words of bits and of parts that are kept.
+        fn n_kept(&self) -> usize {
+            let of_item = |item: &Item| match &item.members {
+                Members::Numbers(numbers) => 1 + numbers.len(),
+                Members::Marked(words) => 1 + words.len(),
+                Members::Edited(edits) => 1 + edits.len(),
+                _ => 1,
+            };
+            let scopes = self.scopes.instances.iter().map(|one| &one.scope).chain([&self.scopes.top]);
+            let lists = scopes.flat_map(|scope| [&scope.nodes, &scope.elements]);
+            lists.flat_map(|list| &list.all).flat_map(|set| &set.items).map(of_item).sum()
+        }
+    }
+
+    /// Returns the sets of a file of nodes.
+    fn sets_of(name: &str, text: impl AsRef<[u8]>) -> NodeSets {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        read_node_file(&InputFile::open(&path).expect("a file"), 3).expect("nodes").sets
+    }
+
+    fn members(sets: &NodeSets, name: &str) -> Vec<i64> {
+        sets.find(name).expect("a set").expect("resolved")
+    }
+
+    const NODES: &str = "*NODE\n10,0,0,0\n20,.1,0,0\n30,0,.2,0\n40,0,0,.3\n";
+
+    /// Each of 40 levels names the level before it twice: a trillion members, if they were listed.
+    #[test]
+    fn sets_of_sets_have_each_member_once() {
+        let element = "*ELEMENT, TYPE=C3D4, ELSET=A0\n1, 10,20,30,40\n";
+        let levels = |keyword: &str, name: &str| -> String {
+            (1..=40)
+                .map(|k| format!("*{keyword}, {keyword}={name}{k}\n{name}{}, {name}{}\n", k - 1, k - 1))
+                .collect()
+        };
+        let text = format!("{NODES}*NSET, NSET=B0\n20, 10\n{}", levels("NSET", "B"));
+        let sets = sets_of("nodes.inp", text);
+        assert_eq!(members(&sets, "B40"), [20, 10], "the order of the file");
+        assert!(sets.n_kept() < 200, "{}", sets.n_kept());
+        let text = format!("{NODES}{element}{}*NSET, NSET=N, ELSET=A40\n", levels("ELSET", "A"));
+        let sets = sets_of("nodes.inp", text);
+        assert_eq!(members(&sets, "N"), [10, 20, 30, 40]);
+        assert!(sets.n_kept() < 250, "{}", sets.n_kept());
+        // A set that names itself is the set as it was above.
+        let text =
+            format!("{NODES}*NSET, NSET=A\n10, 20\n{}*NSET, NSET=A\n30\n", "*NSET, NSET=A\nA\n".repeat(40));
+        assert_eq!(members(&sets_of("nodes.inp", text), "A"), [10, 20, 30]);
+    }
+
+    /// Sets that name an earlier set have its members at that line.
+    #[test]
+    fn a_set_has_the_members_that_another_set_had_above() {
+        let text =
+            format!("{NODES}*NSET, NSET=A\n10\n*NSET, NSET=B\nA\n*NSET, NSET=A\n20\n*NSET, NSET=C\n40, A\n");
+        let sets = sets_of("nodes.inp", text);
+        assert_eq!(members(&sets, "b"), [10]);
+        assert_eq!(members(&sets, "C"), [40, 10, 20]);
+        assert_eq!(sets.names().collect::<Vec<_>>(), ["A", "B", "C"]);
+    }
+
+    #[test]
+    fn ranges_are_the_numbers_that_exist() {
+        let lines = "1, 99999999, 1\n1, 200000002, 3\n".repeat(50);
+        let text = format!("*NSET, NSET=A, GENERATE\n20, 30, 10\n{lines}{NODES}");
+        let sets = sets_of("nodes.inp", text);
+        assert_eq!(members(&sets, "A"), [20, 30, 10, 40], "nodes below the set count as well");
+        assert!(sets.n_kept() < 150, "{}", sets.n_kept());
+        let text = format!(
+            "{NODES}*ELEMENT, TYPE=C3D4\n7, 10,20,30,40\n*ELSET, ELSET=E, GENERATE\n{lines}*NSET, NSET=A, ELSET=E\n"
+        );
+        assert_eq!(members(&sets_of("nodes.inp", text), "A"), [10, 20, 30, 40]);
+    }
+
+    #[test]
+    fn components_of_ansys_keep_their_ranges() {
+        let nodes: String =
+            (1..=500).map(|id| format!("{id:9}{:9}{:9}{:21.13E}\n", 0, 0, f64::from(id))).collect();
+        let head = "NBLOCK,6,SOLID,500,500\n(3i9,6e21.13e3)\n";
+        let components: String =
+            (0..500).map(|k| format!("CMBLOCK,C{k},NODE,3\n(8i10)\n{:10}{:10}{:10}\n", 7, 1, -499)).collect();
+        let sets = sets_of("nodes.cdb", format!("/PREP7\n{head}{nodes}N,R5.3,LOC,-1,\n{components}"));
+        let expected: Vec<i64> = [7, 1].into_iter().chain((2..=499).filter(|id| *id != 7)).collect();
+        assert_eq!(members(&sets, "C499"), expected);
+        assert!(sets.n_kept() < 500 * 10, "{}", sets.n_kept());
+    }
+
+    /// An entity that belongs to many groups: its nodes are kept once.
+    #[test]
+    fn groups_of_gmsh_share_the_nodes_of_their_entities() {
+        let groups: String = (1..=300).map(|group| format!(" {group}")).collect();
+        let elements: String = (1..=1000).map(|element| format!("{element} 40 20 30 10\n")).collect();
+        let text = format!(
+            "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 7 \"seven\"\n$EndPhysicalNames\n$Entities\n0 0 0 1\n1 0 0 0 1 1 1 300{groups} 0\n$EndEntities\n\
+            $Nodes\n1 4 10 40\n3 1 0 4\n10\n20\n30\n40\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n\
+            $Elements\n1 1000 1 1000\n3 1 4 1000\n{elements}$EndElements\n"
+        );
+        let sets = sets_of("mesh.msh", text);
+        assert_eq!(members(&sets, "seven"), [10, 20, 30, 40]);
+        assert_eq!(members(&sets, "300"), [10, 20, 30, 40]);
+        assert!(sets.n_kept() < 500, "{}", sets.n_kept());
+    }
+
+    /// Marks of points take a bit each, and arrays that lie at one place of the file are refused.
+    #[test]
+    fn marked_points_of_vtk_take_a_bit() {
+        let count = 6400;
+        let of = |sets: usize, place: fn(usize) -> usize| {
+            let data = [&(24 * count as u32).to_le_bytes()[..], &vec![0; 24 * count]].concat();
+            let marks = [&(count as u32).to_le_bytes()[..], &vec![1; count]].concat();
+            let array = |k: usize| {
+                let offset = data.len() + place(k) * marks.len();
+                format!("<DataArray type=\"Int8\" Name=\"s{k}\" format=\"appended\" offset=\"{offset}\"/>")
+            };
+            let head = format!(
+                "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\"><UnstructuredGrid><Piece NumberOfPoints=\"{count}\"><Points>\
+                <DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/></Points><PointData>{}</PointData>\
+                </Piece></UnstructuredGrid><AppendedData encoding=\"raw\">_",
+                (0..sets).map(array).collect::<String>()
+            );
+            [head.as_bytes(), &data, &marks.repeat(3), b"</AppendedData></VTKFile>"].concat()
+        };
+        let sets = sets_of("nodes.vtu", of(3, |k| k));
+        assert_eq!(members(&sets, "s2").len(), count);
+        assert!(sets.n_kept() <= 3 * (1 + count / 64), "{}", sets.n_kept());
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("nodes.vtu");
+        std::fs::write(&path, of(200, |_| 0)).expect("written");
+        let refused = read_node_file(&InputFile::open(&path).expect("a file"), 3).expect_err("refused");
+        assert!(
+            refused[0].message().contains("`s3` lies where other arrays lie"),
+            "{}",
+            refused[0].message()
+        );
+    }
+
+    /// A chain of sets takes neither a stack nor the square of its length.
+    #[test]
+    fn long_chains_of_sets_are_walked_once() {
+        let mut list = SetList::default();
+        list.add("S0", vec![range(1, 3, 1)]);
+        for k in 1..200_000 {
+            let before = list.so_far(&format!("S{}", k - 1)).expect("a set");
+            list.add(&format!("S{k}"), vec![own(Members::Set(before)), own(Members::Set(before))]);
+        }
+        let sets = NodeSets::of_nodes(&[1, 2, 3, 4], list);
+        assert_eq!(members(&sets, "S199999"), [1, 2, 3]);
+    }
+
+    /// Returns the members of a set as they were listed: all numbers of all parts, then each once.
+    fn listed(list: &SetList, ids: &[i64], SoFar { set, items }: SoFar) -> Vec<i64> {
+        let mut all = Vec::new();
+        for item in &list.all[set].items[..items] {
+            match &item.members {
+                Members::Numbers(numbers) => all.extend(numbers),
+                Members::Range { first, last, step } => {
+                    all.extend((*first..=*last).step_by(*step as usize).filter(|id| ids.contains(id)));
+                }
+                Members::Set(other) => all.extend(listed(list, ids, *other)),
+                other => panic!("{other:?} is not used here"),
+            }
+        }
+        let mut seen = HashSet::new();
+        all.retain(|id| seen.insert(*id));
+        all
+    }
+
+    proptest::proptest! {
+        /// Members are those of the parts, in their order, however parts overlap.
+        #[test]
+        fn members_are_those_that_would_be_listed(
+            ids in proptest::collection::btree_set(-20i64..60, 1..40),
+            parts in proptest::collection::vec((0usize..4, -20i64..60, 0i64..40, 1i64..6, 0usize..3), 1..25),
+        ) {
+            let ids: Vec<i64> = ids.into_iter().collect();
+            let mut list = SetList::default();
+            for (set, first, length, step, kind) in parts {
+                let other = list.so_far(&format!("S{}", length % 4));
+                let item = match (kind, other) {
+                    (0, _) => own(Members::Numbers(vec![first, first + step])),
+                    (1, Some(other)) => own(Members::Set(other)),
+                    _ => range(first, first + length, step),
+                };
+                list.extend(&format!("S{set}"), Ok(vec![item]));
+            }
+            let expected: Vec<Vec<i64>> =
+                (0..list.all.len()).map(|set| listed(&list, &ids, list.all_of(set))).collect();
+            let names: Vec<String> = list.names().map(str::to_owned).collect();
+            let sets = NodeSets::of_nodes(&ids, list);
+            for (name, expected) in names.iter().zip(expected) {
+                proptest::prop_assert_eq!(members(&sets, name), expected);
+            }
+        }
+    }
+}

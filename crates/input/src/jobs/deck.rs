@@ -1,6 +1,7 @@
 //! Keyword decks (`.inp`) of Abaqus and CalculiX: cards `*KEYWORD, PARAMETER=VALUE`, each with lines of data.
 
 use super::Found;
+use crate::sets::comparable;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{Line, Lines, excerpt, line_end};
@@ -236,11 +237,6 @@ impl Deck {
             .with_help("begin the deck with a keyword line such as *NODE")),
         }
     }
-}
-
-/// Returns a name in the form in which names are compared: in upper case, without blanks.
-pub(crate) fn comparable(name: &str) -> String {
-    name.split_whitespace().collect::<String>().to_uppercase()
 }
 
 /// Returns true when a line is a keyword line: it begins with a single asterisk, after any blanks.

@@ -1,7 +1,8 @@
 //! Members of sets, found part by part. The time is proportional to the text of the sets and the number of their members:
 //! numbers that were found are passed over by later ranges, and a set that was walked is not walked again.
 
-use super::{Edit, Item, Members, NodeSets, SetList, SoFar};
+use super::list::{Edit, Item, Members, SetList, SoFar};
+use super::scope::SetScopes;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -18,7 +19,7 @@ type Space = (Option<usize>, Kind);
 
 /// State of finding the members of one or several sets.
 pub(super) struct Walk<'s> {
-    sets: &'s NodeSets,
+    scopes: &'s SetScopes,
     found: HashMap<Space, Found>,
     /// Number of items of each set that have been walked.
     walked: HashMap<(Space, usize), usize>,
@@ -33,8 +34,8 @@ struct Frame {
 }
 
 impl<'s> Walk<'s> {
-    pub(super) fn new(sets: &'s NodeSets) -> Self {
-        Self { sets, found: HashMap::new(), walked: HashMap::new() }
+    pub(super) fn new(scopes: &'s SetScopes) -> Self {
+        Self { scopes, found: HashMap::new(), walked: HashMap::new() }
     }
 
     /// Returns the members of a node set that were not found yet, in the numbering of the model.
@@ -70,13 +71,13 @@ impl<'s> Walk<'s> {
                 Members::Set(SoFar { set, items }) => open.push(Frame { space, set: *set, items: *items }),
                 Members::NodesOfElements(set) => {
                     let elements = self.elements(space.0, *set);
-                    let nodes = self.sets.scope(space.0).nodes_of(&elements);
+                    let nodes = self.scopes.of(space.0).nodes_of(&elements);
                     self.take(space, &nodes, members);
                 }
                 Members::Numbers(numbers) => self.take(space, numbers, members),
                 Members::Marked(bits) => {
                     let is_marked = |at: &usize| bits[at / 64] >> (at % 64) & 1 == 1;
-                    let ids = &self.sets.scope(space.0).ids;
+                    let ids = &self.scopes.of(space.0).ids;
                     let marked = (0..ids.len().min(64 * bits.len())).filter(is_marked);
                     self.take(space, &marked.map(|at| ids[at]).collect::<Vec<_>>(), members);
                 }
@@ -102,7 +103,7 @@ impl<'s> Walk<'s> {
     }
 
     fn list(&self, (instance, kind): Space) -> &'s SetList {
-        let scope = self.sets.scope(instance);
+        let scope = self.scopes.of(instance);
         match kind {
             Kind::Nodes => &scope.nodes,
             Kind::Elements => &scope.elements,
@@ -110,7 +111,7 @@ impl<'s> Walk<'s> {
     }
 
     fn ids(&self, (instance, kind): Space) -> Arc<Vec<i64>> {
-        let scope = self.sets.scope(instance);
+        let scope = self.scopes.of(instance);
         match kind {
             Kind::Nodes => scope.sorted_ids(),
             Kind::Elements => Arc::clone(&scope.element_index().ids),
@@ -119,7 +120,7 @@ impl<'s> Walk<'s> {
 
     fn shift(&self, (instance, kind): Space) -> i64 {
         match kind {
-            Kind::Nodes => self.sets.scope(instance).shift,
+            Kind::Nodes => self.scopes.of(instance).shift,
             Kind::Elements => 0,
         }
     }
