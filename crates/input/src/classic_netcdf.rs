@@ -7,7 +7,7 @@
 #[cfg(test)]
 mod tests;
 
-use super::node_files::NumberType;
+use super::number_type::NumberType;
 use flexbody_base::memory::left;
 use std::cell::Cell;
 use std::collections::HashMap;

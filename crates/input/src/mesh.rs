@@ -1,6 +1,6 @@
 //! The surface by which a part is drawn, from the elements of its files.
 
-use super::node_files::NodeFile;
+use super::node_file::NodeFile;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_model::{ElementShape, Elements, Nodes, Skin, SurfaceMesh, extents, skin};
 use std::collections::HashMap;

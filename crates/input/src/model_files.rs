@@ -1,6 +1,6 @@
 //! The files of a model.
 
-use super::jobs::JobFile;
+use super::jobs::{JobFile, family};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
@@ -330,7 +330,7 @@ impl ModelFiles {
             ModelSource::Tables(TableFiles { stiffness, mass, nodes, dofs }) => {
                 [&stiffness.path, &mass.path, nodes].into_iter().chain(dofs).cloned().collect()
             }
-            ModelSource::Job(job) => job.family(),
+            ModelSource::Job(job) => family(job),
         };
         paths
             .into_iter()

@@ -2,26 +2,27 @@
 
 mod ansys_list;
 mod cdb;
+mod errors;
 mod exodus;
 mod gmsh;
+mod point_data;
 mod vtk_legacy;
+mod vtk_packing;
 mod vtk_xml;
 
-pub(super) use vtk_legacy::{NumberType, point_arrays as legacy_point_arrays};
-pub(super) use vtk_xml::{CollectionMember, PointArray, PointData, collection, pieces, point_arrays};
+pub(super) use point_data::{PointArray, PointData};
+pub(super) use vtk_legacy::point_arrays as legacy_point_arrays;
+pub(super) use vtk_xml::{CollectionMember, collection, pieces, point_arrays};
 
 use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};
-use super::sets::NodeSets;
+use super::node_file::NodeFile;
 use super::tables::read_nodes;
+use errors::Found;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::refuse_packed;
-use flexbody_base::text::scanner::expected;
-use flexbody_model::{DofLabel, Elements, NodeAxes, Nodes};
-use std::collections::{HashMap, HashSet};
-
-type Found<T> = Result<T, Vec<Diagnostic>>;
+use std::collections::HashSet;
 
 /// Format of node files besides the table of this program.
 struct Format {
@@ -92,33 +93,6 @@ fn is_deck(head: &str) -> bool {
 
 fn bulk(file: &InputFile) -> Found<NodeFile> {
     nodes_of_bulk(file.path())
-}
-
-/// Returns FB115 at a line.
-fn syntax(file: &InputFile, line: usize, message: String) -> Vec<Diagnostic> {
-    vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).at_line(line)]
-}
-
-/// Returns FB115 for a line of an unexpected form.
-fn unexpected(file: &InputFile, line: usize, what: &str, found: &[u8]) -> Vec<Diagnostic> {
-    vec![expected(Code::NodeFileSyntax, what, found).in_file(file.path()).at_line(line)]
-}
-
-/// Returns FB115 about a file without lines.
-fn refused(file: &InputFile, message: String, help: &str) -> Vec<Diagnostic> {
-    vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).with_help(help)]
-}
-
-/// Nodes, sets and elements of a file.
-#[derive(Debug, Default)]
-pub(super) struct NodeFile {
-    pub nodes: Nodes,
-    pub sets: NodeSets,
-    pub elements: Elements,
-    /// Rows that follow others by constraints of a deck, by the names of the constraints.
-    pub followers: Vec<(String, Vec<DofLabel>)>,
-    /// Unit vectors along the rows of nodes, where these are not the axes of the model.
-    pub axes: HashMap<i64, NodeAxes>,
 }
 
 /// Returns true when a file begins like VTK in XML.

@@ -9,7 +9,8 @@ use super::model_files::{
     InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
     OperatorSource, RecoverySource,
 };
-use super::node_files::{NodeFile, read_node_file};
+use super::node_file::NodeFile;
+use super::node_files::read_node_file;
 use super::open_files::OpenFiles;
 use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::recovery_files::{OperatorColumns, read_forces, read_offset, read_operator};

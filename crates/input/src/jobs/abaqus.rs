@@ -5,8 +5,9 @@
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::element_kinds::{family, has_internal_nodes};
+use super::job::{Found, FromFile, JobFile, JobModel, JobReader, both, condensed, missing};
 use super::matrix_files::{CoordinateFile, has_labels, labelled};
-use super::{Found, FromFile, JobFile, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
+use super::siblings::{is_deck, siblings};
 use crate::assemble::{Entry, StoredEntries, assemble, check_size};
 use crate::coordinates::{cut_off, line_aligned};
 use crate::digits::{COUNTED, written_digits};

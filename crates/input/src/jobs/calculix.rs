@@ -3,11 +3,12 @@
 
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
-use super::deck_sets::Surfaces;
+use super::deck_surfaces::Surfaces;
 use super::expanded::{Once, copies_in_sets, label_once};
+use super::job::{Found, JobFile, JobModel, JobReader, both, missing};
 use super::knots::Knots;
 use super::matrix_files::CoordinateFile;
-use super::{Found, JobFile, JobModel, JobReader, both, is_deck, missing};
+use super::siblings::is_deck;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::numbers::significant;
 use flexbody_base::text::input_file::{InputFile, SeenFile};

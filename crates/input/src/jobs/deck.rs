@@ -1,6 +1,6 @@
 //! Keyword decks (`.inp`) of Abaqus and CalculiX: cards `*KEYWORD, PARAMETER=VALUE`, each with lines of data.
 
-use super::Found;
+use super::job::Found;
 use crate::sets::comparable;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};

@@ -1,9 +1,9 @@
 //! Nodes, elements and sets of a keyword deck, including parts and instances of Abaqus.
 
-use super::Found;
 use super::deck::{Card, Deck, fields};
-use super::deck_sets::{Elements, Scope};
+use super::deck_scope::{Elements, Scope};
 use super::element_kinds::{Drawing, drawing};
+use super::job::Found;
 use crate::sets::{Item, Members, NodeSets, SetIndex, SetInstance, SetScope, comparable, dotted};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::memory::{left, refuse_beyond};

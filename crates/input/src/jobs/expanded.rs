@@ -7,9 +7,9 @@
 //! the rigid rotations R. If none of the three is at x, the middle one keeps the number of the node; others get numbers
 //! that the deck does not have. Of the two nodes of a linear shell the upper one keeps the number.
 
-use super::Found;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
+use super::job::Found;
 use crate::sets::NodeCopies;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};

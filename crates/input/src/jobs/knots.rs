@@ -9,9 +9,9 @@
 //! shell, so it follows the other rows statically, e = -K_ee^-1 K_eo u_o. This changes no static deflection, and
 //! frequencies by a part of the order of the square of their ratio to these waves (1e-10 for sheets).
 
-use super::Found;
 use super::deck_mesh::DeckMesh;
 use super::expanded::solved;
+use super::job::Found;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};

@@ -5,7 +5,7 @@
 //! without a header.
 
 use super::deck::fields;
-use super::{Found, FromFile, both};
+use super::job::{Found, FromFile, both};
 use crate::assemble::{Entry, Sides, StoredEntries, assemble_distinct, check_size, given_twice};
 use crate::coordinates::{Blocks, Coordinates, Limits, TextEnd, cut_off, line_aligned, most_entries};
 use crate::digits::{COUNTED, written_digits};

@@ -1,7 +1,8 @@
 //! Node lists of Ansys: a table with tabs, whose header names the columns in the user's language, and the listing of
 //! NLIST. Decimal commas are read.
 
-use super::{Found, NodeFile, unexpected};
+use super::errors::{Found, unexpected};
+use crate::node_file::NodeFile;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, integer, real, words};
 use flexbody_model::NodeAxes;

@@ -2,7 +2,8 @@
 //! all in fields of fixed width.
 
 use super::ansys_list::axes;
-use super::{Found, NodeFile, syntax};
+use super::errors::{Found, syntax};
+use crate::node_file::NodeFile;
 use crate::sets::{Item, Members, NodeSets, SetList};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Lines, excerpt, field, integer, real};

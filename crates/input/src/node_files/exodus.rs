@@ -1,9 +1,10 @@
 //! Meshes of Exodus II (.exo, .e, .g, .exii): nodes, node sets by their names or numbers, elements.
 //! <https://sandialabs.github.io/seacas-docs/exodusII-new.pdf>. They are netCDF files: netCDF-4, which is HDF5, or classic.
 
-use super::{Found, NodeFile};
+use super::errors::Found;
 use crate::classic_netcdf::is_classic;
 use crate::exodus::read_mesh;
+use crate::node_file::NodeFile;
 use flexbody_base::text::InputFile;
 
 /// Returns true when a file is HDF5 or classic netCDF.

@@ -1,6 +1,7 @@
 //! Meshes of Gmsh (.msh, versions 2.2 and 4.1, text): nodes, the nodes of physical groups as sets, and elements.
 
-use super::{Found, NodeFile, syntax};
+use super::errors::{Found, syntax};
+use crate::node_file::NodeFile;
 use crate::sets::{Item, Members, NodeSets, SetList, SoFar};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;

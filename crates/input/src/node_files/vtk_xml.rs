@@ -2,8 +2,11 @@
 //! unstructured grids.
 //! <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>
 
-use super::vtk_legacy::{Base64, NumberType, Packing, Unpacked};
-use super::{Found, NodeFile, refused};
+use super::errors::{Found, refused};
+use super::point_data::{DIGITS_OF_TEXT, PointArray, PointData, exact_ids};
+use super::vtk_packing::{Base64, Packing, Unpacked};
+use crate::node_file::NodeFile;
+use crate::number_type::NumberType;
 use crate::sets::{Item, Members, NodeSets, SetList};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{number, words};
@@ -37,31 +40,6 @@ fn points_and_sets(bytes: &[u8]) -> Unpacked<NodeFile> {
     let elements = mesh.cells(&ids)?;
     Ok(NodeFile { nodes: Nodes { ids, positions }, sets, elements, ..NodeFile::default() })
 }
-
-/// Array of numbers at the points of a mesh.
-#[derive(Clone)]
-pub(crate) struct PointArray {
-    pub name: String,
-    /// Number of values for each point.
-    pub components: usize,
-    /// Values, point by point.
-    pub values: Vec<f64>,
-    /// Significant decimal digits.
-    pub digits: u8,
-}
-
-/// Values at the points of a mesh.
-pub(crate) struct PointData {
-    /// Numbers of the points, if the file has any.
-    pub ids: Option<Vec<i64>>,
-    /// Arrays of real numbers.
-    pub arrays: Vec<PointArray>,
-    /// True for each point that another piece owns (`vtkGhostType` or `vtkGhostLevels`); empty without ghosts.
-    pub ghosts: Vec<bool>,
-}
-
-/// Significant decimal digits that an array in text is assumed to have.
-pub(super) const DIGITS_OF_TEXT: u8 = 6;
 
 /// Returns the numbers of the points (the global ids, or the array `node`; `None` without either) and the arrays of real
 /// numbers at the points of a mesh.
@@ -151,18 +129,6 @@ pub(crate) fn collection(bytes: &[u8]) -> Unpacked<Option<Vec<CollectionMember>>
     match members.iter().find(|member| !files.insert(&member.file)) {
         Some(member) => Err(format!("{} is the file of several times, expected one of each", member.file)),
         None => Ok(Some(members)),
-    }
-}
-
-/// Returns the numbers of points as integers.
-///
-/// # Errors
-/// A description of the problem.
-pub(super) fn exact_ids(name: &str, ids: &[f64]) -> Unpacked<Vec<i64>> {
-    // Larger numbers are not exact in f64.
-    match ids.iter().find(|id| id.abs() > 9e15) {
-        Some(id) => Err(format!("array `{name}` numbers a point {id}")),
-        None => Ok(ids.iter().map(|id| *id as i64).collect()),
     }
 }
 

@@ -1,11 +1,11 @@
 //! The content of bulk data and case control of a deck: positions, axes of rows, boundary, supports, sets.
 
 use super::constraints::Constraints;
+use super::control_sections::{Assigned, SetLines};
 use super::systems::{Definition, Grid, SystemCard, SystemKind};
-use super::{Assigned, SetLines};
 use crate::bulk_cards::{Card, Item, components, read_deck};
 use crate::dmig::Dmigs;
-use crate::jobs::Found;
+use crate::jobs::job::Found;
 use crate::mesh::in_order_of_shape;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;

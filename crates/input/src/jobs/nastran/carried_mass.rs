@@ -1,11 +1,10 @@
 //! Points with mass that follow several grids by constraints which the reader eliminates: their mass before the
 //! constraint, by which the model knows with what it turns.
 
-use super::Axes;
 use super::elimination::Elimination;
 use crate::dmig::Point;
 use flexbody_linalg::CscMatrix;
-use flexbody_model::{DofLabel, GivenRows, Nodes, RawFollowers, RowMap};
+use flexbody_model::{DofLabel, GivenRows, NodeAxes as Axes, Nodes, RawFollowers, RowMap};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Mass before the elimination of dependent rows, and the grids that carry it.

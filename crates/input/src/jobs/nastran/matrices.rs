@@ -1,18 +1,20 @@
 //! K and M of a deck, and their transformation from the rows of the files to those of the model.
 
-use super::Axes;
 use super::bulk::Bulk;
 use super::carried_mass::CarriedMass;
 use super::elimination::{Elimination, Followers, GridPlaces};
 use crate::dmig::{Dmigs, Point, label};
-use crate::jobs::{Found, JobFile, JobSibling, beginning_alike, both, missing, siblings};
+use crate::jobs::job::{Found, JobFile, both, missing};
+use crate::jobs::siblings::{JobSibling, beginning_alike, siblings};
 use crate::mapping::Turn;
 use crate::named_matrices::{named_pair, pair};
 use crate::output4;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_linalg::CscMatrix;
-use flexbody_model::{DofLabel, GivenRows, Nodes, RawFollowers, RawMatrix, RowMap, filled_rows};
+use flexbody_model::{
+    DofLabel, GivenRows, NodeAxes as Axes, Nodes, RawFollowers, RawMatrix, RowMap, filled_rows,
+};
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,9 @@
 //! Arrays at the points of a mesh of VTK in its legacy form: fields, scalars, vectors, tensors and global ids.
 
-use super::super::vtk_xml::{DIGITS_OF_TEXT, PointArray, PointData, exact_ids};
-use super::{Cursor, NumberType, Unpacked};
+use super::super::point_data::{DIGITS_OF_TEXT, PointArray, PointData, exact_ids};
+use super::super::vtk_packing::Unpacked;
+use super::Cursor;
+use crate::number_type::NumberType;
 use flexbody_base::text::scanner::Words;
 
 /// Returns the numbers of the points (the global ids, or the array `node`; `None` without either) and the arrays of real

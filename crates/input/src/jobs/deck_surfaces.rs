@@ -1,30 +1,10 @@
-//! Nodes, elements and sets of a keyword deck, by the scope that defines them, and surfaces as sets of nodes.
+//! Surfaces of a keyword deck as sets of nodes.
 
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
-use crate::sets::{ElementNodes, SetList};
 use flexbody_base::text::scanner::integer;
 use std::cell::OnceCell;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::sync::Arc;
-
-/// Elements of one type.
-#[derive(Debug, Clone)]
-pub(super) struct Elements {
-    /// Type in upper case.
-    pub kind: String,
-    /// Number and nodes of each element.
-    pub members: ElementNodes,
-}
-
-/// Nodes, elements and sets of a part, of the assembly, or of a deck without either. Instances share those of their part.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Scope {
-    pub nodes: Arc<BTreeMap<i64, [f64; 3]>>,
-    pub elements: Arc<Vec<Elements>>,
-    pub sets: Arc<SetList>,
-    pub element_sets: Arc<SetList>,
-}
+use std::collections::{BTreeSet, HashMap};
 
 /// Nodes of the faces S1 to S6 of a hexahedron, numbered from 1 in the order of C3D20; C3D8 has the first 8 nodes.
 const HEXAHEDRON: &[&[usize]] = &[
