@@ -2,19 +2,21 @@
 //! `coord`), `node_num_map`, `node_ns1`, ... and their names `ns_names`, or numbers `ns_prop1`, `connect1`, ...,
 //! `name_nod_var` with `vals_nod_var1`, ....
 
+mod classic;
+#[cfg(feature = "hdf5")]
+mod netcdf4;
+#[cfg(not(feature = "hdf5"))]
+#[path = "exodus/without_hdf5.rs"]
+mod netcdf4;
+mod variables;
+
 use super::classic_netcdf::{ClassicNetcdf, is_classic};
-use super::hdf5;
+use super::matrices::HEAD;
 use super::mesh::in_order_of_shape;
-use super::reader::HEAD;
 use super::sets::{Item, Members, NodeSets, SetList};
-use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_model::{ElementShape, Elements, Nodes};
-
-type Found<T> = Result<T, Vec<Diagnostic>>;
-
-const HELP: &str =
-    "give an Exodus mesh in netCDF-4 or classic netCDF, or a table with the columns node, x, y, z";
+use variables::{ExodusFile, Found, NumberTable, wrong};
 
 /// Largest number of members of all sets together, for each byte of the file: sets of more members name datasets that
 /// others name as well, or are packed far more densely than node numbers are.
@@ -22,39 +24,6 @@ const MAX_MEMBERS_PER_BYTE: u64 = 16;
 
 /// Number of members that the sets of any file may have.
 const MIN_MEMBERS: u64 = 1 << 20;
-
-/// Variables of a file, by their names.
-pub(super) trait ExodusFile {
-    /// Returns true if there is a variable of this name.
-    fn has(&self, name: &str) -> bool;
-
-    /// Returns the numbers of a variable with one extent.
-    fn floats(&self, name: &str) -> Found<Vec<f64>>;
-
-    /// Returns the whole numbers of a variable with one extent.
-    fn whole_numbers(&self, name: &str) -> Found<Vec<i64>>;
-
-    /// Returns a variable with two extents.
-    fn table(&self, name: &str) -> Found<NumberTable>;
-
-    /// Returns a variable with three extents, of which the second is `layers`, as a table: each row of each layer in turn.
-    fn stacked(&self, name: &str, layers: usize) -> Found<NumberTable>;
-
-    /// Returns a list of texts.
-    fn names(&self, name: &str) -> Found<Vec<String>>;
-
-    /// Returns the attribute `elem_type` of a variable; empty without one.
-    fn element_type(&self, name: &str) -> String;
-}
-
-/// Numbers in rows.
-pub(super) struct NumberTable {
-    pub rows: usize,
-    pub columns: usize,
-    /// Values row by row.
-    pub values: Vec<f64>,
-    pub is_single_precision: bool,
-}
 
 /// Variables of the nodes at every time.
 pub(super) struct NodalVariables {
@@ -74,7 +43,7 @@ fn with_file<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> Found<T>
         let opened = ClassicNetcdf::open(file.bytes()).map_err(wrong)?;
         read(&opened)
     } else {
-        hdf5::with_exodus(file, read)?
+        netcdf4::with_exodus(file, read)?
     };
     // Errors of datasets are reported as errors of nodes, not of matrices.
     found.map_err(|found| found.iter().flat_map(|one| wrong(one.message().to_owned())).collect())
@@ -149,16 +118,6 @@ fn of_one_variable(opened: &dyn ExodusFile, ids: Vec<i64>, names: Vec<String>) -
     let of = |variable: usize| (0..times).flat_map(|time| row(time, variable).iter().copied()).collect();
     let values = (0..count).map(of).collect();
     Ok(NodalVariables { ids, names, values, times, is_single: is_single_precision })
-}
-
-/// Returns the error about a variable whose extents are not times, variables and nodes.
-pub(super) fn wrong_layers(name: &str, extents: &[impl ToString], layers: usize) -> String {
-    let extents: Vec<String> = extents.iter().map(ToString::to_string).collect();
-    format!("`{name}` has the extents {}, expected times x {layers} variables x nodes", extents.join(" x "))
-}
-
-fn wrong(message: String) -> Vec<Diagnostic> {
-    vec![Diagnostic::new(Code::NodeFileSyntax, message).with_help(HELP)]
 }
 
 /// Returns the numbers of `count` nodes.
@@ -239,61 +198,6 @@ fn nodes_at(list: &str, ids: &[i64], places: impl Iterator<Item = Option<i64>>) 
     };
     let nodes: Option<Vec<i64>> = places.map(node).collect();
     nodes.ok_or_else(|| wrong(format!("`{list}` names a node that does not exist")))
-}
-
-impl ExodusFile for ClassicNetcdf<'_> {
-    fn has(&self, name: &str) -> bool {
-        self.variable(name).is_some()
-    }
-
-    fn floats(&self, name: &str) -> Found<Vec<f64>> {
-        let variable = self.variable(name).ok_or_else(|| missing(name))?;
-        match variable.shape.len() {
-            1 => self.numbers(variable).map_err(wrong),
-            _ => Err(wrong(format!("`{name}` is not a list of numbers"))),
-        }
-    }
-
-    fn whole_numbers(&self, name: &str) -> Found<Vec<i64>> {
-        let whole = |value: f64| (value.fract() == 0.0 && value.abs() < 9e15).then_some(value as i64);
-        let numbers: Option<Vec<i64>> = self.floats(name)?.into_iter().map(whole).collect();
-        numbers.ok_or_else(|| wrong(format!("`{name}` has a number that is not whole")))
-    }
-
-    fn table(&self, name: &str) -> Found<NumberTable> {
-        let variable = self.variable(name).ok_or_else(|| missing(name))?;
-        let &[rows, columns] = variable.shape.as_slice() else {
-            return Err(wrong(format!("`{name}` is not a table of numbers")));
-        };
-        let values = self.numbers(variable).map_err(wrong)?;
-        Ok(NumberTable { rows, columns, values, is_single_precision: variable.is_single_precision() })
-    }
-
-    fn stacked(&self, name: &str, layers: usize) -> Found<NumberTable> {
-        let variable = self.variable(name).ok_or_else(|| missing(name))?;
-        let &[times, own, columns] = variable.shape.as_slice() else {
-            return Err(wrong(wrong_layers(name, &variable.shape, layers)));
-        };
-        if own != layers {
-            return Err(wrong(wrong_layers(name, &variable.shape, layers)));
-        }
-        let values = self.numbers(variable).map_err(wrong)?;
-        let is_single_precision = variable.is_single_precision();
-        Ok(NumberTable { rows: times * layers, columns, values, is_single_precision })
-    }
-
-    fn names(&self, name: &str) -> Found<Vec<String>> {
-        let variable = self.variable(name).ok_or_else(|| missing(name))?;
-        self.lines(variable).map_err(wrong)
-    }
-
-    fn element_type(&self, name: &str) -> String {
-        self.variable(name).map_or(String::new(), |variable| variable.text("elem_type").to_owned())
-    }
-}
-
-fn missing(name: &str) -> Vec<Diagnostic> {
-    wrong(format!("file has no variable `{name}`"))
 }
 
 /// Adds an element of a type with an Exodus name (`HEX8`, `TETRA`, `SHELL4`). Points are not drawn.

@@ -13,10 +13,10 @@ mod tests;
 
 use super::classic_netcdf::is_classic;
 use super::exodus::has_nodal_variables;
-use super::hdf5::Hdf5;
-use super::reader::{HEAD, Reader};
+use super::matrices::hdf5::Hdf5;
+use super::matrices::scipy_npz::{Archive, ScipyNpz};
+use super::matrices::{HEAD, Reader};
 use crate::npy::{self, Blocks};
-use crate::scipy_npz::{Archive, ScipyNpz};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Error;

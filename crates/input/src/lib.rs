@@ -1,5 +1,5 @@
 //! Reads manifests, matrices, tables of nodes and degrees of freedom, and jobs of FE programs. Each matrix format has
-//! one file behind [`Reader`] and [`READERS`], each FE program one in `jobs`. The contracts with users are
+//! one file in `matrices` behind [`Reader`] and [`READERS`], each FE program one in `jobs`. The contracts with users are
 //! `docs/reference/input.md` and `docs/how_to/from_fe_programs.md`.
 
 #![deny(
@@ -11,12 +11,9 @@
 )]
 
 mod array;
-mod assemble;
 mod bulk_cards;
 mod classic_netcdf;
-mod coordinates;
 mod digits;
-mod dmig;
 mod exodus;
 mod fe_results;
 #[cfg(feature = "hdf5")]
@@ -26,45 +23,37 @@ mod hdf5;
 mod hdf5;
 mod jobs;
 mod labels_of_file;
-#[cfg(feature = "hdf5")]
-mod lent;
 mod manifest;
 mod mapping;
-mod mat5;
-mod matrix_market;
+mod matrices;
 mod mesh;
 mod mode_files;
 mod model_files;
-mod named_matrices;
 mod node_file;
 mod node_files;
 mod npy;
 mod number_type;
 mod open_files;
-mod output4;
-mod petsc;
 mod read_model;
-mod reader;
 mod recipes;
 mod recovery_files;
 mod rows_of_model;
-mod scipy_npz;
 mod sets;
 mod shapes;
 mod stated;
 mod tables;
 mod with_stress;
 
-pub use assemble::check_size;
 pub use fe_results::{PointStresses, read_point_stresses, read_steps};
 pub use jobs::{ElementDeck, JobFile, is_job, job_programs};
 pub use manifest::read_manifest;
+pub use matrices::assemble::check_size;
+pub use matrices::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use model_files::{
     InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
     OperatorSource, RecoverySource, Region, StressStiffnessSource, TableFiles, WithStress, parse_units,
 };
 pub use read_model::{interface_in_memory, read_matrix, read_model};
-pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use recipes::{RECIPES, Recipe, Step};
 pub use shapes::{ImportedColumns, read_imported, read_shapes};
 pub use stated::parse_damping;

@@ -4,6 +4,7 @@ use super::fe_results::{AnswerFiles, read_answers};
 use super::jobs::{JobModel, read_job};
 use super::labels_of_file::LabelsOfFile;
 use super::mapping::Mapping;
+use super::matrices::{MatrixRole, MatrixSource, reader_for};
 use super::mesh::MeshReading;
 use super::model_files::{
     InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
@@ -12,7 +13,6 @@ use super::model_files::{
 use super::node_file::NodeFile;
 use super::node_files::read_node_file;
 use super::open_files::OpenFiles;
-use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::recovery_files::{OperatorColumns, read_forces, read_offset, read_operator};
 use super::rows_of_model::{by_rows_of_model, in_order_of_nodes, refuse_followers, turned};
 use super::sets::NodeSets;

@@ -2,15 +2,16 @@
 //! and values of the undeformed body.
 
 use super::array::Array;
-use super::assemble::Entry;
-use super::dmig::{self, DmigPunch, NumberedColumns};
-use super::hdf5::{self, Hdf5};
-use super::mat5::{self, Mat5};
-use super::matrix_market;
-use super::output4::{self, Output4};
-use super::petsc::{self, Petsc};
-use super::reader::{HEAD, Reader};
-use super::scipy_npz::{self, ScipyNpz};
+use super::matrices::assemble::Entry;
+use super::matrices::dmig::{self, DmigPunch, NumberedColumns};
+use super::matrices::hdf5::{self, Hdf5};
+use super::matrices::mat5::{self, Mat5};
+use super::matrices::matrix_market;
+use super::matrices::output4::{self, Output4};
+use super::matrices::petsc::{self, Petsc};
+use super::matrices::rectangular::Rectangular;
+use super::matrices::scipy_npz::{self, ScipyNpz};
+use super::matrices::{HEAD, Reader};
 use super::shapes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::{Compression, InputFile};
@@ -19,44 +20,6 @@ use flexbody_model::DofLabel;
 use std::collections::HashMap;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
-
-/// Matrix that need not be square, with entries from 0.
-pub(super) struct Rectangular {
-    pub rows: usize,
-    pub columns: usize,
-    pub entries: Vec<Entry>,
-}
-
-impl Rectangular {
-    /// Returns the matrix if all entries lie within it and are finite.
-    ///
-    /// # Errors
-    /// FB303 and FB306.
-    pub(super) fn checked(self) -> Result<Self, Diagnostic> {
-        let Self { rows, columns, entries } = &self;
-        let outside = |entry: &&Entry| entry.row as usize >= *rows || entry.col as usize >= *columns;
-        if let Some(entry) = entries.iter().find(outside) {
-            let message = format!(
-                "an entry is at ({}, {}), counted from 0, in a matrix of {rows} x {columns}",
-                entry.row, entry.col
-            );
-            return Err(Diagnostic::new(Code::MatrixIndex, message));
-        }
-        match entries.iter().find(|entry| !entry.value.is_finite()) {
-            Some(Entry { row, col, value }) => {
-                let message = format!("entry ({row}, {col}), counted from 0, is {value}");
-                Err(Diagnostic::new(Code::MatrixNotFinite, message))
-            }
-            None => Ok(self),
-        }
-    }
-
-    /// Returns the transposed matrix.
-    fn transposed(&self) -> CscMatrix {
-        let entries: Vec<(u32, u32, f64)> = self.entries.iter().map(|e| (e.col, e.row, e.value)).collect();
-        CscMatrix::from_triplets(self.columns, self.rows, &entries)
-    }
-}
 
 /// Operator as its file gives it.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,12 +2,12 @@
 //! content. Shapes may also come by nodes, as FE programs write modes.
 
 use super::array::Array;
-use super::hdf5::Hdf5;
-use super::matrix_market::MatrixMarket;
+use super::matrices::hdf5::Hdf5;
+use super::matrices::matrix_market::{self, MatrixMarket};
+use super::matrices::{HEAD, Reader};
 use super::mode_files::read_modes;
 use super::model_files::MatrixLocation;
-use super::reader::{HEAD, Reader};
-use super::{hdf5, matrix_market, npy};
+use super::{hdf5, npy};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};

@@ -4,10 +4,10 @@
 
 use super::step_values::{Found, Place, Step, StepValues, unreadable};
 use crate::exodus::{NodalVariables, read_nodal_variables};
+use crate::matrices::HEAD;
 use crate::node_files::{
     self, CollectionMember, PointArray, PointData, collection, legacy_point_arrays, pieces, point_arrays,
 };
-use crate::reader::HEAD;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::text::InputFile;
 use std::collections::{HashMap, HashSet};

@@ -1,19 +1,15 @@
 //! Lists of numbers and small attributes of any stored type.
 
-use super::{MAX_DEPTH, MAX_GROUPS, Members, layout, opened};
-use crate::array::Array;
-use crate::assemble::Entry;
-use crate::recovery_files::Rectangular;
+use super::file::Found;
+use super::members::Members;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::hdf5_file::first_broken_heap;
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::InputFile;
 use hdf5_metno::types::{FixedAscii, FixedUnicode, FloatSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
-use hdf5_metno::{Attribute, Dataset, File, Group, Hyperslab, SliceOrIndex};
+use hdf5_metno::{Attribute, Dataset, Group, Hyperslab, SliceOrIndex};
 use std::cell::OnceCell;
 use std::ops::Range;
-
-pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
 
 /// Number of values per stored byte above which values of a dataset must be missing from the file: no filter reaches it
 /// on real data (deflate: 1032).
@@ -42,7 +38,7 @@ impl NumberKind {
 }
 
 /// Dataset of numbers whose values are stored in this file.
-pub(super) struct Numbers {
+pub(crate) struct Numbers {
     pub dataset: Dataset,
     /// Path within the file, for messages.
     pub name: String,
@@ -55,7 +51,7 @@ impl Numbers {
     /// # Errors
     /// FB302 for values that are no real numbers, FB304 for values that are not stored, FB310 for values outside this
     /// file.
-    pub(super) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
+    pub(crate) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
         let (dataset, at) = stored_here(group, members, group_name, name)?;
         let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
         let kind = dataset.dtype().and_then(|t| t.to_descriptor()).ok().and_then(|t| NumberKind::of(&t));
@@ -66,7 +62,7 @@ impl Numbers {
         Ok(Self { dataset, name: at, kind })
     }
 
-    pub(super) fn is_single_precision(&self) -> bool {
+    pub(crate) fn is_single_precision(&self) -> bool {
         self.kind == NumberKind::Single
     }
 }
@@ -94,7 +90,7 @@ fn stored_here(group: &Group, members: &Members, group_name: &str, name: &str) -
 ///
 /// # Errors
 /// FB302 for other datasets, FB304 for rows that are not stored, FB310 for values outside this file.
-pub(super) fn names_of(group: &Group, members: &Members, name: &str) -> Found<Vec<String>> {
+pub(crate) fn names_of(group: &Group, members: &Members, name: &str) -> Found<Vec<String>> {
     let (dataset, at) = stored_here(group, members, "", name)?;
     let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
     let shape = dataset.shape();
@@ -140,7 +136,7 @@ fn check_stored(dataset: &Dataset) -> Result<(), String> {
 ///
 /// # Errors
 /// FB601 if they do not fit.
-pub(super) fn refuse_beyond_memory(values: usize, name: &str) -> Found<()> {
+pub(crate) fn refuse_beyond_memory(values: usize, name: &str) -> Found<()> {
     let what = format!("reading {values} values of the dataset {name}");
     let needed = values as f64 * size_of::<f64>() as f64;
     let refused = refuse_beyond(left(), needed, &what, "use a larger machine");
@@ -148,7 +144,7 @@ pub(super) fn refuse_beyond_memory(values: usize, name: &str) -> Found<()> {
 }
 
 /// List of numbers in the file.
-pub(super) struct Vector {
+pub(crate) struct Vector {
     dataset: Dataset,
     /// Path within the file, for messages.
     pub name: String,
@@ -165,7 +161,7 @@ impl Vector {
     ///
     /// # Errors
     /// The errors of [`Numbers::open`]; FB302 for other shapes.
-    pub(super) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
+    pub(crate) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
         let Numbers { dataset, name, kind } = Numbers::open(group, members, group_name, name)?;
         let refuse = |what: String| vec![Diagnostic::new(Code::MatrixKind, format!("dataset {name} {what}"))];
         let shape = dataset.shape();
@@ -181,16 +177,16 @@ impl Vector {
         Ok(Self { dataset, name, dimensions: shape.len(), axis, len, kind, chunk })
     }
 
-    pub(super) fn is_single_precision(&self) -> bool {
+    pub(crate) fn is_single_precision(&self) -> bool {
         self.kind == NumberKind::Single
     }
 
-    pub(super) fn floats(&self, range: Range<usize>) -> Found<Vec<f64>> {
+    pub(crate) fn floats(&self, range: Range<usize>) -> Found<Vec<f64>> {
         self.read::<f64>(range)
     }
 
     /// Returns whole numbers; 64-bit numbers beyond i64 become its largest value.
-    pub(super) fn integers(&self, range: Range<usize>) -> Found<Vec<i64>> {
+    pub(crate) fn integers(&self, range: Range<usize>) -> Found<Vec<i64>> {
         if self.kind == NumberKind::Whole {
             return self.read::<i64>(range);
         }
@@ -220,7 +216,7 @@ impl Vector {
 }
 
 /// Returns the whole numbers of a small attribute; `None` for other attributes.
-pub(super) fn integers_of(attribute: &Attribute) -> Option<Vec<i64>> {
+pub(crate) fn integers_of(attribute: &Attribute) -> Option<Vec<i64>> {
     let kind = NumberKind::of(&attribute.dtype().ok()?.to_descriptor().ok()?)?;
     let shape = attribute.shape();
     let scalar = attribute.is_scalar();
@@ -238,7 +234,7 @@ pub(super) fn integers_of(attribute: &Attribute) -> Option<Vec<i64>> {
 }
 
 /// Returns a boolean, or a whole number 0 or 1 as one; `None` for other attributes.
-pub(super) fn truth_of(attribute: &Attribute) -> Option<bool> {
+pub(crate) fn truth_of(attribute: &Attribute) -> Option<bool> {
     if attribute.is_scalar() && attribute.dtype().ok()?.to_descriptor().ok()? == TypeDescriptor::Boolean {
         return attribute.read_scalar::<bool>().ok();
     }
@@ -249,13 +245,13 @@ pub(super) fn truth_of(attribute: &Attribute) -> Option<bool> {
 }
 
 /// Global heaps of a file, which hold texts of variable length. The HDF5 library walks damaged ones endlessly.
-pub(super) struct Heaps<'f> {
+pub(crate) struct Heaps<'f> {
     file: &'f InputFile,
     are_checked: OnceCell<bool>,
 }
 
 impl<'f> Heaps<'f> {
-    pub(super) fn of(file: &'f InputFile) -> Self {
+    pub(crate) fn of(file: &'f InputFile) -> Self {
         Self { file, are_checked: OnceCell::new() }
     }
 
@@ -267,7 +263,7 @@ impl<'f> Heaps<'f> {
 }
 
 /// Returns a short text of any string type of HDF5; `heaps` are those of the file.
-pub(super) fn text_of(attribute: &Attribute, heaps: &Heaps<'_>) -> Option<String> {
+pub(crate) fn text_of(attribute: &Attribute, heaps: &Heaps<'_>) -> Option<String> {
     // A null dataspace has no value.
     if !attribute.is_scalar() && attribute.shape() != [1] {
         return None;
@@ -288,138 +284,4 @@ pub(super) fn text_of(attribute: &Attribute, heaps: &Heaps<'_>) -> Option<String
         _ => return None,
     };
     String::from_utf8(text).ok().map(|text| text.trim().to_owned())
-}
-
-// A dense array in an HDF5 file: the named dataset, or the only one with two extents.
-
-/// Reads the dataset `name`, or the only array of the file.
-pub(crate) fn read_array(file: &InputFile, name: Option<&str>) -> Found<Array> {
-    array_of(&named_or_only(&opened(file)?, name)?)
-}
-
-fn named_or_only(file: &File, name: Option<&str>) -> Found<Numbers> {
-    match name {
-        Some(name) => named(file, name),
-        None => search(file),
-    }
-}
-
-fn array_of(numbers: &Numbers) -> Found<Array> {
-    let shape = numbers.dataset.shape();
-    let (rows, cols) = match *shape.as_slice() {
-        [rows] => (rows, 1),
-        [rows, cols] => (rows, cols),
-        _ => {
-            let message = format!("dataset {} has the shape {shape:?}, expected two extents", numbers.name);
-            return Err(vec![Diagnostic::new(Code::MatrixKind, message)]);
-        }
-    };
-    let single = numbers.is_single_precision();
-    refuse_beyond_memory(rows.saturating_mul(cols), &numbers.name)?;
-    let values = numbers.dataset.read_raw::<f64>().map_err(|e| {
-        let message = format!("dataset {} cannot be read: {e}", numbers.name);
-        vec![Diagnostic::new(Code::FileUnreadable, message).with_help("write the file again")]
-    })?;
-    Ok(Array { rows, cols, row_major: true, values, digits: if single { 7 } else { 17 } })
-}
-
-/// Reads the dataset `name`, or the only array of the file, as a matrix. MATLAB stores the transposed array.
-pub(super) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
-    let opened = opened(file)?;
-    let numbers = named_or_only(&opened, name)?;
-    let is_transposed = numbers.dataset.attr("MATLAB_class").is_ok();
-    let Array { rows, cols, values, .. } = array_of(&numbers)?;
-    let mut entries = Vec::new();
-    for (at, &value) in values.iter().enumerate().filter(|(_, value)| **value != 0.0) {
-        let (row, col) = ((at / cols.max(1)) as u32, (at % cols.max(1)) as u32);
-        entries.push(if is_transposed {
-            Entry { row: col, col: row, value }
-        } else {
-            Entry { row, col, value }
-        });
-    }
-    let (rows, columns) = if is_transposed { (cols, rows) } else { (rows, cols) };
-    Rectangular { rows, columns, entries }.checked().map_err(|diagnostic| vec![diagnostic])
-}
-
-/// Returns true if the file has arrays with two extents outside the group `name`.
-pub(super) fn has_arrays_beside(file: &File, name: &str) -> bool {
-    arrays(file).iter().any(|(_, path, _)| path != name && !(path.is_empty() && name == "/"))
-}
-
-fn named(file: &File, name: &str) -> Found<Numbers> {
-    let parts: Vec<&str> = name.split('/').filter(|part| !part.is_empty()).collect();
-    let Some((last, groups)) = parts.split_last() else { return search(file) };
-    let mut group = root(file)?;
-    let mut path = String::new();
-    for part in groups {
-        let missing = || {
-            vec![layout(format!("`{part}` of `{name}` is not a group of the file")).with_help(listing(file))]
-        };
-        if !Members::of(&group).is_here(part) {
-            return Err(missing());
-        }
-        group = group.group(part).map_err(|_| missing())?;
-        path = format!("{path}/{part}");
-    }
-    let members = Members::of(&group);
-    if members.link(last).is_none() {
-        return Err(vec![layout(format!("dataset `{name}` is not in the file")).with_help(listing(file))]);
-    }
-    Numbers::open(&group, &members, &path, last)
-}
-
-fn search(file: &File) -> Found<Numbers> {
-    let mut found = arrays(file);
-    match (found.pop(), found.is_empty()) {
-        (Some((group, path, name)), true) => Numbers::open(&group, &Members::of(&group), &path, &name),
-        (None, _) => Err(vec![layout("file holds no array with two extents".into()).with_help(HELP)]),
-        (Some(_), false) => {
-            let message =
-                format!("file holds {} arrays with two extents; which has the shapes?", found.len() + 1);
-            Err(vec![layout(message).with_help(listing(file))])
-        }
-    }
-}
-
-const HELP: &str = "store the shapes as a dataset with one row for every matrix row";
-
-fn listing(file: &File) -> String {
-    let found = arrays(file);
-    if found.is_empty() {
-        return HELP.to_owned();
-    }
-    let names: Vec<String> = found.iter().take(8).map(|(_, path, name)| format!("{path}/{name}")).collect();
-    let more = if found.len() > names.len() { ", ..." } else { "" };
-    format!("name the dataset as FILE.h5:/dataset; the file has {}{more}", names.join(", "))
-}
-
-fn root(file: &File) -> Found<Group> {
-    file.group("/").map_err(|e| vec![layout(format!("root group cannot be read: {e}"))])
-}
-
-/// Returns all datasets with two extents, breadth first: group, path of the group, and name.
-fn arrays(file: &File) -> Vec<(Group, String, String)> {
-    let mut found = Vec::new();
-    let mut level: Vec<(String, Group)> = root(file).map(|root| (String::new(), root)).into_iter().collect();
-    let mut visited = 0;
-    for _ in 0..MAX_DEPTH {
-        let mut next = Vec::new();
-        for (path, group) in level {
-            let members = Members::of(&group);
-            for child in members.hard_links().filter(|child| !child.starts_with('#')) {
-                visited += 1;
-                if visited > MAX_GROUPS {
-                    return found;
-                }
-                if let Ok(inner) = group.group(child) {
-                    next.push((format!("{path}/{child}"), inner));
-                } else if group.dataset(child).is_ok_and(|dataset| dataset.ndim() == 2) {
-                    found.push((group.clone(), path.clone(), child.to_owned()));
-                }
-            }
-        }
-        level = next;
-    }
-    found
 }

@@ -6,10 +6,12 @@
 
 use super::deck::fields;
 use super::job::{Found, FromFile, both};
-use crate::assemble::{Entry, Sides, StoredEntries, assemble_distinct, check_size, given_twice};
-use crate::coordinates::{Blocks, Coordinates, Limits, TextEnd, cut_off, line_aligned, most_entries};
 use crate::digits::{COUNTED, written_digits};
-use crate::mapping::Recent;
+use crate::matrices::assemble::{Entry, Sides, StoredEntries, assemble_distinct, check_size, given_twice};
+use crate::matrices::coordinates::{
+    Blocks, Coordinates, Limits, TextEnd, cut_off, line_aligned, most_entries,
+};
+use crate::matrices::recent::Recent;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};

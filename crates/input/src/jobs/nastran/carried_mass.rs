@@ -2,7 +2,7 @@
 //! constraint, by which the model knows with what it turns.
 
 use super::elimination::Elimination;
-use crate::dmig::Point;
+use crate::matrices::dmig::Point;
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{DofLabel, GivenRows, NodeAxes as Axes, Nodes, RawFollowers, RowMap};
 use std::collections::{BTreeMap, BTreeSet, HashMap};

@@ -2,7 +2,7 @@
 //! contain them: rows that follow others are eliminated.
 
 use crate::bulk_cards::{Card, components};
-use crate::dmig::{Point, label};
+use crate::matrices::dmig::{Point, label};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::scanner::{real, whole};
 use flexbody_model::DofLabel;

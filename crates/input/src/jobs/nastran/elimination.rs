@@ -1,7 +1,7 @@
 //! The elimination of rows that follow others by constraints: u = T u_n, so that K and M become T' K T and T' M T.
 
 use super::constraints::{Constraint, Relation};
-use crate::dmig::Point;
+use crate::matrices::dmig::Point;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{NodeAxes as Axes, Nodes};

@@ -3,12 +3,12 @@
 use super::bulk::Bulk;
 use super::carried_mass::CarriedMass;
 use super::elimination::{Elimination, Followers, GridPlaces};
-use crate::dmig::{Dmigs, Point, label};
 use crate::jobs::job::{Found, JobFile, both, missing};
 use crate::jobs::siblings::{JobSibling, beginning_alike, siblings};
-use crate::mapping::Turn;
-use crate::named_matrices::{named_pair, pair};
-use crate::output4;
+use crate::matrices::dmig::{Dmigs, Point, label};
+use crate::matrices::named_matrices::{named_pair, pair};
+use crate::matrices::output4;
+use crate::matrices::turn::Turn;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_linalg::CscMatrix;

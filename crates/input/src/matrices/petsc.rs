@@ -3,16 +3,16 @@
 //! values 4, 8 or 16 bytes, by the configuration of PETSc. The file does not state these sizes, but they follow from
 //! its first number and its length.
 
-use super::array::Compressed;
 use super::assemble::{Entry, check_extents, check_size};
+use super::compressed::Compressed;
 use super::reader::{MatrixSource, Reader};
-use super::recovery_files::Rectangular;
+use super::rectangular::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_model::RawMatrix;
 
 /// Reader of PETSc's binary files.
-pub(super) struct Petsc;
+pub(crate) struct Petsc;
 
 /// Number at the beginning of a matrix. Other objects have similar numbers.
 const MATRIX: u64 = 1_211_216;
@@ -164,7 +164,7 @@ fn read(bytes: &[u8], source: &MatrixSource<'_>) -> std::result::Result<RawMatri
 ///
 /// # Errors
 /// FB301 to FB306 for an invalid matrix, FB313 for one beyond memory.
-pub(super) fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
+pub(crate) fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
     let check = |rows, columns, entries| check_extents(rows, columns, entries).map(|_| ());
     let stored = Stored::of(bytes, check)?;
     let pointers = stored.pointers();

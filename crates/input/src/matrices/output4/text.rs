@@ -1,7 +1,7 @@
 //! Text files: a header with the format of the numbers, a line for each column or string, and the numbers, side by side
 //! without blanks.
 
-use super::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off, unpadded};
+use super::columns::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off, unpadded};
 use crate::digits::written_digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;

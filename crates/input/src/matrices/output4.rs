@@ -2,31 +2,27 @@
 //! into their lengths, or in separate words: BIGMAT).
 
 mod binary;
+mod columns;
 mod text;
 
-use super::assemble::{check_extents, check_size, given_twice, undeclared_triangle};
+use super::assemble::{check_extents, check_size, undeclared_triangle};
 use super::named_matrices::{choose, named_or_only};
 use super::reader::{MatrixSource, Reader};
-use super::recovery_files::Rectangular;
-use crate::assemble::{
-    ColumnEntries, Entry, Sides, StoredEntries, assemble_columns, assemble_distinct, push,
-};
+use super::rectangular::Rectangular;
 use binary::Binary;
+use columns::{Columns, SINGLE_DIGITS, Stored, Stretch};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_base::memory::allow_failure;
 use flexbody_base::text::{Compression, InputFile};
 use flexbody_linalg::parallel;
 use flexbody_model::RawMatrix;
-use std::ops::Range;
-use std::path::Path;
 use text::Format;
 
 /// Number of digits with which OUTPUT4 writes single-precision numbers as text.
 const PADDED_DIGITS: u8 = 10;
 
 /// Reader of OUTPUT4 files.
-pub(super) struct Output4;
+pub(crate) struct Output4;
 
 impl Reader for Output4 {
     fn name(&self) -> &'static str {
@@ -59,7 +55,7 @@ impl Reader for Output4 {
 type Found<T> = std::result::Result<T, Diagnostic>;
 
 /// Matrices of a file, in its order.
-pub(super) struct Contents {
+pub(crate) struct Contents {
     matrices: Vec<(Stored, Encoding)>,
 }
 
@@ -75,7 +71,7 @@ impl Contents {
     ///
     /// # Errors
     /// FB301 for a file that is no OUTPUT4 file, FB303, FB304 for files that are cut off.
-    pub(super) fn of(file: &InputFile) -> Found<Self> {
+    pub(crate) fn of(file: &InputFile) -> Found<Self> {
         let matrices = match Binary::of(file.bytes()) {
             Some(binary) => {
                 let all = binary.contents(file)?.into_iter();
@@ -90,12 +86,12 @@ impl Contents {
     }
 
     /// Returns the names of the matrices.
-    pub(super) fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         self.matrices.iter().map(|(stored, _)| stored.header.name.clone()).collect()
     }
 
     /// Returns the number of rows of a square matrix with entries; `None` for another matrix.
-    pub(super) fn square(&self, at: usize) -> Option<usize> {
+    pub(crate) fn square(&self, at: usize) -> Option<usize> {
         let (stored, _) = self.matrices.get(at)?;
         let is_square = stored.header.rows == stored.header.columns && stored.values > 0;
         usize::try_from(stored.header.rows).ok().filter(|_| is_square)
@@ -132,7 +128,7 @@ impl Contents {
     /// FB301 for text that cannot be parsed, FB302 for complex and other matrices, FB303 for rows outside the matrix,
     /// FB305 for a matrix that is not square, FB306 for values that are not finite, FB307 for a single triangle, FB312
     /// if there is no nonzero entry.
-    pub(super) fn matrix(&self, file: &InputFile, wanted: usize) -> Found<RawMatrix> {
+    pub(crate) fn matrix(&self, file: &InputFile, wanted: usize) -> Found<RawMatrix> {
         let Some((stored, encoding)) = self.matrices.get(wanted) else {
             return Err(Diagnostic::new(Code::MatrixSyntax, "the matrix is not in the file"));
         };
@@ -169,7 +165,7 @@ impl Contents {
 ///
 /// # Errors
 /// FB310 if there is no such matrix, the errors of [`Contents::of`] and of the matrix.
-pub(super) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+pub(crate) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
     let contents = Contents::of(file)?;
     let wanted = named_or_only(&contents.names(), name)?;
     contents.rectangular(file, wanted)
@@ -193,281 +189,6 @@ fn columns(file: &InputFile, stored: &Stored, encoding: Encoding) -> Found<Colum
         }
     }
     Ok(all)
-}
-
-// The common parts of text and binary files: headers, strings of values, and the collected columns.
-
-/// Number of digits of single precision.
-const SINGLE_DIGITS: u8 = 7;
-
-/// Number of rows from which on the start of a string does not fit into one word with its length.
-const MIN_ROWS_OF_TWO_WORDS: u64 = 65_536;
-
-/// Header of a matrix.
-#[derive(Debug, Clone)]
-struct Header {
-    pub name: String,
-    pub rows: u64,
-    pub columns: u64,
-    pub form: i64,
-    /// Kind of the numbers: 1, 2 for real numbers of single and double precision; 3, 4 for complex ones.
-    pub kind: i64,
-    /// True if start and length of strings are in separate words.
-    pub is_big: bool,
-}
-
-impl Header {
-    /// Creates the header from its numbers. The error describes numbers that belong to no matrix.
-    fn new(
-        columns: i64,
-        rows: i64,
-        form: i64,
-        kind: i64,
-        name: &[u8],
-    ) -> std::result::Result<Self, Diagnostic> {
-        let name: String = String::from_utf8_lossy(unpadded(name)).to_uppercase();
-        let is_name = |c: char| c.is_ascii_graphic();
-        if columns <= 0
-            || rows == 0
-            || rows == i64::MIN
-            || !(1..=4).contains(&kind)
-            || !name.chars().all(is_name)
-        {
-            let message = format!("header of a matrix states {columns} columns, {rows} rows, type {kind}");
-            return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help("write the file again"));
-        }
-        Ok(Self {
-            name,
-            rows: rows.unsigned_abs(),
-            columns: columns.unsigned_abs(),
-            form,
-            kind,
-            is_big: rows < 0 || rows.unsigned_abs() >= MIN_ROWS_OF_TWO_WORDS,
-        })
-    }
-
-    /// Returns a name that is stored in words of eight bytes, with four or eight letters in each.
-    fn name_of_wide_words(name: &[u8]) -> Vec<u8> {
-        let letters = |word: &[u8]| match word.split_at_checked(4) {
-            Some((four, rest)) if unpadded(rest).is_empty() => four.to_vec(),
-            _ => word.to_vec(),
-        };
-        name.chunks(8).flat_map(letters).collect()
-    }
-
-    fn is_real(&self) -> bool {
-        matches!(self.kind, 1 | 2)
-    }
-
-    fn is_single(&self) -> bool {
-        self.kind % 2 == 1
-    }
-
-    /// Returns start and number of words of a string, which are packed into one number.
-    fn unpacked(word: i64) -> (i64, i64) {
-        let length = (word >> 16) - 1;
-        (word - ((length + 1) << 16), length)
-    }
-
-    /// Checks a column number: it is within the matrix, or the next one, which ends the matrix.
-    fn column(&self, column: i64) -> std::result::Result<ColumnRecord, Diagnostic> {
-        match u64::try_from(column) {
-            Ok(column) if column >= 1 && column <= self.columns => {
-                Ok(ColumnRecord::Number(column as u32 - 1))
-            }
-            Ok(column) if column == self.columns + 1 => Ok(ColumnRecord::End),
-            _ => {
-                let message =
-                    format!("matrix {} has {} columns, found column {column}", self.name, self.columns);
-                Err(Diagnostic::new(Code::MatrixIndex, message).with_help("write the file again"))
-            }
-        }
-    }
-
-    /// Checks the position of a string of values. Returns its first row, from 0.
-    fn first_row(&self, row: i64, count: usize) -> std::result::Result<u32, Diagnostic> {
-        let end = row.checked_add(count as i64 - 1).unwrap_or(i64::MAX);
-        if row < 1 || end.unsigned_abs() > self.rows || self.rows > u64::from(u32::MAX) {
-            let message = format!("matrix {} has {} rows, found rows {row} to {end}", self.name, self.rows);
-            return Err(Diagnostic::new(Code::MatrixIndex, message).with_help("write the file again"));
-        }
-        Ok(row as u32 - 1)
-    }
-}
-
-/// Returns a name without the blanks and zero bytes that pad its field.
-fn unpadded(name: &[u8]) -> &[u8] {
-    let fills = |b: &u8| b.is_ascii_whitespace() || *b == 0;
-    let start = name.iter().position(|b| !fills(b)).unwrap_or(name.len());
-    let end = name.iter().rposition(|b| !fills(b)).map_or(start, |last| last + 1);
-    &name[start..end]
-}
-
-/// Kind of a column record.
-enum ColumnRecord {
-    Number(u32),
-    End,
-}
-
-/// Positions of the columns of a matrix in its file, found from the lengths in the file before any value is read.
-struct Stored {
-    pub header: Header,
-    /// Groups of whole columns, in file order.
-    pub stretches: Vec<Stretch>,
-    /// Upper bound of the number of values in the columns.
-    pub values: usize,
-    /// True if every column has a higher number than the preceding one.
-    pub ascending: bool,
-    last: Option<u32>,
-}
-
-/// Some columns of a matrix: their bytes in the file, and the number of lines above them in a text file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Stretch {
-    pub bytes: Range<usize>,
-    pub line: usize,
-}
-
-impl Stored {
-    /// Bytes of columns that one thread reads at a time.
-    const BYTES_PER_TASK: usize = 1 << 20;
-
-    fn new(header: Header) -> Self {
-        Self { header, stretches: Vec::new(), values: 0, ascending: true, last: None }
-    }
-
-    /// Adds a column with at most `values` values in the given bytes, below `line` lines.
-    fn add(&mut self, column: u32, values: usize, bytes: Range<usize>, line: usize) {
-        self.ascending &= self.last.is_none_or(|last| last < column);
-        self.last = Some(column);
-        self.values += values;
-        match self.stretches.last_mut() {
-            Some(stretch) if stretch.bytes.len() < Self::BYTES_PER_TASK => stretch.bytes.end = bytes.end,
-            _ => self.stretches.push(Stretch { bytes, line }),
-        }
-    }
-}
-
-/// Entries of some columns, in file order, without zeros.
-#[derive(Default)]
-struct Columns {
-    /// Each column with its number of entries.
-    lengths: Vec<(u32, usize)>,
-    rows: Vec<u32>,
-    values: Vec<f64>,
-    sides: Sides,
-    /// Largest number of written digits.
-    pub written: u8,
-}
-
-impl Columns {
-    /// Creates an empty list with capacity for `entries` entries, as far as memory allows.
-    fn with_capacity(entries: usize) -> Self {
-        let mut columns_of_task = Self::default();
-        allow_failure(|| {
-            if columns_of_task.rows.try_reserve_exact(entries).is_ok() {
-                let _ = columns_of_task.values.try_reserve_exact(entries);
-            }
-        });
-        columns_of_task
-    }
-
-    /// Adds an entry unless it is zero.
-    ///
-    /// # Errors
-    /// FB306 for a value that is not finite.
-    fn push(&mut self, row: u32, col: u32, value: f64) -> std::result::Result<(), Diagnostic> {
-        self.extend(row, col, std::iter::once(value))
-    }
-
-    /// Adds consecutive values of a column, beginning at row `first`.
-    ///
-    /// # Errors
-    /// FB306 for a value that is not finite.
-    fn extend(
-        &mut self,
-        first: u32,
-        col: u32,
-        values: impl Iterator<Item = f64>,
-    ) -> std::result::Result<(), Diagnostic> {
-        if self.lengths.last().is_none_or(|(last, _)| *last != col) {
-            self.lengths.push((col, 0));
-        }
-        let before = self.rows.len();
-        // The zip in this order does not advance the rows beyond the last value.
-        for (value, row) in values.zip(first..) {
-            if !value.is_finite() {
-                let message = format!("entry ({}, {}) is {value}", row + 1, col + 1);
-                return Err(Diagnostic::new(Code::MatrixNotFinite, message));
-            }
-            if value != 0.0 {
-                self.rows.push(row);
-                self.values.push(value);
-            }
-        }
-        let added = &self.rows[before..];
-        // Rows ascend from the first to the last value.
-        self.sides.lower |= added.last().is_some_and(|row| *row > col);
-        self.sides.upper |= added.first().is_some_and(|row| *row < col);
-        if let Some((_, length)) = self.lengths.last_mut() {
-            *length += added.len();
-        }
-        Ok(())
-    }
-
-    /// Adds the columns that follow in the file.
-    fn append(&mut self, next: &Self) {
-        self.lengths.extend_from_slice(&next.lengths);
-        self.rows.extend_from_slice(&next.rows);
-        self.values.extend_from_slice(&next.values);
-        self.sides.lower |= next.sides.lower;
-        self.sides.upper |= next.sides.upper;
-        self.written = self.written.max(next.written);
-    }
-
-    fn count(&self) -> usize {
-        self.values.len()
-    }
-
-    fn sides(&self) -> Sides {
-        self.sides
-    }
-
-    /// Returns all entries in file order.
-    fn into_entries(self) -> Vec<Entry> {
-        let columns = self.lengths.iter().flat_map(|&(col, length)| std::iter::repeat_n(col, length));
-        let places = columns.zip(self.rows).zip(self.values);
-        places.map(|((col, row), value)| Entry { row, col, value }).collect()
-    }
-
-    /// Returns the matrix of `n` rows and columns.
-    ///
-    /// # Errors
-    /// FB309 for an entry given twice, FB312 if there is no nonzero entry.
-    fn into_matrix(
-        self,
-        n: usize,
-        ascending: bool,
-        path: &Path,
-    ) -> std::result::Result<RawMatrix, Diagnostic> {
-        if ascending {
-            let columns = ColumnEntries::new(n, &self.lengths, self.rows, self.values);
-            return assemble_columns(columns, self.written, path);
-        }
-        let mut pieces = Vec::new();
-        let columns = self.lengths.iter().flat_map(|&(col, length)| std::iter::repeat_n(col, length));
-        for ((col, row), value) in columns.zip(self.rows).zip(self.values) {
-            push(&mut pieces, Entry { row, col, value });
-        }
-        assemble_distinct(n, pieces, StoredEntries::Full, self.written, path, |row, column| {
-            given_twice(&format!("row {}", row + 1), &format!("column {}", column + 1), path)
-        })
-    }
-}
-
-/// Returns FB304: the file ends within a matrix.
-fn cut_off(name: &str) -> Diagnostic {
-    Diagnostic::new(Code::MatrixCount, format!("the file ends within matrix {name}"))
 }
 
 #[cfg(test)]

@@ -142,7 +142,7 @@ fn listing(names: &[String]) -> String {
 ///
 /// # Errors
 /// An empty list of pairs, if there is not exactly one matrix of each name.
-pub(super) fn named_pair(
+pub(crate) fn named_pair(
     names: &[String],
     stated: &[String; 2],
 ) -> Result<(usize, usize), Vec<(usize, usize)>> {
@@ -159,7 +159,7 @@ pub(super) fn named_pair(
 ///
 /// # Errors
 /// The candidate pairs, if there is not exactly one.
-pub(super) fn pair(names: &[String]) -> Result<(usize, usize), Vec<(usize, usize)>> {
+pub(crate) fn pair(names: &[String]) -> Result<(usize, usize), Vec<(usize, usize)>> {
     let of = |role| (0..names.len()).filter(move |&k| is_called(role, &names[k])).collect::<Vec<_>>();
     let (stiffness, mass) = (of(MatrixRole::Stiffness), of(MatrixRole::Mass));
     let rest = |k: usize| names[k].get(1..).unwrap_or_default();

@@ -3,7 +3,7 @@
 //! The text is cut at line ends into pieces that are parsed in parallel. Pieces keep the order of the file.
 
 use super::assemble::{Entry, Sides, check_size, refuse_beyond_memory};
-use super::digits::{COUNTED, written_digits};
+use crate::digits::{COUNTED, written_digits};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::{Compression, broken};
@@ -13,7 +13,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// Entries of a file, and the problems of its lines.
-pub(super) struct Coordinates {
+pub(crate) struct Coordinates {
     limits: Limits,
     /// Number of entries that the file announces, if it does.
     announced: Option<u64>,
@@ -36,7 +36,7 @@ pub(super) struct Coordinates {
 
 impl Coordinates {
     /// Creates an empty list below a header of `lines` lines.
-    pub(super) fn new(limits: Limits, announced: Option<u64>, lines: usize) -> Self {
+    pub(crate) fn new(limits: Limits, announced: Option<u64>, lines: usize) -> Self {
         Self {
             limits,
             announced,
@@ -57,7 +57,7 @@ impl Coordinates {
     /// # Errors
     /// FB103 for a damaged compressed file, FB304 for a compressed file that unpacks to little but blank lines and
     /// comments, with the bad lines so far.
-    pub(super) fn read(
+    pub(crate) fn read(
         &mut self,
         path: &Path,
         mut blocks: Blocks<'_>,
@@ -128,12 +128,12 @@ impl Coordinates {
     }
 
     /// Returns the sides of the diagonal on which entries lie.
-    pub(super) fn sides(&self) -> Sides {
+    pub(crate) fn sides(&self) -> Sides {
         Sides { lower: self.lower.is_some(), upper: self.upper.is_some() }
     }
 
     /// Returns diagnostics of the bad lines, the first few one by one.
-    pub(super) fn bad_lines(&self, end: TextEnd) -> Vec<Diagnostic> {
+    pub(crate) fn bad_lines(&self, end: TextEnd) -> Vec<Diagnostic> {
         let located = |bad: Diagnostic| {
             if end == TextEnd::Line || bad.line() != Some(self.lines) {
                 return bad;
@@ -156,7 +156,7 @@ impl Coordinates {
 
 /// Returns the diagnostic for a file whose last line has no line end, while the others have: digits may be missing, which
 /// no later check sees.
-pub(super) fn cut_off(line: usize) -> Diagnostic {
+pub(crate) fn cut_off(line: usize) -> Diagnostic {
     let message = "the file ends within its last number: unlike the others, the last line has no line end";
     Diagnostic::new(Code::MatrixSyntax, message)
         .at_line(line)

@@ -1,8 +1,7 @@
 //! Exodus II in netCDF-4, which is HDF5.
 
-use super::values::{Found, Heaps, Numbers, Vector, names_of, refuse_beyond_memory, text_of};
-use super::{Members, layout, opened};
-use crate::exodus::{ExodusFile, NumberTable, wrong_layers};
+use super::variables::{ExodusFile, Found, NumberTable, wrong_layers};
+use crate::hdf5::{Heaps, Members, Numbers, Vector, layout, names_of, opened, refuse_beyond_memory, text_of};
 use flexbody_base::text::InputFile;
 use hdf5_metno::Group;
 use std::cell::Cell;
@@ -11,7 +10,7 @@ use std::cell::Cell;
 ///
 /// # Errors
 /// FB101 for a file that cannot be opened.
-pub(crate) fn with_exodus<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> T) -> Found<T> {
+pub(super) fn with_exodus<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> T) -> Found<T> {
     let opened = opened(file)?;
     let root = opened.group("/").map_err(|e| vec![layout(format!("file cannot be read: {e}"))])?;
     let members = Members::of(&root);

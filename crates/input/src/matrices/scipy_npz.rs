@@ -1,14 +1,14 @@
 //! Sparse matrices of SciPy (`scipy.sparse.save_npz`): an archive of the arrays of a matrix in CSC, CSR, COO
 //! or BSR form, <https://docs.scipy.org/doc/scipy/reference/generated/scipy.sparse.save_npz.html>.
 
-use super::array::{Compressed, EntryCheck};
 use super::assemble::{
     Entry, StoredEntries, assemble, check_extents, check_size, push, refuse_beyond_memory,
     undeclared_triangle,
 };
-use super::npy;
+use super::compressed::{Compressed, EntryCheck};
 use super::reader::{MatrixSource, Reader};
-use super::recovery_files::Rectangular;
+use super::rectangular::Rectangular;
+use crate::npy;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::memory::{left, refuse_beyond};
@@ -18,7 +18,7 @@ use std::path::Path;
 use zip::ZipArchive;
 
 /// Reader of SciPy's archives.
-pub(super) struct ScipyNpz;
+pub(crate) struct ScipyNpz;
 
 const HELP: &str = "write it again: scipy.sparse.save_npz(file, A.tocsc())";
 const MEMORY_HELP: &str = "use a larger machine";
@@ -54,7 +54,7 @@ impl Reader for ScipyNpz {
 ///
 /// # Errors
 /// FB103, FB301 to FB306 for an archive that is not valid.
-pub(super) fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
+pub(crate) fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
     let mut archive = Archive::open(bytes)?;
     let form = archive.member("format").ok().and_then(|bytes| npy::read_word(&bytes)).unwrap_or_default();
     let shape = npy::read_integers(&archive.member("shape")?)?;
@@ -249,10 +249,10 @@ fn same_length(values: &[f64], indices: &[i64], what: &str) -> std::result::Resu
 }
 
 /// Archive of arrays of NumPy.
-pub(super) struct Archive<'a>(ZipArchive<Cursor<&'a [u8]>>);
+pub(crate) struct Archive<'a>(ZipArchive<Cursor<&'a [u8]>>);
 
 impl<'a> Archive<'a> {
-    pub(super) fn open(bytes: &'a [u8]) -> std::result::Result<Self, Diagnostic> {
+    pub(crate) fn open(bytes: &'a [u8]) -> std::result::Result<Self, Diagnostic> {
         ZipArchive::new(Cursor::new(bytes)).map(Self).map_err(|error| damaged(&error))
     }
 
@@ -267,7 +267,7 @@ impl<'a> Archive<'a> {
     }
 
     /// Returns the bytes of the array `name`, verified by its checksum.
-    pub(super) fn member(&mut self, name: &str) -> std::result::Result<Vec<u8>, Diagnostic> {
+    pub(crate) fn member(&mut self, name: &str) -> std::result::Result<Vec<u8>, Diagnostic> {
         let mut member = self.open_member(name)?;
         let mut bytes = Vec::new();
         let mut take = |bytes: &mut Vec<u8>, most: u64| {
@@ -286,7 +286,7 @@ impl<'a> Archive<'a> {
         Ok(bytes)
     }
 
-    pub(super) fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.0.index_for_name(&format!("{name}.npy")).is_some()
     }
 

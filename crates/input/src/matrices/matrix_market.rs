@@ -5,7 +5,7 @@ use super::assemble::{
 };
 use super::coordinates::{Blocks, Coordinates, Limits, TextEnd, cut_off};
 use super::reader::{MatrixSource, Reader};
-use super::recovery_files::Rectangular;
+use super::rectangular::Rectangular;
 use crate::array::Array;
 use crate::digits::written_digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -17,7 +17,7 @@ use flexbody_base::text::scanner::{Line, Lines, excerpt, real, words};
 use flexbody_model::RawMatrix;
 
 /// Reader of Matrix Market files.
-pub(super) struct MatrixMarket;
+pub(crate) struct MatrixMarket;
 
 impl Reader for MatrixMarket {
     fn name(&self) -> &'static str {
@@ -74,7 +74,7 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnos
 }
 
 /// Returns true if the (unpacked) file that begins with `head` lists entries, not a dense array.
-pub(super) fn is_coordinate(head: &[u8]) -> bool {
+pub(crate) fn is_coordinate(head: &[u8]) -> bool {
     let first = head.split(|&byte| byte == b'\n').next().unwrap_or_default();
     has_banner(head) && !String::from_utf8_lossy(first).to_lowercase().contains(" array ")
 }
@@ -84,7 +84,7 @@ pub(super) fn is_coordinate(head: &[u8]) -> bool {
 ///
 /// # Errors
 /// FB301 to FB306 for a file that is not valid, all that are found.
-pub(super) fn read_rectangular(
+pub(crate) fn read_rectangular(
     file: &InputFile,
     compression: Compression,
 ) -> std::result::Result<Rectangular, Vec<Diagnostic>> {
@@ -295,7 +295,7 @@ const HELP: &str = "write the array as Matrix Market array real general: scipy.i
 type Found<T> = std::result::Result<T, Vec<Diagnostic>>;
 
 /// Reads an array of real numbers.
-pub(super) fn read_array(file: &InputFile, compression: Compression) -> Found<Array> {
+pub(crate) fn read_array(file: &InputFile, compression: Compression) -> Found<Array> {
     let damaged = |e: std::io::Error| vec![broken(file.path(), &e)];
     let mut blocks = Blocks::of(file, compression);
     let mut reading = ArrayReader::default();

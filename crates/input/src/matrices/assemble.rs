@@ -1,7 +1,7 @@
 //! Compressed columns from entries in file order, by counting. Each task handles some columns and takes their entries
 //! in file order, so that the bits are the same for any number of tasks.
 
-use super::digits::significant_digits;
+use crate::digits::significant_digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::memory::{allow_failure, left, refuse_beyond};
 use flexbody_linalg::{ColumnBlock, CscMatrix, parallel, split_columns};
@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// Stored entry with indices from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Entry {
+pub(crate) struct Entry {
     pub row: u32,
     pub col: u32,
     pub value: f64,
@@ -19,7 +19,7 @@ pub(super) struct Entry {
 
 /// Part of a matrix that a file stores.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum StoredEntries {
+pub(crate) enum StoredEntries {
     /// All entries of the matrix.
     Full,
     /// One triangle of a symmetric matrix: every off-diagonal entry represents two.
@@ -28,14 +28,14 @@ pub(super) enum StoredEntries {
 
 /// Sides of the diagonal on which entries lie.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Sides {
+pub(crate) struct Sides {
     pub lower: bool,
     pub upper: bool,
 }
 
 impl StoredEntries {
     /// Returns the stored part for a file without a declaration: entries on one side alone represent both.
-    pub(super) fn of(sides: Sides) -> Self {
+    pub(crate) fn of(sides: Sides) -> Self {
         match sides {
             Sides { lower: true, upper: true } => Self::Full,
             _ => Self::Triangle,
@@ -121,7 +121,7 @@ pub(super) fn undeclared_triangle(sides: Sides, help: impl FnOnce(&str) -> Strin
 ///
 /// # Errors
 /// FB306 if a sum of duplicates is not finite, FB312 if no nonzero entry is left.
-pub(super) fn assemble(
+pub(crate) fn assemble(
     n: usize,
     pieces: Vec<Vec<Entry>>,
     stored: StoredEntries,
@@ -137,7 +137,7 @@ pub(super) fn assemble(
 ///
 /// # Errors
 /// The diagnostic from `twice`; FB312 if no nonzero entry is left.
-pub(super) fn assemble_distinct(
+pub(crate) fn assemble_distinct(
     n: usize,
     pieces: Vec<Vec<Entry>>,
     stored: StoredEntries,
@@ -154,7 +154,7 @@ pub(super) fn assemble_distinct(
 
 /// Returns the diagnostic for an entry that a list of a program gives twice: such lists have every entry once and no count,
 /// so that a file written twice into one, or a line too many, shows in nothing else.
-pub(super) fn given_twice(row: &str, column: &str, path: &Path) -> Diagnostic {
+pub(crate) fn given_twice(row: &str, column: &str, path: &Path) -> Diagnostic {
     let message = format!("the entry of {row} and {column} is given twice");
     Diagnostic::new(Code::MatrixTriangles, message)
         .in_file(path)

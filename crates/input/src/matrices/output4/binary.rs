@@ -1,7 +1,7 @@
 //! Binary files: records of Fortran, each between two lengths, in either byte order and with words of four or eight
 //! bytes.
 
-use super::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off};
+use super::columns::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 

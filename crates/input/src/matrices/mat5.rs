@@ -1,11 +1,11 @@
 //! Matrices in MAT-files of MATLAB, versions 5 to 7, as MATLAB, Octave and SciPy write them: "MAT-File Format", The
 //! MathWorks. Files of version 7.3 are HDF5.
 
+use super::assemble::{Entry, check_extents, check_size, most_entries_of};
+use super::compressed::Compressed;
 use super::named_matrices::{NamedMatrices, named_or_only};
 use super::reader::{MatrixRole, MatrixSource, Reader};
-use super::recovery_files::Rectangular;
-use crate::array::Compressed;
-use crate::assemble::{Entry, check_extents, check_size, most_entries_of};
+use super::rectangular::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::memory::{left, refuse_beyond};
@@ -15,7 +15,7 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 /// Reader of MAT-files.
-pub(super) struct Mat5;
+pub(crate) struct Mat5;
 
 /// Number of bytes of the header: text, version and byte order.
 const HEADER: usize = 128;
@@ -66,7 +66,7 @@ impl Reader for Mat5 {
 /// # Errors
 /// FB102 and FB103 for a file that cannot be read, FB310 if there is no such variable, FB301 to FB306 for an invalid
 /// matrix.
-pub(super) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+pub(crate) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
     let bytes = file.bytes();
     let Some(order) = Order::of(bytes) else {
         return Err(Diagnostic::new(

@@ -1,15 +1,14 @@
 //! A sparse matrix in an HDF5 group: compressed columns or rows, or coordinates, in the conventions of scipy, anndata,
 //! MATLAB and PETSc (`docs/reference/input.md`).
 
-use super::super::assemble::{
+use crate::hdf5::{Found, Heaps, Members, Vector, integers_of, text_of, truth_of};
+use crate::matrices::assemble::{
     ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, assembled, check_extents,
     check_size, push, refuse_beyond_memory, undeclared_triangle,
 };
-use super::values::{Found, Heaps, Vector, integers_of, text_of, truth_of};
-use super::{Members, POINTERS};
-use crate::lent::StoredColumns;
-use crate::reader::MatrixSource;
-use crate::recovery_files::Rectangular;
+use crate::matrices::lent::StoredColumns;
+use crate::matrices::reader::MatrixSource;
+use crate::matrices::rectangular::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_linalg::CscMatrix;
@@ -20,14 +19,44 @@ use std::path::Path;
 /// Number of entries read at a time.
 const ENTRIES_PER_READ: usize = 1 << 20;
 
+/// Names of the indices of a compressed matrix.
+const INDICES: &[&str] = &["indices", "ir"];
+
+/// Names of the pointers of a compressed matrix.
+const POINTERS: &[&str] = &["indptr", "jc"];
+
+/// Names of the values of a matrix.
+const VALUES: &[&str] = &["data", "values", "val"];
+
+/// Names of the rows of the entries of a matrix.
+const ROWS: &[&str] = &["row", "rows", "i"];
+
+/// Names of the columns of the entries of a matrix.
+const COLUMNS: &[&str] = &["col", "cols", "j"];
+
+/// Returns the names of values, indices and pointers; `None` if one is missing.
+fn compressed(members: &Members) -> Option<(&'static str, &'static str, &'static str)> {
+    Some((members.first(VALUES)?, members.first(INDICES)?, members.first(POINTERS)?))
+}
+
+/// Returns the names of values, rows and columns; `None` if one is missing.
+fn coordinates(members: &Members) -> Option<(&'static str, &'static str, &'static str)> {
+    Some((members.first(VALUES)?, members.first(ROWS)?, members.first(COLUMNS)?))
+}
+
+/// Returns true when a group with these members holds a sparse matrix.
+pub(super) fn holds_matrix(members: &Members) -> bool {
+    compressed(members).is_some() || coordinates(members).is_some()
+}
+
 /// Reads the matrix in `group`, which messages call `name`.
 pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Found<RawMatrix> {
     let MatrixSource { file, keep_in, .. } = *source;
     let reader = GroupReader { file, group, name, members: Members::of(group), keep_in };
     let declared = reader.declared_symmetry().map_err(|d| vec![d])?;
-    let parsed = match reader.members.compressed() {
+    let parsed = match compressed(&reader.members) {
         Some(names) => reader.compressed(names)?,
-        None => match reader.members.coordinates() {
+        None => match coordinates(&reader.members) {
             Some(names) => reader.coordinates(names)?,
             None => return Err(vec![reader.layout("holds no sparse matrix")]),
         },
@@ -82,7 +111,7 @@ pub(super) fn read_rectangular(group: &Group, name: &str, file: &InputFile) -> F
         .shape()?
         .ok_or_else(|| vec![reader.layout("has no `shape`").with_help("store shape = [rows, columns]")])?;
     let read = |vector: &Vector| vector.integers(0..vector.len);
-    let (values, places) = match (reader.members.compressed(), reader.members.coordinates()) {
+    let (values, places) = match (compressed(&reader.members), coordinates(&reader.members)) {
         (Some((values, indices, pointers)), _) => {
             let [values, indices, pointers] =
                 [reader.vector(values)?, reader.vector(indices)?, reader.vector(pointers)?];

@@ -3,11 +3,11 @@
 use super::assemble::{
     Entry, Sides, StoredEntries, assemble_distinct, check_size, given_twice, push, undeclared_triangle,
 };
-use super::bulk_cards::{Card, Item, MatrixLines, is_bulk_data, read_cards, read_deck};
 use super::named_matrices::{choose, named_or_only};
 use super::reader::{MatrixSource, Reader};
+use super::recent::Recent;
+use crate::bulk_cards::{Card, Item, MatrixLines, is_bulk_data, read_cards, read_deck};
 use crate::digits::written_digits;
-use crate::mapping::Recent;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result as Outcome};
 use flexbody_base::text::Compression;
@@ -23,7 +23,7 @@ const RECTANGULAR: i64 = 9;
 
 /// All DMIG matrices of a deck.
 #[derive(Default)]
-pub(super) struct Dmigs {
+pub(crate) struct Dmigs {
     matrices: Vec<Dmig>,
     points: Vec<Point>,
     numbers: HashMap<Point, u32>,
@@ -62,7 +62,7 @@ impl Dmigs {
     /// # Errors
     /// FB101, FB106 for files that cannot be read, FB110 for a deck that cannot be read, FB301 for bad cards, FB302 for
     /// unsupported matrices, all that are found.
-    pub(super) fn of(paths: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
+    pub(crate) fn of(paths: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
         let mut all = Self::default();
         for path in paths {
             let read = read_deck(path, &mut |item| match item {
@@ -80,7 +80,7 @@ impl Dmigs {
     }
 
     /// Reads a DMIG card.
-    pub(super) fn card(&mut self, card: &Card, path: &Path) {
+    pub(crate) fn card(&mut self, card: &Card, path: &Path) {
         match card.field(1) {
             b"0" => {
                 if let Err(bad) = self.header(card, path) {
@@ -101,7 +101,7 @@ impl Dmigs {
     ///
     /// # Errors
     /// FB110 for cards that cannot be read.
-    pub(super) fn cards(&mut self, lines: &MatrixLines<'_>) -> Result<(), Diagnostic> {
+    pub(crate) fn cards(&mut self, lines: &MatrixLines<'_>) -> Result<(), Diagnostic> {
         let (bytes, path) = (lines.file.bytes(), lines.file.path());
         let at_once = 8 * rayon::current_num_threads();
         for parts in lines.parts.chunk_by(|a, b| a.is_header == b.is_header).flat_map(|p| p.chunks(at_once)) {
@@ -164,17 +164,17 @@ impl Dmigs {
     }
 
     /// Returns the diagnostics of the cards, and removes them.
-    pub(super) fn take_bad(&mut self) -> Vec<Diagnostic> {
+    pub(crate) fn take_bad(&mut self) -> Vec<Diagnostic> {
         std::mem::take(&mut self.bad).into_diagnostics(Code::MatrixSyntax, "card")
     }
 
     /// Returns the names of the matrices, in the order of the deck.
-    pub(super) fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         self.matrices.iter().map(|matrix| matrix.name.clone()).collect()
     }
 
     /// Returns the indices of matrices that may be K or M: square ones with entries, or all if there are none.
-    pub(super) fn candidates(&self) -> Vec<usize> {
+    pub(crate) fn candidates(&self) -> Vec<usize> {
         // Entries of complex matrices are not stored.
         let has_entries = |dmig: &Dmig| dmig.count() > 0 || !dmig.is_real();
         let is_one = |k: &usize| self.matrices[*k].form != RECTANGULAR && has_entries(&self.matrices[*k]);
@@ -183,7 +183,7 @@ impl Dmigs {
     }
 
     /// Returns the points named by nonzero entries of the matrices `of`, ascending.
-    pub(super) fn points(&self, of: &[usize]) -> Vec<Point> {
+    pub(crate) fn points(&self, of: &[usize]) -> Vec<Point> {
         let mut named = vec![false; self.points.len()];
         for entry in of.iter().flat_map(|&k| &self.matrices[k].pieces).flatten() {
             if entry.value != 0.0 {
@@ -210,7 +210,7 @@ impl Dmigs {
     /// # Errors
     /// FB302 for complex matrices and other forms, FB307 for an undeclared triangle, FB309 for duplicate entries, FB301
     /// for more rows than the entries can fill, FB312 if there is no nonzero entry.
-    pub(super) fn take_matrix(&mut self, k: usize, points: &[Point]) -> Result<RawMatrix, Diagnostic> {
+    pub(crate) fn take_matrix(&mut self, k: usize, points: &[Point]) -> Result<RawMatrix, Diagnostic> {
         let dmig = &mut self.matrices[k];
         let (count, pieces) = (dmig.count(), std::mem::take(&mut dmig.pieces));
         let dmig = &self.matrices[k];
@@ -350,7 +350,7 @@ impl Dmigs {
 }
 
 /// Matrix with labelled rows and numbered columns.
-pub(super) struct NumberedColumns {
+pub(crate) struct NumberedColumns {
     pub name: String,
     pub columns: u32,
     /// Row, column from 0, and value of every entry.
@@ -361,14 +361,14 @@ pub(super) struct NumberedColumns {
 ///
 /// # Errors
 /// FB310 if there is no such matrix, the errors of [`Dmigs::of`] and of the matrix.
-pub(super) fn read_numbered(path: &Path, name: Option<&str>) -> Result<NumberedColumns, Vec<Diagnostic>> {
+pub(crate) fn read_numbered(path: &Path, name: Option<&str>) -> Result<NumberedColumns, Vec<Diagnostic>> {
     let mut all = Dmigs::of(&[path.to_path_buf()])?;
     let wanted = named_or_only(&all.names(), name).map_err(|diagnostic| vec![diagnostic.in_file(path)])?;
     all.take_numbered(wanted).map_err(|diagnostic| vec![diagnostic])
 }
 
 /// Returns the label of a row. Scalar points have direction 1.
-pub(super) fn label((node, component): Point) -> DofLabel {
+pub(crate) fn label((node, component): Point) -> DofLabel {
     DofLabel { node, direction: component.max(1) }
 }
 
@@ -380,7 +380,7 @@ fn named((id, component): Point) -> String {
 }
 
 /// Reader of matrices in punch files.
-pub(super) struct DmigPunch;
+pub(crate) struct DmigPunch;
 
 impl Reader for DmigPunch {
     fn name(&self) -> &'static str {
@@ -425,7 +425,7 @@ impl Reader for DmigPunch {
 // Cards with columns of DMIG matrices, read independently of the cards above them except for the headers.
 
 /// Grid or scalar point with its component: 1 to 6, and 0 for a scalar point.
-pub(super) type Point = (i64, u8);
+pub(crate) type Point = (i64, u8);
 
 /// Name of each matrix whose header is above the columns, and true if its entries are real; complex columns are
 /// skipped.

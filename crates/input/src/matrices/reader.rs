@@ -1,13 +1,5 @@
-//! The interface of a reader of a matrix format and its input, the registry of matrix formats, and the choice of the
-//! format of a file.
+//! The interface of a reader of a matrix format, and its input.
 
-use super::dmig::DmigPunch;
-use super::hdf5::Hdf5;
-use super::mat5::Mat5;
-use super::matrix_market::MatrixMarket;
-use super::output4::Output4;
-use super::petsc::Petsc;
-use super::scipy_npz::ScipyNpz;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::text::{Compression, InputFile};
@@ -129,77 +121,6 @@ pub trait Reader: Sync {
 /// Number of bytes that [`Reader::recognises`] receives. HDF5 files may begin with a user block of this size.
 pub const HEAD: usize = 2048 + 8;
 
-/// Every supported matrix format.
-pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5, &ScipyNpz, &Mat5, &Petsc, &Output4, &DmigPunch];
-
-/// Returns the reader for a file: by its content, else by its extension.
-///
-/// # Errors
-/// FB102 if neither determines the format, with the likely kind of the file.
-pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&'static dyn Reader> {
-    let head = compression.head(file, HEAD);
-    let by_content = READERS.iter().find(|reader| reader.recognises(&head));
-    let by_name = || {
-        let extension = extension(file.path());
-        READERS.iter().find(|reader| reader.extensions().contains(&extension.as_str()))
-    };
-    // A known foreign format is reported by name rather than parsed by its extension.
-    let not_read = NOT_READ.iter().find(|(magic, ..)| head.starts_with(magic));
-    match (by_content, not_read) {
-        (Some(reader), _) => Ok(*reader),
-        (None, Some((_, what, help))) => {
-            let message = format!("file is {what}");
-            Err(Diagnostic::new(Code::FileFormatUnknown, message)
-                .in_file(file.path())
-                .with_help(*help)
-                .into())
-        }
-        (None, None) => by_name().copied().ok_or_else(|| {
-            let start = &head[..head.len().min(24)];
-            let message = format!("file begins with `{}`", start.escape_ascii());
-            Diagnostic::new(Code::FileFormatUnknown, message).in_file(file.path()).into()
-        }),
-    }
-}
-
-/// First bytes of known file formats that are not supported, with their kind and advice.
-const NOT_READ: &[(&[u8], &str, &str)] = &[
-    (b"PK\x03\x04", "a zip archive", "unpack it"),
-    (
-        b"[row ",
-        "printed by MFEM's SparseMatrix::Print",
-        "write it by A.PrintMM(file), which is Matrix Market",
-    ),
-    (
-        b"% size ",
-        "printed by MFEM's SparseMatrix::PrintMatlab",
-        "write it by A.PrintMM(file), which is Matrix Market",
-    ),
-    (
-        b"**\n** GENERATION OF SUBSTRUCTURE",
-        "a substructure of Abaqus",
-        "give the deck that names it: flexbody convert job.inp",
-    ),
-    (
-        b"**\r\n** GENERATION OF SUBSTRUCTURE",
-        "a substructure of Abaqus",
-        "give the deck that names it: flexbody convert job.inp",
-    ),
-    (b"BZh", "compressed by bzip2", "unpack it, or compress it by gzip or zstd"),
-    (b"\xfd7zXZ", "compressed by xz", "unpack it, or compress it by gzip or zstd"),
-    (b"\x1f\x8b", "compressed twice", "unpack it once"),
-    (b"\x28\xb5\x2f\xfd", "compressed twice", "unpack it once"),
-];
-
-/// Returns the extension in lower case, without that of the compression: `mtx` for `k.MTX.gz`.
-fn extension(path: &Path) -> String {
-    let lower = |p: &Path| p.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
-    match lower(path).as_str() {
-        "gz" | "zst" => lower(&path.with_extension("")),
-        other => other.to_owned(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -208,12 +129,5 @@ mod tests {
     fn roles_know_their_names() {
         assert!(MatrixRole::Stiffness.is_named("k") && MatrixRole::Stiffness.is_named("Stiffness"));
         assert!(!MatrixRole::Mass.is_named("K") && MatrixRole::Mass.is_named("M"));
-    }
-
-    #[test]
-    fn compression_suffixes_are_not_the_format() {
-        for (path, expected) in [("a/K.MTX", "mtx"), ("K.mtx.gz", "mtx"), ("K.1.h5.zst", "h5"), ("K", "")] {
-            assert_eq!(extension(Path::new(path)), expected, "{path}");
-        }
     }
 }

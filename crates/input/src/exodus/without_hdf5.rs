@@ -1,0 +1,14 @@
+//! Exodus II in netCDF-4 in a build without HDF5: refused by name.
+
+use super::variables::ExodusFile;
+use crate::hdf5::left_out;
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::text::InputFile;
+
+/// Refuses an Exodus file.
+pub(super) fn with_exodus<T>(
+    _: &InputFile,
+    _: impl FnOnce(&dyn ExodusFile) -> T,
+) -> Result<T, Vec<Diagnostic>> {
+    Err(vec![left_out()])
+}
