@@ -22,9 +22,7 @@ mod hdf5;
 #[path = "without_hdf5.rs"]
 mod hdf5;
 mod jobs;
-mod labels_of_file;
 mod manifest;
-mod mapping;
 mod matrices;
 mod mesh;
 mod mode_files;
@@ -33,16 +31,12 @@ mod node_file;
 mod node_files;
 mod npy;
 mod number_type;
-mod open_files;
 mod read_model;
 mod recipes;
-mod recovery_files;
-mod rows_of_model;
 mod sets;
 mod shapes;
 mod stated;
 mod tables;
-mod with_stress;
 
 pub use fe_results::{PointStresses, read_point_stresses, read_steps};
 pub use jobs::{ElementDeck, JobFile, is_job, job_programs};

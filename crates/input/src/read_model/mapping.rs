@@ -1,7 +1,7 @@
 //! The degree of freedom of each matrix row: the table of this program, or files that Ansys writes with its matrices.
 
-use super::matrices::matrix_market::read_array;
-use super::tables::read_dofs;
+use crate::matrices::matrix_market::read_array;
+use crate::tables::read_dofs;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::scanner::{Lines, integer, words};
 use flexbody_base::text::{Compression, InputFile};

@@ -1,8 +1,8 @@
 //! Geometric stiffness as the difference of two stiffness matrices: that of the undeformed part with a stress, and K.
 
-use super::jobs::read_calculix_stiffness;
-use super::model_files::{MatrixLocation, StressStiffnessSource};
 use super::rows_of_model::by_rows_of_model;
+use crate::jobs::read_calculix_stiffness;
+use crate::model_files::{MatrixLocation, StressStiffnessSource};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::InputFile;
 use flexbody_linalg::ties::first_smallest;

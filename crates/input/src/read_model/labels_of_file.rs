@@ -1,8 +1,8 @@
 //! Rows of matrices whose files name them, beside tables of nodes that list the nodes in any order.
 
-use super::matrices::{MatrixRole, MatrixSource, reader_for};
-use super::model_files::{MatrixLocation, ModelFiles, StressStiffnessSource};
 use super::open_files::OpenFiles;
+use crate::matrices::{MatrixRole, MatrixSource, reader_for};
+use crate::model_files::{MatrixLocation, ModelFiles, StressStiffnessSource};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::Compression;
 use flexbody_model::{Damping, DofLabel};

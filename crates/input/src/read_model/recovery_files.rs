@@ -1,18 +1,18 @@
 //! Files of recoveries: operators, which have one row for each value and one column for each matrix row of the model,
 //! and values of the undeformed body.
 
-use super::array::Array;
-use super::matrices::assemble::Entry;
-use super::matrices::dmig::{self, DmigPunch, NumberedColumns};
-use super::matrices::hdf5::{self, Hdf5};
-use super::matrices::mat5::{self, Mat5};
-use super::matrices::matrix_market;
-use super::matrices::output4::{self, Output4};
-use super::matrices::petsc::{self, Petsc};
-use super::matrices::rectangular::Rectangular;
-use super::matrices::scipy_npz::{self, ScipyNpz};
-use super::matrices::{HEAD, Reader};
-use super::shapes;
+use crate::array::Array;
+use crate::matrices::assemble::Entry;
+use crate::matrices::dmig::{self, DmigPunch, NumberedColumns};
+use crate::matrices::hdf5::{self, Hdf5};
+use crate::matrices::mat5::{self, Mat5};
+use crate::matrices::matrix_market;
+use crate::matrices::output4::{self, Output4};
+use crate::matrices::petsc::{self, Petsc};
+use crate::matrices::rectangular::Rectangular;
+use crate::matrices::scipy_npz::{self, ScipyNpz};
+use crate::matrices::{HEAD, Reader};
+use crate::shapes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::{Compression, InputFile};
 use flexbody_linalg::CscMatrix;

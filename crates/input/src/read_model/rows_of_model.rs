@@ -1,6 +1,6 @@
 //! Rows of the model for the matrices of its files: their labels, the axes of nodes, and matrices beside K and M.
 
-use super::matrices::turn::Turn;
+use crate::matrices::turn::Turn;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_model::{DofLabel, GivenRows, LostRow, NodeAxes, Nodes, RawMatrix, RowMap};
 use std::collections::{HashMap, HashSet};

@@ -1,0 +1,20 @@
+//! Collection of the problems of all files.
+
+use flexbody_base::diagnostic::Diagnostic;
+
+/// Content of a file, or all its problems.
+pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
+
+/// Returns a value that could be read; adds the errors of another.
+pub(super) fn take<T>(diagnostics: &mut Vec<Diagnostic>, found: Found<T>) -> Option<T> {
+    found.map_err(|list| collect(diagnostics, list)).ok()
+}
+
+/// Adds the diagnostics that are not in the list yet: a file that is used twice is reported once.
+pub(super) fn collect(diagnostics: &mut Vec<Diagnostic>, found: Vec<Diagnostic>) {
+    for diagnostic in found {
+        if !diagnostics.contains(&diagnostic) {
+            diagnostics.push(diagnostic);
+        }
+    }
+}
