@@ -1,10 +1,10 @@
 //! Report on advice: guidelines of the literature for ranges of motion, and the settings of other programs.
 
-use super::Format;
-use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
-use super::facts::UnitFacts;
-use super::numbers::{frequency, percent, significant};
-use super::run_data::RunData;
+use crate::Format;
+use crate::document::{Block, Document, Inline, State, Table, Term, cells, heading};
+use crate::notation::numbers::{frequency, percent, significant};
+use crate::notation::units::UnitFacts;
+use crate::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};

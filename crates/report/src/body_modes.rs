@@ -1,14 +1,14 @@
 //! Modes in the report of a body: frequencies, completeness, truncation errors.
 
-use super::body_report::{word, word_as};
-use super::chart::{Cells, DECADES, STEPS, step};
-use super::completeness::{Completeness, GuaranteeFacts, cut};
-use super::craig_bampton::CraigBamptonFacts;
-use super::document::{Block, Inline, Span, Table, Term, cells, heading, listed, quantity};
-use super::facts::{Facts, ModeFacts};
-use super::geometric_stiffness::softening_in_words;
-use super::held::HeldFacts;
-use super::numbers::{counted, frequencies as frequencies_of, frequency, percent, significant};
+use crate::body_report::{word, word_as};
+use crate::chart::{Cells, DECADES, STEPS, step};
+use crate::completeness::{Completeness, GuaranteeFacts, cut};
+use crate::craig_bampton::CraigBamptonFacts;
+use crate::document::{Block, Inline, Span, Table, Term, cells, heading, listed, quantity};
+use crate::facts::{Facts, ModeFacts};
+use crate::geometric_stiffness::softening_in_words;
+use crate::held::HeldFacts;
+use crate::notation::numbers::{counted, frequencies as frequencies_of, frequency, percent, significant};
 use faer::Mat;
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::{FlexBody, Truncation};

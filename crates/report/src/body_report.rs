@@ -1,19 +1,19 @@
 //! Report of a body.
 
-use super::body_modes::{heat_maps, modes};
-use super::chart::{Axis, Bar, Bars};
-use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading, listed, quantity};
-use super::facts::{Facts, InterfaceFacts, ModelFacts, RunFacts};
-use super::lumped::{
+use crate::body_modes::{heat_maps, modes};
+use crate::chart::{Axis, Bar, Bars};
+use crate::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading, listed, quantity};
+use crate::facts::{Facts, InterfaceFacts, ModelFacts, RunFacts};
+use crate::lumped::{
     ErrorNorm, Errors, LumpedFacts, LumpedModesFacts, NEGLIGIBLE, distinct, invariant_in_words, judgement,
     scheme_in_words,
 };
-use super::numbers::{
+use crate::notation::numbers::{
     bytes, coordinates, counted, duration, frequency, frequency_range, percent, sentence, significant, times,
     triple,
 };
-use super::run_data::{Phase, SearchAttempt};
-use super::text::KEEP;
+use crate::run_data::{Phase, SearchAttempt};
+use crate::text::KEEP;
 use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::{FlexBody, MassStructure};
 use flexbody_body::invariants::{ERROR_NORMS, LumpedScheme};

@@ -1,7 +1,7 @@
 //! Modes that two bodies have in common if one has fewer modes than the other.
 
-use super::comparison::by_shape;
-use super::numbers::{counted, frequency, frequency_range};
+use crate::comparison::by_shape;
+use crate::notation::numbers::{counted, frequency, frequency_range};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;

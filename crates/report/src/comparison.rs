@@ -17,9 +17,9 @@ use comparable::{Comparable, in_own_frame, is_placed};
 use groups::OneSidedGroups;
 use modal_rows::ModalRows;
 
-use super::common_modes::{CommonModes, clusters};
-use super::comparison_report::{ComparisonFormat, ComparisonReport};
-use super::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com};
+use crate::common_modes::{CommonModes, clusters};
+use crate::comparison_report::{ComparisonFormat, ComparisonReport};
+use crate::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 #[cfg(doc)]

@@ -1,11 +1,11 @@
 //! Report on the comparison of two bodies, for people, programs and automated checks.
 
-use super::comparison::{BodyComparison, ComparisonRow, ModePair, signed_percent};
-use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
-use super::html::{self, Plain};
-use super::numbers::{plain, significant};
-use super::render;
-use super::text::{self, Screen};
+use crate::comparison::{BodyComparison, ComparisonRow, ModePair, signed_percent};
+use crate::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
+use crate::notation::markup::{Plain, plain};
+use crate::notation::numbers::significant;
+use crate::text::{self, Screen};
+use crate::{html, render};
 use flexbody_base::provenance::generator;
 use maud::{PreEscaped, html};
 use std::path::Path;

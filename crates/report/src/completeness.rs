@@ -1,7 +1,8 @@
 //! Completeness of the modes in a sentence that claims no more than the certificate proves.
 
-use super::craig_bampton;
-use super::numbers::{counted, frequency, plain, significant};
+use crate::craig_bampton;
+use crate::notation::markup::plain;
+use crate::notation::numbers::{counted, frequency, significant};
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::{FlexBody, TermGroup, is_static};
 use flexbody_body::invariants::{DIGITS, digits_of_error};

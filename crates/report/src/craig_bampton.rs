@@ -1,7 +1,7 @@
 //! Facts of a Craig-Bampton body: its coordinates, their proof of completeness, and the frequency up to which
 //! it represents the free body.
 
-use super::numbers::{counted, frequency, percent};
+use crate::notation::numbers::{counted, frequency, percent};
 use flexbody_body::flex_body::{FixedInterface, FlexBody, FreeEstimate, ReferenceConditions};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};

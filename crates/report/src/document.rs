@@ -1,9 +1,9 @@
 //! Tree of a report, built once from the facts and rendered as a text or as a page.
 
-use super::chart::{Bars, Cells, Chart};
-use super::picture::Fields;
-use super::render::{Format, json};
-use super::{html, text};
+use crate::chart::{Bars, Cells, Chart};
+use crate::picture::Fields;
+use crate::render::{Format, json};
+use crate::{html, text};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_body::flex_body::FlexBody;
 use serde::Serialize;

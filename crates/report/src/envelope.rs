@@ -1,7 +1,7 @@
 //! Largest stresses of every point over a run, or over several load cases: files, and the summary of several load cases.
 
-use super::csv;
-use super::numbers::{counted, significant};
+use crate::notation::csv;
+use crate::notation::numbers::{counted, significant};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::table::{Column, Table};

@@ -1,6 +1,6 @@
 //! Errors of a recommended body: in words, relative to the model that it was made from, and in variations of its scene.
 
-use super::numbers::{counted, significant};
+use crate::notation::numbers::{counted, significant};
 use flexbody_base::numbers::joined_runs;
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::reference::{MAX_REFERENCE_ERROR, ReferenceError};

@@ -1,17 +1,17 @@
 //! Facts of a body and of the run that made it, computed once and rendered in every format.
 
-use super::completeness::{Completeness, GuaranteeFacts, TermFacts};
-use super::craig_bampton::CraigBamptonFacts;
-use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz};
-use super::held::HeldFacts;
-use super::lumped::{LumpedFacts, LumpedModesFacts};
-use super::mass_properties::MassProperties;
-use super::named_loads::NamedLoadFacts;
-use super::numbers::{coordinates, counted, percent, significant};
-use super::run_data::{Phase, RunData, SearchAttempt};
+use crate::completeness::{Completeness, GuaranteeFacts, TermFacts};
+use crate::craig_bampton::CraigBamptonFacts;
+use crate::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz};
+use crate::held::HeldFacts;
+use crate::lumped::{LumpedFacts, LumpedModesFacts};
+use crate::mass_properties::MassProperties;
+use crate::named_loads::NamedLoadFacts;
+use crate::notation::numbers::{coordinates, counted, percent, significant};
+use crate::notation::units::UnitFacts;
+use crate::run_data::{Phase, RunData, SearchAttempt};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::{self, SourceFile};
-use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::FREE_MODE;
 use flexbody_body::flex_body::{
     Coupling, FlexBody, Interface, MassStructure, Quantity, Recovery, Storage, Truncation, is_static,
@@ -106,16 +106,6 @@ impl MeshFacts {
         let (triangles, edges) = (counted(self.triangles, "triangle"), counted(self.edges, "edge"));
         format!("{triangles} and {edges} on {}", counted(self.nodes, "node"))
     }
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct UnitFacts {
-    pub length: String,
-    pub mass: String,
-    pub time: String,
-    pub stated: bool,
-    #[serde(skip)]
-    pub system: UnitSystem,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -472,52 +462,6 @@ impl ModeFacts {
             }
         }
         if matches!(origins.as_slice(), [(FREE_MODE, _)]) { Vec::new() } else { origins }
-    }
-}
-
-impl UnitFacts {
-    pub(crate) fn new(units: &UnitSystem) -> Self {
-        Self {
-            length: units.length.name().to_owned(),
-            mass: units.mass.name().to_owned(),
-            time: units.time.name().to_owned(),
-            stated: units.stated,
-            system: units.clone(),
-        }
-    }
-
-    pub(crate) fn mass(&self) -> String {
-        self.system.mass_name()
-    }
-
-    pub(crate) fn length(&self) -> String {
-        self.system.length_name()
-    }
-
-    pub(crate) fn time(&self) -> String {
-        self.system.time_name()
-    }
-
-    pub(crate) fn energy(&self) -> String {
-        self.system.energy_name()
-    }
-
-    pub(crate) fn force(&self) -> String {
-        self.system.force_name()
-    }
-
-    pub(crate) fn torque(&self) -> String {
-        self.system.moment_name()
-    }
-
-    pub(crate) fn inertia(&self) -> String {
-        format!("{} {}^2", self.mass(), self.length())
-    }
-
-    /// Returns the three units, with a remark if they are assumed.
-    pub(crate) fn in_words(&self) -> String {
-        let assumed = if self.stated { "" } else { " assumed, none stated" };
-        format!("{}, {}, {}{assumed}", self.length(), self.mass(), self.time())
     }
 }
 

@@ -1,6 +1,6 @@
 //! Geometric stiffness of a body, or the centrifugal softening without it.
 
-use super::numbers::{frequencies, significant};
+use crate::notation::numbers::{frequencies, significant};
 use flexbody_body::flex_body::{FlexBody, LoadKind};
 use flexbody_body::invariants::relative_norm;
 use nalgebra::Matrix3;

@@ -1,7 +1,7 @@
 //! Facts of the modes of a body held at each of its interfaces, with their effective masses.
 
-use super::document::{Block, Inline, Table, cells};
-use super::numbers::{counted, significant};
+use crate::document::{Block, Inline, Table, cells};
+use crate::notation::numbers::{counted, significant};
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::{Carrier, FlexBody, HeldMode, is_static};
 use serde::Serialize;

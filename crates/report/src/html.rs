@@ -1,10 +1,10 @@
 //! HTML page of a document. The page loads nothing from elsewhere and is readable without scripts, on a phone
 //! and on paper.
 
-use super::chart::{Cells, colour_scale};
-use super::document::{Block, Document, Inline, Span, State, Table, Term};
-use super::numbers::plain;
-use super::picture::{Embedded, Field, Fields};
+use crate::chart::{Cells, colour_scale};
+use crate::document::{Block, Document, Inline, Span, State, Table, Term};
+use crate::notation::markup::{Plain, raised};
+use crate::picture::{Embedded, Field, Fields};
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 use flexbody_base::provenance::started;
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
@@ -14,15 +14,6 @@ const PICTURE_STYLE: &str = include_str!("picture/embedded.css");
 
 /// Script that opens folded blocks before a page is printed.
 const UNFOLD: &str = "<script>addEventListener(\"beforeprint\", () => document.querySelectorAll(\"details\").forEach((fold) => (fold.open = true)));</script>\n";
-
-/// User text, escaped, without control characters that change the direction of text.
-pub(crate) struct Plain<'t>(pub &'t str);
-
-impl Render for Plain<'_> {
-    fn render_to(&self, buffer: &mut String) {
-        plain(self.0).render_to(buffer);
-    }
-}
 
 impl Render for Span {
     fn render(&self) -> Markup {
@@ -45,11 +36,6 @@ impl Render for Inline {
     fn render(&self) -> Markup {
         html! { @for span in &self.0 { (span) } }
     }
-}
-
-/// Returns a text with raised exponents: the 2 of `t mm^2`.
-pub(crate) fn raised(text: &str) -> String {
-    text.replace("^2", "\u{b2}").replace("^3", "\u{b3}")
 }
 
 /// Renders the whole page.

@@ -1,8 +1,8 @@
 //! Errors that lumped masses would have caused.
 
-use super::mass_properties::{centre_of_mass, inertia_about_com, principal_moments};
-use super::numbers::{percent, significant};
-use super::run_data::LumpedModes;
+use crate::mass_properties::{centre_of_mass, inertia_about_com, principal_moments};
+use crate::notation::numbers::{percent, significant};
+use crate::run_data::LumpedModes;
 use flexbody_body::flex_body::LumpedBody;
 use flexbody_body::invariants::{ERROR_NORMS, Invariants, LumpedScheme};
 use flexbody_linalg::larger;

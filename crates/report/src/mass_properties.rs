@@ -1,6 +1,6 @@
 //! Mass, centre of mass and principal inertia of a body in any frame.
 
-use super::numbers::significant;
+use crate::notation::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, ReferenceConditions};
 use flexbody_body::invariants::Invariants;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};

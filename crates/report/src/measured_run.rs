@@ -1,10 +1,10 @@
 //! Report on a run of another program: its errors relative to a reference motion.
 
-use super::Format;
-use super::document::{Block, Document, State, Term};
-use super::errors::{errors_in_words, tolerances_in_words};
-use super::numbers::{counted, significant};
-use super::run_data::RunData;
+use crate::Format;
+use crate::document::{Block, Document, State, Term};
+use crate::errors::{errors_in_words, tolerances_in_words};
+use crate::notation::numbers::{counted, significant};
+use crate::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_motion::scene::{OutputErrors, Tolerance};

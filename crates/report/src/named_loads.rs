@@ -1,6 +1,6 @@
 //! Facts about the named loads of a body.
 
-use super::numbers::percent;
+use crate::notation::numbers::percent;
 use flexbody_body::flex_body::FlexBody;
 use serde::Serialize;
 

@@ -1,9 +1,9 @@
 //! Root mean squares of random vibration: facts, tables and the file of all of them.
 
-use super::csv;
-use super::document::{Block, Inline, Table, Term, heading};
-use super::envelope::EnvelopeKind;
-use super::numbers::{counted, frequency_range, percent, significant};
+use crate::document::{Block, Inline, Table, Term, heading};
+use crate::envelope::EnvelopeKind;
+use crate::notation::csv;
+use crate::notation::numbers::{counted, frequency_range, percent, significant};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, RecoveryRow};

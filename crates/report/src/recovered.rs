@@ -1,10 +1,10 @@
 //! Report on recoveries over time: the largest value of each.
 
-use super::Format;
-use super::csv;
-use super::document::{Block, Document, Term};
-use super::numbers::{counted, significant};
-use super::run_data::RunData;
+use crate::Format;
+use crate::document::{Block, Document, Term};
+use crate::notation::csv;
+use crate::notation::numbers::{counted, significant};
+use crate::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{FlexBody, Quantity, RecoveryRow};

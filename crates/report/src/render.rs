@@ -1,7 +1,7 @@
 //! Formats of a report, and the JSON object that every command prints with `--json` (`schemas/output.schema.json`).
 
-use super::document::Document;
-use super::{Facts, body_report};
+use crate::document::Document;
+use crate::{Facts, body_report};
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 use flexbody_base::error::ExitCode;
 use serde::Serialize;

@@ -1,13 +1,13 @@
 //! Report on a frequency response: facts, verdict, errors and plots.
 
-use super::Format;
-use super::chart::{Axis, Chart, Mark, Panel, Scale, Series};
-use super::csv;
-use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
-use super::facts::UnitFacts;
-use super::numbers::{counted, frequency, frequency_range, percent, significant, times};
-use super::random::RandomFacts;
-use super::run_data::RunData;
+use crate::Format;
+use crate::chart::{Axis, Chart, Mark, Panel, Scale, Series};
+use crate::document::{Block, Document, Inline, State, Table, Term, cells, heading};
+use crate::notation::csv;
+use crate::notation::numbers::{counted, frequency, frequency_range, percent, significant, times};
+use crate::notation::units::UnitFacts;
+use crate::random::RandomFacts;
+use crate::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;

@@ -1,15 +1,15 @@
 //! Report on a selection: the terms and modes that a scene needs, and the reasons for the decision.
 
-use super::Format;
-use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
-use super::errors::{
+use crate::Format;
+use crate::document::{Block, Document, Inline, State, Table, Term, cells, heading};
+use crate::errors::{
     ReferenceErrorFacts, VariationFacts, errors_in_words, in_words, part_in_words, ranges,
     reference_in_words, tolerances_in_words,
 };
-use super::numbers::{percent, significant};
-use super::run_data::RunData;
-use super::selection_verdict::SelectionVerdict;
-use super::text::{self, Screen};
+use crate::notation::numbers::{percent, significant};
+use crate::run_data::RunData;
+use crate::selection_verdict::SelectionVerdict;
+use crate::text::{self, Screen};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{TermDecision, TermGroup};

@@ -1,14 +1,14 @@
 //! Report on a simulation: facts, verdict, motion and plots.
 
-use super::Format;
-use super::chart::{Axis, Chart, Mark, Panel, STYLES, Scale, Series};
-use super::csv;
-use super::document::{Block, Document, State, Term, heading, quantity};
-use super::facts::UnitFacts;
-use super::numbers::{counted, frequencies, significant, times};
-use super::picture::Fields;
-use super::recovered::RecoveryFacts;
-use super::run_data::RunData;
+use crate::Format;
+use crate::chart::{Axis, Chart, Mark, Panel, STYLES, Scale, Series};
+use crate::document::{Block, Document, State, Term, heading, quantity};
+use crate::notation::csv;
+use crate::notation::numbers::{counted, frequencies, significant, times};
+use crate::notation::units::UnitFacts;
+use crate::picture::Fields;
+use crate::recovered::RecoveryFacts;
+use crate::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;

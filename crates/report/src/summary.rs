@@ -1,17 +1,17 @@
 //! Summary of a body on one screen: properties, completeness of the modes, errors of lumped masses. Warnings and notes
 //! are printed apart.
 
-use super::craig_bampton::CraigBamptonFacts;
-use super::document::{Block, Term, Tone, listed_to};
-use super::facts::{InterfaceFacts, RecoveryFacts, RunFacts};
-use super::geometric_stiffness::softening_in_words;
-use super::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
-use super::named_loads::NamedLoadFacts;
-use super::numbers::{
+use crate::craig_bampton::CraigBamptonFacts;
+use crate::document::{Block, Term, Tone, listed_to};
+use crate::facts::{InterfaceFacts, RecoveryFacts, RunFacts};
+use crate::geometric_stiffness::softening_in_words;
+use crate::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
+use crate::named_loads::NamedLoadFacts;
+use crate::notation::numbers::{
     bytes, coordinates, counted, duration, frequencies, frequency, frequency_range, triple,
 };
-use super::text::{self, Screen};
-use super::{Facts, html};
+use crate::text::{self, Screen};
+use crate::{Facts, html};
 use flexbody_body::flex_body::MassStructure;
 
 /// Number of list entries that are shown.

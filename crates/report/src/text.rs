@@ -1,7 +1,7 @@
 //! Text of a document for a terminal.
 
-use super::document::{Block, Table, Term, Tone, listed};
-use super::numbers::plain;
+use crate::document::{Block, Table, Term, Tone, listed};
+use crate::notation::markup::plain;
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 
 /// Default width of a text: columns that every terminal has.

@@ -1,12 +1,13 @@
 //! Report on a trade study: facts, verdict, candidates and the plot of error against cost.
 
-use super::chart::{Axis, Chart, Mark, Panel, Series};
-use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
-use super::errors::{ReferenceErrorFacts, VariationFacts, ranges, reference_in_words, tolerances_in_words};
-use super::numbers::{bytes, counted, duration, significant, times};
-use super::run_data::RunData;
-use super::trade_verdict::{NodalFacts, TradeCaseFacts, case_facts, cases_table, varied_line, verdict_lines};
-use super::{Format, csv};
+use crate::Format;
+use crate::chart::{Axis, Chart, Mark, Panel, Series};
+use crate::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
+use crate::errors::{ReferenceErrorFacts, VariationFacts, ranges, reference_in_words, tolerances_in_words};
+use crate::notation::csv;
+use crate::notation::numbers::{bytes, counted, duration, significant, times};
+use crate::run_data::RunData;
+use crate::trade_verdict::{NodalFacts, TradeCaseFacts, case_facts, cases_table, varied_line, verdict_lines};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::Storage;

@@ -1,11 +1,11 @@
 //! Verdict of a trade study in lines: request, recommendation, reason, error, savings, run.
 
-use super::document::{Table, cells};
-use super::errors::{
+use crate::document::{Table, cells};
+use crate::errors::{
     ReferenceErrorFacts, VariationFacts, errors_in_words, groups_in_words, in_words, part_in_words, ranges,
 };
-use super::numbers::{counted, duration, frequency, significant};
-use super::trade::accuracy_key;
+use crate::notation::numbers::{counted, duration, frequency, significant};
+use crate::trade::accuracy_key;
 use flexbody_body::flex_body::Storage;
 use flexbody_motion::scene::{OutputErrors, Scheme, Tolerance};
 use flexbody_study::reference::ReferenceError;

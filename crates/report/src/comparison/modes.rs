@@ -1,7 +1,7 @@
 //! Comparison of frequencies mode by mode: pairs of modes by their shapes, otherwise in ascending order.
 
 use super::{BodyComparison, product, relative};
-use crate::numbers::frequency;
+use crate::notation::numbers::frequency;
 use faer::{Mat, MatRef};
 use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::FlexBody;

@@ -1,8 +1,8 @@
 //! Drawn parts of a body: its surface, with fewer triangles if it is large, or its nodes as points.
 
 use super::{Field, InitialView, MarkedPlace, Packed, Placed};
-use crate::html::Plain;
-use crate::numbers::{counted, significant};
+use crate::notation::markup::Plain;
+use crate::notation::numbers::{counted, significant};
 use faer::MatRef;
 use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
 use maud::Render;

@@ -2,7 +2,7 @@
 //! motion.
 
 use super::{Drawing, MarkedPlace};
-use crate::numbers::significant;
+use crate::notation::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, Recovery};
 use flexbody_motion::scene::{CasePeak, Envelope, RecoveryEnvelope, StressPoint};
 use serde::Serialize;

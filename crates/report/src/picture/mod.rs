@@ -5,10 +5,10 @@ mod drawing;
 mod field;
 mod initial_view;
 
-use crate::facts::UnitFacts;
-use crate::html::Plain;
 use crate::mass_properties::{centre_of_mass, inertia_about_com};
-use crate::numbers::{counted, frequency, plain};
+use crate::notation::markup::{Plain, plain};
+use crate::notation::numbers::{counted, frequency};
+use crate::notation::units::UnitFacts;
 use drawing::{still, turned};
 use field::ShownField;
 use flexbody_base::provenance;
