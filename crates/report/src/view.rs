@@ -136,7 +136,7 @@ impl View {
         let modes = if is_still { 0 } else { usize::MAX };
         let drawing = Drawing::new(body, triangles, MAX_DRAWING_BYTES, modes, fields.sets());
         let shown = motion.map(|motion| ShownMotion::new(motion, body));
-        let mut arrays = drawing.arrays(&fields.drawn);
+        let mut arrays = drawing.arrays(fields.array(&drawing));
         arrays.extend(shown.iter().flat_map(ShownMotion::arrays));
         let entries = terms(body, &drawing, &fields, shown.as_ref());
         let data =

@@ -1,7 +1,9 @@
 //! Values at the nodes of a body that colour its picture: equivalent stresses of its modes, or the largest ones of a
 //! motion.
 
-use super::{Drawing, MarkedPlace};
+use super::drawing::Drawing;
+use super::initial_view::MarkedPlace;
+use super::packed::Packed;
 use crate::notation::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, Recovery};
 use flexbody_motion::scene::{CasePeak, Envelope, RecoveryEnvelope, StressPoint};
@@ -164,7 +166,7 @@ impl Field {
     }
 
     /// Returns the values at the drawn nodes, set by set, in steps of the largest value of their set.
-    pub(super) fn packed<'f>(&'f self, drawing: &'f Drawing<'_>) -> impl Iterator<Item = i16> + 'f {
+    fn packed<'f>(&'f self, drawing: &'f Drawing<'_>) -> impl Iterator<Item = i16> + 'f {
         self.sets.iter().flat_map(|set| {
             let largest = set.largest();
             drawing.nodes().iter().map(move |&node| in_steps(set.values[node as usize], largest))
@@ -284,5 +286,11 @@ impl Fields {
     /// Returns the number of sets of values of all fields.
     pub(crate) fn sets(&self) -> usize {
         self.drawn.iter().map(Field::sets).sum()
+    }
+
+    /// Returns the values at the drawn nodes, field by field, as the page reads them; `None` without a field.
+    pub(crate) fn array(&self, drawing: &Drawing<'_>) -> Option<Packed> {
+        let values = self.drawn.iter().flat_map(|field| field.packed(drawing));
+        (!self.drawn.is_empty()).then(|| Packed::i16("values", values))
     }
 }

@@ -1,6 +1,6 @@
 //! Initial view of a picture, and the places of a drawn body that other parts of its surface hide.
 
-use super::Drawing;
+use super::drawing::Drawing;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// Depth of a surface in front of a place, relative to the radius of the drawing, from which it hides the place. The wall of a
