@@ -1,7 +1,6 @@
 //! Report on advice: guidelines of the literature for ranges of motion, and the settings of other programs.
 
-use crate::Format;
-use crate::document::{Block, Document, Inline, State, Table, Term, cells, heading};
+use crate::document::{Block, Document, Format, Inline, State, Table, Term, cells, heading};
 use crate::notation::numbers::{frequency, percent, significant};
 use crate::notation::units::UnitFacts;
 use crate::run_data::RunData;

@@ -1,8 +1,7 @@
 //! Report on all bodies of a batch: text, JSON and HTML.
 
-use crate::document::{Block, Document, Inline, Table, cells, heading};
+use crate::document::{Block, Document, Format, Inline, Table, cells, heading};
 use crate::notation::numbers::frequency_range;
-use crate::render::Format;
 use flexbody_base::provenance::generator;
 use serde::Serialize;
 use serde_json::Value;

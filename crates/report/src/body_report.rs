@@ -2,7 +2,10 @@
 
 use crate::body_modes::{heat_maps, modes};
 use crate::chart::{Axis, Bar, Bars};
-use crate::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading, listed, quantity};
+use crate::document::text::KEEP;
+use crate::document::{
+    Block, Document, Format, Inline, Span, State, Table, Term, cells, heading, listed, quantity,
+};
 use crate::facts::{Facts, InterfaceFacts, ModelFacts, RunFacts};
 use crate::lumped::{
     ErrorNorm, Errors, LumpedFacts, LumpedModesFacts, NEGLIGIBLE, distinct, invariant_in_words, judgement,
@@ -13,7 +16,6 @@ use crate::notation::numbers::{
     triple,
 };
 use crate::run_data::{Phase, SearchAttempt};
-use crate::text::KEEP;
 use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::{FlexBody, MassStructure};
 use flexbody_body::invariants::{ERROR_NORMS, LumpedScheme};
@@ -21,8 +23,13 @@ use flexbody_body::invariants::{ERROR_NORMS, LumpedScheme};
 /// Product of inertia, relative to the largest moment, that counts as rounding.
 const INERTIA_ROUNDING: f64 = 1e-14;
 
+/// Renders the facts in a format, ending with a line break.
+pub fn render(facts: &Facts<'_>, format: Format) -> String {
+    Document::render(facts, format, || document(facts))
+}
+
 /// Builds the report of a body.
-pub(super) fn document<'f>(facts: &'f Facts<'_>) -> Document<'f> {
+fn document<'f>(facts: &'f Facts<'_>) -> Document<'f> {
     // Errors and warnings are shown before the results they affect.
     let is_urgent = facts.diagnostics.iter().any(|found| found.severity() != Severity::Note);
     let diagnostics = |is_here: bool| is_here.then_some(Block::Diagnostics(&facts.diagnostics));

@@ -1,9 +1,9 @@
 //! Results of checks, audits of files of other programs, and diagnostics, for terminals and programs.
 
 use crate::completeness::dropped_text;
+use crate::document::text::{self, Screen};
 use crate::document::{Block, Inline, Table, cells};
 use crate::notation::numbers::significant;
-use crate::text::{self, Screen};
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::FlexBody;

@@ -1,11 +1,10 @@
 //! Report on the comparison of two bodies, for people, programs and automated checks.
 
 use crate::comparison::{BodyComparison, ComparisonRow, ModePair, signed_percent};
-use crate::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
+use crate::document::text::{self, Screen};
+use crate::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading, html, json};
 use crate::notation::markup::{Plain, plain};
 use crate::notation::numbers::significant;
-use crate::text::{self, Screen};
-use crate::{html, render};
 use flexbody_base::provenance::generator;
 use maud::{PreEscaped, html};
 use std::path::Path;
@@ -56,7 +55,7 @@ impl ComparisonReport<'_> {
     pub fn render(&self, format: ComparisonFormat) -> String {
         match format {
             ComparisonFormat::Text => text::render(&self.blocks(), Screen::default()),
-            ComparisonFormat::Json => render::json(self.comparison),
+            ComparisonFormat::Json => json(self.comparison),
             ComparisonFormat::Html => html::render(&Document {
                 name: &self.title(),
                 kind: "Comparison of two bodies",

@@ -1,5 +1,6 @@
 //! Largest stresses of every point over a run, or over several load cases: files, and the summary of several load cases.
 
+use crate::document::json;
 use crate::notation::csv;
 use crate::notation::numbers::{counted, significant};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -249,6 +250,6 @@ impl<'a> EnvelopeFacts<'a> {
 
     /// Returns the facts as JSON.
     pub fn json(&self) -> String {
-        super::render::json(self)
+        json(self)
     }
 }

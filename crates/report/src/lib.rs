@@ -27,23 +27,21 @@ mod errors;
 mod facts;
 mod geometric_stiffness;
 mod held;
-mod html;
 mod lumped;
 mod mass_properties;
 mod measured_run;
 mod named_loads;
 mod notation;
+mod output;
 mod picture;
 mod random;
 mod recovered;
-mod render;
 mod response;
 mod run_data;
 mod selection;
 mod selection_verdict;
 mod simulation;
 mod summary;
-mod text;
 #[cfg(feature = "hdf5")]
 mod trade;
 #[cfg(feature = "hdf5")]
@@ -53,23 +51,25 @@ mod view;
 
 pub use advice::AdviceFacts;
 pub use batch::{BatchFacts, BatchRow};
+pub use body_report::render;
 pub use checks::{
     audit_json, audit_text, checks_json, checks_text, diagnostics_json, identities_json, identities_text,
 };
 pub use comparison::{BodyComparison, ComparisonRow, ModePair, Pairing, Tolerances, compare, compare_common};
 pub use comparison_report::{ComparisonFormat, ComparisonReport};
 pub use completeness::dropped_text;
+pub use document::Format;
+pub use document::text::Screen;
 pub use envelope::{EnvelopeFacts, EnvelopeKind, read_envelope};
 pub use facts::Facts;
 pub use measured_run::MeasuredRunFacts;
+pub use output::output_json;
 pub use recovered::{RecoveredFacts, channels_csv, recovered_csv};
-pub use render::{Format, output_json, render};
 pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData, SearchAttempt};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
 pub use summary::{summary, summary_html};
-pub use text::Screen;
 #[cfg(feature = "hdf5")]
 pub use trade::{TradeFacts, trade_csv};
 #[cfg(feature = "hdf5")]

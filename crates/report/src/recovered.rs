@@ -1,7 +1,6 @@
 //! Report on recoveries over time: the largest value of each.
 
-use crate::Format;
-use crate::document::{Block, Document, Term};
+use crate::document::{Block, Document, Format, Term};
 use crate::notation::csv;
 use crate::notation::numbers::{counted, significant};
 use crate::run_data::RunData;

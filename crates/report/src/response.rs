@@ -1,8 +1,7 @@
 //! Report on a frequency response: facts, verdict, errors and plots.
 
-use crate::Format;
 use crate::chart::{Axis, Chart, Mark, Panel, Scale, Series};
-use crate::document::{Block, Document, Inline, State, Table, Term, cells, heading};
+use crate::document::{Block, Document, Format, Inline, State, Table, Term, cells, heading};
 use crate::notation::csv;
 use crate::notation::numbers::{counted, frequency, frequency_range, percent, significant, times};
 use crate::notation::units::UnitFacts;

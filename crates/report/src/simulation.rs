@@ -1,8 +1,7 @@
 //! Report on a simulation: facts, verdict, motion and plots.
 
-use crate::Format;
 use crate::chart::{Axis, Chart, Mark, Panel, STYLES, Scale, Series};
-use crate::document::{Block, Document, State, Term, heading, quantity};
+use crate::document::{Block, Document, Format, State, Term, heading, quantity};
 use crate::notation::csv;
 use crate::notation::numbers::{counted, frequencies, significant, times};
 use crate::notation::units::UnitFacts;

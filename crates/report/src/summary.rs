@@ -1,8 +1,10 @@
 //! Summary of a body on one screen: properties, completeness of the modes, errors of lumped masses. Warnings and notes
 //! are printed apart.
 
+use crate::Facts;
 use crate::craig_bampton::CraigBamptonFacts;
-use crate::document::{Block, Term, Tone, listed_to};
+use crate::document::text::{self, Screen};
+use crate::document::{Block, Term, Tone, html, listed_to};
 use crate::facts::{InterfaceFacts, RecoveryFacts, RunFacts};
 use crate::geometric_stiffness::softening_in_words;
 use crate::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
@@ -10,8 +12,6 @@ use crate::named_loads::NamedLoadFacts;
 use crate::notation::numbers::{
     bytes, coordinates, counted, duration, frequencies, frequency, frequency_range, triple,
 };
-use crate::text::{self, Screen};
-use crate::{Facts, html};
 use flexbody_body::flex_body::MassStructure;
 
 /// Number of list entries that are shown.

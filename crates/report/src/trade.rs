@@ -1,8 +1,7 @@
 //! Report on a trade study: facts, verdict, candidates and the plot of error against cost.
 
-use crate::Format;
 use crate::chart::{Axis, Chart, Mark, Panel, Series};
-use crate::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
+use crate::document::{Block, Document, Format, Inline, Span, State, Table, Term, cells, heading};
 use crate::errors::{ReferenceErrorFacts, VariationFacts, ranges, reference_in_words, tolerances_in_words};
 use crate::notation::csv;
 use crate::notation::numbers::{bytes, counted, duration, significant, times};

@@ -1,12 +1,11 @@
 //! Page that shows a body in motion by WebGL: one file with all its data. All quantities are computed here;
 //! the script of the page only rotates and animates them.
 
-use crate::Format;
+use crate::document::{Format, json};
 use crate::notation::markup::{Plain, plain};
 use crate::notation::numbers::{bytes, counted, significant};
 use crate::notation::units::UnitFacts;
 use crate::picture::{Drawing, Field, Fields, HALF_STEP, Packed, SCRIPT, ShownBody, script};
-use crate::render::json;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;

@@ -11,6 +11,9 @@ use crate::notation::numbers::counted;
 use flexbody_body::flex_body::FlexBody;
 use maud::Render;
 
+/// Style of the element with the picture.
+pub(crate) const EMBEDDED_STYLE: &str = include_str!("embedded.css");
+
 const PANEL: &str = include_str!("panel.html");
 
 /// Size limit of positions, shapes and mesh in a report, in bytes; the report then stays below 4 MB.

@@ -10,7 +10,7 @@ mod principal_axes;
 mod shown_body;
 mod still;
 
-pub(crate) use embedded::Embedded;
+pub(crate) use embedded::{EMBEDDED_STYLE, Embedded};
 pub(crate) use field::{Field, Fields};
 
 // Parts of the page that shows a body in motion.

@@ -1,16 +1,18 @@
 //! HTML page of a document. The page loads nothing from elsewhere and is readable without scripts, on a phone
 //! and on paper.
 
+use super::blocks::{Block, Document, State};
+use super::inline::{Inline, Span};
+use super::table::Table;
+use super::terms::Term;
 use crate::chart::{Cells, colour_scale};
-use crate::document::{Block, Document, Inline, Span, State, Table, Term};
 use crate::notation::markup::{Plain, raised};
-use crate::picture::{Embedded, Field, Fields};
+use crate::picture::{EMBEDDED_STYLE, Embedded, Field, Fields};
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 use flexbody_base::provenance::started;
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 const STYLE: &str = include_str!("report.css");
-const PICTURE_STYLE: &str = include_str!("picture/embedded.css");
 
 /// Script that opens folded blocks before a page is printed.
 const UNFOLD: &str = "<script>addEventListener(\"beforeprint\", () => document.querySelectorAll(\"details\").forEach((fold) => (fold.open = true)));</script>\n";
@@ -39,7 +41,7 @@ impl Render for Inline {
 }
 
 /// Renders the whole page.
-pub(super) fn render(document: &Document<'_>) -> String {
+pub(crate) fn render(document: &Document<'_>) -> String {
     let mut page = Page::default();
     let content = page.blocks(&document.blocks);
     // The content security policy allows inline scripts of the page and no external resources.
@@ -118,7 +120,7 @@ impl Page {
 
     fn picture(&mut self, picture: Option<Embedded>, blocks: &[Block<'_>]) -> Markup {
         let Some(Embedded { panel, scripts }) = picture else { return self.blocks(blocks) };
-        self.style = PICTURE_STYLE;
+        self.style = EMBEDDED_STYLE;
         self.scripts.push_str(&scripts);
         html! { div class="top" { (PreEscaped(panel)) div class="properties" { (self.blocks(blocks)) } } }
     }
@@ -140,7 +142,7 @@ fn verdict(state: State, head: &str, rest: &str) -> Markup {
 }
 
 /// Renders terms; values of one label stand below each other.
-pub(super) fn terms(items: &[Term]) -> Markup {
+pub(crate) fn terms(items: &[Term]) -> Markup {
     let shown: Vec<&Term> = items.iter().filter(|term| term.is_in_page).collect();
     html! {
         @if !shown.is_empty() {

@@ -1,6 +1,8 @@
 //! Text of a document for a terminal.
 
-use crate::document::{Block, Table, Term, Tone, listed};
+use super::blocks::Block;
+use super::table::Table;
+use super::terms::{Term, Tone, listed};
 use crate::notation::markup::plain;
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 
@@ -9,7 +11,7 @@ const DEFAULT_COLUMNS: usize = 80;
 /// Width of the label column in characters.
 const LABEL_COLUMNS: usize = 12;
 /// Character that stands for a space at which a line must not break.
-pub(super) const KEEP: &str = "\u{a0}";
+pub(crate) const KEEP: &str = "\u{a0}";
 
 /// Terminal that a text is written for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,7 +46,7 @@ impl Default for Screen {
 }
 
 /// Writes the blocks of a document that belong to a text, with its diagnostics at the end, ending with a line break.
-pub(super) fn render(blocks: &[Block<'_>], screen: Screen) -> String {
+pub(crate) fn render(blocks: &[Block<'_>], screen: Screen) -> String {
     let mut text = Text { text: String::new(), label: String::new(), screen };
     text.blocks(blocks);
     for block in blocks {
@@ -56,7 +58,7 @@ pub(super) fn render(blocks: &[Block<'_>], screen: Screen) -> String {
 }
 
 /// Writes the blocks of a document that belong to a text, without its diagnostics, ending with a line break.
-pub(super) fn render_results(blocks: &[Block<'_>], screen: Screen) -> String {
+pub(crate) fn render_results(blocks: &[Block<'_>], screen: Screen) -> String {
     let mut text = Text { text: String::new(), label: String::new(), screen };
     text.blocks(blocks);
     text.finish()
@@ -212,7 +214,7 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::document::Inline;
+    use super::super::inline::Inline;
     use super::*;
 
     #[test]
