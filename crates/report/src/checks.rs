@@ -1,6 +1,6 @@
 //! Results of checks, audits of files of other programs, and diagnostics, for terminals and programs.
 
-use crate::completeness::dropped_text;
+use crate::body::dropped_text;
 use crate::document::text::{self, Screen};
 use crate::document::{Block, Inline, Table, cells};
 use crate::notation::numbers::significant;

@@ -12,25 +12,17 @@
 
 mod advice;
 mod batch;
-mod body_modes;
-mod body_report;
+mod body;
 mod chart;
 mod checks;
 mod common_modes;
 mod comparison;
 mod comparison_report;
-mod completeness;
-mod craig_bampton;
 mod document;
 mod envelope;
 mod errors;
-mod facts;
-mod geometric_stiffness;
-mod held;
-mod lumped;
 mod mass_properties;
 mod measured_run;
-mod named_loads;
 mod notation;
 mod output;
 mod picture;
@@ -41,7 +33,6 @@ mod run_data;
 mod selection;
 mod selection_verdict;
 mod simulation;
-mod summary;
 #[cfg(feature = "hdf5")]
 mod trade;
 #[cfg(feature = "hdf5")]
@@ -51,17 +42,15 @@ mod view;
 
 pub use advice::AdviceFacts;
 pub use batch::{BatchFacts, BatchRow};
-pub use body_report::render;
+pub use body::{Facts, dropped_text, render, summary, summary_html};
 pub use checks::{
     audit_json, audit_text, checks_json, checks_text, diagnostics_json, identities_json, identities_text,
 };
 pub use comparison::{BodyComparison, ComparisonRow, ModePair, Pairing, Tolerances, compare, compare_common};
 pub use comparison_report::{ComparisonFormat, ComparisonReport};
-pub use completeness::dropped_text;
 pub use document::Format;
 pub use document::text::Screen;
 pub use envelope::{EnvelopeFacts, EnvelopeKind, read_envelope};
-pub use facts::Facts;
 pub use measured_run::MeasuredRunFacts;
 pub use output::output_json;
 pub use recovered::{RecoveredFacts, channels_csv, recovered_csv};
@@ -69,7 +58,6 @@ pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData, SearchAttempt};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
-pub use summary::{summary, summary_html};
 #[cfg(feature = "hdf5")]
 pub use trade::{TradeFacts, trade_csv};
 #[cfg(feature = "hdf5")]

@@ -1,14 +1,13 @@
 //! Summary of a body on one screen: properties, completeness of the modes, errors of lumped masses. Warnings and notes
 //! are printed apart.
 
-use crate::Facts;
-use crate::craig_bampton::CraigBamptonFacts;
+use super::craig_bampton::CraigBamptonFacts;
+use super::facts::{Facts, InterfaceFacts, RecoveryFacts, RunFacts};
+use super::geometric_stiffness::softening_in_words;
+use super::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
+use super::named_loads::NamedLoadFacts;
 use crate::document::text::{self, Screen};
 use crate::document::{Block, Term, Tone, html, listed_to};
-use crate::facts::{InterfaceFacts, RecoveryFacts, RunFacts};
-use crate::geometric_stiffness::softening_in_words;
-use crate::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
-use crate::named_loads::NamedLoadFacts;
 use crate::notation::numbers::{
     bytes, coordinates, counted, duration, frequencies, frequency, frequency_range, triple,
 };

@@ -1,12 +1,12 @@
 //! Facts of a body and of the run that made it, computed once and rendered in every format.
 
-use crate::completeness::{Completeness, GuaranteeFacts, TermFacts};
-use crate::craig_bampton::CraigBamptonFacts;
-use crate::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz};
-use crate::held::HeldFacts;
-use crate::lumped::{LumpedFacts, LumpedModesFacts};
+use super::completeness::{Completeness, GuaranteeFacts, TermFacts};
+use super::craig_bampton::CraigBamptonFacts;
+use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz};
+use super::held::HeldFacts;
+use super::lumped::{LumpedFacts, LumpedModesFacts};
+use super::named_loads::NamedLoadFacts;
 use crate::mass_properties::MassProperties;
-use crate::named_loads::NamedLoadFacts;
 use crate::notation::numbers::{coordinates, counted, percent, significant};
 use crate::notation::units::UnitFacts;
 use crate::run_data::{Phase, RunData, SearchAttempt};

@@ -1,6 +1,6 @@
 //! Completeness of the modes in a sentence that claims no more than the certificate proves.
 
-use crate::craig_bampton;
+use super::craig_bampton;
 use crate::notation::markup::plain;
 use crate::notation::numbers::{counted, frequency, significant};
 use flexbody_body::basis::BasisKind;
