@@ -15,9 +15,7 @@ mod batch;
 mod body;
 mod chart;
 mod checks;
-mod common_modes;
 mod comparison;
-mod comparison_report;
 mod document;
 mod envelope;
 mod errors;
@@ -46,8 +44,10 @@ pub use body::{Facts, dropped_text, render, summary, summary_html};
 pub use checks::{
     audit_json, audit_text, checks_json, checks_text, diagnostics_json, identities_json, identities_text,
 };
-pub use comparison::{BodyComparison, ComparisonRow, ModePair, Pairing, Tolerances, compare, compare_common};
-pub use comparison_report::{ComparisonFormat, ComparisonReport};
+pub use comparison::{
+    BodyComparison, ComparisonFormat, ComparisonReport, ComparisonRow, ModePair, Pairing, Tolerances,
+    compare, compare_common,
+};
 pub use document::Format;
 pub use document::text::Screen;
 pub use envelope::{EnvelopeFacts, EnvelopeKind, read_envelope};

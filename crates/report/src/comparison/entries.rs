@@ -1,7 +1,11 @@
 //! Comparison of the entries of two bodies other than invariants and mode shapes: interfaces, nodal data of the modes,
 //! modal matrices; and the entries of the flex-body file that a comparison leaves out.
 
-use super::{BodyComparison, Pair, is_placed, product, relative, turned};
+use super::body_comparison::BodyComparison;
+use super::comparable::is_placed;
+use super::pair::Pair;
+use super::relative_difference::relative;
+use super::shapes::{product, turned};
 use crate::mass_properties::gyration_radius;
 use faer::{Mat, MatRef};
 use flexbody_body::flex_body::{FlexBody, GeometricStiffness, Interface, InternalRows, LoadKind, UnitLoad};

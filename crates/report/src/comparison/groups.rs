@@ -1,6 +1,7 @@
 //! Comparison of the groups of the kinetic energy that two bodies hold.
 
-use super::BodyComparison;
+use super::body_comparison::BodyComparison;
+use super::relative_difference::relative;
 use faer::Mat;
 use flexbody_body::flex_body::{FlexBody, TermGroup};
 use flexbody_body::invariants::{CauchySchwarz, Invariants};
@@ -68,5 +69,5 @@ fn size_of(invariants: &Invariants, group: TermGroup) -> f64 {
 fn largest(matrix: Option<Mat<f64>>, bound: impl Fn(usize, usize) -> f64) -> f64 {
     let Some(matrix) = matrix else { return 0.0 };
     let places = (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| (i, j)));
-    places.map(|(i, j)| super::relative(matrix[(i, j)], bound(i, j))).fold(0.0, larger)
+    places.map(|(i, j)| relative(matrix[(i, j)], bound(i, j))).fold(0.0, larger)
 }

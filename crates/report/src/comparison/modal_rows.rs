@@ -1,5 +1,7 @@
 //! Comparison of rows by the modes (rows x nf) of two bodies whose modes have other signs or another basis.
 
+use super::relative_difference::relative;
+use super::shapes::product;
 use faer::{Mat, MatRef};
 use flexbody_linalg::larger;
 use std::borrow::Cow;
@@ -21,7 +23,7 @@ impl<'r> ModalRows<'r> {
         let nf = basis.nrows();
         let mut turned = Mat::zeros(b.nrows(), b.ncols());
         for first in (0..b.ncols()).step_by(nf.max(1)) {
-            let component = super::product(b.as_ref().subcols(first, nf), basis.as_ref());
+            let component = product(b.as_ref().subcols(first, nf), basis.as_ref());
             turned.as_mut().subcols_mut(first, nf).copy_from(&component);
         }
         Self { a, b: Cow::Owned(turned), has_one_basis: true }
@@ -29,7 +31,7 @@ impl<'r> ModalRows<'r> {
 
     /// Returns the largest difference of one of `rows` (index and factor) over a group of modes, relative to the largest norm.
     pub(super) fn difference(&self, rows: &[(usize, f64)], groups: &[Range<usize>]) -> f64 {
-        super::relative(self.largest_difference(rows, groups), self.size(rows, groups))
+        relative(self.largest_difference(rows, groups), self.size(rows, groups))
     }
 
     /// Returns the largest norm of one of `rows` over a group of modes.
@@ -77,7 +79,7 @@ impl<'r> ModalRows<'r> {
         let difference = |&(row, own): &(usize, f64)| {
             own * factor * (product(self.a.as_ref(), row) - product(self.b.as_ref().as_ref(), row)).abs()
         };
-        super::relative(rows.iter().map(difference).fold(0.0, larger), norms[at])
+        relative(rows.iter().map(difference).fold(0.0, larger), norms[at])
     }
 }
 

@@ -1,6 +1,9 @@
 //! Comparison of the named loads of two bodies.
 
-use super::{BodyComparison, ModalRows, Pair, relative, relative_difference};
+use super::body_comparison::BodyComparison;
+use super::modal_rows::ModalRows;
+use super::pair::Pair;
+use super::relative_difference::{relative, relative_difference};
 use faer::Mat;
 use flexbody_body::flex_body::{FlexBody, NamedLoad};
 use flexbody_linalg::larger;

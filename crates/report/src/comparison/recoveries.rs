@@ -1,6 +1,9 @@
 //! Comparison of the recoveries of two bodies: their rows in the modes, under constant unit loads and under forces of motion.
 
-use super::{BodyComparison, ModalRows, Pair, relative, relative_difference};
+use super::body_comparison::BodyComparison;
+use super::modal_rows::ModalRows;
+use super::pair::Pair;
+use super::relative_difference::{relative, relative_difference};
 use faer::{Mat, MatRef};
 use flexbody_base::error::Result;
 use flexbody_base::named_unit::NamedUnit;

@@ -1,6 +1,7 @@
 //! Report on the comparison of two bodies, for people, programs and automated checks.
 
-use crate::comparison::{BodyComparison, ComparisonRow, ModePair, signed_percent};
+use super::body_comparison::{BodyComparison, ComparisonRow};
+use super::mode_pair::{ModePair, signed_percent};
 use crate::document::text::{self, Screen};
 use crate::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading, html, json};
 use crate::notation::markup::{Plain, plain};
@@ -48,6 +49,13 @@ pub struct ComparisonReport<'a> {
     pub a: &'a str,
     /// File of the body that is compared with the reference.
     pub b: &'a str,
+}
+
+impl BodyComparison {
+    /// Returns the comparison as a table for a terminal.
+    pub fn text(&self) -> String {
+        ComparisonReport { comparison: self, a: &self.a, b: &self.b }.render(ComparisonFormat::Text)
+    }
 }
 
 impl ComparisonReport<'_> {

@@ -1,6 +1,6 @@
 //! Modes that two bodies have in common if one has fewer modes than the other.
 
-use crate::comparison::by_shape;
+use super::mode_pair::by_shape;
 use crate::notation::numbers::{counted, frequency, frequency_range};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -28,7 +28,7 @@ impl CommonModes {
     ///
     /// # Errors
     /// [`BodyIncomparable`](Code::BodyIncomparable) when no mode is left.
-    pub(crate) fn of(a: &FlexBody, b: &FlexBody, assurance: Option<&Mat<f64>>) -> Result<Self> {
+    pub(super) fn of(a: &FlexBody, b: &FlexBody, assurance: Option<&Mat<f64>>) -> Result<Self> {
         let (of_a, of_b) = (&a.modes().eigenvalue, &b.modes().eigenvalue);
         let is_first = of_a.len() <= of_b.len();
         let (fewer, more) = if is_first { (of_a, of_b) } else { (of_b, of_a) };
