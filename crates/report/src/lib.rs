@@ -10,35 +10,22 @@
     clippy::unwrap_used
 )]
 
-mod advice;
 mod batch;
 mod body;
 mod chart;
 mod checks;
 mod comparison;
 mod document;
-mod envelope;
-mod errors;
 mod mass_properties;
-mod measured_run;
+mod motion;
 mod notation;
 mod output;
 mod picture;
-mod random;
-mod recovered;
-mod response;
 mod run_data;
-mod selection;
-mod selection_verdict;
-mod simulation;
-#[cfg(feature = "hdf5")]
-mod trade;
-#[cfg(feature = "hdf5")]
-mod trade_verdict;
+mod study;
 #[cfg(feature = "hdf5")]
 mod view;
 
-pub use advice::AdviceFacts;
 pub use batch::{BatchFacts, BatchRow};
 pub use body::{Facts, dropped_text, render, summary, summary_html};
 pub use checks::{
@@ -50,15 +37,14 @@ pub use comparison::{
 };
 pub use document::Format;
 pub use document::text::Screen;
-pub use envelope::{EnvelopeFacts, EnvelopeKind, read_envelope};
-pub use measured_run::MeasuredRunFacts;
+pub use motion::{
+    EnvelopeFacts, EnvelopeKind, RecoveredFacts, ResponseFacts, SimulationFacts, channels_csv, read_envelope,
+    recovered_csv, response_csv, simulation_csv,
+};
 pub use output::output_json;
-pub use recovered::{RecoveredFacts, channels_csv, recovered_csv};
-pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData, SearchAttempt};
-pub use selection::SelectionFacts;
-pub use simulation::{SimulationFacts, simulation_csv};
+pub use study::{AdviceFacts, MeasuredRunFacts, SelectionFacts};
 #[cfg(feature = "hdf5")]
-pub use trade::{TradeFacts, trade_csv};
+pub use study::{TradeFacts, trade_csv};
 #[cfg(feature = "hdf5")]
 pub use view::{Colouring, View};

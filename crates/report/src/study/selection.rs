@@ -1,14 +1,14 @@
 //! Report on a selection: the terms and modes that a scene needs, and the reasons for the decision.
 
-use crate::document::text::{self, Screen};
-use crate::document::{Block, Document, Format, Inline, State, Table, Term, cells, heading};
-use crate::errors::{
+use super::errors::{
     ReferenceErrorFacts, VariationFacts, errors_in_words, in_words, part_in_words, ranges,
     reference_in_words, tolerances_in_words,
 };
+use super::selection_verdict::SelectionVerdict;
+use crate::document::text::{self, Screen};
+use crate::document::{Block, Document, Format, Inline, State, Table, Term, cells, heading};
 use crate::notation::numbers::{percent, significant};
 use crate::run_data::RunData;
-use crate::selection_verdict::SelectionVerdict;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{TermDecision, TermGroup};

@@ -1,7 +1,7 @@
 //! Root mean squares of random vibration: facts, tables and the file of all of them.
 
+use super::envelope::EnvelopeKind;
 use crate::document::{Block, Inline, Table, Term, heading};
-use crate::envelope::EnvelopeKind;
 use crate::notation::csv;
 use crate::notation::numbers::{counted, frequency_range, percent, significant};
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -1,11 +1,11 @@
 //! Report on a frequency response: facts, verdict, errors and plots.
 
+use super::random::RandomFacts;
 use crate::chart::{Axis, Chart, Mark, Panel, Scale, Series};
 use crate::document::{Block, Document, Format, Inline, State, Table, Term, cells, heading};
 use crate::notation::csv;
 use crate::notation::numbers::{counted, frequency, frequency_range, percent, significant, times};
 use crate::notation::units::UnitFacts;
-use crate::random::RandomFacts;
 use crate::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;

@@ -1,12 +1,12 @@
 //! Report on a simulation: facts, verdict, motion and plots.
 
+use super::recovered::RecoveryFacts;
 use crate::chart::{Axis, Chart, Mark, Panel, STYLES, Scale, Series};
 use crate::document::{Block, Document, Format, State, Term, heading, quantity};
 use crate::notation::csv;
 use crate::notation::numbers::{counted, frequencies, significant, times};
 use crate::notation::units::UnitFacts;
 use crate::picture::Fields;
-use crate::recovered::RecoveryFacts;
 use crate::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;

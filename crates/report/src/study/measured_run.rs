@@ -1,7 +1,7 @@
 //! Report on a run of another program: its errors relative to a reference motion.
 
+use super::errors::{errors_in_words, tolerances_in_words};
 use crate::document::{Block, Document, Format, State, Term};
-use crate::errors::{errors_in_words, tolerances_in_words};
 use crate::notation::numbers::{counted, significant};
 use crate::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;

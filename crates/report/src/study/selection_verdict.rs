@@ -1,6 +1,6 @@
 //! Verdict of a selection in five lines: request, recommendation, reason, error, savings.
 
-use crate::errors::{ReferenceErrorFacts, error_in_words, errors_in_words, groups_in_words, ranges};
+use super::errors::{ReferenceErrorFacts, error_in_words, errors_in_words, groups_in_words, ranges};
 use crate::notation::numbers::{counted, frequency, significant};
 use flexbody_body::flex_body::TermGroup;
 use flexbody_study::reference::ReferenceError;

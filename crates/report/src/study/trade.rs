@@ -1,12 +1,14 @@
 //! Report on a trade study: facts, verdict, candidates and the plot of error against cost.
 
+use super::errors::{ReferenceErrorFacts, VariationFacts, ranges, reference_in_words, tolerances_in_words};
+use super::integration::{NodalFacts, accuracy_key};
+use super::trade_cases::{TradeCaseFacts, case_facts, cases_table};
+use super::trade_verdict::{varied_line, verdict_lines};
 use crate::chart::{Axis, Chart, Mark, Panel, Series};
 use crate::document::{Block, Document, Format, Inline, Span, State, Table, Term, cells, heading};
-use crate::errors::{ReferenceErrorFacts, VariationFacts, ranges, reference_in_words, tolerances_in_words};
 use crate::notation::csv;
 use crate::notation::numbers::{bytes, counted, duration, significant, times};
 use crate::run_data::RunData;
-use crate::trade_verdict::{NodalFacts, TradeCaseFacts, case_facts, cases_table, varied_line, verdict_lines};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::Storage;
@@ -223,17 +225,6 @@ impl<'a> TimedRunFacts<'a> {
             steps: run.work.steps,
             initial_modes: run.start.iter().map(facts).collect(),
         }
-    }
-}
-
-/// Returns the accuracy of a time integration as the key of a scene: `tolerance = 1e-4` or `step = 0.002`.
-pub(super) fn accuracy_key(scheme: Scheme) -> String {
-    // All digits, without an exponent where that is short.
-    let exact =
-        |value: f64| if (1e-3..1e6).contains(&value) { format!("{value}") } else { format!("{value:e}") };
-    match scheme {
-        Scheme::Adaptive { tolerance } => format!("tolerance = {}", exact(tolerance)),
-        Scheme::Conserving { step, .. } => format!("step = {}", exact(step.unwrap_or_default())),
     }
 }
 
