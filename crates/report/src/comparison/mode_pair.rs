@@ -1,4 +1,4 @@
-//! Pairs of modes of two bodies, and the likeness of their shapes.
+//! Pairs of modes of two bodies, and the modal assurance criterion of their shapes.
 
 use super::shapes::product;
 use crate::notation::numbers::{frequency, significant};

@@ -1,4 +1,4 @@
-//! Names with values.
+//! Terms of a document: names with their values.
 
 use super::inline::Inline;
 

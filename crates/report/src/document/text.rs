@@ -58,7 +58,7 @@ pub(crate) fn render(blocks: &[Block<'_>], screen: Screen) -> String {
 }
 
 /// Writes the blocks of a document that belong to a text, without its diagnostics, ending with a line break.
-pub(crate) fn render_results(blocks: &[Block<'_>], screen: Screen) -> String {
+pub(super) fn render_results(blocks: &[Block<'_>], screen: Screen) -> String {
     let mut text = Text { text: String::new(), label: String::new(), screen };
     text.blocks(blocks);
     text.finish()
