@@ -77,7 +77,7 @@ macro_rules! codes {
 codes! {
     // FB1xx: files
     FileUnreadable = "FB101", Error, BadInput, "file cannot be read", "check the path and its permissions";
-    FileFormatUnknown = "FB102", Error, BadInput, "file format not recognised", "give Matrix Market (.mtx, .mtx.gz, .mtx.zst), HDF5 (.h5, .hdf5), SciPy (.npz), MATLAB (.mat), PETSc or Nastran (.op4, .pch) matrices";
+    FileFormatUnknown = "FB102", Error, BadInput, "file format not recognised", "give Matrix Market (.mtx, .mtx.gz, .mtx.zst), HDF5 (.h5, .hdf5), SciPy (.npz), NumPy (.npy), MATLAB (.mat), PETSc or Nastran (.op4, .pch) matrices";
     FileCompressionBroken = "FB103", Error, BadInput, "compressed file is damaged or cut off", "transfer or write the file again";
     OutputUnwritable = "FB104", Error, Resources, "output cannot be written", "check the folder, its permissions and the free space";
     OutputFolderMissing = "FB105", Error, BadInput, "folder of the output file does not exist", "make the folder first";

@@ -2,8 +2,10 @@
 
 /// Dense array as read from its file.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Array {
+pub struct Array {
+    /// Number of rows.
     pub rows: usize,
+    /// Number of columns.
     pub cols: usize,
     /// True if the values of a row are contiguous, false if those of a column are.
     pub row_major: bool,

@@ -15,6 +15,8 @@ mod lent;
 pub(super) mod mat5;
 pub(super) mod matrix_market;
 pub(super) mod named_matrices;
+mod npy_matrix;
+pub(super) mod operator;
 pub(super) mod output4;
 pub(super) mod petsc;
 mod reader;
@@ -30,15 +32,17 @@ use flexbody_base::text::{Compression, InputFile};
 use hdf5::Hdf5;
 use mat5::Mat5;
 use matrix_market::MatrixMarket;
+use npy_matrix::Npy;
 use output4::Output4;
 use petsc::Petsc;
 use scipy_npz::ScipyNpz;
 use std::path::Path;
 
-pub use reader::{HEAD, MatrixRole, MatrixSource, Reader};
+pub use reader::{ArraySource, HEAD, MatrixRole, MatrixSource, ReadOutcome, Reader};
 
 /// Every supported matrix format.
-pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5, &ScipyNpz, &Mat5, &Petsc, &Output4, &DmigPunch];
+pub const READERS: &[&dyn Reader] =
+    &[&MatrixMarket, &Hdf5, &ScipyNpz, &Npy, &Mat5, &Petsc, &Output4, &DmigPunch];
 
 /// Returns the reader for a file: by its content, else by its extension.
 ///
@@ -68,6 +72,19 @@ pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&
             Diagnostic::new(Code::FileFormatUnknown, message).in_file(file.path()).into()
         }),
     }
+}
+
+/// Returns what `read` gives for the reader that recognises the file by its content; `None` if none does. `name` is the
+/// matrix or dataset of a file with several.
+pub(super) fn with_reader<T>(
+    file: &InputFile,
+    name: Option<&str>,
+    read: impl FnOnce(&dyn Reader, &ArraySource<'_>) -> Option<T>,
+) -> Option<T> {
+    let compression = Compression::of(file.bytes());
+    let head = compression.head(file, HEAD);
+    let reader = READERS.iter().find(|reader| reader.recognises(&head))?;
+    read(*reader, &ArraySource { file, compression, head: &head, name })
 }
 
 /// First bytes of known file formats that are not supported, with their kind and advice.

@@ -2,12 +2,9 @@
 //! content. Shapes may also come by nodes, as FE programs write modes.
 
 use super::array::Array;
-use super::matrices::hdf5::Hdf5;
-use super::matrices::matrix_market::{self, MatrixMarket};
-use super::matrices::{HEAD, Reader};
+use super::matrices::{HEAD, READERS, with_reader};
 use super::mode_files::read_modes;
 use super::model_files::MatrixLocation;
-use super::{hdf5, npy};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -55,27 +52,20 @@ pub fn read_shapes(location: &MatrixLocation, counts: &[usize], role: &str) -> R
     Ok(RawShapes { matrix, digits, path: path.to_path_buf(), source })
 }
 
-/// Reads a dense array in any of the formats.
+/// Reads a dense array in any of the formats: the `dataset` of a file with several.
 pub(super) fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, Vec<Diagnostic>> {
-    let compression = Compression::of(file.bytes());
-    let head = compression.head(file, HEAD);
-    let packed = compression != Compression::None;
-    if !packed && Hdf5.recognises(&head) {
-        return hdf5::read_array(file, dataset);
+    if let Some(found) = with_reader(file, dataset, |reader, source| reader.read_array(source)) {
+        return found;
     }
     if let Some(dataset) = dataset {
         let message = format!("dataset `{dataset}` is named, but the file is not HDF5");
         return Err(vec![Diagnostic::new(Code::Hdf5Layout, message).with_help("give the file alone")]);
     }
-    if MatrixMarket.recognises(&head) {
-        return matrix_market::read_array(file, compression);
-    }
-    if !packed && npy::recognises(&head) {
-        file.load().map_err(|diagnostic| vec![diagnostic])?;
-        return npy::read(file.bytes()).map_err(|diagnostic| vec![diagnostic]);
-    }
+    let compression = Compression::of(file.bytes());
+    let head = compression.head(file, HEAD);
     let start = &head[..head.len().min(24)];
-    let what = if packed && (npy::recognises(&head) || Hdf5.recognises(&head)) {
+    let is_packed = compression != Compression::None;
+    let what = if is_packed && READERS.iter().any(|reader| reader.recognises(&head)) {
         "file is compressed as a whole".to_owned()
     } else {
         format!("file begins with `{}`", start.escape_ascii())

@@ -23,8 +23,8 @@ pub struct ConvertArguments {
     /// Job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
-    /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst), HDF5 (FILE.h5:/group), SciPy (.npz), MATLAB (FILE.mat:/K),
-    /// PETSc or Nastran (FILE.op4:/KGG)
+    /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst), HDF5 (FILE.h5:/group), SciPy (.npz), NumPy (.npy), MATLAB
+    /// (FILE.mat:/K), PETSc or Nastran (FILE.op4:/KGG)
     #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"], conflicts_with_all = ["format", "matrices"])]
     pub stiffness: Option<PathBuf>,
     /// Mass matrix, consistent

@@ -4,7 +4,8 @@ use super::assemble::{
     Entry, Sides, StoredEntries, assemble_distinct, check_size, given_twice, push, undeclared_triangle,
 };
 use super::named_matrices::{choose, named_or_only};
-use super::reader::{MatrixSource, Reader};
+use super::operator::OperatorColumns;
+use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
 use super::recent::Recent;
 use crate::bulk_cards::{Card, Item, MatrixLines, is_bulk_data, read_cards, read_deck};
 use crate::digits::written_digits;
@@ -350,7 +351,7 @@ impl Dmigs {
 }
 
 /// Matrix with labelled rows and numbered columns.
-pub(crate) struct NumberedColumns {
+struct NumberedColumns {
     pub name: String,
     pub columns: u32,
     /// Row, column from 0, and value of every entry.
@@ -361,7 +362,7 @@ pub(crate) struct NumberedColumns {
 ///
 /// # Errors
 /// FB310 if there is no such matrix, the errors of [`Dmigs::of`] and of the matrix.
-pub(crate) fn read_numbered(path: &Path, name: Option<&str>) -> Result<NumberedColumns, Vec<Diagnostic>> {
+fn read_numbered(path: &Path, name: Option<&str>) -> Result<NumberedColumns, Vec<Diagnostic>> {
     let mut all = Dmigs::of(&[path.to_path_buf()])?;
     let wanted = named_or_only(&all.names(), name).map_err(|diagnostic| vec![diagnostic.in_file(path)])?;
     all.take_numbered(wanted).map_err(|diagnostic| vec![diagnostic])
@@ -419,6 +420,13 @@ impl Reader for DmigPunch {
         let all = Dmigs::of(&[path.to_path_buf()]).map_err(Error::new)?;
         let at = choose(&all.names(), source.role, source.group).map_err(|d| d.in_file(path))?;
         Ok(Some(all.points_beside(at).into_iter().map(label).collect()))
+    }
+
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+        let labelled = |NumberedColumns { name, columns, entries }| {
+            OperatorColumns::Labelled(name, columns as usize, entries)
+        };
+        source.is_plain().then(|| read_numbered(source.file.path(), source.name).map(labelled))
     }
 }
 

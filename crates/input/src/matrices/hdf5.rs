@@ -4,11 +4,13 @@ mod group;
 
 use super::assemble::Entry;
 use super::named_matrices::NamedMatrices;
-use super::reader::{MatrixRole, MatrixSource, Reader};
+use super::operator::OperatorColumns;
+use super::reader::{ArraySource, MatrixRole, MatrixSource, ReadOutcome, Reader};
 use super::rectangular::Rectangular;
 use crate::array::Array;
 use crate::hdf5::{
-    Found, MAX_DEPTH, MAX_GROUPS, Members, StoredArray, has_arrays_beside, layout, opened, read_stored_array,
+    Found, MAX_DEPTH, MAX_GROUPS, Members, StoredArray, has_arrays_beside, layout, opened, read_array,
+    read_stored_array,
 };
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -57,13 +59,22 @@ impl Reader for Hdf5 {
         };
         read().map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))
     }
+
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+        let read = || read_rectangular(source.file, source.name);
+        source.is_plain().then(read).map(|found| found.map(Rectangular::operator))
+    }
+
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {
+        source.is_plain().then(|| read_array(source.file, source.name))
+    }
 }
 
 /// Reads a matrix that need not be square: the sparse matrix or the dense array `name`, or the only one of the file.
 ///
 /// # Errors
 /// FB310 if there is no such matrix or several, FB302 to FB313 for an invalid one.
-pub(crate) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
     let opened = opened(file)?;
     let found = matrices(&opened);
     let wanted = name.map(|name| format!("/{}", name.trim_matches('/')));

@@ -4,7 +4,8 @@
 use super::assemble::{Entry, check_extents, check_size, most_entries_of};
 use super::compressed::Compressed;
 use super::named_matrices::{NamedMatrices, named_or_only};
-use super::reader::{MatrixRole, MatrixSource, Reader};
+use super::operator::OperatorColumns;
+use super::reader::{ArraySource, MatrixRole, MatrixSource, ReadOutcome, Reader};
 use super::rectangular::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -59,6 +60,12 @@ impl Reader for Mat5 {
         };
         read().map_err(|diagnostic: Diagnostic| Error::from(diagnostic.in_file(source.file.path())))
     }
+
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+        let one = |diagnostic| vec![diagnostic];
+        let read = || read_rectangular(source.file, source.name).map_err(one);
+        source.is_plain().then(read).map(|found| found.map(Rectangular::operator))
+    }
 }
 
 /// Reads the variable `name`, or the only matrix of the file, which need not be square.
@@ -66,7 +73,7 @@ impl Reader for Mat5 {
 /// # Errors
 /// FB102 and FB103 for a file that cannot be read, FB310 if there is no such variable, FB301 to FB306 for an invalid
 /// matrix.
-pub(crate) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
     let bytes = file.bytes();
     let Some(order) = Order::of(bytes) else {
         return Err(Diagnostic::new(

@@ -4,7 +4,8 @@ use super::assemble::{
     Entry, StoredEntries, assemble, check_extents, check_size, refuse_beyond_memory, undeclared_triangle,
 };
 use super::coordinates::{Blocks, Coordinates, Limits, TextEnd, cut_off};
-use super::reader::{MatrixSource, Reader};
+use super::operator::OperatorColumns;
+use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
 use super::rectangular::Rectangular;
 use crate::array::Array;
 use crate::digits::written_digits;
@@ -46,6 +47,16 @@ impl Reader for MatrixMarket {
         read(source)
             .map_err(|diagnostics| Error::new(diagnostics.into_iter().map(|d| d.in_file(path)).collect()))
     }
+
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+        let read = || read_rectangular(source.file, source.compression);
+        let holds = source.name.is_none() && is_coordinate(source.head);
+        holds.then(read).map(|found| found.map(Rectangular::operator))
+    }
+
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {
+        source.name.is_none().then(|| read_array(source.file, source.compression))
+    }
 }
 
 fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnostic>> {
@@ -74,7 +85,7 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnos
 }
 
 /// Returns true if the (unpacked) file that begins with `head` lists entries, not a dense array.
-pub(crate) fn is_coordinate(head: &[u8]) -> bool {
+fn is_coordinate(head: &[u8]) -> bool {
     let first = head.split(|&byte| byte == b'\n').next().unwrap_or_default();
     has_banner(head) && !String::from_utf8_lossy(first).to_lowercase().contains(" array ")
 }
@@ -84,7 +95,7 @@ pub(crate) fn is_coordinate(head: &[u8]) -> bool {
 ///
 /// # Errors
 /// FB301 to FB306 for a file that is not valid, all that are found.
-pub(crate) fn read_rectangular(
+fn read_rectangular(
     file: &InputFile,
     compression: Compression,
 ) -> std::result::Result<Rectangular, Vec<Diagnostic>> {

@@ -7,7 +7,8 @@ mod text;
 
 use super::assemble::{check_extents, check_size, undeclared_triangle};
 use super::named_matrices::{choose, named_or_only};
-use super::reader::{MatrixSource, Reader};
+use super::operator::OperatorColumns;
+use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
 use super::rectangular::Rectangular;
 use binary::Binary;
 use columns::{Columns, SINGLE_DIGITS, Stored, Stretch};
@@ -49,6 +50,12 @@ impl Reader for Output4 {
             contents.matrix(source.file, choose(&contents.names(), source.role, source.group)?)
         };
         read().map_err(|found: Diagnostic| Error::from(found.in_file(path)))
+    }
+
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+        let one = |diagnostic| vec![diagnostic];
+        let read = || read_rectangular(source.file, source.name).map_err(one);
+        source.is_plain().then(read).map(|found| found.map(Rectangular::operator))
     }
 }
 
@@ -165,7 +172,7 @@ impl Contents {
 ///
 /// # Errors
 /// FB310 if there is no such matrix, the errors of [`Contents::of`] and of the matrix.
-pub(crate) fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
     let contents = Contents::of(file)?;
     let wanted = named_or_only(&contents.names(), name)?;
     contents.rectangular(file, wanted)

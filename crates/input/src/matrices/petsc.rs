@@ -5,7 +5,8 @@
 
 use super::assemble::{Entry, check_extents, check_size};
 use super::compressed::Compressed;
-use super::reader::{MatrixSource, Reader};
+use super::operator::OperatorColumns;
+use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
 use super::rectangular::Rectangular;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -42,6 +43,12 @@ impl Reader for Petsc {
             read(source.not_packed("PETSc file")?, source)
         };
         read().map_err(|diagnostic: Diagnostic| Error::from(diagnostic.in_file(source.file.path())))
+    }
+
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+        let one = |diagnostic| vec![diagnostic];
+        let read = || read_rectangular(source.file.bytes()).map_err(one);
+        (source.is_plain() && source.name.is_none()).then(read).map(|found| found.map(Rectangular::operator))
     }
 }
 
@@ -164,7 +171,7 @@ fn read(bytes: &[u8], source: &MatrixSource<'_>) -> std::result::Result<RawMatri
 ///
 /// # Errors
 /// FB301 to FB306 for an invalid matrix, FB313 for one beyond memory.
-pub(crate) fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
+fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
     let check = |rows, columns, entries| check_extents(rows, columns, entries).map(|_| ());
     let stored = Stored::of(bytes, check)?;
     let pointers = stored.pointers();

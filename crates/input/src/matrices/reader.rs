@@ -1,5 +1,7 @@
 //! The interface of a reader of a matrix format, and its input.
 
+use super::operator::OperatorColumns;
+use crate::array::Array;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::text::{Compression, InputFile};
@@ -80,6 +82,29 @@ impl<'a> MatrixSource<'a> {
     }
 }
 
+/// Location of a matrix that need not be square, or of an array: an operator, shapes, loads, values.
+#[derive(Debug, Clone, Copy)]
+pub struct ArraySource<'a> {
+    /// File of the matrix.
+    pub file: &'a InputFile,
+    /// Compression of the file.
+    pub compression: Compression,
+    /// First bytes of the unpacked file, as [`Reader::recognises`] receives them.
+    pub head: &'a [u8],
+    /// Name of the matrix or dataset within the file, if the user named one.
+    pub name: Option<&'a str>,
+}
+
+impl ArraySource<'_> {
+    /// Returns true if the file is not compressed as a whole.
+    pub(super) fn is_plain(&self) -> bool {
+        self.compression == Compression::None
+    }
+}
+
+/// Result of reading a matrix that need not be square, or an array.
+pub type ReadOutcome<T> = std::result::Result<T, Vec<Diagnostic>>;
+
 /// Reader of one matrix format. A new format has one file in this crate, one entry in [`READERS`](super::READERS) and
 /// one folder in `fixtures/readers/`.
 pub trait Reader: Sync {
@@ -115,6 +140,25 @@ pub trait Reader: Sync {
     fn labels(&self, source: &MatrixSource<'_>) -> Result<Option<Vec<DofLabel>>> {
         let _ = source;
         Ok(None)
+    }
+
+    /// Reads a sparse matrix that need not be square, such as an operator; `None` if a file of this format holds none in
+    /// this way.
+    ///
+    /// # Errors
+    /// The errors of [`Reader::read`], apart from those of matrices that are not square.
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+        let _ = source;
+        None
+    }
+
+    /// Reads a dense array with one or two extents: shapes, loads, values; `None` if a file of this format holds none.
+    ///
+    /// # Errors
+    /// FB103, FB301 to FB313 for a file that cannot be read.
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {
+        let _ = source;
+        None
     }
 }
 

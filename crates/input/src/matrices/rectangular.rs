@@ -1,6 +1,7 @@
 //! Matrices that need not be square, such as operators.
 
 use super::assemble::Entry;
+use super::operator::OperatorColumns;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::CscMatrix;
 
@@ -33,6 +34,11 @@ impl Rectangular {
             }
             None => Ok(self),
         }
+    }
+
+    /// Returns the operator whose rows are those of the matrix.
+    pub(super) fn operator(self) -> OperatorColumns {
+        OperatorColumns::Matrix(self.transposed())
     }
 
     /// Returns the transposed matrix.

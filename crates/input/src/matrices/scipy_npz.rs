@@ -6,7 +6,8 @@ use super::assemble::{
     undeclared_triangle,
 };
 use super::compressed::{Compressed, EntryCheck};
-use super::reader::{MatrixSource, Reader};
+use super::operator::OperatorColumns;
+use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
 use super::rectangular::Rectangular;
 use crate::npy;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -48,13 +49,19 @@ impl Reader for ScipyNpz {
         let read = source.has_one_matrix("an archive of SciPy").and_then(|()| read(source));
         read.map_err(|diagnostic| Error::from(diagnostic.in_file(source.file.path())))
     }
+
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+        let one = |diagnostic| vec![diagnostic];
+        let read = || read_rectangular(source.file.bytes()).map_err(one);
+        (source.is_plain() && source.name.is_none()).then(read).map(|found| found.map(Rectangular::operator))
+    }
 }
 
 /// Reads a matrix in CSC, CSR or COO form that need not be square.
 ///
 /// # Errors
 /// FB103, FB301 to FB306 for an archive that is not valid.
-pub(crate) fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
+fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
     let mut archive = Archive::open(bytes)?;
     let form = archive.member("format").ok().and_then(|bytes| npy::read_word(&bytes)).unwrap_or_default();
     let shape = npy::read_integers(&archive.member("shape")?)?;

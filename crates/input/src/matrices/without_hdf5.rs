@@ -1,11 +1,11 @@
 //! Matrices in HDF5 files in a build without HDF5: recognised, and refused by name.
 
-use super::reader::{MatrixSource, Reader};
-use super::rectangular::Rectangular;
+use super::operator::OperatorColumns;
+use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
+use crate::array::Array;
 use crate::hdf5::left_out;
-use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::{Error, Result};
-use flexbody_base::text::input_file::{InputFile, is_hdf5};
+use flexbody_base::text::input_file::is_hdf5;
 use flexbody_model::RawMatrix;
 
 /// Substitute of the HDF5 reader, which refuses every file.
@@ -27,12 +27,12 @@ impl Reader for Hdf5 {
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
         Err(Error::from(left_out().in_file(source.file.path())))
     }
-}
 
-/// Refuses an operator.
-pub(crate) fn read_rectangular(
-    _: &InputFile,
-    _: Option<&str>,
-) -> std::result::Result<Rectangular, Vec<Diagnostic>> {
-    Err(vec![left_out()])
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+        source.is_plain().then(|| Err(vec![left_out()]))
+    }
+
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {
+        source.is_plain().then(|| Err(vec![left_out()]))
+    }
 }

@@ -3,8 +3,9 @@
 use super::diagnostics::{Found, take};
 use super::interfaces::NodeLookup;
 use super::open_files::OpenFiles;
-use super::recovery_files::{OperatorColumns, read_offset, read_operator};
+use super::recovery_files::{read_offset, read_operator};
 use crate::fe_results::{AnswerFiles, read_answers};
+use crate::matrices::operator::OperatorColumns;
 use crate::model_files::{
     InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, OperatorSource, RecoverySource,
 };

@@ -3,58 +3,15 @@
 
 use crate::array::Array;
 use crate::matrices::assemble::Entry;
-use crate::matrices::dmig::{self, DmigPunch, NumberedColumns};
-use crate::matrices::hdf5::{self, Hdf5};
-use crate::matrices::mat5::{self, Mat5};
-use crate::matrices::matrix_market;
-use crate::matrices::output4::{self, Output4};
-use crate::matrices::petsc::{self, Petsc};
+use crate::matrices::operator::OperatorColumns;
 use crate::matrices::rectangular::Rectangular;
-use crate::matrices::scipy_npz::{self, ScipyNpz};
-use crate::matrices::{HEAD, Reader};
+use crate::matrices::with_reader;
 use crate::shapes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::{Compression, InputFile};
+use flexbody_base::text::InputFile;
 use flexbody_linalg::CscMatrix;
-use flexbody_model::DofLabel;
-use std::collections::HashMap;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
-
-/// Operator as its file gives it.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum OperatorColumns {
-    /// R' with one row for each matrix row.
-    Matrix(CscMatrix),
-    /// R' with labelled rows (name, number of columns, entries), as Nastran writes DMIG matrices.
-    Labelled(String, usize, Vec<(DofLabel, u32, f64)>),
-}
-
-impl OperatorColumns {
-    /// Returns R' with one row for each of the `labels` of the matrix rows.
-    ///
-    /// # Errors
-    /// FB322 for a label that is none of the matrix rows.
-    pub(super) fn by_rows(self, labels: &[DofLabel]) -> Result<CscMatrix, Diagnostic> {
-        let (name, columns, given) = match self {
-            Self::Matrix(matrix) => return Ok(matrix),
-            Self::Labelled(name, columns, given) => (name, columns, given),
-        };
-        let places: HashMap<DofLabel, u32> = labels.iter().copied().zip(0..).collect();
-        let mut entries = Vec::with_capacity(given.len());
-        for (label, column, value) in given {
-            let Some(&row) = places.get(&label) else {
-                let message = format!(
-                    "DMIG {name} has an entry at node {}, component {}, which is no row of the matrices",
-                    label.node, label.direction
-                );
-                return Err(Diagnostic::new(Code::RecoverySize, message));
-            };
-            entries.push((row, column, value));
-        }
-        Ok(CscMatrix::from_triplets(labels.len(), columns, &entries))
-    }
-}
 
 /// Reads an operator R (rows x matrix rows of the model) in any of the formats of K, or as a dense array. `name` is the
 /// matrix of a file with several.
@@ -62,34 +19,19 @@ impl OperatorColumns {
 /// # Errors
 /// FB102 for other formats; FB103, FB301 to FB313 for files that cannot be read.
 pub(super) fn read_operator(file: &InputFile, name: Option<&str>) -> Found<OperatorColumns> {
-    let about = |found: Vec<Diagnostic>| -> Vec<Diagnostic> {
-        found.into_iter().map(|diagnostic| diagnostic.in_file(file.path())).collect()
-    };
-    let one = |diagnostic: Diagnostic| about(vec![diagnostic]);
-    let compression = Compression::of(file.bytes());
-    let head = compression.head(file, HEAD);
-    let is_plain = compression == Compression::None;
-    if is_plain && DmigPunch.recognises(&head) {
-        let NumberedColumns { name, columns, entries } = dmig::read_numbered(file.path(), name)?;
-        return Ok(OperatorColumns::Labelled(name, columns as usize, entries));
+    let about = |found: Vec<Diagnostic>| in_file(found, file);
+    let sparse = with_reader(file, name, |reader, source| reader.read_operator(source));
+    if let Some(found) = sparse {
+        return found.map_err(about);
     }
-    let read = if is_plain && Hdf5.recognises(&head) {
-        hdf5::read_rectangular(file, name).map_err(about)
-    } else if is_plain && Mat5.recognises(&head) {
-        mat5::read_rectangular(file, name).map_err(one)
-    } else if is_plain && Output4.recognises(&head) {
-        output4::read_rectangular(file, name).map_err(one)
-    } else if is_plain && name.is_none() && Petsc.recognises(&head) {
-        petsc::read_rectangular(file.bytes()).map_err(one)
-    } else if is_plain && name.is_none() && ScipyNpz.recognises(&head) {
-        scipy_npz::read_rectangular(file.bytes()).map_err(one)
-    } else if name.is_none() && matrix_market::is_coordinate(&head) {
-        matrix_market::read_rectangular(file, compression).map_err(about)
-    } else {
-        let array = shapes::read(file, name).map_err(|found| about(with_formats(found)))?;
-        return transposed_array(&array).map(OperatorColumns::Matrix).map_err(one);
-    };
-    Ok(OperatorColumns::Matrix(read?.transposed()))
+    let array = shapes::read(file, name).map_err(|found| about(with_formats(found)))?;
+    transposed_array(&array).map(OperatorColumns::Matrix).map_err(|diagnostic| about(vec![diagnostic]))
+}
+
+/// Returns the diagnostics with the file, where they name none.
+fn in_file(found: Vec<Diagnostic>, file: &InputFile) -> Vec<Diagnostic> {
+    let located = |one: Diagnostic| if one.file().is_none() { one.in_file(file.path()) } else { one };
+    found.into_iter().map(located).collect()
 }
 
 /// Reads one value per row.
@@ -110,9 +52,7 @@ pub(super) fn read_forces(file: &InputFile, dataset: Option<&str>) -> Found<Vec<
 
 /// Reads an array with one row or one column; `misfit` is the code and the name of any other.
 fn read_vector(file: &InputFile, dataset: Option<&str>, misfit: (Code, &str)) -> Found<Vec<f64>> {
-    let about = |found: Vec<Diagnostic>| -> Vec<Diagnostic> {
-        found.into_iter().map(|diagnostic| diagnostic.in_file(file.path())).collect()
-    };
+    let about = |found: Vec<Diagnostic>| in_file(found, file);
     let Array { rows, cols, values, .. } = shapes::read(file, dataset).map_err(about)?;
     if rows != 1 && cols != 1 {
         let (code, name) = misfit;

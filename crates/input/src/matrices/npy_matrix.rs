@@ -1,0 +1,61 @@
+//! Matrices stored in full as one array of NumPy (`numpy.save`).
+
+use super::assemble::{check_size, refuse_beyond_memory};
+use super::compressed::Compressed;
+use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
+use crate::array::Array;
+use crate::npy;
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::error::{Error, Result};
+use flexbody_model::RawMatrix;
+
+/// Reader of arrays of NumPy.
+pub(crate) struct Npy;
+
+const HELP: &str = "write it again: numpy.save(file, K)";
+const BOTH_TRIANGLES: &str = "save both triangles: K + numpy.tril(K, -1).T";
+
+impl Reader for Npy {
+    fn name(&self) -> &'static str {
+        "NumPy"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["npy"]
+    }
+
+    fn recognises(&self, head: &[u8]) -> bool {
+        npy::recognises(head)
+    }
+
+    fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
+        let read = source.has_one_matrix("an array of NumPy").and_then(|()| read(source));
+        read.map_err(|diagnostic| Error::from(diagnostic.in_file(source.file.path())))
+    }
+
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {
+        let read = || {
+            source.file.load()?;
+            npy::read(source.file.bytes())
+        };
+        (source.is_plain() && source.name.is_none()).then(|| read().map_err(|diagnostic| vec![diagnostic]))
+    }
+}
+
+fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic> {
+    let Array { rows, cols, row_major, values, digits } = npy::read(source.not_packed("NumPy array")?)?;
+    let n = check_size(rows as u64, cols as u64, values.len() as u64)?;
+    refuse_beyond_memory(values.len() as u64)?;
+    let compressed = Compressed {
+        n,
+        by_rows: row_major,
+        pointers: (0..=n as u64).map(|column| column * n as u64).collect(),
+        pointers_name: "the list of columns",
+        entries: n * n,
+        entry: &|k| ((k % n) as i64, values[k]),
+        help: HELP,
+        both_triangles: BOTH_TRIANGLES,
+    };
+    let raw = compressed.assemble(source.file.path())?;
+    Ok(RawMatrix { digits: digits.min(raw.digits), ..raw })
+}
