@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Cost of the equations of motion beside Exudyn's ObjectFFRFreducedOrder and dense matrices; writes docs/validation/dynamics.md.
+"""Cost of the equations of motion beside Exudyn's ObjectFFRFreducedOrder and dense matrices; writes evidence/pages/dynamics.md.
 
     python3 -m venv target/peers && target/peers/bin/pip install exudyn==1.13.6 h5py numpy scipy
     cargo build --release --locked
@@ -199,7 +199,7 @@ Jacobians by all coordinates and velocities and gravity, bracket_hex20:
 |---|---|---|
 {others}
 
-The unreduced equations of all nodes, state in, rates out ([theory (6.9)](../theory.md#6-mass-matrices-that-do-not-commute-with-a-rotation)):
+The unreduced equations of all nodes, state in, rates out ([theory (6.9)](../../docs/theory.md#6-mass-matrices-that-do-not-commute-with-a-rotation)):
 
 | body | rows of K and M | all nodes (us) |
 |---|---|---|
@@ -245,7 +245,7 @@ def main():
     page = PAGE.format(machine=machine(), python=platform.python_version(), exudyn=version("exudyn"), numpy=version("numpy"), turns=TURNS,
                        peers=table(peers), trajectories=table(trajectories), evaluations=table(evaluations), others=table(others),
                        nodal=table(nodal))
-    (ROOT / "docs/validation/dynamics.md").write_text(page)
+    (ROOT / "evidence/pages/dynamics.md").write_text(page)
 
 
 if __name__ == "__main__":

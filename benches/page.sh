@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Measures all of docs/validation/performance.md anew: about 100 minutes on two cores, 24 GB of memory. benches/peers/README.md says
+# Measures all of evidence/pages/performance.md anew: about 100 minutes on two cores, 24 GB of memory. benches/peers/README.md says
 # how the peers are installed. Nothing else should run meanwhile.
 set -uo pipefail
 cd "$(dirname "$0")/.."

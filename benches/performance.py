@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Measures whole conversions and the peers of benches/peers/ side by side, and the floors of this machine; writes docs/validation/performance.md.
+"""Measures whole conversions and the peers of benches/peers/ side by side, and the floors of this machine; writes evidence/pages/performance.md.
 
     python3 -m venv target/peers && target/peers/bin/pip install numpy scipy    (benches/peers/README.md: the peers themselves)
     cargo build --release --locked
     python3 benches/performance.py --quick                        small models, a minute: does everything work?
     python3 benches/performance.py                                all of it, hours, on a quiet machine
     python3 benches/performance.py --cases block-100k --peers slepc
-    python3 benches/performance.py --render-only                  docs/validation/performance.md from benches/results.json
+    python3 benches/performance.py --render-only                  evidence/pages/performance.md from benches/results.json
 
 Programs take turns, in alternating order. flexbody is charged for its whole process: reading Matrix Market text, checks, proof of
 completeness, lumped comparison, flex-body file. Peers get the matrices as arrays for nothing and are charged for
@@ -308,7 +308,7 @@ def arguments():
 def main():
     args = arguments()
     output = args.models if args.quick else BENCHES
-    store, page = output / "results.json", args.models / "performance.md" if args.quick else ROOT / "docs/validation/performance.md"
+    store, page = output / "results.json", args.models / "performance.md" if args.quick else ROOT / "evidence/pages/performance.md"
     args.models.mkdir(parents=True, exist_ok=True)
     results = json.loads(store.read_text()) if store.exists() else {"cases": {}}
 

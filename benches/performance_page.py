@@ -1,4 +1,4 @@
-"""docs/validation/performance.md from what benches/performance.py measured."""
+"""evidence/pages/performance.md from what benches/performance.py measured."""
 
 import math
 from statistics import median

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures how fast the matrices of FE programs are read, and with how much memory, and writes it into docs/validation/performance.md.
+"""Measures how fast the matrices of FE programs are read, and with how much memory, and writes it into evidence/pages/performance.md.
 
     pip install numpy
     cargo build --release --locked
@@ -69,7 +69,7 @@ def main():
     results = json.loads(store.read_text())
     results["readers"] = {"machine": performance.machine(), "commit": performance.commit(), "runs": args.runs, "rows": rows}
     store.write_text(json.dumps(results, indent=1) + "\n")
-    (performance.ROOT / "docs/validation/performance.md").write_text(performance_page.render(results), encoding="utf-8")
+    (performance.ROOT / "evidence/pages/performance.md").write_text(performance_page.render(results), encoding="utf-8")
 
 
 if __name__ == "__main__":

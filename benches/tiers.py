@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures what each `--accuracy` costs and gives, and writes it into docs/validation/performance.md.
+"""Measures what each `--accuracy` costs and gives, and writes it into evidence/pages/performance.md.
 
     pip install numpy
     cargo build --release --locked
@@ -107,7 +107,7 @@ def main():
         results.setdefault("tiers", {})[name] = found
         results["tiers"] = {key: results["tiers"][key] for key in CASES if key in results["tiers"]}
         store.write_text(json.dumps(results, indent=1) + "\n")
-        (performance.ROOT / "docs/validation/performance.md").write_text(performance_page.render(results), encoding="utf-8")
+        (performance.ROOT / "evidence/pages/performance.md").write_text(performance_page.render(results), encoding="utf-8")
 
 
 if __name__ == "__main__":

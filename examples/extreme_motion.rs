@@ -1,5 +1,5 @@
 //! A free body at the extremes of spin, step, deformation and duration: what of energy, momentum and state is
-//! kept, or how it ends. `scripts/pages/make_stability.py` makes tables of the JSON lines that this prints.
+//! kept, or how it ends. `evidence/programs/make_stability.py` makes tables of the JSON lines that this prints.
 //!
 //!     cargo run --release --example extreme_motion -- body.flex.h5
 

@@ -1,4 +1,4 @@
-//! Writes the table of docs/validation/plausibility.md: findings of the checks of the mass against the stiffness on
+//! Writes the table of evidence/pages/plausibility.md: findings of the checks of the mass against the stiffness on
 //! every model at hand, in the right order and in wrong ones.
 //!
 //!     cargo run --release --example plausibility
@@ -52,7 +52,7 @@ fn main() {
         "| model | pairs of M | not of K | speed, whole / median (m/s) | density, quartiles (kg/m^3) | found in the right order | M in random order | M reversed | two far nodes exchanged | two coupled nodes exchanged | largest undetected change | smallest detected change |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     folders.iter().for_each(|folder| table.push_str(&format!("{}\n", row(folder))));
-    let path = root.join("docs/validation/plausibility.md");
+    let path = root.join("evidence/pages/plausibility.md");
     let page = std::fs::read_to_string(&path).expect("the page");
     let (before, rest) = page.split_once("<!-- models -->\n").expect("a place for the table");
     let (_, after) = rest.split_once("<!-- end of models -->").expect("an end of the table");

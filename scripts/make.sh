@@ -2,7 +2,7 @@
 # Makes everything of the repository that programs write, by one command each:
 #
 #   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/reference/codes.md, docs/reference/file_format.md, schemas
-#   ./scripts/make.sh pages [NAME]     pages of docs/validation, docs/reference/python.md and pictures; without NAME all of them (some hours). NAME:
+#   ./scripts/make.sh pages [NAME]     pages of evidence/ (its README has the times), docs/reference/python.md and pictures; without NAME all of them (many hours). NAME:
 #                                      accuracy, craig_bampton, cutoff, dynamics, embedded, geometric_stiffness, peers, performance, plausibility, python, recovery, seeds, stability,
 #                                      trade, verdicts [SEEDS], image_response, image_simulation, image_terminal, image_tutorial, image_view, image_vtk
 #   ./scripts/make.sh fixtures NAME    fixtures: models, general, frames, broken, foreign, jobs, modes, open, ... (fixtures/make/make_NAME.py; its head says what it needs)
@@ -47,16 +47,17 @@ pages)
     performance) ./benches/page.sh ;;
     plausibility) cargo run --release --locked --example plausibility ;;
     recovery)
-        "${PYTHON:-python3}" scripts/pages/make_recovery.py "${@:3}"
+        "${PYTHON:-python3}" evidence/programs/make_recovery.py "${@:3}"
         FLEXBODY_BLESS=1 cargo test --release --locked --package flexbody-study stresses_in_motion -- --ignored
         ;;
     verdicts) FLEXBODY_BLESS=1 FLEXBODY_VERDICTS="${3:-100}" cargo test --release --locked --package flexbody-study random_verdicts -- --include-ignored ;;
     "")
-        for script in scripts/pages/make_*.py scripts/pages/image_*.py; do "${PYTHON:-python3}" "$script"; done
+        for script in evidence/programs/make_*.py scripts/pages/*.py; do "${PYTHON:-python3}" "$script"; done
         for page in craig_bampton dynamics embedded peers performance plausibility verdicts; do ./scripts/make.sh pages "$page"; done
         ;;
     image_*) "${PYTHON:-python3}" "scripts/pages/$name.py" "${@:3}" ;;
-    *) "${PYTHON:-python3}" "scripts/pages/make_$name.py" "${@:3}" ;;
+    python) "${PYTHON:-python3}" scripts/pages/make_python.py ;;
+    *) "${PYTHON:-python3}" "evidence/programs/make_$name.py" "${@:3}" ;;
     esac
     ;;
 fixtures)

@@ -1,4 +1,4 @@
-"""The documentation as a site; `scripts/site.sh` builds it of README.md, ARCHITECTURE.md, CHANGELOG.md and docs/."""
+"""The documentation as a site; `scripts/site.sh` builds it of README.md, ARCHITECTURE.md, CHANGELOG.md, docs/ and evidence/."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ author = "the flexbody developers"
 # MathJax is part of the site, so that formulas appear without a network.
 extensions = ["myst_parser", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
 root_doc = "README"
-include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "fixtures/README.md", "fixtures/cases/README.md", "python/README.md", "docs/*.md", "docs/**/*.md"]
+include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "fixtures/README.md", "fixtures/cases/README.md", "python/README.md", "docs/*.md", "docs/**/*.md", "evidence/**/*.md"]
 # Headings are link targets and formulas stand between dollars, as where the sources are read.
 myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath"]
@@ -28,8 +28,9 @@ CONTENTS = {
     "Reference": ["docs/reference/commands", "docs/reference/runs", "docs/reference/codes", "docs/reference/input", "docs/reference/scenes", "docs/reference/simulate", "docs/reference/select", "docs/reference/trade", "docs/reference/measure", "docs/reference/advise", "docs/reference/response", "docs/reference/recovery", "docs/reference/report", "docs/reference/view", "docs/reference/audit", "docs/reference/exports", "docs/reference/python", "docs/reference/rust", "docs/reference/versions"],
     "Files": ["docs/reference/file_format", "docs/reference/formats/*"],
     "Theory": ["docs/theory"],
-    "Validation": ["docs/validation/index", "docs/validation/*"],
+    "Validation": ["docs/validation/index"],
     "Project": ["docs/decisions", "python/README", "ARCHITECTURE", "fixtures/README", "fixtures/cases/README", "CONTRIBUTING", "CHANGELOG"],
+    "Evidence": ["evidence/README", "evidence/pages/*"],
 }
 
 

@@ -6,7 +6,7 @@ import sys
 
 from common import ROOT, Row, program
 
-sys.path.insert(0, str(ROOT / "scripts/pages"))
+sys.path.insert(0, str(ROOT / "evidence/programs"))
 
 # Largest difference of a component, relative to the largest, by the digits of the results.
 LIMITS = {15: 1e-9, 7: 2e-6, 6: 2e-5}

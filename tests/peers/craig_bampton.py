@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Craig-Bampton bases of flexbody beside Exudyn's, and pyYeti's checks of the reduced matrices; writes docs/validation/craig_bampton.md.
+"""Craig-Bampton bases of flexbody beside Exudyn's, and pyYeti's checks of the reduced matrices; writes evidence/pages/craig_bampton.md.
 
 Optional, some seconds: needs Python with exudyn, pyyeti, h5py, numpy and scipy; not part of `cargo test`.
 
@@ -205,7 +205,7 @@ def main():
     table = lambda rows: "\n".join("| " + " | ".join(map(str, row)) + " |" for row in rows)
     versions = {p: version(p) for p in ["exudyn", "pyyeti", "scipy", "numpy"]}
     page = PAGE.format(modes=MODES, spans=table(spans), checks=table(checks), **versions)
-    (ROOT / "docs/validation/craig_bampton.md").write_text(page)
+    (ROOT / "evidence/pages/craig_bampton.md").write_text(page)
 
 
 if __name__ == "__main__":

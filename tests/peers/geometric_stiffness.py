@@ -6,7 +6,7 @@ import sys
 
 from common import ROOT, Row, program
 
-sys.path.insert(0, str(ROOT / "scripts/pages"))
+sys.path.insert(0, str(ROOT / "evidence/programs"))
 
 
 def rows(flexbody, folder):

@@ -34,7 +34,7 @@ from scipy.integrate import solve_ivp
 import common
 from common import ROOT, Absent, Row, run
 
-sys.path.insert(0, str(ROOT / "scripts/pages"))
+sys.path.insert(0, str(ROOT / "evidence/programs"))
 from geometric_elements import Element, Part  # noqa: E402
 
 SOURCE = "sources at www.mbdyn.org, of 2024 or later"

@@ -4,7 +4,7 @@
     python3 tests/peers/suite.py --install --write
 
 installs Exudyn, welib, open FE codes, h5py, scipy and readers of pictures by pip and npm into target/peers, Octave, GetFEM, FEniCSx, CalculiX, SLEPc and an ARM compiler by apt-get (as root; else it says the command), runs every
-peer with target/release/flexbody and writes the tables of docs/validation/ and that of docs/reference/formats/embedded.md. Some minutes. Without options it runs what is
+peer with target/release/flexbody and writes the tables of evidence/pages/ and that of docs/reference/formats/embedded.md. Some minutes. Without options it runs what is
 installed and prints. Programs that are in no package archive are found by environment variables: MBDYN (the program, where it is not on the PATH), PYMBS,
 FEMBEAM, EMBSLIB (folders of their sources). Exits with 1 when a number is worse than its limit; what is not found is said and fails nothing.
 
@@ -63,7 +63,7 @@ def equations(flexbody, folder):
 
     found, absent, refusals = of_targets.run(flexbody, folder, quick=OPTIONS["small"])
     if not OPTIONS["small"]:
-        TABLES["docs/validation/exports.md", "target equations"] = of_targets.text(found, absent, refusals)
+        TABLES["evidence/pages/exports.md", "target equations"] = of_targets.text(found, absent, refusals)
     return of_targets.rows(found, refusals)
 
 
@@ -81,14 +81,14 @@ OPTIONS = {"small": False}
 TABLES = {}
 # Those of the peers that have a table of their own.
 PLACES = {
-    "calculix.rows": ("docs/validation/fe_programs.md", "calculix"),
-    "calculix_stresses.rows": ("docs/validation/fe_programs.md", "calculix stresses"),
-    "public_decks.rows": ("docs/validation/fe_programs.md", "public decks"),
-    "nastran.rows": ("docs/validation/fe_programs.md", "nastran"),
-    "abaqus.rows": ("docs/validation/fe_programs.md", "abaqus"),
-    "open_codes.rows": ("docs/validation/fe_programs.md", "recipes"),
-    "cluster.rows": ("docs/validation/cluster.md", "cluster"),
-    "cluster.large": ("docs/validation/cluster.md", "cluster-large"),
+    "calculix.rows": ("evidence/pages/fe_programs.md", "calculix"),
+    "calculix_stresses.rows": ("evidence/pages/fe_programs.md", "calculix stresses"),
+    "public_decks.rows": ("evidence/pages/fe_programs.md", "public decks"),
+    "nastran.rows": ("evidence/pages/fe_programs.md", "nastran"),
+    "abaqus.rows": ("evidence/pages/fe_programs.md", "abaqus"),
+    "open_codes.rows": ("evidence/pages/fe_programs.md", "recipes"),
+    "cluster.rows": ("evidence/pages/cluster.md", "cluster"),
+    "cluster.large": ("evidence/pages/cluster.md", "cluster-large"),
 }
 # Name, module and function, whether it needs seconds only.
 PEERS = [
@@ -198,7 +198,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flexbody", type=Path, default=ROOT / "target/release/flexbody")
     parser.add_argument("--install", action="store_true", help="install what pip and apt-get have, then run")
-    parser.add_argument("--write", action="store_true", help="write the tables of docs/")
+    parser.add_argument("--write", action="store_true", help="write the tables of evidence/ and docs/")
     parser.add_argument("--small", action="store_true", help="only what needs seconds")
     parser.add_argument("--only", default="", metavar="WORD", help="only peers whose name has this word; with --write their own tables")
     parser.add_argument("--all", action="store_true", help="also the scripts that write files of their own")
@@ -213,7 +213,7 @@ def main():
         elsewhere = ("CalculiX", "Abaqus", "pyNastran", "pyYeti", "NX Nastran", "public decks", "all nodes")
         of_exports = [row for row in rows if not (row.program.startswith(elsewhere) or "CalculiX" in row.program or row.format.startswith(("recipe", "cluster")))]
         if not args.only:
-            TABLES["docs/validation/exports.md", "peers"] = table(of_exports, absent)
+            TABLES["evidence/pages/exports.md", "peers"] = table(of_exports, absent)
         for (page, mark), text in TABLES.items():
             write(page, mark, text)
     print(f"\n{len(rows)} comparisons, {len(bad)} worse than allowed" + "".join(f"\nnot found: {one}" for one in absent))

@@ -47,12 +47,13 @@ fn recipes_are_those_of_the_pages() {
     }
 }
 
-/// Returns README, ARCHITECTURE, CHANGELOG and all documents of `docs/`, `fixtures/` and `benches/` with
-/// their text.
+/// Returns README, ARCHITECTURE, CHANGELOG and all documents of `docs/`, `evidence/`, `fixtures/` and `benches/`
+/// with their text.
 fn documents() -> Vec<(PathBuf, String)> {
     let root = oracle::root();
     let mut found = Vec::new();
-    let mut left: Vec<PathBuf> = ["docs", "fixtures", "benches/peers"].map(|folder| root.join(folder)).into();
+    let mut left: Vec<PathBuf> =
+        ["docs", "evidence", "fixtures", "benches/peers"].map(|folder| root.join(folder)).into();
     let mut entries: Vec<PathBuf> =
         std::fs::read_dir(&root).unwrap().map(|entry| entry.unwrap().path()).collect();
     while let Some(folder) = left.pop() {

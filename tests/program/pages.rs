@@ -1,4 +1,4 @@
-//! Code blocks of README.md and docs/ run, and links and paths in documents and sources lead to files.
+//! Code blocks of README.md, docs/ and evidence/ run, and links and paths in documents and sources lead to files.
 //!
 //! | block | what happens |
 //! |---|---|
@@ -96,7 +96,7 @@ fn files(folder: &str, endings: &[&str]) -> Vec<String> {
 fn documents() -> Vec<String> {
     let mut found: Vec<String> =
         ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md"].map(str::to_owned).into();
-    for folder in ["docs", "fixtures", "benches", "python", "crates"] {
+    for folder in ["docs", "evidence", "fixtures", "benches", "python", "crates"] {
         found.extend(files(folder, &[".md"]));
     }
     found
@@ -298,6 +298,7 @@ fn reference() {
 #[test]
 fn theory_and_validation() {
     check_all("docs/validation", false);
+    check_all("evidence", false);
     check("docs/theory.md", false);
     check("docs/decisions.md", false);
 }
@@ -425,6 +426,7 @@ fn paths_in_documents_and_sources_exist() {
         "python",
         "fixtures/cases",
         "docs",
+        "evidence",
     ] {
         sources.extend(files(folder, &[".rs", ".py", ".sh", ".json", ".pyi", ".h", ".toml", ".ipynb"]));
     }
@@ -432,8 +434,9 @@ fn paths_in_documents_and_sources_exist() {
     for source in sources {
         let text = read(&source);
         let is_document = source.ends_with(".md");
-        let folders = ["docs/", "scripts/", "crates/", "tests/", "benches/", "examples/", "schemas/"];
-        for folder in if is_document { &folders[..] } else { &folders[..1] } {
+        let folders =
+            ["docs/", "evidence/", "scripts/", "crates/", "tests/", "benches/", "examples/", "schemas/"];
+        for folder in if is_document { &folders[..] } else { &folders[..2] } {
             for path in paths(&text, folder) {
                 assert!(root.join(path).exists(), "{source} names {path}, which does not exist");
                 count += 1;

@@ -281,7 +281,7 @@ const MIN_ROW_SUM: f64 = 0.01;
 
 /// Largest difference of the mass of a node from the mass expected from its stiffness, relative to the
 /// largest expected mass of its group, for a mass that fits. Nodes of equal elements stay within 0.12 on all
-/// models in docs/validation/plausibility.md.
+/// models in evidence/pages/plausibility.md.
 const MAX_FITTING_DIFFERENCE: f64 = 0.15;
 /// Smallest such difference that is reported.
 const MIN_REPORTED_DIFFERENCE: f64 = 0.3;

@@ -1,4 +1,4 @@
-"""Runs all checks on all formats. Each check has a limit with its reason; the result is the table of docs/validation/exports.md."""
+"""Runs all checks on all formats. Each check has a limit with its reason; the result is the table of evidence/pages/exports.md."""
 
 import re
 import subprocess
@@ -31,7 +31,7 @@ REGION = [("weight", "rigid", None, [500]), ("end", "averaging", [-0.01, 0.08, 0
 
 MARKS = {"first": "a", "undeformed": "b", "rest": "c", "small": "d"}
 NOTES = {
-    "a": "To first order in q, q' and q'', at any angular velocity: SID has mdCM, J and Cr to first order (modal forces of solids are exact, and compared at the random states), and the kinetic energy of nodes that turn is of second order in q and q' ([6.2a](../theory.md)).",
+    "a": "To first order in q, q' and q'', at any angular velocity: SID has mdCM, J and Cr to first order (modal forces of solids are exact, and compared at the random states), and the kinetic energy of nodes that turn is of second order in q and q' ([6.2a](../../docs/theory.md)).",
     "b": "At q = 0, to first order in q' and q'': the format has no stiffness of inertia of nodes that turn. mbdyn has it, and is compared so for beams and shells only: their mass has a symmetric part of W3, for which it has no place.",
     "c": "At q = q' = 0 at any angular velocity, and without angular velocity to first order: the engine has no terms of angular velocity with q and q'.",
     "d": "To first order without angular velocity: the file has no groups 14 to 18.",
@@ -39,7 +39,7 @@ NOTES = {
     "f": "Gravity acts on masses that the deck gives to the nodes.",
     "g": "Exudyn has Rayleigh damping only, an argument of `AddObjectFFRFreducedOrder`.",
     "h": "Angles between the modes: each is drawn with a factor of its own, in single precision, in metres whatever the units of the body are.",
-    "i": "The moment acts on the axes $e^{\\tilde\\theta}$ at a random q ([6.8](../theory.md)).",
+    "i": "The moment acts on the axes $e^{\\tilde\\theta}$ at a random q ([6.8](../../docs/theory.md)).",
     "j": "Refused (FB720).",
     "l": "At q = 0: Exudyn takes the moment of the undeformed centre of mass.",
     "k": "Without groups 14 to 18 the modes of such a body do not move its centre of mass. `export` refuses it.",

@@ -1,5 +1,5 @@
-//! Extreme bodies: accuracy that remains, and their errors. `scripts/pages/make_stability.py` compares such cases with
-//! high precision and writes `docs/validation/stability.md`.
+//! Extreme bodies: accuracy that remains, and their errors. `evidence/programs/make_stability.py` compares such cases with
+//! high precision and writes `evidence/pages/stability.md`.
 
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};

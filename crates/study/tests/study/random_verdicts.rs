@@ -3,7 +3,7 @@
 //!
 //! The suite runs a few seeds. `FLEXBODY_VERDICTS=200 cargo test -p flexbody-study random_verdicts --
 //! --nocapture` runs 200 and prints the distribution; with `FLEXBODY_BLESS=1` it is written to
-//! `docs/validation/verdicts.md`.
+//! `evidence/pages/verdicts.md`.
 
 use flexbody_base::error::Result;
 use flexbody_body::basis::ModeSettings;
@@ -498,7 +498,7 @@ fn quantiles(mut values: Vec<f64>) -> Option<[f64; 5]> {
     Some([0.0, 0.05, 0.5, 0.95, 1.0].map(|part| values[(part * last as f64).round() as usize]))
 }
 
-/// Returns the tables of the distribution with the names of their places in `docs/validation/verdicts.md`.
+/// Returns the tables of the distribution with the names of their places in `evidence/pages/verdicts.md`.
 fn tables(outcomes: &[Outcome], not_run: &[String]) -> [(&'static str, String); 4] {
     let missing = if not_run.is_empty() { "none".to_owned() } else { not_run.join("; ") };
     let counts = format!("{} scenes were run; not run: {missing}.\n", outcomes.len());
@@ -580,7 +580,7 @@ fn verdict_table(outcomes: &[Outcome]) -> String {
 
 /// Writes the tables into their places in the page.
 fn write_tables(tables: &[(&str, String)]) {
-    let path = oracle::root().join("docs/validation/verdicts.md");
+    let path = oracle::root().join("evidence/pages/verdicts.md");
     let mut page = std::fs::read_to_string(&path).expect("the page");
     for (name, table) in tables {
         let (begin, end) = (format!("<!-- {name} -->\n"), format!("<!-- end of {name} -->"));

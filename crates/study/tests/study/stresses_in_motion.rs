@@ -1,6 +1,6 @@
 //! Stresses of bodies in motion, beside those of the equations of all nodes: modes alone, with static columns of loads and
 //! spin, and with those of the inertia of the deformation. With `FLEXBODY_BLESS` the ignored test writes the table of
-//! `docs/validation/recovery.md`.
+//! `evidence/pages/recovery.md`.
 
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
@@ -192,7 +192,7 @@ fn stresses_in_motion_are_those_of_all_nodes() {
         }
     }
     if std::env::var_os("FLEXBODY_BLESS").is_some() {
-        let path = oracle::root().join("docs/validation/recovery.md");
+        let path = oracle::root().join("evidence/pages/recovery.md");
         let page = std::fs::read_to_string(&path).expect("the page");
         let (begin, end) = ("<!-- motion -->\n", "<!-- end of motion -->");
         let (before, rest) = page.split_once(begin).expect("a place for the table");

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Writes docs/validation/trade.md and docs/images/trade_*.svg: what each scene of fixtures/scenes needs, and what accuracy costs there.
+"""Writes evidence/pages/trade.md and evidence/images/trade_*.svg: what each scene of fixtures/scenes needs, and what accuracy costs there.
 
     pip install numpy scipy h5py exudyn==1.13.6
     cargo build --release --locked
-    python3 scripts/pages/make_trade.py
+    python3 evidence/programs/make_trade.py
 
-Runs in Exudyn and in a C program are those of scripts/pages/trade_seconds.py, in MBDyn those of trade_mbdyn.py where it is installed (the variable MBDYN or the PATH); all of it takes some two hours. `--only PART ...` measures some parts again (a scene by
+Runs in Exudyn and in a C program are those of evidence/programs/trade_seconds.py, in MBDyn those of trade_mbdyn.py where it is installed (the variable MBDYN or the PATH); all of it takes some two hours. `--only PART ...` measures some parts again (a scene by
 the name of its file, or guidelines, block, conversions) and keeps the rest of the page, which is written after each part.
 """
 
@@ -60,15 +60,15 @@ REASONS = {
     "tumbling": "The bracket is thrown undeformed with its full spin, which is a shock: it vibrates at all its frequencies, and those above the modes of the reference are missing in its stress. "
     'With `[initial] deformation = "static"` there is no shock.',
 }
-HEAD = """<!-- Written by scripts/pages/make_trade.py -->
+HEAD = """<!-- Written by evidence/programs/make_trade.py -->
 
 # Cost of accuracy in each scene
 
 For each scene of `fixtures/scenes`: the body that it needs, its error against the finite element model, and the seconds that it takes in two other
-programs. Each part names the versions and the processor that it was measured with. Written by `./scripts/make.sh pages trade`; how `trade` works: [reference](../reference/trade.md).
+programs. Each part names the versions and the processor that it was measured with. Written by `./scripts/make.sh pages trade`; how `trade` works: [reference](../../docs/reference/trade.md).
 
 * **Error**: `flexbody trade MODEL --modes N` simulates candidate bodies and measures each against a reference: 2N modes with residual vectors, enriched with the static
-  responses to the forces that the equations of all nodes leave unbalanced along the motion ([theory](../theory.md), (8.16)). The error of the reference
+  responses to the forces that the equations of all nodes leave unbalanced along the motion ([theory](../../docs/theory.md), (8.16)). The error of the reference
   itself against the FE model is estimated by the same forces and listed. If it exceeds the tolerances (**bold**), `trade` warns (FB548) and exits with 1: errors of such a scene are
   relative to its reference only, and the part of the scene says why.
 * **Runs**: time, error and number of steps are those of one run. The number of steps belongs to a candidate as its modes do: for each candidate and program it is the smallest found for which the error of the run
@@ -86,7 +86,7 @@ programs. Each part names the versions and the processor that it was measured wi
 Terms alone save nothing in Exudyn, whose object has no form without them (`export` writes zeros); only the number of modes counts there. The C program leaves out terms that a body does not hold.
 
 Number of modes that the tolerances of each scene need, by the way in which they are chosen; the lowest first unless stated otherwise. Free modes and residual vectors are tried in the numbers 2N, N, N/2 and N/4 of free modes; shapes of the motion are
-those of `convert --scene --basis scene`, which represent this motion only ([select](../reference/select.md#a-basis-for-one-scene)):
+those of `convert --scene --basis scene`, which represent this motion only ([select](../../docs/reference/select.md#a-basis-for-one-scene)):
 
 {bases}
 
@@ -95,7 +95,7 @@ MBDYN = """* **MBDyn** (in the parts {parts}): `export --to mbdyn` in its modal 
 """
 GUIDE = """## Guidelines I to IV
 
-Guidelines of [WP19], section 8, taken literally as sets of terms ([theory](../theory.md#7-sizes-of-the-terms), section 7), whether or not they cut across a group of the kinetic energy:
+Guidelines of [WP19], section 8, taken literally as sets of terms ([theory](../../docs/theory.md#7-sizes-of-the-terms), section 7), whether or not they cut across a group of the kinetic energy:
 
 | | terms |
 |---|---|
@@ -110,7 +110,7 @@ Guidelines of [WP19], section 8, taken literally as sets of terms ([theory](../t
 In the normal case of guideline IV, W1 Qd omega is the only Coriolis term in the rows of the rotation; slender free bodies need all terms. "IV rotation" and "IV normal" are the two readings of the normal case, without and with
 the Coriolis force on the modes. Where the rotation is prescribed, they equal III and IV apart from the Euler force.
 
-Each set is integrated with the first {few} free modes, by a separate program (numpy and scipy, `scripts/pages/trade_guidelines.py`, from the equations of theory section 3), and compared with all terms.
+Each set is integrated with the first {few} free modes, by a separate program (numpy and scipy, `evidence/programs/trade_guidelines.py`, from the equations of theory section 3), and compared with all terms.
 Its whole motion agrees with `flexbody simulate` to {agree:.0e}. Numbers are attitude errors in radians / errors of the elastic energy's root; **bold** above the tolerance of
 the scene. Bodies with nodal rotations have other equations and are not in the table.
 
@@ -327,7 +327,7 @@ def drawn(told, times, name):
             points.append((seconds, 100 * one.errors["Exudyn"], described(row), bool(row["lumped"]), row["number"] == told["recommended"]))
     if not points:
         return []
-    (ROOT / "docs/images" / f"trade_{name}.svg").write_text(figure(told["scene"], points))
+    (ROOT / "evidence/images" / f"trade_{name}.svg").write_text(figure(told["scene"], points))
     return [f"![error over seconds](../images/trade_{name}.svg)"]
 
 
@@ -538,7 +538,7 @@ def main():
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
-    parser.add_argument("--output", type=Path, default=ROOT / "docs/validation/trade.md")
+    parser.add_argument("--output", type=Path, default=ROOT / "evidence/pages/trade.md")
     names = [*(name for name, *_ in SCENES), *OTHERS]
     parser.add_argument("--only", nargs="+", choices=names, metavar="PART", help=f"measure these parts and keep the rest of the page: {', '.join(names)}")
     args = parser.parse_args()
@@ -601,7 +601,7 @@ def assembled(parts):
     text = HEAD.format(turns=TURNS, table=top, bases=ways, mbdyn=mbdyn_in_words([parts[name][0] for name in scenes]))
     missing = [name for name, *_ in SCENES if name not in parts]
     if missing:
-        text += f"Not measured yet in this form: {', '.join(missing)} (`python3 scripts/pages/make_trade.py --only ...`).\n\n"
+        text += f"Not measured yet in this form: {', '.join(missing)} (`python3 evidence/programs/make_trade.py --only ...`).\n\n"
     sections = {**{name: parts[name][0] for name in scenes}, **{name: parts[name] for name in OTHERS if name in parts}}
     return (text + "".join(f"<!-- part {name} -->\n{section}" for name, section in sections.items())).rstrip() + "\n"
 

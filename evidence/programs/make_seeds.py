@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes docs/validation/seeds.md: how large the invariants and the terms of the equations of motion are on six bodies, and motions with and without terms.
+"""Writes evidence/pages/seeds.md: how large the invariants and the terms of the equations of motion are on six bodies, and motions with and without terms.
 
     python3 -m venv target/peers && target/peers/bin/pip install exudyn==1.13.6 h5py numpy scipy
     cargo build --release --locked
-    target/peers/bin/python scripts/pages/make_seeds.py
+    target/peers/bin/python evidence/programs/make_seeds.py
 
 Bodies are converted by the program, the sizes of the terms are those of `flexbody select --json`; what numpy adds is arithmetic on the arrays of the files.
 """
@@ -287,7 +287,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
-    parser.add_argument("--output", type=Path, default=ROOT / "docs/validation/seeds.md")
+    parser.add_argument("--output", type=Path, default=ROOT / "evidence/pages/seeds.md")
     parser.add_argument("--mbdyn", help="MBDyn of 2024 or later: the slider-crank is run in it too")
     args = parser.parse_args()
     program = Program(args.program)

@@ -1,23 +1,23 @@
-"""The words of docs/validation/seeds.md, with the numbers that make_seeds.py has found."""
+"""The words of evidence/pages/seeds.md, with the numbers that make_seeds.py has found."""
 
 from importlib.metadata import version as version_of
 
 import numpy as np
 
-PAGE = """<!-- Written by scripts/pages/make_seeds.py -->
+PAGE = """<!-- Written by evidence/programs/make_seeds.py -->
 
 # Sizes of the terms
 
 The tables of [WP19] (Witteveen and Pichler, On the relevance of inertia related terms in the equations of motion of a flexible body in the floating frame of reference formulation,
 Multibody System Dynamics 2019) on six bodies of this repository, of the kinds that the paper studies. The bodies differ from those of the paper, and so do the numbers. Every column
-has its formula. Misprints of the paper are corrected as in [theory, section 11](../theory.md#11-errors-in-the-literature).
+has its formula. Misprints of the paper are corrected as in [theory, section 11](../../docs/theory.md#11-errors-in-the-literature).
 
 | body | model | mass (kg) | largest extent (m) | modes | frequencies (Hz) |
 |---|---|---|---|---|---|
 @BODIES@
 
 Made by `./scripts/make.sh pages seeds` with `flexbody` @VERSION@ and Exudyn @EXUDYN@. Free-surface modes, mass-normalised, about the centre of mass along principal axes; all numbers in kg, m, s. The car body has
-nodal rotations, so that its arrays are those of [theory, section 6](../theory.md#6-mass-matrices-that-do-not-commute-with-a-rotation).
+nodal rotations, so that its arrays are those of [theory, section 6](../../docs/theory.md#6-mass-matrices-that-do-not-commute-with-a-rotation).
 
 ## The invariants ([WP19] Tables 2 and 3)
 
@@ -31,7 +31,7 @@ move all nodes in one direction: such modes do not couple by rotation. The array
 
 ## Ratios of terms ([WP19] Tables 4 and 5)
 
-Sizes of the terms as `flexbody select --json` states them under `significance` (`tier_1`, with the norms of the arrays): the formulas are those of [theory, section 7](../theory.md#7-sizes-of-the-terms). The body turns with a tenth of its first
+Sizes of the terms as `flexbody select --json` states them under `significance` (`tier_1`, with the norms of the arrays): the formulas are those of [theory, section 7](../../docs/theory.md#7-sizes-of-the-terms). The body turns with a tenth of its first
 frequency, omega = @SPEED@ Omega_1, about the principal axis where the term is largest, alpha = omega^2, and the deflection is @DEFLECTION@ of the largest extent: |q| is the amplitude that moves a node by that. The first three stand beside I0, the other four of them beside
 the elastic or the inertia forces of the modes. The Coriolis torque (W1 Qd + Q'W2 Qd + Qd'W2 Q) omega, in its corrected form, stands beside I0 omega Omega_1 with the amplitudes of the [modes below](#significance-of-every-mode-wp19-27-28-36-to-40) at
 their own frequencies: about each axis the sum over the modes of the magnitudes, largest over the axes.

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Stresses of bodies beside those of CalculiX for all nodes: writes docs/validation/recovery.md.
+"""Stresses of bodies beside those of CalculiX for all nodes: writes evidence/pages/recovery.md.
 
     apt install calculix-ccx; pip install numpy scipy h5py
     cargo build --release --locked
-    python3 scripts/pages/make_recovery.py
+    python3 evidence/programs/make_recovery.py
 """
 
 import argparse
@@ -35,18 +35,18 @@ LIMITS = [
     ("stresses of modes and static columns", "recovery = { all = 0.01 }"),
     ("stresses of modes alone", "recovery = { all = { limit = 0.01, static_columns = false } }"),
 ]
-HEAD = """<!-- Written by scripts/pages/make_recovery.py -->
+HEAD = """<!-- Written by evidence/programs/make_recovery.py -->
 
 # Stresses beside CalculiX
 
-Stresses of bodies with 10 modes whose recovery was made by [one run of CalculiX {calculix}](../how_to/stresses_from_calculix.md), beside static runs of CalculiX with all nodes.
+Stresses of bodies with 10 modes whose recovery was made by [one run of CalculiX {calculix}](../../docs/how_to/stresses_from_calculix.md), beside static runs of CalculiX with all nodes.
 Written by `./scripts/make.sh pages recovery`. The error is the largest difference of a component at any node, relative to the largest component. Digits: those of the answers of CalculiX to the shapes.
 Modes follow the load statically; the bodies spin about the principal axis of their largest moment of inertia.
 """
 SELECTION = """
 ## Modes that 1 % takes
 
-Modes that `select` keeps of bodies with {modes} modes, for an error of 1 % at any instant in the estimate by elastic energy or in the von Mises stress at any node ([limits of recoveries](../reference/recovery.md#limits-of-the-error)). A sine of
+Modes that `select` keeps of bodies with {modes} modes, for an error of 1 % at any instant in the estimate by elastic energy or in the von Mises stress at any node ([limits of recoveries](../../docs/reference/recovery.md#limits-of-the-error)). A sine of
 two periods of the first frequency f1 acts at one interface in all directions, from equilibrium; no variations. The reference is the body with all its modes and static columns; "more" than that: the modes alone do not reach 1 %.
 
 """
@@ -57,7 +57,7 @@ MOTION = """
 
 Bodies of bricks beside the equations of motion of all nodes, of which the modes are the lowest free ones (`crates/study/tests/study/stresses_in_motion.rs`). The error is the largest von Mises stress of the difference of two stresses, at any element and
 instant, relative to the largest von Mises stress. f1 is the first frequency of the free body; the loads act at one interface; the bracket that tumbles is deflected by 1.6 % of its size. The last column has `deformed_inertia = true`
-([forces of motion](../reference/recovery.md#forces-of-motion)).
+([forces of motion](../../docs/reference/recovery.md#forces-of-motion)).
 
 """
 TAIL = """
@@ -253,7 +253,7 @@ def worst(ours, theirs):
 def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--program", default=os.environ.get("FLEXBODY", ROOT / "target/release/flexbody"), type=Path)
-    options.add_argument("--output", default=ROOT / "docs/validation/recovery.md", type=Path)
+    options.add_argument("--output", default=ROOT / "evidence/pages/recovery.md", type=Path)
     given = options.parse_args()
     ccx = shutil.which(os.environ.get("CCX", "ccx")) or sys.exit("CalculiX (ccx) is not found: apt install calculix-ccx")
     version = subprocess.run([ccx, "-v"], capture_output=True, text=True).stdout.split()[-1]

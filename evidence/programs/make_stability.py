@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes docs/validation/stability.md: the digits that flexbody keeps of extreme bodies, against the same computation with 120 digits.
+"""Writes evidence/pages/stability.md: the digits that flexbody keeps of extreme bodies, against the same computation with 120 digits.
 
     pip install numpy h5py gmpy2
     cargo build --release --locked --bins --example extreme_motion
-    python3 scripts/pages/make_stability.py
+    python3 evidence/programs/make_stability.py
 """
 
 import argparse
@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[2]
 QUANTITIES = ("f", "I0", "W1", "W2", "W3", "tumbling")
 TOLD = {"FB311", "FB425", "FB510"}
 SILENT = 3e-6  # three times what the diagnostics allow
-HEAD = """<!-- Written by scripts/pages/make_stability.py -->
+HEAD = """<!-- Written by evidence/programs/make_stability.py -->
 
 # Stability at the extremes
 
@@ -42,14 +42,14 @@ separates two errors:
   can be more exact.
 * **out**: the additional error of `flexbody`: its results, compared with exact results of the same files.
 
-`f` are the frequencies, the worst of all modes. I0, W1, W2, W3 are compared entry by entry relative to their Cauchy-Schwarz bounds ([theory](../theory.md#9-lumped-comparators) section 9)
+`f` are the frequencies, the worst of all modes. I0, W1, W2, W3 are compared entry by entry relative to their Cauchy-Schwarz bounds ([theory](../../docs/theory.md#9-lumped-comparators) section 9)
 in the frame of the file, the modes of eigenvalues within 10^-6 of each other turned into each other first; the worst entry counts. Modes whose eigenvalues
 differ by a part g are known to 10^-16 / g at best, which explains `out` of W1 to W3 beside better frequencies. `tumbling` is the state (attitude, rates, deformation)
 after the body tumbled free for {turns} periods of its first mode at a twentieth of its frequency about an axis between the principal ones, with the modes up to ten times the first.
 16 stands for 16 or more. *told* lists warnings and notes of the run; *refused* is an error with its exit code, and no file.
 
 Every file was checked against its model (`flexbody check --against`): all passed. No case has an error above 10^-6 in frequencies, I0 or W1, or from its files in W2 and W3,
-without a warning that says so. Where rounding keeps the K-residuals above those that `standard` promises, modes are projected in twice the precision ([theory](../theory.md#8-modes), after (8.4)): most frequencies then keep
+without a warning that says so. Where rounding keeps the K-residuals above those that `standard` promises, modes are projected in twice the precision ([theory](../../docs/theory.md#8-modes), after (8.4)): most frequencies then keep
 all digits of the files, and W2 and W3 the digits that the distance of the modes permits. Tumbling has no digits where the mass matrix of a bent needle is singular to double precision. `./scripts/make.sh pages stability`
 writes this page, and fails if this is not so; `crates/body/tests/body/extremes.rs` tests these statements.
 
@@ -246,7 +246,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
-    parser.add_argument("--output", type=Path, default=ROOT / "docs/validation/stability.md")
+    parser.add_argument("--output", type=Path, default=ROOT / "evidence/pages/stability.md")
     parser.add_argument("--motion", default=str(target / "release" / "examples" / "extreme_motion"), help="that example (default: the release build)")
     args = parser.parse_args()
     program = str(Path(args.program).resolve())  # it runs in another folder
@@ -261,7 +261,7 @@ def main():
         out += [f"## {title}", "", what, "", *table(rows), ""]
     out += motion((program, str(Path(args.motion).resolve())), bricks((3, 1, 1), BAR))
     args.output.write_text("\n".join(out).rstrip() + "\n", encoding="utf-8")
-    (ROOT / "docs/images/stability.svg").write_text(figure(results), encoding="utf-8")
+    (ROOT / "evidence/images/stability.svg").write_text(figure(results), encoding="utf-8")
     if silent:
         sys.exit(f"errors above {SILENT:.0e} without a warning: {'; '.join(silent)}")
     print(args.output)

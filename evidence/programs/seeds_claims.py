@@ -1,4 +1,4 @@
-"""Sections of docs/validation/seeds.md on motions with and without terms, and on the claims of the paper; for make_seeds.py."""
+"""Sections of evidence/pages/seeds.md on motions with and without terms, and on the claims of the paper; for make_seeds.py."""
 
 import numpy as np
 

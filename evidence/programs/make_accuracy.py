@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Converts the models of fixtures/models and writes docs/validation/accuracy.md: differences from the reference numbers beside the models.
+"""Converts the models of fixtures/models and writes evidence/pages/accuracy.md: differences from the reference numbers beside the models.
 
     pip install numpy h5py
     cargo build --release --locked
-    python3 scripts/pages/make_accuracy.py
+    python3 evidence/programs/make_accuracy.py
 """
 
 import argparse
@@ -21,7 +21,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 SCHEMES = ("row-sum", "diagonal-scaling")
 BLOCKS = (3000, 30000)
-HEAD = """<!-- Written by scripts/pages/make_accuracy.py -->
+HEAD = """<!-- Written by evidence/programs/make_accuracy.py -->
 
 # Accuracy
 
@@ -180,7 +180,7 @@ def page(models, others, certificates, version):
     out += table(["model", "mass", "centre of mass", "inertia", "I0", "W1", "W2", "W3", "row-sum W", "diagonal-scaling W"],
                  [[m["name"], *(digits(m[k]) for k in ("mass", "com", "inertia")), *(digits(m["invariants"][k]) for k in ("I0", "W1", "W2", "W3")),
                    *(digits(m["lumped"][s]) for s in SCHEMES)] for m in models])
-    out += ["## Errors of lumped masses", "", "Error norms of [theory](../theory.md) section 9 (`max`: largest entry, otherwise spectral norm), same modes. Rounding counts as 0.", ""]
+    out += ["## Errors of lumped masses", "", "Error norms of [theory](../../docs/theory.md) section 9 (`max`: largest entry, otherwise spectral norm), same modes. Rounding counts as 0.", ""]
     rows = []
     for m in models:
         for s in SCHEMES:
@@ -196,7 +196,7 @@ def page(models, others, certificates, version):
         rows.append([m["name"], f"{sum(c['passed'] for c in checks)} of {len(checks)}", f"`{worst['name']}`: {digits(worst['value'])} of {digits(worst['limit'])}"])
     out += table(["model", "hold", "closest"], rows)
     out += ["## Nodal rotations, constraints, internal rows", "",
-            "Models of elements written for the purpose (`fixtures/make/make_general.py`), compared with dense products of [theory](../theory.md) section 6 by numpy: beams and shells, a "
+            "Models of elements written for the purpose (`fixtures/make/make_general.py`), compared with dense products of [theory](../../docs/theory.md) section 6 by numpy: beams and shells, a "
             "rigid connection eliminated in the matrices, bubbles and hierarchical functions without coordinates, massless rotations and spring ends. Frobenius norms about the centre of mass, "
             "relative to what the Cauchy-Schwarz inequality allows.", ""]
     out += table(["model", "element", "DOF", "mass structure", "eigenvalues, scipy", "mass", "I0", "W0", "W1", "W2", "W3", "complete", "identities hold"],
@@ -204,7 +204,7 @@ def page(models, others, certificates, version):
                    *(digits(m["norms"][k]) for k in ("I0", "W0", "W1", "W2", "W3")), "proved" if m["proved"] else "not proved", "{0} of {1}".format(*m["checks"])]
                   for m in others])
     out += ["## Accuracy `certified`", "",
-            "Guarantees of [theory](../theory.md) section 8 and their cost: lower and upper bounds of every eigenvalue, of the error of every mode, of the rounding in every "
+            "Guarantees of [theory](../../docs/theory.md) section 8 and their cost: lower and upper bounds of every eigenvalue, of the error of every mode, of the rounding in every "
             "invariant; 20 modes. The blocks come from `benches/make_block.py`. CPU time of one thread, without reading and writing.", ""]
     out += table(["model", "DOF", "widest bounds", "digits of eigenvalues", "shape error", "digits of invariants", "counts below and above", "check", "factorisations",
                   "CPU s, `standard`", "CPU s, `certified`", "ratio"],
@@ -218,7 +218,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
-    parser.add_argument("--output", type=Path, default=ROOT / "docs/validation/accuracy.md")
+    parser.add_argument("--output", type=Path, default=ROOT / "evidence/pages/accuracy.md")
     args = parser.parse_args()
     folders = sorted(f.parent for f in (ROOT / "fixtures" / "models").glob("*/matrices.inp.gz"))
     rest = sorted(f.parent for f in (ROOT / "fixtures" / "models").glob("*/expected.json") if f.parent not in folders)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Geometric stiffness from the stresses of CalculiX beside element code, and a blade under spin beside CalculiX: writes docs/validation/geometric_stiffness.md.
+"""Geometric stiffness from the stresses of CalculiX beside element code, and a blade under spin beside CalculiX: writes evidence/pages/geometric_stiffness.md.
 
     apt install calculix-ccx; pip install numpy scipy h5py
     cargo build --release --locked
-    python3 scripts/pages/make_geometric_stiffness.py
+    python3 evidence/programs/make_geometric_stiffness.py
 """
 
 import argparse
@@ -27,11 +27,11 @@ KINDS = ["C3D4", "C3D8", "C3D10", "C3D20"]
 # Radius of the root, and spin of the rotor over the first frequency of the blade at rest.
 HUB, SPIN_RATIO = 0.2, 0.83
 MODES = 5
-HEAD = """<!-- Written by scripts/pages/make_geometric_stiffness.py -->
+HEAD = """<!-- Written by evidence/programs/make_geometric_stiffness.py -->
 
 # Geometric stiffness beside element code and CalculiX
 
-Written by `./scripts/make.sh pages geometric_stiffness` with CalculiX {calculix}, by the steps of [geometric stiffness from CalculiX](../how_to/geometric_stiffness.md).
+Written by `./scripts/make.sh pages geometric_stiffness` with CalculiX {calculix}, by the steps of [geometric stiffness from CalculiX](../../docs/how_to/geometric_stiffness.md).
 
 ## Rows of K_geo
 
@@ -253,7 +253,7 @@ def frequencies(stiffness, mass):
 def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--program", default=os.environ.get("FLEXBODY", ROOT / "target/release/flexbody"), type=Path)
-    options.add_argument("--output", default=ROOT / "docs/validation/geometric_stiffness.md", type=Path)
+    options.add_argument("--output", default=ROOT / "evidence/pages/geometric_stiffness.md", type=Path)
     chosen = options.parse_args()
     ccx = shutil.which(os.environ.get("CCX", "ccx")) or sys.exit("CalculiX (ccx) is not found: apt install calculix-ccx")
     version = subprocess.run([ccx, "-v"], capture_output=True, text=True).stdout.split()[-1]
@@ -293,7 +293,7 @@ stiffness.
 
 ## A plate with preload
 
-A free plate of C3D20, {1000 * Plate.SIZE[0]:.0f} x {1000 * Plate.SIZE[1]:.0f} x {1000 * Plate.SIZE[2]:.0f} mm, whose middle has an initial stress of 60 MPa along both sides, by the steps of [parts with a preload](../how_to/geometric_stiffness.md#parts-with-a-preload). CalculiX:
+A free plate of C3D20, {1000 * Plate.SIZE[0]:.0f} x {1000 * Plate.SIZE[1]:.0f} x {1000 * Plate.SIZE[2]:.0f} mm, whose middle has an initial stress of 60 MPa along both sides, by the steps of [parts with a preload](../../docs/how_to/geometric_stiffness.md#parts-with-a-preload). CalculiX:
 `*STEP, NLGEOM` with `*STATIC`, then `*STEP, PERTURBATION` with `*FREQUENCY`.
 
 | mode | without preload, Hz | CalculiX, Hz | body, Hz | body less CalculiX |

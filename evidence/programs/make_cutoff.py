@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes docs/validation/cutoff.md: what modes up to a frequency miss of the centrifugal response of a curved plate, and what residual vectors leave.
+"""Writes evidence/pages/cutoff.md: what modes up to a frequency miss of the centrifugal response of a curved plate, and what residual vectors leave.
 
     pip install numpy scipy
     cargo build --release --locked
-    python3 scripts/pages/make_cutoff.py
+    python3 evidence/programs/make_cutoff.py
 """
 
 import argparse
@@ -24,7 +24,7 @@ CELLS = (8, 6, 1)
 COUNTS = (5, 10, 20, 50)
 NODES = [s for s in itertools.product((-1, 0, 1), repeat=3) if s.count(0) <= 1]  # of a 20-node hexahedron
 SPINS = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
-HEAD = """<!-- Written by scripts/pages/make_cutoff.py -->
+HEAD = """<!-- Written by evidence/programs/make_cutoff.py -->
 
 # Frequency cut-off and residual vectors
 
@@ -32,7 +32,7 @@ A free steel plate of 1 x 0.75 x 0.01 m, bent to an arc of 0.8 rad along its lon
 freedom, modes from {first:.0f} Hz. It spins about the axes of the model: x along the arc, y straight, z across the plate in its middle. The response is
 mostly bending, which the first modes contain, and to about a tenth in-plane stretching, which none of the first fifty modes contains.
 
-Errors (8.13) of the static response to the centrifugal loads in the norm of K, of [theory](../theory.md#8-modes) section 8. `flexbody` {version}
+Errors (8.13) of the static response to the centrifugal loads in the norm of K, of [theory](../../docs/theory.md#8-modes) section 8. `flexbody` {version}
 computes the modes; the exact response is a dense solve by scipy. Written by `./scripts/make.sh pages cutoff`; `crates/body/tests/body/residual_vectors.rs` tests the figures.
 
 """
@@ -122,7 +122,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
-    parser.add_argument("--output", type=Path, default=ROOT / "docs/validation/cutoff.md")
+    parser.add_argument("--output", type=Path, default=ROOT / "evidence/pages/cutoff.md")
     args = parser.parse_args()
     args.program = str(Path(args.program).resolve())  # it runs in another folder
     version = subprocess.run([args.program, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
