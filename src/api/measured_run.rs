@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 pub struct MotionHistory(scene::MotionHistory);
 
 impl MotionHistory {
-    /// Reads the table of a run for a body with `n_modes` modes, see `docs/reference/measure.md`.
+    /// Reads the table of a run for a body with `n_modes` modes, see `docs/how_to/known_error.md`.
     ///
     /// # Errors
     /// FB215 for missing columns; FB216 for rows that cannot be read; FB101 if there is no such file.
