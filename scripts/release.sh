@@ -15,7 +15,7 @@
 # (musl-tools of Debian and Ubuntu, musl-gcc of Fedora, or MUSL_CC=compiler), dpkg, python3 with venv and pip, and docker, podman or
 # buildah. Every file is tested where nothing else is: in an empty folder as the file system (root, or user namespaces), in an image, in an
 # empty virtual environment. FLEXBODY=program is an ordinary build of the same
-# sources to compare with, which is then not built. docs/reference/versions.md says what else belongs to a release: that ./.ci/run passes.
+# sources to compare with, which is then not built. CONTRIBUTING.md says what else belongs to a release: that ./.ci/run passes.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/cmake.sh
@@ -130,7 +130,7 @@ for model in connecting_rod bracket_hex20 frame_beams; do
     if cmp --silent "$work/$model.ordinary.flex.h5" "$work/$model.static.flex.h5"; then
         echo "   $model: the same bytes"
     else
-        # METIS takes rand() of the C library, and principal axes its hypot(): docs/reference/versions.md.
+        # METIS takes rand() of the C library, and principal axes its hypot(): evidence/pages/promises.md.
         echo "   $model: the same body, not to the last bit"
     fi
 done
