@@ -7,7 +7,7 @@ author = "the flexbody developers"
 # MathJax is part of the site, so that formulas appear without a network.
 extensions = ["myst_parser", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
 root_doc = "README"
-include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "fixtures/README.md", "fixtures/cases/README.md", "python/README.md", "docs/*.md", "docs/**/*.md", "evidence/**/*.md"]
+include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "fixtures/README.md", "fixtures/cases/README.md", "python/README.md", "docs/*.md", "docs/**/*.md", "evidence/*.md", "evidence/**/*.md"]
 # Headings are link targets and formulas stand between dollars, as where the sources are read.
 myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath"]
