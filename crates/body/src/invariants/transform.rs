@@ -429,7 +429,8 @@ pub fn s_of_modal_mass(
 ) -> [[Mat<f64>; 3]; 3] {
     let mut s = [(); 3].map(|()| [(); 3].map(|()| Mat::zeros(nf, nf)));
     if let Some(m) = modal_mass {
-        s[0][0] = Mat::from_fn(nf, nf, |i, j| 0.5 * m[(i, j)]);
+        // Without the sign of a zero, which their sum with the zeros of the third array loses.
+        s[0][0] = Mat::from_fn(nf, nf, |i, j| 0.5 * m[(i, j)] + 0.0);
         s[1][1] = s[0][0].clone();
     }
     if let Some(w3) = w3 {
