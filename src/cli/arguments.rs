@@ -15,6 +15,7 @@ use flexbody_body::flex_body::Storage;
 use flexbody_formats::export::ExportFormat;
 use flexbody_formats::{FORMATS, IMPORT_FORMATS};
 use flexbody_study::trade::ReferenceChoice;
+use headings::{COST, FORMAT, LOSSES, MODEL, MODES, OUTPUT, SCENE};
 use std::path::PathBuf;
 
 pub(super) use cluster::{AssembleArguments, BatchArguments, EngineArguments, EngineName, PrepareArguments};
@@ -150,17 +151,17 @@ pub enum Command {
 pub struct StatedArguments {
     /// Groups of terms of the body instead of a selection: W1, W2, W3 with commas, none, all, or the groups of a
     /// guideline of Witteveen and Pichler: I, II, III, IV
-    #[arg(long, value_name = "GROUPS", conflicts_with = "from")]
+    #[arg(long, value_name = "GROUPS", conflicts_with = "from", help_heading = SCENE)]
     pub terms: Option<String>,
     /// Numbers of the modes that the body keeps, instead of a selection: 1,3,5-9
-    #[arg(long, value_name = "NUMBERS", conflicts_with_all = ["from", "split"])]
+    #[arg(long, value_name = "NUMBERS", conflicts_with_all = ["from", "split"], help_heading = SCENE)]
     pub keep_modes: Option<String>,
     /// With --basis scene: number of shapes of the motion [default: the fewest that suffice]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "from")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "from", help_heading = SCENE)]
     pub motion_shapes: Option<u32>,
     /// With --scene and stated parts: static responses are added until the truncation error of the body is estimated
     /// to be below a tenth of the tolerances (standard) or a hundredth (fine, as for trade --reference fine)
-    #[arg(long, value_enum, default_value_t = EnrichmentName::Standard, requires = "scene")]
+    #[arg(long, value_enum, default_value_t = EnrichmentName::Standard, requires = "scene", help_heading = SCENE)]
     pub enrichment: EnrichmentName,
 }
 
@@ -238,37 +239,37 @@ pub struct ExportArguments {
     #[arg(value_name = "BODY.flex.h5")]
     pub body: PathBuf,
     /// Format to write
-    #[arg(long, value_name = "FORMAT", value_parser = export_formats())]
+    #[arg(long, value_name = "FORMAT", value_parser = export_formats(), help_heading = FORMAT)]
     pub to: String,
     /// Variant of the format, one of those listed above [default: the first]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = FORMAT)]
     pub dialect: Option<String>,
     /// With --to mbdyn: the last record group that the reader supports; short for --dialect level13 or level19
-    #[arg(long, value_name = "LEVEL", value_parser = ["13", "19"], conflicts_with = "dialect")]
+    #[arg(long, value_name = "LEVEL", value_parser = ["13", "19"], conflicts_with = "dialect", help_heading = FORMAT)]
     pub mbdyn_level: Option<String>,
     /// Places of the body to write: nodes, interfaces, node numbers with commas, or both as in interfaces,17,23
     /// [default: the interfaces if the format has frames and the body has interfaces, else all nodes]
-    #[arg(long, value_name = "POINTS")]
+    #[arg(long, value_name = "POINTS", help_heading = FORMAT)]
     pub points: Option<String>,
     /// With --to vtk or gltf: number of modes to show, the first N [default: vtk all, gltf 8]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = FORMAT)]
     pub modes: Option<u32>,
     /// With --to vtk (.pvd) or gltf: the motion to show instead of modes, a file written by `simulate -o`
-    #[arg(long, value_name = "MOTION.h5", conflicts_with = "to_units")]
+    #[arg(long, value_name = "MOTION.h5", conflicts_with = "to_units", help_heading = FORMAT)]
     pub simulation: Option<PathBuf>,
     /// Scene for which the errors of losses are stated that grow with the motion, the largest over its load cases;
     /// above 5 % of a deflection they need --allow-loss [default: the motion at which they reach 1 %]
-    #[arg(long, value_name = "SCENE.toml")]
+    #[arg(long, value_name = "SCENE.toml", help_heading = LOSSES)]
     pub scene: Option<PathBuf>,
     /// Units to write in [default: those of the body]
-    #[arg(long, value_name = "L,M,T")]
+    #[arg(long, value_name = "L,M,T", help_heading = FORMAT)]
     pub to_units: Option<String>,
     /// Write the file even if the format cannot hold all of the body; with names, such as damping,rotations, only these
     /// may be lost (without the option: losses that are small, or that only fast motions make large)
-    #[arg(long, value_name = "NAMES", num_args = 0..=1, require_equals = true, value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES", num_args = 0..=1, require_equals = true, value_delimiter = ',', help_heading = LOSSES)]
     pub allow_loss: Option<Vec<String>>,
     /// File to write; further files have its name and another extension
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", help_heading = OUTPUT)]
     pub output: PathBuf,
     /// Options of printing.
     #[command(flatten)]
@@ -321,28 +322,28 @@ fn job_programs() -> clap::builder::PossibleValuesParser {
 #[derive(Debug, Clone, Default, Args)]
 pub struct JobArguments {
     /// FE program that has written the job [default: detected from its files]
-    #[arg(long, value_name = "PROGRAM", value_parser = job_programs())]
+    #[arg(long, value_name = "PROGRAM", value_parser = job_programs(), help_heading = MODEL)]
     pub format: Option<String>,
     /// Names of the stiffness and the mass matrix of the job, if it has several pairs (Nastran)
-    #[arg(long, value_name = "K,M")]
+    #[arg(long, value_name = "K,M", help_heading = MODEL)]
     pub matrices: Option<String>,
     /// Units of length, mass and time if no manifest states them [default: m,kg,s; refused if the density is
     /// implausible]
-    #[arg(long, value_name = "L,M,T")]
+    #[arg(long, value_name = "L,M,T", help_heading = MODEL)]
     pub units: Option<String>,
     /// 2 for a plane model, with x and y only, if no manifest states it [default: 3]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=3))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=3), help_heading = MODEL)]
     pub dimension: Option<u8>,
     /// Interface of a model without a manifest: NAME=SET of its node sets, or in place of SET nodes:1/2/3, file:TABLE.csv,
     /// box:X/Y/Z:X/Y/Z (corners), cylinder:X/Y/Z:X/Y/Z:R (ends of the axis, largest radius or least/largest),
     /// plane:X/Y/Z:X/Y/Z:WITHIN (point, normal, distance) or nearest:X/Y/Z:COUNT; then a coupling (rigid, averaging,
     /// free) and a reference point in model axes or node:N, each after a comma, as in bore=SET_BORE,rigid,0/0/12.5
     /// (repeatable) [default point: the centre of its faces, of a cylinder a point on its axis]
-    #[arg(long, value_name = "NAME=NODES[,COUPLING][,POINT]")]
+    #[arg(long, value_name = "NAME=NODES[,COUPLING][,POINT]", help_heading = MODEL)]
     pub interface: Vec<String>,
     /// Damping of a model without a manifest: a ratio of every mode (0.02 or 2%), rayleigh=ALPHA,BETA,
     /// bands=100:0.01,1000:0.1,1 (ends in hertz with ratios, the last without end) or matrix=FILE
-    #[arg(long, value_name = "RATIO|NAME=VALUES", allow_hyphen_values = true)]
+    #[arg(long, value_name = "RATIO|NAME=VALUES", allow_hyphen_values = true, help_heading = MODEL)]
     pub damping: Option<String>,
 }
 
@@ -357,37 +358,37 @@ pub struct TradeArguments {
     #[command(flatten)]
     pub job: JobArguments,
     /// Scene with the motion and the tolerances (see docs/reference/scenes.md)
-    #[arg(long, value_name = "SCENE.toml")]
+    #[arg(long, value_name = "SCENE.toml", help_heading = SCENE)]
     pub scene: PathBuf,
     /// Load case of the scene, by name [default: all; the worst case of a candidate counts]
-    #[arg(long, value_name = "NAME", requires = "scene")]
+    #[arg(long, value_name = "NAME", requires = "scene", help_heading = SCENE)]
     pub case: Option<String>,
     /// Reference of the errors: full, the body with all modes and groups, for a model with twice the modes and residual
     /// vectors; nodal, the unreduced equations (models only)
-    #[arg(long, value_parser = names::reference(), default_value = ReferenceChoice::default().name())]
+    #[arg(long, value_parser = names::reference(), default_value = ReferenceChoice::default().name(), help_heading = COST)]
     pub reference: ReferenceChoice,
     /// Largest number of free modes of the candidates of a model
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..100_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..100_000), help_heading = MODES)]
     pub modes: Option<u32>,
     /// Timing runs per candidate (the median is reported)
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..), help_heading = COST)]
     pub repeat: u16,
     /// Table of the candidates to write
-    #[arg(long, value_name = "TRADE.csv")]
+    #[arg(long, value_name = "TRADE.csv", help_heading = OUTPUT)]
     pub csv: Option<PathBuf>,
     /// Folder to write the body of every candidate to, as candidate_NNN.flex.h5 with its number: for timing in another
     /// program
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "FOLDER", help_heading = OUTPUT)]
     pub bodies: Option<PathBuf>,
     /// Allow work that is estimated to take more than half an hour: modes, or the motion of all nodes
-    #[arg(long)]
+    #[arg(long, help_heading = COST)]
     pub allow_long: bool,
     /// Report to write, with the plot as .html; format by extension: .html, .json or .txt (repeatable)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub report: Vec<PathBuf>,
     /// Number of threads, at most four for each processor or 64; all results except times are independent of it
     /// [default: all processors]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), help_heading = COST)]
     pub threads: Option<u16>,
     /// Options of printing.
     #[command(flatten)]
@@ -404,23 +405,23 @@ pub struct SelectArguments {
     #[command(flatten)]
     pub job: JobArguments,
     /// Scene with the motion and the tolerances (see docs/reference/scenes.md)
-    #[arg(long, value_name = "SCENE.toml")]
+    #[arg(long, value_name = "SCENE.toml", help_heading = SCENE)]
     pub scene: PathBuf,
     /// Load case of the scene, by name [default: all, which one body must serve]
-    #[arg(long, value_name = "NAME", requires = "scene")]
+    #[arg(long, value_name = "NAME", requires = "scene", help_heading = SCENE)]
     pub case: Option<String>,
     /// For a model: number of free modes to select from [default: up to twice the band of the scene, else 20]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = MODES)]
     pub modes: Option<u32>,
     /// Allow work that is estimated to take more than half an hour for its number of modes
-    #[arg(long)]
+    #[arg(long, help_heading = COST)]
     pub allow_long: bool,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub report: Vec<PathBuf>,
     /// Number of threads, at most four for each processor or 64; results are independent of it [default: all
     /// processors]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), help_heading = COST)]
     pub threads: Option<u16>,
     /// Options of printing.
     #[command(flatten)]
@@ -434,30 +435,30 @@ pub struct SimulateArguments {
     #[arg(value_name = "BODY.flex.h5")]
     pub body: PathBuf,
     /// Scene with the motion (see docs/reference/scenes.md)
-    #[arg(long, value_name = "SCENE.toml")]
+    #[arg(long, value_name = "SCENE.toml", help_heading = SCENE)]
     pub scene: PathBuf,
     /// Load case of the scene, by name [default: all, one after the other; file names contain the case names]
-    #[arg(long, value_name = "NAME", requires = "scene")]
+    #[arg(long, value_name = "NAME", requires = "scene", help_heading = SCENE)]
     pub case: Option<String>,
     /// Number of threads, at most four for each processor or 64; results are independent of it [default: all
     /// processors]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), help_heading = COST)]
     pub threads: Option<u16>,
     /// HDF5 file to write the motion to
-    #[arg(short, long, value_name = "MOTION.h5")]
+    #[arg(short, long, value_name = "MOTION.h5", help_heading = OUTPUT)]
     pub output: Option<PathBuf>,
     /// Table to write the motion to
-    #[arg(long, value_name = "MOTION.csv")]
+    #[arg(long, value_name = "MOTION.csv", help_heading = OUTPUT)]
     pub csv: Option<PathBuf>,
     /// File to write the rows of all recoveries of the body to, .csv or .h5
-    #[arg(long, value_name = "ROWS.csv|ROWS.h5")]
+    #[arg(long, value_name = "ROWS.csv|ROWS.h5", help_heading = OUTPUT)]
     pub rows: Option<PathBuf>,
     /// File to write the largest stresses of every point of the recoveries over the motion to, over all load cases: a table
     /// (.csv), or the body with them at its nodes (.vtu); reports draw them as well
-    #[arg(long, value_name = "FILE.csv|FILE.vtu")]
+    #[arg(long, value_name = "FILE.csv|FILE.vtu", help_heading = OUTPUT)]
     pub envelope: Option<PathBuf>,
     /// Report to write, with plots as .html; format by extension: .html, .json or .txt (repeatable)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub report: Vec<PathBuf>,
     /// Options of printing.
     #[command(flatten)]
@@ -542,13 +543,13 @@ pub struct CompareArguments {
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Printing {
     /// Print one JSON object: results, diagnostics, whether all passed (schemas/output.schema.json)
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     pub json: bool,
     /// Treat a warning as a failed check: exit code 1, and no file is written
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     pub deny_warnings: bool,
     /// Print errors only
-    #[arg(short, long)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub quiet: bool,
 }
 

@@ -10,13 +10,13 @@ const PROGRAM: &str = "flexbody";
 
 pub(super) fn completions(arguments: &CompletionsArguments) -> Result<Outcome> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Arguments::grouped(), PROGRAM, &mut script);
+    clap_complete::generate(arguments.shell, &mut Arguments::definition(), PROGRAM, &mut script);
     printed(script)
 }
 
 pub(super) fn man(arguments: &ManArguments) -> Result<Outcome> {
     // Adds the common options to the commands.
-    let mut program = Arguments::grouped();
+    let mut program = Arguments::definition();
     program.build();
     let page = match &arguments.command {
         None => clap_mangen::Man::new(program),

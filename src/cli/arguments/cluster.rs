@@ -1,5 +1,6 @@
 //! Arguments of the commands for clusters and batches.
 
+use super::headings::{CLUSTER, COMPARISON, COST, FRAME, MODEL, MODES, OUTPUT};
 use super::{JobArguments, Printing, memory_size, names, positive};
 use clap::{Args, ValueEnum};
 use flexbody_body::flex_body::Storage;
@@ -19,26 +20,26 @@ pub struct PrepareArguments {
     #[command(flatten)]
     pub job: JobArguments,
     /// Treat implausible densities, and mass coupling without stiffness, as warnings instead of errors
-    #[arg(long)]
+    #[arg(long, help_heading = MODEL)]
     pub allow_implausible: bool,
     /// Leave rotations that only elements that are not quite coplanar hold as K has them, instead of making them
     /// follow the nodes around them (FB428)
-    #[arg(long)]
+    #[arg(long, help_heading = MODEL)]
     pub keep_soft_rotations: bool,
     /// Folder to write, with all that the cluster needs; it is created if it does not exist
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", help_heading = OUTPUT)]
     pub output: PathBuf,
     /// Number of flexible modes [default: 20]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "max_frequency")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "max_frequency", help_heading = MODES)]
     pub modes: Option<u32>,
     /// All flexible modes up to this frequency instead
-    #[arg(long, value_name = "HZ", value_parser = positive)]
+    #[arg(long, value_name = "HZ", value_parser = positive, help_heading = MODES)]
     pub max_frequency: Option<f64>,
     /// Accuracy of the modes: fast or standard
-    #[arg(long, value_parser = names::accuracy(), default_value = Accuracy::default().name())]
+    #[arg(long, value_parser = names::accuracy(), default_value = Accuracy::default().name(), help_heading = COST)]
     pub accuracy: Accuracy,
     /// Bits of the integers of the PETSc on the cluster; matrices of more than two billion entries need 64
-    #[arg(long, value_name = "BITS", default_value = "32", value_parser = ["32", "64"])]
+    #[arg(long, value_name = "BITS", default_value = "32", value_parser = ["32", "64"], help_heading = CLUSTER)]
     pub indices: String,
     /// Options of printing.
     #[command(flatten)]
@@ -52,43 +53,43 @@ pub struct AssembleArguments {
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
     /// Model, if it has moved since `prepare` has read it
-    #[arg(long, value_name = "MODEL.toml|JOB.inp")]
+    #[arg(long, value_name = "MODEL.toml|JOB.inp", help_heading = MODEL)]
     pub model: Option<PathBuf>,
     /// Flex-body file to write
-    #[arg(short, long, value_name = "BODY.flex.h5")]
+    #[arg(short, long, value_name = "BODY.flex.h5", help_heading = OUTPUT)]
     pub output: PathBuf,
     /// Number of modes to use [default: as many as were requested]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = MODES)]
     pub modes: Option<u32>,
     /// Also make the built-in inertia count, which factors K - sigma M on this machine
-    #[arg(long)]
+    #[arg(long, help_heading = MODES)]
     pub prove: bool,
     /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the space and has 7 digits
-    #[arg(long, value_parser = names::storage(), default_value = Storage::default().name())]
+    #[arg(long, value_parser = names::storage(), default_value = Storage::default().name(), help_heading = OUTPUT)]
     pub storage: Storage,
     /// Memory that the program may use: a number with K, M, G or T [default: all that the machine and its control
     /// groups have free]
-    #[arg(long, value_name = "SIZE", value_parser = memory_size)]
+    #[arg(long, value_name = "SIZE", value_parser = memory_size, help_heading = COST)]
     pub memory_limit: Option<u64>,
     /// Frame of the body: com (centre of mass, axes of the model), principal (centre of mass, principal axes), model
     /// (frame of the model), or interface=NAME (reference point of an interface, which is then at rest in every mode)
     /// [default: com]
-    #[arg(long, value_name = "FRAME")]
+    #[arg(long, value_name = "FRAME", help_heading = FRAME)]
     pub frame: Option<FrameChoice>,
     /// Lumped masses for comparison: row-sum, diagonal-scaling, user=FILE (node,mass), or none
-    #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
+    #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling", help_heading = COMPARISON)]
     pub lumped: String,
     /// Leave the surface out of the file
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     pub no_mesh: bool,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub report: Vec<PathBuf>,
     /// Number of threads; results are independent of it [default: all processors]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), help_heading = COST)]
     pub threads: Option<u16>,
     /// Print all facts about the body instead of a summary
-    #[arg(short, long)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub verbose: bool,
     /// Options of printing.
     #[command(flatten)]
@@ -120,24 +121,24 @@ pub struct BatchArguments {
 #[derive(Debug, Clone, Args)]
 pub struct EngineArguments {
     /// Solver for the free modes: this program, or SLEPc over MPI (docs/how_to/cluster.md)
-    #[arg(long, value_enum, default_value_t = EngineName::BuiltIn)]
+    #[arg(long, value_enum, default_value_t = EngineName::BuiltIn, help_heading = CLUSTER)]
     pub engine: EngineName,
     /// Number of MPI ranks of --engine slepc
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), help_heading = CLUSTER)]
     pub ranks: u32,
     /// Method of --engine slepc
-    #[arg(long, value_parser = names::solver(), default_value = Solver::default().name())]
+    #[arg(long, value_parser = names::solver(), default_value = Solver::default().name(), help_heading = CLUSTER)]
     pub solver: Solver,
     /// Command that starts MPI, before `-n N` [default: FLEXBODY_MPIEXEC, else mpiexec]
-    #[arg(long, value_name = "WORDS")]
+    #[arg(long, value_name = "WORDS", help_heading = CLUSTER)]
     pub mpiexec: Option<String>,
     /// Python with petsc4py and slepc4py, started by -I: without PYTHONPATH and packages of the current folder
     /// [default: FLEXBODY_PYTHON, else python3 or /usr/bin/python3]
-    #[arg(long, value_name = "PYTHON")]
+    #[arg(long, value_name = "PYTHON", help_heading = CLUSTER)]
     pub python: Option<PathBuf>,
     /// Working folder of --engine slepc, which is kept [default: BODY.flex.h5.cluster, which is kept only if the run
     /// fails, to continue from it]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = CLUSTER)]
     pub cluster_folder: Option<PathBuf>,
 }
 
