@@ -6,6 +6,7 @@ mod guidance;
 mod headings;
 mod judgement;
 mod names;
+mod parsing;
 mod response;
 
 use clap::builder::PossibleValue;
@@ -199,7 +200,7 @@ pub struct ReduceArguments {
     #[arg(long, value_parser = names::storage())]
     pub storage: Option<Storage>,
     /// Flex-body file to write
-    #[arg(short, long, value_name = "SMALL.flex.h5")]
+    #[arg(short, long, value_name = "SMALL.flex.h5", help_heading = OUTPUT)]
     pub output: PathBuf,
     /// Options of printing.
     #[command(flatten)]
@@ -213,7 +214,7 @@ pub struct ViewArguments {
     #[arg(value_name = "BODY.flex.h5")]
     pub body: PathBuf,
     /// Page to write
-    #[arg(short, long, value_name = "VIEW.html")]
+    #[arg(short, long, value_name = "VIEW.html", help_heading = OUTPUT)]
     pub output: PathBuf,
     /// Motion of the body to play instead of its modes: a file written by `simulate -o`
     #[arg(long, value_name = "MOTION.h5")]
@@ -222,7 +223,7 @@ pub struct ViewArguments {
     #[arg(long, value_name = "NAME", conflicts_with_all = ["simulation", "envelope"])]
     pub recovery: Option<String>,
     /// Colour the body by the largest equivalent stresses of a run: a table written by `simulate` or `recover --envelope`
-    #[arg(long, value_name = "ENVELOPE.csv")]
+    #[arg(long, value_name = "ENVELOPE.csv", help_heading = OUTPUT)]
     pub envelope: Option<PathBuf>,
     /// Largest number of triangles of the surface [default: as many as keep the page below 10 MB]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -475,10 +476,10 @@ pub struct InspectArguments {
     #[arg(long)]
     pub structure: bool,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
-    #[arg(long, value_name = "FILE", conflicts_with = "structure")]
+    #[arg(long, value_name = "FILE", conflicts_with = "structure", help_heading = OUTPUT)]
     pub report: Vec<PathBuf>,
     /// Print all facts about the body instead of a summary
-    #[arg(short, long)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub verbose: bool,
     /// Options of printing.
     #[command(flatten)]
@@ -532,7 +533,7 @@ pub struct CompareArguments {
     pub invariants: Option<f64>,
     /// Report to write, whether the bodies agree or not; format by extension: .html, .json, .txt, .md (Markdown) or
     /// .xml (JUnit test cases) (repeatable)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub report: Vec<PathBuf>,
     /// Options of printing.
     #[command(flatten)]

@@ -107,7 +107,7 @@ pub struct BatchArguments {
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub memory_limit: Option<u64>,
     /// Report about all bodies, format by extension: .html, .json or .txt (repeatable)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub report: Vec<PathBuf>,
     /// Allow a list whose options start programs (--mpiexec, --python); otherwise such a list is refused
     #[arg(long)]

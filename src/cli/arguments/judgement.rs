@@ -1,6 +1,7 @@
 //! Arguments of the commands that judge a body without a study, by ranges of motion and by a run of another program, and
 //! of the commands for stresses: `shapes`, which asks an FE program for them, and `recover`, over a run.
 
+use super::headings::OUTPUT;
 use super::{Deflection, JobArguments, Printing, deflection, ratio};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -27,7 +28,7 @@ pub struct AdviseArguments {
     #[arg(long, value_name = "REL", value_parser = ratio, default_value_t = 0.05)]
     pub limit: f64,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub report: Vec<PathBuf>,
     /// Options of printing.
     #[command(flatten)]
@@ -56,7 +57,7 @@ pub struct MeasureArguments {
     #[arg(long, value_name = "MODEL", requires = "reference")]
     pub model: Option<PathBuf>,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub report: Vec<PathBuf>,
     /// Options of printing.
     #[command(flatten)]
@@ -74,7 +75,7 @@ pub struct RecoverArguments {
     #[arg(long, value_name = "RUN.csv")]
     pub history: PathBuf,
     /// Rows over time, format by extension: .csv or .h5
-    #[arg(short, long, value_name = "FILE", required_unless_present = "channels")]
+    #[arg(short, long, value_name = "FILE", required_unless_present = "channels", help_heading = OUTPUT)]
     pub output: Option<PathBuf>,
     /// Recovery to compute (repeatable) [default: all]
     #[arg(long, value_name = "NAME")]
@@ -85,17 +86,17 @@ pub struct RecoverArguments {
     pub carried_by: Option<String>,
     /// File to write the factor of each FE step over time to, .csv or .h5, for a fatigue program that superposes the
     /// results of these steps
-    #[arg(long, value_name = "FILE.csv|FILE.h5", requires = "shapes")]
+    #[arg(long, value_name = "FILE.csv|FILE.h5", requires = "shapes", help_heading = OUTPUT)]
     pub channels: Option<PathBuf>,
     /// With --channels: archive that `flexbody shapes` wrote with the steps
     #[arg(long, value_name = "ASK.npz", requires = "channels")]
     pub shapes: Option<PathBuf>,
     /// File to write the largest stresses of every point of the recoveries over the run to: a table (.csv), or the body
     /// with them at its nodes (.vtu)
-    #[arg(long, value_name = "FILE.csv|FILE.vtu")]
+    #[arg(long, value_name = "FILE.csv|FILE.vtu", help_heading = OUTPUT)]
     pub envelope: Option<PathBuf>,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub report: Vec<PathBuf>,
     /// Options of printing.
     #[command(flatten)]
@@ -140,7 +141,7 @@ pub struct ShapesArguments {
     #[arg(long, value_name = "STRESSES.dat", requires = "geometric_stiffness")]
     pub stresses: Option<PathBuf>,
     /// File to write; the archive from which the answers are read has its name with the extension .npz
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", help_heading = OUTPUT)]
     pub output: PathBuf,
     /// Options of printing.
     #[command(flatten)]
