@@ -34,9 +34,10 @@ def test_selection(bracket_body: flexbody.Body, scene: Path) -> None:
 
 def test_a_body_made_for_a_scene(scene: Path) -> None:
     model = flexbody.read_model(MODELS / "bracket_hex20" / "model.toml")
-    body = model.convert(modes=6, scene=flexbody.Scene(scene))
+    # The error of its reference body is above half of the tolerances.
+    body = model.convert(modes=6, scene=flexbody.Scene(scene), allow_unjudged=True)
     assert len(body.terms) > 0 and all(isinstance(kept, bool) for _, kept, _ in body.terms)
-    again = flexbody.convert(model, modes=6, scene=[flexbody.Scene(scene)])
+    again = flexbody.convert(model, modes=6, scene=[flexbody.Scene(scene)], allow_unjudged=True)
     assert again == body
 
 
