@@ -1,6 +1,6 @@
 //! Command `flexbody convert`.
 
-use super::arguments::{ConvertArguments, EngineName, Printing};
+use super::arguments::{ConvertArguments, Printing};
 use super::conversion_request::{Scheme, lumping_schemes};
 use super::convert_options::{convert_foreign, with_settings_of};
 use super::mode_source::ModeSource;
@@ -22,7 +22,7 @@ use flexbody_linalg::instruction_set;
 use flexbody_model::{CheckedModel, FeModel};
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SearchAttempt, SelectionFacts, render};
-use flexbody_study::conversion::ConversionRequest;
+use flexbody_study::conversion::{ConversionRequest, refuse_contradiction};
 use std::path::PathBuf;
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
@@ -33,7 +33,6 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let arguments = repeated.as_ref().unwrap_or(arguments);
     let read = |path| LoadCases::read(path, arguments.case.as_deref());
     let mode_source = ModeSource::of(arguments);
-    let is_slepc = arguments.engine.engine == EngineName::Slepc;
     let conversion = ConversionRun {
         request: arguments.request()?,
         schemes: lumping_schemes(&arguments.lumped)?,
@@ -48,9 +47,6 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
         verbose: arguments.verbose,
         printing: arguments.printing,
     };
-    if is_slepc {
-        conversion.refuse_for_slepc()?;
-    }
     let outcome = conversion.run(&mode_source)?;
     mode_source.tidy();
     Ok(outcome)
@@ -91,6 +87,9 @@ impl ConversionRun {
     pub(super) fn run(mut self, mode_source: &ModeSource) -> Result<Outcome> {
         let formats = self.reports.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
         let loads = self.request.loads(&self.files.residual_vectors, self.cases.as_ref());
+        if let ModeSource::Slepc { .. } = mode_source {
+            self.refuse_for_slepc(&loads)?;
+        }
         self.request.check(&loads, self.cases.is_some())?;
         if self.split && loads.iter().any(|set| set.file().is_some()) {
             let message = "--split cannot be used with nodal loads, whose rows belong to all bodies together";
@@ -108,8 +107,7 @@ impl ConversionRun {
         refuse_replacing_read(places.all())?;
         watcher.hear(Event::Phase("checks"));
         if !self.split {
-            let done =
-                self.convert(FeModel::from_raw(raw)?, mode_source, (&places, reserved), &formats, &watcher)?;
+            let done = self.convert(FeModel::from_raw(raw)?, mode_source, reserved, &formats, &watcher)?;
             OutputSlot::commit_all(done.slots)?;
             return Ok(done.outcome);
         }
@@ -124,28 +122,23 @@ impl ConversionRun {
             slots.push(places.reserve()?);
         }
         let mut finished = Vec::<Done>::new();
-        for ((checked, places), reserved) in bodies.into_iter().zip(&all).zip(slots) {
+        for (checked, reserved) in bodies.into_iter().zip(slots) {
             let watcher = if finished.is_empty() { &watcher } else { &self.watcher("start") };
-            finished.push(self.convert(checked, mode_source, (places, reserved), &formats, watcher)?);
+            finished.push(self.convert(checked, mode_source, reserved, &formats, watcher)?);
         }
         together(finished)
     }
 
-    /// Refuses what modes of SLEPc do not serve.
-    fn refuse_for_slepc(&self) -> Result<()> {
+    /// Refuses what modes of SLEPc do not serve. `loads` are those of residual vectors.
+    fn refuse_for_slepc(&self, loads: &[LoadSource]) -> Result<()> {
         let Self { request, .. } = self;
-        let has_residuals = !request.loads(&self.files.residual_vectors, self.cases.as_ref()).is_empty();
-        let rules = [
+        refuse_contradiction(&[
             (request.basis != BasisKind::Free, "--engine slepc finds free modes: it needs --basis free"),
-            (has_residuals, "residual vectors need the factor of --engine built-in"),
+            (!loads.is_empty(), "residual vectors need the factor of --engine built-in"),
             (self.cases.is_some(), "--scene needs --engine built-in"),
             (self.split, "--engine slepc converts a single body: leave --split out"),
             (request.accuracy == Accuracy::Certified, "--accuracy certified needs --engine built-in"),
-        ];
-        match rules.into_iter().find(|(contradicts, _)| *contradicts) {
-            Some((_, message)) => Err(Diagnostic::new(Code::Usage, message).into()),
-            None => Ok(()),
-        }
+        ])
     }
 
     fn watcher(&self, first: &str) -> Watcher {
@@ -173,13 +166,13 @@ impl ConversionRun {
         &self,
         checked: CheckedModel,
         mode_source: &ModeSource,
-        outputs: (&BodyOutputs, Reserved),
+        reserved: Reserved,
         formats: &[Format],
         watcher: &Watcher,
     ) -> Result<Done> {
         let CheckedModel { model, diagnostics: early, .. } = checked;
         let done = refuse_warnings(self.printing, &early)
-            .and_then(|()| self.convert_model(&model, &early, mode_source, outputs, formats, watcher));
+            .and_then(|()| self.convert_model(&model, &early, mode_source, reserved, formats, watcher));
         done.map_err(|error| {
             watcher.clear();
             let error = match model.number() {
@@ -195,7 +188,7 @@ impl ConversionRun {
         model: &FeModel,
         early: &[Diagnostic],
         mode_source: &ModeSource,
-        (places, reserved): (&BodyOutputs, Reserved),
+        reserved: Reserved,
         formats: &[Format],
         watcher: &Watcher,
     ) -> Result<Done> {
@@ -214,7 +207,7 @@ impl ConversionRun {
         // Write the body, then the reports, into their temporary files.
         watcher.hear(Event::Phase("writing"));
         flexbody_file::fill_slot(&conversion.body, &reserved.body)?;
-        let output = (places.body.display().to_string(), size_of(&reserved.body));
+        let output = (reserved.body.path().display().to_string(), size_of(&reserved.body));
         let phases = watcher.finish();
         refuse_warnings(self.printing, &diagnostics)?;
         let mut run = run_data(output, conversion, diagnostics.clone(), phases);

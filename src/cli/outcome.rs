@@ -6,6 +6,8 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::output::OutputSlot;
 use flexbody_base::read_files::{FileIdentity, refuse_read, replaces};
 use flexbody_report::Format;
+use std::fs::{File, OpenOptions};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Outcome of a command: text for stdout, its content as JSON, warnings and notes, and whether its checks passed.
@@ -68,6 +70,23 @@ impl BodyOutputs {
             reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
         })
     }
+}
+
+/// Writes the temporary file of a slot piece by piece.
+///
+/// # Errors
+/// FB104 and FB602 if it cannot be written.
+pub(super) fn fill_by(
+    slot: &OutputSlot,
+    write: impl Fn(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> Result<()> {
+    let all = || {
+        let file = OpenOptions::new().write(true).truncate(true).open(slot.temporary())?;
+        let mut out = BufWriter::new(file);
+        write(&mut out)?;
+        out.flush()
+    };
+    all().map_err(|error| slot.failure(&error))
 }
 
 /// Returns the size of the content of a slot in bytes; zero if it is not known.

@@ -6,7 +6,7 @@ use super::run::{Printed, Run};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_body::flex_body::FlexBody;
+use flexbody_body::flex_body::{Carrier, FlexBody};
 use flexbody_input::read_steps;
 use flexbody_motion::scene::{Channels, Envelope, LoadedHistory, RecoveredMotion, RecoveryRequest};
 use flexbody_report::{EnvelopeKind, Format, RecoveredFacts, channels_csv, recovered_csv};
@@ -75,11 +75,7 @@ pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
     let kind = output.as_deref().map(RowsFile::of).transpose()?;
     let of_channels = channels.as_deref().map(RowsFile::of).transpose()?;
     let of_envelope = envelope.as_deref().map(EnvelopeKind::of).transpose()?;
-    let request = RecoveryRequest {
-        carried_by: arguments.carried_by.clone(),
-        only: arguments.only.clone(),
-        needs_envelope: of_envelope.is_some(),
-    };
+    let request = RecoveryRequest { only: arguments.only.clone(), needs_envelope: of_envelope.is_some() };
     let inputs = [body, history].into_iter().chain(shapes);
     let outputs = output.iter().chain(channels).chain(envelope);
     let mut run = Run::begin(arguments.printing, inputs, outputs, &arguments.report)?;
@@ -87,7 +83,7 @@ pub(super) fn run(arguments: &RecoverArguments) -> Result<Outcome> {
     let (slot, channel_slot, envelope_slot) = (prepare(output)?, prepare(channels)?, prepare(envelope)?);
     let body = run.read_body(body)?;
     let mut history = LoadedHistory::read(history, &body)?;
-    request.carry(&body, &mut history);
+    history.carrier = arguments.carried_by.as_ref().map(|name| Carrier::named(&body, name));
     let mut found = None;
     if let (Some(steps), Some(kind), Some(slot)) = (shapes, of_channels, &channel_slot) {
         let channels = channels_of(&body, &history, steps)?;

@@ -3,7 +3,7 @@
 use super::arguments::{PlacesName, ShapeFormat, ShapesArguments};
 use super::element_decks::deck_for;
 use super::models::of_manifest_or_job;
-use super::outcome::{Outcome, size_of};
+use super::outcome::{Outcome, fill_by, size_of};
 use super::run::{Printed, Run};
 use super::stiffening;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -15,8 +15,6 @@ use flexbody_input::{
     ElementDeck, ModelFiles, OperatorSource, RecoverySource, read_model, read_nodes_of_table,
 };
 use flexbody_model::{CheckedModel, FeModel};
-use std::fs::OpenOptions;
-use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
@@ -109,13 +107,7 @@ impl Asked {
         let Self { deck, watched, places } = self;
         let (elements, solids) = (deck.text.as_slice(), deck.solids.as_slice());
         let deck = StressDeck { shapes, elements, solids, watched, places: *places };
-        let write = || {
-            let file = OpenOptions::new().write(true).truncate(true).open(slot.temporary())?;
-            let mut out = BufWriter::new(file);
-            deck.write(&mut out)?;
-            out.flush()
-        };
-        write().map_err(|error| slot.failure(&error))
+        fill_by(slot, |out| deck.write(out))
     }
 }
 

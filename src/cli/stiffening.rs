@@ -3,7 +3,7 @@
 use super::arguments::ShapesArguments;
 use super::element_decks::deck_for;
 use super::models::of_manifest_or_job;
-use super::outcome::{Outcome, refuse_replacing, refuse_replacing_read, size_of};
+use super::outcome::{Outcome, fill_by, refuse_replacing, refuse_replacing_read, size_of};
 use super::run::{Printed, Run};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -13,8 +13,6 @@ use flexbody_formats::shapes::{NodalShapes, StressDeck, StressPlaces};
 use flexbody_formats::stiffening::{StepStresses, StiffeningDecks, stiffening_script};
 use flexbody_input::{ElementDeck, ModelFiles, read_model, read_point_stresses};
 use flexbody_model::{CheckedModel, FeModel};
-use std::fs::OpenOptions;
-use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
@@ -80,7 +78,7 @@ fn write_question(
         (deck.text.as_slice(), deck.solids.as_slice(), StressPlaces::IntegrationPoints);
     let watched = &model.nodes().ids;
     let asking = StressDeck { shapes, elements, solids, watched, places };
-    fill(&slots[0], |out| asking.write(out))?;
+    fill_by(&slots[0], |out| asking.write(out))?;
     slots[1].fill(&shapes.npz())?;
     let text = |path: &Path| path.display().to_string();
     let mut words: Vec<String> = vec!["flexbody".into(), "shapes".into(), text(&arguments.body)];
@@ -134,7 +132,7 @@ fn write_decks(
     };
     slots[0].fill(stiffening.manifest(named).as_bytes())?;
     for (step, slot) in slots[1..].iter().enumerate() {
-        fill(slot, |out| stiffening.write(step, out))?;
+        fill_by(slot, |out| stiffening.write(step, out))?;
     }
     let next =
         format!("next: ccx on each deck, then append {} to the manifest\n", arguments.output.display());
@@ -152,16 +150,6 @@ fn reserve(files: &[PathBuf], inputs: &[&PathBuf]) -> Result<Vec<OutputSlot>> {
     refuse_replacing(inputs.iter().copied(), files.iter())?;
     refuse_replacing_read(files.iter())?;
     files.iter().map(OutputSlot::prepare).collect()
-}
-
-fn fill(slot: &OutputSlot, write: impl Fn(&mut BufWriter<std::fs::File>) -> io::Result<()>) -> Result<()> {
-    let all = || {
-        let file = OpenOptions::new().write(true).truncate(true).open(slot.temporary())?;
-        let mut out = BufWriter::new(file);
-        write(&mut out)?;
-        out.flush()
-    };
-    all().map_err(|error| slot.failure(&error))
 }
 
 /// Returns the texts about the written files.

@@ -163,19 +163,17 @@ impl ConversionRequest {
             let help = "give --modes 1 or more, or --basis craig-bampton for static condensation";
             return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
         }
-        match self.contradiction(loads, has_scene) {
-            Some(message) => Err(Diagnostic::new(Code::Usage, message).into()),
-            None => Ok(()),
-        }
+        refuse_contradiction(&self.rules(loads, has_scene))
     }
 
-    fn contradiction(&self, loads: &[LoadSource], has_scene: bool) -> Option<&'static str> {
+    /// Returns each contradiction: true if the request has it, and the message about it.
+    fn rules(&self, loads: &[LoadSource], has_scene: bool) -> [(bool, &'static str); 10] {
         let of_motion = self.basis == BasisKind::Scene;
         let is_certified = self.accuracy == Accuracy::Certified;
         let states_shapes = self.stated.as_ref().is_some_and(|stated| stated.motion_shapes.is_some());
         let has_residuals = !loads.is_empty();
         let is_coupled = matches!(self.basis, BasisKind::CraigBampton | BasisKind::CraigChang);
-        let rules = [
+        [
             (of_motion && !has_scene, "--basis scene needs --scene"),
             (states_shapes && !of_motion, "--motion-shapes needs --basis scene"),
             (
@@ -201,8 +199,7 @@ impl ConversionRequest {
                 self.lumped_modes && self.basis != BasisKind::Free,
                 "--lumped-modes compares free-surface modes: it needs --basis free",
             ),
-        ];
-        rules.into_iter().find(|(contradicts, _)| *contradicts).map(|(_, message)| message)
+        ]
     }
 
     /// Converts `model`. The body passes every check of `flexbody check`; for load cases it has the terms and modes that
@@ -290,6 +287,19 @@ impl ConversionRequest {
         }
         let (conversion, selection) = convert_for(model, &tailoring, cases, context)?;
         Ok(Converted { conversion, selection: Some(selection) })
+    }
+}
+
+/// Refuses the first contradiction that a request has.
+///
+/// * `rules`: true if the request has the contradiction, and the message about it.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) with that message.
+pub fn refuse_contradiction(rules: &[(bool, &str)]) -> Result<()> {
+    match rules.iter().find(|(contradicts, _)| *contradicts) {
+        Some((_, message)) => Err(Diagnostic::new(Code::Usage, *message).into()),
+        None => Ok(()),
     }
 }
 

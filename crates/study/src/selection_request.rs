@@ -34,8 +34,10 @@ pub struct Selected {
     pub selection: Selection,
     /// Diagnostics of the body that was made of a model.
     of_body: Vec<Diagnostic>,
-    /// Number of modes that was requested of a model; `None` for a body.
-    of_model: Option<Option<usize>>,
+    /// True if the body was made of a model.
+    is_of_model: bool,
+    /// Number of modes that was requested of the model.
+    modes: Option<usize>,
 }
 
 impl Selected {
@@ -46,9 +48,10 @@ impl Selected {
 
     /// Returns the command that makes exactly the selected body from the inputs of `origin`.
     pub fn command(&self, origin: &Origin) -> String {
-        match self.of_model {
-            Some(modes) => selected_from_model(&self.selection, origin, modes),
-            None => selected_from_file(&self.selection, origin),
+        if self.is_of_model {
+            selected_from_model(&self.selection, origin, self.modes)
+        } else {
+            selected_from_file(&self.selection, origin)
         }
     }
 }
@@ -74,7 +77,7 @@ impl SelectionRequest {
         self.refuse_modes()?;
         let selection = select_judged(body, &[], &[], cases, context)
             .map_err(|error| in_scene_file(error, self.scene_file.as_deref()))?;
-        Ok(Selected { selection, of_body: Vec::new(), of_model: None })
+        Ok(Selected { selection, of_body: Vec::new(), is_of_model: false, modes: None })
     }
 
     /// Makes a body of `model` with everything that the load cases may need, and selects from its modes and terms.
@@ -103,6 +106,6 @@ impl SelectionRequest {
         let Enriched { made, rounds } = tailoring.convert(model, cases, context).map_err(in_scene)?;
         let varied = varied_errors(model, &made.body, cases, context)?;
         let selection = select_judged(&made.body, &rounds, &varied, cases, context).map_err(in_scene)?;
-        Ok(Selected { selection, of_body: made.diagnostics, of_model: Some(self.modes) })
+        Ok(Selected { selection, of_body: made.diagnostics, is_of_model: true, modes: self.modes })
     }
 }

@@ -27,6 +27,41 @@ pub(super) struct Compressed<'a> {
     pub both_triangles: &'static str,
 }
 
+/// Square matrix of which a file stores every entry, column by column or row by row.
+pub(super) struct Full<'a> {
+    /// Number of columns.
+    pub n: usize,
+    /// True if the entries of a row are contiguous, false if those of a column are.
+    pub by_rows: bool,
+    /// Function that returns an entry by its place in the file.
+    pub value: &'a dyn Fn(usize) -> f64,
+    /// Help for messages: the way to write the file again.
+    pub help: &'static str,
+    /// Help for messages: the way to write both triangles.
+    pub both_triangles: &'static str,
+}
+
+impl Full<'_> {
+    /// Builds the matrix without its zeros. Both triangles must be stored; symmetry is not checked.
+    ///
+    /// # Errors
+    /// The errors of [`Compressed::assemble`].
+    pub(super) fn assemble(self, path: &Path) -> Result<RawMatrix, Diagnostic> {
+        let Self { n, by_rows, value, help, both_triangles } = self;
+        let compressed = Compressed {
+            n,
+            by_rows,
+            pointers: (0..=n as u64).map(|column| column * n as u64).collect(),
+            pointers_name: "the list of columns",
+            entries: n * n,
+            entry: &|k| ((k % n) as i64, value(k)),
+            help,
+            both_triangles,
+        };
+        compressed.assemble(path)
+    }
+}
+
 impl Compressed<'_> {
     /// Builds the matrix. Both triangles must be stored; symmetry is not checked.
     ///

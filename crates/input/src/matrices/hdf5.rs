@@ -61,8 +61,7 @@ impl Reader for Hdf5 {
     }
 
     fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
-        let read = || read_rectangular(source.file, source.name);
-        source.is_plain().then(read).map(|found| found.map(Rectangular::operator))
+        source.is_plain().then(|| read_rectangular(source.file, source.name).map(Rectangular::operator))
     }
 
     fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {

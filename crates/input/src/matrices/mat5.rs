@@ -2,7 +2,7 @@
 //! MathWorks. Files of version 7.3 are HDF5.
 
 use super::assemble::{Entry, check_extents, check_size, most_entries_of};
-use super::compressed::Compressed;
+use super::compressed::{Compressed, Full};
 use super::named_matrices::{NamedMatrices, named_or_only};
 use super::operator::OperatorColumns;
 use super::reader::{ArraySource, MatrixRole, MatrixSource, ReadOutcome, Reader};
@@ -62,9 +62,8 @@ impl Reader for Mat5 {
     }
 
     fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
-        let one = |diagnostic| vec![diagnostic];
-        let read = || read_rectangular(source.file, source.name).map_err(one);
-        source.is_plain().then(read).map(|found| found.map(Rectangular::operator))
+        let read = || read_rectangular(source.file, source.name).map(Rectangular::operator);
+        source.is_plain().then(|| read().map_err(|diagnostic| vec![diagnostic]))
     }
 }
 
@@ -357,17 +356,9 @@ impl<'a> Variable<'a> {
             return Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP));
         }
         let n = check_size(self.rows, self.columns, values.len() as u64)?;
-        let compressed = Compressed {
-            n,
-            by_rows: false,
-            pointers: (0..=n as u64).map(|column| column * n as u64).collect(),
-            pointers_name: "the list of columns",
-            entries: n * n,
-            entry: &|k| ((k % n) as i64, values.real(k).unwrap_or(f64::NAN)),
-            help: HELP,
-            both_triangles: BOTH_TRIANGLES,
-        };
-        compressed.assemble(path)
+        let value = |k| values.real(k).unwrap_or(f64::NAN);
+        let full = Full { n, by_rows: false, value: &value, help: HELP, both_triangles: BOTH_TRIANGLES };
+        full.assemble(path)
     }
 }
 

@@ -49,9 +49,8 @@ impl Reader for MatrixMarket {
     }
 
     fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
-        let read = || read_rectangular(source.file, source.compression);
-        let holds = source.name.is_none() && is_coordinate(source.head);
-        holds.then(read).map(|found| found.map(Rectangular::operator))
+        let read = || read_rectangular(source.file, source.compression).map(Rectangular::operator);
+        (source.name.is_none() && is_coordinate(source.head)).then(read)
     }
 
     fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {

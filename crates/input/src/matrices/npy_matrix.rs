@@ -1,7 +1,7 @@
 //! Matrices stored in full as one array of NumPy (`numpy.save`).
 
 use super::assemble::{check_size, refuse_beyond_memory};
-use super::compressed::Compressed;
+use super::compressed::Full;
 use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
 use crate::array::Array;
 use crate::npy;
@@ -38,7 +38,7 @@ impl Reader for Npy {
             source.file.load()?;
             npy::read(source.file.bytes())
         };
-        (source.is_plain() && source.name.is_none()).then(|| read().map_err(|diagnostic| vec![diagnostic]))
+        source.is_plain_of_one().then(|| read().map_err(|diagnostic| vec![diagnostic]))
     }
 }
 
@@ -46,16 +46,8 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic>
     let Array { rows, cols, row_major, values, digits } = npy::read(source.not_packed("NumPy array")?)?;
     let n = check_size(rows as u64, cols as u64, values.len() as u64)?;
     refuse_beyond_memory(values.len() as u64)?;
-    let compressed = Compressed {
-        n,
-        by_rows: row_major,
-        pointers: (0..=n as u64).map(|column| column * n as u64).collect(),
-        pointers_name: "the list of columns",
-        entries: n * n,
-        entry: &|k| ((k % n) as i64, values[k]),
-        help: HELP,
-        both_triangles: BOTH_TRIANGLES,
-    };
-    let raw = compressed.assemble(source.file.path())?;
+    let full =
+        Full { n, by_rows: row_major, value: &|k| values[k], help: HELP, both_triangles: BOTH_TRIANGLES };
+    let raw = full.assemble(source.file.path())?;
     Ok(RawMatrix { digits: digits.min(raw.digits), ..raw })
 }

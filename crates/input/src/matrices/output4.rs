@@ -53,9 +53,8 @@ impl Reader for Output4 {
     }
 
     fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
-        let one = |diagnostic| vec![diagnostic];
-        let read = || read_rectangular(source.file, source.name).map_err(one);
-        source.is_plain().then(read).map(|found| found.map(Rectangular::operator))
+        let read = || read_rectangular(source.file, source.name).map(Rectangular::operator);
+        source.is_plain().then(|| read().map_err(|diagnostic| vec![diagnostic]))
     }
 }
 

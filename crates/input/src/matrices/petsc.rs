@@ -46,9 +46,8 @@ impl Reader for Petsc {
     }
 
     fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
-        let one = |diagnostic| vec![diagnostic];
-        let read = || read_rectangular(source.file.bytes()).map_err(one);
-        (source.is_plain() && source.name.is_none()).then(read).map(|found| found.map(Rectangular::operator))
+        let read = || read_rectangular(source.file.bytes()).map(Rectangular::operator);
+        source.is_plain_of_one().then(|| read().map_err(|diagnostic| vec![diagnostic]))
     }
 }
 

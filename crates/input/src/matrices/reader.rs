@@ -100,6 +100,11 @@ impl ArraySource<'_> {
     pub(super) fn is_plain(&self) -> bool {
         self.compression == Compression::None
     }
+
+    /// Returns true if the user named no matrix of the file, and it is not compressed as a whole.
+    pub(super) fn is_plain_of_one(&self) -> bool {
+        self.is_plain() && self.name.is_none()
+    }
 }
 
 /// Result of reading a matrix that need not be square, or an array.

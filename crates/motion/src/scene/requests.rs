@@ -8,7 +8,7 @@ use super::recovered::{LoadedHistory, RecoveredMotion};
 use super::simulate::{Recording, simulate, simulate_with_envelope};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{Carrier, FlexBody};
+use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 
 /// Request of a simulation.
@@ -68,8 +68,6 @@ impl SimulationRequest {
 /// Request of recoveries over the history of a motion.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct RecoveryRequest {
-    /// Interface or node number that carries the body in the simulation of the history; `None` for the frame of the body.
-    pub carried_by: Option<String>,
     /// Names of the recoveries; empty for all.
     pub only: Vec<String>,
     /// True if the largest stresses of every point are needed.
@@ -86,14 +84,7 @@ pub struct Recovered {
 }
 
 impl RecoveryRequest {
-    /// States the carrier in the history of a motion of `body`.
-    pub fn carry(&self, body: &FlexBody, history: &mut LoadedHistory) {
-        if let Some(name) = &self.carried_by {
-            history.carrier = Some(Carrier::named(body, name));
-        }
-    }
-
-    /// Computes the recoveries of `body` over a `history`, whose carrier is stated.
+    /// Computes the recoveries of `body` over a `history`.
     ///
     /// # Errors
     /// The errors of [`LoadedHistory::recover`].

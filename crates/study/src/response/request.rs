@@ -5,7 +5,7 @@ use super::ends::{Excitation, ResponseEnds};
 use super::place::Place;
 use super::settings::ResponseSettings;
 use super::study::{Response, respond};
-use crate::conversion::RESIDUALS_NEED_FREE_MODES;
+use crate::conversion::{RESIDUALS_NEED_FREE_MODES, refuse_contradiction};
 use crate::tailoring::computed_basis;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -100,7 +100,7 @@ impl ResponseRequest {
     /// needs a scene or shapes.
     pub fn check(&self, has_model: bool, has_body: bool) -> Result<()> {
         let states_body = self.modes.is_some() || self.basis.is_some() || self.residual_vectors.is_some();
-        let rules = [
+        refuse_contradiction(&[
             (
                 has_body && !has_model,
                 "give the model first (a manifest or a job), then the body that was made from it",
@@ -121,11 +121,7 @@ impl ResponseRequest {
                 self.basis == Some(BasisKind::CraigBampton) && self.residual_vectors.is_some(),
                 RESIDUALS_NEED_FREE_MODES,
             ),
-        ];
-        match rules.into_iter().find(|(contradicts, _)| *contradicts) {
-            Some((_, message)) => Err(Diagnostic::new(Code::Usage, message).into()),
-            None => Ok(()),
-        }
+        ])
     }
 
     /// Computes the response of a `body` of `model` with its errors, or without a body that of one that is made now.
