@@ -1,22 +1,33 @@
 //! Checks of a model before any work: each failure is reported with its facts.
 
-use super::assemble::{Assembled, assemble};
-use super::body_number::BodyNumber;
-use super::density::{Densities, LocalMass, SoundSpeed, check_density, check_exchanged, check_speed};
-use super::geometric_stiffness::missing_components;
-use super::internal_rows::refuse_turned_internals;
-use super::mass_structure::{MassForm, mass_form};
-use super::named_load::{check_preloads, refuse_stiff_preloads};
-use super::node_pairs::check_mass_pairs;
-use super::recovery::check_rigid_responses;
-use super::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
-use super::rounding::{block_tolerance, rounding};
-use super::rows::{centre_and_length, extents, rigid_residuals};
-use super::stress::check_stress;
-use super::stress_notes::note_stress_points;
-use super::uniform_strains::check_stresses;
-use super::wording::{in_words, name_some};
-use super::{Damping, DofLabel, FeModel, Followers, Nodes, RawModel, Rows};
+pub(crate) mod density;
+pub(crate) mod ground;
+pub(crate) mod materials;
+pub(crate) mod node_pairs;
+pub(crate) mod rigid_motion;
+pub(crate) mod separate_bodies;
+pub(crate) mod stress;
+pub(crate) mod stress_loads;
+pub(crate) mod stress_notes;
+pub(crate) mod uniform_strains;
+
+use crate::body_number::BodyNumber;
+use crate::checks::density::{Densities, LocalMass, SoundSpeed, check_density, check_exchanged, check_speed};
+use crate::checks::node_pairs::check_mass_pairs;
+use crate::checks::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
+use crate::checks::stress::check_stress;
+use crate::checks::stress_notes::note_stress_points;
+use crate::checks::uniform_strains::check_stresses;
+use crate::directors::mass_structure::{MassForm, mass_form};
+use crate::fe_model::assemble::{Assembled, assemble};
+use crate::geometric_stiffness::missing_components;
+use crate::named_load::{check_preloads, refuse_stiff_preloads};
+use crate::recovery::check_rigid_responses;
+use crate::rounding::{block_tolerance, rounding};
+use crate::rows::internal_rows::refuse_turned_internals;
+use crate::rows::{centre_and_length, extents, rigid_residuals};
+use crate::wording::{in_words, name_some};
+use crate::{Damping, DofLabel, FeModel, Followers, Nodes, RawModel, Rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
 use flexbody_base::numbers::significant;
@@ -69,7 +80,7 @@ pub fn check(raw: RawModel) -> Result<CheckedModel> {
 }
 
 /// Checks a body: its mass, its connections, its rigid motion.
-pub(super) fn check_body(
+pub(crate) fn check_body(
     mut body: Assembled,
     number: Option<BodyNumber>,
     mut found: Vec<Diagnostic>,
@@ -312,7 +323,7 @@ fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
 }
 
 /// Returns the node numbers of every component, in the order of their first nodes.
-pub(super) fn groups(component: &[usize], rows: &Rows, nodes: &Nodes) -> Vec<Vec<i64>> {
+pub(crate) fn groups(component: &[usize], rows: &Rows, nodes: &Nodes) -> Vec<Vec<i64>> {
     let mut groups = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
     for (vertex, &c) in component.iter().enumerate() {
         groups[c].push(rows.number(nodes, vertex));

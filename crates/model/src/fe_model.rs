@@ -1,9 +1,18 @@
 //! Checked model: every used node has d displacements (d: the dimension), and row d i + k is direction k of
 //! node i; other rows follow in the order of [`Rows`].
 
-use super::assemble::Assembled;
-use super::mass_structure::MassForm;
-use super::{
+pub(crate) mod assemble;
+pub(crate) mod drilling;
+pub(crate) mod element_around;
+pub(crate) mod inertial_rows;
+pub(crate) mod layout;
+pub(crate) mod raw;
+pub(crate) mod references;
+pub(crate) mod soft_rotations;
+
+use crate::directors::mass_structure::MassForm;
+use crate::fe_model::assemble::Assembled;
+use crate::{
     BodyNumber, Damping, DirectorMass, DofLabel, Followers, GeometricStiffness, GivenRows, ModelLoad,
     ModelRecovery, NodeSet, Nodes, Rows, SoftRotations, SurfaceMesh,
 };
@@ -58,7 +67,7 @@ pub struct FeModel {
 }
 
 impl FeModel {
-    pub(super) fn new(
+    pub(crate) fn new(
         body: Assembled,
         form: MassForm,
         rigid_residual: f64,
@@ -114,7 +123,7 @@ impl FeModel {
 
     /// Returns the model with points that follow its nodes. If the mass commutes with rotations, the points are
     /// not needed: their mass is that of points at rest between the nodes.
-    pub(super) fn with_followers(self, followers: Option<Followers>) -> Self {
+    pub(crate) fn with_followers(self, followers: Option<Followers>) -> Self {
         let followers = followers.filter(|_| !self.commutes).map(Arc::new);
         Self { followers, ..self }
     }
@@ -302,7 +311,7 @@ impl FeModel {
     ///
     /// # Errors
     /// FB101, FB132 for a file that changed since it was read.
-    pub(super) fn find_sources(&self) -> Result<(), Diagnostic> {
+    pub(crate) fn find_sources(&self) -> Result<(), Diagnostic> {
         self.sources.find()
     }
 
@@ -335,7 +344,7 @@ impl FeModel {
     }
 
     /// Finds the part of M that does not turn; parts up to `rounding` count as zero.
-    pub(super) fn find_fixed_mass(&mut self, rounding: f64) {
+    pub(crate) fn find_fixed_mass(&mut self, rounding: f64) {
         let share = match (self.scalar_mass(), &self.whole_mass) {
             (None, Some(_)) if self.followers.is_some() => {
                 let followers = self.followers.as_ref().expect("there are some");

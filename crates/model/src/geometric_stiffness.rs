@@ -1,7 +1,7 @@
 //! Geometric stiffness given by the user: matrices of the stiffness due to the stress under unit loads.
 
-use super::wording::name_some;
-use super::{NodeSet, RawMatrix};
+use crate::wording::name_some;
+use crate::{NodeSet, RawMatrix};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use nalgebra::Matrix3;
 
@@ -189,7 +189,7 @@ pub struct GeometricStiffness<K> {
 const MAX_NAME_BYTES: usize = 200;
 
 /// Adds errors about the loads by themselves.
-pub(super) fn check_loads(
+pub(crate) fn check_loads(
     given: &[GeometricStiffness<RawMatrix>],
     interfaces: &[NodeSet],
     dimension: usize,
@@ -230,7 +230,7 @@ pub(super) fn check_loads(
 }
 
 /// Returns a note about each kind of load with only some components given.
-pub(super) fn missing_components<K>(given: &[GeometricStiffness<K>], dimension: usize) -> Option<Diagnostic> {
+pub(crate) fn missing_components<K>(given: &[GeometricStiffness<K>], dimension: usize) -> Option<Diagnostic> {
     let loads: Vec<&UnitLoad> = given.iter().map(|one| &one.load).collect();
     let mut missing: Vec<UnitLoad> = Vec::new();
     for kind in loads.iter().map(|load| &load.kind) {

@@ -1,6 +1,6 @@
 //! Interfaces: named node sets, their reference points for joints, and the common motion of both.
 
-use super::{centre_and_length, rigid_count, rigid_fields};
+use crate::{centre_and_length, rigid_count, rigid_fields};
 use faer::{Mat, MatRef};
 use flexbody_linalg::gram;
 use nalgebra::{Matrix3, Vector3};

@@ -1,8 +1,8 @@
 //! Named loads: nodal forces that act on the body as one load with an amplitude.
 
-use super::recovery::{self, Problem, RowsOfFiles};
-use super::rows::{centre_and_length, rigid_count};
-use super::{GeometricStiffness, LoadKind, LostRow, NodeSet, Nodes, Rows, UnitLoad};
+use crate::recovery::{self, Problem, RowsOfFiles};
+use crate::rows::{centre_and_length, rigid_count};
+use crate::{GeometricStiffness, LoadKind, LostRow, NodeSet, Nodes, Rows, UnitLoad};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use std::collections::HashSet;
@@ -48,7 +48,7 @@ const OTHER_VECTORS: [&str; 15] = [
 const MAX_PRELOAD_RESULTANT: f64 = 1e-9;
 
 /// Returns the loads in the internal order of rows; adds an error for each that is not valid.
-pub(super) fn checked_loads(
+pub(crate) fn checked_loads(
     given: Vec<ModelLoad>,
     of_files: &RowsOfFiles<'_>,
     interfaces: &[NodeSet],
@@ -145,7 +145,7 @@ fn refuse_rows_without_place(name: &str, forces: &[f64], rows: &Rows) -> Result<
 
 /// Returns an error for each preload with geometric stiffness, which would act always: the stiffness with preload is that of
 /// the modes only if it is in K.
-pub(super) fn refuse_stiff_preloads(
+pub(crate) fn refuse_stiff_preloads(
     all: &[ModelLoad],
     stiffness: &[GeometricStiffness<SymmetricMatrix>],
 ) -> Vec<Diagnostic> {
@@ -163,7 +163,7 @@ pub(super) fn refuse_stiff_preloads(
 }
 
 /// Returns an error for each preload with a resultant.
-pub(super) fn check_preloads(all: &[ModelLoad], rows: &Rows, nodes: &Nodes) -> Vec<Diagnostic> {
+pub(crate) fn check_preloads(all: &[ModelLoad], rows: &Rows, nodes: &Nodes) -> Vec<Diagnostic> {
     if !all.iter().any(|load| load.preload) {
         return Vec::new();
     }
@@ -189,7 +189,7 @@ pub(super) fn check_preloads(all: &[ModelLoad], rows: &Rows, nodes: &Nodes) -> V
 }
 
 /// Returns the parts of the loads that act on the body with the rows `kept`; loads that do not act on it are left out.
-pub(super) fn loads_of_body(all: &[ModelLoad], kept: &[usize]) -> Vec<ModelLoad> {
+pub(crate) fn loads_of_body(all: &[ModelLoad], kept: &[usize]) -> Vec<ModelLoad> {
     let part = |load: &ModelLoad| {
         let forces: Vec<f64> = kept.iter().map(|&row| load.forces[row]).collect();
         forces.iter().any(|force| *force != 0.0).then(|| ModelLoad { forces, ..load.clone() })
@@ -198,7 +198,7 @@ pub(super) fn loads_of_body(all: &[ModelLoad], kept: &[usize]) -> Vec<ModelLoad>
 }
 
 /// Adds an error for each load whose recoveries and preload would be split between several bodies.
-pub(super) fn refuse_loads_of_several_bodies(
+pub(crate) fn refuse_loads_of_several_bodies(
     all: &[ModelLoad],
     body_of_row: impl Fn(usize) -> usize,
     found: &mut Vec<Diagnostic>,

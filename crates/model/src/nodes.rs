@@ -131,7 +131,7 @@ impl ElementShape {
     }
 
     /// Returns the index of the mid-edge node between two corners; mid-edge nodes follow the corners.
-    pub(super) fn middle(self, a: usize, b: usize) -> Option<usize> {
+    pub(crate) fn middle(self, a: usize, b: usize) -> Option<usize> {
         let at = self.edges().iter().position(|&[c, d]| [c, d] == [a, b] || [d, c] == [a, b])?;
         Some(self.corners() + at)
     }

@@ -1,8 +1,11 @@
 //! Recovery: rows that read stresses, strains, forces or displacements off the deformed body (theory section 12).
 
-use super::rows::{centre_and_length, rigid_count};
-use super::wording::name_some;
-use super::{DofLabel, GivenRows, LostRow, Nodes, Rows};
+pub(crate) mod stress_labels;
+pub(crate) mod stress_points;
+
+use crate::rows::{centre_and_length, rigid_count};
+use crate::wording::name_some;
+use crate::{DofLabel, GivenRows, LostRow, Nodes, Rows};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::ties::first_largest;
@@ -117,7 +120,7 @@ pub struct AnsweredShapes {
 /// Steps of an FE program that `flexbody shapes` has written: modes and static columns as displacements of all nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShapeSteps {
-    /// Mode or static column of each step: `mode 1`, or the name of [`UnitLoad::step`](super::UnitLoad::step).
+    /// Mode or static column of each step: `mode 1`, or the name of [`UnitLoad::step`](crate::UnitLoad::step).
     pub columns: Vec<String>,
     /// Factor of each step: a step is the factor times its mode or column.
     pub factors: Vec<f64>,
@@ -184,7 +187,7 @@ const MAX_NAME_BYTES: usize = 200;
 const MAX_RIGID_RESPONSE: f64 = 1e-3;
 
 /// Rows of the files of a model and their way to the internal order.
-pub(super) struct RowsOfFiles<'a> {
+pub(crate) struct RowsOfFiles<'a> {
     pub given: &'a GivenRows,
     /// Number of rows of K.
     pub matrix_rows: usize,
@@ -194,7 +197,7 @@ pub(super) struct RowsOfFiles<'a> {
 
 impl RowsOfFiles<'_> {
     /// Returns true for the number of rows of K, or of a file of the model.
-    pub(super) fn fit(&self, rows: usize) -> bool {
+    pub(crate) fn fit(&self, rows: usize) -> bool {
         rows == self.matrix_rows || self.given.counts().any(|count| count == rows)
     }
 
@@ -202,7 +205,7 @@ impl RowsOfFiles<'_> {
     ///
     /// # Errors
     /// [`LostRow`] for entries in rows that K and M leave empty.
-    pub(super) fn internal(&self, columns: CscMatrix) -> Result<CscMatrix, LostRow> {
+    pub(crate) fn internal(&self, columns: CscMatrix) -> Result<CscMatrix, LostRow> {
         let count = columns.n_cols();
         let given = self.given.sparse_forces(columns)?;
         let mut entries = Vec::with_capacity(given.nnz());
@@ -221,7 +224,7 @@ impl RowsOfFiles<'_> {
 }
 
 /// Returns the recoveries with operators in the internal order; adds an error for each that is not valid.
-pub(super) fn checked_recoveries(
+pub(crate) fn checked_recoveries(
     asked: Vec<ModelRecovery>,
     of_files: &RowsOfFiles<'_>,
     nodes: &Nodes,
@@ -254,10 +257,10 @@ pub(super) fn checked_recoveries(
 }
 
 /// Code and message about a recovery.
-pub(super) type Problem = (Code, String);
+pub(crate) type Problem = (Code, String);
 
 /// Refuses a name that cannot be that of a group in the file, or that is given twice.
-pub(super) fn refuse_name(name: &str, seen: &mut HashSet<String>) -> Result<(), Problem> {
+pub(crate) fn refuse_name(name: &str, seen: &mut HashSet<String>) -> Result<(), Problem> {
     let wrong = match name {
         "" => "has no name".to_owned(),
         _ if name.len() > MAX_NAME_BYTES || name.chars().any(char::is_control) => format!(
@@ -392,7 +395,7 @@ fn refuse_cut(name: &str, side: &[i64], about: [f64; 3], nodes: &Nodes) -> Resul
 }
 
 /// Returns an error for each recovery with rows of stress, strain, force or moment that a rigid motion changes.
-pub(super) fn check_rigid_responses(all: &[ModelRecovery], rows: &Rows, nodes: &Nodes) -> Vec<Diagnostic> {
+pub(crate) fn check_rigid_responses(all: &[ModelRecovery], rows: &Rows, nodes: &Nodes) -> Vec<Diagnostic> {
     if all.is_empty() {
         return Vec::new();
     }
@@ -467,7 +470,7 @@ fn middle_of(at: &[u32], fields: &Mat<f64>, d: usize, displaced: usize) -> Vecto
 
 /// Returns the parts of the recoveries that belong to the body with the rows `kept` and the `nodes`: an operator with
 /// entries, or a cut with nodes, in this body.
-pub(super) fn recoveries_of_body(all: &[ModelRecovery], kept: &[usize], nodes: &Nodes) -> Vec<ModelRecovery> {
+pub(crate) fn recoveries_of_body(all: &[ModelRecovery], kept: &[usize], nodes: &Nodes) -> Vec<ModelRecovery> {
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
     let operator = |one: &ModelRecovery| match &one.operator {
         RecoveryOperator::Cut { nodes: side, about } => side
@@ -501,7 +504,7 @@ pub(super) fn recoveries_of_body(all: &[ModelRecovery], kept: &[usize], nodes: &
 
 /// Adds an error for each recovery that reads several bodies. `body_of` returns the body of an internal row, or of a
 /// node.
-pub(super) fn refuse_several_bodies(
+pub(crate) fn refuse_several_bodies(
     all: &[ModelRecovery],
     body_of_row: impl Fn(usize) -> usize,
     body_of_node: impl Fn(i64) -> Option<usize>,

@@ -4,7 +4,11 @@
 //! motion only K determines (bubbles, hierarchical shape functions); then nodal rotations; last massless
 //! rows without a position.
 
-use super::{DofLabel, Nodes};
+pub(crate) mod given_rows;
+pub(crate) mod internal_rows;
+pub(crate) mod neighbours;
+
+use crate::{DofLabel, Nodes};
 use faer::Mat;
 use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{SymmetricMatrix, connected_components, largest, parallel};
@@ -16,20 +20,20 @@ const MAX_MOTION_AT_REST: f64 = 1e-9;
 /// Rows of a model beyond its plain displacements, and the order of all rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rows {
-    pub(super) dimension: usize,
-    pub(super) nodes: usize,
+    pub(crate) dimension: usize,
+    pub(crate) nodes: usize,
     /// Numbers in the labels of vectors without a position.
-    pub(super) vectors: Vec<i64>,
+    pub(crate) vectors: Vec<i64>,
     /// Index of the node and axis (0, 1, 2) of every rotation, ascending.
-    pub(super) rotations: Vec<(u32, u8)>,
+    pub(crate) rotations: Vec<(u32, u8)>,
     /// Labels of the massless rows without a position.
-    pub(super) others: Vec<DofLabel>,
-    pub(super) recovered: Recovered,
+    pub(crate) others: Vec<DofLabel>,
+    pub(crate) recovered: Recovered,
 }
 
 /// Rigid motion of the rows without a position, determined by K: vectors first, then the massless rows.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Recovered {
+pub(crate) struct Recovered {
     /// One column per rigid motion; rotations about `centre`, divided by `length`.
     pub fields: Mat<f64>,
     pub centre: [f64; 3],
@@ -82,12 +86,12 @@ impl Rows {
     }
 
     /// Returns true if a vertex ([`Rows::vertex`]) is a node.
-    pub(super) fn is_node(&self, vertex: usize) -> bool {
+    pub(crate) fn is_node(&self, vertex: usize) -> bool {
         vertex < self.nodes
     }
 
     /// Returns the vertex of a row: nodes first, then vectors, then each of the other rows by itself.
-    pub(super) fn vertex(&self, row: usize) -> usize {
+    pub(crate) fn vertex(&self, row: usize) -> usize {
         let after = self.displacements();
         match row {
             _ if row < after => row / self.dimension,
@@ -97,7 +101,7 @@ impl Rows {
     }
 
     /// Returns the rows of a [`vertex`](Self::vertex), ascending.
-    pub(super) fn of_vertex(&self, vertex: usize) -> impl Iterator<Item = usize> {
+    pub(crate) fn of_vertex(&self, vertex: usize) -> impl Iterator<Item = usize> {
         let (after, d) = (self.displacements(), self.dimension);
         let up_to = |node: usize| after + self.rotations.partition_point(|&(row, _)| (row as usize) < node);
         let (first, second) = match vertex.checked_sub(self.nodes + self.vectors.len()) {
@@ -111,7 +115,7 @@ impl Rows {
     }
 
     /// Returns the label of a row.
-    pub(super) fn label(&self, nodes: &Nodes, row: usize) -> DofLabel {
+    pub(crate) fn label(&self, nodes: &Nodes, row: usize) -> DofLabel {
         let (after, d) = (self.displacements(), self.dimension);
         if row < after {
             return DofLabel { node: self.number(nodes, row / d), direction: (row % d) as u8 + 1 };
@@ -123,7 +127,7 @@ impl Rows {
     }
 
     /// Returns the size of a rigid field with the given `length` at each row: one for a displacement.
-    pub(super) fn field_sizes(&self, length: f64) -> Vec<f64> {
+    pub(crate) fn field_sizes(&self, length: f64) -> Vec<f64> {
         let mut sizes = vec![1.0; self.displacements()];
         sizes.resize(sizes.len() + self.rotations.len(), 1.0 / length);
         let first = self.dimension * self.vectors.len();
@@ -136,7 +140,7 @@ impl Rows {
     }
 
     /// Returns true if rigid motion does not move the vectors without a position (bubbles).
-    pub(super) fn are_still(&self) -> bool {
+    pub(crate) fn are_still(&self) -> bool {
         let known = &self.recovered.fields;
         let rows = self.dimension * self.vectors.len();
         (0..known.ncols()).all(|c| (0..rows).all(|row| known[(row, c)].abs() < MAX_MOTION_AT_REST))
@@ -144,7 +148,7 @@ impl Rows {
 
     /// Returns the connected component of every vertex, numbered from 0 in the order of their first
     /// vertices. Any entry of any of the matrices connects, and the rows of a node are connected.
-    pub(super) fn components(&self, matrices: &[&SymmetricMatrix]) -> Vec<usize> {
+    pub(crate) fn components(&self, matrices: &[&SymmetricMatrix]) -> Vec<usize> {
         if self.rotations.is_empty() && self.others.is_empty() {
             return connected_components(matrices, self.dimension);
         }
@@ -184,7 +188,7 @@ impl Rows {
 
     /// Splits the rows by the component of their vertices; returns the rows of each component, ascending,
     /// and their meaning.
-    pub(super) fn separated(&self, component: &[usize]) -> Vec<(Vec<usize>, Self)> {
+    pub(crate) fn separated(&self, component: &[usize]) -> Vec<(Vec<usize>, Self)> {
         let empty = Self {
             dimension: self.dimension,
             nodes: 0,
@@ -212,12 +216,12 @@ impl Rows {
     }
 
     /// Returns the number of nodes, vectors without a position, and other rows.
-    pub(super) fn vertices(&self) -> usize {
+    pub(crate) fn vertices(&self) -> usize {
         self.nodes + self.vectors.len() + self.others.len()
     }
 
     /// Returns the number in the label of a vertex.
-    pub(super) fn number(&self, nodes: &Nodes, vertex: usize) -> i64 {
+    pub(crate) fn number(&self, nodes: &Nodes, vertex: usize) -> i64 {
         let after = vertex.saturating_sub(self.nodes);
         match nodes.ids.get(vertex).or_else(|| self.vectors.get(after)) {
             Some(&number) => number,
@@ -353,7 +357,7 @@ pub fn span(positions: &[[f64; 3]]) -> f64 {
 /// Returns for each row i the maximum over the fields of |(K R)_i| / sum_j |K_ij| r_j, zero for empty rows,
 /// with r_j the typical size of a field at row j. Values near one mean a support, values near roundoff a
 /// free body.
-pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>, sizes: &[f64]) -> Vec<f64> {
+pub(crate) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>, sizes: &[f64]) -> Vec<f64> {
     // Store the fields row by row, so that the data for a matrix entry lie in one or two cache lines.
     let rows: Vec<[f64; 7]> = parallel::values(k.n(), 1024, |i| {
         std::array::from_fn(|c| match c {

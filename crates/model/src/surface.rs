@@ -1,16 +1,19 @@
 //! Surface of a part, for drawing.
 
-use super::feature_edges::{Side, feature_edges};
+pub(crate) mod decimate;
+pub(crate) mod feature_edges;
+
 use crate::Nodes;
 use crate::nodes::{ElementShape, Elements};
+use crate::surface::feature_edges::{Side, feature_edges};
 use std::collections::{HashMap, HashSet};
 
 /// Triangles of the surface of a part, and lines: its feature edges, the rims of shells, and beams, all by
 /// indices of nodes. The mesh is used for drawing only.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SurfaceMesh {
-    pub(super) triangles: Vec<[u32; 3]>,
-    pub(super) edges: Vec<[u32; 2]>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) edges: Vec<[u32; 2]>,
 }
 
 impl SurfaceMesh {
@@ -38,7 +41,7 @@ impl SurfaceMesh {
     }
 
     /// Creates a mesh from valid parts; `None` if there is nothing to draw.
-    pub(super) fn of_parts(triangles: Vec<[u32; 3]>, edges: Vec<[u32; 2]>) -> Option<Self> {
+    pub(crate) fn of_parts(triangles: Vec<[u32; 3]>, edges: Vec<[u32; 2]>) -> Option<Self> {
         (!triangles.is_empty() || !edges.is_empty()).then_some(Self { triangles, edges })
     }
 

@@ -11,7 +11,7 @@ const CHANGE: f64 = 1e-15;
 ///
 /// # Panics
 /// If the value of the variable is no whole number: no test runs without the rounding that it asks for.
-pub(super) fn rounded(matrices: [SymmetricMatrix; 2]) -> [SymmetricMatrix; 2] {
+pub(crate) fn rounded(matrices: [SymmetricMatrix; 2]) -> [SymmetricMatrix; 2] {
     let Some(seed) = std::env::var_os("FLEXBODY_TEST_ROUNDING") else { return matrices };
     let seed: u64 =
         seed.to_str().and_then(|seed| seed.parse().ok()).expect("FLEXBODY_TEST_ROUNDING is a whole number");

@@ -4,7 +4,7 @@
 const MAX_NAMED: usize = 5;
 
 /// Joins items as `a, b, c and 7 more`.
-pub(super) fn name_some<T: std::fmt::Display>(items: &[T]) -> String {
+pub(crate) fn name_some<T: std::fmt::Display>(items: &[T]) -> String {
     let named: Vec<String> = items.iter().take(MAX_NAMED).map(T::to_string).collect();
     match items.len().saturating_sub(MAX_NAMED) {
         0 => named.join(", "),
@@ -13,7 +13,7 @@ pub(super) fn name_some<T: std::fmt::Display>(items: &[T]) -> String {
 }
 
 /// Formats groups as `8 nodes (1, 2, 3, 4, 5 and 3 more), 1 node (9)`.
-pub(super) fn in_words(groups: &[Vec<i64>]) -> String {
+pub(crate) fn in_words(groups: &[Vec<i64>]) -> String {
     let group = |nodes: &Vec<i64>| {
         let plural = if nodes.len() == 1 { "" } else { "s" };
         format!("{} node{plural} ({})", nodes.len(), name_some(nodes))
