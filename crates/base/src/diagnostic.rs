@@ -385,6 +385,9 @@ pub struct Diagnostic {
     help: Option<String>,
 }
 
+/// Value of a step, or the errors that prevent it.
+pub type Diagnosed<T> = Result<T, Vec<Diagnostic>>;
+
 impl Diagnostic {
     /// Creates a diagnostic with `message`, a lowercase text that says what is wrong, with the facts.
     pub fn new(code: Code, message: impl Into<String>) -> Self {

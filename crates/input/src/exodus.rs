@@ -14,9 +14,10 @@ use super::classic_netcdf::{ClassicNetcdf, is_classic};
 use super::matrices::HEAD;
 use super::mesh::in_order_of_shape;
 use super::sets::{Item, Members, NodeSets, SetList};
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use flexbody_model::{ElementShape, Elements, Nodes};
-use variables::{ExodusFile, Found, NumberTable, wrong};
+use variables::{ExodusFile, NumberTable, wrong};
 
 /// Largest number of members of all sets together, for each byte of the file: sets of more members name datasets that
 /// others name as well, or are packed far more densely than node numbers are.
@@ -37,7 +38,7 @@ pub(super) struct NodalVariables {
 }
 
 /// Runs `read` on the file in either form.
-fn with_file<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> Found<T>) -> Found<T> {
+fn with_file<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> Diagnosed<T>) -> Diagnosed<T> {
     let found = if is_classic(&file.first_bytes(HEAD)) {
         file.load().map_err(|diagnostic| vec![diagnostic])?;
         let opened = ClassicNetcdf::open(file.bytes()).map_err(wrong)?;
@@ -53,7 +54,7 @@ fn with_file<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> Found<T>
 ///
 /// # Errors
 /// FB101 for a file that cannot be opened, FB115 for a file that is no such mesh.
-pub(super) fn read_mesh(file: &InputFile) -> Found<(Nodes, NodeSets, Elements)> {
+pub(super) fn read_mesh(file: &InputFile) -> Diagnosed<(Nodes, NodeSets, Elements)> {
     with_file(file, |opened| {
         let positions = positions(opened)?;
         let ids = ids(opened, positions.len())?;
@@ -78,7 +79,7 @@ pub(super) fn has_nodal_variables(file: &InputFile) -> bool {
 ///
 /// # Errors
 /// FB101 for a file that cannot be opened, FB115 for variables that do not fit the nodes.
-pub(super) fn read_nodal_variables(file: &InputFile) -> Found<NodalVariables> {
+pub(super) fn read_nodal_variables(file: &InputFile) -> Diagnosed<NodalVariables> {
     with_file(file, |opened| {
         let ids = ids(opened, positions(opened)?.len())?;
         let names = opened.names("name_nod_var")?;
@@ -102,7 +103,7 @@ pub(super) fn read_nodal_variables(file: &InputFile) -> Found<NodalVariables> {
 }
 
 /// Returns the variables of the nodes of a file that has all of them in `vals_nod_var`.
-fn of_one_variable(opened: &dyn ExodusFile, ids: Vec<i64>, names: Vec<String>) -> Found<NodalVariables> {
+fn of_one_variable(opened: &dyn ExodusFile, ids: Vec<i64>, names: Vec<String>) -> Diagnosed<NodalVariables> {
     let count = names.len();
     let NumberTable { rows, columns: nodes, values: all, is_single_precision } =
         opened.stacked("vals_nod_var", count)?;
@@ -121,17 +122,17 @@ fn of_one_variable(opened: &dyn ExodusFile, ids: Vec<i64>, names: Vec<String>) -
 }
 
 /// Returns the numbers of `count` nodes.
-fn ids(file: &dyn ExodusFile, count: usize) -> Found<Vec<i64>> {
+fn ids(file: &dyn ExodusFile, count: usize) -> Diagnosed<Vec<i64>> {
     match file.has("node_num_map") {
         true => file.whole_numbers("node_num_map"),
         false => Ok((1..=count as i64).collect()),
     }
 }
 
-fn positions(file: &dyn ExodusFile) -> Found<Vec<[f64; 3]>> {
+fn positions(file: &dyn ExodusFile) -> Diagnosed<Vec<[f64; 3]>> {
     let axes: Vec<Vec<f64>> = if file.has("coordx") {
         let names = ["coordx", "coordy", "coordz"].into_iter().filter(|name| file.has(name));
-        names.map(|name| file.floats(name)).collect::<Found<_>>()?
+        names.map(|name| file.floats(name)).collect::<Diagnosed<_>>()?
     } else if file.has("coord") {
         let table = file.table("coord")?;
         table.values.chunks(table.columns.max(1)).map(<[f64]>::to_vec).collect()
@@ -147,7 +148,7 @@ fn positions(file: &dyn ExodusFile) -> Found<Vec<[f64; 3]>> {
 }
 
 /// Returns the elements of all blocks, which list node positions from 1.
-fn elements(file: &dyn ExodusFile, ids: &[i64]) -> Found<Elements> {
+fn elements(file: &dyn ExodusFile, ids: &[i64]) -> Diagnosed<Elements> {
     let mut elements = Elements::default();
     for name in (1..).map(|k| format!("connect{k}")).take_while(|name| file.has(name)) {
         let kind = file.element_type(&name);
@@ -164,7 +165,7 @@ fn elements(file: &dyn ExodusFile, ids: &[i64]) -> Found<Elements> {
 /// Returns the node sets, which list node positions from 1. A set without a name is named by its number.
 ///
 /// * `most`: largest number of members of all sets together.
-fn sets(file: &dyn ExodusFile, ids: &[i64], most: u64) -> Found<SetList> {
+fn sets(file: &dyn ExodusFile, ids: &[i64], most: u64) -> Diagnosed<SetList> {
     let names = if file.has("ns_names") { file.names("ns_names")? } else { Vec::new() };
     let numbers = if file.has("ns_prop1") { file.whole_numbers("ns_prop1")? } else { Vec::new() };
     let (mut sets, mut members) = (SetList::default(), 0);
@@ -191,7 +192,7 @@ fn sets(file: &dyn ExodusFile, ids: &[i64], most: u64) -> Found<SetList> {
 }
 
 /// Returns the numbers of the nodes at `places` (from 1), which a variable lists; `None` is an invalid position.
-fn nodes_at(list: &str, ids: &[i64], places: impl Iterator<Item = Option<i64>>) -> Found<Vec<i64>> {
+fn nodes_at(list: &str, ids: &[i64], places: impl Iterator<Item = Option<i64>>) -> Diagnosed<Vec<i64>> {
     let node = |place: Option<i64>| {
         let at = usize::try_from(place?.checked_sub(1)?).ok()?;
         ids.get(at).copied()

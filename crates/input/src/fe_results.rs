@@ -18,7 +18,7 @@ use super::matrices::scipy_npz::{Archive, ScipyNpz};
 use super::matrices::{HEAD, Reader};
 use crate::npy::{self, Blocks};
 use faer::Mat;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::Error;
 use flexbody_base::text::InputFile;
 use flexbody_base::units::UnitSystem;
@@ -26,7 +26,7 @@ use flexbody_linalg::ties::TIE_MARGIN;
 use flexbody_model::{AnsweredShapes, DofLabel, Quantity, RecoveryOperator, RecoveryRow, ShapeSteps};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
-use step_values::{COMPONENTS, Found, Place, StepValues, unreadable};
+use step_values::{COMPONENTS, Place, StepValues, unreadable};
 
 /// Smallest tolerance of displacements that an FE program returns, relative to the largest one of their shape. Files
 /// with fewer digits get a tolerance of ten units of their last digit.
@@ -58,7 +58,7 @@ pub(super) fn files_listed_by(results: &Path) -> Vec<PathBuf> {
 pub(super) fn read_answers(
     files: &AnswerFiles<'_>,
     units: &UnitSystem,
-) -> Found<(RecoveryOperator, Vec<Diagnostic>)> {
+) -> Diagnosed<(RecoveryOperator, Vec<Diagnostic>)> {
     let values = read_values(files.answers, &files.listed)?;
     let is_archive = ShapeArchive::recognises(files.displacements);
     let shapes = match is_archive {
@@ -136,7 +136,7 @@ pub fn read_point_stresses(path: &Path) -> Result<PointStresses, Error> {
 }
 
 /// Reads results in any of the formats; `listed` are the files of collections.
-fn read_values(file: &InputFile, listed: &[&InputFile]) -> Found<StepValues> {
+fn read_values(file: &InputFile, listed: &[&InputFile]) -> Diagnosed<StepValues> {
     let head = file.first_bytes(HEAD);
     if Hdf5.recognises(&head) {
         return match has_nodal_variables(file) {
@@ -169,7 +169,7 @@ fn refuse_other_displacements(
     values: &StepValues,
     shapes: &ShapeArchive,
     files: &AnswerFiles<'_>,
-) -> Found<()> {
+) -> Diagnosed<()> {
     let refuse = |message: String| {
         Err(vec![Diagnostic::new(Code::RecoveryShapes, message).in_file(files.answers.path())])
     };
@@ -264,7 +264,7 @@ impl ShapeArchive {
     ///
     /// # Errors
     /// FB326 for results without displacements or with a node twice.
-    fn of_results(values: &StepValues, file: &InputFile) -> Found<Self> {
+    fn of_results(values: &StepValues, file: &InputFile) -> Diagnosed<Self> {
         let dofs: Vec<DofLabel> = displacements_of(&values.moved).collect();
         let unique: HashSet<&i64> = values.moved.iter().collect();
         if dofs.is_empty() || unique.len() < values.moved.len() {
@@ -288,7 +288,7 @@ impl ShapeArchive {
     ///
     /// # Errors
     /// FB326 for a file that is no such archive; FB103, FB301 to FB306 for damaged arrays.
-    fn read(file: &InputFile) -> Found<Self> {
+    fn read(file: &InputFile) -> Diagnosed<Self> {
         let about = |diagnostic: Diagnostic| vec![of_archive(diagnostic, HELP).in_file(file.path())];
         let foreign = |message: String| about(Diagnostic::new(Code::RecoveryShapes, message));
         file.load().map_err(|diagnostic| vec![diagnostic])?;

@@ -6,7 +6,7 @@ mod members;
 mod values;
 
 pub(super) use arrays::{StoredArray, has_arrays_beside, read_array, read_stored_array};
-pub(super) use file::{Found, MAX_DEPTH, MAX_GROUPS, layout, opened};
+pub(super) use file::{MAX_DEPTH, MAX_GROUPS, layout, opened};
 pub(super) use members::Members;
 pub(super) use values::{
     Heaps, Numbers, Vector, integers_of, names_of, refuse_beyond_memory, text_of, truth_of,

@@ -21,11 +21,11 @@ use abaqus::Abaqus;
 use calculix::Calculix;
 use deck::Deck;
 use deck_mesh::DeckMesh;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::refuse_packed;
 use flexbody_model::Nodes;
-use job::{Found, JobReader};
+use job::JobReader;
 use nastran::Nastran;
 use siblings::{is_deck, siblings};
 use std::path::{Path, PathBuf};
@@ -67,7 +67,7 @@ pub(super) fn family(job: &JobFile) -> Vec<PathBuf> {
 ///
 /// # Errors
 /// FB102 for a compressed file, FB108 if no reader recognises the file, and the errors of [`JobReader::read`].
-pub(super) fn read_job(job: &JobFile) -> Found<JobModel> {
+pub(super) fn read_job(job: &JobFile) -> Diagnosed<JobModel> {
     let reader = match &job.program {
         Some(program) => JOBS.iter().find(|reader| reader.name() == program.as_str()),
         None => {
@@ -107,7 +107,7 @@ fn unknown(job: &JobFile) -> Diagnostic {
 ///
 /// # Errors
 /// FB101, FB106 for files that cannot be read; FB110, FB111 for decks that cannot be read.
-pub(super) fn nodes_of_deck(file: &InputFile) -> Found<NodeFile> {
+pub(super) fn nodes_of_deck(file: &InputFile) -> Diagnosed<NodeFile> {
     let mesh = DeckMesh::of(&Deck::read(file.path())?)?;
     let elements = mesh.drawn();
     let (ids, positions) = mesh.nodes.into_iter().unzip();

@@ -44,7 +44,7 @@ pub use jobs::{ElementDeck, JobFile, is_job, job_programs};
 pub use manifest::read_manifest;
 pub use matrices::assemble::check_size;
 pub use matrices::operator::OperatorColumns;
-pub use matrices::{ArraySource, HEAD, MatrixRole, MatrixSource, READERS, ReadOutcome, Reader};
+pub use matrices::{ArraySource, HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use model_files::{
     InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
     OperatorSource, RecoverySource, Region, StressStiffnessSource, TableFiles, WithStress, parse_units,

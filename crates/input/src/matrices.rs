@@ -38,7 +38,7 @@ use petsc::Petsc;
 use scipy_npz::ScipyNpz;
 use std::path::Path;
 
-pub use reader::{ArraySource, HEAD, MatrixRole, MatrixSource, ReadOutcome, Reader};
+pub use reader::{ArraySource, HEAD, MatrixRole, MatrixSource, Reader};
 
 /// Every supported matrix format.
 pub const READERS: &[&dyn Reader] =

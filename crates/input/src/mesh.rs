@@ -1,7 +1,7 @@
 //! The surface by which a part is drawn, from the elements of its files.
 
 use super::node_file::NodeFile;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_model::{ElementShape, Elements, Nodes, Skin, SurfaceMesh, extents, skin};
 use std::collections::HashMap;
 use std::path::Path;
@@ -22,15 +22,15 @@ pub(super) struct MeshReading<'m> {
     pub path: &'m Path,
 }
 
-/// Surface with notes about missing elements, or errors.
-type Found = Result<(Option<SurfaceMesh>, Vec<Diagnostic>), Vec<Diagnostic>>;
-
 impl MeshReading<'_> {
     /// Returns the surface by the elements of the file `from`, else by the elements that were read with the nodes.
     ///
     /// # Errors
     /// FB125 if `from` is not a mesh on the nodes of the model.
-    pub(crate) fn mesh(&self, from: Option<(&NodeFile, &Path)>) -> Found {
+    pub(crate) fn mesh(
+        &self,
+        from: Option<(&NodeFile, &Path)>,
+    ) -> Diagnosed<(Option<SurfaceMesh>, Vec<Diagnostic>)> {
         let Some((mesh, path)) = from else {
             return Ok(self.drawn(self.elements, self.path));
         };

@@ -7,15 +7,16 @@ mod mode_table;
 mod op2;
 mod punch;
 
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::InputFile;
 use flexbody_model::RawModes;
-use mode_table::{Found, ModeTable};
+use mode_table::ModeTable;
 
 /// Format of files of modes.
 struct Format {
     recognises: fn(&[u8]) -> bool,
-    read: fn(&InputFile) -> Found<ModeTable>,
+    read: fn(&InputFile) -> Diagnosed<ModeTable>,
 }
 
 /// Formats of files of modes. The first that recognises the beginning of a file reads it.
@@ -34,7 +35,7 @@ const HEAD: usize = 4096;
 ///
 /// # Errors
 /// FB128 for a file that cannot be read, FB306 for values that are not finite.
-pub(super) fn read_modes(file: &InputFile, role: &str) -> Option<Found<RawModes>> {
+pub(super) fn read_modes(file: &InputFile, role: &str) -> Option<Diagnosed<RawModes>> {
     let bytes = file.bytes();
     let head = &bytes[..bytes.len().min(HEAD)];
     let format = FORMATS.iter().find(|format| (format.recognises)(head))?;

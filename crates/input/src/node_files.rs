@@ -18,8 +18,7 @@ use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};
 use super::node_file::NodeFile;
 use super::tables::read_nodes;
-use errors::Found;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::refuse_packed;
 use std::collections::HashSet;
@@ -27,7 +26,7 @@ use std::collections::HashSet;
 /// Format of node files besides the table of this program.
 struct Format {
     recognises: fn(&str) -> bool,
-    read: fn(&InputFile) -> Found<NodeFile>,
+    read: fn(&InputFile) -> Diagnosed<NodeFile>,
 }
 
 /// Formats of node files. The first that recognises the beginning of a file reads it.
@@ -49,7 +48,7 @@ const HEAD: usize = 4096;
 ///
 /// # Errors
 /// FB102 for compressed files; FB106, FB203 to FB206 for tables; FB110, FB111, FB115, FB205 for other files.
-pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Found<NodeFile> {
+pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Diagnosed<NodeFile> {
     refuse_packed(file, "file of nodes or elements").map_err(|found| vec![found])?;
     let bytes = file.bytes();
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]);
@@ -91,7 +90,7 @@ fn is_deck(head: &str) -> bool {
         .is_some_and(|line| line.starts_with('*') && line[1..].starts_with(|c: char| c.is_ascii_alphabetic()))
 }
 
-fn bulk(file: &InputFile) -> Found<NodeFile> {
+fn bulk(file: &InputFile) -> Diagnosed<NodeFile> {
     nodes_of_bulk(file.path())
 }
 

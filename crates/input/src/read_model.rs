@@ -16,8 +16,8 @@ mod with_stress;
 
 use super::mesh::MeshReading;
 use super::model_files::{ModelFiles, ModelSource, NamedLoadSource};
-use diagnostics::{Found, collect, take};
-use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
+use diagnostics::{collect, take};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::Sources;
 use flexbody_base::text::quotes::without_foreign_quotes;
@@ -153,7 +153,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
 /// Returns the geometric stiffness of every load that could be read; adds errors. Also returns the number of digits that
 /// are left of each that is a difference of matrices, with its load.
 fn of_stress(
-    read: Vec<Found<GeometricStiffness<StressMatrix>>>,
+    read: Vec<Diagnosed<GeometricStiffness<StressMatrix>>>,
     matrices: Option<&ModelMatrices>,
     dimension: u8,
     diagnostics: &mut Vec<Diagnostic>,

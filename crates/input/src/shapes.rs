@@ -6,7 +6,7 @@ use super::matrices::{HEAD, READERS, with_reader};
 use super::mode_files::read_modes;
 use super::model_files::MatrixLocation;
 use faer::Mat;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::Compression;
@@ -53,7 +53,7 @@ pub fn read_shapes(location: &MatrixLocation, counts: &[usize], role: &str) -> R
 }
 
 /// Reads a dense array in any of the formats: the `dataset` of a file with several.
-pub(super) fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, Vec<Diagnostic>> {
+pub(super) fn read(file: &InputFile, dataset: Option<&str>) -> Diagnosed<Array> {
     if let Some(found) = with_reader(file, dataset, |reader, source| reader.read_array(source)) {
         return found;
     }

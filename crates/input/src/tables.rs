@@ -1,6 +1,6 @@
 //! The three tables: nodes, labels of the matrix rows, nodes of an interface.
 
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{BadLines, excerpt, integer, number};
@@ -9,14 +9,12 @@ use flexbody_model::{DofLabel, Nodes, Quantity, RecoveryRow};
 use std::collections::HashMap;
 use std::path::Path;
 
-type Found<T> = Result<T, Vec<Diagnostic>>;
-
 const fn column(name: &'static str, required: bool) -> Column {
     Column { name, required }
 }
 
 /// Reads `node,x,y,z`; for `dimension` 2 `node,x,y`, where a column z must be zero.
-pub(super) fn read_nodes(file: &InputFile, dimension: u8) -> Found<Nodes> {
+pub(super) fn read_nodes(file: &InputFile, dimension: u8) -> Diagnosed<Nodes> {
     let plane = dimension == 2;
     let columns = [column("node", true), column("x", true), column("y", true), column("z", !plane)];
     let table = Table::open(file, &columns).map_err(|d| {
@@ -45,7 +43,7 @@ pub(super) fn read_nodes(file: &InputFile, dimension: u8) -> Found<Nodes> {
 }
 
 /// Reads `node,dir` or `row,node,dir`. Returns the labels in the order of the matrix rows.
-pub(super) fn read_dofs(file: &InputFile) -> Found<Vec<DofLabel>> {
+pub(super) fn read_dofs(file: &InputFile) -> Diagnosed<Vec<DofLabel>> {
     let columns = [column("node", true), column("dir", true), column("row", false)];
     let table = Table::open(file, &columns)
         .map_err(|d| vec![d.with_help("name the columns in the first line: `node,dir` or `row,node,dir`")])?;
@@ -76,7 +74,7 @@ pub(super) fn read_dofs(file: &InputFile) -> Found<Vec<DofLabel>> {
 }
 
 /// Sorts labels by their row numbers, which must be 0 to n - 1, each once.
-fn by_row(file: &InputFile, rows: &[(i64, usize, DofLabel)]) -> Found<Vec<DofLabel>> {
+fn by_row(file: &InputFile, rows: &[(i64, usize, DofLabel)]) -> Diagnosed<Vec<DofLabel>> {
     let n = rows.len();
     let mut at: Vec<Option<usize>> = vec![None; n];
     let mut bad = BadLines::default();
@@ -104,7 +102,7 @@ fn by_row(file: &InputFile, rows: &[(i64, usize, DofLabel)]) -> Found<Vec<DofLab
 }
 
 /// Reads the column `node`.
-pub(super) fn read_node_list(file: &InputFile) -> Found<Vec<i64>> {
+pub(super) fn read_node_list(file: &InputFile) -> Diagnosed<Vec<i64>> {
     let table = Table::open(file, &[column("node", true)]).map_err(|d| vec![d])?;
     let rows = table.rows(|line, fields| Ok((node_number(fields[0])?, line)))?;
     no_duplicates(file, rows.iter().copied())?;
@@ -116,7 +114,7 @@ pub(super) fn read_node_list(file: &InputFile) -> Found<Vec<i64>> {
 ///
 /// # Errors
 /// FB203, FB204 for a table that cannot be read, FB323 for unknown quantities and row numbers that are not 0, 1, 2, ...
-pub(super) fn read_recovery_rows(file: &InputFile) -> Found<Vec<RecoveryRow>> {
+pub(super) fn read_recovery_rows(file: &InputFile) -> Diagnosed<Vec<RecoveryRow>> {
     let columns = [
         column("row", true),
         column("name", true),
@@ -170,7 +168,7 @@ pub(super) fn read_recovery_rows(file: &InputFile) -> Found<Vec<RecoveryRow>> {
 }
 
 /// Reads `node,mass`.
-pub(super) fn read_masses(file: &InputFile) -> Found<Vec<(i64, f64)>> {
+pub(super) fn read_masses(file: &InputFile) -> Diagnosed<Vec<(i64, f64)>> {
     let columns = [column("node", true), column("mass", true)];
     let table = Table::open(file, &columns)
         .map_err(|d| vec![d.with_help("name the columns in the first line: `node,mass`")])?;
@@ -214,7 +212,7 @@ fn coordinate(node: i64, axis: &str, field: &[u8]) -> Result<f64, Diagnostic> {
     }
 }
 
-fn no_duplicates(file: &InputFile, nodes: impl Iterator<Item = (i64, usize)>) -> Found<()> {
+fn no_duplicates(file: &InputFile, nodes: impl Iterator<Item = (i64, usize)>) -> Diagnosed<()> {
     let mut bad = BadLines::default();
     let mut first: HashMap<i64, usize> = HashMap::with_capacity(nodes.size_hint().0);
     for (node, line) in nodes {

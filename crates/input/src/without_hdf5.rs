@@ -1,11 +1,11 @@
 //! HDF5 files in a build without HDF5: refused by name.
 
 use super::array::Array;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 
 /// Refuses an array of shapes.
-pub(super) fn read_array(_: &InputFile, _: Option<&str>) -> Result<Array, Vec<Diagnostic>> {
+pub(super) fn read_array(_: &InputFile, _: Option<&str>) -> Diagnosed<Array> {
     Err(vec![left_out()])
 }
 

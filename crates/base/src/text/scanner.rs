@@ -3,7 +3,7 @@
 //!
 //! Blanks are those of ASCII. A reader adds what its format alone has: comments, keywords and continuations.
 
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnosed, Diagnostic};
 use std::cell::Cell;
 
 /// Returns the text, or its beginning, in printable form for a message.
@@ -391,7 +391,7 @@ impl BadLines {
     ///
     /// # Errors
     /// The diagnostics of [`Self::into_diagnostics`] if there are bad lines.
-    pub fn finish(self, code: Code, line: &str) -> Result<(), Vec<Diagnostic>> {
+    pub fn finish(self, code: Code, line: &str) -> Diagnosed<()> {
         if self.is_empty() { Ok(()) } else { Err(self.into_diagnostics(code, line)) }
     }
 }

@@ -7,7 +7,7 @@
 use super::input_file::InputFile;
 use super::last_field::LastFields;
 use super::scanner::{BadLines, Line, Lines, Separator, excerpt, number, without_mark};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnosed, Diagnostic};
 
 /// Smallest number of rows.
 const MIN_ROWS: usize = 2;
@@ -65,11 +65,7 @@ pub struct Series {
 /// # Errors
 /// FB215 for all columns that the file does not have. FB216 for rows that cannot be read (the first few, and the number
 /// of others), for times that do not ascend, for fewer than two rows and for a file that may end within its last number.
-pub fn read_series(
-    file: &InputFile,
-    time: &ColumnKey,
-    wanted: &[ColumnKey],
-) -> Result<Series, Vec<Diagnostic>> {
+pub fn read_series(file: &InputFile, time: &ColumnKey, wanted: &[ColumnKey]) -> Diagnosed<Series> {
     let Some(text) = without_mark(file.bytes()) else {
         let error = row_error(file, 1, "file is UTF-16".to_owned());
         return Err(vec![error.with_help("save it as UTF-8 or ASCII text")]);
@@ -200,7 +196,7 @@ impl<'f> Layout<'f> {
         &self,
         file: &InputFile,
         keys: impl Iterator<Item = &'k ColumnKey>,
-    ) -> Result<Vec<usize>, Vec<Diagnostic>> {
+    ) -> Diagnosed<Vec<usize>> {
         let (mut places, mut found) = (Vec::new(), Vec::new());
         for key in keys {
             match self.place(key) {
@@ -364,7 +360,7 @@ impl<'r> SeriesReader<'r> {
         row_error(self.file, lines[row], message).with_help(help)
     }
 
-    fn finish(self) -> Result<Series, Vec<Diagnostic>> {
+    fn finish(self) -> Diagnosed<Series> {
         if !self.bad.is_empty() {
             return Err(self.bad.into_diagnostics(Code::SeriesRow, "row"));
         }
@@ -385,7 +381,7 @@ impl<'r> SeriesReader<'r> {
 mod tests {
     use super::*;
 
-    fn read(text: &str, time: &str, wanted: &[&str]) -> Result<Series, Vec<Diagnostic>> {
+    fn read(text: &str, time: &str, wanted: &[&str]) -> Diagnosed<Series> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("run.csv");
         std::fs::write(&path, text).expect("written");

@@ -4,7 +4,7 @@ use super::compression::refuse_packed;
 use super::input_file::InputFile;
 use super::last_field::LastFields;
 use super::scanner::{BadLines, Line, Lines, Separator, excerpt, number, without_mark};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnosed, Diagnostic};
 use std::path::Path;
 
 /// Column that a table may have.
@@ -95,7 +95,7 @@ impl<'a> Table<'a> {
     pub fn rows<T>(
         &self,
         mut read: impl FnMut(usize, &[&'a [u8]]) -> Result<T, Diagnostic>,
-    ) -> Result<Vec<T>, Vec<Diagnostic>> {
+    ) -> Diagnosed<Vec<T>> {
         let mut rows = Vec::with_capacity(self.rest.rest().len() / 32);
         let mut bad = BadLines::default();
         let mut columns: Vec<&[u8]> = vec![b""; self.columns];

@@ -1,15 +1,15 @@
 //! Variables of Exodus II in classic netCDF.
 
-use super::variables::{ExodusFile, Found, NumberTable, wrong, wrong_layers};
+use super::variables::{ExodusFile, NumberTable, wrong, wrong_layers};
 use crate::classic_netcdf::ClassicNetcdf;
-use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::diagnostic::{Diagnosed, Diagnostic};
 
 impl ExodusFile for ClassicNetcdf<'_> {
     fn has(&self, name: &str) -> bool {
         self.variable(name).is_some()
     }
 
-    fn floats(&self, name: &str) -> Found<Vec<f64>> {
+    fn floats(&self, name: &str) -> Diagnosed<Vec<f64>> {
         let variable = self.variable(name).ok_or_else(|| missing(name))?;
         match variable.shape.len() {
             1 => self.numbers(variable).map_err(wrong),
@@ -17,13 +17,13 @@ impl ExodusFile for ClassicNetcdf<'_> {
         }
     }
 
-    fn whole_numbers(&self, name: &str) -> Found<Vec<i64>> {
+    fn whole_numbers(&self, name: &str) -> Diagnosed<Vec<i64>> {
         let whole = |value: f64| (value.fract() == 0.0 && value.abs() < 9e15).then_some(value as i64);
         let numbers: Option<Vec<i64>> = self.floats(name)?.into_iter().map(whole).collect();
         numbers.ok_or_else(|| wrong(format!("`{name}` has a number that is not whole")))
     }
 
-    fn table(&self, name: &str) -> Found<NumberTable> {
+    fn table(&self, name: &str) -> Diagnosed<NumberTable> {
         let variable = self.variable(name).ok_or_else(|| missing(name))?;
         let &[rows, columns] = variable.shape.as_slice() else {
             return Err(wrong(format!("`{name}` is not a table of numbers")));
@@ -32,7 +32,7 @@ impl ExodusFile for ClassicNetcdf<'_> {
         Ok(NumberTable { rows, columns, values, is_single_precision: variable.is_single_precision() })
     }
 
-    fn stacked(&self, name: &str, layers: usize) -> Found<NumberTable> {
+    fn stacked(&self, name: &str, layers: usize) -> Diagnosed<NumberTable> {
         let variable = self.variable(name).ok_or_else(|| missing(name))?;
         let &[times, own, columns] = variable.shape.as_slice() else {
             return Err(wrong(wrong_layers(name, &variable.shape, layers)));
@@ -45,7 +45,7 @@ impl ExodusFile for ClassicNetcdf<'_> {
         Ok(NumberTable { rows: times * layers, columns, values, is_single_precision })
     }
 
-    fn names(&self, name: &str) -> Found<Vec<String>> {
+    fn names(&self, name: &str) -> Diagnosed<Vec<String>> {
         let variable = self.variable(name).ok_or_else(|| missing(name))?;
         self.lines(variable).map_err(wrong)
     }

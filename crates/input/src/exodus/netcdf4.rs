@@ -1,7 +1,8 @@
 //! Exodus II in netCDF-4, which is HDF5.
 
-use super::variables::{ExodusFile, Found, NumberTable, wrong_layers};
+use super::variables::{ExodusFile, NumberTable, wrong_layers};
 use crate::hdf5::{Heaps, Members, Numbers, Vector, layout, names_of, opened, refuse_beyond_memory, text_of};
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use hdf5_metno::Group;
 use std::cell::Cell;
@@ -10,7 +11,7 @@ use std::cell::Cell;
 ///
 /// # Errors
 /// FB101 for a file that cannot be opened.
-pub(super) fn with_exodus<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> T) -> Found<T> {
+pub(super) fn with_exodus<T>(file: &InputFile, read: impl FnOnce(&dyn ExodusFile) -> T) -> Diagnosed<T> {
     let opened = opened(file)?;
     let root = opened.group("/").map_err(|e| vec![layout(format!("file cannot be read: {e}"))])?;
     let members = Members::of(&root);
@@ -29,13 +30,13 @@ struct Datasets<'f> {
 }
 
 impl Datasets<'_> {
-    fn vector(&self, name: &str) -> Found<Vector> {
+    fn vector(&self, name: &str) -> Diagnosed<Vector> {
         self.numbers(name)?;
         Vector::open(&self.root, &self.members, "", name)
     }
 
     /// Opens a dataset to read its values. Each dataset has one name: all together store no more bytes than the file has.
-    fn numbers(&self, name: &str) -> Found<Numbers> {
+    fn numbers(&self, name: &str) -> Diagnosed<Numbers> {
         let numbers = self.unread(name)?;
         let read = self.read.get().saturating_add(numbers.dataset.storage_size());
         self.read.set(read);
@@ -48,7 +49,7 @@ impl Datasets<'_> {
         ))])
     }
 
-    fn unread(&self, name: &str) -> Found<Numbers> {
+    fn unread(&self, name: &str) -> Diagnosed<Numbers> {
         Numbers::open(&self.root, &self.members, "", name)
     }
 }
@@ -58,17 +59,17 @@ impl ExodusFile for Datasets<'_> {
         self.members.link(name).is_some()
     }
 
-    fn floats(&self, name: &str) -> Found<Vec<f64>> {
+    fn floats(&self, name: &str) -> Diagnosed<Vec<f64>> {
         let vector = self.vector(name)?;
         vector.floats(0..vector.len)
     }
 
-    fn whole_numbers(&self, name: &str) -> Found<Vec<i64>> {
+    fn whole_numbers(&self, name: &str) -> Diagnosed<Vec<i64>> {
         let vector = self.vector(name)?;
         vector.integers(0..vector.len)
     }
 
-    fn stacked(&self, name: &str, layers: usize) -> Found<NumberTable> {
+    fn stacked(&self, name: &str, layers: usize) -> Diagnosed<NumberTable> {
         let numbers = self.numbers(name)?;
         let shape = numbers.dataset.shape();
         match shape.as_slice() {
@@ -77,7 +78,7 @@ impl ExodusFile for Datasets<'_> {
         }
     }
 
-    fn table(&self, name: &str) -> Found<NumberTable> {
+    fn table(&self, name: &str) -> Diagnosed<NumberTable> {
         let numbers = self.numbers(name)?;
         let &[rows, columns] = numbers.dataset.shape().as_slice() else {
             return Err(vec![layout(format!("dataset {} is not a table of numbers", numbers.name))]);
@@ -85,7 +86,7 @@ impl ExodusFile for Datasets<'_> {
         read_rows(&numbers, rows, columns)
     }
 
-    fn names(&self, name: &str) -> Found<Vec<String>> {
+    fn names(&self, name: &str) -> Diagnosed<Vec<String>> {
         names_of(&self.root, &self.members, name)
     }
 
@@ -96,7 +97,7 @@ impl ExodusFile for Datasets<'_> {
 }
 
 /// Returns the values of a dataset as a table.
-fn read_rows(numbers: &Numbers, rows: usize, columns: usize) -> Found<NumberTable> {
+fn read_rows(numbers: &Numbers, rows: usize, columns: usize) -> Diagnosed<NumberTable> {
     refuse_beyond_memory(numbers.dataset.size(), &numbers.name)?;
     let values = numbers.dataset.read_raw::<f64>();
     let failed = |e| vec![layout(format!("dataset {} cannot be read: {e}", numbers.name))];

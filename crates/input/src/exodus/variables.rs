@@ -1,8 +1,6 @@
 //! Variables of an Exodus file by their names, in either form of netCDF.
 
-use flexbody_base::diagnostic::{Code, Diagnostic};
-
-pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 
 const HELP: &str =
     "give an Exodus mesh in netCDF-4 or classic netCDF, or a table with the columns node, x, y, z";
@@ -13,19 +11,19 @@ pub(super) trait ExodusFile {
     fn has(&self, name: &str) -> bool;
 
     /// Returns the numbers of a variable with one extent.
-    fn floats(&self, name: &str) -> Found<Vec<f64>>;
+    fn floats(&self, name: &str) -> Diagnosed<Vec<f64>>;
 
     /// Returns the whole numbers of a variable with one extent.
-    fn whole_numbers(&self, name: &str) -> Found<Vec<i64>>;
+    fn whole_numbers(&self, name: &str) -> Diagnosed<Vec<i64>>;
 
     /// Returns a variable with two extents.
-    fn table(&self, name: &str) -> Found<NumberTable>;
+    fn table(&self, name: &str) -> Diagnosed<NumberTable>;
 
     /// Returns a variable with three extents, of which the second is `layers`, as a table: each row of each layer in turn.
-    fn stacked(&self, name: &str, layers: usize) -> Found<NumberTable>;
+    fn stacked(&self, name: &str, layers: usize) -> Diagnosed<NumberTable>;
 
     /// Returns a list of texts.
-    fn names(&self, name: &str) -> Found<Vec<String>>;
+    fn names(&self, name: &str) -> Diagnosed<Vec<String>>;
 
     /// Returns the attribute `elem_type` of a variable; empty without one.
     fn element_type(&self, name: &str) -> String;

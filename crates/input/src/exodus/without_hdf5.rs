@@ -2,13 +2,10 @@
 
 use super::variables::ExodusFile;
 use crate::hdf5::left_out;
-use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::diagnostic::{Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 
 /// Refuses an Exodus file.
-pub(super) fn with_exodus<T>(
-    _: &InputFile,
-    _: impl FnOnce(&dyn ExodusFile) -> T,
-) -> Result<T, Vec<Diagnostic>> {
+pub(super) fn with_exodus<T>(_: &InputFile, _: impl FnOnce(&dyn ExodusFile) -> T) -> Diagnosed<T> {
     Err(vec![left_out()])
 }

@@ -2,10 +2,10 @@
 //! with the datasets `nodes` (n), `displacements` (steps x 3n), `stresses` (steps x 6n) and optionally `strain_energy`
 //! (steps), node by node.
 
-use super::step_values::{Found, Place, Step, StepValues, unreadable};
+use super::step_values::{Place, Step, StepValues, unreadable};
 use crate::array::Array;
 use crate::hdf5::read_array;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{excerpt, integer, number};
 use flexbody_base::text::table::{Column, Table};
@@ -19,7 +19,7 @@ const DIGITS: u8 = 6;
 ///
 /// # Errors
 /// FB203, FB204 for a table that cannot be read, FB327 for steps that are not in ascending order from 1.
-pub(super) fn read_table(file: &InputFile) -> Found<StepValues> {
+pub(super) fn read_table(file: &InputFile) -> Diagnosed<StepValues> {
     let columns = NAMES.map(|name| Column { name, required: true });
     let table = Table::open(file, &columns).map_err(|diagnostic| vec![diagnostic])?;
     let rows = table.rows(|_, fields| {
@@ -54,7 +54,7 @@ pub(super) fn read_table(file: &InputFile) -> Found<StepValues> {
 ///
 /// # Errors
 /// FB327 for arrays that do not fit each other, and the errors of arrays.
-pub(super) fn read_hdf5(file: &InputFile) -> Found<StepValues> {
+pub(super) fn read_hdf5(file: &InputFile) -> Diagnosed<StepValues> {
     let about = |found: Vec<Diagnostic>| -> Vec<_> {
         found.into_iter().map(|diagnostic| diagnostic.in_file(file.path())).collect()
     };

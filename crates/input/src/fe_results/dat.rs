@@ -1,8 +1,8 @@
 //! Printed results of CalculiX (.dat): stresses at integration points, displacements and the strain energy of the part,
 //! with seven digits.
 
-use super::step_values::{Found, Place, Step, StepValues};
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use super::step_values::{Place, Step, StepValues};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, excerpt, integer, real, words};
 
@@ -38,7 +38,7 @@ enum Table {
 ///
 /// # Errors
 /// FB327.
-pub(super) fn read(file: &InputFile) -> Found<StepValues> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<StepValues> {
     file.load().map_err(|diagnostic| vec![diagnostic])?;
     let mut steps: Vec<Step> = Vec::new();
     let (mut table, mut time) = (Table::Other, None);

@@ -1,8 +1,8 @@
 //! Results of CalculiX (.frd): text with six digits, or text with blocks of 32-bit or 64-bit numbers. The blocks are
 //! described in the manual of CalculiX GraphiX, section "Result format".
 
-use super::step_values::{COMPONENTS, Found, Place, Step, StepValues, unreadable};
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use super::step_values::{COMPONENTS, Place, Step, StepValues, unreadable};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{excerpt, field, integer, line_end, line_number, real};
 use std::collections::HashMap;
@@ -54,7 +54,7 @@ impl Form {
 ///
 /// # Errors
 /// FB327.
-pub(super) fn read(file: &InputFile) -> Found<StepValues> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<StepValues> {
     let mut reading = FrdReading {
         file,
         bytes: file.bytes(),
@@ -104,7 +104,7 @@ struct Heading {
 }
 
 impl<'f> FrdReading<'f> {
-    fn all(&mut self) -> Found<()> {
+    fn all(&mut self) -> Diagnosed<()> {
         let mut heading = None;
         while self.at < self.bytes.len() {
             let (start, line) = self.line();
@@ -134,7 +134,7 @@ impl<'f> FrdReading<'f> {
     }
 
     /// Returns the next `count` records of `size` bytes.
-    fn records(&mut self, count: usize, size: usize) -> Found<std::slice::ChunksExact<'f, u8>> {
+    fn records(&mut self, count: usize, size: usize) -> Diagnosed<std::slice::ChunksExact<'f, u8>> {
         let end = count.checked_mul(size).and_then(|bytes| self.at.checked_add(bytes));
         let Some(end) = end.filter(|end| *end <= self.bytes.len()) else {
             return Err(unreadable(self.file, "the file is cut off within a block of numbers"));
@@ -152,7 +152,7 @@ impl<'f> FrdReading<'f> {
     }
 
     /// Passes the block of the nodes.
-    fn skip_nodes(&mut self, start: usize, line: &[u8]) -> Found<()> {
+    fn skip_nodes(&mut self, start: usize, line: &[u8]) -> Diagnosed<()> {
         let (count, form) = self.counted(start, line)?;
         match form {
             Form::Text { .. } => self.skip_text(),
@@ -168,14 +168,14 @@ impl<'f> FrdReading<'f> {
     }
 
     /// Returns the number of records and the form of the numbers from the heading of nodes or elements.
-    fn counted(&self, start: usize, line: &[u8]) -> Found<(usize, Form)> {
+    fn counted(&self, start: usize, line: &[u8]) -> Diagnosed<(usize, Form)> {
         let count = integer(field(line, 24..36)).and_then(|count| usize::try_from(count).ok());
         let form = Form::of(field(line, 73..75));
         count.zip(form).ok_or_else(|| self.wrong(start, "a number of records and their form", line))
     }
 
     /// Reads the materials at the nodes from the elements.
-    fn elements(&mut self, start: usize, line: &'f [u8]) -> Found<()> {
+    fn elements(&mut self, start: usize, line: &'f [u8]) -> Diagnosed<()> {
         let (count, form) = self.counted(start, line)?;
         if let Form::Text { start } = form {
             return self.elements_in_text(start - 3);
@@ -193,7 +193,7 @@ impl<'f> FrdReading<'f> {
     }
 
     /// Reads elements whose node numbers have `width` characters.
-    fn elements_in_text(&mut self, width: usize) -> Found<()> {
+    fn elements_in_text(&mut self, width: usize) -> Diagnosed<()> {
         let mut material = 0;
         while self.at < self.bytes.len() {
             let (start, line) = self.line();
@@ -220,7 +220,7 @@ impl<'f> FrdReading<'f> {
         }
     }
 
-    fn heading(&self, start: usize, line: &[u8]) -> Found<Heading> {
+    fn heading(&self, start: usize, line: &[u8]) -> Diagnosed<Heading> {
         let (count, form) = self.counted(start, line)?;
         match integer(field(line, 58..63)) {
             Some(number) => Ok(Heading { number, count, form }),
@@ -229,7 +229,7 @@ impl<'f> FrdReading<'f> {
     }
 
     /// Reads a block of displacements or stresses; passes others.
-    fn block(&mut self, line: &'f [u8], heading: &Heading) -> Found<()> {
+    fn block(&mut self, line: &'f [u8], heading: &Heading) -> Diagnosed<()> {
         let name = field(line, 5..13);
         let components = self.components();
         let wanted: Option<Vec<usize>> = match name {
@@ -281,7 +281,12 @@ impl<'f> FrdReading<'f> {
     }
 
     /// Reads the numbers of the nodes and their values.
-    fn values(&mut self, heading: &Heading, components: usize, wanted: bool) -> Found<Vec<(i64, Vec<f64>)>> {
+    fn values(
+        &mut self,
+        heading: &Heading,
+        components: usize,
+        wanted: bool,
+    ) -> Diagnosed<Vec<(i64, Vec<f64>)>> {
         let Heading { count, form, .. } = *heading;
         match form {
             Form::Text { .. } if !wanted => {
@@ -313,7 +318,7 @@ impl<'f> FrdReading<'f> {
         count: usize,
         start: usize,
         components: usize,
-    ) -> Found<Vec<(i64, Vec<f64>)>> {
+    ) -> Diagnosed<Vec<(i64, Vec<f64>)>> {
         let mut records: Vec<(i64, Vec<f64>)> = Vec::new();
         while self.at < self.bytes.len() {
             let (at, line) = self.line();

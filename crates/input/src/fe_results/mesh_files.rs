@@ -2,13 +2,13 @@
 //! `stress N` of each step at the points, files of pieces (.pvtu), collections of such files (.pvd), and Exodus, with
 //! variables of the nodes at every time.
 
-use super::step_values::{Found, Place, Step, StepValues, unreadable};
+use super::step_values::{Place, Step, StepValues, unreadable};
 use crate::exodus::{NodalVariables, read_nodal_variables};
 use crate::matrices::HEAD;
 use crate::node_files::{
     self, CollectionMember, PointArray, PointData, collection, legacy_point_arrays, pieces, point_arrays,
 };
-use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::diagnostic::{Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -65,7 +65,7 @@ fn beside(listing: &Path, member: &str) -> PathBuf {
 ///
 /// # Errors
 /// FB327 for another mesh, for a step without one of the two arrays, and for points without numbers.
-pub(super) fn read_vtk(file: &InputFile, members: &[&InputFile]) -> Found<StepValues> {
+pub(super) fn read_vtk(file: &InputFile, members: &[&InputFile]) -> Diagnosed<StepValues> {
     let members: &Opened<'_> = &members.iter().map(|member| (member.path(), *member)).collect();
     let listed = match node_files::is_vtk_xml(&file.first_bytes(HEAD)) {
         true => collection(file.bytes()).map_err(|message| unreadable(file, message))?,
@@ -96,7 +96,11 @@ pub(super) fn read_vtk(file: &InputFile, members: &[&InputFile]) -> Found<StepVa
 type Opened<'f> = HashMap<&'f Path, &'f InputFile>;
 
 /// Reads the files of a collection, one for each step, in the order of their times.
-fn read_collection(file: &InputFile, listed: &[CollectionMember], members: &Opened<'_>) -> Found<StepValues> {
+fn read_collection(
+    file: &InputFile,
+    listed: &[CollectionMember],
+    members: &Opened<'_>,
+) -> Diagnosed<StepValues> {
     let (mut steps, mut digits) = (Vec::new(), 15);
     for member in listed {
         let path = beside(file.path(), &member.file);
@@ -120,7 +124,7 @@ fn read_collection(file: &InputFile, listed: &[CollectionMember], members: &Open
 }
 
 /// Returns the numbers of the points of a mesh and the arrays at them; of a parallel file those of all pieces.
-fn point_data(file: &InputFile, members: &Opened<'_>) -> Found<(Vec<i64>, Vec<PointArray>)> {
+fn point_data(file: &InputFile, members: &Opened<'_>) -> Diagnosed<(Vec<i64>, Vec<PointArray>)> {
     let sources = match node_files::is_vtk_xml(&file.first_bytes(HEAD)) {
         true => pieces(file.bytes()).map_err(|message| unreadable(file, message))?,
         false => None,
@@ -141,7 +145,7 @@ fn data_of_pieces(
     file: &InputFile,
     sources: &[String],
     members: &Opened<'_>,
-) -> Found<(Vec<i64>, Vec<PointArray>)> {
+) -> Diagnosed<(Vec<i64>, Vec<PointArray>)> {
     let mut whole: Option<(Vec<i64>, Vec<PointArray>)> = None;
     let mut place: HashMap<i64, usize> = HashMap::new();
     let mut left: HashSet<i64> = HashSet::new();
@@ -204,7 +208,7 @@ fn refuse_difference(
     first: usize,
     arrays: &[PointArray],
     at: usize,
-) -> Found<()> {
+) -> Diagnosed<()> {
     for (whole, array) in joined.iter().zip(arrays) {
         let n = array.components;
         let size = array.values.iter().filter(|value| value.is_finite()).fold(0.0f64, |m, v| m.max(v.abs()));
@@ -228,7 +232,7 @@ fn refuse_difference(
 type FileData = (Vec<i64>, Vec<PointArray>, Vec<bool>);
 
 /// Returns the numbers of the points of one file, the arrays at them and the marks of ghosts.
-fn data_of_file(file: &InputFile) -> Found<FileData> {
+fn data_of_file(file: &InputFile) -> Diagnosed<FileData> {
     let PointData { ids, arrays, ghosts } = if node_files::is_vtk_legacy(&file.first_bytes(HEAD)) {
         legacy_point_arrays(file.bytes()).map_err(|(line, message)| {
             unreadable(file, message).into_iter().map(|found| found.at_line(line)).collect::<Vec<_>>()
@@ -265,7 +269,7 @@ fn step_of(array: &PointArray, what: &str) -> Option<usize> {
 }
 
 /// Refuses arrays of steps behind a missing one.
-fn refuse_unfinished(file: &InputFile, arrays: &[PointArray], steps: usize) -> Found<()> {
+fn refuse_unfinished(file: &InputFile, arrays: &[PointArray], steps: usize) -> Diagnosed<()> {
     let of_steps = arrays.iter().filter(|array| step_of(array, "stress").is_some());
     match of_steps.count() {
         0 => Err(unreadable(file, "file has no arrays `displacement 1` and `stress 1` at its points")),
@@ -310,7 +314,7 @@ const COMPONENTS: [[&str; 2]; 6] =
 ///
 /// # Errors
 /// FB327 for a file without one of these variables, and the errors of datasets.
-pub(super) fn read_exodus(file: &InputFile) -> Found<StepValues> {
+pub(super) fn read_exodus(file: &InputFile) -> Diagnosed<StepValues> {
     let about = |found: Vec<Diagnostic>| -> Vec<Diagnostic> {
         found.iter().flat_map(|diagnostic| unreadable(file, diagnostic.message())).collect()
     };
@@ -333,8 +337,9 @@ pub(super) fn read_exodus(file: &InputFile) -> Found<StepValues> {
         })
     };
     let moved: Vec<usize> =
-        ["x", "y", "z"].iter().map(|end| find(&DISPLACEMENTS, &[end])).collect::<Found<_>>()?;
-    let stressed: Vec<usize> = COMPONENTS.iter().map(|ends| find(&STRESSES, ends)).collect::<Found<_>>()?;
+        ["x", "y", "z"].iter().map(|end| find(&DISPLACEMENTS, &[end])).collect::<Diagnosed<_>>()?;
+    let stressed: Vec<usize> =
+        COMPONENTS.iter().map(|ends| find(&STRESSES, ends)).collect::<Diagnosed<_>>()?;
     let n = ids.len();
     let value = |variable: usize, time: usize, at: usize| values[variable][time * n + at];
     let of_time =

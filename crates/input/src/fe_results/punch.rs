@@ -3,9 +3,9 @@
 //! behind 18 characters for the number of the element or grid point, or for -CONT-.
 
 use super::averaged::{Averaged, NodeStress};
-use super::step_values::{Found, Place, Step, StepValues, unreadable};
+use super::step_values::{Place, Step, StepValues, unreadable};
 use crate::mode_files::is_punch;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, excerpt, field, integer, real, words};
 use std::collections::BTreeMap;
@@ -114,7 +114,7 @@ struct Record<'f> {
 ///
 /// # Errors
 /// FB327.
-pub(super) fn read(file: &InputFile) -> Found<StepValues> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<StepValues> {
     let mut reading = Reading {
         file,
         section: Section::Other,
@@ -155,7 +155,7 @@ impl<'f> Reading<'f> {
     }
 
     /// Takes a line of a heading, `$NAME` or `$NAME = value`.
-    fn heading(&mut self, at: usize, line: &[u8]) -> Found<()> {
+    fn heading(&mut self, at: usize, line: &[u8]) -> Diagnosed<()> {
         let line = line.trim_ascii();
         let is = |name: &str| line.starts_with(name.as_bytes());
         let value = || {
@@ -195,7 +195,7 @@ impl<'f> Reading<'f> {
     }
 
     /// Returns the section of stresses of elements of a type.
-    fn section_of(&self, at: usize, number: Option<i64>, line: &[u8]) -> Found<Section> {
+    fn section_of(&self, at: usize, number: Option<i64>, line: &[u8]) -> Diagnosed<Section> {
         let Some(number) = number else {
             let message = format!("expected a type of elements, found `{}`", excerpt(line));
             return Err(self.wrong(at, message, REQUEST));
@@ -217,7 +217,7 @@ impl<'f> Reading<'f> {
     }
 
     /// Takes a line of values.
-    fn line(&mut self, at: usize, line: &'f [u8]) -> Found<()> {
+    fn line(&mut self, at: usize, line: &'f [u8]) -> Diagnosed<()> {
         let mut fields: Vec<&[u8]> =
             (1..=3).map(|place| field(line, place * WIDTH..(place + 1) * WIDTH)).collect();
         while fields.last().is_some_and(|last| last.is_empty()) {
@@ -237,7 +237,7 @@ impl<'f> Reading<'f> {
     }
 
     /// Takes the record that ends before a heading, before the next record or with the file.
-    fn finish(&mut self) -> Found<()> {
+    fn finish(&mut self) -> Diagnosed<()> {
         let Some(record) = self.record.take() else { return Ok(()) };
         let Some(subcase) = self.subcase else {
             return Err(self.wrong(record.line, "values come before the number of their subcase", REQUEST));
@@ -272,7 +272,7 @@ impl<'f> Reading<'f> {
     }
 
     /// Returns the displacements of a grid point; `None` for a scalar point or a coordinate of a mode.
-    fn displacement(&self, record: &Record<'_>) -> Found<Option<(i64, [f64; 3])>> {
+    fn displacement(&self, record: &Record<'_>) -> Diagnosed<Option<(i64, [f64; 3])>> {
         let mut head = words(record.head);
         let number = head.next().and_then(integer);
         let letter = head.next();
@@ -289,7 +289,7 @@ impl<'f> Reading<'f> {
     }
 
     /// Returns the number of a solid element and the stresses at its corners.
-    fn solid(&self, record: &Record<'_>, solid: Solid) -> Found<(i64, Vec<NodeStress>)> {
+    fn solid(&self, record: &Record<'_>, solid: Solid) -> Diagnosed<(i64, Vec<NodeStress>)> {
         let wrong = |message: String, help: &str| Err(self.wrong(record.line, message, help));
         let Some((element, (&[system, _, active], points))) =
             integer(record.head).zip(record.fields.split_first_chunk::<3>())
@@ -332,7 +332,7 @@ impl<'f> Reading<'f> {
     }
 
     /// Returns the stresses at a grid point of a volume.
-    fn grid_point(&self, record: &Record<'_>) -> Found<NodeStress> {
+    fn grid_point(&self, record: &Record<'_>) -> Diagnosed<NodeStress> {
         let node = integer(record.head);
         let values: Option<Vec<f64>> = record.fields.iter().map(|field| real(field)).collect();
         let values = values.filter(|values| values.len() == FIELDS_OF_VOLUME);
@@ -370,7 +370,7 @@ fn other_form(line: &[u8]) -> Option<&'static str> {
 }
 
 /// Returns the values of all subcases with the stresses of each node averaged over the corners of its elements.
-fn steps(cases: BTreeMap<(i64, i64), Case>, file: &InputFile) -> Found<StepValues> {
+fn steps(cases: BTreeMap<(i64, i64), Case>, file: &InputFile) -> Diagnosed<StepValues> {
     let about = |message: String| -> Vec<Diagnostic> {
         unreadable(file, message).into_iter().map(|found| found.with_help(REQUEST)).collect()
     };

@@ -2,10 +2,8 @@
 
 use super::averaged::Averaged;
 use faer::Mat;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
-
-pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
 
 /// Components of the stress in the order of the rows of a recovery.
 pub(super) const COMPONENTS: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
@@ -51,7 +49,7 @@ impl StepValues {
     ///
     /// # Errors
     /// FB327 for results without stresses, for steps with different places, and for values that are not finite.
-    pub(super) fn of(steps: Vec<Step>, digits: u8, file: &InputFile) -> Found<Self> {
+    pub(super) fn of(steps: Vec<Step>, digits: u8, file: &InputFile) -> Diagnosed<Self> {
         let mut values = Self { digits, ..Self::default() };
         for (at, step) in steps.into_iter().enumerate() {
             let (places, stresses): (Vec<_>, Vec<_>) = step.stresses.into_iter().unzip();
@@ -77,7 +75,7 @@ impl StepValues {
     ///
     /// # Errors
     /// FB327.
-    pub(super) fn with_stresses(self, file: &InputFile) -> Found<Self> {
+    pub(super) fn with_stresses(self, file: &InputFile) -> Diagnosed<Self> {
         if self.places.is_empty() {
             return Err(unreadable(file, "no stresses are in the file"));
         }

@@ -1,15 +1,15 @@
 //! Dense arrays in HDF5 files: the named dataset, or the only one with two extents.
 
-use super::file::{Found, MAX_DEPTH, MAX_GROUPS, layout, opened, root};
+use super::file::{MAX_DEPTH, MAX_GROUPS, layout, opened, root};
 use super::members::Members;
 use super::values::{Numbers, refuse_beyond_memory};
 use crate::array::Array;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use hdf5_metno::{File, Group};
 
 /// Reads the dataset `name`, or the only array of the file.
-pub(crate) fn read_array(file: &InputFile, name: Option<&str>) -> Found<Array> {
+pub(crate) fn read_array(file: &InputFile, name: Option<&str>) -> Diagnosed<Array> {
     array_of(&named_or_only(&opened(file)?, name)?)
 }
 
@@ -21,20 +21,20 @@ pub(crate) struct StoredArray {
 }
 
 /// Reads the dataset `name`, or the only array of the file, and whether it is transposed.
-pub(crate) fn read_stored_array(file: &InputFile, name: Option<&str>) -> Found<StoredArray> {
+pub(crate) fn read_stored_array(file: &InputFile, name: Option<&str>) -> Diagnosed<StoredArray> {
     let numbers = named_or_only(&opened(file)?, name)?;
     let is_transposed = numbers.dataset.attr("MATLAB_class").is_ok();
     Ok(StoredArray { array: array_of(&numbers)?, is_transposed })
 }
 
-fn named_or_only(file: &File, name: Option<&str>) -> Found<Numbers> {
+fn named_or_only(file: &File, name: Option<&str>) -> Diagnosed<Numbers> {
     match name {
         Some(name) => named(file, name),
         None => search(file),
     }
 }
 
-fn array_of(numbers: &Numbers) -> Found<Array> {
+fn array_of(numbers: &Numbers) -> Diagnosed<Array> {
     let shape = numbers.dataset.shape();
     let (rows, cols) = match *shape.as_slice() {
         [rows] => (rows, 1),
@@ -58,7 +58,7 @@ pub(crate) fn has_arrays_beside(file: &File, name: &str) -> bool {
     arrays(file).iter().any(|(_, path, _)| path != name && !(path.is_empty() && name == "/"))
 }
 
-fn named(file: &File, name: &str) -> Found<Numbers> {
+fn named(file: &File, name: &str) -> Diagnosed<Numbers> {
     let parts: Vec<&str> = name.split('/').filter(|part| !part.is_empty()).collect();
     let Some((last, groups)) = parts.split_last() else { return search(file) };
     let mut group = root(file)?;
@@ -80,7 +80,7 @@ fn named(file: &File, name: &str) -> Found<Numbers> {
     Numbers::open(&group, &members, &path, last)
 }
 
-fn search(file: &File) -> Found<Numbers> {
+fn search(file: &File) -> Diagnosed<Numbers> {
     let mut found = arrays(file);
     match (found.pop(), found.is_empty()) {
         (Some((group, path, name)), true) => Numbers::open(&group, &Members::of(&group), &path, &name),

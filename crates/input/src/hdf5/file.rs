@@ -1,12 +1,9 @@
 //! Opening of HDF5 files, and limits of the search in them.
 
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::hdf5_file::{by_utf8_name, without_plugins};
 use flexbody_base::text::InputFile;
 use hdf5_metno::{File, Group};
-
-/// Result of reading a file; the error lists all problems.
-pub(crate) type Found<T> = Result<T, Vec<Diagnostic>>;
 
 /// Largest number of groups that are searched: a file must not make the search endless.
 pub(crate) const MAX_GROUPS: usize = 1000;
@@ -15,7 +12,7 @@ pub(crate) const MAX_GROUPS: usize = 1000;
 pub(crate) const MAX_DEPTH: usize = 6;
 
 /// Opens a file with the HDF5 library, which loads no plugins.
-pub(crate) fn opened(file: &InputFile) -> Found<File> {
+pub(crate) fn opened(file: &InputFile) -> Diagnosed<File> {
     without_plugins();
     by_utf8_name(file.path(), |path| File::open(path)).map_err(|e| {
         let message = format!("HDF5 file cannot be opened: {e}");
@@ -29,6 +26,6 @@ pub(crate) fn layout(message: String) -> Diagnostic {
 }
 
 /// Returns the group that holds all others.
-pub(super) fn root(file: &File) -> Found<Group> {
+pub(super) fn root(file: &File) -> Diagnosed<Group> {
     file.group("/").map_err(|e| vec![layout(format!("root group cannot be read: {e}"))])
 }

@@ -1,8 +1,7 @@
 //! Lists of numbers and small attributes of any stored type.
 
-use super::file::Found;
 use super::members::Members;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::hdf5_file::first_broken_heap;
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::InputFile;
@@ -51,7 +50,7 @@ impl Numbers {
     /// # Errors
     /// FB302 for values that are no real numbers, FB304 for values that are not stored, FB310 for values outside this
     /// file.
-    pub(crate) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
+    pub(crate) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Diagnosed<Self> {
         let (dataset, at) = stored_here(group, members, group_name, name)?;
         let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
         let kind = dataset.dtype().and_then(|t| t.to_descriptor()).ok().and_then(|t| NumberKind::of(&t));
@@ -71,7 +70,12 @@ impl Numbers {
 ///
 /// # Errors
 /// FB310 for values outside this file.
-fn stored_here(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<(Dataset, String)> {
+fn stored_here(
+    group: &Group,
+    members: &Members,
+    group_name: &str,
+    name: &str,
+) -> Diagnosed<(Dataset, String)> {
     let at = format!("`{}/{name}`", group_name.trim_end_matches('/'));
     let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
     if members.is_elsewhere(name) {
@@ -90,7 +94,7 @@ fn stored_here(group: &Group, members: &Members, group_name: &str, name: &str) -
 ///
 /// # Errors
 /// FB302 for other datasets, FB304 for rows that are not stored, FB310 for values outside this file.
-pub(crate) fn names_of(group: &Group, members: &Members, name: &str) -> Found<Vec<String>> {
+pub(crate) fn names_of(group: &Group, members: &Members, name: &str) -> Diagnosed<Vec<String>> {
     let (dataset, at) = stored_here(group, members, "", name)?;
     let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
     let shape = dataset.shape();
@@ -136,7 +140,7 @@ fn check_stored(dataset: &Dataset) -> Result<(), String> {
 ///
 /// # Errors
 /// FB601 if they do not fit.
-pub(crate) fn refuse_beyond_memory(values: usize, name: &str) -> Found<()> {
+pub(crate) fn refuse_beyond_memory(values: usize, name: &str) -> Diagnosed<()> {
     let what = format!("reading {values} values of the dataset {name}");
     let needed = values as f64 * size_of::<f64>() as f64;
     let refused = refuse_beyond(left(), needed, &what, "use a larger machine");
@@ -161,7 +165,7 @@ impl Vector {
     ///
     /// # Errors
     /// The errors of [`Numbers::open`]; FB302 for other shapes.
-    pub(crate) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
+    pub(crate) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Diagnosed<Self> {
         let Numbers { dataset, name, kind } = Numbers::open(group, members, group_name, name)?;
         let refuse = |what: String| vec![Diagnostic::new(Code::MatrixKind, format!("dataset {name} {what}"))];
         let shape = dataset.shape();
@@ -181,12 +185,12 @@ impl Vector {
         self.kind == NumberKind::Single
     }
 
-    pub(crate) fn floats(&self, range: Range<usize>) -> Found<Vec<f64>> {
+    pub(crate) fn floats(&self, range: Range<usize>) -> Diagnosed<Vec<f64>> {
         self.read::<f64>(range)
     }
 
     /// Returns whole numbers; 64-bit numbers beyond i64 become its largest value.
-    pub(crate) fn integers(&self, range: Range<usize>) -> Found<Vec<i64>> {
+    pub(crate) fn integers(&self, range: Range<usize>) -> Diagnosed<Vec<i64>> {
         if self.kind == NumberKind::Whole {
             return self.read::<i64>(range);
         }
@@ -199,7 +203,7 @@ impl Vector {
         Ok(numbers.into_iter().map(|v| v as i64).collect())
     }
 
-    fn read<T: hdf5_metno::H5Type>(&self, range: Range<usize>) -> Found<Vec<T>> {
+    fn read<T: hdf5_metno::H5Type>(&self, range: Range<usize>) -> Diagnosed<Vec<T>> {
         if range.is_empty() {
             return Ok(Vec::new());
         }

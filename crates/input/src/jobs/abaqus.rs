@@ -5,14 +5,14 @@
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::element_kinds::{family, has_internal_nodes};
-use super::job::{Found, FromFile, JobFile, JobModel, JobReader, both, condensed, missing};
+use super::job::{FromFile, JobFile, JobModel, JobReader, both, condensed, missing};
 use super::matrix_files::{CoordinateFile, has_labels, labelled};
 use super::siblings::{is_deck, siblings};
 use crate::digits::{COUNTED, written_digits};
 use crate::matrices::MatrixRole;
 use crate::matrices::assemble::{Entry, StoredEntries, assemble, check_size};
 use crate::matrices::coordinates::{cut_off, line_aligned};
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;
 use flexbody_base::text::scanner::{Line, Lines, excerpt, integer, real};
 use flexbody_linalg::parallel;
@@ -39,7 +39,7 @@ impl JobReader for Abaqus {
         is_deck(path) && (Matrices::beside(path).is_ok() || substructure_of(path).is_some())
     }
 
-    fn read(&self, job: &JobFile) -> Found<JobModel> {
+    fn read(&self, job: &JobFile) -> Diagnosed<JobModel> {
         let path = job.path.as_path();
         let matrices = Matrices::beside(path);
         let deck = Deck::read(path)?;
@@ -89,7 +89,7 @@ struct Rows {
 }
 
 impl Rows {
-    fn of_model(files: &Matrices, mesh: &DeckMesh, deck: &Path) -> Found<Self> {
+    fn of_model(files: &Matrices, mesh: &DeckMesh, deck: &Path) -> Diagnosed<Self> {
         let Matrices { stiffness, mass, .. } = files;
         let (labels, matrices) = if has_labels(stiffness)? {
             labelled([stiffness, mass])?
@@ -105,7 +105,7 @@ impl Rows {
     ///
     /// # Errors
     /// FB111 for rows whose nodes are not in the deck, or along the axes of a `*TRANSFORM`.
-    fn of_substructure(file: &Path, deck: &Deck, mesh: &DeckMesh) -> Found<Self> {
+    fn of_substructure(file: &Path, deck: &Deck, mesh: &DeckMesh) -> Diagnosed<Self> {
         let Substructure { labels, stiffness, mass, seen } = Substructure::read(file)?;
         let nodes: BTreeSet<i64> = labels.iter().map(|label| label.node).collect();
         if let Some(node) = nodes.iter().find(|node| !mesh.nodes.contains_key(node)) {
@@ -151,7 +151,7 @@ struct Matrices {
 impl Matrices {
     /// Finds the files with the name of the deck, STIF or MASS, and the number of a step: those of the last step that
     /// has both; else the last file of each.
-    fn beside(deck: &Path) -> Found<Self> {
+    fn beside(deck: &Path) -> Diagnosed<Self> {
         let mut found: [BTreeMap<u32, PathBuf>; 2] = Default::default();
         for (rest, path) in siblings(deck) {
             let rest = rest.trim_start_matches('_');
@@ -190,7 +190,7 @@ fn numbered(
     mesh: &DeckMesh,
     deck: &Path,
     [stiffness, mass]: [&PathBuf; 2],
-) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
+) -> Diagnosed<(Vec<DofLabel>, [FromFile; 2])> {
     let labels = labels(mesh, deck)?;
     let n = labels.len();
     let read = |path: &Path, role| {
@@ -214,7 +214,7 @@ const ROWS_HELP: &str = "write *MATRIX OUTPUT with FORMAT=MATRIX INPUT, whose li
 ///
 /// # Errors
 /// FB111 for elements whose directions are unknown.
-fn labels(mesh: &DeckMesh, deck: &Path) -> Found<Vec<DofLabel>> {
+fn labels(mesh: &DeckMesh, deck: &Path) -> Diagnosed<Vec<DofLabel>> {
     let mut directions: BTreeMap<i64, u8> = BTreeMap::new();
     let mut unknown: Vec<&str> = Vec::new();
     for elements in &mesh.elements {
@@ -306,7 +306,7 @@ impl Substructure {
     /// # Errors
     /// FB101, FB106; FB109 if a matrix is missing; FB110 for lines that cannot be read; FB111 for degrees of freedom
     /// other than displacements and rotations; FB301, FB303, FB312.
-    pub(super) fn read(path: &Path) -> Found<Self> {
+    pub(super) fn read(path: &Path) -> Diagnosed<Self> {
         let deck = Deck::read(path)?;
         let mut elements = deck.cards().iter().filter(|card| card.keyword == "USERELEMENT");
         let (Some(element), None) = (elements.next(), elements.next()) else {
@@ -414,7 +414,7 @@ impl SubstructureFile<'_> {
     }
 
     /// Returns the matrix of a type with `n` rows.
-    fn matrix(&self, kind: &str, n: usize, stored: StoredEntries) -> Found<RawMatrix> {
+    fn matrix(&self, kind: &str, n: usize, stored: StoredEntries) -> Diagnosed<RawMatrix> {
         let is_meant =
             |card: &&Card| card.keyword == "MATRIX" && card.name("TYPE").is_some_and(|stated| stated == kind);
         let Some(card) = self.deck.cards().iter().find(is_meant) else {
@@ -451,7 +451,7 @@ impl SubstructureFile<'_> {
     }
 
     /// Returns the numbers below a card.
-    fn values(&self, card: &Card) -> Found<Vec<NumberLines>> {
+    fn values(&self, card: &Card) -> Diagnosed<Vec<NumberLines>> {
         let (first, text) = self.deck.text(card);
         let pieces = parallel::map(line_aligned(text), NumberLines::parse);
         let mut above = first;

@@ -5,11 +5,11 @@ use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::deck_surfaces::Surfaces;
 use super::expanded::{Once, copies_in_sets, label_once};
-use super::job::{Found, JobFile, JobModel, JobReader, both, missing};
+use super::job::{JobFile, JobModel, JobReader, both, missing};
 use super::knots::Knots;
 use super::matrix_files::CoordinateFile;
 use super::siblings::is_deck;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::numbers::significant;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{Line, Lines, excerpt, expected, integer, real};
@@ -37,7 +37,7 @@ impl JobReader for Calculix {
         is_deck(path) && ["sti", "mas", "dof"].iter().any(|extension| path.with_extension(extension).exists())
     }
 
-    fn read(&self, job: &JobFile) -> Found<JobModel> {
+    fn read(&self, job: &JobFile) -> Diagnosed<JobModel> {
         let path = job.path.as_path();
         let [sti, mas, dof] = ["sti", "mas", "dof"].map(|extension| path.with_extension(extension));
         let absent =
@@ -103,19 +103,19 @@ impl JobReader for Calculix {
 pub(in super::super) fn read_stiffness(
     matrix: &InputFile,
     labels: &InputFile,
-) -> Found<(RawMatrix, Vec<DofLabel>)> {
+) -> Diagnosed<(RawMatrix, Vec<DofLabel>)> {
     let labels = labels_of(labels)?;
     let (matrix, _) = CoordinateFile::read_opened(matrix, labels.len() as u32)?.into_matrix(labels.len())?;
     Ok((matrix, labels))
 }
 
 /// Reads the labels of the rows from lines `node.direction`.
-fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
+fn read_labels(path: &Path) -> Diagnosed<(Vec<DofLabel>, SeenFile)> {
     let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
     Ok((labels_of(&file)?, file.seen().map_err(|diagnostic| vec![diagnostic])?))
 }
 
-fn labels_of(file: &InputFile) -> Found<Vec<DofLabel>> {
+fn labels_of(file: &InputFile) -> Diagnosed<Vec<DofLabel>> {
     let mut labels = Vec::with_capacity(file.bytes().len() / 6);
     for Line { number, text: line } in Lines::of(file.bytes()).filter_map(Line::content) {
         let label = line.iter().position(|&b| b == b'.').and_then(|dot| {
@@ -149,7 +149,7 @@ const ROTATION_HELP: &str = "run CalculiX again if the deck has changed since; e
 ///
 /// # Errors
 /// FB111 if the rows that are rotations, or their reference node, cannot be identified.
-fn rotation_nodes(deck: &Deck, mesh: &DeckMesh, labels: &[DofLabel]) -> Found<HashMap<i64, i64>> {
+fn rotation_nodes(deck: &Deck, mesh: &DeckMesh, labels: &[DofLabel]) -> Diagnosed<HashMap<i64, i64>> {
     let mut rotations = named_rotation_nodes(deck)?;
     rotations.extend(made_rotation_nodes(deck, mesh, labels)?);
     let with_rows: BTreeSet<i64> = labels.iter().map(|label| label.node).collect();
@@ -185,7 +185,7 @@ struct Rotation<'d> {
 ///
 /// # Errors
 /// FB111 for *RIGID BODY without REF NODE or ROT NODE.
-fn named_rotation_nodes(deck: &Deck) -> Found<Vec<Rotation<'_>>> {
+fn named_rotation_nodes(deck: &Deck) -> Diagnosed<Vec<Rotation<'_>>> {
     let mut rotations = Vec::new();
     for card in deck.cards().iter().filter(|card| card.keyword == "RIGIDBODY") {
         let node = |name: &str| {
@@ -242,7 +242,7 @@ impl Coupling<'_> {
     ///
     /// # Errors
     /// FB111 if REF NODE is neither.
-    fn reference(&self, deck: &Deck, mesh: &DeckMesh) -> Found<i64> {
+    fn reference(&self, deck: &Deck, mesh: &DeckMesh) -> Diagnosed<i64> {
         let text = self.card.parameter("REFNODE").unwrap_or_default();
         let set = || match mesh.set(text)?.as_slice() {
             [node] => Some(*node),
@@ -256,7 +256,7 @@ impl Coupling<'_> {
     }
 
     /// Returns FB111: the rows of the rotations of the reference node cannot be identified.
-    fn refuse<T>(&self, deck: &Deck, reference: i64, why: &str, help: &str) -> Found<T> {
+    fn refuse<T>(&self, deck: &Deck, reference: i64, why: &str, help: &str) -> Diagnosed<T> {
         let message = format!(
             "*COUPLING, *KINEMATIC: the rows of the rotations of REF NODE {reference} cannot be identified: {why}"
         );
@@ -275,7 +275,11 @@ struct Numbered<'d> {
 ///
 /// # Errors
 /// FB111 if rows of nodes outside the deck are not those that its couplings create.
-fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel]) -> Found<Vec<Rotation<'d>>> {
+fn made_rotation_nodes<'d>(
+    deck: &'d Deck,
+    mesh: &DeckMesh,
+    labels: &[DofLabel],
+) -> Diagnosed<Vec<Rotation<'d>>> {
     let mut next = mesh.nodes.keys().next_back().and_then(|highest| highest.checked_add(1));
     let mut end = i64::MIN;
     let mut numbered = Vec::new();
@@ -350,7 +354,7 @@ const COUPLING_HELP: &str = "write *DISTRIBUTING COUPLING, ELSET=E with one elem
 ///
 /// # Errors
 /// FB111 for a coupling whose reference node or nodes cannot be identified.
-fn reference_places(deck: &Deck, mesh: &DeckMesh) -> Found<BTreeMap<i64, [f64; 3]>> {
+fn reference_places(deck: &Deck, mesh: &DeckMesh) -> Diagnosed<BTreeMap<i64, [f64; 3]>> {
     let is_coupling = |card: &&Card| card.keyword == "DISTRIBUTINGCOUPLING";
     let mut sums: BTreeMap<i64, Sum<'_>> = BTreeMap::new();
     for card in deck.cards().iter().filter(is_coupling) {

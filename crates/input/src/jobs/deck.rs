@@ -1,8 +1,7 @@
 //! Keyword decks (`.inp`) of Abaqus and CalculiX: cards `*KEYWORD, PARAMETER=VALUE`, each with lines of data.
 
-use super::job::Found;
 use crate::sets::comparable;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{Line, Lines, excerpt, line_end};
 use std::ops::Range;
@@ -64,7 +63,7 @@ impl Deck {
     /// # Errors
     /// FB101, FB106 for files that cannot be read; FB110 for lines of data before the first keyword, and for files that
     /// include themselves.
-    pub(super) fn read(path: &Path) -> Found<Self> {
+    pub(super) fn read(path: &Path) -> Diagnosed<Self> {
         let mut deck = Self { files: Vec::new(), cards: Vec::new() };
         deck.include(path, 0).map_err(|diagnostic| vec![diagnostic])?;
         Ok(deck)
@@ -80,7 +79,7 @@ impl Deck {
     ///
     /// # Errors
     /// FB132 for files that changed while they were read.
-    pub(super) fn seen(&self) -> Found<Vec<(&'static str, SeenFile)>> {
+    pub(super) fn seen(&self) -> Diagnosed<Vec<(&'static str, SeenFile)>> {
         let seen = |file: &InputFile| Ok(("deck", file.seen()?));
         self.files.iter().map(seen).collect::<Result<_, Diagnostic>>().map_err(|diagnostic| vec![diagnostic])
     }

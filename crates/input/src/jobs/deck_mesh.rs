@@ -3,9 +3,8 @@
 use super::deck::{Card, Deck, fields};
 use super::deck_scope::{Elements, Scope};
 use super::element_kinds::{Drawing, drawing};
-use super::job::Found;
 use crate::sets::{Item, Members, NodeSets, SetIndex, SetInstance, SetScope, comparable, dotted};
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::scanner::{self, BadLines, excerpt, integer};
 use nalgebra::{Rotation3, Unit, Vector3};
@@ -38,7 +37,7 @@ impl DeckMesh {
     ///
     /// # Errors
     /// FB110 for lines that cannot be read, FB111 for cards that define nodes in a way that is not supported.
-    pub(super) fn of(deck: &Deck) -> Found<Self> {
+    pub(super) fn of(deck: &Deck) -> Diagnosed<Self> {
         let mut reading = DeckMeshReader { deck, bad: BadLines::default(), placed: 0 };
         let mut scopes = Scopes::default();
         for card in deck.cards() {
@@ -154,7 +153,7 @@ impl Scopes {
 
     /// Returns the model of all instances. Node numbers are kept if no two instances share one; else every instance
     /// gets a separate range of numbers.
-    fn assembled(self) -> Found<DeckMesh> {
+    fn assembled(self) -> Diagnosed<DeckMesh> {
         let placed: Vec<(&Instance, &Scope)> = self.instances.iter().map(|one| (one, &one.scope)).collect();
         let mut taken: std::collections::HashSet<i64> = self.top.nodes.keys().copied().collect();
         let unique = placed.iter().all(|(_, scope)| scope.nodes.keys().all(|id| taken.insert(*id)));

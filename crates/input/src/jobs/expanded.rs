@@ -9,10 +9,9 @@
 
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
-use super::job::Found;
 use crate::sets::NodeCopies;
 use faer::Mat;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::scanner::real;
 use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix};
@@ -56,7 +55,7 @@ pub(super) fn label_once(
     labels: Vec<DofLabel>,
     [stiffness, mass]: [&RawMatrix; 2],
     path: &Path,
-) -> Found<Once> {
+) -> Diagnosed<Once> {
     let mut rows: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
     labels.iter().enumerate().for_each(|(row, label)| rows.entry(label.node).or_default().push(row));
     // Nodes with more than one row in a direction were expanded.

@@ -1,7 +1,7 @@
 //! The job of an FE program: its main file, the model that is read from it, and the interface of its readers.
 
 use crate::sets::NodeSets;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;
 use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawFollowers, RawMatrix};
 use std::path::{Path, PathBuf};
@@ -41,9 +41,6 @@ pub(crate) struct JobModel {
 /// A matrix and the file that it was read from.
 pub(super) type FromFile = (RawMatrix, SeenFile);
 
-/// Result of reading a job; the error lists all problems.
-pub(crate) type Found<T> = Result<T, Vec<Diagnostic>>;
-
 /// Reader of the jobs of one FE program.
 pub(super) trait JobReader: Sync {
     /// Returns the name of the program for `--format` and the manifest.
@@ -59,7 +56,7 @@ pub(super) trait JobReader: Sync {
     ///
     /// # Errors
     /// FB101 to FB112 for files and decks, FB2xx for tables and nodes, FB3xx for matrices, all that are found.
-    fn read(&self, job: &JobFile) -> Found<JobModel>;
+    fn read(&self, job: &JobFile) -> Diagnosed<JobModel>;
 
     /// Returns true when the matrices of a job have names by which a user may choose.
     fn names_matrices(&self) -> bool {
@@ -68,7 +65,7 @@ pub(super) trait JobReader: Sync {
 }
 
 /// Returns both values, or the errors of both.
-pub(super) fn both<A, B>(a: Found<A>, b: Found<B>) -> Found<(A, B)> {
+pub(super) fn both<A, B>(a: Diagnosed<A>, b: Diagnosed<B>) -> Diagnosed<(A, B)> {
     match (a, b) {
         (Ok(a), Ok(b)) => Ok((a, b)),
         (a, b) => Err([a.err(), b.err()].into_iter().flatten().flatten().collect()),

@@ -11,9 +11,8 @@
 
 use super::deck_mesh::DeckMesh;
 use super::expanded::solved;
-use super::job::Found;
 use faer::Mat;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use flexbody_model::{DofLabel, GivenRows, RawMatrix, RowMap};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -49,7 +48,7 @@ impl Knots {
         labels: &[DofLabel],
         rotations: &HashMap<i64, i64>,
         path: &Path,
-    ) -> Found<Self> {
+    ) -> Diagnosed<Self> {
         let mut directions: BTreeMap<i64, Vec<u8>> = BTreeMap::new();
         labels.iter().for_each(|label| directions.entry(label.node).or_default().push(label.direction));
         let made = |node: &i64| !mesh.nodes.contains_key(node) && !rotations.contains_key(node);
@@ -121,7 +120,7 @@ impl Knots {
         &self,
         [stiffness, mass]: [RawMatrix; 2],
         path: &Path,
-    ) -> Found<([RawMatrix; 2], GivenRows)> {
+    ) -> Diagnosed<([RawMatrix; 2], GivenRows)> {
         let refuse = || {
             let message = "the stiffness of the stretches of knots of shells is not positive";
             let help = "run CalculiX again: the matrices may belong to another deck";

@@ -5,14 +5,14 @@
 //! without a header.
 
 use super::deck::fields;
-use super::job::{Found, FromFile, both};
+use super::job::{FromFile, both};
 use crate::digits::{COUNTED, written_digits};
 use crate::matrices::assemble::{Entry, Sides, StoredEntries, assemble_distinct, check_size, given_twice};
 use crate::matrices::coordinates::{
     Blocks, Coordinates, Limits, TextEnd, cut_off, line_aligned, most_entries,
 };
 use crate::matrices::recent::Recent;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{BadLines, Line, Lines, expected, integer, real};
@@ -25,7 +25,7 @@ use std::path::Path;
 /// # Errors
 /// FB101 for files that cannot be read, FB132 for files that changed, FB301 for bad lines, and the errors of
 /// [`assemble_distinct`], FB309 for an entry given twice.
-pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
+pub(super) fn labelled(paths: [&Path; 2]) -> Diagnosed<(Vec<DofLabel>, [FromFile; 2])> {
     let ((k, k_file), (m, m_file)) = both(LabelledLines::read(paths[0]), LabelledLines::read(paths[1]))?;
     let all = [&k, &m].into_iter().flat_map(|lines| &lines.pieces).flat_map(|piece| &piece.labels);
     let mut labels: Vec<DofLabel> = all.copied().collect();
@@ -36,7 +36,7 @@ pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2]
 }
 
 /// Returns true when the first line of data of a matrix names nodes and directions: it has fields with commas.
-pub(super) fn has_labels(path: &Path) -> Found<bool> {
+pub(super) fn has_labels(path: &Path) -> Diagnosed<bool> {
     let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
     let mut blocks = Blocks::of(&file, Compression::None);
     while let Some(block) = blocks.next().map_err(|e| vec![file.failed(&e)])? {
@@ -57,7 +57,7 @@ struct LabelledLines {
 }
 
 impl LabelledLines {
-    fn read(path: &Path) -> Found<(Self, SeenFile)> {
+    fn read(path: &Path) -> Diagnosed<(Self, SeenFile)> {
         let one = |diagnostic| vec![diagnostic];
         let file = InputFile::open_unread(path).map_err(one)?;
         let mut blocks = Blocks::of(&file, Compression::None);
@@ -79,7 +79,7 @@ impl LabelledLines {
     }
 
     /// Returns the matrix with rows in the order of the ascending `labels`.
-    fn into_matrix(self, labels: &[DofLabel], path: &Path) -> Found<RawMatrix> {
+    fn into_matrix(self, labels: &[DofLabel], path: &Path) -> Diagnosed<RawMatrix> {
         let n = labels.len() as u64;
         let count = self.pieces.iter().map(|piece| piece.entries.len() as u64).sum();
         check_size(n, n, count).map_err(|diagnostic| vec![diagnostic.in_file(path)])?;
@@ -193,7 +193,7 @@ impl CoordinateFile {
     /// # Errors
     /// FB101, FB103, FB106 for a file that cannot be read, FB132 for one that changed; FB301 for bad lines, FB303 for
     /// indices out of range, FB306 for values that are not finite.
-    pub(super) fn read(path: &Path, n: u32) -> Found<Self> {
+    pub(super) fn read(path: &Path, n: u32) -> Diagnosed<Self> {
         let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
         let read = Self::read_opened(&file, n);
         // A change of the file during reading may be the cause of other problems, so it is reported first.
@@ -205,7 +205,7 @@ impl CoordinateFile {
     ///
     /// # Errors
     /// The errors of [`Self::read`] but FB101 and FB132.
-    pub(super) fn read_opened(file: &InputFile, n: u32) -> Found<Self> {
+    pub(super) fn read_opened(file: &InputFile, n: u32) -> Diagnosed<Self> {
         let path = file.path();
         let compression = Compression::of(file.bytes());
         let in_file = |found: Vec<Diagnostic>| found.into_iter().map(|d| d.in_file(path)).collect::<Vec<_>>();
@@ -237,7 +237,7 @@ impl CoordinateFile {
     ///
     /// # Errors
     /// FB301 for more rows than the entries can fill, FB306, FB309 for an entry given twice, FB312.
-    pub(super) fn into_matrix(self, n: usize) -> Found<FromFile> {
+    pub(super) fn into_matrix(self, n: usize) -> Diagnosed<FromFile> {
         let path = &self.seen.path;
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(path)];
         check_size(n as u64, n as u64, self.count).map_err(in_file)?;

@@ -9,12 +9,12 @@ mod elimination;
 mod matrices;
 mod systems;
 
-use super::job::{Found, JobFile, JobModel, JobReader, condensed};
+use super::job::{JobFile, JobModel, JobReader, condensed};
 use crate::bulk_cards::is_bulk_data;
 use crate::node_file::NodeFile;
 use bulk::Bulk;
 use elimination::GridPlaces;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::BadLines;
 use flexbody_model::{Elements, NodeAxes as Axes, Nodes};
@@ -46,7 +46,7 @@ impl JobReader for Nastran {
         true
     }
 
-    fn read(&self, job: &JobFile) -> Found<JobModel> {
+    fn read(&self, job: &JobFile) -> Diagnosed<JobModel> {
         let path = job.path.as_path();
         let mut bulk = Bulk::read(path)?;
         if bulk.grids.is_empty() {
@@ -90,7 +90,7 @@ impl JobReader for Nastran {
 
 /// Returns the positions of the grids in the basic system, and the row axes of grids with other axes than the basic
 /// ones.
-fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
+fn places(bulk: &Bulk) -> Diagnosed<(Nodes, HashMap<i64, Axes>)> {
     let mut systems = Systems::new(&bulk.systems, &bulk.grids);
     let (mut nodes, mut axes, mut bad) = (Nodes::default(), HashMap::new(), Vec::new());
     for (&id, grid) in &bulk.grids {
@@ -121,7 +121,7 @@ fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
 ///
 /// # Errors
 /// The errors of [`Bulk::read`]; FB111 if rows of grids are along other axes than those of the basic system.
-pub(crate) fn nodes_of_bulk(path: &Path) -> Found<NodeFile> {
+pub(crate) fn nodes_of_bulk(path: &Path) -> Diagnosed<NodeFile> {
     let bulk = Bulk::read(path)?;
     let (nodes, axes) = places(&bulk)?;
     if let Some(grid) = axes.keys().min() {

@@ -4,7 +4,7 @@
 
 use super::assemble::{Entry, Sides, check_size, refuse_beyond_memory};
 use crate::digits::{COUNTED, written_digits};
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::{Compression, broken};
 use flexbody_base::text::scanner::{BadLines, excerpt, expected, line_end, real, words};
@@ -63,7 +63,7 @@ impl Coordinates {
         mut blocks: Blocks<'_>,
         first: Vec<u8>,
         skip: usize,
-    ) -> Result<TextEnd, Vec<Diagnostic>> {
+    ) -> Diagnosed<TextEnd> {
         let (mut block, mut skip) = (first, skip);
         loop {
             // The next block is read and unpacked while this one is parsed.
@@ -92,7 +92,7 @@ impl Coordinates {
     /// # Errors
     /// FB601 or the errors of [`check_size`] if the number of entries is not announced and exceeds the memory or that
     /// of any matrix.
-    fn is_too_much(&self) -> Result<bool, Vec<Diagnostic>> {
+    fn is_too_much(&self) -> Diagnosed<bool> {
         if let Some(announced) = self.announced {
             return Ok(self.count > announced);
         }

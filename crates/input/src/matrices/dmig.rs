@@ -5,11 +5,11 @@ use super::assemble::{
 };
 use super::named_matrices::{choose, named_or_only};
 use super::operator::OperatorColumns;
-use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
+use super::reader::{ArraySource, MatrixSource, Reader};
 use super::recent::Recent;
 use crate::bulk_cards::{Card, Item, MatrixLines, is_bulk_data, read_cards, read_deck};
 use crate::digits::written_digits;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result as Outcome};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::SeenFile;
@@ -63,7 +63,7 @@ impl Dmigs {
     /// # Errors
     /// FB101, FB106 for files that cannot be read, FB110 for a deck that cannot be read, FB301 for bad cards, FB302 for
     /// unsupported matrices, all that are found.
-    pub(crate) fn of(paths: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
+    pub(crate) fn of(paths: &[PathBuf]) -> Diagnosed<Self> {
         let mut all = Self::default();
         for path in paths {
             let read = read_deck(path, &mut |item| match item {
@@ -362,7 +362,7 @@ struct NumberedColumns {
 ///
 /// # Errors
 /// FB310 if there is no such matrix, the errors of [`Dmigs::of`] and of the matrix.
-fn read_numbered(path: &Path, name: Option<&str>) -> Result<NumberedColumns, Vec<Diagnostic>> {
+fn read_numbered(path: &Path, name: Option<&str>) -> Diagnosed<NumberedColumns> {
     let mut all = Dmigs::of(&[path.to_path_buf()])?;
     let wanted = named_or_only(&all.names(), name).map_err(|diagnostic| vec![diagnostic.in_file(path)])?;
     all.take_numbered(wanted).map_err(|diagnostic| vec![diagnostic])
@@ -422,7 +422,7 @@ impl Reader for DmigPunch {
         Ok(Some(all.points_beside(at).into_iter().map(label).collect()))
     }
 
-    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
         let labelled = |NumberedColumns { name, columns, entries }| {
             OperatorColumns::Labelled(name, columns as usize, entries)
         };
@@ -568,7 +568,7 @@ mod tests {
         text
     }
 
-    fn read(text: &str, threads: usize) -> Result<Vec<RawMatrix>, Vec<Diagnostic>> {
+    fn read(text: &str, threads: usize) -> Diagnosed<Vec<RawMatrix>> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("job.pch");
         std::fs::write(&path, text).expect("written");

@@ -5,14 +5,14 @@ mod group;
 use super::assemble::Entry;
 use super::named_matrices::NamedMatrices;
 use super::operator::OperatorColumns;
-use super::reader::{ArraySource, MatrixRole, MatrixSource, ReadOutcome, Reader};
+use super::reader::{ArraySource, MatrixRole, MatrixSource, Reader};
 use super::rectangular::Rectangular;
 use crate::array::Array;
 use crate::hdf5::{
-    Found, MAX_DEPTH, MAX_GROUPS, Members, StoredArray, has_arrays_beside, layout, opened, read_array,
+    MAX_DEPTH, MAX_GROUPS, Members, StoredArray, has_arrays_beside, layout, opened, read_array,
     read_stored_array,
 };
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, is_hdf5};
@@ -60,11 +60,11 @@ impl Reader for Hdf5 {
         read().map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))
     }
 
-    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
         source.is_plain().then(|| read_rectangular(source.file, source.name).map(Rectangular::operator))
     }
 
-    fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<Diagnosed<Array>> {
         source.is_plain().then(|| read_array(source.file, source.name))
     }
 }
@@ -73,7 +73,7 @@ impl Reader for Hdf5 {
 ///
 /// # Errors
 /// FB310 if there is no such matrix or several, FB302 to FB313 for an invalid one.
-fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+fn read_rectangular(file: &InputFile, name: Option<&str>) -> Diagnosed<Rectangular> {
     let opened = opened(file)?;
     let found = matrices(&opened);
     let wanted = name.map(|name| format!("/{}", name.trim_matches('/')));
@@ -92,7 +92,7 @@ fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> 
 }
 
 /// Reads the dataset `name`, or the only array of the file, as a matrix. MATLAB stores the transposed array.
-fn dense(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+fn dense(file: &InputFile, name: Option<&str>) -> Diagnosed<Rectangular> {
     let StoredArray { array, is_transposed } = read_stored_array(file, name)?;
     let Array { rows, cols, values, .. } = array;
     let mut entries = Vec::new();
@@ -109,7 +109,7 @@ fn dense(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
 }
 
 /// Opens the group that the user named.
-fn named(file: &File, name: &str) -> Found<Group> {
+fn named(file: &File, name: &str) -> Diagnosed<Group> {
     let mut group = file.group("/").map_err(|e| vec![layout(format!("root group cannot be read: {e}"))])?;
     for part in name.split('/').filter(|part| !part.is_empty()) {
         if Members::of(&group).is_elsewhere(part) {
@@ -133,7 +133,7 @@ fn named(file: &File, name: &str) -> Found<Group> {
 }
 
 /// Returns the only matrix of the file, or the only one named after its role.
-fn search(file: &File, role: MatrixRole) -> Found<(String, Group)> {
+fn search(file: &File, role: MatrixRole) -> Diagnosed<(String, Group)> {
     let mut found = matrices(file);
     if found.is_empty() {
         return Err(vec![layout("file holds no sparse matrix".into())]);

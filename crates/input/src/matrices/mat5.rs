@@ -5,10 +5,10 @@ use super::assemble::{Entry, check_extents, check_size, most_entries_of};
 use super::compressed::{Compressed, Full};
 use super::named_matrices::{NamedMatrices, named_or_only};
 use super::operator::OperatorColumns;
-use super::reader::{ArraySource, MatrixRole, MatrixSource, ReadOutcome, Reader};
+use super::reader::{ArraySource, MatrixRole, MatrixSource, Reader};
 use super::rectangular::Rectangular;
-use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::{Error, Result};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
+use flexbody_base::error::{self, Error};
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::InputFile;
 use flexbody_model::RawMatrix;
@@ -43,7 +43,7 @@ impl Reader for Mat5 {
         Order::of(head).is_some()
     }
 
-    fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
+    fn read(&self, source: &MatrixSource<'_>) -> error::Result<RawMatrix> {
         let read = || {
             let bytes = source.not_packed("MATLAB file")?;
             let Some(order) = Order::of(bytes) else {
@@ -61,7 +61,7 @@ impl Reader for Mat5 {
         read().map_err(|diagnostic: Diagnostic| Error::from(diagnostic.in_file(source.file.path())))
     }
 
-    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
         let read = || read_rectangular(source.file, source.name).map(Rectangular::operator);
         source.is_plain().then(|| read().map_err(|diagnostic| vec![diagnostic]))
     }
@@ -72,7 +72,7 @@ impl Reader for Mat5 {
 /// # Errors
 /// FB102 and FB103 for a file that cannot be read, FB310 if there is no such variable, FB301 to FB306 for an invalid
 /// matrix.
-fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+fn read_rectangular(file: &InputFile, name: Option<&str>) -> Result<Rectangular, Diagnostic> {
     let bytes = file.bytes();
     let Some(order) = Order::of(bytes) else {
         return Err(Diagnostic::new(
@@ -96,7 +96,7 @@ fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> 
 }
 
 /// Reads the heads of all variables of the file.
-fn variables(bytes: &[u8], order: Order) -> Found<Vec<Variable<'_>>> {
+fn variables(bytes: &[u8], order: Order) -> Result<Vec<Variable<'_>>, Diagnostic> {
     let mut variables = Vec::new();
     let mut rest = &bytes[HEADER..];
     while !rest.is_empty() {
@@ -119,7 +119,7 @@ fn variables(bytes: &[u8], order: Order) -> Found<Vec<Variable<'_>>> {
 }
 
 /// Returns the variable that the user named.
-fn named<'v, 'a>(variables: &'v [Variable<'a>], name: &str) -> Found<&'v Variable<'a>> {
+fn named<'v, 'a>(variables: &'v [Variable<'a>], name: &str) -> Result<&'v Variable<'a>, Diagnostic> {
     let path = name.trim_matches('/');
     let outer = path.split('/').next().unwrap_or(path);
     let mut found = variables.iter().filter(|variable| variable.name == outer);
@@ -146,7 +146,7 @@ fn named<'v, 'a>(variables: &'v [Variable<'a>], name: &str) -> Found<&'v Variabl
 
 /// Returns the only sparse matrix, or the only one named after its role; in a file without sparse matrices, the only
 /// square full one or the one named after its role.
-fn search<'v, 'a>(variables: &'v [Variable<'a>], role: MatrixRole) -> Found<&'v Variable<'a>> {
+fn search<'v, 'a>(variables: &'v [Variable<'a>], role: MatrixRole) -> Result<&'v Variable<'a>, Diagnostic> {
     let sparse: Vec<&Variable<'a>> = variables.iter().filter(|v| v.kind == VariableKind::Sparse).collect();
     let is_full = |v: &&Variable<'a>| v.kind == VariableKind::Full && v.rows == v.columns && v.rows > 1;
     let candidates = if sparse.is_empty() { variables.iter().filter(is_full).collect() } else { sparse };
@@ -200,7 +200,7 @@ impl<'a> Variable<'a> {
     ///
     /// # Errors
     /// FB103 for damaged packed bytes, FB301, FB304.
-    fn open(body: &'a [u8], compressed: bool, order: Order) -> Found<Self> {
+    fn open(body: &'a [u8], compressed: bool, order: Order) -> Result<Self, Diagnostic> {
         let [flags, extents, name] = Self::head(&mut Elements::of(body, compressed, order)?)?;
         let flags = flags.whole(0).unwrap_or(0);
         let extent = |k: usize| extents.whole(k).and_then(|extent| u64::try_from(extent).ok()).unwrap_or(0);
@@ -232,7 +232,7 @@ impl<'a> Variable<'a> {
     }
 
     /// Reads flags, extents and name.
-    fn head(elements: &mut Elements<'a>) -> Found<[Numbers; 3]> {
+    fn head(elements: &mut Elements<'a>) -> Result<[Numbers; 3], Diagnostic> {
         let mut next = || elements.next(HEAD_BYTES);
         let head = [next()?, next()?, next()?];
         if head[0].len() < 2 || !head[0].is_whole() || !head[1].is_whole() {
@@ -246,7 +246,7 @@ impl<'a> Variable<'a> {
     ///
     /// # Errors
     /// FB302 for a variable that is no matrix of real numbers, FB103.
-    fn arrays(&self) -> Found<Arrays> {
+    fn arrays(&self) -> Result<Arrays, Diagnostic> {
         let mut elements = Elements::of(self.body, self.compressed, self.order)?;
         Self::head(&mut elements)?;
         let arrays = match (self.kind, self.not_real) {
@@ -272,7 +272,7 @@ impl<'a> Variable<'a> {
     ///
     /// # Errors
     /// The errors of [`Self::arrays`] and of matrices.
-    fn matrix(&self, path: &Path) -> Found<RawMatrix> {
+    fn matrix(&self, path: &Path) -> Result<RawMatrix, Diagnostic> {
         let raw = match self.arrays()? {
             Arrays::Sparse(arrays) => self.sparse(arrays, path)?,
             Arrays::Full(values) => self.full(&values, path)?,
@@ -285,7 +285,7 @@ impl<'a> Variable<'a> {
     /// # Errors
     /// The errors of [`Self::arrays`]; FB301, FB304 for lists that do not fit each other, FB313 for a matrix beyond
     /// memory.
-    fn rectangular(&self) -> Found<Rectangular> {
+    fn rectangular(&self) -> Result<Rectangular, Diagnostic> {
         let (starts, count, entry): (Vec<u64>, usize, EntryAt) = match self.arrays()? {
             Arrays::Sparse([indices, pointers, values]) => {
                 let count = indices.len().min(values.len());
@@ -329,7 +329,11 @@ impl<'a> Variable<'a> {
         most_entries_of(self.columns).min(u64::MAX / 8)
     }
 
-    fn sparse(&self, [indices, pointers, values]: [Numbers; 3], path: &Path) -> Found<RawMatrix> {
+    fn sparse(
+        &self,
+        [indices, pointers, values]: [Numbers; 3],
+        path: &Path,
+    ) -> Result<RawMatrix, Diagnostic> {
         let n = check_size(self.rows, self.columns, values.len() as u64)?;
         let pointers = starts_of(&pointers);
         // The arrays may have capacity for more entries than are used.
@@ -348,7 +352,7 @@ impl<'a> Variable<'a> {
         compressed.assemble(path)
     }
 
-    fn full(&self, values: &Numbers, path: &Path) -> Found<RawMatrix> {
+    fn full(&self, values: &Numbers, path: &Path) -> Result<RawMatrix, Diagnostic> {
         if self.rows.checked_mul(self.columns) != Some(values.len() as u64) {
             let (rows, columns, count) = (self.rows, self.columns, values.len());
             let message =
@@ -380,8 +384,6 @@ fn starts_of(pointers: &Numbers) -> Vec<u64> {
 }
 
 // Data elements of a MAT-file: a tag with type and number of bytes, and the bytes.
-
-type Found<T> = std::result::Result<T, Diagnostic>;
 
 /// Byte order of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -424,7 +426,7 @@ struct Elements<'a> {
 
 impl<'a> Elements<'a> {
     /// Returns the elements in the body of a variable.
-    fn of(body: &'a [u8], compressed: bool, order: Order) -> Found<Self> {
+    fn of(body: &'a [u8], compressed: bool, order: Order) -> Result<Self, Diagnostic> {
         let mut elements = Self { stream: Box::new(body), order, is_packed: compressed };
         if compressed {
             elements.stream = Box::new(flate2::read::ZlibDecoder::new(body));
@@ -439,7 +441,7 @@ impl<'a> Elements<'a> {
     /// # Errors
     /// FB103 for damaged packed bytes, FB304 if the variable ends within the element or the element has more than
     /// `most` bytes, FB601.
-    fn next(&mut self, most: u64) -> Found<Numbers> {
+    fn next(&mut self, most: u64) -> Result<Numbers, Diagnostic> {
         let tag: [u8; 8] = self.take(8)?.try_into().expect("eight bytes were read");
         let [kind, length] = self.order.two(&tag);
         // An element of up to four bytes is stored in the tag itself.
@@ -471,7 +473,7 @@ impl<'a> Elements<'a> {
     ///
     /// # Errors
     /// FB103 for damaged packed bytes, FB304 if the packed bytes do not end soon.
-    fn finish(mut self) -> Found<()> {
+    fn finish(mut self) -> Result<(), Diagnostic> {
         let mut rest = self.stream.by_ref().take(MAX_REST_BYTES + 1);
         let count = std::io::copy(&mut rest, &mut std::io::sink()).map_err(damaged)?;
         if count <= MAX_REST_BYTES || !self.is_packed {
@@ -481,7 +483,7 @@ impl<'a> Elements<'a> {
         Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP))
     }
 
-    fn take(&mut self, length: u64) -> Found<Vec<u8>> {
+    fn take(&mut self, length: u64) -> Result<Vec<u8>, Diagnostic> {
         let bytes = self.read(length)?;
         if bytes.len() as u64 == length {
             return Ok(bytes);
@@ -491,7 +493,7 @@ impl<'a> Elements<'a> {
     }
 
     /// Returns the next `length` bytes, or fewer at the end.
-    fn read(&mut self, length: u64) -> Found<Vec<u8>> {
+    fn read(&mut self, length: u64) -> Result<Vec<u8>, Diagnostic> {
         let mut bytes = Vec::new();
         self.stream.by_ref().take(length).read_to_end(&mut bytes).map_err(damaged)?;
         Ok(bytes)

@@ -5,11 +5,11 @@ use super::assemble::{
 };
 use super::coordinates::{Blocks, Coordinates, Limits, TextEnd, cut_off};
 use super::operator::OperatorColumns;
-use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
+use super::reader::{ArraySource, MatrixSource, Reader};
 use super::rectangular::Rectangular;
 use crate::array::Array;
 use crate::digits::written_digits;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::InputFile;
@@ -48,17 +48,17 @@ impl Reader for MatrixMarket {
             .map_err(|diagnostics| Error::new(diagnostics.into_iter().map(|d| d.in_file(path)).collect()))
     }
 
-    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
         let read = || read_rectangular(source.file, source.compression).map(Rectangular::operator);
         (source.name.is_none() && is_coordinate(source.head)).then(read)
     }
 
-    fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<Diagnosed<Array>> {
         source.name.is_none().then(|| read_array(source.file, source.compression))
     }
 }
 
-fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnostic>> {
+fn read(source: &MatrixSource<'_>) -> Diagnosed<RawMatrix> {
     let path = source.file.path();
     let mut blocks = Blocks::of(source.file, source.compression);
     let Some(first) = blocks.next().map_err(|e| vec![broken(path, &e)])? else {
@@ -94,10 +94,7 @@ fn is_coordinate(head: &[u8]) -> bool {
 ///
 /// # Errors
 /// FB301 to FB306 for a file that is not valid, all that are found.
-fn read_rectangular(
-    file: &InputFile,
-    compression: Compression,
-) -> std::result::Result<Rectangular, Vec<Diagnostic>> {
+fn read_rectangular(file: &InputFile, compression: Compression) -> Diagnosed<Rectangular> {
     let path = file.path();
     let mut blocks = Blocks::of(file, compression);
     let Some(first) = blocks.next().map_err(|e| vec![broken(path, &e)])? else {
@@ -209,7 +206,7 @@ fn without_bom(text: &[u8]) -> &[u8] {
 }
 
 /// Returns the header, and its numbers of bytes and lines.
-fn parse_header(text: &[u8]) -> std::result::Result<(Header, usize, usize), Vec<Diagnostic>> {
+fn parse_header(text: &[u8]) -> Diagnosed<(Header, usize, usize)> {
     let mut lines = Lines::of(text);
     let first = lines.next().map_or(&b""[..], |line| line.text);
     let (integer, symmetry) = banner(without_bom(first))?;
@@ -235,7 +232,7 @@ fn size(field: &[u8]) -> Option<u64> {
 }
 
 /// Returns field type and symmetry of the banner. The error names every unsupported property.
-fn banner(line: &[u8]) -> std::result::Result<(bool, Symmetry), Vec<Diagnostic>> {
+fn banner(line: &[u8]) -> Diagnosed<(bool, Symmetry)> {
     let shown = excerpt(line.trim_ascii());
     if !has_banner(line) {
         let message =
@@ -302,10 +299,8 @@ const MAX_COUNTED_VALUES: usize = 4096;
 
 const HELP: &str = "write the array as Matrix Market array real general: scipy.io.mmwrite of a numpy array";
 
-type Found<T> = std::result::Result<T, Vec<Diagnostic>>;
-
 /// Reads an array of real numbers.
-pub(crate) fn read_array(file: &InputFile, compression: Compression) -> Found<Array> {
+pub(crate) fn read_array(file: &InputFile, compression: Compression) -> Diagnosed<Array> {
     let damaged = |e: std::io::Error| vec![broken(file.path(), &e)];
     let mut blocks = Blocks::of(file, compression);
     let mut reading = ArrayReader::default();
@@ -326,7 +321,7 @@ pub(crate) fn read_array(file: &InputFile, compression: Compression) -> Found<Ar
     if blocks.end() == TextEnd::Number { Err(vec![cut_off(line)]) } else { Ok(array) }
 }
 
-fn check_array_banner(line: &[u8]) -> Found<()> {
+fn check_array_banner(line: &[u8]) -> Diagnosed<()> {
     let text = String::from_utf8_lossy(line).to_lowercase();
     let kinds: Vec<&str> = text.split_whitespace().collect();
     if !has_banner(line) || kinds.len() != 5 {

@@ -2,10 +2,10 @@
 
 use super::assemble::{check_size, refuse_beyond_memory};
 use super::compressed::Full;
-use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
+use super::reader::{ArraySource, MatrixSource, Reader};
 use crate::array::Array;
 use crate::npy;
-use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::diagnostic::{Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_model::RawMatrix;
 
@@ -33,7 +33,7 @@ impl Reader for Npy {
         read.map_err(|diagnostic| Error::from(diagnostic.in_file(source.file.path())))
     }
 
-    fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<Diagnosed<Array>> {
         let read = || {
             source.file.load()?;
             npy::read(source.file.bytes())

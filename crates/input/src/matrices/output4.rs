@@ -8,12 +8,12 @@ mod text;
 use super::assemble::{check_extents, check_size, undeclared_triangle};
 use super::named_matrices::{choose, named_or_only};
 use super::operator::OperatorColumns;
-use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
+use super::reader::{ArraySource, MatrixSource, Reader};
 use super::rectangular::Rectangular;
 use binary::Binary;
 use columns::{Columns, SINGLE_DIGITS, Stored, Stretch};
-use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::{Error, Result};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
+use flexbody_base::error::{self, Error};
 use flexbody_base::text::{Compression, InputFile};
 use flexbody_linalg::parallel;
 use flexbody_model::RawMatrix;
@@ -38,7 +38,7 @@ impl Reader for Output4 {
         Binary::of(head).is_some() || text::begins(head)
     }
 
-    fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
+    fn read(&self, source: &MatrixSource<'_>) -> error::Result<RawMatrix> {
         let path = source.file.path();
         if source.compression != Compression::None {
             let message = "OUTPUT4 file is compressed as a whole";
@@ -52,13 +52,11 @@ impl Reader for Output4 {
         read().map_err(|found: Diagnostic| Error::from(found.in_file(path)))
     }
 
-    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
         let read = || read_rectangular(source.file, source.name).map(Rectangular::operator);
         source.is_plain().then(|| read().map_err(|diagnostic| vec![diagnostic]))
     }
 }
-
-type Found<T> = std::result::Result<T, Diagnostic>;
 
 /// Matrices of a file, in its order.
 pub(crate) struct Contents {
@@ -77,7 +75,7 @@ impl Contents {
     ///
     /// # Errors
     /// FB301 for a file that is no OUTPUT4 file, FB303, FB304 for files that are cut off.
-    pub(crate) fn of(file: &InputFile) -> Found<Self> {
+    pub(crate) fn of(file: &InputFile) -> Result<Self, Diagnostic> {
         let matrices = match Binary::of(file.bytes()) {
             Some(binary) => {
                 let all = binary.contents(file)?.into_iter();
@@ -108,7 +106,7 @@ impl Contents {
     /// # Errors
     /// FB301 for text that cannot be parsed, FB302 for complex matrices and other forms, FB303 for rows outside the
     /// matrix, FB306 for values that are not finite, FB313 for more entries than memory holds.
-    fn rectangular(&self, file: &InputFile, wanted: usize) -> Found<Rectangular> {
+    fn rectangular(&self, file: &InputFile, wanted: usize) -> Result<Rectangular, Diagnostic> {
         let (stored, encoding) = &self.matrices[wanted];
         let header = &stored.header;
         let about = |diagnostic: Diagnostic| diagnostic.about(&header.name);
@@ -134,7 +132,7 @@ impl Contents {
     /// FB301 for text that cannot be parsed, FB302 for complex and other matrices, FB303 for rows outside the matrix,
     /// FB305 for a matrix that is not square, FB306 for values that are not finite, FB307 for a single triangle, FB312
     /// if there is no nonzero entry.
-    pub(crate) fn matrix(&self, file: &InputFile, wanted: usize) -> Found<RawMatrix> {
+    pub(crate) fn matrix(&self, file: &InputFile, wanted: usize) -> Result<RawMatrix, Diagnostic> {
         let Some((stored, encoding)) = self.matrices.get(wanted) else {
             return Err(Diagnostic::new(Code::MatrixSyntax, "the matrix is not in the file"));
         };
@@ -171,7 +169,7 @@ impl Contents {
 ///
 /// # Errors
 /// FB310 if there is no such matrix, the errors of [`Contents::of`] and of the matrix.
-fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> {
+fn read_rectangular(file: &InputFile, name: Option<&str>) -> Result<Rectangular, Diagnostic> {
     let contents = Contents::of(file)?;
     let wanted = named_or_only(&contents.names(), name)?;
     contents.rectangular(file, wanted)
@@ -179,7 +177,7 @@ fn read_rectangular(file: &InputFile, name: Option<&str>) -> Found<Rectangular> 
 
 /// Reads all columns of a matrix. Groups of stretches are read in parallel and joined in the order of the file before
 /// the next group, so that the entries are in memory once.
-fn columns(file: &InputFile, stored: &Stored, encoding: Encoding) -> Found<Columns> {
+fn columns(file: &InputFile, stored: &Stored, encoding: Encoding) -> Result<Columns, Diagnostic> {
     let at_once = 8 * rayon::current_num_threads();
     let mut all = Columns::with_capacity(stored.values);
     for stretches in stored.stretches.chunks(at_once) {
@@ -256,7 +254,7 @@ mod tests {
         bytes
     }
 
-    fn read(bytes: &[u8], threads: usize) -> Found<RawMatrix> {
+    fn read(bytes: &[u8], threads: usize) -> Result<RawMatrix, Diagnostic> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("job.op4");
         std::fs::write(&path, bytes).expect("written");

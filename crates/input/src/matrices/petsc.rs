@@ -6,9 +6,9 @@
 use super::assemble::{Entry, check_extents, check_size};
 use super::compressed::Compressed;
 use super::operator::OperatorColumns;
-use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
+use super::reader::{ArraySource, MatrixSource, Reader};
 use super::rectangular::Rectangular;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_model::RawMatrix;
 
@@ -45,7 +45,7 @@ impl Reader for Petsc {
         read().map_err(|diagnostic: Diagnostic| Error::from(diagnostic.in_file(source.file.path())))
     }
 
-    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
         let read = || read_rectangular(source.file.bytes()).map(Rectangular::operator);
         source.is_plain_of_one().then(|| read().map_err(|diagnostic| vec![diagnostic]))
     }

@@ -2,7 +2,7 @@
 
 use super::operator::OperatorColumns;
 use crate::array::Array;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::text::{Compression, InputFile};
 use flexbody_model::{DofLabel, RawMatrix};
@@ -107,9 +107,6 @@ impl ArraySource<'_> {
     }
 }
 
-/// Result of reading a matrix that need not be square, or an array.
-pub type ReadOutcome<T> = std::result::Result<T, Vec<Diagnostic>>;
-
 /// Reader of one matrix format. A new format has one file in this crate, one entry in [`READERS`](super::READERS) and
 /// one folder in `fixtures/readers/`.
 pub trait Reader: Sync {
@@ -152,7 +149,7 @@ pub trait Reader: Sync {
     ///
     /// # Errors
     /// The errors of [`Reader::read`], apart from those of matrices that are not square.
-    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
         let _ = source;
         None
     }
@@ -161,7 +158,7 @@ pub trait Reader: Sync {
     ///
     /// # Errors
     /// FB103, FB301 to FB313 for a file that cannot be read.
-    fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<Diagnosed<Array>> {
         let _ = source;
         None
     }

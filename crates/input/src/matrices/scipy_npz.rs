@@ -7,10 +7,10 @@ use super::assemble::{
 };
 use super::compressed::{Compressed, EntryCheck};
 use super::operator::OperatorColumns;
-use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
+use super::reader::{ArraySource, MatrixSource, Reader};
 use super::rectangular::Rectangular;
 use crate::npy;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_model::RawMatrix;
@@ -50,7 +50,7 @@ impl Reader for ScipyNpz {
         read.map_err(|diagnostic| Error::from(diagnostic.in_file(source.file.path())))
     }
 
-    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
         let read = || read_rectangular(source.file.bytes()).map(Rectangular::operator);
         source.is_plain_of_one().then(|| read().map_err(|diagnostic| vec![diagnostic]))
     }

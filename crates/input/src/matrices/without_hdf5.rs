@@ -1,9 +1,10 @@
 //! Matrices in HDF5 files in a build without HDF5: recognised, and refused by name.
 
 use super::operator::OperatorColumns;
-use super::reader::{ArraySource, MatrixSource, ReadOutcome, Reader};
+use super::reader::{ArraySource, MatrixSource, Reader};
 use crate::array::Array;
 use crate::hdf5::left_out;
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::input_file::is_hdf5;
 use flexbody_model::RawMatrix;
@@ -28,11 +29,11 @@ impl Reader for Hdf5 {
         Err(Error::from(left_out().in_file(source.file.path())))
     }
 
-    fn read_operator(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<OperatorColumns>> {
+    fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
         source.is_plain().then(|| Err(vec![left_out()]))
     }
 
-    fn read_array(&self, source: &ArraySource<'_>) -> Option<ReadOutcome<Array>> {
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<Diagnosed<Array>> {
         source.is_plain().then(|| Err(vec![left_out()]))
     }
 }

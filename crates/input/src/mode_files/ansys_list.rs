@@ -1,7 +1,8 @@
 //! Lists of Ansys: `PRNSOL,U` or `PRNSOL,DOF` after `SET` for every mode, in one file.
 
-use super::mode_table::{Found, ModeTable, syntax, unexpected, unreadable};
+use super::mode_table::{ModeTable, syntax, unexpected, unreadable};
 use crate::digits::written_digits;
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, excerpt, integer, real, words};
 use flexbody_model::DofLabel;
@@ -24,7 +25,7 @@ struct AnsysListReader {
 }
 
 /// Reads all lists. Pages and lists of one substep belong to one mode.
-pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<ModeTable> {
     let mut reading = AnsysListReader::default();
     for Line { number: at, text: line } in Lines::of(file.bytes()) {
         let words = numbers_apart(line);
@@ -59,7 +60,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
 
 impl AnsysListReader {
     /// Reads the heading `LOAD STEP=  1  SUBSTEP=  7`, and below it `FREQ= 3907.0   LOAD CASE=   0`.
-    fn head(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
+    fn head(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Diagnosed<()> {
         self.columns = None;
         if let (Some(step), Some(substep)) =
             (behind(line, b"STEP=").and_then(integer), behind(line, b"SUBSTEP=").and_then(integer))
@@ -85,7 +86,7 @@ impl AnsysListReader {
     }
 
     /// Reads a line of a node.
-    fn node(&mut self, file: &InputFile, at: usize, node: i64, words: &[Vec<u8>]) -> Found<()> {
+    fn node(&mut self, file: &InputFile, at: usize, node: i64, words: &[Vec<u8>]) -> Diagnosed<()> {
         let Some(columns) = &self.columns else { return Ok(()) };
         let values: Option<Vec<f64>> = words.iter().map(|word| real(word)).collect();
         let Some(values) = values.filter(|values| values.len() == columns.len()) else {

@@ -1,7 +1,8 @@
 //! Results of CalculiX (.frd, text): the displacements of every mode of a `*FREQUENCY` step, with five decimals, in
 //! fields of fixed width that touch each other.
 
-use super::mode_table::{Found, ModeTable, syntax, unexpected, unreadable};
+use super::mode_table::{ModeTable, syntax, unexpected, unreadable};
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, field, integer, real, words};
 use flexbody_model::DofLabel;
@@ -40,7 +41,7 @@ struct Block {
 }
 
 /// Reads the displacements of all modes.
-pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<ModeTable> {
     let mut table = ModeTable::new(DIGITS.0, DIGITS.1);
     let (mut head, mut pending, mut block): (Head, Option<Block>, Option<Block>) = Default::default();
     for Line { number: at, text: line } in Lines::of(file.bytes()) {
@@ -96,7 +97,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
 impl Head {
     /// Reads a line with a parameter of the step: `1PMODE`, `1PGM` and `1PGK` (modal mass and stiffness), `1PHID`
     /// (nodal diameter of a cyclic structure, -1 without).
-    fn parameter(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
+    fn parameter(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Diagnosed<()> {
         let mut words = words(&line[6..]);
         let (Some(name), Some(value)) = (words.next(), words.next()) else { return Ok(()) };
         match name {
@@ -114,7 +115,7 @@ impl Head {
     }
 
     /// Returns the block of a mode from the heading of a block; `None` for other blocks.
-    fn block(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<Option<Block>> {
+    fn block(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Diagnosed<Option<Block>> {
         if !self.mode || field(line, 56..58) != FREQUENCY {
             return Ok(None);
         }
@@ -140,7 +141,7 @@ impl Head {
 
 impl Block {
     /// Reads the displacements of a node.
-    fn node(&mut self, table: &mut ModeTable, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
+    fn node(&mut self, table: &mut ModeTable, file: &InputFile, at: usize, line: &[u8]) -> Diagnosed<()> {
         let node = line.get(3..self.start).and_then(|field| integer(field.trim_ascii()));
         let value =
             |k: usize| real(line.get(self.start + WIDTH * k..self.start + WIDTH * (k + 1))?.trim_ascii());

@@ -1,14 +1,12 @@
 //! Values of modes as read from a file: node by node, mode by mode; and the errors of files of modes.
 
 use faer::Mat;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::expected;
 use flexbody_model::{DofLabel, RawModes};
 use std::collections::HashMap;
-
-pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
 
 /// Modes of a file, all of the same nodes and directions.
 #[derive(Debug, Default)]
@@ -72,7 +70,7 @@ impl ModeTable {
         line: Option<usize>,
         label: DofLabel,
         value: f64,
-    ) -> Found<()> {
+    ) -> Diagnosed<()> {
         let number = self.modes.len();
         let wrong = |code, message: String| {
             let diagnostic = Diagnostic::new(code, message).in_file(file.path());
@@ -109,7 +107,7 @@ impl ModeTable {
     ///
     /// # Errors
     /// FB128 if there is no mode, or if modes have different nodes.
-    pub(super) fn into_modes(mut self, file: &InputFile, source: SourceFile) -> Found<RawModes> {
+    pub(super) fn into_modes(mut self, file: &InputFile, source: SourceFile) -> Diagnosed<RawModes> {
         let n = self.labels.len();
         if n == 0 {
             let help = "write the displacements of the modes: see docs/how_to/import_modes.md";

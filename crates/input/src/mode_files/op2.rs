@@ -3,7 +3,8 @@
 //! after them. Between records are keys (records of one word): a positive key is the number of words of the next
 //! record, a key that is not positive ends a part of the table, and zero ends the table.
 
-use super::mode_table::{Found, ModeTable, unreadable};
+use super::mode_table::{ModeTable, unreadable};
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use flexbody_model::DofLabel;
 
@@ -41,7 +42,7 @@ const HELP: &str = "write it with PARAM,POST,-1, or give the shapes as an array:
 const TABLES: &[&str] = &["OUGV1", "OUG1", "OUGV1PAT", "OPHIG"];
 
 /// Reads the eigenvectors of all modes.
-pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<ModeTable> {
     let mut records = Records::new(file);
     let digits = DIGITS[usize::from(records.wide)];
     let mut table = ModeTable::new(digits, digits).along_nodes();
@@ -60,7 +61,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
 }
 
 /// Adds the values of a mode, if the part is one.
-fn add_mode(table: &mut ModeTable, records: &Records<'_>, head: &[u64], values: &[u64]) -> Found<()> {
+fn add_mode(table: &mut ModeTable, records: &Records<'_>, head: &[u64], values: &[u64]) -> Diagnosed<()> {
     let file = records.file;
     let whole = |at: usize| records.whole(head[at]);
     if head.len() < HEAD_WORDS || whole(0) / 10 != REAL_EIGENVALUES || !SHAPES.contains(&(whole(1) % 1000)) {
@@ -137,13 +138,13 @@ impl<'f> Records<'f> {
         String::from_utf8_lossy(&letters).trim_matches([' ', '\0']).to_owned()
     }
 
-    fn broken<T>(&self) -> Found<T> {
+    fn broken<T>(&self) -> Diagnosed<T> {
         let at = self.file.bytes().len() - self.rest.len();
         Err(unreadable(self.file, format!("records do not follow each other at byte {at}"), HELP))
     }
 
     /// Returns the bytes of the next record; `None` at the end of the file.
-    fn record(&mut self) -> Found<Option<&'f [u8]>> {
+    fn record(&mut self) -> Diagnosed<Option<&'f [u8]>> {
         if self.rest.is_empty() {
             return Ok(None);
         }
@@ -162,7 +163,7 @@ impl<'f> Records<'f> {
     }
 
     /// Returns the next key; `None` at the end of the file.
-    fn key(&mut self) -> Found<Option<i64>> {
+    fn key(&mut self) -> Diagnosed<Option<i64>> {
         match self.record()? {
             None => Ok(None),
             Some(record) => match self.word(record) {
@@ -173,7 +174,7 @@ impl<'f> Records<'f> {
     }
 
     /// Returns the record that a key announces.
-    fn announced(&mut self, words: i64) -> Found<&'f [u8]> {
+    fn announced(&mut self, words: i64) -> Diagnosed<&'f [u8]> {
         match self.record()? {
             Some(record) if record.len() as u64 == (words as u64).saturating_mul(self.width() as u64) => {
                 Ok(record)
@@ -183,7 +184,7 @@ impl<'f> Records<'f> {
     }
 
     /// Skips the label of the tape, if there is one: a date, a name, eight more letters.
-    fn skip_label(&mut self) -> Found<()> {
+    fn skip_label(&mut self) -> Diagnosed<()> {
         let start = self.rest;
         if self.key()? != Some(3) {
             self.rest = start;
@@ -200,7 +201,7 @@ impl<'f> Records<'f> {
     }
 
     /// Returns the name of the next table; `None` after the last.
-    fn table_name(&mut self) -> Found<Option<String>> {
+    fn table_name(&mut self) -> Diagnosed<Option<String>> {
         match self.key()? {
             Some(2) => {
                 let name = self.announced(2)?;
@@ -212,7 +213,7 @@ impl<'f> Records<'f> {
     }
 
     /// Returns the words of every part of a table if they are `wanted`.
-    fn parts(&mut self, wanted: bool) -> Found<Vec<Vec<u64>>> {
+    fn parts(&mut self, wanted: bool) -> Diagnosed<Vec<Vec<u64>>> {
         let mut parts: Vec<Vec<u64>> = Vec::new();
         // Each part after the first begins with a record of one word, its kind.
         let mut kind_follows = false;

@@ -1,7 +1,8 @@
 //! Punch files of Nastran (.pch): `DISPLACEMENT(PUNCH) = ALL` in SOL 103 writes two lines for every grid point of every
 //! mode, with seven digits.
 
-use super::mode_table::{Found, ModeTable, syntax, unexpected, unreadable};
+use super::mode_table::{ModeTable, syntax, unexpected, unreadable};
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, integer, real, words};
 use flexbody_model::DofLabel;
@@ -38,7 +39,7 @@ enum SectionKind {
 }
 
 /// Reads the eigenvectors of all modes.
-pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<ModeTable> {
     let mut table = ModeTable::new(DIGITS, DIGITS).along_nodes();
     let mut kind = SectionKind::Other;
     let mut is_mode = false;
@@ -98,7 +99,7 @@ fn kind_of(line: &[u8], before: SectionKind) -> SectionKind {
     }
 }
 
-fn refuse_other_forms(file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
+fn refuse_other_forms(file: &InputFile, at: usize, line: &[u8]) -> Diagnosed<()> {
     let what = if line.starts_with(b"$REAL-IMAGINARY") || line.starts_with(b"$MAGNITUDE") {
         "eigenvectors are complex"
     } else if line.starts_with(b"$POINT") {
@@ -114,7 +115,7 @@ fn refuse_other_forms(file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
 }
 
 /// Reads a line `$EIGENVALUE =  3.947842E+05  MODE =  1`.
-fn eigenvalue(file: &InputFile, at: usize, line: &[u8]) -> Found<Option<f64>> {
+fn eigenvalue(file: &InputFile, at: usize, line: &[u8]) -> Diagnosed<Option<f64>> {
     let Some(rest) = line.strip_prefix(b"$EIGENVALUE") else { return Ok(None) };
     let mut words = words(rest);
     let value = match words.next() {
@@ -135,7 +136,7 @@ fn grid_line(
     at: usize,
     line: &[u8],
     before: Option<i64>,
-) -> Found<Option<i64>> {
+) -> Diagnosed<Option<i64>> {
     let mut words = words(line);
     let bad = || Err(unexpected(file, at, "a grid point with three values, or -CONT- and three more", line));
     let (first, node) = match (words.next(), before) {

@@ -1,8 +1,9 @@
 //! Node lists of Ansys: a table with tabs, whose header names the columns in the user's language, and the listing of
 //! NLIST. Decimal commas are read.
 
-use super::errors::{Found, unexpected};
+use super::errors::unexpected;
 use crate::node_file::NodeFile;
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, integer, real, words};
 use flexbody_model::NodeAxes;
@@ -29,7 +30,7 @@ fn is_listing_head(line: &str) -> bool {
 
 /// Reads every line with a node number and three coordinates, and three angles of rotated nodes if the heading of the
 /// page has them (`THXY`). Other lines are headings of pages.
-pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<NodeFile> {
     let mut read = NodeFile::default();
     let mut with_angles = false;
     for Line { number, text: line } in Lines::of(file.bytes()) {

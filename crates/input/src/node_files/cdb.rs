@@ -2,9 +2,10 @@
 //! all in fields of fixed width.
 
 use super::ansys_list::axes;
-use super::errors::{Found, syntax};
+use super::errors::syntax;
 use crate::node_file::NodeFile;
 use crate::sets::{Item, Members, NodeSets, SetList};
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Lines, excerpt, field, integer, real};
 use flexbody_model::{ElementShape, Elements};
@@ -19,7 +20,7 @@ pub(super) fn recognises(head: &str) -> bool {
 }
 
 /// Reads all blocks of nodes, all components of nodes, and the elements.
-pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<NodeFile> {
     let text: Vec<&[u8]> = Lines::of(file.bytes()).map(|line| line.text).collect();
     let mut read = NodeFile::default();
     let mut sets = SetList::default();
@@ -67,7 +68,7 @@ fn nth_field(line: &[u8], k: usize, width: usize) -> &[u8] {
     field(line, k * width..(k + 1) * width)
 }
 
-fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> Found<usize> {
+fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> Diagnosed<usize> {
     let format = text.get(head + 1).and_then(|line| widths(line));
     let Some([(count, width), (reals, length)]) = format.filter(|[whole, reals]| whole.1 > 0 && reals.1 > 0)
     else {
@@ -111,7 +112,7 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
 }
 
 /// Reads a component, which is a set if its members are nodes. Returns the index of the line after it.
-fn component(file: &InputFile, text: &[&[u8]], head: usize, sets: &mut SetList) -> Found<usize> {
+fn component(file: &InputFile, text: &[&[u8]], head: usize, sets: &mut SetList) -> Diagnosed<usize> {
     let line = String::from_utf8_lossy(text[head]).into_owned();
     let words: Vec<&str> = line.split(',').map(str::trim).collect();
     let of_nodes = words.get(2).is_some_and(|kind| kind.to_uppercase().starts_with("NODE"));

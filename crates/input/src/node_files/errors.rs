@@ -4,8 +4,6 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::expected;
 
-pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
-
 /// Returns FB115 at a line.
 pub(super) fn syntax(file: &InputFile, line: usize, message: String) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).at_line(line)]

@@ -1,9 +1,9 @@
 //! Meshes of Gmsh (.msh, versions 2.2 and 4.1, text): nodes, the nodes of physical groups as sets, and elements.
 
-use super::errors::{Found, syntax};
+use super::errors::syntax;
 use crate::node_file::NodeFile;
 use crate::sets::{Item, Members, NodeSets, SetList, SoFar};
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Words, integer, number};
 use flexbody_model::{ElementShape, Elements};
@@ -30,7 +30,7 @@ struct Mesh {
 }
 
 /// Reads nodes, groups and elements.
-pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<NodeFile> {
     let mut words = MeshWords { file, text: Words::of(file.bytes()) };
     let mut mesh = Mesh::default();
     while let Some(section) = words.section() {
@@ -49,7 +49,7 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     Ok(mesh.finish())
 }
 
-fn format(words: &mut MeshWords<'_>) -> Found<i64> {
+fn format(words: &mut MeshWords<'_>) -> Diagnosed<i64> {
     let (version, binary) = (words.real("a version")?, words.whole("0 for text")?);
     let message = match (version, binary) {
         (v, 0) if (2.0..3.0).contains(&v) => return Ok(2),
@@ -67,7 +67,7 @@ fn format(words: &mut MeshWords<'_>) -> Found<i64> {
 }
 
 impl Mesh {
-    fn physical_names(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
+    fn physical_names(&mut self, words: &mut MeshWords<'_>) -> Diagnosed<()> {
         for _ in 0..words.whole("a count")? {
             let (dimension, tag) = (words.whole("a dimension")?, words.whole("a tag")?);
             let name = String::from_utf8_lossy(words.text.line()).into_owned();
@@ -76,8 +76,8 @@ impl Mesh {
         Ok(())
     }
 
-    fn entities(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
-        let counts: Vec<i64> = (0..4).map(|_| words.whole("a count")).collect::<Found<_>>()?;
+    fn entities(&mut self, words: &mut MeshWords<'_>) -> Diagnosed<()> {
+        let counts: Vec<i64> = (0..4).map(|_| words.whole("a count")).collect::<Diagnosed<_>>()?;
         for (dimension, count) in counts.into_iter().enumerate() {
             for _ in 0..count {
                 let tag = words.whole("a tag")?;
@@ -85,7 +85,7 @@ impl Mesh {
                     words.real("a bound")?;
                 }
                 let groups = words.whole("a count")?;
-                let groups = (0..groups).map(|_| words.whole("a group")).collect::<Found<Vec<_>>>()?;
+                let groups = (0..groups).map(|_| words.whole("a group")).collect::<Diagnosed<Vec<_>>>()?;
                 if dimension > 0 {
                     for _ in 0..words.whole("a count")? {
                         words.whole("a bounding entity")?;
@@ -97,7 +97,7 @@ impl Mesh {
         Ok(())
     }
 
-    fn nodes_2(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
+    fn nodes_2(&mut self, words: &mut MeshWords<'_>) -> Diagnosed<()> {
         for _ in 0..words.whole("a count")? {
             self.read.nodes.ids.push(words.whole("a node")?);
             self.read.nodes.positions.push(words.place()?);
@@ -105,7 +105,7 @@ impl Mesh {
         Ok(())
     }
 
-    fn nodes_4(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
+    fn nodes_4(&mut self, words: &mut MeshWords<'_>) -> Diagnosed<()> {
         let blocks = words.whole("a count")?;
         for _ in 0..3 {
             words.whole("a count")?;
@@ -128,12 +128,12 @@ impl Mesh {
         Ok(())
     }
 
-    fn elements_2(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
+    fn elements_2(&mut self, words: &mut MeshWords<'_>) -> Diagnosed<()> {
         for _ in 0..words.whole("a count")? {
             words.whole("an element")?;
             let kind = words.whole("a type")?;
             let tags =
-                (0..words.whole("a count")?).map(|_| words.whole("a tag")).collect::<Found<Vec<_>>>()?;
+                (0..words.whole("a count")?).map(|_| words.whole("a tag")).collect::<Diagnosed<Vec<_>>>()?;
             let nodes = words.nodes(kind)?;
             draw(&mut self.read.elements, kind, &nodes);
             if let (Some(&group), Some(dimension)) = (tags.first(), dimension_of(kind)) {
@@ -143,7 +143,7 @@ impl Mesh {
         Ok(())
     }
 
-    fn elements_4(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
+    fn elements_4(&mut self, words: &mut MeshWords<'_>) -> Diagnosed<()> {
         let blocks = words.whole("a count")?;
         for _ in 0..3 {
             words.whole("a count")?;
@@ -266,13 +266,13 @@ struct MeshWords<'a> {
 }
 
 impl MeshWords<'_> {
-    fn wrong<T>(&self, expected: &str, found: Option<&[u8]>) -> Found<T> {
+    fn wrong<T>(&self, expected: &str, found: Option<&[u8]>) -> Diagnosed<T> {
         let found =
             found.map_or("the end of the file".to_owned(), |word| format!("`{}`", word.escape_ascii()));
         Err(syntax(self.file, self.text.line_number(), format!("expected {expected}, found {found}")))
     }
 
-    fn whole(&mut self, expected: &str) -> Found<i64> {
+    fn whole(&mut self, expected: &str) -> Diagnosed<i64> {
         let word = self.text.next();
         match word.and_then(integer) {
             Some(number) => Ok(number),
@@ -280,7 +280,7 @@ impl MeshWords<'_> {
         }
     }
 
-    fn real(&mut self, expected: &str) -> Found<f64> {
+    fn real(&mut self, expected: &str) -> Diagnosed<f64> {
         let word = self.text.next();
         match word.and_then(number) {
             Some(number) => Ok(number),
@@ -288,11 +288,11 @@ impl MeshWords<'_> {
         }
     }
 
-    fn place(&mut self) -> Found<[f64; 3]> {
+    fn place(&mut self) -> Diagnosed<[f64; 3]> {
         Ok([self.real("a coordinate")?, self.real("a coordinate")?, self.real("a coordinate")?])
     }
 
-    fn nodes(&mut self, kind: i64) -> Found<Vec<i64>> {
+    fn nodes(&mut self, kind: i64) -> Diagnosed<Vec<i64>> {
         match nodes_of(kind) {
             Some(count) => (0..count).map(|_| self.whole("a node")).collect(),
             None => self.wrong("a known element type", Some(kind.to_string().as_bytes())),

@@ -5,9 +5,10 @@ mod arrays;
 
 pub(crate) use arrays::point_arrays;
 
-use super::errors::{Found, syntax};
+use super::errors::syntax;
 use crate::node_file::NodeFile;
 use crate::number_type::NumberType;
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Words, number};
 
@@ -19,7 +20,7 @@ pub(super) fn recognises(head: &str) -> bool {
 }
 
 /// Reads the points, numbered from 0 as in ParaView.
-pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<NodeFile> {
     let mut cursor = Cursor { text: Words::of(file.bytes()), binary: false };
     let places = cursor.points().map_err(|message| syntax(file, cursor.text.line_number(), message))?;
     let mut read = NodeFile::default();

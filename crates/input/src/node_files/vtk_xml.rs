@@ -2,12 +2,13 @@
 //! unstructured grids.
 //! <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>
 
-use super::errors::{Found, refused};
+use super::errors::refused;
 use super::point_data::{DIGITS_OF_TEXT, PointArray, PointData, exact_ids};
 use super::vtk_packing::{Base64, Packing, Unpacked};
 use crate::node_file::NodeFile;
 use crate::number_type::NumberType;
 use crate::sets::{Item, Members, NodeSets, SetList};
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{number, words};
 use flexbody_model::{ElementShape, Elements, Nodes};
@@ -25,7 +26,7 @@ pub(super) fn recognises(head: &str) -> bool {
 }
 
 /// Reads the points. They are numbered from 0, as in ParaView, or by the array that the file declares as global ids.
-pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
+pub(super) fn read(file: &InputFile) -> Diagnosed<NodeFile> {
     points_and_sets(file.bytes()).map_err(|message| refused(file, message, HELP))
 }
 

@@ -1,12 +1,9 @@
 //! Collection of the problems of all files.
 
-use flexbody_base::diagnostic::Diagnostic;
-
-/// Content of a file, or all its problems.
-pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
+use flexbody_base::diagnostic::{Diagnosed, Diagnostic};
 
 /// Returns a value that could be read; adds the errors of another.
-pub(super) fn take<T>(diagnostics: &mut Vec<Diagnostic>, found: Found<T>) -> Option<T> {
+pub(super) fn take<T>(diagnostics: &mut Vec<Diagnostic>, found: Diagnosed<T>) -> Option<T> {
     found.map_err(|list| collect(diagnostics, list)).ok()
 }
 

@@ -1,11 +1,10 @@
 //! Nodes of interfaces and of sides of cuts: listed, from tables, from sets of the model, or in a region.
 
-use super::diagnostics::Found;
 use super::model_matrices::{ModelMatrices, moving};
 use super::open_files::OpenFiles;
 use crate::model_files::{InterfaceNodes, InterfaceSource, ModelFiles, ModelSource};
 use crate::tables::read_node_list;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_model::{NodeSet, RawModel};
 use std::collections::HashSet;
@@ -28,7 +27,7 @@ impl<'m> NodeLookup<'m> {
         interface: &InterfaceSource,
         opened: &OpenFiles,
         files: &ModelFiles,
-    ) -> Found<NodeSet> {
+    ) -> Diagnosed<NodeSet> {
         self.node_set(&format!("interface `{}`", interface.name), interface, opened, files)
     }
 
@@ -42,7 +41,7 @@ impl<'m> NodeLookup<'m> {
         interface: &InterfaceSource,
         opened: &OpenFiles,
         files: &ModelFiles,
-    ) -> Found<NodeSet> {
+    ) -> Diagnosed<NodeSet> {
         let mut outline = Vec::new();
         let nodes = match &interface.nodes {
             InterfaceNodes::Listed(nodes) => nodes.clone(),
@@ -75,7 +74,13 @@ impl<'m> NodeLookup<'m> {
     }
 
     /// Returns the nodes of a set that have rows. `outline` receives all nodes of the set.
-    fn of_set(&self, owner: &str, name: &str, files: &ModelFiles, outline: &mut Vec<i64>) -> Found<Vec<i64>> {
+    fn of_set(
+        &self,
+        owner: &str,
+        name: &str,
+        files: &ModelFiles,
+        outline: &mut Vec<i64>,
+    ) -> Diagnosed<Vec<i64>> {
         let Some(matrices) = self.matrices else { return Ok(Vec::new()) };
         match matrices.sets.find(name) {
             Some(Ok(nodes)) => *outline = nodes,
@@ -95,7 +100,13 @@ impl<'m> NodeLookup<'m> {
         Ok(outline.iter().copied().filter(|id| self.moves(*id)).collect())
     }
 
-    fn refuse_empty(&self, owner: &str, nodes: Vec<i64>, why: &str, files: &ModelFiles) -> Found<Vec<i64>> {
+    fn refuse_empty(
+        &self,
+        owner: &str,
+        nodes: Vec<i64>,
+        why: &str,
+        files: &ModelFiles,
+    ) -> Diagnosed<Vec<i64>> {
         if nodes.is_empty() && self.matrices.is_some() {
             let message = format!("{owner}: {why}");
             return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message))]);

@@ -2,13 +2,11 @@
 
 use crate::matrices::matrix_market::read_array;
 use crate::tables::read_dofs;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::scanner::{Lines, integer, words};
 use flexbody_base::text::{Compression, InputFile};
 use flexbody_model::DofLabel;
 use std::path::Path;
-
-type Found<T> = Result<T, Vec<Diagnostic>>;
 
 /// Content of a file about the rows.
 pub(super) enum Mapping {
@@ -24,7 +22,7 @@ impl Mapping {
     ///
     /// # Errors
     /// FB203 to FB208 for a table that is not valid, FB301, FB302 for an array that is not valid.
-    pub(super) fn read(file: &InputFile) -> Found<Self> {
+    pub(super) fn read(file: &InputFile) -> Diagnosed<Self> {
         let bytes = file.bytes();
         if bytes.get(..14).is_some_and(|start| start.eq_ignore_ascii_case(b"%%MatrixMarket")) {
             return node_array(file).map(Self::Nodes);
@@ -39,7 +37,7 @@ impl Mapping {
     ///
     /// # Errors
     /// FB402 if the rows are not an equal number (2, 3 or 6) for each node.
-    pub(super) fn labels(self, n: usize, path: &Path) -> Found<Vec<DofLabel>> {
+    pub(super) fn labels(self, n: usize, path: &Path) -> Diagnosed<Vec<DofLabel>> {
         let nodes = match self {
             Self::Labels(labels) => return Ok(labels),
             Self::Nodes(nodes) => nodes,
@@ -58,7 +56,7 @@ impl Mapping {
     }
 }
 
-fn node_array(file: &InputFile) -> Found<Vec<i64>> {
+fn node_array(file: &InputFile) -> Diagnosed<Vec<i64>> {
     let array = read_array(file, Compression::of(file.bytes()))
         .map_err(|found| found.into_iter().map(|d| d.in_file(file.path())).collect::<Vec<_>>())?;
     let wrong = |what: String| vec![Diagnostic::new(Code::TableRow, what).in_file(file.path())];

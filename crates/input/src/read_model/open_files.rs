@@ -1,6 +1,6 @@
 //! Files of a model while they are read.
 
-use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::diagnostic::{Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::text::input_file::InputFile;
 use std::collections::HashMap;
@@ -26,14 +26,14 @@ impl OpenFiles {
     }
 
     /// Returns a file whose bytes are in memory.
-    pub(super) fn get(&self, path: &Path) -> std::result::Result<&InputFile, Vec<Diagnostic>> {
+    pub(super) fn get(&self, path: &Path) -> Diagnosed<&InputFile> {
         let file = self.unread(path)?;
         file.load().map_err(|diagnostic| vec![diagnostic])?;
         Ok(file)
     }
 
     /// Returns a file whose bytes may not be in memory yet.
-    pub(super) fn unread(&self, path: &Path) -> std::result::Result<&InputFile, Vec<Diagnostic>> {
+    pub(super) fn unread(&self, path: &Path) -> Diagnosed<&InputFile> {
         let place = self.places.get(path).expect("every path of the model is opened");
         self.files[*place].as_ref().map_err(|diagnostic| vec![diagnostic.clone()])
     }

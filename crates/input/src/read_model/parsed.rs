@@ -1,6 +1,6 @@
 //! Content of the files of a model as read, each with its problems.
 
-use super::diagnostics::{Found, take};
+use super::diagnostics::take;
 use super::labels_of_file::LabelsOfFile;
 use super::mapping::Mapping;
 use super::matrix::read_opened;
@@ -13,7 +13,7 @@ use crate::matrices::MatrixRole;
 use crate::model_files::{MatrixLocation, ModelFiles, ModelSource};
 use crate::node_file::NodeFile;
 use crate::node_files::read_node_file;
-use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::diagnostic::{Diagnosed, Diagnostic};
 use flexbody_base::error::Error;
 use flexbody_linalg::parallel;
 use flexbody_model::{Damping, GeometricStiffness, GivenRows, RawMatrix};
@@ -21,9 +21,9 @@ use flexbody_model::{Damping, GeometricStiffness, GivenRows, RawMatrix};
 /// Parsed content of the files, each with its problems.
 pub(super) struct Parsed {
     pub matrices: Matrices,
-    pub mesh: Option<Found<NodeFile>>,
-    pub damping: Option<Found<Damping<RawMatrix>>>,
-    pub geometric_stiffness: Vec<Found<GeometricStiffness<StressMatrix>>>,
+    pub mesh: Option<Diagnosed<NodeFile>>,
+    pub damping: Option<Diagnosed<Damping<RawMatrix>>>,
+    pub geometric_stiffness: Vec<Diagnosed<GeometricStiffness<StressMatrix>>>,
     /// Labels of the rows of the matrices beside K, which come with tables.
     pub labels: Vec<LabelsOfFile>,
 }
@@ -31,15 +31,15 @@ pub(super) struct Parsed {
 /// Matrices, nodes and labels by their source.
 pub(super) enum Matrices {
     Tables(Box<ParsedTables>),
-    Job(Box<Found<ModelMatrices>>),
+    Job(Box<Diagnosed<ModelMatrices>>),
 }
 
 /// Content of the tables of a model.
 pub(super) struct ParsedTables {
-    stiffness: Found<RawMatrix>,
-    mass: Found<RawMatrix>,
-    nodes: Found<NodeFile>,
-    dofs: Option<Found<Mapping>>,
+    stiffness: Diagnosed<RawMatrix>,
+    mass: Diagnosed<RawMatrix>,
+    nodes: Diagnosed<NodeFile>,
+    dofs: Option<Diagnosed<Mapping>>,
     /// Labels of the rows in the file of the stiffness matrix, if it names them.
     labels: Option<LabelsOfFile>,
 }

@@ -1,6 +1,6 @@
 //! Recoveries of a model: operators by the rows of its files, shapes with answers, and sections.
 
-use super::diagnostics::{Found, take};
+use super::diagnostics::take;
 use super::interfaces::NodeLookup;
 use super::open_files::OpenFiles;
 use super::recovery_files::{read_offset, read_operator};
@@ -10,7 +10,7 @@ use crate::model_files::{
     InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, OperatorSource, RecoverySource,
 };
 use crate::tables::read_recovery_rows;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{GivenRows, ModelRecovery, RecoveryOperator, Reference};
 use std::borrow::Cow;
@@ -42,7 +42,7 @@ fn by_matrix_rows(
     given: OperatorColumns,
     location: &MatrixLocation,
     dimension: u8,
-) -> Found<CscMatrix> {
+) -> Diagnosed<CscMatrix> {
     let refuse = |diagnostic: Diagnostic| vec![diagnostic.in_file(&location.path)];
     let labels = match (&given, lookup.matrices) {
         (OperatorColumns::Matrix(_), _) => Cow::Borrowed(&[][..]),
@@ -68,7 +68,7 @@ fn recovery(
     source: &RecoverySource,
     opened: &OpenFiles,
     files: &ModelFiles,
-) -> Found<(ModelRecovery, Vec<Diagnostic>)> {
+) -> Diagnosed<(ModelRecovery, Vec<Diagnostic>)> {
     let (name, deformed_inertia) = (source.name.clone(), source.deformed_inertia);
     match &source.operator {
         OperatorSource::Rows { operator, rows, offset } => {
@@ -86,7 +86,7 @@ fn recovery(
                 answers: opened.unread(answers)?,
                 displacements: opened.unread(displacements)?,
                 energies: energies.as_ref().map(|path| opened.unread(path)).transpose()?,
-                listed: listed.iter().map(|path| opened.unread(path)).collect::<Found<_>>()?,
+                listed: listed.iter().map(|path| opened.unread(path)).collect::<Diagnosed<_>>()?,
             };
             let (operator, found) = read_answers(&answer_files, &files.units)?;
             Ok((ModelRecovery { name, operator, path: answers.clone(), deformed_inertia }, found))

@@ -7,18 +7,16 @@ use crate::matrices::operator::OperatorColumns;
 use crate::matrices::rectangular::Rectangular;
 use crate::matrices::with_reader;
 use crate::shapes;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_linalg::CscMatrix;
-
-type Found<T> = Result<T, Vec<Diagnostic>>;
 
 /// Reads an operator R (rows x matrix rows of the model) in any of the formats of K, or as a dense array. `name` is the
 /// matrix of a file with several.
 ///
 /// # Errors
 /// FB102 for other formats; FB103, FB301 to FB313 for files that cannot be read.
-pub(super) fn read_operator(file: &InputFile, name: Option<&str>) -> Found<OperatorColumns> {
+pub(super) fn read_operator(file: &InputFile, name: Option<&str>) -> Diagnosed<OperatorColumns> {
     let about = |found: Vec<Diagnostic>| in_file(found, file);
     let sparse = with_reader(file, name, |reader, source| reader.read_operator(source));
     if let Some(found) = sparse {
@@ -38,7 +36,7 @@ fn in_file(found: Vec<Diagnostic>, file: &InputFile) -> Vec<Diagnostic> {
 ///
 /// # Errors
 /// The errors of dense arrays; FB322 for an array with several columns and several rows.
-pub(super) fn read_offset(file: &InputFile, dataset: Option<&str>) -> Found<Vec<f64>> {
+pub(super) fn read_offset(file: &InputFile, dataset: Option<&str>) -> Diagnosed<Vec<f64>> {
     read_vector(file, dataset, (Code::RecoverySize, "of the offset"))
 }
 
@@ -46,12 +44,12 @@ pub(super) fn read_offset(file: &InputFile, dataset: Option<&str>) -> Found<Vec<
 ///
 /// # Errors
 /// The errors of dense arrays; FB328 for an array with several columns and several rows.
-pub(super) fn read_forces(file: &InputFile, dataset: Option<&str>) -> Found<Vec<f64>> {
+pub(super) fn read_forces(file: &InputFile, dataset: Option<&str>) -> Diagnosed<Vec<f64>> {
     read_vector(file, dataset, (Code::NamedLoadMisfit, "of a named load"))
 }
 
 /// Reads an array with one row or one column; `misfit` is the code and the name of any other.
-fn read_vector(file: &InputFile, dataset: Option<&str>, misfit: (Code, &str)) -> Found<Vec<f64>> {
+fn read_vector(file: &InputFile, dataset: Option<&str>, misfit: (Code, &str)) -> Diagnosed<Vec<f64>> {
     let about = |found: Vec<Diagnostic>| in_file(found, file);
     let Array { rows, cols, values, .. } = shapes::read(file, dataset).map_err(about)?;
     if rows != 1 && cols != 1 {
@@ -129,7 +127,7 @@ mod tests {
         bytes.into_inner()
     }
 
-    fn read(name: &str, bytes: &[u8]) -> Found<CscMatrix> {
+    fn read(name: &str, bytes: &[u8]) -> Diagnosed<CscMatrix> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).expect("written");

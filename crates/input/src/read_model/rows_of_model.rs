@@ -1,12 +1,10 @@
 //! Rows of the model for the matrices of its files: their labels, the axes of nodes, and matrices beside K and M.
 
 use crate::matrices::turn::Turn;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_model::{DofLabel, GivenRows, LostRow, NodeAxes, Nodes, RawMatrix, RowMap};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
-
-type Found<T> = Result<T, Vec<Diagnostic>>;
 
 /// Returns the labels of rows that follow the nodes of a table, each with its displacements.
 pub(super) fn in_order_of_nodes(nodes: &Nodes, dimension: u8) -> Vec<DofLabel> {
@@ -20,7 +18,7 @@ pub(super) fn refuse_followers(
     followers: &[(String, Vec<DofLabel>)],
     labels: &[DofLabel],
     deck: &Path,
-) -> Found<()> {
+) -> Diagnosed<()> {
     let labels: HashSet<DofLabel> = labels.iter().copied().collect();
     let open = followers.iter().filter(|(_, rows)| rows.iter().any(|row| labels.contains(row)));
     let names: Vec<&str> = open.map(|(name, _)| name.as_str()).collect();
@@ -42,7 +40,7 @@ pub(super) fn turned(
     matrices: [RawMatrix; 2],
     labels: &[DofLabel],
     axes: HashMap<i64, NodeAxes>,
-) -> Found<([RawMatrix; 2], GivenRows)> {
+) -> Diagnosed<([RawMatrix; 2], GivenRows)> {
     let [stiffness, mass] = matrices;
     let has_rows = |raw: &RawMatrix| raw.matrix.n_cols() == labels.len();
     // Different numbers of rows are reported later.
@@ -63,7 +61,7 @@ pub(super) fn turned(
 }
 
 /// Returns an additional matrix, such as damping, by the rows of the model.
-pub(super) fn by_rows_of_model(raw: RawMatrix, rows: &GivenRows) -> Found<RawMatrix> {
+pub(super) fn by_rows_of_model(raw: RawMatrix, rows: &GivenRows) -> Diagnosed<RawMatrix> {
     let RawMatrix { matrix, digits, path } = raw;
     match rows.matrix(matrix) {
         Ok(matrix) => Ok(RawMatrix { matrix, digits, path }),

@@ -3,7 +3,7 @@
 use super::rows_of_model::by_rows_of_model;
 use crate::jobs::read_calculix_stiffness;
 use crate::model_files::{MatrixLocation, StressStiffnessSource};
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::input_file::InputFile;
 use flexbody_linalg::ties::first_smallest;
 use flexbody_linalg::{CscMatrix, parallel};
@@ -11,8 +11,6 @@ use flexbody_model::{DofLabel, GivenRows, RawMatrix, UnitLoad};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::Path;
-
-type Found<T> = Result<T, Vec<Diagnostic>>;
 
 /// Differences of two entries below this many units in their last digit are rounding.
 const ROUNDED_UNITS: f64 = 2.0;
@@ -56,9 +54,9 @@ pub(super) struct OfStress {
 /// Errors of the files.
 pub(super) fn read_stress_matrix<'f>(
     source: &StressStiffnessSource,
-    opened: impl Fn(&Path) -> Found<&'f InputFile>,
-    other: impl Fn(&MatrixLocation) -> Found<RawMatrix>,
-) -> Found<StressMatrix> {
+    opened: impl Fn(&Path) -> Diagnosed<&'f InputFile>,
+    other: impl Fn(&MatrixLocation) -> Diagnosed<RawMatrix>,
+) -> Diagnosed<StressMatrix> {
     let load_size = source.with_stress.as_ref().map(|with| with.load_size);
     if let Some(dofs) = source.with_stress.as_ref().and_then(|with| with.dofs.as_ref()) {
         let (raw, labels) = read_calculix_stiffness(opened(&source.location.path)?, opened(dofs)?)?;
@@ -74,7 +72,7 @@ impl StressMatrix {
     ///
     /// # Errors
     /// FB112 for rows that are not those of K, FB308 for a matrix of another size, FB452 for a matrix that is K.
-    pub(super) fn of_stress(self, plain: PlainStiffness<'_>, rows: &GivenRows) -> Found<OfStress> {
+    pub(super) fn of_stress(self, plain: PlainStiffness<'_>, rows: &GivenRows) -> Diagnosed<OfStress> {
         let Self { raw, labels, load_size } = self;
         let matrix = match &labels {
             Some(labels) => in_rows_of(raw, labels, &plain.labels)?,
@@ -89,7 +87,7 @@ impl StressMatrix {
 ///
 /// # Errors
 /// FB112 if the rows are not the same.
-fn in_rows_of(raw: RawMatrix, own: &[DofLabel], wanted: &[DofLabel]) -> Found<RawMatrix> {
+fn in_rows_of(raw: RawMatrix, own: &[DofLabel], wanted: &[DofLabel]) -> Diagnosed<RawMatrix> {
     let refuse = |label: &DofLabel, has: &str, lacks: &str| {
         let message = format!(
             "{has} a row for node {} direction {}, which {lacks}: K and the matrix with stress are those of different constraints or elements",

@@ -7,7 +7,7 @@ use crate::named_load::{loads_of_body, refuse_loads_of_several_bodies};
 use crate::recovery::{recoveries_of_body, refuse_several_bodies};
 use crate::wording::{in_words, name_some};
 use crate::{BodyNumber, Damping, FeModel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
-use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
 use flexbody_linalg::SymmetricMatrix;
 use std::cmp::Reverse;
@@ -61,7 +61,7 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
 }
 
 /// Returns the bodies, in the order of their first nodes.
-fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnostic>> {
+fn separate(whole: Assembled) -> Diagnosed<Vec<Assembled>> {
     let component = whole.rows.components(&[&whole.stiffness, &whole.mass]);
     let members = whole.rows.separated(&component);
     let mut found = Vec::new();

@@ -1,8 +1,7 @@
 //! Answers to shapes, written by the tests: their displacements and stresses, and the folder of their files.
 
-use crate::fe_results::step_values::Found;
 use crate::fe_results::{AnswerFiles, read_answers};
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_model::{AnsweredShapes, RecoveryOperator, RecoveryRow};
@@ -81,7 +80,7 @@ impl Place {
         &self,
         answers: &str,
         energies: Option<&str>,
-    ) -> Found<(RecoveryOperator, Vec<Diagnostic>)> {
+    ) -> Diagnosed<(RecoveryOperator, Vec<Diagnostic>)> {
         let open = |name: &str| InputFile::open_unread(self.0.path().join(Path::new(name))).expect("a file");
         let (answers, displacements) = (open(answers), open("ask.npz"));
         let energies = energies.map(open);

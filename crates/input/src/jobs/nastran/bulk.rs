@@ -4,10 +4,9 @@ use super::constraints::Constraints;
 use super::control_sections::{Assigned, SetLines};
 use super::systems::{Definition, Grid, SystemCard, SystemKind};
 use crate::bulk_cards::{Card, Item, components, read_deck};
-use crate::jobs::job::Found;
 use crate::matrices::dmig::Dmigs;
 use crate::mesh::in_order_of_shape;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;
 use flexbody_base::text::scanner::{BadLines, excerpt, whole};
 use flexbody_model::{ElementShape, Elements};
@@ -71,7 +70,7 @@ impl Bulk {
     /// # Errors
     /// FB101, FB106 for files that cannot be read, FB110 for bad lines, FB111 for unsupported cards, FB205 for a node
     /// that is given twice, and the errors of [`Dmigs`], all that are found.
-    pub(super) fn read(path: &Path) -> Found<Self> {
+    pub(super) fn read(path: &Path) -> Diagnosed<Self> {
         let mut bulk = Self::default();
         let files = read_deck(path, &mut |item| match item {
             Item::Control(line) => {

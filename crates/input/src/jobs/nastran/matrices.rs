@@ -3,13 +3,13 @@
 use super::bulk::Bulk;
 use super::carried_mass::CarriedMass;
 use super::elimination::{Elimination, Followers, GridPlaces};
-use crate::jobs::job::{Found, JobFile, both, missing};
+use crate::jobs::job::{JobFile, both, missing};
 use crate::jobs::siblings::{JobSibling, beginning_alike, siblings};
 use crate::matrices::dmig::{Dmigs, Point, label};
 use crate::matrices::named_matrices::{named_pair, pair};
 use crate::matrices::output4;
 use crate::matrices::turn::Turn;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{
@@ -40,7 +40,7 @@ pub(super) struct Matrices {
 
 impl Matrices {
     /// Reads the matrices of the deck, else those of the files in its folder: either punch files or OUTPUT4.
-    pub(super) fn of(bulk: &Bulk, dmigs: Dmigs, job: &JobFile, places: &GridPlaces<'_>) -> Found<Self> {
+    pub(super) fn of(bulk: &Bulk, dmigs: Dmigs, job: &JobFile, places: &GridPlaces<'_>) -> Diagnosed<Self> {
         let (path, stated) = (&job.path, job.matrices.as_ref());
         let names = dmigs.names();
         // Beside elements, DMIG matrices are a part of the model, which its K and M contain.
@@ -74,7 +74,7 @@ impl Matrices {
         mut dmigs: Dmigs,
         (k, m): (usize, usize),
         places: &GridPlaces<'_>,
-    ) -> Found<Self> {
+    ) -> Diagnosed<Self> {
         let mut points: BTreeSet<Point> = dmigs.points(&[k, m]).into_iter().collect();
         // Rows that others follow must exist, even if they are zero.
         let followers = followers(bulk, |point| points.contains(point), places)?;
@@ -92,7 +92,7 @@ impl Matrices {
         Self::new(bulk, Read { stiffness, mass, points, files }, places)
     }
 
-    fn new(bulk: &Bulk, read: Read, places: &GridPlaces<'_>) -> Found<Self> {
+    fn new(bulk: &Bulk, read: Read, places: &GridPlaces<'_>) -> Diagnosed<Self> {
         let Read { stiffness, mass, points, files } = read;
         let followers = followers(bulk, |point| points.binary_search(point).is_ok(), places)?;
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(&stiffness.path)];
@@ -148,7 +148,7 @@ impl Matrices {
     }
 
     /// Returns the matrices with all rows along the axes of the basic system.
-    pub(super) fn turned(self, axes: &HashMap<i64, Axes>) -> Found<Self> {
+    pub(super) fn turned(self, axes: &HashMap<i64, Axes>) -> Diagnosed<Self> {
         if !self.labels.iter().any(|label| axes.contains_key(&label.node)) {
             return Ok(self);
         }
@@ -194,7 +194,7 @@ impl Matrices {
 
     /// Returns FB111 for modal coordinates: rows of scalar points with mass. K and M do not contain their shapes, and
     /// thus not the change of the inertia with them.
-    pub(super) fn refuse_modal(&self, bulk: &Bulk) -> Found<()> {
+    pub(super) fn refuse_modal(&self, bulk: &Bulk) -> Diagnosed<()> {
         let is_modal = |(row, label): (usize, &DofLabel)| {
             !bulk.grids.contains_key(&label.node)
                 && bulk.scalars.contains(&label.node)
@@ -273,7 +273,7 @@ fn product(a: &CscMatrix, b: &CscMatrix) -> CscMatrix {
 
 /// Returns the matrix files in the folder of a deck: punch files, and files of OUTPUT4. A file with the name of the
 /// deck takes precedence over files whose names continue it.
-fn files_beside(bulk: &Bulk, job: &JobFile) -> Found<(Vec<PathBuf>, Vec<PathBuf>)> {
+fn files_beside(bulk: &Bulk, job: &JobFile) -> Diagnosed<(Vec<PathBuf>, Vec<PathBuf>)> {
     let path = &job.path;
     let with = |extension: &str| {
         let beside = siblings(path).filter(|(rest, file)| rest.ends_with(extension) && file != path);
@@ -296,7 +296,11 @@ fn files_beside(bulk: &Bulk, job: &JobFile) -> Found<(Vec<PathBuf>, Vec<PathBuf>
 
 /// Returns the dependent points by constraints that the matrices do not contain yet; `has` returns true for points with
 /// rows.
-fn followers(bulk: &Bulk, has: impl Fn(&Point) -> bool, places: &GridPlaces<'_>) -> Found<Option<Followers>> {
+fn followers(
+    bulk: &Bulk,
+    has: impl Fn(&Point) -> bool,
+    places: &GridPlaces<'_>,
+) -> Diagnosed<Option<Followers>> {
     let one = |diagnostic| vec![diagnostic];
     let open = bulk.constraints.open(has).map_err(one)?;
     if open.is_empty() {
@@ -344,7 +348,7 @@ struct Outputs {
 }
 
 impl Outputs {
-    pub(super) fn of(paths: Vec<PathBuf>) -> Found<Self> {
+    pub(super) fn of(paths: Vec<PathBuf>) -> Diagnosed<Self> {
         let mut all = Self { files: Vec::new(), names: Vec::new(), places: Vec::new() };
         for path in paths {
             let file = InputFile::open(&path).map_err(|diagnostic| vec![diagnostic])?;
@@ -369,7 +373,7 @@ impl Outputs {
         if fitting.is_empty() { (0..self.names.len()).collect() } else { fitting }
     }
 
-    pub(super) fn matrices(&self, bulk: &Bulk, (k, m): (usize, usize)) -> Found<Read> {
+    pub(super) fn matrices(&self, bulk: &Bulk, (k, m): (usize, usize)) -> Diagnosed<Read> {
         let matrix = |name: usize| {
             let (file, at) = self.places[name];
             let (file, contents) = &self.files[file];

@@ -100,9 +100,6 @@ pub(super) struct Systems<'b> {
     open: Vec<i64>,
 }
 
-/// Result with a diagnostic, which has file and line if its card is not that of the grid.
-type Found<T> = Result<T, Diagnostic>;
-
 impl<'b> Systems<'b> {
     pub(super) fn new(cards: &'b HashMap<i64, SystemCard>, grids: &'b BTreeMap<i64, Grid>) -> Self {
         Self { cards, grids, known: HashMap::from([(0, BASIC)]), open: Vec::new() }
@@ -112,7 +109,7 @@ impl<'b> Systems<'b> {
     ///
     /// # Errors
     /// FB110 for systems that are missing, refer to themselves, or have collinear points.
-    pub(super) fn position(&mut self, grid: &Grid) -> Found<[f64; 3]> {
+    pub(super) fn position(&mut self, grid: &Grid) -> Result<[f64; 3], Diagnostic> {
         let system = self.system(grid.system.unwrap_or(0))?;
         Ok(system.point(grid.x))
     }
@@ -121,11 +118,11 @@ impl<'b> Systems<'b> {
     ///
     /// # Errors
     /// The errors of [`position`](Self::position).
-    pub(super) fn axes(&mut self, grid: &Grid, x: [f64; 3]) -> Found<[[f64; 3]; 3]> {
+    pub(super) fn axes(&mut self, grid: &Grid, x: [f64; 3]) -> Result<[[f64; 3]; 3], Diagnostic> {
         Ok(self.system(grid.axes.unwrap_or(0))?.axes_at(x))
     }
 
-    fn system(&mut self, id: i64) -> Found<System> {
+    fn system(&mut self, id: i64) -> Result<System, Diagnostic> {
         if let Some(known) = self.known.get(&id) {
             return Ok(*known);
         }
@@ -154,7 +151,7 @@ impl<'b> Systems<'b> {
     }
 
     /// Returns the three points of a card in the basic system.
-    fn points(&mut self, card: &SystemCard) -> Found<[[f64; 3]; 3]> {
+    fn points(&mut self, card: &SystemCard) -> Result<[[f64; 3]; 3], Diagnostic> {
         match &card.definition {
             Definition::Points { reference, points } => {
                 let system = self.system(*reference)?;

@@ -1,7 +1,7 @@
 //! A sparse matrix in an HDF5 group: compressed columns or rows, or coordinates, in the conventions of scipy, anndata,
 //! MATLAB and PETSc (`docs/reference/input.md`).
 
-use crate::hdf5::{Found, Heaps, Members, Vector, integers_of, text_of, truth_of};
+use crate::hdf5::{Heaps, Members, Vector, integers_of, text_of, truth_of};
 use crate::matrices::assemble::{
     ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, assembled, check_extents,
     check_size, push, refuse_beyond_memory, undeclared_triangle,
@@ -9,7 +9,7 @@ use crate::matrices::assemble::{
 use crate::matrices::lent::StoredColumns;
 use crate::matrices::reader::MatrixSource;
 use crate::matrices::rectangular::Rectangular;
-use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
 use flexbody_linalg::CscMatrix;
 use flexbody_model::RawMatrix;
@@ -50,7 +50,7 @@ pub(super) fn holds_matrix(members: &Members) -> bool {
 }
 
 /// Reads the matrix in `group`, which messages call `name`.
-pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Found<RawMatrix> {
+pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Diagnosed<RawMatrix> {
     let MatrixSource { file, keep_in, .. } = *source;
     let reader = GroupReader { file, group, name, members: Members::of(group), keep_in };
     let declared = reader.declared_symmetry().map_err(|d| vec![d])?;
@@ -101,7 +101,7 @@ pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Foun
 ///
 /// # Errors
 /// FB310 for a group that does not say which of rows and columns are compressed, FB301 to FB306 for an invalid matrix.
-pub(super) fn read_rectangular(group: &Group, name: &str, file: &InputFile) -> Found<Rectangular> {
+pub(super) fn read_rectangular(group: &Group, name: &str, file: &InputFile) -> Diagnosed<Rectangular> {
     let reader = GroupReader { file, group, name, members: Members::of(group), keep_in: None };
     if reader.declared_symmetry().map_err(|d| vec![d])? == Declared::Triangle {
         let message = format!("group `{name}` declares one triangle, and an operator has none");
@@ -201,11 +201,11 @@ impl GroupReader<'_> {
         Diagnostic::new(Code::Hdf5Layout, format!("group `{}` {what}", self.name))
     }
 
-    fn vector(&self, dataset: &str) -> Found<Vector> {
+    fn vector(&self, dataset: &str) -> Diagnosed<Vector> {
         Vector::open(self.group, &self.members, self.name, dataset)
     }
 
-    fn compressed(&self, (values, indices, pointers): (&str, &str, &str)) -> Found<Parsed> {
+    fn compressed(&self, (values, indices, pointers): (&str, &str, &str)) -> Diagnosed<Parsed> {
         let values = self.vector(values)?;
         let indices = self.vector(indices)?;
         let pointers = self.vector(pointers)?;
@@ -250,7 +250,7 @@ impl GroupReader<'_> {
         folder: &Path,
         (values, indices, pointers): (&Vector, &Vector, &[i64]),
         n: usize,
-    ) -> Found<Option<Parsed>> {
+    ) -> Diagnosed<Option<Parsed>> {
         let mut columns = StoredColumns::new(folder, n).map_err(|d| vec![d])?;
         let mut wrong = None;
         let sides = self.visit(values, &[indices], n, by_major(pointers), |entry| {
@@ -269,7 +269,7 @@ impl GroupReader<'_> {
         Ok(matrix.map(|matrix| Parsed { n, entries: Entries::Stored(matrix), sides, single_precision }))
     }
 
-    fn coordinates(&self, (values, rows, columns): (&str, &str, &str)) -> Found<Parsed> {
+    fn coordinates(&self, (values, rows, columns): (&str, &str, &str)) -> Diagnosed<Parsed> {
         let values = self.vector(values)?;
         let row_indices = self.vector(rows)?;
         let column_indices = self.vector(columns)?;
@@ -290,7 +290,7 @@ impl GroupReader<'_> {
 
     /// Returns true if rows are compressed, false if columns are: by the declared encoding, by the names of MATLAB, or by
     /// the number of pointers.
-    fn compresses_rows(&self, pointers: u64, rows: u64, columns: u64) -> Found<bool> {
+    fn compresses_rows(&self, pointers: u64, rows: u64, columns: u64) -> Diagnosed<bool> {
         let words = ["encoding-type", "h5sparse_format", "format"].iter().find_map(|name| {
             text_of(&self.group.attr(name).ok()?, &Heaps::of(self.file)).map(|text| text.to_lowercase())
         });
@@ -325,7 +325,7 @@ impl GroupReader<'_> {
         n: usize,
         mut place: impl FnMut(usize, [i64; N]) -> (i64, i64),
         mut keep: impl FnMut(Entry),
-    ) -> Found<Sides> {
+    ) -> Diagnosed<Sides> {
         // Pieces consist of whole chunks, so that no chunk is unpacked twice.
         let step = indices.iter().map(|v| v.chunk).fold(ENTRIES_PER_READ.max(values.chunk), usize::max);
         let mut sides = Sides::default();
@@ -351,7 +351,7 @@ impl GroupReader<'_> {
         if bad.count == 0 { Ok(sides) } else { Err(bad.finish(self.name)) }
     }
 
-    fn same_length(&self, values: &Vector, indices: &Vector) -> Found<usize> {
+    fn same_length(&self, values: &Vector, indices: &Vector) -> Diagnosed<usize> {
         if values.len == indices.len {
             return Ok(values.len);
         }
@@ -362,7 +362,7 @@ impl GroupReader<'_> {
     }
 
     /// Returns the numbers of rows and columns, from the attribute or dataset `shape` or from MATLAB's attribute.
-    fn shape(&self) -> Found<Option<(u64, u64)>> {
+    fn shape(&self) -> Diagnosed<Option<(u64, u64)>> {
         let attribute = ["shape", "h5sparse_shape"].iter().find_map(|name| self.group.attr(name).ok());
         let numbers = if let Some(attribute) = attribute {
             integers_of(&attribute)
