@@ -62,7 +62,7 @@ type GivenInterface<'py> = (String, GivenNodes, Option<Bound<'py, PyAny>>, Optio
 
 /// Returns the coupling of this name.
 fn coupling(name: Argument<'_, '_>) -> PyResult<Option<Coupling>> {
-    name.map(|name| called("coupling", name, Coupling::ALL, Coupling::name)).transpose()
+    name.map(|name| called("coupling", name, &Coupling::ALL, Coupling::name)).transpose()
 }
 
 /// Damping from `flexbody.model`.
@@ -90,12 +90,12 @@ fn damped(py: Python<'_>, builder: ModelBuilder, damping: &Damping<'_>) -> PyRes
 /// Returns the bases that are computed of a model. Imported shapes are read from a file, which is an option of the program
 /// only.
 pub fn computed_bases() -> Vec<Basis> {
-    Basis::ALL.into_iter().filter(|basis| *basis != Basis::Imported).collect()
+    Basis::ALL.iter().copied().filter(|basis| *basis != Basis::Imported).collect()
 }
 
 /// Returns the basis of this name; the default without a name.
 pub fn basis(name: Argument<'_, '_>) -> PyResult<Basis> {
-    name.map_or(Ok(Basis::default()), |name| called("basis", name, computed_bases(), Basis::name))
+    name.map_or(Ok(Basis::default()), |name| called("basis", name, &computed_bases(), Basis::name))
 }
 
 /// Returns the options of a conversion from names.
@@ -125,7 +125,7 @@ fn convert_options(
         options = options.without_comparators();
     }
     if let Some(given) = accuracy {
-        options = options.accuracy(called("accuracy", given, Accuracy::ALL, Accuracy::name)?);
+        options = options.accuracy(called("accuracy", given, &Accuracy::ALL, Accuracy::name)?);
     }
     if let Some(given) = frame {
         options = options.frame(frame_choice(given)?);
