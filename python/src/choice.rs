@@ -35,9 +35,9 @@ pub fn _choices(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let names = |choices: &[&str]| choices.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
     let bases = flexbody::Basis::ALL.iter().filter(|basis| **basis != flexbody::Basis::Imported);
     all.set_item("Basis", bases.map(|basis| basis.name()).collect::<Vec<_>>())?;
-    all.set_item("Accuracy", names_of(&flexbody::Accuracy::ALL, flexbody::Accuracy::name))?;
-    all.set_item("Coupling", names_of(&flexbody::Coupling::ALL, flexbody::Coupling::name))?;
-    all.set_item("Reference", names_of(&flexbody::ReferenceChoice::ALL, flexbody::ReferenceChoice::name))?;
+    all.set_item("Accuracy", names_of(flexbody::Accuracy::ALL, flexbody::Accuracy::name))?;
+    all.set_item("Coupling", names_of(flexbody::Coupling::ALL, flexbody::Coupling::name))?;
+    all.set_item("Reference", names_of(flexbody::ReferenceChoice::ALL, flexbody::ReferenceChoice::name))?;
     let formats: Vec<&str> = flexbody::FlexBody::export_formats().iter().map(|(name, _)| *name).collect();
     let dialects = formats.iter().filter_map(|name| flexbody::FlexBody::export_dialects(name).ok());
     all.set_item("Dialect", names(&dialects.flatten().copied().collect::<Vec<_>>()))?;

@@ -62,7 +62,7 @@ type GivenInterface<'py> = (String, GivenNodes, Option<Bound<'py, PyAny>>, Optio
 
 /// Returns the coupling of this name.
 fn coupling(name: Argument<'_, '_>) -> PyResult<Option<Coupling>> {
-    name.map(|name| called("coupling", name, &Coupling::ALL, Coupling::name)).transpose()
+    name.map(|name| called("coupling", name, Coupling::ALL, Coupling::name)).transpose()
 }
 
 /// Damping from `flexbody.model`.
@@ -125,7 +125,7 @@ fn convert_options(
         options = options.without_comparators();
     }
     if let Some(given) = accuracy {
-        options = options.accuracy(called("accuracy", given, &Accuracy::ALL, Accuracy::name)?);
+        options = options.accuracy(called("accuracy", given, Accuracy::ALL, Accuracy::name)?);
     }
     if let Some(given) = frame {
         options = options.frame(frame_choice(given)?);

@@ -29,7 +29,7 @@ pub fn options(
         options = options.repeat(positive(given, "repeat")?);
     }
     if let Some(given) = reference {
-        options = options.reference(called("reference", given, &ReferenceChoice::ALL, ReferenceChoice::name)?);
+        options = options.reference(called("reference", given, ReferenceChoice::ALL, ReferenceChoice::name)?);
     }
     Ok(options)
 }

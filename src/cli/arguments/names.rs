@@ -20,7 +20,7 @@ fn one_of<T: Copy + Send + Sync + 'static>(
 
 /// Returns the parser of the bases.
 pub(super) fn basis() -> impl TypedValueParser<Value = BasisKind> {
-    one_of(&BasisKind::ALL, BasisKind::name, |kind| match kind {
+    one_of(BasisKind::ALL, BasisKind::name, |kind| match kind {
         BasisKind::Free => "Free-surface modes, computed by flexbody",
         BasisKind::CraigBampton => {
             "Modes with the interfaces of the manifest held (--modes counts them), and static shapes for unit motions of the interfaces"
@@ -39,7 +39,7 @@ pub(super) fn basis() -> impl TypedValueParser<Value = BasisKind> {
 
 /// Returns the parser of the accuracies.
 pub(super) fn accuracy() -> impl TypedValueParser<Value = Accuracy> {
-    one_of(&Accuracy::ALL, Accuracy::name, |accuracy| match accuracy {
+    one_of(Accuracy::ALL, Accuracy::name, |accuracy| match accuracy {
         Accuracy::Fast => "Residual 1e-6, completeness possibly not proved",
         Accuracy::Standard => "Residual 1e-9 or the rounding floor, completeness proved",
         Accuracy::Certified => {
@@ -59,7 +59,7 @@ pub(super) fn factor() -> impl TypedValueParser<Value = FactorChoice> {
 
 /// Returns the parser of the precisions of the file.
 pub(super) fn storage() -> impl TypedValueParser<Value = Storage> {
-    one_of(&Storage::ALL, Storage::name, |storage| match storage {
+    one_of(Storage::ALL, Storage::name, |storage| match storage {
         Storage::F64 => "64-bit floats",
         Storage::F32 => "32-bit floats",
     })
@@ -67,7 +67,7 @@ pub(super) fn storage() -> impl TypedValueParser<Value = Storage> {
 
 /// Returns the parser of the solvers of SLEPc.
 pub(super) fn solver() -> impl TypedValueParser<Value = Solver> {
-    one_of(&Solver::ALL, Solver::name, |solver| match solver {
+    one_of(Solver::ALL, Solver::name, |solver| match solver {
         Solver::Mumps => "Krylov-Schur, shift-invert, on one factor of MUMPS",
         Solver::Slices => "Spectrum slicing, one factor for each part of the spectrum: hundreds of modes",
         Solver::Gamg => "Krylov-Schur on conjugate gradients with algebraic multigrid: no factor, no count",
@@ -77,7 +77,7 @@ pub(super) fn solver() -> impl TypedValueParser<Value = Solver> {
 
 /// Returns the parser of the references for errors.
 pub(super) fn reference() -> impl TypedValueParser<Value = ReferenceChoice> {
-    one_of(&ReferenceChoice::ALL, ReferenceChoice::name, |reference| match reference {
+    one_of(ReferenceChoice::ALL, ReferenceChoice::name, |reference| match reference {
         ReferenceChoice::Full => "The largest body",
         ReferenceChoice::Fine => {
             "A body that is enriched until its estimated error relative to all nodes is at most a hundredth of the tolerances"
