@@ -587,7 +587,7 @@ impl Body {
         let terms = terms.map_or_else(|| Ok("all".to_owned()), |terms| text(terms, "terms"))?;
         let mut body = value(py, self.inner.subset(modes.as_deref(), &terms))?;
         if let Some(storage) = storage {
-            called("storage", storage, ["f32"], |name| name)?;
+            called("storage", storage, &["f32"], |name| name)?;
             body = value(py, body.rounded_to_f32())?;
         }
         Ok(Body::new(body, Vec::new()))

@@ -10,11 +10,10 @@ use pyo3::types::PyDict;
 pub fn called<T: Copy>(
     what: &str,
     given: &Bound<'_, PyAny>,
-    all: impl IntoIterator<Item = T>,
+    all: &[T],
     name_of: fn(T) -> &'static str,
 ) -> PyResult<T> {
-    let all: Vec<T> = all.into_iter().collect();
-    let known = || all.iter().map(|choice| name_of(*choice)).collect::<Vec<_>>().join(", ");
+    let known = || names_of(all, name_of).join(", ");
     let Ok(name) = given.extract::<String>() else {
         return Err(mistyped(given, what, &format!("one of {}", known())));
     };
@@ -24,16 +23,21 @@ pub fn called<T: Copy>(
         .ok_or_else(|| value_error(given.py(), format!("`{what}` is {name:?}, expected one of {}", known())))
 }
 
+/// Returns the names of `all`.
+fn names_of<T: Copy>(all: &[T], name_of: fn(T) -> &'static str) -> Vec<&'static str> {
+    all.iter().map(|choice| name_of(*choice)).collect()
+}
+
 /// Returns the names of all choices, for the test that the types of the package state the same ones.
 #[pyfunction]
 pub fn _choices(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let all = PyDict::new(py);
     let names = |choices: &[&str]| choices.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-    let bases = flexbody::Basis::ALL.into_iter().filter(|basis| *basis != flexbody::Basis::Imported);
-    all.set_item("Basis", names(&bases.map(flexbody::Basis::name).collect::<Vec<_>>()))?;
-    all.set_item("Accuracy", names(&flexbody::Accuracy::ALL.map(flexbody::Accuracy::name)))?;
-    all.set_item("Coupling", names(&flexbody::Coupling::ALL.map(flexbody::Coupling::name)))?;
-    all.set_item("Reference", names(&flexbody::ReferenceChoice::ALL.map(flexbody::ReferenceChoice::name)))?;
+    let bases = flexbody::Basis::ALL.iter().filter(|basis| **basis != flexbody::Basis::Imported);
+    all.set_item("Basis", bases.map(|basis| basis.name()).collect::<Vec<_>>())?;
+    all.set_item("Accuracy", names_of(flexbody::Accuracy::ALL, flexbody::Accuracy::name))?;
+    all.set_item("Coupling", names_of(flexbody::Coupling::ALL, flexbody::Coupling::name))?;
+    all.set_item("Reference", names_of(flexbody::ReferenceChoice::ALL, flexbody::ReferenceChoice::name))?;
     let formats: Vec<&str> = flexbody::FlexBody::export_formats().iter().map(|(name, _)| *name).collect();
     let dialects = formats.iter().filter_map(|name| flexbody::FlexBody::export_dialects(name).ok());
     all.set_item("Dialect", names(&dialects.flatten().copied().collect::<Vec<_>>()))?;

@@ -90,12 +90,12 @@ fn damped(py: Python<'_>, builder: ModelBuilder, damping: &Damping<'_>) -> PyRes
 /// Returns the bases that are computed of a model. Imported shapes are read from a file, which is an option of the program
 /// only.
 pub fn computed_bases() -> Vec<Basis> {
-    Basis::ALL.into_iter().filter(|basis| *basis != Basis::Imported).collect()
+    Basis::ALL.iter().copied().filter(|basis| *basis != Basis::Imported).collect()
 }
 
 /// Returns the basis of this name; the default without a name.
 pub fn basis(name: Argument<'_, '_>) -> PyResult<Basis> {
-    name.map_or(Ok(Basis::default()), |name| called("basis", name, computed_bases(), Basis::name))
+    name.map_or(Ok(Basis::default()), |name| called("basis", name, &computed_bases(), Basis::name))
 }
 
 /// Returns the options of a conversion from names.

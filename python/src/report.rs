@@ -30,7 +30,7 @@ pub fn report_in<'py, F: Copy>(
     render: impl FnOnce(F) -> String,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (name, format) = match form {
-        Some(form) => called("form", form, forms.iter().copied(), |(name, _)| name)?,
+        Some(form) => called("form", form, forms, |(name, _)| name)?,
         None => forms[0],
     };
     let text = render(format);

@@ -27,7 +27,7 @@ pub enum Basis {
 pub fn frames(raw: &RawModel) -> Vec<FrameChoice> {
     let at = |name: &&str| FrameChoice::Interface((*name).to_owned());
     let interfaces = if raw.geometric_stiffness.is_empty() { &["root", "tip"][..] } else { &[] };
-    BodyFrame::ALL.into_iter().map(FrameChoice::Mean).chain(interfaces.iter().map(at)).collect()
+    BodyFrame::ALL.iter().map(|&frame| FrameChoice::Mean(frame)).chain(interfaces.iter().map(at)).collect()
 }
 
 /// A model, its conversion, and the load cases of the body.

@@ -10,8 +10,9 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Severity of a diagnostic.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, strum::IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Severity {
     /// Fact that the user should know.
     Note,
@@ -24,11 +25,7 @@ pub enum Severity {
 impl Severity {
     /// Returns the name of the severity: `note`, `warning` or `error`.
     pub fn name(self) -> &'static str {
-        match self {
-            Severity::Note => "note",
-            Severity::Warning => "warning",
-            Severity::Error => "error",
-        }
+        self.into()
     }
 }
 

@@ -9,7 +9,8 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 /// Solver of the driver.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum Solver {
     /// Shift-invert Krylov-Schur with a factor of MUMPS.
     #[default]
@@ -24,16 +25,11 @@ pub enum Solver {
 
 impl Solver {
     /// All solvers, in the order of the documentation.
-    pub const ALL: [Self; 4] = [Self::Mumps, Self::Slices, Self::Gamg, Self::Lobpcg];
+    pub const ALL: &'static [Self] = <Self as strum::VariantArray>::VARIANTS;
 
     /// Returns the name for the driver and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Mumps => "mumps",
-            Self::Slices => "slices",
-            Self::Gamg => "gamg",
-            Self::Lobpcg => "lobpcg",
-        }
+        self.into()
     }
 }
 

@@ -12,8 +12,8 @@ use super::problem::Task;
 use super::search::Attempt;
 use super::settings::Precision;
 
-/// A way to find modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A way to find modes. Ways are tried in the order of the variants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::VariantArray)]
 pub enum Way {
     /// All modes by dense eigenproblems.
     Dense,
@@ -29,8 +29,7 @@ pub enum Way {
 
 impl Way {
     /// Every way, in the order in which they are tried.
-    pub const ALL: [Self; 5] =
-        [Self::Dense, Self::Cycles, Self::SinglePrecision, Self::SecondShift, Self::DoublePrecision];
+    pub const ALL: &'static [Self] = <Self as strum::VariantArray>::VARIANTS;
 
     /// Returns the name of the way in reports.
     pub fn name(self) -> &'static str {
@@ -92,7 +91,7 @@ impl Plan {
         let dense = dense::is_chosen(task, wanted);
         let mut attempts = Vec::new();
         let mut refused = None;
-        for way in Way::ALL.into_iter().filter(|way| (*way == Way::Dense) == dense) {
+        for &way in Way::ALL.iter().filter(|way| (**way == Way::Dense) == dense) {
             match way.attempt().needs(task, wanted) {
                 Ok(needs) => {
                     let needs = Needs { bytes: needs.bytes.max(resident(count.bytes)), ..needs };

@@ -1,5 +1,7 @@
 //! The settings of the search: the wanted modes, their accuracy, the algorithm, and the precision of the factor.
 
+use strum::{EnumString, IntoStaticStr, VariantArray};
+
 /// Choice of the wanted modes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Wanted {
@@ -10,7 +12,8 @@ pub enum Wanted {
 }
 
 /// Guaranteed accuracy of the result.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum Accuracy {
     /// K-residual 1e-6; completeness is not proved.
     Fast,
@@ -24,7 +27,7 @@ pub enum Accuracy {
 
 impl Accuracy {
     /// Every accuracy, in the order of the documentation.
-    pub const ALL: [Self; 3] = [Self::Fast, Self::Standard, Self::Certified];
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// Returns the guaranteed K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|).
     pub fn residual(self) -> f64 {
@@ -37,16 +40,12 @@ impl Accuracy {
 
     /// Returns the name on the command line and in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Fast => "fast",
-            Self::Standard => "standard",
-            Self::Certified => "certified",
-        }
+        self.into()
     }
 
     /// Returns the accuracy of this name; `None` for an unknown name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|known| known.name() == name)
+        name.parse().ok()
     }
 }
 

@@ -201,7 +201,7 @@ const SOURCE: &[Item] = &[
         "`rotation-invariant`: every 3x3 node block of M is a multiple of I; `diagonal`: that, and M diagonal; `general`: neither, and `/invariants/W0` is there",
         both(
             |v| text(v.body.source.mass_structure.name()),
-            put!(|d, read| d.body.source.mass_structure = named(read.text(), &MassStructure::ALL, MassStructure::name)?),
+            put!(|d, read| d.body.source.mass_structure = named(read.text(), MassStructure::ALL, MassStructure::name)?),
         ),
     ),
     attribute(

@@ -41,7 +41,7 @@ impl InterfaceSource {
         }
         if let Some((before, last)) = rest.rsplit_once(',') {
             let known = Coupling::from_name(last.trim()).ok_or_else(|| {
-                let all = Coupling::ALL.map(Coupling::name).join(", ");
+                let all = Coupling::NAMES.join(", ");
                 let why = format!("`{}` is not a coupling", last.trim().escape_debug());
                 refused(&why, &format!("use one of the couplings {all}"))
             })?;

@@ -136,7 +136,7 @@ pub(super) fn read_recovery_rows(file: &InputFile) -> Diagnosed<Vec<RecoveryRow>
         };
         let quantity = text(fields[2]);
         let known = Quantity::from_name(&quantity).ok_or_else(|| {
-            let all = Quantity::ALL.map(Quantity::name).join(", ");
+            let all = Quantity::NAMES.join(", ");
             wrong(format!("quantity of row {row} is `{}`, expected one of {all}", excerpt(fields[2])))
         })?;
         let number = |at: usize, what: &str| match (has[at], fields[5 + at]) {

@@ -4,7 +4,8 @@ use flexbody_base::text::walk::{Value, Walk};
 use toml::de::DeValue;
 
 /// Damping of a body. `D` is the type of the matrix: a path, a matrix as read, or the checked matrix.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Damping<D> {
     /// One ratio for all modes.
     Ratio(f64),
@@ -83,12 +84,7 @@ pub fn ratio_at(bands: &[DampingBand], hertz: f64) -> f64 {
 impl<D> Damping<D> {
     /// Returns the key of the manifest: `ratio`, `bands`, `rayleigh` or `matrix`.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Ratio(_) => "ratio",
-            Self::Bands(_) => "bands",
-            Self::Rayleigh { .. } => "rayleigh",
-            Self::Matrix(_) => "matrix",
-        }
+        self.into()
     }
 
     /// Returns the matrix, if damping is given by one.

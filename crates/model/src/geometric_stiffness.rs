@@ -6,7 +6,8 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use nalgebra::Matrix3;
 
 /// Kind of load that stresses the body.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, strum::IntoStaticStr, strum::VariantNames)]
+#[strum(serialize_all = "snake_case")]
 pub enum LoadKind {
     /// Inertia forces -M a of a unit acceleration a of the origin of the frame along an axis. Gravity g
     /// counts as an acceleration -g.
@@ -22,27 +23,20 @@ pub enum LoadKind {
     /// Unit moment about an axis at the named interface.
     Moment(String),
     /// Unit of a load known by its name only.
+    #[strum(serialize = "load")]
     Named(String),
 }
 
 impl LoadKind {
     /// Names of the kinds in manifests and files; [`LoadKind::Named`] is `load`.
-    pub const NAMES: [&'static str; 6] =
-        ["acceleration", "angular_acceleration", "spin", "force", "moment", "load"];
+    pub const NAMES: &'static [&'static str] = <Self as strum::VariantNames>::VARIANTS;
 
     /// Axes of the components of [`LoadKind::Spin`].
     pub const SPIN: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
     /// Returns the name of the kind.
     pub fn name(&self) -> &'static str {
-        Self::NAMES[match self {
-            Self::Acceleration => 0,
-            Self::AngularAcceleration => 1,
-            Self::Spin => 2,
-            Self::Force(_) => 3,
-            Self::Moment(_) => 4,
-            Self::Named(_) => 5,
-        }]
+        self.into()
     }
 
     /// Returns the names of the components in their order: three axes, or six products of spin rates. A

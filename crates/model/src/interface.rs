@@ -4,13 +4,15 @@ use crate::{centre_and_length, rigid_count, rigid_fields};
 use faer::{Mat, MatRef};
 use flexbody_linalg::gram;
 use nalgebra::{Matrix3, Vector3};
+use strum::{EnumString, IntoStaticStr, VariantArray, VariantNames};
 
 /// Width of a node set across its best-fit line, relative to its length, below which it determines no
 /// rotation about that line.
 const COLLINEAR_WIDTH: f64 = 1e-6;
 
 /// Coupling between the nodes of an interface and its reference point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, EnumString, IntoStaticStr, VariantArray, VariantNames)]
+#[strum(serialize_all = "lowercase")]
 pub enum Coupling {
     /// The nodes move as one rigid body with the reference point (RBE2).
     Rigid,
@@ -22,20 +24,19 @@ pub enum Coupling {
 
 impl Coupling {
     /// All couplings.
-    pub const ALL: [Self; 3] = [Self::Rigid, Self::Averaging, Self::Free];
+    pub const ALL: &'static [Self] = <Self as VariantArray>::VARIANTS;
+
+    /// Names of all couplings, in the order of `ALL`.
+    pub const NAMES: &'static [&'static str] = <Self as VariantNames>::VARIANTS;
 
     /// Returns the name in manifests, files and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Rigid => "rigid",
-            Self::Averaging => "averaging",
-            Self::Free => "free",
-        }
+        self.into()
     }
 
     /// Returns the coupling with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|known| known.name() == name)
+        name.parse().ok()
     }
 }
 

@@ -13,9 +13,11 @@ use flexbody_linalg::{CscMatrix, larger};
 use nalgebra::Vector3;
 use std::collections::HashSet;
 use std::path::PathBuf;
+use strum::{EnumString, IntoStaticStr, VariantArray, VariantNames};
 
 /// Physical quantity of a row of a recovery.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, EnumString, IntoStaticStr, VariantArray, VariantNames)]
+#[strum(serialize_all = "lowercase")]
 pub enum Quantity {
     /// Component of the stress.
     Stress,
@@ -33,24 +35,19 @@ pub enum Quantity {
 
 impl Quantity {
     /// All quantities, in the order of the documentation.
-    pub const ALL: [Self; 6] =
-        [Self::Stress, Self::Strain, Self::Force, Self::Moment, Self::Displacement, Self::Other];
+    pub const ALL: &'static [Self] = <Self as VariantArray>::VARIANTS;
+
+    /// Names of all quantities, in the order of `ALL`.
+    pub const NAMES: &'static [&'static str] = <Self as VariantNames>::VARIANTS;
 
     /// Returns the name in tables and files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Stress => "stress",
-            Self::Strain => "strain",
-            Self::Force => "force",
-            Self::Moment => "moment",
-            Self::Displacement => "displacement",
-            Self::Other => "other",
-        }
+        self.into()
     }
 
     /// Returns the quantity with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|known| known.name() == name)
+        name.parse().ok()
     }
 
     /// Returns true if a rigid motion of the body leaves the quantity at zero.

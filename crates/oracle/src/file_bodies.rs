@@ -154,11 +154,11 @@ fn recovery(r: &mut Random, number: usize, nf: usize, loaded: &[String], named: 
             .collect(),
         named: r.matrix(rows, named),
         motion: MotionLoad::ALL
-            .into_iter()
+            .iter()
             .filter(|_| r.below(3) == 0)
             .collect::<Vec<_>>()
             .into_iter()
-            .map(|load| MotionColumns { load, columns: r.matrix(rows, load.components() * nf) })
+            .map(|&load| MotionColumns { load, columns: r.matrix(rows, load.components() * nf) })
             .collect(),
     }
 }
@@ -231,7 +231,6 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
     ];
     let axes = Rotation3::from_euler_angles(0.3, -1.2, 2.5)
         * Rotation3::from_euler_angles(r.positive().min(1.0), 0.1, 0.2);
-    let structures = [MassStructure::RotationInvariant, MassStructure::Diagonal, MassStructure::General];
     let lumped = (0..schemes)
         .map(|i| LumpedBody {
             scheme: format!("{i}{}", r.name()),
@@ -241,7 +240,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
         })
         .collect();
     let bounded = eigenvalue.clone();
-    let mass_structure = structures[r.below(3)];
+    let mass_structure = MassStructure::ALL[r.below(3)];
     let general = (mass_structure == MassStructure::General).then(|| r.general(nf));
     let wild = r.wild;
     let mut parts = Parts {

@@ -8,13 +8,13 @@ use flexbody_eigen::{Accuracy, FactorChoice, Precision};
 use flexbody_study::trade::ReferenceChoice;
 
 /// Returns a parser of the names of `all`; the help shows each name with the text of `about`.
-fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
-    all: [T; N],
+fn one_of<T: Copy + Send + Sync + 'static>(
+    all: &'static [T],
     name: fn(T) -> &'static str,
     about: fn(T) -> &'static str,
 ) -> impl TypedValueParser<Value = T> {
-    let shown = all.map(|one| PossibleValue::new(name(one)).help(about(one)));
-    let called = move |text: String| all.into_iter().find(|one| name(*one) == text);
+    let shown = all.iter().map(|&one| PossibleValue::new(name(one)).help(about(one)));
+    let called = move |text: String| all.iter().copied().find(|&one| name(one) == text);
     PossibleValuesParser::new(shown).map(move |text| called(text).expect("one of the possible values"))
 }
 
@@ -50,7 +50,7 @@ pub(super) fn accuracy() -> impl TypedValueParser<Value = Accuracy> {
 
 /// Returns the parser of the precisions of the factor.
 pub(super) fn factor() -> impl TypedValueParser<Value = FactorChoice> {
-    one_of(FactorChoice::ALL, FactorChoice::name, |factor| match factor {
+    one_of(&FactorChoice::ALL, FactorChoice::name, |factor| match factor {
         FactorChoice::Auto => "The faster of the two that fits into the memory",
         FactorChoice::Always(Precision::Double) => "Double precision",
         FactorChoice::Always(Precision::Single) => "Single precision, corrected in double",

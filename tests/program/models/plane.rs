@@ -61,7 +61,7 @@ fn rigid_properties_of_a_turned_rectangle_are_exact() {
 /// section 4, J0 = I0_zz, b = W1_zz / 2, and the z rows of C2 and W3.
 #[test]
 fn kinetic_energy_equals_that_of_the_nodes() {
-    for frame in BodyFrame::ALL {
+    for &frame in BodyFrame::ALL {
         let model = model(rectangle(5, 2, 0.7, [1.0, 2.0]));
         let body = converted(&model, 12, frame).body;
         let invariants = body.invariants();

@@ -104,7 +104,7 @@ fn carried_invariants_are_those_of_the_mass_matrix() {
     let turned = straight.moved(&Random(7).rotation(), [3.0, -1.0, 0.5]);
     let assembly = turned.assemble(&SOFT, MassRule::Consistent);
     let mass = SymmetricMatrix::new(assembly.scalar_mass.clone()).expect("symmetric");
-    for frame in BodyFrame::ALL {
+    for &frame in BodyFrame::ALL {
         let body = body_of(with_ends(&straight, assembly.raw_model()), 20, frame);
         let carried = body.carried(&root()).expect("an interface");
         let shape = carried.modes().shape.as_ref();

@@ -10,6 +10,7 @@ use flexbody_eigen::{EigenProblem, EigenSolution, Wanted, energy_noise};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{Pencil, combine, gram, larger, symmetric_eigen};
 use flexbody_model::{FeModel, centre_and_length};
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// A kind of basis. A new kind needs one file in this folder and one variant of
 /// [`BasisChoice`](super::BasisChoice).
@@ -185,7 +186,8 @@ fn noise_note(model: &FeModel, noise: f64) -> Option<Diagnostic> {
 }
 
 /// Kind of basis: the shapes that span the deformation of a body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum BasisKind {
     /// Free-surface modes, and the residual vectors that the model or the scene requests.
     #[default]
@@ -203,23 +205,16 @@ pub enum BasisKind {
 
 impl BasisKind {
     /// All kinds, in the order of the documentation.
-    pub const ALL: [Self; 5] =
-        [Self::Free, Self::CraigBampton, Self::CraigChang, Self::Imported, Self::Scene];
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// Returns the name in files, reports and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Free => "free",
-            Self::CraigBampton => "craig-bampton",
-            Self::CraigChang => "craig-chang",
-            Self::Imported => "imported",
-            Self::Scene => "scene",
-        }
+        self.into()
     }
 
     /// Returns the kind with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|known| known.name() == name)
+        name.parse().ok()
     }
 
     /// Returns true if the basis consists of free-surface modes only, or if its shapes are chosen from

@@ -17,7 +17,8 @@ use flexbody_linalg::side_by_side;
 use nalgebra::{Matrix3, Vector3};
 
 /// Kind of a force that the deformed body exerts by its motion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum MotionLoad {
     /// Damping forces -D psi_j per unit of qd_j, of a damping matrix or of Rayleigh damping.
     Damping,
@@ -53,19 +54,14 @@ impl<'a> ModalMotion<'a> {
 
 impl MotionLoad {
     /// All kinds, in the order of files.
-    pub const ALL: [Self; 4] = [Self::Damping, Self::Acceleration, Self::Turning, Self::Centrifugal];
+    pub const ALL: &'static [Self] = <Self as strum::VariantArray>::VARIANTS;
 
     /// Kinds of the inertia of the deformation.
     pub const INERTIA: [Self; 3] = [Self::Acceleration, Self::Turning, Self::Centrifugal];
 
     /// Returns the name in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Damping => "damping",
-            Self::Acceleration => "acceleration",
-            Self::Turning => "turning",
-            Self::Centrifugal => "centrifugal",
-        }
+        self.into()
     }
 
     /// Returns the forces in words, for messages.

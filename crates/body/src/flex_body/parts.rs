@@ -31,7 +31,8 @@ pub struct Source {
 }
 
 /// Structure of the FE mass matrix, as tested block by block.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum MassStructure {
     /// Every 3x3 node block is a multiple of the identity: M = Ms kron I3.
     RotationInvariant,
@@ -43,20 +44,16 @@ pub enum MassStructure {
 
 impl MassStructure {
     /// All structures, in the order of the documentation.
-    pub const ALL: [Self; 3] = [Self::RotationInvariant, Self::Diagonal, Self::General];
+    pub const ALL: &'static [Self] = <Self as strum::VariantArray>::VARIANTS;
 
     /// Returns the name used in files and reports.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::RotationInvariant => "rotation-invariant",
-            Self::Diagonal => "diagonal",
-            Self::General => "general",
-        }
+        self.into()
     }
 
     /// Returns the structure with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|known| known.name() == name)
+        name.parse().ok()
     }
 }
 

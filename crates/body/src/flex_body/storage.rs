@@ -1,7 +1,10 @@
 //! Storage precision of the large arrays of a body.
 
+use strum::{EnumString, IntoStaticStr, VariantArray};
+
 /// Precision of the shapes and of the inertia of the modes, in memory and in the file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum Storage {
     /// 64-bit floats.
     #[default]
@@ -12,19 +15,16 @@ pub enum Storage {
 
 impl Storage {
     /// All choices, in the order of the documentation.
-    pub const ALL: [Storage; 2] = [Self::F64, Self::F32];
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// Returns the name in files, reports and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::F64 => "f64",
-            Self::F32 => "f32",
-        }
+        self.into()
     }
 
     /// Returns the storage with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|known| known.name() == name)
+        name.parse().ok()
     }
 
     /// Returns the additional rounding error of sums of array entries relative to their Cauchy-Schwarz

@@ -10,6 +10,7 @@ use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
 use flexbody_linalg::{SymmetricMatrix, contiguous_mut, parallel};
 use nalgebra::{Matrix3, Vector3};
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// The body frame in model coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +74,8 @@ impl Frame {
 }
 
 /// Choice of the body frame for mean axes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum BodyFrame {
     /// Origin at the centre of mass, axes of the model.
     #[default]
@@ -86,20 +88,16 @@ pub enum BodyFrame {
 
 impl BodyFrame {
     /// All choices, in the order of the documentation.
-    pub const ALL: [BodyFrame; 3] = [Self::Com, Self::Principal, Self::Model];
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// Returns the name in settings and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Principal => "principal",
-            Self::Com => "com",
-            Self::Model => "model",
-        }
+        self.into()
     }
 
     /// Returns the frame with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|known| known.name() == name)
+        name.parse().ok()
     }
 }
 
@@ -151,7 +149,7 @@ impl std::str::FromStr for FrameChoice {
         if let Some(name) = text.strip_prefix("interface=").filter(|name| !name.is_empty()) {
             return Ok(Self::Interface(name.to_owned()));
         }
-        let known = || BodyFrame::ALL.map(BodyFrame::name).join(", ");
+        let known = || BodyFrame::ALL.iter().map(|frame| frame.name()).collect::<Vec<_>>().join(", ");
         let unknown = || format!("expected {} or interface=NAME", known());
         BodyFrame::from_name(text).map(Self::Mean).ok_or_else(unknown)
     }

@@ -8,13 +8,15 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
 use flexbody_linalg::{SymmetricMatrix, gram};
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// Masses below this part of the largest mass count as zero: cancelling row sums leave rounding of either
 /// sign.
 const ZERO_MASS: f64 = 1e-14;
 
 /// Scheme that derives nodal masses from the consistent mass matrix.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum LumpedScheme {
     /// Row sums of Ms: preserve mass and centre of mass; negative at the corners of quadratic elements.
     RowSum,
@@ -26,20 +28,16 @@ pub enum LumpedScheme {
 
 impl LumpedScheme {
     /// All schemes, in the order of the documentation.
-    pub const ALL: [LumpedScheme; 3] = [Self::RowSum, Self::DiagonalScaling, Self::User];
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// Returns the name in files, reports and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::RowSum => "row-sum",
-            Self::DiagonalScaling => "diagonal-scaling",
-            Self::User => "user",
-        }
+        self.into()
     }
 
     /// Returns the scheme with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|known| known.name() == name)
+        name.parse().ok()
     }
 }
 

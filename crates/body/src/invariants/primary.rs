@@ -161,7 +161,7 @@ pub struct GeneralTerms {
 // Groups of the kinetic energy that a body holds (theory section 7).
 
 /// Group of the kinetic energy: all terms that one invariant causes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, strum::IntoStaticStr)]
 pub enum TermGroup {
     /// Inertia linear in q, and the constant centrifugal load of the modes.
     W1,
@@ -177,11 +177,7 @@ impl TermGroup {
 
     /// Returns the name in files and reports.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::W1 => "W1",
-            Self::W2 => "W2",
-            Self::W3 => "W3",
-        }
+        self.into()
     }
 }
 

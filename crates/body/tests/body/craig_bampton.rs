@@ -316,7 +316,7 @@ fn rows_of_the_interfaces_are_the_motion_of_the_reference_points() {
 fn every_identity_holds() {
     for raw in models() {
         let model = model(raw);
-        for frame in BodyFrame::ALL {
+        for &frame in BodyFrame::ALL {
             let basis = BasisChoice::CraigBampton(CraigBampton);
             let body = converted(&model, basis, 7, frame).body;
             assert_eq!(body.parts().interface_identities().len(), 4);

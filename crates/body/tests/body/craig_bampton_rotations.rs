@@ -87,7 +87,7 @@ fn a_single_node_with_rotations_is_a_joint() {
         let (d, zero) = if raw.dimension == 2 { (2, 3) } else { (3, 6) };
         let nodes = turning(&raw);
         let ends = [vec![nodes[0]], vec![nodes[1]]];
-        for coupling in Coupling::ALL {
+        for &coupling in Coupling::ALL {
             let what = format!("{name}, {}", coupling.name());
             let model = with(raw.clone(), coupling, &ends);
             let held = |row: usize| ends.iter().any(|set| set.contains(&model.label(row).node));

@@ -147,7 +147,7 @@ fn forces_of_motion_deform_the_body_as_all_nodes() {
     let (m, d) = (dense(&raw.mass.matrix), dense(&damping(&raw)));
     let statics = Statics::new(&raw, false);
     for (which, body) in bodies(&raw) {
-        for load in MotionLoad::ALL {
+        for &load in MotionLoad::ALL {
             let loads = forces(&body, &m, &d, load);
             for recovery in body.recoveries() {
                 let expected = exact(&raw, &statics, &recovery.name, &loads);
@@ -166,7 +166,7 @@ fn rigid_interfaces_stay_rigid_under_forces_of_motion() {
     let body = body(raw.clone(), BasisChoice::CraigBampton(CraigBampton), 2, BodyFrame::Principal);
     let (m, d) = (dense(&raw.mass.matrix), dense(&damping(&raw)));
     let [rigid, deforming] = [true, false].map(|rigid| Statics::new(&raw, rigid));
-    for load in MotionLoad::ALL {
+    for &load in MotionLoad::ALL {
         let loads = forces(&body, &m, &d, load);
         let own = numbers(&whole(&body, &body.recoveries()[0], load));
         let error = |statics| error(&own, &numbers(&exact(&raw, statics, "stress", &loads)));

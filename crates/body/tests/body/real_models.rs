@@ -163,7 +163,7 @@ fn obeys_the_nodal_equations(case: &Case) {
     let body = proved(case.raw.clone(), case.eigenvalues.len(), Method::Auto);
     let mass = labelled(&case.raw, &body);
     let mut random = Random(42);
-    for choice in BodyFrame::ALL {
+    for &choice in BodyFrame::ALL {
         let condensed = body.condensed(choice);
         let reduced = reduced(&condensed.invariants);
         // Modes are mass-normalised: displacements of a fifth of the size of the body, without linearisation.

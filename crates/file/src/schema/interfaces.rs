@@ -55,7 +55,7 @@ pub(super) const INTERFACES: &[Item] = &[
         "`rigid`: the nodes follow the reference point as one rigid body (RBE2); `averaging`: the reference point follows their mean motion (RBE3); `free`: no reference point; absent: not stated",
         both(
             |v| text(v.interface?.coupling?.name()),
-            put!(|d, read| d.interface().coupling = Some(named(read.text(), &Coupling::ALL, Coupling::name)?)),
+            put!(|d, read| d.interface().coupling = Some(named(read.text(), Coupling::ALL, Coupling::name)?)),
         ),
     )
     .added(2),

@@ -36,7 +36,7 @@ impl Label {
     fn row(self) -> Result<RecoveryRow, String> {
         let Self { name, quantity, component, unit, node, element } = self;
         let known = Quantity::from_name(&quantity).ok_or_else(|| {
-            let all = Quantity::ALL.map(Quantity::name).join(", ");
+            let all = Quantity::NAMES.join(", ");
             format!("expected one of the quantities {all}, found {quantity:?}")
         })?;
         Ok(RecoveryRow { name, quantity: known, component, unit, node, element })

@@ -135,7 +135,7 @@ impl ManifestWalk<'_, '_> {
         };
         let coupling = Coupling::from_name(name);
         if coupling.is_none() {
-            let expected = Coupling::ALL.map(|coupling| format!("`{}`", coupling.name())).join(", ");
+            let expected = format!("`{}`", Coupling::NAMES.join("`, `"));
             let message = match name {
                 "" => format!("`coupling` is no text, expected one of {expected}"),
                 name => format!("`coupling` is `{name}`, expected one of {expected}"),

@@ -9,7 +9,8 @@ use flexbody_model::{DofLabel, RawMatrix};
 use std::path::Path;
 
 /// Role of a matrix in the model. It selects among several matrices of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "snake_case")]
 pub enum MatrixRole {
     /// Stiffness matrix K.
     Stiffness,
@@ -23,16 +24,11 @@ pub enum MatrixRole {
 
 impl MatrixRole {
     /// Every role.
-    pub const ALL: [Self; 4] = [Self::Stiffness, Self::Mass, Self::Damping, Self::GeometricStiffness];
+    pub const ALL: &'static [Self] = <Self as strum::VariantArray>::VARIANTS;
 
     /// Returns the name in messages and in [`flexbody_base::provenance::SourceFile::role`].
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Stiffness => "stiffness",
-            Self::Mass => "mass",
-            Self::Damping => "damping",
-            Self::GeometricStiffness => "geometric_stiffness",
-        }
+        self.into()
     }
 
     /// Returns true when a matrix called `name` (in any case) has this role: `K` or `stiffness`, `M` or `mass`, `D` or

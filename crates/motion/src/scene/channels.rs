@@ -172,7 +172,7 @@ fn motion_step(name: &str, n_modes: usize) -> Option<(MotionLoad, usize, usize)>
         name.rsplit_once(" of mode ")?.1.parse::<usize>().ok()?.checked_sub(1).filter(|j| *j < n_modes)?;
     let component =
         |load: MotionLoad| (0..load.components()).find(|&component| load.step(component, mode) == name);
-    MotionLoad::ALL.into_iter().find_map(|load| Some((load, component(load)?, mode)))
+    MotionLoad::ALL.iter().find_map(|&load| Some((load, component(load)?, mode)))
 }
 
 /// Refuses steps of another body.

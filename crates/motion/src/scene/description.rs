@@ -157,7 +157,8 @@ impl Run {
 }
 
 /// Integration methods ([`crate::integration`]).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Scheme {
     /// Explicit method of order 8 with error control.
     Adaptive {
@@ -176,10 +177,7 @@ pub enum Scheme {
 impl Scheme {
     /// Returns the name of the method in scene files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Adaptive { .. } => "adaptive",
-            Self::Conserving { .. } => "conserving",
-        }
+        self.into()
     }
 }
 

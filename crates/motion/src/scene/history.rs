@@ -415,7 +415,8 @@ impl VectorHistory {
 }
 
 /// Axes that a vector is given in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Axes {
     /// Axes fixed in space.
     World,
@@ -429,11 +430,7 @@ pub enum Axes {
 impl Axes {
     /// Returns the name in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::World => "world",
-            Self::Model => "model",
-            Self::Body => "body",
-        }
+        self.into()
     }
 }
 

@@ -258,9 +258,8 @@ fn not_negative(
 
 fn kind(walk: &mut Walk<'_>, table: &TomlTable) -> Option<AttachmentKind> {
     let Some(value) = table.get("kind") else { return Some(AttachmentKind::default()) };
-    let kinds = [AttachmentKind::Free, AttachmentKind::Soft, AttachmentKind::Stiff];
     let known = match value.get_ref() {
-        DeValue::String(text) => kinds.into_iter().find(|kind| kind.name() == text.as_ref()),
+        DeValue::String(text) => text.parse().ok(),
         _ => None,
     };
     if known.is_none() {

@@ -130,7 +130,8 @@ pub struct Attachment {
 }
 
 /// Kinds of attachment, the most sensitive first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, strum::EnumString, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum AttachmentKind {
     /// No attachment: the rotation of the body is free. The conservative default.
     #[default]
@@ -144,11 +145,7 @@ pub enum AttachmentKind {
 impl AttachmentKind {
     /// Returns the name in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Free => "free",
-            Self::Soft => "soft",
-            Self::Stiff => "stiff",
-        }
+        self.into()
     }
 }
 

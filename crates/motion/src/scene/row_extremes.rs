@@ -16,6 +16,7 @@ use super::{Peak, RowLayout, RowMap, RowStates, StressPoint};
 use faer::{Mat, MatRef};
 use flexbody_linalg::{SymmetricEigen, parallel, symmetric_eigen};
 use flexbody_model::RecoveryRow;
+use strum::VariantArray;
 
 /// Directions with a smaller part of the largest eigenvalue of the history are rounding: their part is bounded by
 /// amplitudes alone.
@@ -66,7 +67,7 @@ impl<'a> LinearRows<'a> {
 }
 
 /// Magnitude of a row, or of the stress at a point, that is searched. A norm of its linear forms bounds it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, VariantArray)]
 pub(super) enum Magnitude {
     Row,
     VonMises,
@@ -75,8 +76,6 @@ pub(super) enum Magnitude {
 }
 
 impl Magnitude {
-    const ALL: [Self; 4] = [Self::Row, Self::VonMises, Self::Tension, Self::Compression];
-
     /// Returns the linear forms (k x length of z) of one place, whose norm is not below the measure.
     pub(super) fn forms(self, rows: &LinearRows<'_>, place: usize) -> Mat<f64> {
         let m = rows.matrix.ncols();
@@ -231,7 +230,7 @@ impl ExtremeSearch {
         let directions = Directions::new(states, places);
         for (map, found) in maps.iter().zip(&mut self.found) {
             let rows = LinearRows::of(map);
-            for magnitude in Magnitude::ALL {
+            for &magnitude in Magnitude::VARIANTS {
                 let search = LargestSearch {
                     magnitude,
                     rows,

@@ -189,11 +189,11 @@ pub(super) struct QuantityFacts {
 
 impl RecoveryFacts {
     fn of(recovery: &Recovery) -> Self {
-        let of = |quantity: Quantity| QuantityFacts {
+        let of = |&quantity: &Quantity| QuantityFacts {
             quantity: quantity.name(),
             rows: recovery.rows.iter().filter(|row| row.quantity == quantity).count(),
         };
-        let quantities = Quantity::ALL.into_iter().map(of);
+        let quantities = Quantity::ALL.iter().map(of);
         Self {
             name: recovery.name.clone(),
             rows: recovery.rows.len(),

@@ -499,15 +499,15 @@ impl<'a> TradeFacts<'a> {
             let measured = self.rows[number - 1].measured.as_ref()?;
             Some([measured.multiplications as f64, measured.worst.max(NO_ERROR)])
         };
-        let of_kind = |(i, kind): (usize, CandidateKind)| {
-            let rows = self.rows.iter().filter(move |row| row.kind == kind);
+        let of_kind = |(i, kind): (usize, &CandidateKind)| {
+            let rows = self.rows.iter().filter(|row| row.kind == *kind);
             let (points, titles) = rows
                 .filter_map(|row| Some((point(row.number)?, format!("{}: {}", row.number, row.in_words()))))
                 .unzip();
             let mark = [Mark::Disc, Mark::Square, Mark::Triangle, Mark::Circle][i % 4];
             Series { titles, ..Series::new(kind.name(), mark, i, points) }
         };
-        let mut series: Vec<Series> = CandidateKind::ALL.into_iter().enumerate().map(of_kind).collect();
+        let mut series: Vec<Series> = CandidateKind::ALL.iter().enumerate().map(of_kind).collect();
         let measured = || series.iter().flat_map(|own| &own.points);
         let most = self.allowed_multiplications.map(|most| most as f64);
         let costs = measured().map(|point| point[0]).chain(most);

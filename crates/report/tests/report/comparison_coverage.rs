@@ -123,8 +123,8 @@ fn complete() -> FlexBody {
         loads: vec![LoadColumns { interface: "left".to_owned(), columns: Mat::from_fn(1, 6, number) }],
         named: Mat::from_fn(1, 1, number),
         motion: MotionLoad::ALL
-            .into_iter()
-            .map(|load| MotionColumns { load, columns: Mat::from_fn(1, load.components() * nf, number) })
+            .iter()
+            .map(|&load| MotionColumns { load, columns: Mat::from_fn(1, load.components() * nf, number) })
             .collect(),
     }];
     parts.named_loads = vec![NamedLoad {

@@ -9,7 +9,8 @@ use flexbody_motion::scene::{Point, find_nodal_point};
 use nalgebra::Vector3;
 
 /// Direction of a force and displacement along an axis of the model, or of a torque and rotation about it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Direction {
     /// Along x.
     X,
@@ -33,7 +34,7 @@ impl Direction {
 
     /// Returns the name of the direction: `x`, `y`, `z`, `rx`, `ry`, `rz` or `amplitude`.
     pub fn name(self) -> &'static str {
-        ["x", "y", "z", "rx", "ry", "rz", "amplitude"][self as usize]
+        self.into()
     }
 
     /// Returns true for a torque and a rotation.

@@ -13,7 +13,7 @@ use nalgebra::DVector;
 const LADDER: [usize; 14] = [1, 2, 4, 6, 10, 15, 20, 30, 40, 60, 80, 120, 160, 240];
 
 /// Kind of a candidate, which is a series of the plot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, strum::VariantArray)]
 #[serde(rename_all = "lowercase")]
 pub enum CandidateKind {
     /// Some of the modes, all groups of the kinetic energy.
@@ -28,7 +28,7 @@ pub enum CandidateKind {
 
 impl CandidateKind {
     /// All kinds, in the order of plots.
-    pub const ALL: [CandidateKind; 4] = [Self::Modes, Self::Groups, Self::Lumped, Self::Single];
+    pub const ALL: &'static [Self] = <Self as strum::VariantArray>::VARIANTS;
 
     /// Returns the name in reports.
     pub fn name(self) -> &'static str {
@@ -42,7 +42,8 @@ impl CandidateKind {
 }
 
 /// Lumped part of the mass and name of the scheme: the two practices of multibody programs.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum LumpedMass {
     /// Modes and modal mass of the consistent mass; the rigid body and all couplings are summed over nodal masses. This
     /// corresponds to a modal neutral file, which holds modes, generalised masses and nodal masses.
@@ -61,10 +62,7 @@ impl LumpedMass {
 
     /// Returns the lumped part: `couplings` or `whole`.
     pub fn part(&self) -> &'static str {
-        match self {
-            Self::Couplings(_) => "couplings",
-            Self::Whole(_) => "whole",
-        }
+        self.into()
     }
 }
 

@@ -30,7 +30,8 @@ pub struct TradeSettings<'s> {
 }
 
 /// Requested reference motion for the errors of a study.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum ReferenceChoice {
     /// Motion of the body with all its modes and groups.
     #[default]
@@ -44,15 +45,11 @@ pub enum ReferenceChoice {
 
 impl ReferenceChoice {
     /// Every choice, in the order of the documentation.
-    pub const ALL: [Self; 3] = [Self::Full, Self::Fine, Self::Nodal];
+    pub const ALL: &'static [Self] = <Self as strum::VariantArray>::VARIANTS;
 
     /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Full => "full",
-            Self::Fine => "fine",
-            Self::Nodal => "nodal",
-        }
+        self.into()
     }
 }
 

@@ -32,6 +32,7 @@ use oracle::scenes::nothing_happens;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::fmt::Write;
+use strum::{IntoStaticStr, VariantArray};
 
 /// Number of seeds of the suite, and seeds of the driven cases: noise, a blow and a resonance.
 const FEW: u64 = 6;
@@ -46,7 +47,8 @@ const COUNTS: f64 = 1e-3;
 
 /// Kind of start of the loads, and additional loads. A shock excites unlimited modes, which no number of
 /// responses can follow.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 enum Start {
     Calm,
     Shock,
@@ -59,16 +61,8 @@ enum Start {
 }
 
 impl Start {
-    const ALL: [Self; 5] = [Self::Calm, Self::Shock, Self::Resonance, Self::Blow, Self::Noise];
-
     fn name(self) -> &'static str {
-        match self {
-            Self::Calm => "calm",
-            Self::Shock => "shock",
-            Self::Resonance => "resonance",
-            Self::Blow => "blow",
-            Self::Noise => "noise",
-        }
+        self.into()
     }
 
     /// Returns the range of effectivities that the suite allows.
@@ -523,7 +517,7 @@ fn ratio_table(outcomes: &[Outcome], of: impl Fn(&Outcome) -> &Vec<(&'static str
         let cells = quantiles.map(|value| format!("{value:.2}")).join(" | ");
         let _ = writeln!(page, "| {name} | {output} | {count} | {cells} | {low} | {high} |");
     };
-    for start in Start::ALL {
+    for &start in Start::VARIANTS {
         for output in ["attitude", "deflection", "stress", "reaction"] {
             let all = outcomes.iter().filter(|one| one.start == start).flat_map(&of);
             add(
@@ -543,7 +537,7 @@ fn verdict_table(outcomes: &[Outcome]) -> String {
     let mut page = String::from(
         "| start | accepted | least | 5 % | median | 95 % | largest | accepted above the tolerance | accepted of those below half of it | with modes to spare | most modes to spare |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
-    for start in Start::ALL {
+    for &start in Start::VARIANTS {
         let all: Vec<&Outcome> = outcomes.iter().filter(|one| one.start == start).collect();
         let held: Vec<&&Outcome> = all.iter().filter(|one| one.verdict.0).collect();
         let Some(quantiles) = quantiles(held.iter().map(|one| one.verdict.1).collect()) else { continue };

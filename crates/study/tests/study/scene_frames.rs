@@ -15,7 +15,7 @@ use oracle::flexible::body_of;
 use std::fs;
 
 fn bodies() -> Vec<FlexBody> {
-    BodyFrame::ALL.into_iter().map(|frame| body_of(footed_block(), 8, frame)).collect()
+    BodyFrame::ALL.iter().map(|&frame| body_of(footed_block(), 8, frame)).collect()
 }
 
 fn scene(text: &str) -> Scene {

@@ -41,7 +41,7 @@ fn misprinted_coriolis_terms_are_seen() {
 
 fn check_model(model: Model) {
     let mut random = Random(42);
-    for choice in BodyFrame::ALL {
+    for &choice in BodyFrame::ALL {
         let (frame, properties) = choose_frame(&model.scalar_mass, &model.positions, choice).expect("a body");
         let positions = frame.to_body(&model.positions);
         let smooth = smooth_shapes(&mut random, &positions, 6);

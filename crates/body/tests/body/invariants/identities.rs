@@ -58,7 +58,7 @@ fn exact_bodies_fulfil_every_identity() {
 #[test]
 fn real_bodies_fulfil_every_identity_in_every_frame_and_basis() {
     for model in models::own() {
-        for choice in BodyFrame::ALL {
+        for &choice in BodyFrame::ALL {
             let frame = choose_frame(&model.scalar_mass, &model.positions, choice).expect("a body").0;
             let positions = frame.to_body(&model.positions);
             let raw = random_matrix(&mut Random(9), 3 * positions.len(), 5);
