@@ -114,18 +114,23 @@ mod api;
 #[allow(clippy::exit, clippy::print_stderr, clippy::print_stdout)] // the program
 mod cli;
 
+#[cfg(feature = "import")]
+pub use api::Audit;
 pub use api::{
-    Accuracy, Advice, AttachedMass, Audit, Basis, BodyFrame, Channels, Check, Comparison, ComparisonFormat,
+    Accuracy, Advice, AttachedMass, Basis, BodyFrame, Channels, Check, Comparison, ComparisonFormat,
     ComparisonRow, Conversion, ConvertOptions, Coupling, ExportOptions, FlexBody, FrameChoice,
     GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, LoadedHistory, Matrix,
     MeasuredRun, ModePair, Model, ModelBuilder, Motion, MotionHistory, PointPath, Progress, Quantity, Ranges,
-    Recipe, RecipeStep, Recovered, RecoveredRows, RecoveryRow, ReportFormat, Response, ResponseOptions,
-    Scene, Selection, SourceFile, SparseMatrix, Tolerances, TransferFunction, unit_names,
+    Recipe, RecipeStep, Recovered, RecoveredRows, RecoveryRow, ReportFormat, Scene, Selection, SourceFile,
+    SparseMatrix, Tolerances, unit_names,
 };
-#[cfg(feature = "cli")]
+#[cfg(feature = "cluster")]
 pub use api::{Batch, BatchOptions, BatchedBody};
 #[cfg(feature = "hdf5")]
 pub use api::{RecordedMotion, ReferenceChoice, Trade, TradeOptions, View};
+#[cfg(feature = "response")]
+pub use api::{Response, ResponseOptions, TransferFunction};
+
 /// The reduced equations of motion of one body, as a reference for other programs: mass matrix, velocity
 /// forces, accelerations, momenta, energies (theory sections 2 and 6). [`FlexBody::equations_of_motion`]
 /// makes them, [`FlexBody::node_point`] and [`FlexBody::interface_point`] the points where joints hold a
@@ -148,9 +153,9 @@ pub use flexbody_base::error::{Error, ExitCode, Result};
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod program {
-    pub use crate::cli::{
-        Arguments, end, end_without_unfinished_files, parse, run, set_program, use_threads,
-    };
+    #[cfg(feature = "cluster")]
+    pub use crate::cli::set_program;
+    pub use crate::cli::{Arguments, end, end_without_unfinished_files, parse, run, use_threads};
     pub use flexbody_base::hdf5_file::take_variables as take_hdf5_variables;
     pub use flexbody_base::memory::accepts_failure;
     pub use flexbody_base::output::abandon_unfinished_soon;

@@ -3,13 +3,14 @@
 
 mod advice;
 mod arrays;
-#[cfg(feature = "cli")]
+#[cfg(feature = "cluster")]
 mod batch;
 mod body;
 mod check;
 mod comparison;
 mod conversion;
 mod export;
+#[cfg(feature = "import")]
 mod foreign;
 mod interface;
 mod matrix;
@@ -20,6 +21,7 @@ mod progress;
 mod recovery;
 mod report;
 mod report_format;
+#[cfg(feature = "response")]
 mod response;
 mod scene;
 #[cfg(feature = "hdf5")]
@@ -29,7 +31,7 @@ mod view;
 
 pub use advice::{Advice, AttachedMass, Ranges};
 pub use arrays::{GeometricStiffness, SourceFile};
-#[cfg(feature = "cli")]
+#[cfg(feature = "cluster")]
 pub use batch::{Batch, BatchOptions, BatchedBody};
 pub use body::{FlexBody, Identity};
 pub use check::Check;
@@ -44,6 +46,7 @@ pub use flexbody_model::{Coupling, Quantity, RecoveryRow};
 pub use flexbody_report::{ComparisonFormat, ComparisonRow, ModePair, Tolerances};
 #[cfg(feature = "hdf5")]
 pub use flexbody_study::trade::ReferenceChoice;
+#[cfg(feature = "import")]
 pub use foreign::Audit;
 pub use interface::{Interface, InterfaceCoordinates};
 pub use matrix::Matrix;
@@ -53,6 +56,7 @@ pub use motion::{Motion, PointPath};
 pub use progress::{Listener, Progress};
 pub use recovery::{Channels, LoadedHistory, Recovered, RecoveredRows};
 pub use report_format::ReportFormat;
+#[cfg(feature = "response")]
 pub use response::{Response, ResponseOptions, TransferFunction};
 pub use scene::{Scene, Selection};
 #[cfg(feature = "hdf5")]

@@ -1,32 +1,40 @@
 //! Arguments of the command line.
 
+#[cfg(feature = "cluster")]
 mod cluster;
 mod convert;
 mod guidance;
 mod headings;
+#[cfg(feature = "import")]
+mod import;
 mod judgement;
 mod names;
 mod parsing;
+#[cfg(feature = "response")]
 mod response;
 
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand};
 use flexbody_base::numbers::parse_ratio;
 use flexbody_body::flex_body::Storage;
+use flexbody_formats::FORMATS;
 use flexbody_formats::export::ExportFormat;
-use flexbody_formats::{FORMATS, IMPORT_FORMATS};
 use flexbody_study::trade::ReferenceChoice;
 use headings::{COST, FORMAT, LOSSES, MODEL, MODES, OUTPUT, SCENE};
 use std::path::PathBuf;
 
+#[cfg(feature = "cluster")]
 pub(super) use cluster::{AssembleArguments, BatchArguments, EngineArguments, EngineName, PrepareArguments};
 pub(super) use convert::ConvertArguments;
 pub(super) use guidance::{
     CompletionsArguments, DoctorArguments, ExplainArguments, ManArguments, RecipeArguments,
 };
+#[cfg(feature = "import")]
+pub(super) use import::AuditArguments;
 pub(super) use judgement::{
     AdviseArguments, MeasureArguments, PlacesName, RecoverArguments, ShapeFormat, ShapesArguments,
 };
+#[cfg(feature = "response")]
 pub(super) use response::ResponseArguments;
 
 /// Exact flexible bodies for multibody simulation from finite element mass and stiffness matrices.
@@ -53,13 +61,16 @@ pub enum Command {
     )]
     Convert(Box<ConvertArguments>),
     /// Write the files that a cluster needs to find the modes of a model by SLEPc over MPI, including its driver
+    #[cfg(feature = "cluster")]
     #[command(
         after_help = "Example:\n  flexbody prepare model.toml --modes 40 -o job\n  mpiexec -n 64 python3 job/driver.py job\n  flexbody assemble job -o rod.flex.h5"
     )]
     Prepare(PrepareArguments),
     /// Make a body of the modes that a cluster has found in a folder of `prepare`
+    #[cfg(feature = "cluster")]
     Assemble(AssembleArguments),
     /// Make the bodies of a list, as many in parallel as fit into the memory; unchanged bodies are kept
+    #[cfg(feature = "cluster")]
     Batch(BatchArguments),
     /// Show the content of a flex-body file
     Inspect(InspectArguments),
@@ -112,6 +123,7 @@ pub enum Command {
     Reduce(ReduceArguments),
     /// Compute the frequency response of a body between places, and its difference from the response of all nodes of
     /// its model
+    #[cfg(feature = "response")]
     #[command(
         after_help = "Examples:\n  flexbody response model.toml --modes 20 --band 0..2000 --from big_end --to small_end --damping 0.01 --report response.html\n  flexbody response model.toml rod.flex.h5 --scene crank.toml --csv response.csv\n  flexbody response rod.flex.h5 --band 10..2000 --from big_end:z --to 17:x,z"
     )]
@@ -133,6 +145,7 @@ pub enum Command {
     #[command(after_help = "Examples:\n  flexbody explain FB408\n  flexbody explain")]
     Explain(ExplainArguments),
     /// Check a flexible-body file of another program: dialect, identities, digits, units, in plain words
+    #[cfg(feature = "import")]
     #[command(after_help = "Example:\n  flexbody audit rod.SID_FEM")]
     Audit(AuditArguments),
     /// Print the components of the program and the resources of this machine: threads, memory, instructions
@@ -152,13 +165,13 @@ pub enum Command {
 pub struct StatedArguments {
     /// Groups of terms of the body instead of a selection: W1, W2, W3 with commas, none, all, or the groups of a
     /// guideline of Witteveen and Pichler: I, II, III, IV
-    #[arg(long, value_name = "GROUPS", conflicts_with = "from", help_heading = SCENE)]
+    #[arg(long, value_name = "GROUPS", help_heading = SCENE)]
     pub terms: Option<String>,
     /// Numbers of the modes that the body keeps, instead of a selection: 1,3,5-9
-    #[arg(long, value_name = "NUMBERS", conflicts_with_all = ["from", "split"], help_heading = SCENE)]
+    #[arg(long, value_name = "NUMBERS", conflicts_with = "split", help_heading = SCENE)]
     pub keep_modes: Option<String>,
     /// With --basis scene: number of shapes of the motion [default: the fewest that suffice]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "from", help_heading = SCENE)]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = SCENE)]
     pub motion_shapes: Option<u32>,
     /// With --scene and stated parts: static responses are added until the truncation error of the body is estimated
     /// to be below a tenth of the tolerances (standard) or a hundredth (fine, as for trade --reference fine)
@@ -290,28 +303,6 @@ fn export_formats() -> clap::builder::PossibleValuesParser {
     };
     let adams = PossibleValue::new("adams").alias("mnf").hide(true);
     FORMATS.iter().map(value).chain([adams]).collect::<Vec<_>>().into()
-}
-
-/// Arguments of `audit`.
-#[derive(Debug, Args)]
-pub struct AuditArguments {
-    /// SID_FEM, MBDyn .fem, MBSim or Exudyn file
-    #[arg(value_name = "FILE")]
-    pub file: PathBuf,
-    /// Format of the file [default: detected from its content]
-    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats())]
-    pub from: Option<String>,
-    /// Tolerance of the identities, relative to the size of their terms
-    #[arg(long, value_name = "REL", default_value_t = 1e-6, value_parser = ratio)]
-    pub tolerance: f64,
-    /// Options of printing.
-    #[command(flatten)]
-    pub printing: Printing,
-}
-
-/// Returns the names of the formats that can be read.
-fn foreign_formats() -> clap::builder::PossibleValuesParser {
-    IMPORT_FORMATS.iter().map(|format| PossibleValue::new(format.name())).collect::<Vec<_>>().into()
 }
 
 /// Returns the names of the FE programs whose jobs can be read.

@@ -1,23 +1,48 @@
 //! Command `flexbody assemble`: a conversion with modes that a cluster has found.
 
 use super::arguments::{AssembleArguments, JobArguments};
+use super::cluster_folder::folder_around;
 use super::conversion_request::lumping_schemes;
 use super::convert::ConversionRun;
-use super::mode_source::{ModeSource, folder_around};
+use super::mode_source::ModeSource;
 use super::models::of_manifest_or_job;
 use super::outcome::Outcome;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_body::basis::{BasisChoice, ModeSettings};
 use flexbody_body::convert::MeshChoice;
-use flexbody_cluster::{Prepared, read_prepared};
-use flexbody_input::ModelFiles;
+use flexbody_cluster::{Prepared, read_found, read_prepared};
+use flexbody_input::{LoadSource, ModelFiles};
+use flexbody_linalg::context::Context;
+use flexbody_model::FeModel;
 use flexbody_study::conversion::ConversionRequest;
+use std::path::Path;
 
 pub(super) fn run(arguments: &AssembleArguments) -> Result<Outcome> {
     let prepared = read_prepared(&arguments.folder)?;
     let conversion = conversion(arguments, &prepared)?;
-    let (folder, prove) = (arguments.folder.clone(), arguments.prove);
-    conversion.run(&ModeSource::Cluster { folder, prepared: Box::new(prepared), prove })
+    conversion.run(&Cluster { folder: &arguments.folder, prepared: &prepared, prove: arguments.prove })
+}
+
+/// Cluster that has found modes in a folder, as their source.
+struct Cluster<'a> {
+    folder: &'a Path,
+    prepared: &'a Prepared,
+    /// True if the built-in count is made in addition to that of the cluster.
+    prove: bool,
+}
+
+impl ModeSource for Cluster<'_> {
+    /// Refuses nothing: [`conversion`] requests what the modes serve.
+    fn refuse(&self, _: &ConversionRequest, _: &[LoadSource], _: bool, _: bool) -> Result<()> {
+        Ok(())
+    }
+
+    fn modes(&self, model: &FeModel, _: &ModeSettings, context: &Context<'_>) -> Result<Option<BasisChoice>> {
+        context.phase("modes of the cluster");
+        let found = read_found(self.folder, self.prepared, model, self.prove)?;
+        Ok(Some(BasisChoice::Solved(found.modes)))
+    }
 }
 
 /// Returns the conversion of the model that was prepared.

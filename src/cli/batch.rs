@@ -158,7 +158,7 @@ impl BatchTask<'_> {
         parsed: &[(Vec<String>, Box<ConvertArguments>)],
         ledger: &Ledger,
     ) -> Result<()> {
-        let files = |converted: &ConvertArguments| match &converted.from {
+        let files = |converted: &ConvertArguments| match converted.foreign_format() {
             Some(_) => converted.model.iter().cloned().collect(),
             None => converted.model_files().map(|files| files.paths()).unwrap_or_default(),
         };
@@ -280,7 +280,7 @@ fn need(body: &BatchBody, converted: &ConvertArguments, watch: Watch<'_>) -> Res
     if let Some(known) = body.memory {
         return Ok(known);
     }
-    if converted.from.is_some() {
+    if converted.foreign_format().is_some() {
         return Ok(IMPORT);
     }
     watch(Event::Phase("estimating"));

@@ -1,55 +1,52 @@
 //! Command `flexbody convert`.
 
 use super::arguments::{ConvertArguments, Printing};
+#[cfg(feature = "cluster")]
+use super::cluster_folder::folder_around;
 use super::conversion_request::{Scheme, lumping_schemes};
-use super::convert_options::{convert_foreign, with_settings_of};
-use super::mode_source::ModeSource;
+#[cfg(feature = "import")]
+use super::convert_foreign::convert_foreign;
+use super::convert_options::with_settings_of;
+use super::mode_source::{BuiltIn, ModeSource};
 use super::outcome::{
     BodyOutputs, Outcome, Reserved, format_of, refuse_replacing, refuse_replacing_read, refuse_warnings,
     size_of,
 };
 use super::resources::{context, peak_memory_bytes, resident_bytes, use_threads};
+#[cfg(feature = "cluster")]
+use super::slepc::Slepc;
 use super::terminal::{Watcher, body_text};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_body::basis::BasisKind;
 use flexbody_body::convert::Conversion;
-use flexbody_eigen::{Accuracy, PlannedAttempt};
+use flexbody_eigen::PlannedAttempt;
 use flexbody_input::{LoadSource, ModelFiles, read_model};
 use flexbody_linalg::context::Event;
 use flexbody_linalg::instruction_set;
 use flexbody_model::{CheckedModel, FeModel};
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SearchAttempt, SelectionFacts, render};
-use flexbody_study::conversion::{ConversionRequest, refuse_contradiction};
+use flexbody_study::conversion::ConversionRequest;
 use std::path::PathBuf;
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
-    if let Some(from) = &arguments.from {
+    #[cfg(feature = "import")]
+    if let Some(from) = arguments.foreign_format() {
         return convert_foreign(arguments, from);
     }
     let repeated = arguments.like.as_ref().map(|path| with_settings_of(arguments, path)).transpose()?;
     let arguments = repeated.as_ref().unwrap_or(arguments);
-    let read = |path| LoadCases::read(path, arguments.case.as_deref());
-    let mode_source = ModeSource::of(arguments);
-    let conversion = ConversionRun {
-        request: arguments.request()?,
-        schemes: lumping_schemes(&arguments.lumped)?,
-        files: ModelFiles { keep_in: mode_source.keeps_in(&arguments.output), ..arguments.model_files()? },
-        cases: arguments.scene.as_deref().map(read).transpose()?,
-        also_read: arguments.scene.iter().chain(&arguments.like).cloned().collect(),
-        output: arguments.output.clone(),
-        reports: arguments.report.clone(),
-        split: arguments.split,
-        memory_limit: arguments.memory_limit,
-        allow_long: arguments.allow_long,
-        verbose: arguments.verbose,
-        printing: arguments.printing,
-    };
-    let outcome = conversion.run(&mode_source)?;
-    mode_source.tidy();
-    Ok(outcome)
+    #[cfg(feature = "cluster")]
+    if let Some(slepc) = Slepc::of(arguments) {
+        let mut conversion = ConversionRun::new(arguments)?;
+        // Bodies that are solved elsewhere are large: their matrices may be kept beside the output.
+        conversion.files.keep_in = Some(folder_around(&arguments.output));
+        let outcome = conversion.run(&slepc)?;
+        slepc.tidy();
+        return Ok(outcome);
+    }
+    ConversionRun::new(arguments)?.run(&BuiltIn)
 }
 
 /// Conversion of the bodies of a model, with its files and outputs.
@@ -80,16 +77,36 @@ struct Done {
 }
 
 impl ConversionRun {
+    /// Returns the conversion that the command line requests, whose matrices stay in memory.
+    ///
+    /// # Errors
+    /// FB801 for options that cannot be read; the errors of the manifest and of the scene.
+    fn new(arguments: &ConvertArguments) -> Result<Self> {
+        let read = |path| LoadCases::read(path, arguments.case.as_deref());
+        Ok(Self {
+            request: arguments.request()?,
+            schemes: lumping_schemes(&arguments.lumped)?,
+            files: arguments.model_files()?,
+            cases: arguments.scene.as_deref().map(read).transpose()?,
+            also_read: arguments.scene.iter().chain(&arguments.like).cloned().collect(),
+            output: arguments.output.clone(),
+            reports: arguments.report.clone(),
+            split: arguments.split,
+            memory_limit: arguments.memory_limit,
+            allow_long: arguments.allow_long,
+            verbose: arguments.verbose,
+            printing: arguments.printing,
+        })
+    }
+
     /// Converts with modes that this program finds, or those of `mode_source`.
     ///
     /// # Errors
     /// The errors of [`ConversionRequest::convert`], of the model and of the outputs.
-    pub(super) fn run(mut self, mode_source: &ModeSource) -> Result<Outcome> {
+    pub(super) fn run(mut self, mode_source: &dyn ModeSource) -> Result<Outcome> {
         let formats = self.reports.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
         let loads = self.request.loads(&self.files.residual_vectors, self.cases.as_ref());
-        if let ModeSource::Slepc { .. } = mode_source {
-            self.refuse_for_slepc(&loads)?;
-        }
+        mode_source.refuse(&self.request, &loads, self.cases.is_some(), self.split)?;
         self.request.check(&loads, self.cases.is_some())?;
         if self.split && loads.iter().any(|set| set.file().is_some()) {
             let message = "--split cannot be used with nodal loads, whose rows belong to all bodies together";
@@ -129,18 +146,6 @@ impl ConversionRun {
         together(finished)
     }
 
-    /// Refuses what modes of SLEPc do not serve. `loads` are those of residual vectors.
-    fn refuse_for_slepc(&self, loads: &[LoadSource]) -> Result<()> {
-        let Self { request, .. } = self;
-        refuse_contradiction(&[
-            (request.basis != BasisKind::Free, "--engine slepc finds free modes: it needs --basis free"),
-            (!loads.is_empty(), "residual vectors need the factor of --engine built-in"),
-            (self.cases.is_some(), "--scene needs --engine built-in"),
-            (self.split, "--engine slepc converts a single body: leave --split out"),
-            (request.accuracy == Accuracy::Certified, "--accuracy certified needs --engine built-in"),
-        ])
-    }
-
     fn watcher(&self, first: &str) -> Watcher {
         Watcher::new(self.printing.quiet || self.printing.json, first)
     }
@@ -165,7 +170,7 @@ impl ConversionRun {
     fn convert(
         &self,
         checked: CheckedModel,
-        mode_source: &ModeSource,
+        mode_source: &dyn ModeSource,
         reserved: Reserved,
         formats: &[Format],
         watcher: &Watcher,
@@ -187,7 +192,7 @@ impl ConversionRun {
         &self,
         model: &FeModel,
         early: &[Diagnostic],
-        mode_source: &ModeSource,
+        mode_source: &dyn ModeSource,
         reserved: Reserved,
         formats: &[Format],
         watcher: &Watcher,

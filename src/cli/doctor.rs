@@ -1,5 +1,6 @@
 //! Command `flexbody doctor`: components of the program and resources of the machine.
 
+use super::left_out::features_left_out;
 use super::outcome::Outcome;
 use super::resources::{address_space_limit, memory_left, use_threads};
 use flexbody_base::error::Result;
@@ -16,6 +17,9 @@ struct Findings {
     built_for: String,
     hdf5: String,
     hdf5_from: &'static str,
+    /// Features that this build leaves out; the key is missing if it has all.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    features_left_out: Vec<&'static str>,
     /// Instructions of sums and products on this machine; the last bits of results depend on them.
     instructions: &'static str,
     processors: usize,
@@ -36,6 +40,7 @@ impl Findings {
             built_for: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             hdf5: library_version(),
             hdf5_from: if cfg!(feature = "bundled-hdf5") { "built in" } else { "of the system" },
+            features_left_out: features_left_out(),
             instructions: instruction_set(),
             processors: std::thread::available_parallelism().map_or(1, usize::from),
             threads: use_threads(None),
@@ -60,7 +65,9 @@ impl Findings {
             ("limit", gigabytes(self.address_space_limit_bytes, "none on address space")),
             ("temporary", format!("{}{writable}", self.temporary_folder)),
         ];
-        lines.iter().map(|(label, text)| format!("{label:12}{text}\n")).collect()
+        let left_out = ("left out", self.features_left_out.join(", "));
+        let left_out = (!left_out.1.is_empty()).then_some(left_out);
+        lines.iter().chain(&left_out).map(|(label, text)| format!("{label:12}{text}\n")).collect()
     }
 }
 

@@ -1,13 +1,11 @@
 //! Execution of a command, output of results and diagnostics, and the exit code.
 
-use super::arguments::{Arguments, Command, Printing};
+use super::arguments::{Arguments, Printing};
+use super::invocation::Invocation;
+use super::left_out::what_is_left_out;
 use super::outcome::{Outcome, warnings};
 use super::resources::{memory_left, use_threads};
 use super::terminal::{colours_of_stderr, for_terminal};
-use super::{
-    advise, assemble, audit, batch, check, compare, completions, convert, doctor, explain, export, inspect,
-    measure, prepare, recipe, recover, reduce, response, select, shapes, simulate, trade, view,
-};
 use clap::CommandFactory;
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{ExitCode, Result};
@@ -26,14 +24,13 @@ use std::io::{IsTerminal, Write};
 pub fn parse(words: &[OsString]) -> std::result::Result<Arguments, ExitCode> {
     Arguments::parse_words(words.iter().cloned()).map_err(|error| {
         let words = || words.iter().skip(1).take_while(|word| *word != "--");
-        if words().any(|word| word == "--json") && error.use_stderr() {
-            let printing = Printing { json: true, quiet: false, deny_warnings: false };
+        let json = words().any(|word| word == "--json");
+        let left_out = what_is_left_out(&error);
+        if left_out.is_some() || (json && error.use_stderr()) {
+            let printing = Printing { json, quiet: false, deny_warnings: false };
             let given = words().find_map(|word| command_named(word.to_str()?));
-            return finish(
-                given.as_deref(),
-                printing,
-                Err(Diagnostic::new(Code::Usage, first_paragraph(&error)).into()),
-            );
+            let found = left_out.unwrap_or_else(|| Diagnostic::new(Code::Usage, first_paragraph(&error)));
+            return finish(given.as_deref(), printing, Err(found.into()));
         }
         // An error of a closed stream cannot be reported.
         let _ = error.print();
@@ -55,90 +52,24 @@ fn first_paragraph(error: &clap::Error) -> String {
 
 /// Runs the command and prints its outcome.
 pub fn run(arguments: &Arguments) -> ExitCode {
-    use_threads(match &arguments.command {
-        Command::Convert(arguments) => arguments.threads,
-        Command::Trade(arguments) => arguments.threads,
-        Command::Select(arguments) => arguments.threads,
-        Command::Simulate(arguments) => arguments.threads,
-        Command::Response(arguments) => arguments.threads,
-        Command::Assemble(arguments) => arguments.threads,
-        _ => None,
-    });
-    let (name, printing) = command_of(arguments);
+    let invocation = Invocation::of(&arguments.command);
+    use_threads(invocation.threads);
     read_files::begin_run();
     begin_run();
     set_left(|| memory_left(None));
     // Run inside the thread pool: from any other thread, every parallel loop would be handed over while this thread
     // sleeps.
-    let outcome = rayon::scope(|_| outcome_of(arguments));
+    let outcome = rayon::scope(|_| invocation.run());
     stand_by();
     let has_outcome = outcome.is_ok();
-    let code = finish(Some(name), printing, outcome);
+    let code = finish(Some(invocation.name), invocation.printing, outcome);
     end_run(code, has_outcome && matches!(code, ExitCode::Done | ExitCode::CheckFailed));
     code
 }
 
-fn outcome_of(arguments: &Arguments) -> Result<Outcome> {
-    match &arguments.command {
-        Command::Convert(arguments) => convert::run(arguments),
-        Command::Prepare(arguments) => prepare::run(arguments),
-        Command::Assemble(arguments) => assemble::run(arguments),
-        Command::Batch(arguments) => batch::run(arguments),
-        Command::Inspect(arguments) => inspect::run(arguments),
-        Command::Check(arguments) => check::run(arguments),
-        Command::Compare(arguments) => compare::run(arguments),
-        Command::Select(arguments) => select::run(arguments),
-        Command::Simulate(arguments) => simulate::run(arguments),
-        Command::Trade(arguments) => trade::run(arguments),
-        Command::Response(arguments) => response::run(arguments),
-        Command::Measure(arguments) => measure::run(arguments),
-        Command::Recover(arguments) => recover::run(arguments),
-        Command::Shapes(arguments) => shapes::run(arguments),
-        Command::Reduce(arguments) => reduce::run(arguments),
-        Command::Advise(arguments) => advise::run(arguments),
-        Command::View(arguments) => view::run(arguments),
-        Command::Export(arguments) => export::run(arguments),
-        Command::Audit(arguments) => audit::run(arguments),
-        Command::Recipe(arguments) => recipe::run(arguments),
-        Command::Explain(arguments) => explain::run(arguments),
-        Command::Doctor(_) => doctor::run(),
-        Command::Completions(arguments) => completions::completions(arguments),
-        Command::Man(arguments) => completions::man(arguments),
-    }
-}
-
-fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
-    match &arguments.command {
-        Command::Convert(arguments) => ("convert", arguments.printing),
-        Command::Prepare(arguments) => ("prepare", arguments.printing),
-        Command::Assemble(arguments) => ("assemble", arguments.printing),
-        Command::Batch(arguments) => ("batch", arguments.printing),
-        Command::Inspect(arguments) => ("inspect", arguments.printing),
-        Command::Check(arguments) => ("check", arguments.printing),
-        Command::Compare(arguments) => ("compare", arguments.printing),
-        Command::Select(arguments) => ("select", arguments.printing),
-        Command::Simulate(arguments) => ("simulate", arguments.printing),
-        Command::Trade(arguments) => ("trade", arguments.printing),
-        Command::Response(arguments) => ("response", arguments.printing),
-        Command::Measure(arguments) => ("measure", arguments.printing),
-        Command::Recover(arguments) => ("recover", arguments.printing),
-        Command::Shapes(arguments) => ("shapes", arguments.printing),
-        Command::Reduce(arguments) => ("reduce", arguments.printing),
-        Command::Advise(arguments) => ("advise", arguments.printing),
-        Command::View(arguments) => ("view", arguments.printing),
-        Command::Export(arguments) => ("export", arguments.printing),
-        Command::Audit(arguments) => ("audit", arguments.printing),
-        Command::Recipe(arguments) => ("recipe", arguments.printing),
-        Command::Explain(arguments) => ("explain", arguments.printing),
-        Command::Doctor(arguments) => ("doctor", arguments.printing),
-        Command::Completions(arguments) => ("completions", arguments.printing),
-        Command::Man(arguments) => ("man", arguments.printing),
-    }
-}
-
 /// Reports an internal error.
 pub(super) fn report_internal_error(arguments: &Arguments) -> ExitCode {
-    let (name, printing) = command_of(arguments);
+    let Invocation { name, printing, .. } = Invocation::of(&arguments.command);
     let message = "internal error: the program stopped";
     finish(Some(name), printing, Err(Diagnostic::new(Code::Internal, message).into()))
 }

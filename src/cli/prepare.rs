@@ -1,7 +1,7 @@
 //! Command `flexbody prepare`.
 
 use super::arguments::PrepareArguments;
-use super::mode_source::{folder_around, in_made_folder};
+use super::cluster_folder::{folder_around, in_made_folder};
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
 use flexbody_base::diagnostic::{Code, Diagnostic};

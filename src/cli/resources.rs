@@ -29,6 +29,7 @@ pub fn use_threads(asked: Option<u16>) -> usize {
 
 /// Runs work whose outcome depends on the number of threads, such as an estimate of memory, for a process that may have
 /// more threads than this one.
+#[cfg(feature = "cluster")]
 pub(super) fn for_threads<T: Send>(asked: Option<u16>, work: impl FnOnce() -> T + Send) -> T {
     let wanted = sensible_threads(asked);
     if wanted <= rayon::current_num_threads() {

@@ -10,6 +10,8 @@
     clippy::unwrap_used
 )]
 
+#[cfg(feature = "import")]
+mod audit;
 mod batch;
 mod body;
 mod chart;
@@ -26,11 +28,11 @@ mod study;
 #[cfg(feature = "hdf5")]
 mod view;
 
+#[cfg(feature = "import")]
+pub use audit::{audit_json, audit_text};
 pub use batch::{BatchFacts, BatchRow};
 pub use body::{Facts, dropped_text, render, summary, summary_html};
-pub use checks::{
-    audit_json, audit_text, checks_json, checks_text, diagnostics_json, identities_json, identities_text,
-};
+pub use checks::{checks_json, checks_text, diagnostics_json, identities_json, identities_text};
 pub use comparison::{
     BodyComparison, ComparisonFormat, ComparisonReport, ComparisonRow, ModePair, Pairing, Tolerances,
     compare, compare_common,
@@ -38,9 +40,11 @@ pub use comparison::{
 pub use document::Format;
 pub use document::text::Screen;
 pub use motion::{
-    EnvelopeFacts, EnvelopeKind, RecoveredFacts, ResponseFacts, SimulationFacts, channels_csv, read_envelope,
-    recovered_csv, response_csv, simulation_csv,
+    EnvelopeFacts, EnvelopeKind, RecoveredFacts, SimulationFacts, channels_csv, read_envelope, recovered_csv,
+    simulation_csv,
 };
+#[cfg(feature = "response")]
+pub use motion::{ResponseFacts, response_csv};
 pub use output::output_json;
 pub use run_data::{LumpedModes, Phase, RunData, SearchAttempt};
 pub use study::{AdviceFacts, MeasuredRunFacts, SelectionFacts};

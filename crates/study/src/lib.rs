@@ -14,6 +14,7 @@ pub mod conversion;
 pub mod measured_run;
 pub mod recipe;
 pub mod reference;
+#[cfg(feature = "response")]
 pub mod response;
 pub mod selection;
 pub mod selection_request;

@@ -1,13 +1,17 @@
 //! Arguments of the commands for clusters and batches.
 
-use super::headings::{CLUSTER, COMPARISON, COST, FRAME, MODEL, MODES, OUTPUT};
+use super::headings::{COMPARISON, COST, FRAME, MODEL, MODES, OUTPUT};
 use super::{JobArguments, Printing, memory_size, names, positive};
+use clap::builder::TypedValueParser;
 use clap::{Args, ValueEnum};
 use flexbody_body::flex_body::Storage;
 use flexbody_body::invariants::FrameChoice;
 use flexbody_cluster::Solver;
 use flexbody_eigen::Accuracy;
 use std::path::PathBuf;
+
+/// Heading of the options of computations on a cluster.
+const CLUSTER: &str = "Cluster";
 
 /// Arguments of `prepare`.
 #[derive(Debug, Args)]
@@ -127,7 +131,7 @@ pub struct EngineArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), help_heading = CLUSTER)]
     pub ranks: u32,
     /// Method of --engine slepc
-    #[arg(long, value_parser = names::solver(), default_value = Solver::default().name(), help_heading = CLUSTER)]
+    #[arg(long, value_parser = solver(), default_value = Solver::default().name(), help_heading = CLUSTER)]
     pub solver: Solver,
     /// Command that starts MPI, before `-n N` [default: FLEXBODY_MPIEXEC, else mpiexec]
     #[arg(long, value_name = "WORDS", help_heading = CLUSTER)]
@@ -163,4 +167,14 @@ pub enum EngineName {
     BuiltIn,
     /// SLEPc over MPI
     Slepc,
+}
+
+/// Returns the parser of the solvers of SLEPc.
+fn solver() -> impl TypedValueParser<Value = Solver> {
+    names::one_of(Solver::ALL, Solver::name, |solver| match solver {
+        Solver::Mumps => "Krylov-Schur, shift-invert, on one factor of MUMPS",
+        Solver::Slices => "Spectrum slicing, one factor for each part of the spectrum: hundreds of modes",
+        Solver::Gamg => "Krylov-Schur on conjugate gradients with algebraic multigrid: no factor, no count",
+        Solver::Lobpcg => "LOBPCG with algebraic multigrid: no factor, no count",
+    })
 }

@@ -1,9 +1,11 @@
 //! Arguments of the command that makes bodies.
 
+#[cfg(feature = "cluster")]
+use super::EngineArguments;
 use super::headings::{COMPARISON, COST, FRAME, MODEL, MODES, OUTPUT, SCENE};
-use super::{
-    EngineArguments, JobArguments, Printing, StatedArguments, foreign_formats, memory_size, names, positive,
-};
+#[cfg(feature = "import")]
+use super::import::ForeignArguments;
+use super::{JobArguments, Printing, StatedArguments, memory_size, names, positive};
 use clap::Args;
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::Storage;
@@ -18,9 +20,10 @@ pub struct ConvertArguments {
     /// (docs/how_to/from_fe_programs.md); with --from the body of another program
     #[arg(value_name = "MODEL.toml|JOB.inp", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs"])]
     pub model: Option<PathBuf>,
-    /// Convert the body in a file of another program instead of making one from a model
-    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "lumped", "lumped_modes", "scene", "case", "split", "format", "matrices", "dimension", "interface", "damping"], help_heading = MODEL)]
-    pub from: Option<String>,
+    /// Body of another program.
+    #[cfg(feature = "import")]
+    #[command(flatten)]
+    pub foreign: ForeignArguments,
     /// Job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
@@ -38,11 +41,11 @@ pub struct ConvertArguments {
     #[arg(long, value_name = "FILE", requires = "stiffness", help_heading = MODEL)]
     pub dofs: Option<PathBuf>,
     /// Treat implausible densities, and mass coupling without stiffness, as warnings instead of errors
-    #[arg(long, conflicts_with = "from", help_heading = MODEL)]
+    #[arg(long, help_heading = MODEL)]
     pub allow_implausible: bool,
     /// Leave rotations that only elements that are not quite coplanar hold as K has them, instead of making them
     /// follow the nodes around them (FB428)
-    #[arg(long, conflicts_with = "from", help_heading = MODEL)]
+    #[arg(long, help_heading = MODEL)]
     pub keep_soft_rotations: bool,
     /// Convert each of several bodies in the matrices, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports likewise)
     #[arg(long, conflicts_with = "shapes", help_heading = MODEL)]
@@ -67,7 +70,7 @@ pub struct ConvertArguments {
     #[arg(long, value_name = "LOADS", help_heading = MODES)]
     pub residual_vectors: Option<String>,
     /// Body whose settings are used: basis, modes, accuracy, residual vectors, frame, comparators and storage
-    #[arg(long, value_name = "BODY.flex.h5", conflicts_with_all = ["from", "modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "frame", "lumped", "storage", "scene"], help_heading = MODES)]
+    #[arg(long, value_name = "BODY.flex.h5", conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "frame", "lumped", "storage", "scene"], help_heading = MODES)]
     pub like: Option<PathBuf>,
     /// Accuracy of the modes
     #[arg(long, value_parser = names::accuracy(), default_value = Accuracy::default().name(), help_heading = COST)]
@@ -114,6 +117,7 @@ pub struct ConvertArguments {
     #[arg(long, requires = "scene", help_heading = SCENE)]
     pub allow_unjudged: bool,
     /// Solver for the modes.
+    #[cfg(feature = "cluster")]
     #[command(flatten)]
     pub engine: EngineArguments,
     /// Flex-body file to write
@@ -123,10 +127,10 @@ pub struct ConvertArguments {
     #[arg(long, value_parser = names::storage(), default_value = Storage::default().name(), help_heading = OUTPUT)]
     pub storage: Storage,
     /// Largest number of triangles of the surface for drawing [default: all of the elements of the model]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "from", help_heading = OUTPUT)]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = OUTPUT)]
     pub mesh_triangles: Option<u32>,
     /// Leave the surface out of the file
-    #[arg(long, conflicts_with_all = ["from", "mesh_triangles"], help_heading = OUTPUT)]
+    #[arg(long, conflicts_with = "mesh_triangles", help_heading = OUTPUT)]
     pub no_mesh: bool,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
@@ -137,4 +141,18 @@ pub struct ConvertArguments {
     /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
+}
+
+impl ConvertArguments {
+    /// Returns the format of the body of another program that is converted; `None` for a model.
+    #[cfg(feature = "import")]
+    pub fn foreign_format(&self) -> Option<&str> {
+        self.foreign.from.as_deref()
+    }
+
+    /// Returns `None`: a build without the feature `import` converts models only.
+    #[cfg(not(feature = "import"))]
+    pub fn foreign_format(&self) -> Option<&str> {
+        None
+    }
 }

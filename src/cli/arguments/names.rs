@@ -3,12 +3,11 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::Storage;
-use flexbody_cluster::Solver;
 use flexbody_eigen::{Accuracy, FactorChoice, Precision};
 use flexbody_study::trade::ReferenceChoice;
 
 /// Returns a parser of the names of `all`; the help shows each name with the text of `about`.
-fn one_of<T: Copy + Send + Sync + 'static>(
+pub(super) fn one_of<T: Copy + Send + Sync + 'static>(
     all: &'static [T],
     name: fn(T) -> &'static str,
     about: fn(T) -> &'static str,
@@ -62,16 +61,6 @@ pub(super) fn storage() -> impl TypedValueParser<Value = Storage> {
     one_of(Storage::ALL, Storage::name, |storage| match storage {
         Storage::F64 => "64-bit floats",
         Storage::F32 => "32-bit floats",
-    })
-}
-
-/// Returns the parser of the solvers of SLEPc.
-pub(super) fn solver() -> impl TypedValueParser<Value = Solver> {
-    one_of(Solver::ALL, Solver::name, |solver| match solver {
-        Solver::Mumps => "Krylov-Schur, shift-invert, on one factor of MUMPS",
-        Solver::Slices => "Spectrum slicing, one factor for each part of the spectrum: hundreds of modes",
-        Solver::Gamg => "Krylov-Schur on conjugate gradients with algebraic multigrid: no factor, no count",
-        Solver::Lobpcg => "LOBPCG with algebraic multigrid: no factor, no count",
     })
 }
 

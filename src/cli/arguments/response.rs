@@ -1,11 +1,14 @@
 //! Arguments of the command for frequency responses.
 
-use super::headings::{COST, MODES, OUTPUT, PLACES, SCENE};
+use super::headings::{COST, MODES, OUTPUT, SCENE};
 use super::{JobArguments, Printing, names, ratio};
 use clap::Args;
 use flexbody_body::basis::BasisKind;
 use flexbody_study::response::{Band, ResponseSettings};
 use std::path::PathBuf;
+
+/// Heading of the options that state places and frequencies.
+const PLACES: &str = "Places and frequencies";
 
 /// Arguments of `response`.
 #[derive(Debug, Args)]

@@ -1,5 +1,5 @@
 //! The `.fem` file of MBDyn's modal joint.
 
+#[cfg(feature = "import")]
 pub(super) mod read;
-mod records;
 pub(super) mod write;

@@ -97,6 +97,7 @@ impl Axis {
     }
 
     /// Returns the axis of angles from -180 to 180 degrees.
+    #[cfg(any(test, feature = "response"))]
     pub(crate) fn degrees() -> Self {
         let marked = (-2..=2).map(|quarter| 90.0 * f64::from(quarter));
         Self::new("degrees", Scale::Linear, [-180.0, 180.0], marked)

@@ -58,8 +58,8 @@ impl Series {
 }
 
 /// Drawing style of the points of a series. Most of the styles are used by trade studies only, which need
-/// HDF5.
-#[cfg_attr(not(feature = "hdf5"), allow(dead_code))]
+/// HDF5, and dots by frequency responses.
+#[cfg_attr(not(all(feature = "hdf5", feature = "response")), allow(dead_code))]
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Mark {
     /// A line through the points.

@@ -1,9 +1,9 @@
 //! Identities between the arrays of the frames, arrays that are zero although others require them, and frequencies.
 
+use super::arrays::{Array, Arrays, FrameArrays};
+use super::body::{Declared, Layout};
+use super::parse::Listed;
 use crate::import::AuditCheck;
-use crate::sid::arrays::{Array, Arrays, FrameArrays};
-use crate::sid::body::{Declared, Layout};
-use crate::sid::parse::Listed;
 use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
 use flexbody_linalg::ties::first_largest;

@@ -1,6 +1,7 @@
 //! MBDyn as an import format, recognised by its record groups, and the body that they describe.
 
-use super::records::{GROUP, Records, Surplus};
+mod records;
+
 use crate::import::redundant::{ROUNDING, Redundant, asymmetry, has_no_w2, in_other_order, relative};
 use crate::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use faer::Mat;
@@ -11,6 +12,7 @@ use flexbody_body::flex_body::{GeometricStiffness, LoadKind, UnitLoad};
 use flexbody_body::invariants::{Numbered, TermGroups};
 use flexbody_linalg::larger;
 use nalgebra::{Matrix3, Vector3};
+use records::{GROUP, Records, Surplus};
 
 /// Import format of MBDyn.
 pub(crate) struct Mbdyn;

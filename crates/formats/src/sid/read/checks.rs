@@ -1,10 +1,10 @@
 //! Checks of the redundant arrays of a SID file.
 
+use super::arrays::{Array, Arrays, FrameArrays, PAIRS, largest};
+use super::body::{Blocks, Declared, Layout};
 use super::frame_checks::{Missing, Violation, frame_checks, frequencies, is_free, largest_entry};
+use super::parse::Listed;
 use crate::import::AuditCheck;
-use crate::sid::arrays::{Array, Arrays, FrameArrays, PAIRS, largest};
-use crate::sid::body::{Blocks, Declared, Layout};
-use crate::sid::parse::Listed;
 use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
 use flexbody_linalg::ties::first_largest;
