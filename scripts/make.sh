@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes everything of the repository that programs write, by one command each:
 #
-#   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/reference/codes.md, docs/reference/file_format.md, schemas
+#   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/reference/codes.md, docs/reference/file_format.md, schemas,
+#                                      the types of the Python package (_flexbody.pyi)
 #   ./scripts/make.sh pages [NAME]     pages of evidence/ (its README has the times), docs/reference/python.md and pictures; without NAME all of them (many hours). NAME:
 #                                      accuracy, craig_bampton, cutoff, dynamics, embedded, geometric_stiffness, peers, performance, plausibility, python, recovery, seeds, stability,
 #                                      trade, verdicts [SEEDS], image_response, image_simulation, image_terminal, image_tutorial, image_view, image_vtk

@@ -2,6 +2,7 @@
 
 use crate::arguments::mistyped;
 use crate::errors::value_error;
+use crate::types::{Floats, Given};
 use flexbody::Matrix;
 use nalgebra::{Matrix3, Vector3};
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods};
@@ -10,35 +11,35 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
 /// Returns a vector as an array.
-pub fn vector<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyAny> {
+pub fn vector<'py>(py: Python<'py>, values: &[f64]) -> Floats<'py> {
     PyArray1::from_slice(py, values).into_any()
 }
 
 /// Returns a matrix as an array, row by row.
-pub fn matrix<'py>(py: Python<'py>, matrix: &Matrix) -> PyResult<Bound<'py, PyAny>> {
+pub fn matrix<'py>(py: Python<'py>, matrix: &Matrix) -> PyResult<Floats<'py>> {
     let (rows, columns) = (matrix.rows(), matrix.columns());
     let by_rows = (0..rows).flat_map(|i| (0..columns).map(move |j| matrix[(i, j)])).collect();
     shaped(py, by_rows, [rows, columns])
 }
 
 /// Returns a matrix with three rows for each node as an array (columns x nodes x 3).
-pub fn by_node<'py>(py: Python<'py>, matrix: &Matrix) -> PyResult<Bound<'py, PyAny>> {
+pub fn by_node<'py>(py: Python<'py>, matrix: &Matrix) -> PyResult<Floats<'py>> {
     let all = PyArray1::from_slice(py, matrix.values());
     Ok(all.reshape([matrix.columns(), matrix.rows() / 3, 3])?.into_any())
 }
 
 /// Returns numbers that are stored row by row as an array of this shape.
-pub fn shaped<'py>(py: Python<'py>, values: Vec<f64>, shape: [usize; 2]) -> PyResult<Bound<'py, PyAny>> {
+pub fn shaped<'py>(py: Python<'py>, values: Vec<f64>, shape: [usize; 2]) -> PyResult<Floats<'py>> {
     Ok(PyArray1::from_vec(py, values).reshape(shape)?.into_any())
 }
 
 /// Returns a 3 x 3 matrix as an array.
-pub fn matrix3<'py>(py: Python<'py>, matrix: &Matrix3<f64>) -> PyResult<Bound<'py, PyAny>> {
+pub fn matrix3<'py>(py: Python<'py>, matrix: &Matrix3<f64>) -> PyResult<Floats<'py>> {
     shaped(py, matrix.transpose().as_slice().to_vec(), [3, 3])
 }
 
 /// Returns rows of three as an array (n x 3).
-pub fn triples<'py>(py: Python<'py>, rows: &[[f64; 3]]) -> PyResult<Bound<'py, PyAny>> {
+pub fn triples<'py>(py: Python<'py>, rows: &[[f64; 3]]) -> PyResult<Floats<'py>> {
     shaped(py, rows.as_flattened().to_vec(), [rows.len(), 3])
 }
 
@@ -52,9 +53,6 @@ pub fn rows_of_three(array: &Bound<'_, PyArray2<f64>>, name: &str) -> PyResult<V
     }
     Ok(array.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
 }
-
-/// Numbers from a caller: an array or a sequence.
-pub type Given<'py> = Bound<'py, PyAny>;
 
 /// Returns the numbers of an array or a sequence with the given number of axes, row by row, and its shape.
 fn array_of(given: &Given<'_>, axes: usize, name: &str) -> PyResult<(Vec<f64>, Vec<usize>)> {

@@ -3,10 +3,10 @@
 use crate::arguments::{Argument, count, path};
 use crate::errors::diagnostics;
 use crate::report::report;
+use crate::types::{Diagnostics, JsonRows};
 use crate::work::run;
 use flexbody::BatchOptions;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 use std::ffi::OsString;
 
 /// Bodies of a list, made by the command `flexbody`, each in a process of its own.
@@ -21,7 +21,7 @@ pub struct Batch {
 /// `memory_limit` limits the memory of all of them in bytes; without one it is the free memory. `allow_programs` lets the
 /// options of the list name programs to start. Raises InputError for a list that cannot be read.
 #[pyfunction]
-#[pyo3(signature = (path, *, memory_limit=None, allow_programs=false))]
+#[pyo3(signature = (path: "_Path", *, memory_limit: "int | None" = None, allow_programs=false))]
 pub fn batch(
     py: Python<'_>,
     path: &Bound<'_, PyAny>,
@@ -50,7 +50,7 @@ impl Batch {
     /// Bodies, each as a dict with the properties from `flexbody batch`: output, state ("done", "unchanged", "failed"),
     /// error, modes, frequencies_hz, seconds and others.
     #[getter]
-    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<JsonRows<'py>> {
         report(py, None, |format| self.inner.report(format))?.get_item("bodies")
     }
 
@@ -62,12 +62,17 @@ impl Batch {
 
     /// The error about failed bodies (FB771), as a tuple of `Diagnostic`; empty if all were made.
     #[getter]
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Diagnostics<'py>> {
         diagnostics(py, &self.inner.diagnostics())
     }
 
     /// Returns the report of `flexbody batch`: a dict with all numbers, or "json", "text", "html" as a str.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (
+            form: "Literal['dict']; Literal['json', 'text', 'html']" = None,
+        ) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }

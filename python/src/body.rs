@@ -15,6 +15,10 @@ use crate::report::{loads, report};
 use crate::response::{Response, ResponseArguments};
 use crate::scene::{Motion, Scene, Selection};
 use crate::trade::{Trade, options as trade_options};
+use crate::types::{
+    Diagnostics, ErrorsByScheme, Floats, FloatsByName, FloatsOrNone, IdentityTuple, Integers,
+    InterfaceCoordinatesTuple, InterfacesByName, Json,
+};
 use crate::work::{brief, run};
 use flexbody::{ExportOptions, FlexBody, Matrix, Ranges};
 use numpy::PyArray1;
@@ -69,7 +73,7 @@ impl Body {
 
     /// Settings of the conversion that can change the result, as a dict.
     #[getter]
-    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Json<'py>> {
         loads(py, &self.inner.settings_json())
     }
 
@@ -82,55 +86,55 @@ impl Body {
 
     /// Warnings and notes of the conversion, as a tuple of `Diagnostic`; empty for a body that was read.
     #[getter]
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Diagnostics<'py>> {
         diagnostics(py, &self.diagnostics)
     }
 
     /// Node numbers (n), int64.
     #[getter]
-    fn node_ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn node_ids<'py>(&self, py: Python<'py>) -> PyResult<Integers<'py>> {
         self.cache.get(py, "node_ids", || Ok(PyArray1::from_slice(py, self.inner.node_ids()).into_any()))
     }
 
     /// Positions of the nodes in the body frame (n x 3). Unit: length.
     #[getter]
-    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.cache.get(py, "positions", || triples(py, self.inner.positions()))
     }
 
     /// Origin of the body frame in model coordinates (3). Unit: length.
     #[getter]
-    fn origin<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn origin<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.numbers(py, "origin", self.inner.frame().0.as_slice())
     }
 
     /// Axes of the body frame as columns, in model axes (3 x 3): x_model = origin + axes @ x_body.
     #[getter]
-    fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn axes<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.cache.get(py, "axes", || matrix3(py, &self.inner.frame().1))
     }
 
     /// Frequencies of the modes, ascending (nf). Unit: Hz.
     #[getter]
-    fn frequencies_hz<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn frequencies_hz<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.numbers(py, "frequencies_hz", &self.inner.frequencies_hz())
     }
 
     /// Eigenvalues of the modes, omega^2 (nf). Unit: 1/time^2.
     #[getter]
-    fn eigenvalues<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn eigenvalues<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.numbers(py, "eigenvalues", self.inner.eigenvalues())
     }
 
     /// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|) of the modes (nf).
     #[getter]
-    fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.numbers(py, "residuals", self.inner.residuals())
     }
 
     /// Damping ratios of the modes (nf).
     #[getter]
-    fn damping_ratios<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn damping_ratios<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.numbers(py, "damping_ratios", self.inner.damping_ratios())
     }
 
@@ -148,14 +152,14 @@ impl Body {
 
     /// Psi (nf x n x 3): displacements of the nodes in each mode, shapes[j] for mode j. Unit: 1/sqrt(mass).
     #[getter]
-    fn shapes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn shapes<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.cache.get(py, "shapes", || by_node(py, &self.inner.shapes()))
     }
 
     /// Rotations of the nodes in each mode (nf x n x 3), zero at nodes without rotations; None for models with
     /// displacements only. Unit: 1/(length sqrt(mass)).
     #[getter]
-    fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn rotations<'py>(&self, py: Python<'py>) -> PyResult<FloatsOrNone<'py>> {
         self.cache.get(py, "rotations", || match self.inner.rotations() {
             Some(rotations) => by_node(py, &rotations),
             None => Ok(py.None().into_bound(py)),
@@ -170,83 +174,83 @@ impl Body {
 
     /// First moment c = sum m x (3). Unit: mass length.
     #[getter]
-    fn first_moment<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn first_moment<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.numbers(py, "first_moment", self.inner.first_moment().as_slice())
     }
 
     /// Second moment J = sum m x x' (3 x 3). Unit: mass length^2.
     #[getter]
-    fn second_moment<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn second_moment<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.cache.get(py, "second_moment", || matrix3(py, &self.inner.second_moment()))
     }
 
     /// I0 (3 x 3): inertia of the undeformed body. Unit: mass length^2.
     #[getter(I0)]
-    fn i0<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn i0<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.cache.get(py, "I0", || matrix3(py, &self.inner.inertia()))
     }
 
     /// W0 (3 x 3nf): linear momentum of rotation, linear in the modal coordinates. Unit: sqrt(mass).
     #[getter(W0)]
-    fn w0<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn w0<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.matrix(py, "W0", |body| Some(body.w0()))
     }
 
     /// W1 (3 x 3nf): inertia linear in q, I(q) = I0 + W1 Q + Q'W2 Q with Q = kron(eye(3), q). None for a body made for
     /// a scene that does not need it. Unit: sqrt(mass) length.
     #[getter(W1)]
-    fn w1<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn w1<'py>(&self, py: Python<'py>) -> PyResult<FloatsOrNone<'py>> {
         self.matrix(py, "W1", FlexBody::w1)
     }
 
     /// W2 (3nf x 3nf): inertia quadratic in q. None for a body made for a scene that does not need it. Unit: 1.
     #[getter(W2)]
-    fn w2<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn w2<'py>(&self, py: Python<'py>) -> PyResult<FloatsOrNone<'py>> {
         self.matrix(py, "W2", FlexBody::w2)
     }
 
     /// W3 (3nf x nf): coupling of rotation and modes through q. None for a body made for a scene that does not need it.
     /// Unit: 1.
     #[getter(W3)]
-    fn w3<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn w3<'py>(&self, py: Python<'py>) -> PyResult<FloatsOrNone<'py>> {
         self.matrix(py, "W3", FlexBody::w3)
     }
 
     /// C1 (3 x nf): coupling of translation and modes; zero for free modes. Unit: sqrt(mass).
     #[getter(C1)]
-    fn c1<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn c1<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.matrix(py, "C1", |body| Some(body.c1()))
     }
 
     /// C2 (3 x nf): coupling of rotation and modes in the undeformed body; zero for free modes. Unit: sqrt(mass)
     /// length.
     #[getter(C2)]
-    fn c2<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn c2<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.matrix(py, "C2", |body| Some(body.c2()))
     }
 
     /// Modal mass m_ff = Psi' M Psi (nf x nf). Unit: 1.
     #[getter]
-    fn modal_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn modal_mass<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.matrix(py, "modal_mass", |body| Some(body.modal_mass()))
     }
 
     /// Modal stiffness K_ff = Psi' K Psi (nf x nf). Unit: 1/time^2.
     #[getter]
-    fn modal_stiffness<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn modal_stiffness<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.matrix(py, "modal_stiffness", |body| Some(body.modal_stiffness()))
     }
 
     /// D (nf x nf): modal damping; diag(2 zeta_j omega_j) if only ratios are known. Unit: 1/time.
     #[getter]
-    fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn damping<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.matrix(py, "damping", |body| Some(body.damping()))
     }
 
     /// Geometric stiffness Psi' K_geo Psi (nf x nf) of unit loads: dict of load ("spin_xx", "force_z_tip", ...) to
     /// array. Unit: 1/time^2 per unit of the load.
     #[getter]
-    fn geometric_stiffness<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn geometric_stiffness<'py>(&self, py: Python<'py>) -> PyResult<FloatsByName<'py>> {
         let all = PyDict::new(py);
         for one in self.inner.geometric_stiffness() {
             all.set_item(one.load, matrix(py, &one.matrix)?)?;
@@ -258,7 +262,7 @@ impl Body {
     /// ("acceleration_x", "angular_acceleration_x", "spin_xx", ...) to array; empty if no rotation carries mass. It is
     /// added to K_ff like geometric stiffness. Unit: 1/time^2 per unit of the load.
     #[getter]
-    fn inertia_stiffness<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn inertia_stiffness<'py>(&self, py: Python<'py>) -> PyResult<FloatsByName<'py>> {
         let all = PyDict::new(py);
         for one in self.inner.inertia_stiffness() {
             all.set_item(one.load, matrix(py, &one.matrix)?)?;
@@ -268,7 +272,7 @@ impl Body {
 
     /// Interfaces: dict of name to Interface (node_ids, coupling, reference, translation, rotation).
     #[getter]
-    fn interfaces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn interfaces<'py>(&self, py: Python<'py>) -> PyResult<InterfacesByName<'py>> {
         let (class, all) = (py.import("flexbody._types")?.getattr("Interface")?, PyDict::new(py));
         let rows = |rows: Option<Matrix>| rows.map(|rows| matrix(py, &rows)).transpose();
         for one in self.inner.interfaces() {
@@ -287,7 +291,10 @@ impl Body {
     /// K and M in the nc interface coordinates of a Craig-Bampton body: InterfaceCoordinates (names, stiffness, mass,
     /// of_modes); None for other bodies.
     #[getter]
-    fn interface_coordinates<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+    fn interface_coordinates<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<Option<InterfaceCoordinatesTuple<'py>>> {
         let Some(coordinates) = self.inner.interface_coordinates() else { return Ok(None) };
         let class = py.import("flexbody._types")?.getattr("InterfaceCoordinates")?;
         let (stiffness, mass) = (matrix(py, &coordinates.stiffness)?, matrix(py, &coordinates.mass)?);
@@ -303,7 +310,7 @@ impl Body {
 
     /// Errors of lumped masses: dict of scheme to a dict of error norm to relative error.
     #[getter]
-    fn lumped_errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn lumped_errors<'py>(&self, py: Python<'py>) -> PyResult<ErrorsByScheme<'py>> {
         let all = PyDict::new(py);
         for (scheme, errors) in self.inner.lumped_errors() {
             let of_scheme = PyDict::new(py);
@@ -314,7 +321,7 @@ impl Body {
     }
 
     /// Checks all identities of the numbers of the body: list of Identity (name, value, limit, holds).
-    fn identities<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    fn identities<'py>(&self, py: Python<'py>) -> PyResult<Vec<IdentityTuple<'py>>> {
         identities(py, &brief(py, || Ok(self.inner.identities()))?)
     }
 
@@ -325,6 +332,7 @@ impl Body {
 
     /// Writes a flex-body file (HDF5, docs/reference/file_format.md), which appears complete or not at all. The bytes
     /// are those of `flexbody convert` for the same model and settings.
+    #[pyo3(signature = (path: "_Path"))]
     fn write(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         let path = self::path(path, "path")?;
         brief(py, || self.inner.write(&path))
@@ -342,7 +350,21 @@ impl Body {
     ///
     /// Raises InputError for properties that the format cannot hold (FB720), options that it does not have, and the motion
     /// of another body.
-    #[pyo3(signature = (format, path, *, points=None, dialect=None, to_units=None, modes=None, motion=None, scene=None, allow_loss=None), text_signature = "($self, format, path, *, points=None, dialect=None, to_units=None, modes=None, motion=None, scene=None, allow_loss=False)")]
+    #[pyo3(
+        signature = (
+            format: "_types.ExportFormat",
+            path: "_Path",
+            *,
+            points: "_types.Points | None" = None,
+            dialect: "_types.Dialect | None" = None,
+            to_units: "_types.Units | None" = None,
+            modes: "int | None" = None,
+            motion: "Motion | _Path | None" = None,
+            scene: "_Cases | None" = None,
+            allow_loss: "bool | str | Sequence[str]" = None,
+        ),
+        text_signature = "($self, format, path, *, points=None, dialect=None, to_units=None, modes=None, motion=None, scene=None, allow_loss=False)"
+    )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn export<'py>(
         &self,
@@ -356,7 +378,7 @@ impl Body {
         motion: Argument<'_, 'py>,
         scene: Argument<'_, 'py>,
         allow_loss: Argument<'_, 'py>,
-    ) -> PyResult<Bound<'py, PyTuple>> {
+    ) -> PyResult<Diagnostics<'py>> {
         let (format, path) = (text(format, "format")?, self::path(path, "path")?);
         let mut options = ExportOptions::default();
         if let Some(points) = points {
@@ -390,7 +412,7 @@ impl Body {
 
     /// Checks every identity of the body and, `against` the model that it was made of (a Model, or the path of its
     /// manifest or job), every invariant and every mode, like `flexbody check`.
-    #[pyo3(signature = (against=None))]
+    #[pyo3(signature = (against: "Model | _Path | None" = None))]
     fn check(&self, py: Python<'_>, against: Argument<'_, '_>) -> PyResult<Check> {
         let body = Arc::clone(&self.inner);
         let model = against.map(|given| model_for(given, "against", Arc::clone(&body))).transpose()?;
@@ -401,7 +423,18 @@ impl Body {
 
     /// Compares another body (a Body, or the path of its file) with this one, like `flexbody compare`. With `common` only
     /// the modes and the groups of the kinetic energy that both have are compared. The tolerances are relative; 1e-9 without, 1e-8 for `invariants`.
-    #[pyo3(signature = (other, *, common=false, frequency=None, mass=None, centre_of_mass=None, inertia=None, invariants=None))]
+    #[pyo3(
+        signature = (
+            other: "Body | _Path",
+            *,
+            common=false,
+            frequency: "float | None" = None,
+            mass: "float | None" = None,
+            centre_of_mass: "float | None" = None,
+            inertia: "float | None" = None,
+            invariants: "float | None" = None,
+        )
+    )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn compare(
         &self,
@@ -430,7 +463,18 @@ impl Body {
     /// Computes the frequency response between places, like `flexbody response` without a model: its errors are unknown.
     /// `Model.response` computes them, and describes the arguments.
     #[pyo3(
-        signature = (source=None, target=None, *, base=None, rows=None, psd=None, band=None, scene=None, damping=None, points=None),
+        signature = (
+            source: "_types.Places | None" = None,
+            target: "_types.Places | None" = None,
+            *,
+            base: "str | None" = None,
+            rows: "str | Sequence[str] | None" = None,
+            psd: "_Path | None" = None,
+            band: "tuple[float, float] | None" = None,
+            scene: "_Scene | None" = None,
+            damping: "float | None" = None,
+            points: "int" = None,
+        ),
         text_signature = "($self, source=None, target=None, *, base=None, rows=None, psd=None, band=None, scene=None, damping=None, points=400)"
     )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
@@ -487,7 +531,13 @@ impl Body {
     /// model, which turn with the body. Interfaces without loads count as unloaded, named loads without amplitudes as zero;
     /// preloads act always and take none. `carried_by` names the interface (or the number of the node) in whose frame the
     /// motion is, that of a body carried by it.
-    #[pyo3(signature = (history, only=None, carried_by=None))]
+    #[pyo3(
+        signature = (
+            history: "_types.History",
+            only: "str | Sequence[str] | None" = None,
+            carried_by: "str | None" = None,
+        )
+    )]
     fn recover(
         &self,
         py: Python<'_>,
@@ -504,6 +554,7 @@ impl Body {
     ///
     /// `history` is one as for `recover`, `shapes` the archive (.npz) that `flexbody shapes` wrote with the steps. Raises
     /// InputError for steps of another body, of other modes or terms (FB326).
+    #[pyo3(signature = (history: "_types.History", shapes: "_Path"))]
     fn channels(
         &self,
         py: Python<'_>,
@@ -520,7 +571,15 @@ impl Body {
     /// the largest displacement. With `envelope`, the path of a table (.csv) of `Recovered.write_envelope` or
     /// `write_envelope_of_cases`, the body, at rest or in the motion, has the colours of the largest equivalent stresses.
     /// Raises InputError for stresses that cannot be drawn (FB221).
-    #[pyo3(signature = (motion=None, *, recovery=None, envelope=None, triangles=None))]
+    #[pyo3(
+        signature = (
+            motion: "Motion | _Path | None; None" = None,
+            *,
+            recovery: "None; str" = None,
+            envelope: "_Path | None; None" = None,
+            triangles: "int | None" = None,
+        )
+    )]
     fn view(
         &self,
         py: Python<'_>,
@@ -536,7 +595,14 @@ impl Body {
     /// dict: the largest rotation rate `spin` in Hz, the largest `deflection` of a node (1 % of its extent without), and
     /// the mass `attached` to it, or a tuple of the mass and the interface that carries it.
     #[pyo3(
-        signature = (*, spin=None, deflection=None, attached=None, rotation_given=false, limit=None),
+        signature = (
+            *,
+            spin: "float" = None,
+            deflection: "float | None" = None,
+            attached: "_types.Attached | None" = None,
+            rotation_given=false,
+            limit: "float" = None,
+        ),
         text_signature = "($self, *, spin=0.0, deflection=None, attached=None, rotation_given=False, limit=0.05)"
     )]
     fn advise<'py>(
@@ -547,7 +613,7 @@ impl Body {
         attached: Argument<'_, 'py>,
         rotation_given: bool,
         limit: Argument<'_, 'py>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Json<'py>> {
         let or = |given: Argument<'_, 'py>, name: &str, default: f64| {
             given.map_or(Ok(default), |given| real(given, name))
         };
@@ -564,6 +630,7 @@ impl Body {
 
     /// Decides which terms and modes the body needs in a scene: a Scene, a list of load cases, or the path of a scene
     /// file.
+    #[pyo3(signature = (scene: "_Cases"))]
     fn select(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Selection> {
         let (scene, body) = (Scene::whole(scene)?, Arc::clone(&self.inner));
         Selection::with_warnings(py, run(py, move |listener| body.select_with_progress(&scene, listener))?)
@@ -573,7 +640,12 @@ impl Body {
     /// "W3" with commas, "none", "all", or those of a guideline: "I", "II", "III", "IV". With `storage` "f32" its shapes and
     /// the inertia of its modes are rounded to 32-bit floats. Like `flexbody reduce`.
     #[pyo3(
-        signature = (modes=None, terms=None, *, storage=None),
+        signature = (
+            modes: "Sequence[int] | None" = None,
+            terms: "str" = None,
+            *,
+            storage: "Literal['f32'] | None" = None,
+        ),
         text_signature = "($self, modes=None, terms=\"all\", *, storage=None)"
     )]
     fn subset(
@@ -596,7 +668,7 @@ impl Body {
     /// Simulates the body in a scene: a Scene, or a scene as it takes one (a path, a text, a dict) without load cases. With
     /// `envelope` the largest stresses of every point of the recoveries over the continuous motion are found for
     /// `Motion.recovered.write_envelope`.
-    #[pyo3(signature = (scene, *, envelope=false))]
+    #[pyo3(signature = (scene: "_Scene", *, envelope=false))]
     fn simulate(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, envelope: bool) -> PyResult<Motion> {
         let (scene, body) = (Scene::one(scene)?, Arc::clone(&self.inner));
         let motion = run(py, move |listener| match envelope {
@@ -611,7 +683,15 @@ impl Body {
     /// None). The reference is the motion of `reference`, a body with more modes of `model`, or of this body itself.
     ///
     /// Returns the report of `flexbody measure` as a dict.
-    #[pyo3(signature = (scene, history, *, reference=None, model=None))]
+    #[pyo3(
+        signature = (
+            scene: "_Scene",
+            history: "_Path | tuple[ArrayLike, ArrayLike, ArrayLike | None]",
+            *,
+            reference: "Body | _Path | None" = None,
+            model: "Model | _Path | None" = None,
+        )
+    )]
     fn measure<'py>(
         &self,
         py: Python<'py>,
@@ -619,7 +699,7 @@ impl Body {
         history: &Bound<'py, PyAny>,
         reference: Argument<'_, 'py>,
         model: Argument<'_, 'py>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Json<'py>> {
         let (scene, body) = (Scene::one(scene)?, Arc::clone(&self.inner));
         let history = motion_history(history, self.inner.n_modes())?;
         let reference = match (reference, model) {
@@ -645,7 +725,10 @@ impl Body {
     }
 
     /// Measures accuracy against cost in a scene for reduced versions of this body. `Model.trade` compares conversions.
-    #[pyo3(signature = (scene, *, repeat=None), text_signature = "($self, scene, *, repeat=3)")]
+    #[pyo3(
+        signature = (scene: "_Cases", *, repeat: "int" = None),
+        text_signature = "($self, scene, *, repeat=3)"
+    )]
     fn trade(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, repeat: Argument<'_, '_>) -> PyResult<Trade> {
         let (scene, body) = (Scene::whole(scene)?, Arc::clone(&self.inner));
         let options = trade_options(None, repeat, None)?;
@@ -653,7 +736,12 @@ impl Body {
     }
 
     /// Returns the report of `flexbody inspect`: a dict with all numbers, or "json", "text", "html" as a str.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (
+            form: "Literal['dict']; Literal['json', 'text', 'html']" = None,
+        ) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }
@@ -671,10 +759,12 @@ impl Body {
         this
     }
 
+    #[pyo3(signature = (_memo: "object"))]
     fn __deepcopy__(this: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
         this
     }
 
+    #[pyo3(signature = () -> "tuple[Any, ...]")]
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let bytes = brief(py, || self.inner.to_bytes())?;
         let restore = py.import("flexbody._flexbody")?.getattr("_restored")?;

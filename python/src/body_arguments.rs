@@ -1,9 +1,10 @@
 //! Arguments of the methods of bodies.
 
 use crate::arguments::{mistyped, real, text, whole};
-use crate::arrays::{Given, rows_of, rows_of_many, sequence};
+use crate::arrays::{rows_of, rows_of_many, sequence};
 use crate::errors::value;
 use crate::scene::Motion;
+use crate::types::Given;
 use crate::work::alone;
 use flexbody::{AttachedMass, MotionHistory, RecordedMotion};
 use pyo3::prelude::*;

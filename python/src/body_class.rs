@@ -2,6 +2,7 @@
 
 use crate::arguments::mistyped;
 use crate::arrays::{ArrayCache, matrix, vector};
+use crate::types::{Floats, FloatsOrNone};
 use crate::work::alone;
 use flexbody::{Diagnostic, FlexBody, Matrix};
 use pyo3::prelude::*;
@@ -42,12 +43,7 @@ impl Body {
         Ok(Arc::new(alone(given.py(), || FlexBody::read(&path))?))
     }
 
-    pub fn numbers<'py>(
-        &self,
-        py: Python<'py>,
-        name: &'static str,
-        of: &[f64],
-    ) -> PyResult<Bound<'py, PyAny>> {
+    pub fn numbers<'py>(&self, py: Python<'py>, name: &'static str, of: &[f64]) -> PyResult<Floats<'py>> {
         self.cache.get(py, name, || Ok(vector(py, of)))
     }
 
@@ -57,7 +53,7 @@ impl Body {
         py: Python<'py>,
         name: &'static str,
         of: impl FnOnce(&FlexBody) -> Option<Matrix>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<FloatsOrNone<'py>> {
         self.cache.get(py, name, || match of(&self.inner) {
             Some(given) => matrix(py, &given),
             None => Ok(py.None().into_bound(py)),

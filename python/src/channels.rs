@@ -3,6 +3,7 @@
 use crate::arguments::path;
 use crate::arrays::{ArrayCache, matrix, vector};
 use crate::recovered::history_of;
+use crate::types::Floats;
 use crate::work::{alone, brief, run};
 use flexbody::FlexBody;
 use pyo3::prelude::*;
@@ -36,7 +37,7 @@ impl Channels {
 impl Channels {
     /// Times (nt). Unit: time.
     #[getter]
-    fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn time<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.cache.get(py, "time", || Ok(vector(py, self.inner.times())))
     }
 
@@ -49,7 +50,7 @@ impl Channels {
     /// Factor of each step at each time (nt x nc): modal coordinate, product of angular velocities or load, over the factor
     /// with which the step was scaled; ones in the last column, for the results at rest. Unit: 1.
     #[getter]
-    fn values<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn values<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.cache.get(py, "values", || matrix(py, &self.inner.values()))
     }
 
@@ -59,6 +60,7 @@ impl Channels {
     }
 
     /// Writes the HDF5 file of `flexbody recover --channels FILE.h5`, which appears complete or not at all.
+    #[pyo3(signature = (path: "_Path"))]
     fn write(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         let path = self::path(path, "path")?;
         brief(py, || self.inner.write(&self.body, &path))

@@ -4,10 +4,10 @@ use crate::arguments::{Argument, path, positive, real, text};
 use crate::body_arguments::recorded;
 use crate::errors::{diagnostics, exception, value, value_error};
 use crate::report::report_in;
+use crate::types::{ComparisonRowTuple, Diagnostics, IdentityTuple};
 use crate::work::{alone, run};
 use flexbody::{Code, ComparisonFormat, Diagnostic, FlexBody, Tolerances};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 use std::sync::Arc;
 
 /// Forms of a report that has no page.
@@ -20,7 +20,7 @@ pub struct Check {
 }
 
 /// Returns identities as a list of `flexbody.Identity`.
-pub fn identities<'py>(py: Python<'py>, all: &[flexbody::Identity]) -> PyResult<Vec<Bound<'py, PyAny>>> {
+pub fn identities<'py>(py: Python<'py>, all: &[flexbody::Identity]) -> PyResult<Vec<IdentityTuple<'py>>> {
     let class = py.import("flexbody._types")?.getattr("Identity")?;
     all.iter().map(|one| class.call1((one.name, one.value, one.limit, one.holds))).collect()
 }
@@ -35,18 +35,21 @@ impl Check {
 
     /// All checks: list of Identity (name, value, limit, holds).
     #[getter]
-    fn identities<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    fn identities<'py>(&self, py: Python<'py>) -> PyResult<Vec<IdentityTuple<'py>>> {
         identities(py, &self.inner.identities())
     }
 
     /// Warnings and notes, as a tuple of `Diagnostic`.
     #[getter]
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Diagnostics<'py>> {
         diagnostics(py, self.inner.diagnostics())
     }
 
     /// Returns the report of `flexbody check`: a dict with all numbers, or "json", "text" as a str.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (form: "Literal['dict']; Literal['json', 'text']" = None) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report_in(py, form, &WITHOUT_PAGE, |is_json| match is_json {
             true => self.inner.json(),
@@ -99,7 +102,7 @@ impl Comparison {
 
     /// Compared quantities: list of ComparisonRow (quantity, meaning, difference, tolerance, passed).
     #[getter]
-    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Vec<ComparisonRowTuple<'py>>> {
         let class = py.import("flexbody._types")?.getattr("ComparisonRow")?;
         let row = |one: &flexbody::ComparisonRow| {
             class.call1((one.quantity, one.meaning, one.difference, one.tolerance, one.passed))
@@ -109,7 +112,12 @@ impl Comparison {
 
     /// Returns the report of `flexbody compare`: a dict with all numbers, or "json", "text", "html", "junit", "markdown"
     /// as a str.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (
+            form: "Literal['dict']; Literal['json', 'text', 'html', 'junit', 'markdown']" = None,
+        ) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         const FORMS: [(&str, ComparisonFormat); 6] = [
             ("dict", ComparisonFormat::Json),
@@ -156,12 +164,15 @@ impl Audit {
 
     /// Failed checks, as a tuple of `Diagnostic`.
     #[getter]
-    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Diagnostics<'py>> {
         diagnostics(py, &self.inner.findings())
     }
 
     /// Returns the report of `flexbody audit`: a dict with all numbers, or "json", "text" as a str.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (form: "Literal['dict']; Literal['json', 'text']" = None) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report_in(py, form, &WITHOUT_PAGE, |is_json| match is_json {
             true => self.inner.json(),
@@ -180,7 +191,10 @@ impl Audit {
 ///
 /// Raises InputError if the file cannot be read or its format is not recognised.
 #[pyfunction]
-#[pyo3(signature = (path, *, format=None, tolerance=None), text_signature = "(path, *, format=None, tolerance=1e-6)")]
+#[pyo3(
+    signature = (path: "_Path", *, format: "_types.ImportFormat | None" = None, tolerance: "float" = None),
+    text_signature = "(path, *, format=None, tolerance=1e-6)"
+)]
 pub fn audit(
     py: Python<'_>,
     path: &Bound<'_, PyAny>,
@@ -206,6 +220,7 @@ pub fn audit(
 /// Returns how an FE program writes its matrices, like `flexbody recipe`: the lines of the deck, and the command that
 /// continues from there.
 #[pyfunction]
+#[pyo3(signature = (program: "_types.RecipeProgram"))]
 pub fn recipe(py: Python<'_>, program: &Bound<'_, PyAny>) -> PyResult<String> {
     let program = text(program, "program")?;
     value(py, flexbody::Recipe::of(&program)).map(|recipe| recipe.to_string())
@@ -214,7 +229,7 @@ pub fn recipe(py: Python<'_>, program: &Bound<'_, PyAny>) -> PyResult<String> {
 /// Returns what a message means, why it arises and what to do, like `flexbody explain`: by its code (`"FB408"`,
 /// `"408"`), or all codes in one line each without one. Errors and warnings of this package state their codes.
 #[pyfunction]
-#[pyo3(signature = (code=None))]
+#[pyo3(signature = (code: "str | None" = None))]
 pub fn explain(py: Python<'_>, code: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
     let code = code.map(|code| text(code, "code")).transpose()?;
     value(py, flexbody::Explanation::of(code.as_deref())).map(|explanation| explanation.to_string())
@@ -268,13 +283,17 @@ impl View {
     }
 
     /// Writes the page, which appears complete or not at all.
+    #[pyo3(signature = (path: "_Path"))]
     fn write(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         let path = self::path(path, "path")?;
         alone(py, || self.inner.write(&path))
     }
 
     /// Returns the facts that `flexbody view` prints: a dict, or "json", "text" as a str.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (form: "Literal['dict']; Literal['json', 'text']" = None) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         use flexbody::ReportFormat::{Json, Text};
         report_in(py, form, &WITHOUT_PAGE, |is_json| self.inner.report(if is_json { Json } else { Text }))

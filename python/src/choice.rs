@@ -30,6 +30,7 @@ fn names_of<T: Copy>(all: &[T], name_of: fn(T) -> &'static str) -> Vec<&'static 
 
 /// Returns the names of all choices, for the test that the types of the package state the same ones.
 #[pyfunction]
+#[pyo3(signature = () -> "dict[str, list[str]]")]
 pub fn _choices(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let all = PyDict::new(py);
     let names = |choices: &[&str]| choices.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();

@@ -12,6 +12,7 @@ use std::ffi::OsString;
 /// The process must serve this command only: signals with the default handling, and panics, end the process as they end
 /// the program, without an unfinished file.
 #[pyfunction]
+#[pyo3(signature = (words: "Sequence[str]"))]
 pub fn run_command(py: Python<'_>, words: Vec<OsString>) -> PyResult<u8> {
     // The executable of this process is that of Python.
     program::set_program(words_of_the_command(py)?);

@@ -1,8 +1,9 @@
 //! The equations of motion of one body.
 
 use crate::arguments::{text, whole};
-use crate::arrays::{Given, matrix3, numbers, shaped, vector, vector3};
+use crate::arrays::{matrix3, numbers, shaped, vector, vector3};
 use crate::errors::{exception, value_error};
+use crate::types::{Floats, Given};
 use flexbody::dynamics::{self, BodyPoint, Evaluation};
 use flexbody::{Code, Diagnostic, FlexBody};
 use nalgebra::Vector3;
@@ -69,7 +70,7 @@ impl EquationsOfMotion {
     }
 
     /// Returns the mass matrix Mc(q) (n x n).
-    fn mass_matrix<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn mass_matrix<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Floats<'py>> {
         let n = self.inner.n_velocities();
         let mut matrix = vec![0.0; n * n];
         self.at(&q, None)?.mass_matrix(&mut matrix);
@@ -77,12 +78,7 @@ impl EquationsOfMotion {
     }
 
     /// Returns h(q, nu) (n): the inertia forces at zero acceleration.
-    fn velocity_forces<'py>(
-        &self,
-        py: Python<'py>,
-        q: Given<'py>,
-        nu: Given<'py>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn velocity_forces<'py>(&self, py: Python<'py>, q: Given<'py>, nu: Given<'py>) -> PyResult<Floats<'py>> {
         Ok(vector(py, self.at(&q, Some(&nu))?.velocity_forces()))
     }
 
@@ -95,7 +91,7 @@ impl EquationsOfMotion {
         q: Given<'py>,
         nu: Given<'py>,
         acceleration: Option<Given<'py>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Floats<'py>> {
         let n = self.inner.n_velocities();
         let acceleration = numbers(acceleration.as_ref(), n, "acceleration")?;
         let mut forces = vec![0.0; n];
@@ -114,7 +110,7 @@ impl EquationsOfMotion {
         q: Given<'py>,
         nu: Given<'py>,
         applied: Option<Given<'py>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Floats<'py>> {
         let n = self.inner.n_velocities();
         let applied = numbers(applied.as_ref(), n, "applied")?;
         let mut acceleration = vec![0.0; n];
@@ -134,7 +130,7 @@ impl EquationsOfMotion {
         q: Given<'py>,
         nu: Given<'py>,
         acceleration: Option<Given<'py>>,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    ) -> PyResult<(Floats<'py>, Floats<'py>)> {
         let (n, nf) = (self.inner.n_velocities(), self.inner.n_modes());
         let acceleration = numbers(acceleration.as_ref(), n, "acceleration")?;
         let (mut by_q, mut by_nu) = (vec![0.0; n * nf], vec![0.0; n * n]);
@@ -144,7 +140,7 @@ impl EquationsOfMotion {
 
     /// Returns the generalised forces (n) of uniform gravity A'g (3), given along body axes. Unit of gravity:
     /// length/time^2.
-    fn gravity<'py>(&self, py: Python<'py>, q: Given<'py>, g: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn gravity<'py>(&self, py: Python<'py>, q: Given<'py>, g: Given<'py>) -> PyResult<Floats<'py>> {
         let mut forces = vec![0.0; self.inner.n_velocities()];
         self.at(&q, None)?.add_gravity(&vector3(&g, "g")?, &mut forces);
         Ok(vector(py, &forces))
@@ -152,7 +148,7 @@ impl EquationsOfMotion {
 
     /// Returns Mc(q) nu (n): linear momentum, angular momentum about the origin, both along body axes, and the momenta
     /// of the modes.
-    fn momenta<'py>(&self, py: Python<'py>, q: Given<'py>, nu: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn momenta<'py>(&self, py: Python<'py>, q: Given<'py>, nu: Given<'py>) -> PyResult<Floats<'py>> {
         let n = self.inner.n_velocities();
         let rates = numbers(Some(&nu), n, "nu")?;
         let mut matrix = vec![0.0; n * n];
@@ -172,17 +168,18 @@ impl EquationsOfMotion {
     }
 
     /// Returns I(q) = I0 + W1 Q + Q'W2 Q (3 x 3), about the origin, in body axes. Unit: mass length^2.
-    fn inertia<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn inertia<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Floats<'py>> {
         matrix3(py, &self.at(&q, None)?.inertia())
     }
 
     /// Returns the first moment c + C1 q (3) of the deformed body. Unit: mass length.
-    fn first_moment<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn first_moment<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Floats<'py>> {
         Ok(vector(py, self.at(&q, None)?.first_moment().as_slice()))
     }
 
     /// Returns the node of this number (`Body.node_ids`; without `node_ids` its index from 0) as a point for forces and
     /// motion.
+    #[pyo3(signature = (number: "int"))]
     fn node(&self, py: Python<'_>, number: &Bound<'_, PyAny>) -> PyResult<Point> {
         let number = whole(number, "number")?;
         let inner = self.body.node_point(number).map_err(|error| exception(py, &error))?;
@@ -190,6 +187,7 @@ impl EquationsOfMotion {
     }
 
     /// Returns the reference point of the interface of this name.
+    #[pyo3(signature = (name: "str"))]
     fn interface(&self, py: Python<'_>, name: &Bound<'_, PyAny>) -> PyResult<Point> {
         let name = text(name, "name")?;
         let inner = self.body.interface_point(&name).map_err(|error| exception(py, &error))?;
@@ -218,12 +216,12 @@ impl Point {
     }
 
     /// Returns the position r(q) (3) in the deformed body. Unit: length.
-    fn place<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn place<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Floats<'py>> {
         Ok(vector(py, self.inner.place(&evaluation(&self.equations, &q, None)?).as_slice()))
     }
 
     /// Returns the velocity V + omega x r + dr/dt (3). Unit: length/time.
-    fn velocity<'py>(&self, py: Python<'py>, q: Given<'py>, nu: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn velocity<'py>(&self, py: Python<'py>, q: Given<'py>, nu: Given<'py>) -> PyResult<Floats<'py>> {
         Ok(vector(py, self.inner.velocity(&evaluation(&self.equations, &q, Some(&nu))?).as_slice()))
     }
 
@@ -234,7 +232,7 @@ impl Point {
         q: Given<'py>,
         nu: Given<'py>,
         acceleration: Given<'py>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Floats<'py>> {
         let rates = numbers(Some(&acceleration), self.equations.n_velocities(), "acceleration")?;
         let evaluation = evaluation(&self.equations, &q, Some(&nu))?;
         Ok(vector(py, self.inner.acceleration(&evaluation, &rates).as_slice()))
@@ -246,13 +244,13 @@ impl Point {
         py: Python<'py>,
         q: Given<'py>,
         nu: Given<'py>,
-    ) -> PyResult<Option<Bound<'py, PyAny>>> {
+    ) -> PyResult<Option<Floats<'py>>> {
         let evaluation = evaluation(&self.equations, &q, Some(&nu))?;
         Ok(self.inner.angular_velocity(&evaluation).map(|omega| vector(py, omega.as_slice())))
     }
 
     /// Returns the Jacobian J(q) (3 x n), with velocity = J nu: a force f at the point is the generalised force J'f.
-    fn jacobian<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn jacobian<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Floats<'py>> {
         let (n, evaluation) = (self.equations.n_velocities(), evaluation(&self.equations, &q, None)?);
         let mut rows = vec![0.0; 3 * n];
         for (axis, row) in rows.chunks_exact_mut(n).enumerate() {
@@ -271,7 +269,7 @@ impl Point {
         q: Given<'py>,
         force: Given<'py>,
         torque: Option<Given<'py>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Floats<'py>> {
         let evaluation = evaluation(&self.equations, &q, None)?;
         let mut forces = vec![0.0; self.equations.n_velocities()];
         self.inner.add_force(&evaluation, &vector3(&force, "force")?, &mut forces);

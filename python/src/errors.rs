@@ -1,5 +1,6 @@
 //! Diagnostics of the library in Python: exceptions, warnings, and tuples of diagnostics.
 
+use crate::types::Diagnostics;
 use flexbody::{Code, Diagnostic, Error, Severity};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -45,7 +46,7 @@ pub fn bug(py: Python<'_>) -> PyErr {
 }
 
 /// Returns diagnostics as a tuple of `flexbody.Diagnostic`.
-pub fn diagnostics<'py>(py: Python<'py>, found: &[Diagnostic]) -> PyResult<Bound<'py, PyTuple>> {
+pub fn diagnostics<'py>(py: Python<'py>, found: &[Diagnostic]) -> PyResult<Diagnostics<'py>> {
     let class = py.import(ERRORS)?.getattr("Diagnostic")?;
     let one = |diagnostic: &Diagnostic| {
         class.call1((

@@ -14,6 +14,7 @@ use pyo3::types::PyDict;
 /// Raises InputError if it cannot be read or has a newer format, CheckError if it violates its schema or was changed
 /// since it was written.
 #[pyfunction]
+#[pyo3(signature = (path: "_Path"))]
 pub fn read(py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<Body> {
     let path = self::path(path, "path")?;
     Ok(Body::new(alone(py, || FlexBody::read(&path))?, Vec::new()))
@@ -24,7 +25,15 @@ pub fn read(py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<Body> {
 /// `units` are those of length, mass and time of the file, m, kg and s without; `frame` is a body frame as for `convert`,
 /// that of the file without. Raises InputError if the file cannot be read, does not determine a body, or contradicts itself.
 #[pyfunction]
-#[pyo3(signature = (path, format, *, units=None, frame=None))]
+#[pyo3(
+    signature = (
+        path: "_Path",
+        format: "_types.ImportFormat",
+        *,
+        units: "_types.Units | None" = None,
+        frame: "_types.Frame | None" = None,
+    )
+)]
 pub fn import_body(
     py: Python<'_>,
     path: &Bound<'_, PyAny>,
@@ -42,6 +51,7 @@ pub fn import_body(
 
 /// Makes a body of the bytes and the diagnostics of a pickle.
 #[pyfunction]
+#[pyo3(signature = (bytes: "bytes", found: "Sequence[tuple[object, ...]]"))]
 pub fn _restored(py: Python<'_>, bytes: Vec<u8>, found: Vec<PickledDiagnostic>) -> PyResult<Body> {
     let body = alone(py, || FlexBody::from_bytes(&bytes))?;
     Ok(Body::new(body, found.into_iter().filter_map(restored_diagnostic).collect()))
@@ -49,6 +59,7 @@ pub fn _restored(py: Python<'_>, bytes: Vec<u8>, found: Vec<PickledDiagnostic>) 
 
 /// Returns the formats that `Body.export` writes: dict of name to the programs that read it.
 #[pyfunction]
+#[pyo3(signature = () -> "dict[str, str]")]
 pub fn export_formats(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let all = PyDict::new(py);
     FlexBody::export_formats().into_iter().try_for_each(|(name, reader)| all.set_item(name, reader))?;

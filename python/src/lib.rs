@@ -1,5 +1,6 @@
 //! The extension module `flexbody._flexbody`: the front door of the library for Python. The package around it is in
-//! `python/flexbody`, its types in `_flexbody.pyi`.
+//! `python/flexbody`. The signatures of its functions state types of Python, which pyo3 ignores: the stub `_flexbody.pyi` is
+//! made of them.
 
 mod arguments;
 mod arrays;
@@ -20,6 +21,7 @@ mod report;
 mod response;
 mod scene;
 mod trade;
+mod types;
 mod work;
 
 use pyo3::prelude::*;

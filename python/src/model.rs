@@ -8,6 +8,7 @@ use crate::errors::{diagnostics, value, value_error, warn};
 use crate::response::{Response, ResponseArguments};
 use crate::scene::Scene;
 use crate::trade::{Trade, options as trade_options};
+use crate::types::{Diagnostics, Floats};
 use crate::work::run;
 use flexbody::{
     Accuracy, Basis, ConvertOptions, Coupling, Diagnostic, FlexBody, FrameChoice, ModelBuilder, SparseMatrix,
@@ -15,7 +16,6 @@ use flexbody::{
 use numpy::ndarray::ArrayView1;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -172,7 +172,24 @@ impl Model {
     /// Makes a model from arrays, which `flexbody.model` prepares.
     #[staticmethod]
     #[pyo3(name = "_assembled")]
-    #[pyo3(signature = (name, stiffness, mass, node_ids, positions, *, plane, dofs, interfaces, units, damping, residual_vectors, allow_implausible, keep_soft_rotations))]
+    #[pyo3(
+        signature = (
+            name,
+            stiffness: "_Compressed",
+            mass: "_Compressed",
+            node_ids: "NDArray[np.int64]",
+            positions: "_Floats",
+            *,
+            plane,
+            dofs: "NDArray[np.int64] | None",
+            interfaces: "Sequence[tuple[str, list[int] | str, str | None, tuple[float, float, float] | None]]",
+            units: "tuple[str, str, str] | None",
+            damping: "float | tuple[float, float] | list[tuple[float, float]] | _Compressed | None",
+            residual_vectors: "tuple[bool, bool]",
+            allow_implausible,
+            keep_soft_rotations,
+        )
+    )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn assembled<'py>(
         py: Python<'py>,
@@ -233,6 +250,15 @@ impl Model {
     /// Reads the model of a manifest, or of the job of an FE program, for `flexbody.read_model`.
     #[staticmethod]
     #[pyo3(name = "_read")]
+    #[pyo3(
+        signature = (
+            path: "_Path",
+            program: "str | None",
+            units: "tuple[str, str, str] | None",
+            sets: "Sequence[tuple[str, str, str | None]]",
+            damping,
+        )
+    )]
     fn read<'py>(
         py: Python<'py>,
         path: &Bound<'py, PyAny>,
@@ -283,13 +309,13 @@ impl Model {
 
     /// Positions of the nodes in model axes (n x 3). Unit: length.
     #[getter]
-    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         crate::arrays::triples(py, self.inner.positions())
     }
 
     /// Warnings and notes of reading and checking, as a tuple of `Diagnostic`.
     #[getter]
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Diagnostics<'py>> {
         diagnostics(py, self.inner.diagnostics())
     }
 
@@ -301,7 +327,17 @@ impl Model {
     ///
     /// Raises InputError, NumericalError or ResourceError.
     #[pyo3(
-        signature = (*, modes=None, max_frequency=None, basis=None, accuracy=None, frame=None, comparators=true, scene=None, allow_unjudged=false),
+        signature = (
+            *,
+            modes: "int | None" = None,
+            max_frequency: "float | None" = None,
+            basis: "_types.Basis" = None,
+            accuracy: "_types.Accuracy" = None,
+            frame: "_types.Frame" = None,
+            comparators=true,
+            scene: "_Cases | None" = None,
+            allow_unjudged=false,
+        ),
         text_signature = "($self, *, modes=None, max_frequency=None, basis=\"free\", accuracy=\"standard\", frame=\"com\", comparators=True, scene=None, allow_unjudged=False)"
     )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
@@ -346,7 +382,13 @@ impl Model {
     /// Measures accuracy against cost in a scene: candidate bodies against a reference, like `flexbody.trade`. With
     /// several load cases every candidate is measured in each of them and judged by the worst.
     #[pyo3(
-        signature = (scene, *, modes=None, repeat=None, reference=None),
+        signature = (
+            scene: "_Cases",
+            *,
+            modes: "int" = None,
+            repeat: "int" = None,
+            reference: "_types.Reference" = None,
+        ),
         text_signature = "($self, scene, *, modes=20, repeat=3, reference=\"full\")"
     )]
     fn trade(
@@ -373,7 +415,23 @@ impl Model {
     /// body in place of forces, `rows` are recoveries whose rows are read ("gauges", or "gauges:ROW" for one), `psd` is the
     /// file of the spectral densities of a random excitation. `modes` and `basis` are those of a body that is made.
     #[pyo3(
-        signature = (source=None, target=None, *, base=None, rows=None, psd=None, body=None, band=None, scene=None, damping=None, tolerance=None, points=None, solves=None, modes=None, basis=None),
+        signature = (
+            source: "_types.Places | None" = None,
+            target: "_types.Places | None" = None,
+            *,
+            base: "str | None" = None,
+            rows: "str | Sequence[str] | None" = None,
+            psd: "_Path | None" = None,
+            body: "Body | _Path | None" = None,
+            band: "tuple[float, float] | None" = None,
+            scene: "_Scene | None" = None,
+            damping: "float | None" = None,
+            tolerance: "float" = None,
+            points: "int" = None,
+            solves: "int" = None,
+            modes: "int" = None,
+            basis: "_types.Basis" = None,
+        ),
         text_signature = "($self, source=None, target=None, *, base=None, rows=None, psd=None, body=None, band=None, scene=None, damping=None, tolerance=0.05, points=400, solves=80, modes=20, basis=\"free\")"
     )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function

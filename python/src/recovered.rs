@@ -1,9 +1,10 @@
 //! Recoveries over a motion of any program.
 
 use crate::arguments::{Argument, mistyped, path, text, texts};
-use crate::arrays::{ArrayCache, Given, matrix, rows_of, rows_of_many, sequence, vector};
+use crate::arrays::{ArrayCache, matrix, rows_of, rows_of_many, sequence, vector};
 use crate::errors::{value, value_error, warn};
 use crate::report::report;
+use crate::types::{Floats, Given, RowsByRecovery};
 use crate::work::{brief, run};
 use flexbody::{Code, Diagnostic, FlexBody, LoadedHistory, Matrix, RecoveryRow, ReportFormat};
 use numpy::{PyArray1, PyArrayMethods};
@@ -149,7 +150,7 @@ impl Recovered {
 impl Recovered {
     /// Times (nt). Unit: time.
     #[getter]
-    fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn time<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.cache.get(py, "time", || Ok(vector(py, self.inner.times())))
     }
 
@@ -157,7 +158,7 @@ impl Recovered {
     /// with the values of all rows (nt x rows) in the units of their labels, and the equivalent stresses of von Mises (nt x
     /// points) and the principal stresses (nt x points x 3) at the points with all six stresses.
     #[getter]
-    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn rows<'py>(&self, py: Python<'py>) -> PyResult<RowsByRecovery<'py>> {
         let types = py.import("flexbody._types")?;
         let (class, label) = (types.getattr("RecoveredRows")?, types.getattr("RowLabel")?);
         let all = PyDict::new(py);
@@ -178,6 +179,7 @@ impl Recovered {
 
     /// Writes the HDF5 file of `flexbody recover -o FILE.h5` and `flexbody simulate --rows FILE.h5`, which appears complete
     /// or not at all.
+    #[pyo3(signature = (path: "_Path"))]
     fn write(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         let path = self::path(path, "path")?;
         brief(py, || self.inner.write(&self.body, &path))
@@ -185,6 +187,7 @@ impl Recovered {
 
     /// Writes the largest stresses of every point over the motion, like `--envelope`: a table (.csv), or the body with them
     /// at its nodes (.vtu). Those of a simulation need `Body.simulate(scene, envelope=True)`.
+    #[pyo3(signature = (path: "_Path"))]
     fn write_envelope(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         let path = self::path(path, "path")?;
         brief(py, || self.inner.write_envelope(&self.body, &path))
@@ -197,6 +200,7 @@ impl Recovered {
     /// `cases` is a dict of the name of a load case to its Recovered, all of one body, with the same recoveries. Those of a
     /// simulation need `Body.simulate(scene, envelope=True)`. Raises InputError for recoveries of another body.
     #[staticmethod]
+    #[pyo3(signature = (cases: "Mapping[str, Recovered]", path: "_Path"))]
     fn write_envelope_of_cases(
         py: Python<'_>,
         cases: &Bound<'_, PyAny>,
@@ -239,7 +243,12 @@ impl Recovered {
     /// Returns the report of `flexbody recover`: a dict with the largest values, or "json", "text", "html" as a str.
     ///
     /// Raises InputError for rows of a simulation: `Motion.report` has their largest values.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (
+            form: "Literal['dict']; Literal['json', 'text', 'html']" = None,
+        ) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         if self.inner.report(&self.body, ReportFormat::Json).is_none() {
             let message = "the largest values of a simulation are in the report of its motion";
@@ -256,7 +265,7 @@ impl Recovered {
 }
 
 /// Returns three matrices as one array (rows x columns x 3).
-fn principal<'py>(py: Python<'py>, of: &[Matrix; 3]) -> PyResult<Bound<'py, PyAny>> {
+fn principal<'py>(py: Python<'py>, of: &[Matrix; 3]) -> PyResult<Floats<'py>> {
     let (rows, columns) = (of[0].rows(), of[0].columns());
     let entry = |at: usize| of.each_ref().map(|one| one[(at / columns, at % columns)]);
     let values: Vec<f64> = (0..rows * columns).flat_map(entry).collect();

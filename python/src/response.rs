@@ -1,15 +1,16 @@
 //! Frequency responses.
 
 use crate::arguments::{Argument, count, mistyped, path, real};
-use crate::arrays::{Given, sequence, vector};
+use crate::arrays::{sequence, vector};
 use crate::errors::{diagnostics, value_error, warn};
 use crate::report::report;
 use crate::scene::Scene;
+use crate::types::{Diagnostics, Floats, TransferFunctionTuple, ValuesByRecovery};
 use flexbody::ResponseOptions;
 use nalgebra::Complex;
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyInt, PyString, PyTuple};
+use pyo3::types::{PyDict, PyInt, PyString};
 
 /// A frequency response between places of a body.
 #[pyclass(frozen, module = "flexbody")]
@@ -107,14 +108,14 @@ impl Response {
 impl Response {
     /// Frequencies, ascending (n). Unit: Hz.
     #[getter]
-    fn frequencies_hz<'py>(&self, py: Python<'py>) -> Given<'py> {
+    fn frequencies_hz<'py>(&self, py: Python<'py>) -> Floats<'py> {
         vector(py, self.inner.frequencies_hz())
     }
 
     /// Transfer functions: list of TransferFunction (source, source_direction, target, target_direction, reduced, full)
     /// with complex arrays (n); full is nan where the equations of all nodes were not solved.
     #[getter]
-    fn functions<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    fn functions<'py>(&self, py: Python<'py>) -> PyResult<Vec<TransferFunctionTuple<'py>>> {
         let class = py.import("flexbody._types")?.getattr("TransferFunction")?;
         let unsolved = Complex::new(f64::NAN, f64::NAN);
         let function = |one: flexbody::TransferFunction| {
@@ -134,7 +135,7 @@ impl Response {
     /// Root mean squares under random excitation: a dict with, for each recovery, a dict of `rows` and `points` (names), and
     /// of `rms` and `von_mises` (arrays, in the units of the rows); None without spectral densities.
     #[getter]
-    fn random<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+    fn random<'py>(&self, py: Python<'py>) -> PyResult<Option<ValuesByRecovery<'py>>> {
         let Some(random) = self.inner.random() else { return Ok(None) };
         let all = PyDict::new(py);
         for one in &random.recoveries {
@@ -157,12 +158,17 @@ impl Response {
 
     /// Warnings and notes, as a tuple of `Diagnostic`.
     #[getter]
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Diagnostics<'py>> {
         diagnostics(py, self.inner.diagnostics())
     }
 
     /// Returns the report of `flexbody response`: a dict with all numbers, or "json", "text", "html" as a str.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (
+            form: "Literal['dict']; Literal['json', 'text', 'html']" = None,
+        ) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }

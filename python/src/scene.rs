@@ -5,11 +5,12 @@ use crate::arrays::{ArrayCache, shaped, triples, vector};
 use crate::errors::{diagnostics, value, value_error, warn};
 use crate::recovered::Recovered;
 use crate::report::report;
+use crate::types::{Diagnostics, Floats, PathsByName};
 use crate::work::{alone, brief};
 use flexbody::FlexBody;
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyMapping, PyTuple};
+use pyo3::types::{PyDict, PyMapping};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -27,7 +28,7 @@ pub struct Scene {
 #[pymethods]
 impl Scene {
     #[new]
-    #[pyo3(signature = (source, case=None, folder=None))]
+    #[pyo3(signature = (source: "_Source", case: "str | None" = None, folder: "_Path | None" = None))]
     fn new(
         py: Python<'_>,
         source: &Bound<'_, PyAny>,
@@ -47,7 +48,7 @@ impl Scene {
     /// Returns all load cases of a scene (the path of its file, its text, or a dict), in its order; the single scene if
     /// it has no cases.
     #[staticmethod]
-    #[pyo3(signature = (source, folder=None))]
+    #[pyo3(signature = (source: "_Source", folder: "_Path | None" = None))]
     fn cases(py: Python<'_>, source: &Bound<'_, PyAny>, folder: Argument<'_, '_>) -> PyResult<Vec<Scene>> {
         let all = read(source, folder, "source")?.whole(py)?;
         Ok(all.cases().into_iter().map(|inner| Self { inner }).collect())
@@ -170,18 +171,24 @@ impl Selection {
 
     /// Warnings and notes, as a tuple of `Diagnostic`.
     #[getter]
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Diagnostics<'py>> {
         diagnostics(py, self.inner.diagnostics())
     }
 
     /// Returns the command that makes exactly the selected body from the flex-body file that was judged. None if the body
     /// was made with the selection.
+    #[pyo3(signature = (body: "_Path"))]
     fn command(&self, body: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
         Ok(self.inner.command(&path(body, "body")?.display().to_string()))
     }
 
     /// Returns the report of `flexbody select`: a dict with all numbers, or "json", "text", "html" as a str.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (
+            form: "Literal['dict']; Literal['json', 'text', 'html']" = None,
+        ) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }
@@ -222,7 +229,7 @@ impl Motion {
         py: Python<'py>,
         name: &'static str,
         row: impl Fn(usize) -> R,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Floats<'py>> {
         self.cache.get(py, name, || {
             let instants = self.inner.times().len();
             let all: Vec<f64> = (0..instants).flat_map(|instant| row(instant).as_ref().to_vec()).collect();
@@ -237,7 +244,7 @@ impl Motion {
         py: Python<'py>,
         name: &'static str,
         number: impl Fn(usize) -> f64,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Floats<'py>> {
         self.cache.get(py, name, || {
             let all: Vec<f64> = (0..self.inner.times().len()).map(number).collect();
             Ok(vector(py, &all))
@@ -249,80 +256,80 @@ impl Motion {
 impl Motion {
     /// Instants (nt). Unit: time.
     #[getter]
-    fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn time<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.cache.get(py, "time", || Ok(vector(py, self.inner.times())))
     }
 
     /// Modal coordinates q (nt x nf). Unit: sqrt(mass) length.
     #[getter]
-    fn modal_coordinates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn modal_coordinates<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.rows(py, "modal_coordinates", |instant| self.inner.modal_coordinates(instant).to_vec())
     }
 
     /// Rates dq/dt of the modal coordinates (nt x nf). Unit: sqrt(mass) length/time.
     #[getter]
-    fn modal_velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn modal_velocities<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.rows(py, "modal_velocities", |instant| self.inner.modal_velocities(instant).to_vec())
     }
 
     /// Position of the origin of the frame, in world axes (nt x 3). Unit: length.
     #[getter]
-    fn origin<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn origin<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.rows(py, "origin", |instant| <[f64; 3]>::from(self.inner.origin(instant)))
     }
 
     /// Velocity of the origin, in world axes (nt x 3). Unit: length/time.
     #[getter]
-    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.rows(py, "velocity", |instant| <[f64; 3]>::from(self.inner.velocity(instant)))
     }
 
     /// Attitude of the frame (nt x 4): Euler parameters of unit length, the cosine of half the angle first.
     #[getter]
-    fn attitude<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn attitude<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.rows(py, "attitude", |instant| self.inner.attitude(instant))
     }
 
     /// Angular velocity of the frame along its axes (nt x 3). Unit: 1/time.
     #[getter]
-    fn angular_velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn angular_velocity<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.rows(py, "angular_velocity", |instant| <[f64; 3]>::from(self.inner.angular_velocity(instant)))
     }
 
     /// Kinetic energy (nt). Unit: mass length^2/time^2.
     #[getter]
-    fn kinetic_energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn kinetic_energy<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.numbers(py, "kinetic_energy", |instant| self.inner.kinetic_energy(instant))
     }
 
     /// Elastic energy (nt). Unit: mass length^2/time^2.
     #[getter]
-    fn elastic_energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn elastic_energy<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.numbers(py, "elastic_energy", |instant| self.inner.elastic_energy(instant))
     }
 
     /// Work of forces, damping and prescribed motion since the start (nt). Unit: mass length^2/time^2.
     #[getter]
-    fn work<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn work<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.numbers(py, "work", |instant| self.inner.work(instant))
     }
 
     /// Linear momentum, in world axes (nt x 3). Unit: mass length/time.
     #[getter]
-    fn linear_momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn linear_momentum<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.rows(py, "linear_momentum", |instant| <[f64; 3]>::from(self.inner.linear_momentum(instant)))
     }
 
     /// Angular momentum about the initial position of the origin, in world axes (nt x 3). Unit: mass length^2/time.
     #[getter]
-    fn angular_momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn angular_momentum<'py>(&self, py: Python<'py>) -> PyResult<Floats<'py>> {
         self.rows(py, "angular_momentum", |instant| <[f64; 3]>::from(self.inner.angular_momentum(instant)))
     }
 
     /// Force, and torque about the origin, of the prescribed motion, along the axes of the frame (nt x 6); None if no
     /// motion is prescribed.
     #[getter]
-    fn reactions<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+    fn reactions<'py>(&self, py: Python<'py>) -> PyResult<Option<Floats<'py>>> {
         if self.inner.times().is_empty() || self.inner.reaction(0).is_none() {
             return Ok(None);
         }
@@ -336,7 +343,7 @@ impl Motion {
     /// Paths of the watched points: dict of name to PointPath, with arrays (nt x 3) of position, deflection, velocity
     /// and acceleration.
     #[getter]
-    fn paths<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn paths<'py>(&self, py: Python<'py>) -> PyResult<PathsByName<'py>> {
         let (class, all) = (py.import("flexbody._types")?.getattr("PointPath")?, PyDict::new(py));
         for path in self.inner.paths() {
             let [place, deflection, velocity, acceleration] =
@@ -375,18 +382,24 @@ impl Motion {
 
     /// Warnings and notes, as a tuple of `Diagnostic`.
     #[getter]
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Diagnostics<'py>> {
         diagnostics(py, self.inner.diagnostics())
     }
 
     /// Writes the motion to an HDF5 file, like `flexbody simulate -o`. The file appears complete or not at all.
+    #[pyo3(signature = (path: "_Path"))]
     fn write(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         let path = self::path(path, "path")?;
         brief(py, || self.inner.write(&path))
     }
 
     /// Returns the report of `flexbody simulate`: a dict with all numbers, or "json", "text", "html" as a str.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (
+            form: "Literal['dict']; Literal['json', 'text', 'html']" = None,
+        ) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }

@@ -5,9 +5,9 @@ use crate::body_class::Body;
 use crate::choice::called;
 use crate::errors::{diagnostics, value, warn};
 use crate::report::report;
+use crate::types::{Diagnostics, JsonRows};
 use flexbody::{ReferenceChoice, TradeOptions};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 
 /// Candidate bodies for a scene, measured against a reference, and the best of them.
 #[pyclass(frozen, module = "flexbody")]
@@ -46,7 +46,7 @@ impl Trade {
     /// Candidates, each as a dict with the properties from `flexbody trade`: source, kind, modes, groups, errors, worst
     /// error over its tolerance, multiplications, bytes, seconds. The first candidate is the reference.
     #[getter]
-    fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn candidates<'py>(&self, py: Python<'py>) -> PyResult<JsonRows<'py>> {
         report(py, None, |format| self.inner.report(format))?.get_item("rows")
     }
 
@@ -70,11 +70,12 @@ impl Trade {
 
     /// Warnings and notes, as a tuple of `Diagnostic`.
     #[getter]
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Diagnostics<'py>> {
         diagnostics(py, self.inner.diagnostics())
     }
 
     /// Returns the body of a candidate, counted from 0.
+    #[pyo3(signature = (candidate: "int"))]
     fn body(&self, py: Python<'_>, candidate: &Bound<'_, PyAny>) -> PyResult<Body> {
         let body = value(py, self.inner.body(count(candidate, "candidate")?))?;
         Ok(Body::new(body, Vec::new()))
@@ -82,6 +83,7 @@ impl Trade {
 
     /// Returns the command that makes exactly the recommended candidate from the files of the study: the model or the
     /// body, and the scene. None if no candidate is recommended.
+    #[pyo3(signature = (input: "_Path", scene: "_Path"))]
     fn command(&self, input: &Bound<'_, PyAny>, scene: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
         let [input, scene] =
             [path(input, "input")?, path(scene, "scene")?].map(|path| path.display().to_string());
@@ -89,7 +91,12 @@ impl Trade {
     }
 
     /// Returns the report of `flexbody trade`: a dict with all numbers, or "json", "text", "html" as a str.
-    #[pyo3(signature = (form=None), text_signature = "($self, form=\"dict\")")]
+    #[pyo3(
+        signature = (
+            form: "Literal['dict']; Literal['json', 'text', 'html']" = None,
+        ) -> "dict[str, Any]; str",
+        text_signature = "($self, form=\"dict\")"
+    )]
     fn report<'py>(&self, py: Python<'py>, form: Argument<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }

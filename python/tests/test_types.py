@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import inspect
 import os
@@ -102,6 +103,25 @@ def test_the_stated_choices_are_those_of_the_library() -> None:
         stated = get_args(getattr(_types, name))
         assert sorted(stated) == sorted(set(choices)), name
     assert list(flexbody.export_formats()) == list(get_args(_types.ExportFormat))
+
+
+def test_the_stub_has_the_docstrings_of_the_extension() -> None:
+    stub = ast.parse(Path(_flexbody.__file__).with_name("_flexbody.pyi").read_text())
+    found = 0
+    for item in stub.body:
+        if not isinstance(item, (ast.ClassDef, ast.FunctionDef)):
+            continue
+        own = getattr(_flexbody, item.name)
+        pairs = [(item, own)]
+        if isinstance(item, ast.ClassDef):
+            pairs += [(member, getattr(own, member.name)) for member in item.body if isinstance(member, ast.FunctionDef)]
+        for stated, actual in pairs:
+            # Overloads after the first have none, nor have special methods without a doc comment.
+            doc = ast.get_docstring(stated)
+            if doc is not None:
+                assert doc == inspect.getdoc(actual), f"{item.name}.{stated.name}"
+                found += 1
+    assert found > 150
 
 
 def test_everything_has_a_docstring() -> None:

@@ -34,6 +34,11 @@ fn diagnostic_codes() {
     assert_generated("docs/reference/codes.md", &diagnostic::codes_markdown());
 }
 
+#[test]
+fn python_stub() {
+    assert_generated("python/python/flexbody/_flexbody.pyi", &crate::python_stub::python_stub());
+}
+
 /// The output of `flexbody recipe` is in the page of each FE program, each piece in a block of its own.
 #[test]
 fn recipes_are_those_of_the_pages() {

@@ -29,6 +29,7 @@ mod odd_files;
 mod operators;
 mod pages;
 mod program;
+mod python_stub;
 mod replaced_inputs;
 mod stress_colours;
 mod structure;
