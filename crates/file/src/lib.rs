@@ -27,6 +27,7 @@ mod simulation;
 #[cfg(feature = "hdf5")]
 mod structure;
 mod value;
+mod version;
 #[cfg(feature = "hdf5")]
 mod write;
 

@@ -55,7 +55,7 @@ pub(super) const FREE_EIGENVALUE: Item = dataset(
     "eigenvalues of the free body as estimated, upper bounds of them; Craig-Bampton bodies only, whose own are larger",
     estimate_of_free_body!(estimate),
 )
-.beside(&CRAIG_BAMPTON)
+.needed_before(11, &CRAIG_BAMPTON)
 .added(4);
 
 /// Lower bounds of the eigenvalues of the free body, an entry of `/modes` beside [`FREE_EIGENVALUE`].
@@ -67,7 +67,7 @@ pub(super) const FREE_EIGENVALUE_LOWER: Item = dataset(
     "lower bounds of the eigenvalues of the free body, to rounding; 0: none; Craig-Bampton bodies only",
     estimate_of_free_body!(lower),
 )
-.beside(&CRAIG_BAMPTON)
+.needed_before(11, &CRAIG_BAMPTON)
 .added(4);
 
 pub(super) const CERTIFICATE: &[Item] = &[
