@@ -4,7 +4,6 @@
 use super::item::{DERIVED_TOLERANCE, Extent, Item, ItemKind, Origin, SchemaGroup};
 use super::schema::certificate::KEPT;
 use super::schema::{FORMAT, TABLE};
-use super::value::Units;
 use super::version::{DIGESTS_SINCE, MAJOR, MINOR};
 use flexbody_body::flex_body::TermGroup;
 use serde_json::{Map, Value, json};
@@ -353,8 +352,9 @@ fn entry(item: &Item) -> Value {
         Origin::Primary(_) | Origin::Derived(..) => {}
     }
     schema["description"] = json!(item.description);
-    if item.units != Units::One {
-        schema["x-units"] = json!(item.units.symbolic());
+    let units = item.units.symbolic();
+    if units != "1" {
+        schema["x-units"] = json!(units);
     }
     if item.since > 0 {
         schema["x-since"] = json!(format!("{MAJOR}.{}", item.since));

@@ -3,7 +3,8 @@
 use super::draft::Draft;
 use super::names;
 use super::per::Per;
-use super::value::{ReadValue, Units, Value, View, text};
+use super::units::Units;
+use super::value::{ReadValue, Value, View, text};
 #[cfg(feature = "hdf5")]
 use flexbody_body::flex_body::Storage;
 use flexbody_body::flex_body::{Interface, LumpedBody, NamedLoad, Parts, Recovery, TermGroup};
@@ -183,8 +184,7 @@ pub(super) struct Item {
     /// Minor version of the format that introduced the entry.
     pub since: i64,
     pub origin: Origin,
-    /// Reading direction; `None` for entries that the reader does not take from the file, or reads before all others.
-    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // called by the reader only
+    /// Direction into a body; `None` for entries that the reader does not take from the file, or reads before all others.
     pub put: Option<Put>,
     /// Set of entries that the entry belongs to.
     pub together: Option<Membership>,

@@ -14,13 +14,13 @@ use super::item::ItemKind::{Floats, Indices, Int, Ints, Text};
 use super::item::Origin::{ConstantInt, ConstantText};
 use super::item::{EntrySet, Item, SchemaGroup, both, field, put, written};
 use super::per::Per;
-use super::value::{Stored, Units, Value, indices, json_list, shape_rows, text};
+use super::units::{
+    LENGTH, MASS_LENGTH, MASS_LENGTH2, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, PER_TIME2, Units, dimension,
+};
+use super::value::{Stored, Value, indices, json_list, shape_rows, text};
 use super::version::{DIGESTS_SINCE, MAJOR, least_minor};
 use certificate::{CERTIFICATE, CERTIFIED, FREE_EIGENVALUE, FREE_EIGENVALUE_LOWER, INVARIANT_DIGITS, TERMS};
-use entry::{
-    INERTIA, LENGTH, MASS_LENGTH, MASS_LENGTH2, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, PER_TIME2,
-    attribute, constant, dataset, named,
-};
+use entry::{INERTIA, attribute, constant, dataset, named};
 use flexbody_base::provenance;
 use flexbody_body::flex_body::{MassStructure, ReferenceConditions, Storage};
 use flexbody_model::NodeMoments;
@@ -455,7 +455,7 @@ const MODES: &[Item] = &[
     dataset(
         "internal",
         Floats(&[InternalRows, Modes]),
-        ONE,
+        Units::OfModel(dimension(-1, 0, 0)),
         "",
         "the modes at these rows, as the FE model scales them; vectors (three rows) in body axes",
         field!(internal: shape),

@@ -3,8 +3,9 @@
 use super::super::item::Extent::{FixedInterfaceModes, Modes};
 use super::super::item::ItemKind::{Float, Floats, Int, Text};
 use super::super::item::{EntrySet, Item, both, field, put, written};
+use super::super::units::{ONE, PER_TIME2};
 use super::super::value::{Stored, Value, View, text};
-use super::entry::{ONE, PER_TIME2, attribute, dataset};
+use super::entry::{attribute, dataset};
 use flexbody_body::flex_body::{TermDecision, TermGroup};
 
 /// Entries that accuracy `certified` adds.
