@@ -3,8 +3,8 @@
 
 use super::item::{DERIVED_TOLERANCE, Extent, Item, ItemKind, Origin, SchemaGroup};
 use super::schema::certificate::KEPT;
-use super::schema::{FORMAT, MAJOR, MINOR, TABLE};
-use super::value::Units;
+use super::schema::{FORMAT, TABLE};
+use super::version::{DIGESTS_SINCE, MAJOR, MINOR};
 use flexbody_body::flex_body::TermGroup;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -116,7 +116,7 @@ pub fn format_markdown() -> String {
     ));
     add(format_args!("\n{DIGESTS}"));
     for group in TABLE {
-        add(format_args!("\n## `{}`\n\n{}\n", group.path, group.description));
+        add(format_args!("\n## `{}`\n\n{}\n", group.path, description(group)));
         let (attributes, datasets): (Vec<_>, Vec<_>) = group.entries().partition(|i| i.shape().is_none());
         if !datasets.is_empty() {
             add(format_args!(
@@ -137,6 +137,17 @@ pub fn format_markdown() -> String {
         }
     }
     out
+}
+
+/// Returns the description of a group. That of a group which raises the version of files names the version.
+fn description(group: &SchemaGroup) -> String {
+    let since = group.since();
+    if since > DIGESTS_SINCE {
+        let before = since - 1;
+        format!("{} Since {MAJOR}.{since}; a file without it is one of {MAJOR}.{before}.", group.description)
+    } else {
+        group.description.to_owned()
+    }
 }
 
 fn content(item: &Item) -> String {
@@ -281,7 +292,7 @@ fn require(schema: &mut Map<String, Value>, key: &str) {
 fn fill(target: &mut Value, group: &SchemaGroup) {
     let schema = target.as_object_mut().expect("schemas of groups are objects");
     schema.insert("type".to_owned(), json!("object"));
-    schema.insert("description".to_owned(), json!(group.description));
+    schema.insert("description".to_owned(), json!(description(group)));
     for (section, of_datasets) in [("attributes", false), ("datasets", true)] {
         let items = || group.entries().filter(move |i| i.shape().is_some() == of_datasets);
         let mut part = json!({ "type": "object" });
@@ -341,11 +352,15 @@ fn entry(item: &Item) -> Value {
         Origin::Primary(_) | Origin::Derived(..) => {}
     }
     schema["description"] = json!(item.description);
-    if item.units != Units::One {
-        schema["x-units"] = json!(item.units.symbolic());
+    let units = item.units.symbolic();
+    if units != "1" {
+        schema["x-units"] = json!(units);
     }
     if item.since > 0 {
         schema["x-since"] = json!(format!("{MAJOR}.{}", item.since));
     }
     schema
 }
+
+#[cfg(all(test, feature = "hdf5"))]
+mod tests;

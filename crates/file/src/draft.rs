@@ -1,6 +1,4 @@
-//! A body that is read entry by entry: the rows of the table put their values into it.
-
-#![cfg_attr(not(feature = "hdf5"), allow(dead_code))] // used by the reader only
+//! A body that is made entry by entry: the rows of the table put their values into it.
 
 use super::per::Per;
 use super::value::ReadValue;
@@ -19,7 +17,7 @@ use flexbody_model::{BodyNumber, Nodes};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 
-/// A body with the entries read so far; all others are empty.
+/// A body with the entries put so far; all others are empty.
 pub(super) struct Draft {
     /// Body without its invariants and its surface.
     pub body: Parts,

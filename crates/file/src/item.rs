@@ -3,7 +3,8 @@
 use super::draft::Draft;
 use super::names;
 use super::per::Per;
-use super::value::{ReadValue, Units, Value, View, text};
+use super::units::Units;
+use super::value::{ReadValue, Value, View, text};
 #[cfg(feature = "hdf5")]
 use flexbody_body::flex_body::Storage;
 use flexbody_body::flex_body::{Interface, LumpedBody, NamedLoad, Parts, Recovery, TermGroup};
@@ -132,11 +133,20 @@ pub(super) struct EntrySet {
 
 /// Membership of an entry in a set of entries that belong together.
 #[derive(Clone, Copy)]
-#[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // checked by the reader only
 pub(super) struct Membership {
     pub set: &'static EntrySet,
-    /// True if the set requires the entry. False if the entry requires the set, but not the reverse.
-    pub required: bool,
+    pub need: Need,
+}
+
+/// Condition under which a set of entries requires a member.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Need {
+    /// The set requires the entry.
+    Always,
+    /// The set requires the entry for readers before this minor version.
+    Before(i64),
+    /// The entry requires the set, but not the reverse.
+    Never,
 }
 
 /// Source of the value of an entry.
@@ -174,11 +184,9 @@ pub(super) struct Item {
     /// Minor version of the format that introduced the entry.
     pub since: i64,
     pub origin: Origin,
-    /// Reading direction; `None` for entries that the reader does not take from the file, or reads before all others.
-    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // called by the reader only
+    /// Direction into a body; `None` for entries that the reader does not take from the file, or reads before all others.
     pub put: Option<Put>,
     /// Set of entries that the entry belongs to.
-    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // checked by the reader only
     pub together: Option<Membership>,
     /// Group of the kinetic energy that the entry belongs to. The entry is required if the body holds the group, and
     /// must be absent otherwise.
@@ -206,14 +214,31 @@ impl Item {
 
     /// Makes the entry a required member of a set of entries that belong together.
     pub(crate) const fn with(mut self, set: &'static EntrySet) -> Self {
-        self.together = Some(Membership { set, required: true });
+        self.together = Some(Membership { set, need: Need::Always });
         self
     }
 
     /// Makes the entry an optional companion of a set of entries that belong together.
     pub(crate) const fn beside(mut self, set: &'static EntrySet) -> Self {
-        self.together = Some(Membership { set, required: false });
+        self.together = Some(Membership { set, need: Need::Never });
         self
+    }
+
+    /// Makes the entry a member of a set of entries that belong together, which readers before a minor version require
+    /// with the set.
+    pub(crate) const fn needed_before(mut self, minor: i64, set: &'static EntrySet) -> Self {
+        self.together = Some(Membership { set, need: Need::Before(minor) });
+        self
+    }
+
+    /// Returns true if `set` requires the entry.
+    pub(crate) fn is_required_by(&self, set: &'static EntrySet) -> bool {
+        self.together.is_some_and(|own| own.need == Need::Always && std::ptr::eq(own.set, set))
+    }
+
+    /// Returns the set that does not require the entry since the version `minor`, and did before.
+    pub(crate) fn optional_member(&self, minor: i64) -> Option<&'static EntrySet> {
+        self.together.filter(|own| own.need == Need::Before(minor)).map(|own| own.set)
     }
 
     /// Assigns the entry to a group of the kinetic energy.

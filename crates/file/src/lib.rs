@@ -11,6 +11,7 @@
 mod contents;
 mod document;
 mod draft;
+mod in_units;
 mod item;
 mod names;
 mod per;
@@ -26,13 +27,16 @@ mod schema;
 mod simulation;
 #[cfg(feature = "hdf5")]
 mod structure;
+mod units;
 mod value;
+mod version;
 #[cfg(feature = "hdf5")]
 mod write;
 
 pub use contents::{NamedArray, NamedAttributes, Numbers, contents};
 pub use document::{format_markdown, format_schema};
 pub use flexbody_base::output::OutputSlot;
+pub use in_units::in_units;
 #[cfg(feature = "hdf5")]
 pub use read::{read, read_with_notes, validate};
 pub use recorded_motion::RecordedMotion;

@@ -2,12 +2,13 @@
 
 use super::draft::Draft;
 use super::item::{
-    DERIVED_TOLERANCE, EntrySet, Extent, Item, Membership, Origin, SHORT_TOLERANCE, SchemaGroup,
+    DERIVED_TOLERANCE, EntrySet, Extent, Item, Membership, Need, Origin, SHORT_TOLERANCE, SchemaGroup,
 };
 use super::per::Per;
 use super::scan::{Scan, index, key};
-use super::schema::{FORMAT, MAJOR, TABLE};
+use super::schema::{FORMAT, TABLE};
 use super::value::{ReadValue, Value, View};
+use super::version::MAJOR;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::hdf5_file;
@@ -192,14 +193,14 @@ fn check_together(scan: &mut Scan) {
     let mut sets: Vec<FoundSet> = Vec::new();
     for group in TABLE {
         for item in group.entries() {
-            let Some(Membership { set, required }) = item.together else { continue };
+            let Some(Membership { set, need }) = item.together else { continue };
             let name = if group.per == Per::Body { key(group.path, item) } else { group.parent().to_owned() };
             let there = scan.values.contains_key(&name) || !scan.instances(&name).is_empty();
             let at = sets.iter().position(|known| std::ptr::eq(known.set, set)).unwrap_or_else(|| {
                 sets.push(FoundSet { set, entries: Vec::new(), is_incomplete: false });
                 sets.len() - 1
             });
-            sets[at].is_incomplete |= required && !there;
+            sets[at].is_incomplete |= need == Need::Always && !there;
             sets[at].entries.push((name, there));
         }
     }

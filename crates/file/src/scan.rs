@@ -5,8 +5,9 @@ use super::item::{Extent, Item, ItemKind, Origin, SchemaGroup};
 use super::names;
 use super::per::Per;
 use super::schema::certificate::{DROPPED, KEPT};
-use super::schema::{DIGESTS_SINCE, LIST, MAJOR, ORDER, TABLE, WHOLE};
+use super::schema::{LIST, ORDER, TABLE, WHOLE};
 use super::value::Value;
+use super::version::{DIGESTS_SINCE, MAJOR};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::hdf5_file::{
     self, Array, Element, Number, Numbers, Stored, difference, digests_of, elements, of_numbers,

@@ -14,14 +14,15 @@ use super::item::ItemKind::{Floats, Indices, Int, Ints, Text};
 use super::item::Origin::{ConstantInt, ConstantText};
 use super::item::{EntrySet, Item, SchemaGroup, both, field, put, written};
 use super::per::Per;
-use super::value::{Stored, Units, Value, indices, json_list, shape_rows, text};
-use certificate::{CERTIFICATE, CERTIFIED, FREE_EIGENVALUE, FREE_EIGENVALUE_LOWER, INVARIANT_DIGITS, TERMS};
-use entry::{
-    INERTIA, LENGTH, MASS_LENGTH, MASS_LENGTH2, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, PER_TIME2,
-    attribute, constant, dataset, named,
+use super::units::{
+    LENGTH, MASS_LENGTH, MASS_LENGTH2, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, PER_TIME2, Units, dimension,
 };
+use super::value::{Stored, Value, indices, json_list, shape_rows, text};
+use super::version::{DIGESTS_SINCE, MAJOR, least_minor};
+use certificate::{CERTIFICATE, CERTIFIED, FREE_EIGENVALUE, FREE_EIGENVALUE_LOWER, INVARIANT_DIGITS, TERMS};
+use entry::{INERTIA, attribute, constant, dataset, named};
 use flexbody_base::provenance;
-use flexbody_body::flex_body::{MassStructure, Parts, ReferenceConditions, Storage};
+use flexbody_body::flex_body::{MassStructure, ReferenceConditions, Storage};
 use flexbody_model::NodeMoments;
 use interfaces::{COORDINATES, INTERFACES};
 use invariants::{
@@ -40,28 +41,6 @@ pub(super) use flexbody_base::provenance::{DIGEST_OF_LIST as WHOLE, LIST_OF_DIGE
 /// names as a JSON array.
 pub(super) const ORDER: &str = "order";
 
-/// Major version of the format. Readers refuse a newer major version; a newer minor version only adds entries.
-pub(super) const MAJOR: i64 = 1;
-/// Minor version with all entries, see [`MAJOR`]. A file states the lowest version that has all entries which it holds.
-pub(super) const MINOR: i64 = 12;
-/// Minor version of files of bodies with at most one interface, recovery and named load each.
-const WITHOUT_ORDER: i64 = 11;
-/// Minor version of files of bodies whose recoveries have no columns of forces of motion.
-const WITHOUT_MOTION_COLUMNS: i64 = 10;
-/// Minor version of files of bodies without geometric stiffness of rotations.
-const WITHOUT_ROTATED_STIFFNESS: i64 = 9;
-/// Minor version of files of bodies without named loads.
-const WITHOUT_NAMED_LOADS: i64 = 8;
-/// Minor version of files of bodies without recoveries.
-const WITHOUT_RECOVERIES: i64 = 7;
-/// Minor version of files of bodies in mean axes.
-const MEAN_AXES_ONLY: i64 = 6;
-/// Minor version of files of bodies in mean axes without stiffness of inertia.
-const WITHOUT_INERTIA_STIFFNESS: i64 = 5;
-/// Minor version of files of bodies in mean axes without stiffness of inertia and without a surface.
-const WITHOUT_MESH: i64 = 4;
-/// Minor version from which on every file has digests.
-pub(super) const DIGESTS_SINCE: i64 = 4;
 /// Value of the root attribute `format`.
 pub(super) const FORMAT: &str = "flexbody";
 
@@ -73,24 +52,7 @@ const ROOT: &[Item] = &[
         Int,
         ONE,
         "additions within the major version; a reader ignores what it does not know",
-        written(|v| {
-            let Parts { conditions, inertia_stiffness, mesh, recoveries, named_loads, .. } = v.body;
-            let fixed = &v.body.certificate.fixed_interface;
-            Some(Value::Int(match (conditions.is_mean(), inertia_stiffness, mesh) {
-                _ if [v.body.interfaces.len(), recoveries.len(), named_loads.len()].iter().any(|&n| n > 1) => MINOR,
-                _ if recoveries.iter().any(|one| !one.motion.is_empty()) => WITHOUT_ORDER,
-                // Readers of earlier versions require the estimates of every Craig-Bampton body.
-                _ if fixed.as_ref().is_some_and(|fixed| fixed.free.is_none()) => WITHOUT_ORDER,
-                _ if fixed.as_ref().is_some_and(|fixed| !fixed.eigenvalues.is_empty()) => WITHOUT_ORDER,
-                _ if !v.body.rotated_stiffness.is_empty() => WITHOUT_MOTION_COLUMNS,
-                _ if !named_loads.is_empty() => WITHOUT_ROTATED_STIFFNESS,
-                _ if !recoveries.is_empty() => WITHOUT_NAMED_LOADS,
-                (false, _, _) => WITHOUT_RECOVERIES,
-                (true, Some(_), _) => MEAN_AXES_ONLY,
-                (true, None, Some(_)) => WITHOUT_INERTIA_STIFFNESS,
-                (true, None, None) => WITHOUT_MESH,
-            }))
-        }),
+        written(|v| Some(Value::Int(least_minor(TABLE, v.body)))),
     ),
     attribute(
         "generator",
@@ -493,7 +455,7 @@ const MODES: &[Item] = &[
     dataset(
         "internal",
         Floats(&[InternalRows, Modes]),
-        ONE,
+        Units::OfModel(dimension(-1, 0, 0)),
         "",
         "the modes at these rows, as the FE model scales them; vectors (three rows) in body axes",
         field!(internal: shape),
@@ -512,7 +474,7 @@ pub(super) const TABLE: &[SchemaGroup] = &[
     SchemaGroup {
         path: "/mesh",
         per: Per::Body,
-        description: "The surface of the part on some of its nodes, to draw it by. Nothing is computed from it. Absent: not known. Since 1.5; a file without it is one of 1.4.",
+        description: "The surface of the part on some of its nodes, to draw it by. Nothing is computed from it. Absent: not known.",
         items: &[MESH],
     },
     SchemaGroup {
@@ -566,25 +528,25 @@ pub(super) const TABLE: &[SchemaGroup] = &[
     SchemaGroup {
         path: "/rotated_stiffness/<load>",
         per: Per::RotatedLoad,
-        description: "Geometric stiffness of unit rotations R of the body about the axes of the frame, for every load of `/geometric_stiffness`: what modes lose or gain where a rigid motion is taken from them, as that of a carrier (theory section 7). Translations cause no force. Absent: not known. Since 1.10; a file without it is one of 1.9.",
+        description: "Geometric stiffness of unit rotations R of the body about the axes of the frame, for every load of `/geometric_stiffness`: what modes lose or gain where a rigid motion is taken from them, as that of a carrier (theory section 7). Translations cause no force. Absent: not known.",
         items: &[ROTATED_STIFFNESS],
     },
     SchemaGroup {
         path: "/inertia_stiffness/<load>",
         per: Per::InertiaLoad,
-        description: "Stiffness that the inertia of turning nodes adds: terms of the kinetic energy of second order in the rotations of nodes that carry rotational inertia or an eccentric mass. Signs and loads are those of `/geometric_stiffness`, to which a solver adds it: `acceleration_x` to `_z`, `angular_acceleration_x` to `_z`, `spin_xx` to `_xz`, all of them; in the plane `acceleration_x`, `_y`, `angular_acceleration_z`, `spin_zz`. Absent: zero; in files before 1.6 of mass structure `general`: not known. Since 1.6; a file without it is one of 1.5.",
+        description: "Stiffness that the inertia of turning nodes adds: terms of the kinetic energy of second order in the rotations of nodes that carry rotational inertia or an eccentric mass. Signs and loads are those of `/geometric_stiffness`, to which a solver adds it: `acceleration_x` to `_z`, `angular_acceleration_x` to `_z`, `spin_xx` to `_xz`, all of them; in the plane `acceleration_x`, `_y`, `angular_acceleration_z`, `spin_zz`. Absent: zero; in files before 1.6 of mass structure `general`: not known.",
         items: &[INERTIA_STIFFNESS],
     },
     SchemaGroup {
         path: "/recovery/<name>",
         per: Per::Recovery,
-        description: "Rows that read stresses, strains, forces or displacements off the deformed body: y = offset + modes q + loads f + spin (w w), with the modal coordinates q, the loads f at the interfaces (and, since 1.9, the amplitudes of named loads), and the angular velocity w (theory section 12). Accelerations and gravity have no columns. The rows are along the axes of the operator that they were made of. Absent: none. Since 1.8; a file without it is one of 1.7.",
+        description: "Rows that read stresses, strains, forces or displacements off the deformed body: y = offset + modes q + loads f + spin (w w), with the modal coordinates q, the loads f at the interfaces (and, since 1.9, the amplitudes of named loads), and the angular velocity w (theory section 12). Accelerations and gravity have no columns. The rows are along the axes of the operator that they were made of. Absent: none.",
         items: &[RECOVERY],
     },
     SchemaGroup {
         path: "/named_loads/<name>",
         per: Per::NamedLoad,
-        description: "Nodal forces f that act as one load with an amplitude a: generalised forces a (F, T + L q, Psi'f) on the frame and the modes, the forces along body axes at the deformed places of their nodes. Of a preload, whose resultant is zero on the deformed body too, Psi'f alone, always with a = 1. Absent: none. Since 1.9; a file without it is one of 1.8.",
+        description: "Nodal forces f that act as one load with an amplitude a: generalised forces a (F, T + L q, Psi'f) on the frame and the modes, the forces along body axes at the deformed places of their nodes. Of a preload, whose resultant is zero on the deformed body too, Psi'f alone, always with a = 1. Absent: none.",
         items: &[NAMED_LOAD],
     },
     SchemaGroup {
@@ -594,3 +556,6 @@ pub(super) const TABLE: &[SchemaGroup] = &[
         items: &[COORDINATES],
     },
 ];
+
+#[cfg(test)]
+mod tests;

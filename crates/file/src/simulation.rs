@@ -2,7 +2,7 @@
 
 use super::names;
 use super::recorded_motion::RecordedMotion;
-use super::value::Units;
+use super::units::{ONE, Units, unit};
 use super::write::system_error;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -28,11 +28,6 @@ const FORMAT: &str = "flexbody-simulation";
 const VERSION: i64 = 3;
 /// Version of files without digests, which are read as well.
 const WITHOUT_DIGESTS: i64 = 2;
-
-/// Returns the unit with these exponents of mass^(1/2), length and time.
-const fn unit(mass_halves: i8, length: i8, time: i8) -> Units {
-    Units::Of { mass_halves, length, time }
-}
 
 /// Writes the motion of a body with numbers in `units` to the temporary file of `slot`, which appears under its name
 /// when the slot is committed.
@@ -181,7 +176,7 @@ impl Writer<'_> {
         let attitudes: Vec<f64> = states.iter().flat_map(|s| s.attitude.0).collect();
         frame.put_rows(
             "attitude",
-            Units::One,
+            ONE,
             "Euler parameters of the frame, from axes of the model, turning with the body, to world axes; the cosine of half the angle first",
             self.instants(),
             &attitudes,

@@ -1,10 +1,9 @@
 //! Values of the entries of the table, and the objects from which the writer takes them.
 
 use faer::{Mat, MatRef};
-use flexbody_base::units::{Unit, UnitSystem};
 use flexbody_body::flex_body::{
     FixedInterface, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InterfaceRows,
-    InternalRows, LumpedBody, NamedLoad, Parts, Recovery, RotatedStiffness,
+    InternalRows, LumpedBody, NamedLoad, Parts, Recovery, RotatedStiffness, UnitLoad,
 };
 use flexbody_body::invariants::Invariants;
 use flexbody_model::BodyNumber;
@@ -83,6 +82,11 @@ impl<'a> View<'a> {
 
     pub(crate) fn rotated(&self) -> Option<&'a RotatedStiffness> {
         self.rotated
+    }
+
+    /// Returns the load that the group belongs to.
+    pub(crate) fn unit_load(&self) -> Option<&'a UnitLoad> {
+        self.geometric_stiffness.map(|own| &own.load).or(self.rotated.map(|own| &own.load))
     }
 
     pub(crate) fn recovery(&self) -> Option<&'a Recovery> {
@@ -231,75 +235,3 @@ stored!(usize, own => Value::Int(i64::try_from(*own).unwrap_or(i64::MAX)), read 
     let value = read.int();
     Self::try_from(value).map_err(|_| format!("expected a count, found {value}"))?
 });
-
-/// Unit of an entry in terms of the body's units of mass, length and time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Units {
-    /// Dimensionless, written `1`.
-    One,
-    /// Hertz, for any unit of time.
-    Hertz,
-    /// Units that differ between the rows; the description states them.
-    Mixed,
-    /// mass^(halves/2) length^b time^c; mass-normalised modes carry mass^(-1/2).
-    Of { mass_halves: i8, length: i8, time: i8 },
-}
-
-impl Units {
-    /// Returns the unit with the unit names of a body: `kg m^2`, `tonne^(1/2) mm`, `s^-2`. A unit that the user gave as
-    /// a number is written in SI: `(0.0254 m)^2`.
-    pub(crate) fn concrete(self, system: &UnitSystem) -> String {
-        let name = |unit: &Unit, si: &str| match unit.name().parse::<f64>() {
-            Ok(_) => format!("({} {si})", unit.name()),
-            Err(_) => unit.name().to_owned(),
-        };
-        self.spell([name(&system.mass, "kg"), name(&system.length, "m"), name(&system.time, "s")])
-    }
-
-    /// Returns the unit in words: `mass length^2`.
-    pub(crate) fn symbolic(self) -> String {
-        self.spell(["mass", "length", "time"].map(str::to_owned))
-    }
-
-    fn spell(self, [mass, length, time]: [String; 3]) -> String {
-        let (m, l, t) = match self {
-            Units::One => return "1".to_owned(),
-            Units::Hertz => return "Hz".to_owned(),
-            Units::Mixed => return "mixed".to_owned(),
-            Units::Of { mass_halves, length, time } => (mass_halves, length, time),
-        };
-        let mut factors = Vec::new();
-        match m {
-            0 => {}
-            2 => factors.push(mass),
-            m if m % 2 == 0 => factors.push(format!("{mass}^{}", m / 2)),
-            m => factors.push(format!("{mass}^({m}/2)")),
-        }
-        for (name, power) in [(length, l), (time, t)] {
-            match power {
-                0 => {}
-                1 => factors.push(name),
-                p => factors.push(format!("{name}^{p}")),
-            }
-        }
-        factors.join(" ")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn units_are_spelt_with_the_names_of_the_body() {
-        let system = UnitSystem::parse("mm", "tonne", "0.5").expect("known units");
-        let spelt = |mass_halves, length, time| Units::Of { mass_halves, length, time }.concrete(&system);
-        assert_eq!(spelt(2, 2, 0), "tonne mm^2");
-        assert_eq!(spelt(1, 1, 0), "tonne^(1/2) mm");
-        assert_eq!(spelt(-1, 0, 0), "tonne^(-1/2)");
-        assert_eq!(spelt(4, 0, 1), "tonne^2 (0.5 s)");
-        assert_eq!(spelt(0, 0, -2), "(0.5 s)^-2");
-        assert_eq!((Units::One.concrete(&system), Units::Hertz.concrete(&system)), ("1".into(), "Hz".into()));
-        assert_eq!(Units::Of { mass_halves: 1, length: 1, time: -2 }.symbolic(), "mass^(1/2) length time^-2");
-    }
-}

@@ -7,6 +7,7 @@ use super::scan::key;
 use super::schema::ORDER;
 use super::schema::TABLE;
 use super::value::{Value, View};
+use super::version::EMPTY_GROUPS_LEFT_OUT_SINCE;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::hdf5_file::{Number, Numbers, create, finish, make, of_numbers, put_text};
@@ -70,9 +71,8 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
     let mut numbers = Numbers::default();
     for group in TABLE {
         let instances = group.instances(body.parts());
-        // Groups since 1.8 are there only if they have members, so that other files keep their bytes.
-        let is_new = matches!(group.per, Per::Recovery | Per::NamedLoad | Per::RotatedLoad);
-        if group.per != Per::Body && !(is_new && instances.is_empty()) {
+        let is_left_out = instances.is_empty() && group.since() >= EMPTY_GROUPS_LEFT_OUT_SINCE;
+        if group.per != Per::Body && !is_left_out {
             let parent = make(&file, group.parent())?;
             if let Some(order) = group.order(&instances) {
                 put_text(&parent, ORDER, &order)?;

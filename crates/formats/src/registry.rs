@@ -151,7 +151,7 @@ const COMPARISONS: [&str; 1] = ["adams-invariants"];
 /// interfaces whose static compliance the modes do not contain, except for a picture.
 ///
 /// # Errors
-/// The errors of [`export`] and of [`FlexBody::in_units`].
+/// The errors of [`export`] and of [`flexbody_file::in_units`].
 pub fn export_in_units(
     body: &FlexBody,
     format: &dyn ExportFormat,
@@ -160,7 +160,7 @@ pub fn export_in_units(
     allowed: impl Into<AllowedLosses>,
 ) -> Result<(Exported, Vec<Diagnostic>)> {
     let body = match units {
-        Some(units) => Cow::Owned(body.in_units(units)?),
+        Some(units) => Cow::Owned(flexbody_file::in_units(body, units)?),
         None => Cow::Borrowed(body),
     };
     let (exported, mut findings) = export(&body, format, options, allowed)?;

@@ -270,7 +270,7 @@ impl InterfaceCoordinates {
     }
 
     /// Returns true if the coordinate of this name is the amplitude of a fixed-interface mode.
-    pub(crate) fn is_amplitude(name: &str) -> bool {
+    pub fn is_amplitude(name: &str) -> bool {
         name.starts_with("fixed-interface mode ")
     }
 }

@@ -8,7 +8,6 @@ mod frame_change;
 mod held_modes;
 mod held_response;
 mod identities;
-mod in_units;
 mod interface;
 mod modal_change;
 mod model_axes;

@@ -108,11 +108,6 @@ impl MotionLoad {
         format!("{}{axes} of mode {}", self.name(), mode + 1)
     }
 
-    /// Returns the unit of its amplitudes as powers of time, beside the unit of the modal coordinates.
-    pub fn power_of_time(self) -> i32 {
-        if self == Self::Damping { -1 } else { -2 }
-    }
-
     /// Writes the amplitudes of the forces to `to` (components x nf): those of all modes for each component.
     pub fn write_amplitudes(self, motion: &ModalMotion<'_>, to: &mut [f64]) {
         let nf = motion.q.len();

@@ -33,4 +33,4 @@ pub use inertia_stiffness::{InertiaShares, InertiaStiffness, relative_norm};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped, condense_lumped_linear};
 pub use numbered::Numbered;
 pub use primary::{GeneralTerms, Invariants, MassKind, PrimaryData, TermGroup, TermGroups};
-pub use transform::{UnitFactors, ibar_of_c2, s_of_modal_mass, symmetric_part};
+pub use transform::{ibar_of_c2, s_of_modal_mass, symmetric_part};

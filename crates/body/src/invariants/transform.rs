@@ -360,49 +360,10 @@ impl Invariants {
         self
     }
 
-    /// Returns the invariants with every array multiplied by its factor, for other units.
-    pub(crate) fn scaled(&self, factors: &UnitFactors) -> Self {
-        let given = &self.0;
-        let times = |a: &Mat<f64>, factor: f64| Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * factor);
-        let vectors = |row: &[Vec<f64>; 3]| {
-            row.each_ref().map(|entries| entries.iter().map(|v| v * factors.ibar).collect())
-        };
-        Self(PrimaryData {
-            mass: given.mass * factors.mass,
-            first_moment: given.first_moment * factors.first_moment,
-            second_moment: given.second_moment * factors.second_moment,
-            c1: times(&given.c1, factors.c1),
-            ibar: given.ibar.each_ref().map(vectors),
-            s: given.s.clone(),
-            modal_stiffness: times(&given.modal_stiffness, factors.modal_stiffness),
-            general: given
-                .general
-                .as_ref()
-                .map(|general| GeneralTerms { w0: times(&general.w0, factors.c1), ..general.clone() }),
-            groups: given.groups,
-        })
-    }
-
     /// Returns true if the arrays contain no data of groups that are not held.
     pub(crate) fn holds_its_groups_only(&self) -> bool {
         *self == self.clone().with_groups(self.0.groups)
     }
-}
-
-/// Factors of the arrays for a change of units; S needs none.
-pub struct UnitFactors {
-    /// Factor of the mass.
-    pub mass: f64,
-    /// Factor of the first moment c.
-    pub first_moment: f64,
-    /// Factor of the second moment J.
-    pub second_moment: f64,
-    /// Factor of C1 and W0.
-    pub c1: f64,
-    /// Factor of C2 and Ibar.
-    pub ibar: f64,
-    /// Factor of the modal stiffness.
-    pub modal_stiffness: f64,
 }
 
 /// Returns (A + A') / 2.

@@ -3,8 +3,9 @@
 use super::super::item::Extent::{FixedInterfaceModes, Modes};
 use super::super::item::ItemKind::{Float, Floats, Int, Text};
 use super::super::item::{EntrySet, Item, both, field, put, written};
+use super::super::units::{ONE, PER_TIME2};
 use super::super::value::{Stored, Value, View, text};
-use super::entry::{ONE, PER_TIME2, attribute, dataset};
+use super::entry::{attribute, dataset};
 use flexbody_body::flex_body::{TermDecision, TermGroup};
 
 /// Entries that accuracy `certified` adds.
@@ -55,7 +56,7 @@ pub(super) const FREE_EIGENVALUE: Item = dataset(
     "eigenvalues of the free body as estimated, upper bounds of them; Craig-Bampton bodies only, whose own are larger",
     estimate_of_free_body!(estimate),
 )
-.beside(&CRAIG_BAMPTON)
+.needed_before(11, &CRAIG_BAMPTON)
 .added(4);
 
 /// Lower bounds of the eigenvalues of the free body, an entry of `/modes` beside [`FREE_EIGENVALUE`].
@@ -67,7 +68,7 @@ pub(super) const FREE_EIGENVALUE_LOWER: Item = dataset(
     "lower bounds of the eigenvalues of the free body, to rounding; 0: none; Craig-Bampton bodies only",
     estimate_of_free_body!(lower),
 )
-.beside(&CRAIG_BAMPTON)
+.needed_before(11, &CRAIG_BAMPTON)
 .added(4);
 
 pub(super) const CERTIFICATE: &[Item] = &[

@@ -1,22 +1,8 @@
-//! Units, and entries of version 1.0, of which the table is written.
+//! Entries of version 1.0, of which the table is written.
 
 use super::super::item::Origin::{self, Primary};
 use super::super::item::{Access, EntrySet, Item, ItemKind};
-use super::super::value::Units;
-
-pub(super) const ONE: Units = Units::One;
-pub(super) const MASS: Units = Units::Of { mass_halves: 2, length: 0, time: 0 };
-pub(super) const LENGTH: Units = Units::Of { mass_halves: 0, length: 1, time: 0 };
-pub(super) const MASS_LENGTH: Units = Units::Of { mass_halves: 2, length: 1, time: 0 };
-pub(super) const MASS_LENGTH2: Units = Units::Of { mass_halves: 2, length: 2, time: 0 };
-pub(super) const ROOT_MASS: Units = Units::Of { mass_halves: 1, length: 0, time: 0 };
-pub(super) const ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: 1, length: 1, time: 0 };
-pub(super) const PER_ROOT_MASS: Units = Units::Of { mass_halves: -1, length: 0, time: 0 };
-pub(super) const PER_ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: -1, length: -1, time: 0 };
-pub(super) const PER_TIME: Units = Units::Of { mass_halves: 0, length: 0, time: -1 };
-pub(super) const FORCE: Units = Units::Of { mass_halves: 2, length: 1, time: -2 };
-pub(super) const TORQUE: Units = Units::Of { mass_halves: 2, length: 2, time: -2 };
-pub(super) const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
+use super::super::units::{ONE, Units};
 
 /// Returns a required dataset of version 1.0.
 pub(super) const fn dataset(

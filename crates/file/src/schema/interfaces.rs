@@ -4,9 +4,9 @@ use super::super::item::Extent::{Coordinates, Fixed, InterfaceNodes, Modes};
 use super::super::item::Item;
 use super::super::item::ItemKind::{Floats, Ints, Text};
 use super::super::item::{EntrySet, both, field, put, written};
-use super::entry::named;
-use super::entry::{LENGTH, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, attribute, dataset};
-use crate::value::{Stored, Units, Value, matrix, shape_rows, text};
+use super::entry::{attribute, dataset, named};
+use crate::units::{LENGTH, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, Units, dimension};
+use crate::value::{Stored, Value, matrix, shape_rows, text};
 use flexbody_model::Coupling;
 
 pub(super) const INTERFACES: &[Item] = &[
@@ -137,7 +137,7 @@ pub(super) const COORDINATES: &[Item] = &[
     dataset(
         "stiffness",
         Floats(&[Coordinates, Coordinates]),
-        Units::Mixed,
+        Units::PerCoordinates(dimension(2, 2, -2)),
         "K_c",
         "stiffness; translations carry length, rotations none, fixed-interface modes mass^(1/2) length",
         field!(coordinates: stiffness),
@@ -147,7 +147,7 @@ pub(super) const COORDINATES: &[Item] = &[
     dataset(
         "mass",
         Floats(&[Coordinates, Coordinates]),
-        Units::Mixed,
+        Units::PerCoordinates(dimension(2, 2, 0)),
         "M_c",
         "mass, in the same units",
         field!(coordinates: mass),
@@ -157,7 +157,7 @@ pub(super) const COORDINATES: &[Item] = &[
     dataset(
         "of_modes",
         Floats(&[Coordinates, Modes]),
-        Units::Mixed,
+        Units::CoordinatesOfModes,
         "B",
         "coordinates of each mode: B' K_c B = diag(lambda), B' M_c B = I",
         field!(coordinates: of_modes),

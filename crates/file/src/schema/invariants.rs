@@ -4,12 +4,13 @@
 use super::super::item::Extent::{Fixed, Modes, ThreeModes};
 use super::super::item::ItemKind::{Floats, Int, Named, Text};
 use super::super::item::{Item, both, field, put, written};
-use super::super::value::{Stored, Units, Value, View, matrix, rows, text};
-use super::entry::{
-    INERTIA, MASS, MASS_LENGTH, MASS_LENGTH2, ONE, PER_TIME, PER_TIME2, ROOT_MASS, ROOT_MASS_LENGTH,
-    attribute, dataset,
+use super::super::units::{
+    MASS, MASS_LENGTH, MASS_LENGTH2, ONE, PER_TIME, PER_TIME2, ROOT_MASS, ROOT_MASS_LENGTH, Units, dimension,
+    of_load,
 };
-use flexbody_body::flex_body::{LoadKind, TermGroup, UnitLoad};
+use super::super::value::{Stored, Value, View, matrix, rows, text};
+use super::entry::{INERTIA, attribute, dataset};
+use flexbody_body::flex_body::TermGroup;
 
 /// Makes both directions of an entry of the invariants of the group.
 macro_rules! invariant {
@@ -104,15 +105,14 @@ pub(super) const COMPARISON: &[Item] = &[attribute(
 // Geometric stiffness and stiffness of inertia of unit loads: the rows of `/geometric_stiffness/<load>` and
 // `/inertia_stiffness/<load>`.
 
-const ACCELERATION: Units = Units::Of { mass_halves: 0, length: 1, time: -2 };
-const FORCE: Units = Units::Of { mass_halves: 2, length: 1, time: -2 };
-const MOMENT: Units = Units::Of { mass_halves: 2, length: 2, time: -2 };
+/// Unit of a stiffness of the modes for one unit of the load.
+const STIFFNESS_PER_LOAD: Units = Units::PerLoad(dimension(0, 0, -2));
 
 pub(super) const GEOMETRIC_STIFFNESS: &[Item] = &[
     dataset(
         "stiffness",
         Floats(&[Modes, Modes]),
-        PER_TIME2,
+        STIFFNESS_PER_LOAD,
         "K_geo",
         "Psi' K_geo Psi for one unit of the load: times the load, it is added to K_ff",
         field!(load: matrix),
@@ -123,7 +123,7 @@ pub(super) const GEOMETRIC_STIFFNESS: &[Item] = &[
         Text,
         ONE,
         "`acceleration` of the frame's origin, `angular_acceleration`, `spin` (K_geo = sum of w_k w_l times the six), `force` or `moment` at an interface, `load` with a name only",
-        written(|v| text(load(v)?.kind.name())),
+        written(|v| text(v.unit_load()?.kind.name())),
     )
     .derived("")
     .within(2),
@@ -132,7 +132,7 @@ pub(super) const GEOMETRIC_STIFFNESS: &[Item] = &[
         Text,
         ONE,
         "body axis `x`, `y`, `z`; for `spin` `xx`, `yy`, `zz`, `xy`, `yz`, `xz`; empty for `load`",
-        written(|v| text(load(v)?.axis())),
+        written(|v| text(v.unit_load()?.axis())),
     )
     .derived("")
     .within(2),
@@ -144,20 +144,17 @@ pub(super) const GEOMETRIC_STIFFNESS: &[Item] = &[
         Text,
         ONE,
         "name of the interface, for `force` and `moment`",
-        written(|v| load(v)?.kind.interface().and_then(text)),
+        written(|v| v.unit_load()?.kind.interface().and_then(text)),
     )
     .derived("")
     .added(2),
 ];
 
-/// Unit of the modes of [`ROTATED_STIFFNESS`]: square root of mass times length over time squared.
-const ROOT_MASS_LENGTH_PER_TIME2: Units = Units::Of { mass_halves: 1, length: 1, time: -2 };
-
 pub(super) const ROTATED_STIFFNESS: &[Item] = &[
     dataset(
         "modes",
         Floats(&[Modes, Fixed(3)]),
-        ROOT_MASS_LENGTH_PER_TIME2,
+        Units::PerLoad(dimension(1, 1, -2)),
         "Psi' K_geo R",
         "K_geo of unit rotations R, at the modes, for one unit of the load",
         field!(rotated: modes),
@@ -166,7 +163,7 @@ pub(super) const ROTATED_STIFFNESS: &[Item] = &[
     dataset(
         "rotations",
         Floats(&[Fixed(3), Fixed(3)]),
-        MOMENT,
+        Units::PerLoad(dimension(2, 2, -2)),
         "R' K_geo R",
         "K_geo of unit rotations, at unit rotations, for one unit of the load",
         field!(rotated: rotation),
@@ -178,7 +175,7 @@ pub(super) const INERTIA_STIFFNESS: &[Item] = &[
     dataset(
         "stiffness",
         Floats(&[Modes, Modes]),
-        PER_TIME2,
+        STIFFNESS_PER_LOAD,
         "K",
         "stiffness of inertia for one unit of the load: times the load, it is added to K_ff and belongs to the kinetic energy (theory section 6)",
         field!(load: matrix),
@@ -190,27 +187,16 @@ pub(super) const INERTIA_STIFFNESS: &[Item] = &[
         Text,
         ONE,
         "`acceleration` of the frame's origin less gravity, `angular_acceleration`, or `spin` (K = sum of w_k w_l times the six)",
-        written(|v| text(load(v)?.kind.name())),
+        written(|v| text(v.unit_load()?.kind.name())),
     )
     .derived("")
     .within(6),
-    attribute("axis", Text, ONE, "body axis `x`, `y`, `z`; for `spin` `xx`, `yy`, `zz`, `xy`, `yz`, `xz`", written(|v| text(load(v)?.axis())))
+    attribute("axis", Text, ONE, "body axis `x`, `y`, `z`; for `spin` `xx`, `yy`, `zz`, `xy`, `yz`, `xz`", written(|v| text(v.unit_load()?.axis())))
     .derived("")
     .within(6),
     attribute("load_units", Text, ONE, "unit of the load", written(load_units)).derived("").within(6),
 ];
 
 fn load_units(view: &View<'_>) -> Option<Value> {
-    let units = match load(view)?.kind {
-        LoadKind::Acceleration => ACCELERATION,
-        LoadKind::AngularAcceleration | LoadKind::Spin => PER_TIME2,
-        LoadKind::Force(_) => FORCE,
-        LoadKind::Moment(_) => MOMENT,
-        LoadKind::Named(_) => ONE,
-    };
-    text(units.concrete(&view.body.units))
-}
-
-fn load<'a>(view: &View<'a>) -> Option<&'a UnitLoad> {
-    Some(&view.geometric_stiffness?.load)
+    text(Units::Of(of_load(view.unit_load()?)).concrete(&view.body.units))
 }

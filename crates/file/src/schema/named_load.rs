@@ -4,11 +4,12 @@ use super::super::item::Extent::{Fixed, Modes};
 use super::super::item::Item;
 use super::super::item::ItemKind::{Float, Floats, Int};
 use super::super::item::{both, field, put};
-use super::entry::{FORCE, ONE, TORQUE, attribute, dataset};
-use crate::value::{Units, Value};
+use super::entry::{attribute, dataset};
+use crate::units::{FORCE, ONE, TORQUE, Units, unit};
+use crate::value::Value;
 
 /// Unit of a modal load: force over the square root of mass.
-const MODAL_FORCE: Units = Units::Of { mass_halves: 1, length: 1, time: -2 };
+const MODAL_FORCE: Units = unit(1, 1, -2);
 
 pub(super) const NAMED_LOAD: &[Item] = &[
     attribute(

@@ -6,8 +6,9 @@ use super::super::item::Extent::{
 use super::super::item::Item;
 use super::super::item::ItemKind::{Floats, Text};
 use super::super::item::{both, field};
-use super::entry::{ONE, attribute, dataset};
-use crate::value::{Units, Value, text};
+use super::entry::{attribute, dataset};
+use crate::units::{OF_ROWS, ONE, Units, dimension};
+use crate::value::{Value, text};
 use faer::Mat;
 use flexbody_body::flex_body::{
     LOAD_COMPONENTS, LoadColumns, MotionColumns, MotionLoad, Quantity, Recovery, RecoveryRow,
@@ -81,7 +82,7 @@ pub(super) const RECOVERY: &[Item] = &[
     dataset(
         "offset",
         Floats(&[RecoveryRows]),
-        Units::Mixed,
+        OF_ROWS,
         "y0",
         "values of the undeformed body, in the unit of each row",
         field!(recovery: offset),
@@ -90,7 +91,7 @@ pub(super) const RECOVERY: &[Item] = &[
     dataset(
         "modes",
         Floats(&[RecoveryRows, Modes]),
-        Units::Mixed,
+        Units::RowsOver(dimension(1, 1, 0)),
         "R Psi",
         "values for unit modal coordinates: the unit of each row over mass^(1/2) length",
         field!(recovery: modes),
@@ -99,7 +100,7 @@ pub(super) const RECOVERY: &[Item] = &[
     dataset(
         "spin",
         Floats(&[RecoveryRows, Fixed(6)]),
-        Units::Mixed,
+        Units::RowsOver(dimension(0, 0, -2)),
         "-R G_r M c_kl",
         "static values beside the modes for the products w_x w_x, w_y w_y, w_z w_z, w_x w_y, w_y w_z, w_x w_z of the angular velocity along body axes: the unit of each row times time^2",
         field!(recovery: spin),
@@ -126,7 +127,7 @@ pub(super) const RECOVERY: &[Item] = &[
     dataset(
         "loads",
         Floats(&[LoadedInterfaces, RecoveryRows, Fixed(LOAD_COMPONENTS)]),
-        Units::Mixed,
+        Units::RowsOverLoad,
         "R G_r b_a",
         "static values beside the modes for unit forces x, y, z and unit torques x, y, z at the reference point of each interface, along body axes: the unit of each row over that of the load",
         both(
@@ -169,7 +170,7 @@ pub(super) const RECOVERY: &[Item] = &[
     dataset(
         "named",
         Floats(&[RecoveryRows, NamedLoads]),
-        Units::Mixed,
+        OF_ROWS,
         "R G_r f",
         "static values beside the modes for each named load of `named_loads` with the amplitude 1, in the unit of each row",
         both(
@@ -190,7 +191,7 @@ pub(super) const RECOVERY: &[Item] = &[
     dataset(
         "damping",
         Floats(&[RecoveryRows, Modes]),
-        Units::Mixed,
+        Units::RowsOver(dimension(1, 1, -1)),
         "-R G_r D Psi",
         "static values beside the modes for the rates of the modal coordinates, of damping forces that the modes do not hold: the unit of each row times time over mass^(1/2) length",
         both(
@@ -205,7 +206,7 @@ pub(super) const RECOVERY: &[Item] = &[
     dataset(
         "acceleration",
         Floats(&[RecoveryRows, Modes]),
-        Units::Mixed,
+        Units::RowsOver(dimension(1, 1, -2)),
         "-R G_r M Psi",
         "static values beside the modes for the second time derivatives of the modal coordinates: the unit of each row times time^2 over mass^(1/2) length",
         both(
@@ -220,7 +221,7 @@ pub(super) const RECOVERY: &[Item] = &[
     dataset(
         "turning",
         Floats(&[RecoveryRows, ThreeModes]),
-        Units::Mixed,
+        Units::RowsOver(dimension(1, 1, -2)),
         "-R G_r M S_k Psi",
         "static values beside the modes for alpha_k q_j + 2 w_k qd_j, the modes of x, then of y, then of z, along body axes: the unit of each row times time^2 over mass^(1/2) length",
         both(
@@ -235,7 +236,7 @@ pub(super) const RECOVERY: &[Item] = &[
     dataset(
         "centrifugal",
         Floats(&[RecoveryRows, SixModes]),
-        Units::Mixed,
+        Units::RowsOver(dimension(1, 1, -2)),
         "-R G_r M C_kl Psi",
         "static values beside the modes for w_k w_l q_j, the modes of each product in the order of `spin`, along body axes: the unit of each row times time^2 over mass^(1/2) length",
         both(

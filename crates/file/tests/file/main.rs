@@ -2,6 +2,7 @@
 
 #![allow(unreachable_pub)] // tests export nothing
 
+mod body_units;
 mod certified_bodies;
 mod general_models;
 mod statements;

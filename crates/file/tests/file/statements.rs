@@ -133,7 +133,7 @@ fn a_body_held_at_an_interface_knows_its_fixed_interface_modes() {
         assert_eq!(failing(&other), Vec::<&str>::new());
     }
     let milliseconds = UnitSystem::parse("mm", "t", "ms").expect("units");
-    let other = held.in_units(&milliseconds).expect("in other units");
+    let other = flexbody_file::in_units(&held, &milliseconds).expect("in other units");
     for (own, lambda) in fixed(&mut other.into_parts()).eigenvalues.iter().zip(&record.eigenvalues) {
         assert!((own / lambda - 1e-6).abs() < 1e-18, "{own:e}, {lambda:e}");
     }

@@ -2,7 +2,6 @@
 
 #![allow(unreachable_pub)] // tests export nothing
 
-mod body_units;
 mod carried_response;
 mod carried_stiffness;
 mod channels;

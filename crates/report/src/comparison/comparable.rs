@@ -142,7 +142,7 @@ fn in_units_of<'b>(a: &FlexBody, b: &'b FlexBody) -> Result<Cow<'b, FlexBody>> {
     if are_equal || !(ua.stated && ub.stated) {
         return Ok(Cow::Borrowed(b));
     }
-    b.in_units(ua).map(Cow::Owned)
+    flexbody_file::in_units(b, ua).map(Cow::Owned)
 }
 
 /// Returns true if two reference conditions may be the same; a file of another program does not state its

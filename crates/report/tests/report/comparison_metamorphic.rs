@@ -123,7 +123,8 @@ fn one_body_in_other_units_frames_and_signs_agrees() {
     let body = converted(BodyFrame::Com);
     assert_eq!(body.recoveries().len(), 2);
     assert!(!body.recoveries()[1].motion.is_empty(), "forces of motion");
-    let millimetres = body.in_units(&UnitSystem::parse("mm", "t", "s").expect("units")).expect("a body");
+    let millimetres =
+        flexbody_file::in_units(&body, &UnitSystem::parse("mm", "t", "s").expect("units")).expect("a body");
     agree(&body, &millimetres, "units of the body");
     let relabelled = changed(&millimetres, |parts| {
         in_unit(&mut parts.recoveries[0], "Pa", "N/mm^2", 1e-6);

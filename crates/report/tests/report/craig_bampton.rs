@@ -67,7 +67,7 @@ fn the_record_goes_with_the_body() {
     flexbody_file::write(&body, &path).expect("written");
     assert_eq!(record(&flexbody_file::read(&path).expect("read")), record(&body));
     let milliseconds = flexbody_base::units::UnitSystem::parse("mm", "t", "ms").expect("units");
-    let other = body.in_units(&milliseconds).expect("in other units");
+    let other = flexbody_file::in_units(&body, &milliseconds).expect("in other units");
     let estimate = |body| &record(body).free.as_ref().expect("estimates").estimate;
     for (a, b) in estimate(&other).iter().zip(estimate(&body)) {
         close(*a, 1e-6 * b, 1e-14, "lambda");

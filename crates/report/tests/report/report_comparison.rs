@@ -393,8 +393,9 @@ fn reports_have_a_test_case_for_every_quantity_and_escape_names() {
 #[test]
 fn bodies_in_different_units_compare_by_their_meaning() {
     let units = |length, mass, time| UnitSystem::parse(length, mass, time).expect("units");
-    let metres = oracle::flexible::soft_block(5).in_units(&units("m", "kg", "s")).expect("a body");
-    let other = metres.in_units(&units("mm", "t", "ms")).expect("a body");
+    let metres =
+        flexbody_file::in_units(&oracle::flexible::soft_block(5), &units("m", "kg", "s")).expect("a body");
+    let other = flexbody_file::in_units(&metres, &units("mm", "t", "ms")).expect("a body");
     for (a, b) in [(&metres, &other), (&other, &metres)] {
         let comparison = compare(a, b, &Tolerances::default()).expect("a comparison");
         assert!(comparison.passed(), "{}", comparison.text());

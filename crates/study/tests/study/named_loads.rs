@@ -141,7 +141,7 @@ fn static_stresses_are_those_of_all_nodes_with_any_number_of_modes() {
             let units = UnitSystem::parse("mm", "t", "ms").expect("units");
             let turned = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 1.1).into_inner();
             let moved = few.in_frame(Vector3::new(0.4, -1.2, 0.7), turned);
-            for one in [whole.in_units(&units), moved, Ok(few), Ok(whole)] {
+            for one in [flexbody_file::in_units(&whole, &units), moved, Ok(few), Ok(whole)] {
                 let one = one.expect("a body");
                 let error = apart(&static_stresses(&one, at), &exact);
                 assert!(error < 1e-9, "{}, {} modes: {error:e}", load.name, one.n_modes());

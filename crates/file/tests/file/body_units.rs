@@ -1,14 +1,17 @@
-//! Motion of a body in other units: energies, momenta and accelerations change by their units only.
+//! A body in other units: energies, momenta, accelerations and recoveries change by their units only.
 
 use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{BasisChoice, CraigBampton, ModeSettings};
 use flexbody_body::convert::{ConvertSettings, convert};
-use flexbody_body::flex_body::FlexBody;
+use flexbody_body::flex_body::{FlexBody, LOAD_COMPONENTS, ModalMotion, Recovery, RecoveryState};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
+use flexbody_file::in_units;
 use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, LoadKind};
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
+use nalgebra::Vector3;
+use oracle::file_bodies;
 use oracle::flexible::{fixture, stressed};
 use oracle::general::raw_fixture;
 use oracle::random::Random;
@@ -43,7 +46,7 @@ fn equations_of_motion_keep_their_meaning() {
         }
         let [mass, length, time] = factors(&body);
         let modal = mass.sqrt() * length;
-        let in_other = body.in_units(&other()).expect("a body");
+        let in_other = in_units(&body, &other()).expect("a body");
         let (a, b) =
             (EquationsOfMotion::new(&body, Terms::ALL), EquationsOfMotion::new(&in_other, Terms::ALL));
         let (r, n) = (a.n_rigid(), a.n_velocities());
@@ -98,10 +101,10 @@ fn interfaces_and_identities_come_along_and_the_way_back_is_the_body() {
     };
     let body: FlexBody = convert(&model, &settings, &Context::QUIET).expect("converts").body;
     assert!(body.coordinates().is_some() && body.interfaces().iter().any(|i| i.reference.is_some()));
-    let there = body.in_units(&other()).expect("a body");
+    let there = in_units(&body, &other()).expect("a body");
     let failed: Vec<_> = there.identities(BodyFrame::Com).into_iter().filter(|c| !c.passed).collect();
     assert!(failed.is_empty(), "{failed:?}");
-    let back = there.in_units(body.units()).expect("a body");
+    let back = in_units(&there, body.units()).expect("a body");
     let (a, b) = (body.coordinates().expect("there"), back.coordinates().expect("there"));
     for (one, two) in [(&a.stiffness, &b.stiffness), (&a.mass, &b.mass), (&a.of_modes, &b.of_modes)] {
         let entries =
@@ -116,4 +119,43 @@ fn interfaces_and_identities_come_along_and_the_way_back_is_the_body() {
     assert!(worst(pairs, body.extent()) < 1e-14);
     let inches = reference(&body).map(|x| x * factors(&body)[1]);
     assert!(worst(inches.into_iter().zip(reference(&there)), there.extent()) < 1e-14);
+}
+
+/// Random bodies have columns of every kind: modes, spin, loads, named loads and forces of motion.
+#[test]
+fn recoveries_keep_their_values() {
+    for seed in 0..8 {
+        let body = file_bodies::body(seed, 3, 5, 0, 2);
+        let there = in_units(&body, &other()).expect("a body");
+        let [mass, length, time] = factors(&body);
+        let (modal, force) = (mass.sqrt() * length, mass * length / (time * time));
+        let mut random = Random(seed);
+        let mut coordinates = || -> Vec<f64> { (0..body.n_modes()).map(|_| random.signed()).collect() };
+        let motion = [coordinates(), coordinates(), coordinates()];
+        let [w, alpha] = [(); 2].map(|()| Vector3::from_fn(|_, _| random.signed()));
+        let mut load = || -> [f64; LOAD_COMPONENTS] { std::array::from_fn(|_| random.signed()) };
+        let loads = [load(), load()];
+        let in_other = |load: &[f64; LOAD_COMPONENTS]| -> [f64; LOAD_COMPONENTS] {
+            std::array::from_fn(|a| load[a] * if a < 3 { force } else { force * length })
+        };
+        for (a, b) in body.recoveries().iter().zip(there.recoveries()) {
+            let values = |of: &Recovery, modal: f64, time: f64, loads: &[[f64; LOAD_COMPONENTS]]| {
+                let scaled = |order: usize| -> Vec<f64> {
+                    motion[order].iter().map(|value| value * modal / time.powi(order as i32)).collect()
+                };
+                let [q, rate, acceleration] = [0, 1, 2].map(scaled);
+                let motion = ModalMotion {
+                    q: &q,
+                    rate: &rate,
+                    acceleration: &acceleration,
+                    angular_velocity: w / time,
+                    angular_acceleration: alpha / (time * time),
+                };
+                of.values(&RecoveryState { motion, loads: &loads[..of.loads.len()], named: &[0.3, -0.7] })
+            };
+            let expected = values(a, 1.0, 1.0, &loads);
+            let found = values(b, modal, time, &loads.each_ref().map(in_other));
+            assert!(worst(expected.into_iter().zip(found), 1.0) < 1e-12, "{seed}");
+        }
+    }
 }
