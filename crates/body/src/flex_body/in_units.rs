@@ -213,7 +213,7 @@ impl FlexBody {
         };
         let point = |x: &[f64; 3]| x.map(|v| v * change.length);
         let mut parts: Parts = self.parts().clone();
-        parts.units = units.clone();
+        parts.description.units = units.clone();
         parts.frame.origin *= change.length;
         parts.nodes.positions = parts.nodes.positions.iter().map(point).collect();
         parts.modes = change.modes(&parts.modes);

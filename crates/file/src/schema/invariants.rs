@@ -208,7 +208,7 @@ fn load_units(view: &View<'_>) -> Option<Value> {
         LoadKind::Moment(_) => MOMENT,
         LoadKind::Named(_) => ONE,
     };
-    text(units.concrete(&view.body.units))
+    text(units.concrete(&view.body.description.units))
 }
 
 fn load<'a>(view: &View<'a>) -> Option<&'a UnitLoad> {
